@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from time import perf_counter
+from typing import Final, Literal
 
 from ._carried_boxes import MAX_DETECT_EVERY_S
+from .networks import NETWORK_TIME
 
 #: Times between two looks of the detector to choose from.
 INTERVALS_S: Final = (0.0, 0.1, 0.15, MAX_DETECT_EVERY_S)
@@ -53,6 +55,28 @@ class StageTimings:
     def outside_s(self) -> float:
         """Time of the whole frame without the runs of ONNX networks."""
         return self.total_s - self.networks_s
+
+
+class StageClock:
+    """Measures the stages of one frame; it starts when it is made."""
+
+    def __init__(self) -> None:
+        self._since_s = perf_counter()
+        self._networks_before_s = NETWORK_TIME.elapsed_s
+        self._times_s = {"detector": 0.0, "pose": 0.0, "head_pose": 0.0, "rest": 0.0}
+
+    def count(self, stage: Literal["detector", "pose", "head_pose", "rest"]) -> None:
+        """Count the time since the last call, or since the start, to a stage."""
+        now_s = perf_counter()
+        self._times_s[stage] += now_s - self._since_s
+        self._since_s = now_s
+
+    def timings(self) -> StageTimings:
+        """Return what has been counted."""
+        return StageTimings(
+            **{f"{stage}_s": time_s for stage, time_s in self._times_s.items()},
+            networks_s=NETWORK_TIME.elapsed_s - self._networks_before_s,
+        )
 
 
 class FrameBudget:

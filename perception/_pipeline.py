@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from time import perf_counter
 from typing import Any, Final
 
 import numpy as np
@@ -15,7 +14,7 @@ from ._camera import Camera
 from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
 from ._detection import PersonDetection
 from ._floor import FloorPlane
-from ._frame_time import FrameBudget, StageTimings
+from ._frame_time import FrameBudget, StageClock, StageTimings
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
@@ -31,13 +30,9 @@ from .depth_image import checked_depth
 from .errors import PerceptionError
 from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
-from .networks import NETWORK_TIME, OnnxSettings
+from .networks import OnnxSettings
 from .ownership import disowned_keypoints, without_disowned
-from .shipped import (
-    shipped_detector,
-    shipped_head_pose_estimator,
-    shipped_pose_estimator,
-)
+from .shipped import shipped_detector, shipped_head_pose_estimator, shipped_pose_estimator
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
 #: Standard deviations of the eyes in the head, sideways and up and down. Sideways as recorded of
@@ -79,7 +74,6 @@ class AwarenessPipeline:
         eye_estimator: measures the eyes of near people, for instance
             :class:`~perception.networks.MediaPipeEyeEstimator`; default none, then the gaze is the
             head's direction.
-
         unusual_size_probability: probability in [0, 0.9] that a person has not the size of an adult
             who stands: a child, somebody bent or seated. 0 where only adults walk and stand: then
             5 % of range are left of unknown stature, which count as noise of each image.
@@ -125,11 +119,10 @@ class AwarenessPipeline:
         self._floor = _checked_floor(floor)
         self._eye_std_rad = _checked_eye_std(eye_in_head_std_rad)
         shipped_pose = pose_estimator is None
-        if detector is None or pose_estimator is None:
-            if detector is None:
-                detector = shipped_detector(onnx_settings, camera)
-            if pose_estimator is None:
-                pose_estimator = shipped_pose_estimator(onnx_settings)
+        if detector is None:
+            detector = shipped_detector(onnx_settings, camera)
+        if pose_estimator is None:
+            pose_estimator = shipped_pose_estimator(onnx_settings)
         if head_pose_estimator is None:
             head_pose_estimator = PnpHeadPoseEstimator(self._std_px, self._min_score)
             if shipped_pose:
@@ -195,7 +188,7 @@ class AwarenessPipeline:
             PerceptionError: for an image of another size or type, a non-finite stamp, and an
                 estimator that does not return one result per person.
         """
-        began, run_before_s = perf_counter(), NETWORK_TIME.elapsed_s
+        clock = StageClock()
         stamp_s = finite_number("stamp_s", stamp_s)
         floor = self._floor if floor is None else _checked_floor(floor)
         self._check_image(image_rgb)
@@ -204,47 +197,70 @@ class AwarenessPipeline:
             depth_m = checked_depth(depth_m, shape, stamp_s, depth_stamp_s)
         elif depth_stamp_s is not None:
             raise PerceptionError("depth_stamp_s needs depth_m, got None")
-        ready = perf_counter()
-        detections = self._detections(image_rgb, stamp_s)
-        detected = perf_counter()
+        clock.count("rest")
+        detections, people, disowned = self._people(image_rgb, stamp_s, clock)
+        observations: tuple[PersonObservation, ...] = ()
+        if detections:
+            heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
+            _check_count("head_pose_estimator", len(heads), len(people))
+            eyes = self._eyes(image_rgb, heads)
+            clock.count("head_pose")
+            places = place_people(
+                self.camera,
+                detections,
+                people,
+                heads,
+                floor,
+                self._std_px,
+                self._min_score,
+                depth_m,
+                self._unusual_size,
+            )
+            estimates, reasons = self._awareness(people, heads, eyes, disowned)
+            observations = self._observations(
+                stamp_s, detections, people, places, heads, eyes, estimates, reasons
+            )
+            clock.count("rest")
+        self._note(clock.timings())
+        return observations
+
+    def _people(
+        self, image_rgb: ImageRgb, stamp_s: float, clock: StageClock
+    ) -> tuple[
+        tuple[PersonDetection, ...], tuple[PersonKeypoints, ...], list[AwarenessReason | None]
+    ]:
+        """Return detections, their keypoints, and why these are not the person's or None."""
+        if self._carrier is None:
+            detections = tuple(self._detector.detect(image_rgb))
+        else:
+            detections = self._carrier.detections(image_rgb, stamp_s)
+        clock.count("detector")
         people, disowned = self._keypoints(image_rgb, detections)
-        again_s = 0.0
         if self._carrier is not None and not self._carrier.follow(detections, people, disowned):
-            lost = perf_counter()
+            # A carried box has lost its person: look at once.
+            clock.count("pose")
             detections = self._carrier.detect(image_rgb)
-            again_s = perf_counter() - lost
+            clock.count("detector")
             people, disowned = self._keypoints(image_rgb, detections)
             self._carrier.follow(detections, people, disowned)
-        posed = perf_counter()
-        if not detections:
-            self._note(
-                StageTimings(
-                    detected - ready + again_s,
-                    posed - detected - again_s,
-                    rest_s=ready - began,
-                    networks_s=NETWORK_TIME.elapsed_s - run_before_s,
-                )
-            )
-            return ()
-        heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
-        _check_count("head_pose_estimator", len(heads), len(people))
-        eyes = self._eyes(image_rgb, heads)
-        headed = perf_counter()
-        places = place_people(
-            self.camera,
-            detections,
-            people,
-            heads,
-            floor,
-            self._std_px,
-            self._min_score,
-            depth_m,
-            self._unusual_size,
-        )
+        clock.count("pose")
+        return detections, people, disowned
+
+    def _observations(
+        self,
+        stamp_s: float,
+        detections: tuple[PersonDetection, ...],
+        people: tuple[PersonKeypoints, ...],
+        places: Sequence[PersonPlace | None],
+        heads: tuple[HeadPose | None, ...],
+        eyes: tuple[EyeGaze | None, ...],
+        estimates: Sequence[AwarenessEstimate | None],
+        reasons: Sequence[AwarenessReason | None],
+    ) -> tuple[PersonObservation, ...]:
+        """Return the observation of everybody who has a place."""
         # The same call as for the places, which is remembered.
         bodies = place_bodies(self.camera, people, self._std_px, self._min_score)
-        estimates, reasons = self._awareness(people, heads, eyes, disowned)
-        observations = tuple(
+        return tuple(
             PersonObservation(
                 stamp_s=stamp_s,
                 position_camera_m=place.position_camera_m,
@@ -266,17 +282,6 @@ class AwarenessPipeline:
             )
             if place is not None
         )
-        rest = ready - began + perf_counter() - headed
-        self._note(
-            StageTimings(
-                detected - ready + again_s,
-                posed - detected - again_s,
-                headed - posed,
-                rest,
-                NETWORK_TIME.elapsed_s - run_before_s,
-            )
-        )
-        return observations
 
     def _sizes(self, place: PersonPlace) -> dict[str, Any]:
         """Return what an observation says of the person's unknown size: nothing of adults."""
@@ -296,11 +301,6 @@ class AwarenessPipeline:
             looked = timings.detector_s if self._carrier.looked else None
             self._budget.record(looked, timings.total_s - timings.detector_s)
             self._carrier.every_s, self._carrier.size = self._budget.every_s, self._budget.size
-
-    def _detections(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonDetection, ...]:
-        if self._carrier is None:
-            return tuple(self._detector.detect(image_rgb))
-        return self._carrier.detections(image_rgb, stamp_s)
 
     def _keypoints(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]

@@ -308,7 +308,7 @@ def test_a_budget_holds_20_frames_per_second_on_cores_three_times_slower(slow, m
     world = SlowWorld(stander)
     # Of one image on the faster core; every image would take 69 ms on the slowest.
     world.detector_s, world.pose_s = 0.013 * slow, 0.010 * slow
-    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    monkeypatch.setattr("perception._frame_time.perf_counter", lambda: world.clock_s)
     pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
     world.run_on_clock(pipe, 1.0)
     world.looks.clear()
@@ -325,7 +325,7 @@ def test_a_budget_holds_20_frames_per_second_on_cores_three_times_slower(slow, m
 def test_a_budget_lets_the_detector_look_more_often_again(monkeypatch):
     world = SlowWorld(stander)
     world.detector_s, world.pose_s = 0.05, 0.03
-    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    monkeypatch.setattr("perception._frame_time.perf_counter", lambda: world.clock_s)
     pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
     world.run_on_clock(pipe, 1.5)
     assert pipe._carrier.every_s > 0.1
@@ -362,7 +362,7 @@ def test_where_seldom_looks_are_not_enough_the_input_gets_smaller(monkeypatch):
     world = SmallerWorld(stander)
     # 0.03 + 0.12 / 4 = 60 ms with the longest interval, 45 with half of the pixels.
     world.detector_s, world.pose_s = 0.12, 0.03
-    monkeypatch.setattr("perception._pipeline.perf_counter", lambda: world.clock_s)
+    monkeypatch.setattr("perception._frame_time.perf_counter", lambda: world.clock_s)
     pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
     assert pipe.last_timings.detector_share == 1.0
     world.run_on_clock(pipe, 2.0)

@@ -144,55 +144,39 @@ def tune(
             )
             for name, policy in anchors.items()
         }
-        _run_trials(study, settings, _Race(space, evaluator, settings, anchors, tuned), runner)
+        race = _Race(space, evaluator, settings, anchors, tuned)
+        _run_trials(study, settings, race, runner)
         runner.bar.set_postfix_str("held-out seeds")
-        trials = study.finished_trials()
-        front = feasible_front(trials)
-
-        def anchor(name: str, policy: AwarenessPolicy) -> Candidate:
-            held_out = evaluator.evaluate_all(
-                name, policy, settings.held_out_seeds, settings.templates
-            )
-            return Candidate((name,), None, policy, tuned[name], held_out)
-
-        def candidate(trial: optuna.trial.FrozenTrial, names: tuple[str, ...]) -> Candidate:
-            policy, label = space.policy(trial.params), _trial_label(trial.number)
-            for name, known in anchors.items():
-                if known == policy:
-                    return replace(anchor(name, policy), names=names)
-            return Candidate(
-                names,
-                trial.number,
-                policy,
-                evaluator.evaluate_all(
-                    label, policy, settings.tuning_seeds, settings.tuning_templates
-                ),
-                evaluator.evaluate_all(label, policy, settings.held_out_seeds, settings.templates),
-            )
-
-        reasons = chosen_trials(front, tuned[settings.policy_name])
-        rows = merged(
-            [
-                *(anchor(name, policy) for name, policy in anchors.items()),
-                *(candidate(front[row], names) for row, names in reasons.items()),
-            ]
-        )
-        known = tuple(each for each in rows if each.trial is None)
-        new = [each for each in rows if each.trial is not None]
-        tuning = Tuning(
-            settings=settings,
-            space=space,
-            study=study.study,
-            trials=tuple(trials),
-            front=tuple(front),
-            anchors=known,
-            chosen=tuple(named_winner(new, known[0], settings.hold_out_scenarios)),
-        )
+        tuning = _tuning(study, race)
         runner.bar.total = runner.bar.n  # some episodes were known before, some trials dropped
         runner.bar.close()
         with ProcessLock(folder / "locks" / "report.lock"):  # several processes may end at once
             report(tuning)
     return tuning
+
+
+def _tuning(study: SharedStudy, race: _Race) -> Tuning:
+    """Return the result of a finished study; runs the held-out seeds."""
+    settings, trials = race.settings, study.finished_trials()
+    front = feasible_front(trials)
+    reasons = chosen_trials(front, race.tuned[settings.policy_name])
+    rows = merged(
+        [
+            *(race.anchor(name) for name in race.anchors),
+            *(race.finalist(front[row], names) for row, names in reasons.items()),
+        ]
+    )
+    anchors = tuple(each for each in rows if each.trial is None)
+    new = [each for each in rows if each.trial is not None]
+    return Tuning(
+        settings=settings,
+        space=race.space,
+        study=study.study,
+        trials=tuple(trials),
+        front=tuple(front),
+        anchors=anchors,
+        chosen=tuple(named_winner(new, anchors[0], settings.hold_out_scenarios)),
+    )
 
 
 def feasible_front(
@@ -252,7 +236,7 @@ def _run_trials(
 
 @dataclass(frozen=True, slots=True)
 class _Race:
-    """Runs trials, each only as long as it does not lose to the base policy.
+    """Runs trials, each only as long as it does not lose to the base policy, and the finalists.
 
     Attributes:
         space: gives the policy of a trial.
@@ -271,6 +255,29 @@ class _Race:
     def outcomes(self, claims: Sequence[Claim]) -> list[Outcome]:
         """Return the outcomes of trials."""
         return [self._outcome(claim) for claim in claims]
+
+    def anchor(self, name: str) -> Candidate:
+        """Return the base policy or a preset as a candidate."""
+        policy = self.anchors[name]
+        return Candidate((name,), None, policy, self.tuned[name], self._held_out(name, policy))
+
+    def finalist(self, trial: optuna.trial.FrozenTrial, names: tuple[str, ...]) -> Candidate:
+        """Return a trial as a candidate; as the anchor whose policy it has, if there is one."""
+        policy, label = self.space.policy(trial.params), _trial_label(trial.number)
+        for name, known in self.anchors.items():
+            if known == policy:
+                return replace(self.anchor(name), names=names)
+        settings = self.settings
+        tuned = self.evaluator.evaluate_all(
+            label, policy, settings.tuning_seeds, settings.tuning_templates
+        )
+        return Candidate(names, trial.number, policy, tuned, self._held_out(label, policy))
+
+    def _held_out(self, name: str, policy: AwarenessPolicy) -> Evaluation:
+        settings = self.settings
+        return self.evaluator.evaluate_all(
+            name, policy, settings.held_out_seeds, settings.templates
+        )
 
     def _outcome(self, claim: Claim) -> Outcome:
         policy, base = self.space.policy(claim.parameters), self.tuned[self.settings.policy_name]
