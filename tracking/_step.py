@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -78,21 +78,18 @@ def nobody(config: TrackerConfig, sensors: Sensors, next_id: int = 1) -> Tracker
 
 def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState:
     """Return the state after one more frame, whose stamp is not before the state's."""
-    sensor = sensors.all[frame.sensor]
-    config, has_view = sensor.config, sensors.has_view
-    stamp, measured = frame.stamp_s, frame.measurements
+    sensor, config = sensors.all[frame.sensor], sensors.all[frame.sensor].config
+    stamp, given, earlier = frame.stamp_s, frame.measurements, state
     previous = stamp if state.stamp_s is None else state.stamp_s
     dt_s = state.clocks[sensor.index].dt_s(stamp)
-    earlier, faces = state, state.faces
     state = _with_clocks(state, frame, sensors)
     period_s = state.clocks[sensor.index].period_s
     tracks = state.tracks
     if len(tracks) and stamp > previous:
-        expired = expired_before(tracks, stamp, state.periods_s, config, has_view)
+        expired = expired_before(tracks, stamp, state.periods_s, config, sensors.has_view)
         tracks = without(tracks, expired, config)
         tracks = predicted(tracks, previous, stamp, config)
     before = tracks
-    given = measured
     tracks, found, frame = match_frame(
         tracks,
         frame,
@@ -102,39 +99,25 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
         state.clocks,
         sensors,
     )
-    measured = frame.measurements
     followed = None
     if len(sensors) > 1:
         own = np.arange(len(sensors)) == sensor.index
         followed = seen_lately(before, own, stamp, absence_s(period_s))
-    tracks = with_twins(before, tracks, found.source, measured, dt_s, config, followed)
+    tracks = with_twins(before, tracks, found.source, frame.measurements, dt_s, config, followed)
     exits = state.exits
     if sensor.index == 0:
         exits = exits.after_matches(before, tracks, stamp, period_s)
-    unmatched = ~measured.weak
-    unmatched[found.source[found.seen]] = False
-    if unmatched.any():
-        initiated = initiate(frame, unmatched, state.next_id, config, len(sensors))
-        tracks = with_hosts(tracks.append(initiated), len(initiated), config)
-        found = found.with_births(np.flatnonzero(unmatched))
+    tracks, found, next_id = _with_births(tracks, frame, found, state.next_id, sensors)
     tracks = _with_sizes(tracks, frame, given, found, state, sensors)
     tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
-    tracks = with_noticed(before, tracks, frame, found, faces, dt_s, state.clocks, sensors)
+    tracks = with_noticed(before, tracks, frame, found, earlier.faces, dt_s, state.clocks, sensors)
     tracks = with_places(tracks, frame, found, sensors)
-    seen = found.seen
-    missed_s = missed_time_s(tracks, ~seen, dt_s, frame, config, sensor.view)
+    missed_s = missed_time_s(tracks, ~found.seen, dt_s, frame, config, sensor.view)
     tracks = tracks.replaced(missed_s=missed_s)
-    if not seen.all():
-        deleted = ~seen & _deleted(replace(state, exits=exits), tracks, seen, frame, sensors)
-        vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
-        # Only where the camera was the last to see somebody is there an exit of its view.
-        vanished &= tracks.seen_stamps_s[:, 0] == tracks.last_seen_s
-        exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
-        tracks = without(tracks, deleted, config)
+    tracks, exits = _without_deleted(tracks, exits, found.seen, frame, state, sensors)
     double = duplicates(tracks, frame, state.clocks, sensors)
     if double.any():
         tracks = without(tracks, double, config)
-    next_id = state.next_id + int(np.count_nonzero(unmatched))
     return TrackerState(
         tracks,
         state.clocks,
@@ -185,6 +168,21 @@ def _with_clocks(state: TrackerState, frame: Frame, sensors: Sensors) -> Tracker
         origin,
         velocity,
     )
+
+
+def _with_births(
+    tracks: TrackTable, frame: Frame, found: Found, next_id: int, sensors: Sensors
+) -> tuple[TrackTable, Found, int]:
+    """Return the tracks with new ones of the measurements that fit none, and the next free id."""
+    unmatched = ~frame.measurements.weak
+    unmatched[found.source[found.seen]] = False
+    if not unmatched.any():
+        return tracks, found, next_id
+    config = sensors.all[frame.sensor].config
+    initiated = initiate(frame, unmatched, next_id, config, len(sensors))
+    tracks = with_hosts(tracks.append(initiated), len(initiated), config)
+    births = np.flatnonzero(unmatched)
+    return tracks, found.with_births(births), next_id + len(births)
 
 
 def _with_sizes(
@@ -252,13 +250,37 @@ def _with_awareness(
     )
 
 
-def _deleted(
-    state: TrackerState, tracks: TrackTable, seen: BoolArray, frame: Frame, sensors: Sensors
+def _without_deleted(
+    tracks: TrackTable,
+    exits: Exits,
+    seen: BoolArray,
+    frame: Frame,
+    state: TrackerState,
+    sensors: Sensors,
+) -> tuple[TrackTable, Exits]:
+    """Return the tracks without those that the frame ends, and the exits with theirs."""
+    if seen.all():
+        return tracks, exits
+    deleted = ~seen & _due(tracks, exits, seen, frame, state, sensors)
+    vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
+    # Only where the camera was the last to see somebody is there an exit of its view.
+    vanished &= tracks.seen_stamps_s[:, 0] == tracks.last_seen_s
+    exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
+    return without(tracks, deleted, sensors.all[frame.sensor].config), exits
+
+
+def _due(
+    tracks: TrackTable,
+    exits: Exits,
+    seen: BoolArray,
+    frame: Frame,
+    state: TrackerState,
+    sensors: Sensors,
 ) -> BoolArray:
     """Return (N,) True for tracks to delete if the frame, the state's latest, shows them not."""
     gone = np.repeat(doubted(tracks)[:, None], len(sensors), axis=1)
     if frame.sensor == 0:
-        gone[:, 0] |= walked_out(tracks, state.exits, ~seen, frame.T_odom_camera)
+        gone[:, 0] |= walked_out(tracks, exits, ~seen, frame.T_odom_camera)
     slack_s = state.periods_s
     slack_s[frame.sensor] = 0.0
     return due_for_deletion(
