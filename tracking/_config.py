@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pydantic import Field, ValidationError, model_validator
 
 from ._errors import TrackingError
-from .config import StrictConfig
+from .config import StrictConfig, complaints
 
 # Bounds far beyond any sensible setting. Further out the arithmetic overflows or becomes singular.
 _LEAST_S: Final = 1e-4
@@ -107,7 +107,7 @@ class TrackingConfig(StrictConfig):
             try:
                 super().__init__(**settings)
             except ValidationError as cause:
-                raise TrackingError(f"{type(self).__name__}: {cause}") from cause
+                raise TrackingError(f"{type(self).__name__}: {complaints(cause)}") from cause
 
 
 class TrackerConfig(TrackingConfig):

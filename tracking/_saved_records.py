@@ -11,7 +11,7 @@ from ._errors import TrackingError
 from ._exits import MAX_EVENTS
 from ._places import SLOTS, PlainPlace
 from ._sensors import CAMERA, SensorConfig
-from .config import StrictConfig
+from .config import StrictConfig, complaints
 
 FORMAT: Final = "awarenav-tracker"
 VERSION: Final = 2
@@ -284,4 +284,4 @@ def record_of(state: Any) -> TrackerRecord:
     try:
         return TrackerRecord.model_validate(state)
     except ValidationError as cause:
-        raise TrackingError(f"state is not the state of a tracker: {cause}") from cause
+        raise TrackingError(f"state is not the state of a tracker: {complaints(cause)}") from cause

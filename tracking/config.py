@@ -12,12 +12,27 @@ from typing import Any, ClassVar, TypeVar
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic_core import ErrorDetails
 
 from perception.documents import read_yaml
 
 from ._errors import TrackingError
 
 _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
+
+
+def complaints(error: ValidationError) -> str:
+    """Return what is wrong with a config, on one line: every wrong key, and what was given."""
+    return "; ".join(map(complaint, error.errors(include_url=False)))
+
+
+def complaint(details: ErrorDetails) -> str:
+    """Return one of the things that are wrong with a config, as ``path: what is wrong``."""
+    path = ".".join(map(str, details["loc"])).strip(".")
+    message = details["msg"].removeprefix("Value error, ")
+    if details["type"] not in ("value_error", "missing"):
+        message = f"{message}, got {details['input']!r}"
+    return f"{path}: {message}" if path else message
 
 
 class StrictConfig(BaseModel):
@@ -57,7 +72,7 @@ class StrictConfig(BaseModel):
         try:
             return cls.model_validate(data)
         except ValidationError as cause:
-            raise cls.error(f"{path}: {cause}") from cause
+            raise cls.error(f"{path}: {complaints(cause)}") from cause
 
     def to_yaml(self, path: str | Path) -> None:
         """Write the config as YAML for :meth:`from_yaml`; the file is replaced in one step."""

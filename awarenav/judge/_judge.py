@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 
 from pydantic import Field, ValidationError
 
-from tracking.config import StrictConfig
+from tracking.config import StrictConfig, complaints
 
 from ..errors import AwarenavError
 from ..records import PersonRecord, people_by_frame, read_records
@@ -54,11 +54,7 @@ class JudgeConfig(StrictConfig):
         try:
             return cls(**values)
         except ValidationError as cause:
-            wrong = (
-                f"{'.'.join(map(str, each['loc']))}: {each['msg']}, got {each['input']!r}"
-                for each in cause.errors()
-            )
-            raise AwarenavError("; ".join(wrong)) from cause
+            raise AwarenavError(complaints(cause)) from cause
 
 
 class JudgeLimits(StrictConfig):

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from perception import Camera
-from tracking.config import StrictConfig
+from tracking.config import StrictConfig, complaints
 
 from ..actors.body import worker_names
 from ..world.camera import SensorConfig
@@ -92,12 +92,7 @@ class RenderConfig(StrictConfig):
         try:
             return cls(**values)
         except ValidationError as cause:
-            wrong = (
-                f"{'.'.join(map(str, error['loc'])) or 'settings'}: {error['msg']}, "
-                f"got {error['input']!r}"
-                for error in cause.errors()
-            )
-            raise SimError("; ".join(wrong)) from cause
+            raise SimError(complaints(cause)) from cause
 
     @property
     def scene_count(self) -> int:

@@ -15,6 +15,7 @@ from nav_adapter import AwarenessPolicy, RobotProfile
 from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.installation import install_command
+from tracking.config import complaints
 
 from ..actors.behaviour import known_population
 from ..actors.robot import NOVA_CARTER, RobotModel
@@ -348,7 +349,9 @@ def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights
         return given
     try:
         return RewardWeights(**(given or {}))
-    except (TypeError, ValidationError) as cause:
+    except ValidationError as cause:
+        raise SimError(f"reward: {complaints(cause)}") from cause
+    except TypeError as cause:
         raise SimError(f"reward: {cause}") from cause
 
 

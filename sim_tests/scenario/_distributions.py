@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 
 from awarenav.errors import not_one_of
 from perception.arrays import finite_number
-from tracking.config import StrictConfig
+from tracking.config import StrictConfig, complaint
 
 from ..world.errors import SimError
 
@@ -219,20 +219,19 @@ def read_distribution(path: str, kind: str, data: Any) -> Distribution:
 
 
 def error_text(error: ValidationError) -> str:
-    """Return each complaint of pydantic as ``path: what is wrong``, on one line."""
-    complaints = []
+    """Return what is wrong with a scenario, on one line, as for any config.
+
+    A mapping in the place of a number was meant as a distribution.
+    """
+    found = []
     for each in error.errors(include_url=False):
-        path = ".".join(map(str, each["loc"])).strip(".")
-        message = each["msg"].removeprefix("Value error, ")
         if each["type"] in ("float_type", "int_type") and isinstance(each["input"], dict):
-            kind = next(iter(each["input"]), None)
-            message = "must be a number, or a distribution: " + not_one_of(
-                "its kind", kind, DISTRIBUTIONS
-            )
-        elif each["type"] not in ("value_error", "missing"):
-            message = f"{message}, got {each['input']!r}"
-        complaints.append(f"{path}: {message}" if path else message)
-    return "; ".join(complaints)
+            kind = not_one_of("its kind", next(iter(each["input"]), None), DISTRIBUTIONS)
+            path = ".".join(map(str, each["loc"]))
+            found.append(f"{path}: must be a number, or a distribution: {kind}")
+        else:
+            found.append(complaint(each))
+    return "; ".join(found)
 
 
 def _check_order(low: float, high: float) -> None:

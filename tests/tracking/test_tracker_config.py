@@ -49,6 +49,22 @@ def test_values_out_of_range_are_refused(wrong: dict[str, Any]) -> None:
         TrackerConfig.model_validate(wrong)
 
 
+def test_an_unusable_file_is_refused_in_one_line_that_names_every_wrong_key(tmp_path: Path) -> None:
+    path = tmp_path / "tracker.yaml"
+    path.write_text("confirm_hits: 0\ngate_probability: x\nawareness: {prior_awarenes: 0.1}\n")
+    with pytest.raises(TrackingError) as caught:
+        TrackerConfig.from_yaml(path)
+    lines = str(caught.value).splitlines()
+    assert lines == [
+        f"{path}: TrackerConfig: gate_probability: Input should be a valid number, unable to parse "
+        "string as a number, got 'x'; confirm_hits: Input should be greater than or equal to 1, "
+        "got 0; awareness: unknown key 'prior_awarenes' in AwarenessFilterConfig; did you mean "
+        "'prior_awareness'?"
+    ]
+    with pytest.raises(TrackingError, match=r"^TrackerConfig: confirm_hits: [^\n]*, got 0$"):
+        TrackerConfig(confirm_hits=0)
+
+
 def test_a_hidden_face_must_not_keep_awareness_longer_than_being_unseen() -> None:
     with pytest.raises(ValidationError, match="no_face_time_constant_s <= unseen"):
         AwarenessFilterConfig(no_face_time_constant_s=0.5, unseen_time_constant_s=0.3)
@@ -64,7 +80,7 @@ def test_the_tracker_accepts_only_a_tracker_config() -> None:
 def test_settings_that_would_overflow_are_refused_wherever_they_come_from(
     setting: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(TrackingError, match=f"{setting}\n"):
+    with pytest.raises(TrackingError, match=f"{setting}: "):
         TrackerConfig(**{setting: 1e300})
     path = tmp_path / "tracker.yaml"
     path.write_text(f"{setting}: 1.0e+300\n", encoding="utf-8")

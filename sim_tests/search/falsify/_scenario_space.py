@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from perception.arrays import FloatArray
+from tracking.config import complaints
 
 from ...actors.behaviour import FASTEST_RECORDED_MPS, PersonSpec, median_person
 from ...actors.robot import NOVA_CARTER
@@ -105,7 +106,9 @@ class ScenarioSpace:
                     return Scenario.model_validate(data)
                 except ValidationError as cause:
                     if share == 0.0:
-                        raise SimError(f"scenario {self.template.name!r}: {cause}") from cause
+                        raise SimError(
+                            f"scenario {self.template.name!r}: {complaints(cause)}"
+                        ) from cause
         raise AssertionError  # pragma: no cover - the last share always returns or raises
 
     def _varied(self, values: Mapping[str, float]) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from nav_adapter import AwarenessPolicy, NavError
 from perception.anthropometry import BODY_RADIUS_M
 from perception.documents import parse_yaml, read_yaml
+from tracking.config import complaints
 
 from ...world.errors import SimError
 from .._optimizer import Range
@@ -132,7 +133,11 @@ class PolicySpace:
             )
         try:
             return AwarenessPolicy.model_validate(data)
-        except (ValidationError, NavError) as cause:
+        except ValidationError as cause:
+            raise SimError(
+                f"a range leads to a policy that cannot be: {complaints(cause)}"
+            ) from cause
+        except NavError as cause:
             raise SimError(f"a range leads to a policy that cannot be: {cause}") from cause
 
 
@@ -162,7 +167,7 @@ def _parsed_ranges(data: Any, source: str) -> dict[str, PolicyRange]:
         try:
             ranges[str(key)] = PolicyRange.model_validate(each)
         except ValidationError as cause:
-            raise SimError(f"{source}: {key}: {cause}") from cause
+            raise SimError(f"{source}: {key}: {complaints(cause)}") from cause
     return ranges
 
 

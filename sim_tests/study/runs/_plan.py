@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 import yaml
 from pydantic import ValidationError
@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from nav_adapter import AwarenessPolicy
 from perception.arrays import finite_number
 from perception.documents import parse_yaml
+from tracking.config import StrictConfig, complaints
 
 from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault, shipped_faults
@@ -23,6 +24,8 @@ from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
 from ._job import Job
 from ._planner_choice import planner_label, refuse_unusable_planner
+
+_ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
 
 # The name that stands for "without a fault".
 _NO_FAULT: Final = "none"
@@ -156,10 +159,7 @@ def template_of(text: str) -> ScenarioTemplate:
 @lru_cache(maxsize=256)
 def policy_of(text: str) -> AwarenessPolicy:
     """Return the policy of a job; raise SimError for YAML that holds none."""
-    try:
-        return AwarenessPolicy.model_validate(parse_yaml(text, "it", SimError))
-    except (ValidationError, SimError) as cause:
-        raise SimError(f"the policy of an episode is not valid: {cause}") from cause
+    return _of_text("policy", AwarenessPolicy, text)
 
 
 @lru_cache(maxsize=256)
@@ -167,10 +167,16 @@ def fault_of(text: str) -> Fault | None:
     """Return the fault of a job, None without one; raise SimError for YAML that holds none."""
     if not text:
         return None
+    return _of_text("fault", Fault, text)
+
+
+def _of_text(name: str, kind: type[_ConfigT], text: str) -> _ConfigT:
     try:
-        return Fault.model_validate(parse_yaml(text, "it", SimError))
-    except (ValidationError, SimError) as cause:
-        raise SimError(f"the fault of an episode is not valid: {cause}") from cause
+        return kind.model_validate(parse_yaml(text, "it", SimError))
+    except ValidationError as cause:
+        raise SimError(f"the {name} of an episode is not valid: {complaints(cause)}") from cause
+    except SimError as cause:
+        raise SimError(f"the {name} of an episode is not valid: {cause}") from cause
 
 
 def policy_text(policy: AwarenessPolicy) -> str:
