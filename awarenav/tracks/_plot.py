@@ -1,4 +1,7 @@
-"""The plot of ``awarenav tracks``: a plan view, and a panel with the awareness of each track."""
+"""The plot of ``awarenav tracks``: a plan view, and a panel with the awareness of each track.
+
+Recordings without a camera tell nothing of awareness, so they have the plan view alone.
+"""
 
 from __future__ import annotations
 
@@ -82,11 +85,13 @@ def tracks_figure(
     plan_width = _WIDTH - _LEFT - _RIGHT - _LEGEND_WIDTH
     plan_height = plan_width * (limits[3] - limits[2]) / (limits[1] - limits[0])
     plan_height = min(max(plan_height, _MIN_PLAN_HEIGHT), _MAX_PLAN_HEIGHT)
-    columns = 1 if len(shown) <= 6 else 2 if len(shown) <= 12 else 3
-    rows = math.ceil(len(shown) / columns)
+    with_camera = bool(len(tracked.camera_poses))
+    panels = coloured if with_camera else []
+    columns = 1 if len(panels) <= 6 else 2 if len(panels) <= 12 else 3
+    rows = math.ceil(len(panels) / columns)
     row_height = _WIDE_ROW_HEIGHT if columns == 1 else _NARROW_ROW_HEIGHT
     height = _TOP + plan_height + _BOTTOM
-    if shown:
+    if panels:
         height += _PLAN_GAP + rows * (row_height + _ROW_GAP)
 
     page = Page(_WIDTH, height)
@@ -102,11 +107,11 @@ def tracks_figure(
         with_tracker=_has_tracker(tracked),
         truth=truth is not None,
         smoothed=bool(smoothed),
-        with_camera=bool(len(tracked.camera_poses)),
+        with_camera=with_camera,
         field_of_view=camera is not None,
     )
     panel_width = (_WIDTH - _LEFT - _RIGHT + _COLUMN_GAP) / columns - _COLUMN_GAP
-    for index, (history, colour) in enumerate(coloured):
+    for index, (history, colour) in enumerate(panels):
         row, column = index % rows, index // rows
         panel = page.axes(
             _LEFT + column * (panel_width + _COLUMN_GAP),
@@ -118,7 +123,7 @@ def tracks_figure(
         matches = None if truth is None else truth.matches.get(history.id, [])
         draw_awareness(panel, history, colour, matches, short_title=columns > 2)
         panel.set_ylabel("awareness α" if column == 0 else "")
-        last = row == rows - 1 or index == len(coloured) - 1
+        last = row == rows - 1 or index == len(panels) - 1
         panel.set_xlabel("stamp (s)" if last else "")
         panel.tick_params(labelbottom=last)
     return page.figure
@@ -144,7 +149,7 @@ def _draw_legends(
         with_tracker: whether a tracker made the tracks.
         truth: whether the truth is drawn.
         smoothed: whether smoothed paths are drawn.
-        with_camera: whether there is a camera.
+        with_camera: whether there is a camera, and with it a legend of the panels.
         field_of_view: whether the camera's field of view is drawn.
     """
 
@@ -210,13 +215,14 @@ def _draw_legends(
         bbox_to_anchor=(left, box.y1 + 0.01),
         **style,
     )
-    figure.legend(
-        handles=awareness_marks,
-        title="Awareness over time",
-        loc="lower left",
-        bbox_to_anchor=(left, box.y0 - 0.02),
-        **style,
-    )
+    if with_camera:
+        figure.legend(
+            handles=awareness_marks,
+            title="Awareness over time",
+            loc="lower left",
+            bbox_to_anchor=(left, box.y0 - 0.02),
+            **style,
+        )
 
 
 def _has_tracker(tracked: TrackedRecording) -> bool:

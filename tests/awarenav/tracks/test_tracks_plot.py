@@ -12,6 +12,7 @@ from track_lines import lines, pose, standing, walking
 
 from awarenav.records import write_records
 from awarenav.tracks import read_recording, track_recording, tracks_in_file
+from awarenav.tracks._positions import read_positions
 from perception import Camera
 
 pytest.importorskip("matplotlib")
@@ -150,6 +151,17 @@ def test_an_empty_plot_says_that_there_are_no_people(tmp_path):
 def test_a_file_without_frames_gives_an_empty_plot(tmp_path):
     figure = tracks_figure(track_recording(recorded(tmp_path, [])), "nothing")
     assert "no people in 0 frames" in texts(figure)
+    figure.canvas.draw()
+
+
+def test_positions_without_a_camera_have_no_panels_of_awareness(tmp_path):
+    path = tmp_path / "people.csv"
+    rows = [f"{0.1 * k:.1f},{id},{0.1 * k:.2f},{2.0 * id}" for k in range(20) for id in (1, 2)]
+    path.write_text("\n".join(["t_s,id,x_m,y_m", *rows]) + "\n")
+    figure = tracks_figure(track_recording(read_positions(path)), "positions")
+    assert len(figure.axes) == 1
+    assert [legend.get_title().get_text() for legend in figure.legends] == ["From above"]
+    assert {"1", "2"} <= set(texts(figure))
     figure.canvas.draw()
 
 
