@@ -258,32 +258,15 @@ def _without_deleted(
     state: TrackerState,
     sensors: Sensors,
 ) -> tuple[TrackTable, Exits]:
-    """Return the tracks without those that the frame ends, and the exits with theirs."""
+    """Return the tracks without those that the frame, the state's latest, ends; and the exits."""
     if seen.all():
         return tracks, exits
-    deleted = ~seen & _due(tracks, exits, seen, frame, state, sensors)
-    vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
-    # Only where the camera was the last to see somebody is there an exit of its view.
-    vanished &= tracks.seen_stamps_s[:, 0] == tracks.last_seen_s
-    exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
-    return without(tracks, deleted, sensors.all[frame.sensor].config), exits
-
-
-def _due(
-    tracks: TrackTable,
-    exits: Exits,
-    seen: BoolArray,
-    frame: Frame,
-    state: TrackerState,
-    sensors: Sensors,
-) -> BoolArray:
-    """Return (N,) True for tracks to delete if the frame, the state's latest, shows them not."""
     gone = np.repeat(doubted(tracks)[:, None], len(sensors), axis=1)
     if frame.sensor == 0:
         gone[:, 0] |= walked_out(tracks, exits, ~seen, frame.T_odom_camera)
     slack_s = state.periods_s
     slack_s[frame.sensor] = 0.0
-    return due_for_deletion(
+    deleted = ~seen & due_for_deletion(
         tracks,
         frame.stamp_s - slack_s,
         sensors.tentative_gaps_s(state.clocks),
@@ -291,3 +274,8 @@ def _due(
         sensors.config,
         sensors.has_view,
     )
+    vanished = deleted & tracks.confirmed & ~tracks.standing & ~tracks.twins
+    # Only where the camera was the last to see somebody is there an exit of its view.
+    vanished &= tracks.seen_stamps_s[:, 0] == tracks.last_seen_s
+    exits = exits.with_events(tracks.last_places_camera_m[vanished], returned=False)
+    return without(tracks, deleted, sensors.all[frame.sensor].config), exits

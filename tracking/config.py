@@ -22,7 +22,10 @@ _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
 
 
 def complaints(error: ValidationError) -> str:
-    """Return what is wrong with a config, on one line: every wrong key, and what was given."""
+    """Return what is wrong with a config, on one line: the keys, and what was given.
+
+    A model with an unknown key complains of that key alone.
+    """
     return "; ".join(map(complaint, error.errors(include_url=False)))
 
 
@@ -31,7 +34,7 @@ def complaint(details: ErrorDetails) -> str:
     path = ".".join(map(str, details["loc"])).strip(".")
     message = details["msg"].removeprefix("Value error, ")
     if details["type"] not in ("value_error", "missing"):
-        message = f"{message}, got {details['input']!r}"
+        message = f"{message}, got {details['input']!r:.200}"
     return f"{path}: {message}" if path else message
 
 
