@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 import cv2
+import onnx
 import torch
 from torch import nn
 
@@ -22,7 +23,9 @@ from perception import OnnxPoseEstimator
 from perception.shipped import update_manifest
 from sim_tests.actors.body import load_worker
 
+from . import _detector_train, _head_train, _pose_train
 from ._calibrate import limb_scale
+from ._detector_data import DetectorData
 from ._detector_net import DetectorNet
 from ._detector_train import train_detector
 from ._export import export_detector, export_head, export_pose
@@ -31,10 +34,12 @@ from ._head_data import HeadData
 from ._head_net import HeadNet
 from ._head_shapes import add_head_shapes
 from ._head_train import calibration, predictions, train_head
+from ._pose_data import PoseData
 from ._pose_net import PoseNet
 from ._pose_train import train_pose
 from ._recipe import Recipe, Run
 from ._shards import make_shards
+from .quantise import quantise
 
 _ROOT: Final = Path(__file__).parents[2]
 _MODELS: Final = _ROOT / "perception" / "models"
@@ -45,6 +50,8 @@ _TRAINERS: Final[dict[str, Callable[[Run], nn.Module]]] = {
     "detector": train_detector,
 }
 _FILES: Final = {"head": "head_pose", "pose": "person_pose", "detector": "person_detector"}
+# Images from which the ranges of 8-bit activations come.
+_RANGE_IMAGES: Final = 200
 _Net = TypeVar("_Net", bound=nn.Module)
 _ENTRIES: Final = (
     {
@@ -103,6 +110,11 @@ def main() -> None:
         help="folder of exported networks; training goes on from those that are there (default: "
         "from nothing)",
     )
+    parser.add_argument(
+        "--long",
+        action="store_true",
+        help="train the head network as long as the shipped one, for a GPU with many cores",
+    )
     parser.add_argument("--quick", action="store_true", help="a tiny run that checks every stage")
     chosen = parser.parse_args()
     unknown = [stage for stage in chosen.stages if stage not in _STAGES]
@@ -110,6 +122,7 @@ def main() -> None:
         parser.error(f"there is no stage {', '.join(unknown)}; stages are {', '.join(_STAGES)}")
     stages = chosen.stages or list(_STAGES)
     recipe = replace(Recipe(), seed=chosen.seed)
+    recipe = recipe.long() if chosen.long else recipe
     recipe = recipe.quick() if chosen.quick else recipe
     if chosen.quick and chosen.out == _MODELS:
         parser.error("--quick needs --out: its networks are useless and must not ship")
@@ -160,31 +173,48 @@ def _crowd(recipe: Recipe, folder: Path, processes: int) -> tuple[str, ...]:
 
 
 def _export(recipe: Recipe, check: Path, checkpoints: Path, out: Path, names: set[str]) -> None:
-    """Write networks of the checkpoints, calibrated on held-out people."""
+    """Write networks of the checkpoints in 8 bits, calibrated on held-out people.
+
+    In full precision they are written beside the checkpoints.
+    """
+    seed, backgrounds = recipe.seed, recipe.check_backgrounds
     if "head" in names:
-        head = _trained(HeadNet(), checkpoints / "head.pt")
-        held_out = HeadData(check, recipe.seed, recipe.check_backgrounds)
+        head, whole = _trained(HeadNet(), checkpoints / "head.pt"), checkpoints / "head_pose.onnx"
+        heads = HeadData(check, seed, backgrounds)
         # Half of the crops are degraded: a robot's camera is between the two.
-        factors = calibration(predictions(head, held_out, degraded=True))
+        factors = calibration(predictions(head, heads, degraded=True))
         print("factors on the standard deviations:", factors)
-        export_head(head, out / "head_pose.onnx", factors)
+        export_head(head, whole, factors)
+        crops = heads.still(0, _RANGE_IMAGES, degraded=True)["image"]
+        _quantise(whole, _head_train.normalised(crops), out)
     if "pose" in names:
-        pose = _trained(PoseNet(), checkpoints / "pose.pt")
+        pose, whole = _trained(PoseNet(), checkpoints / "pose.pt"), checkpoints / "person_pose.onnx"
 
         def with_scale(scale: float) -> OnnxPoseEstimator:
-            export_pose(pose, out / "person_pose.onnx", scale)
-            return OnnxPoseEstimator(out / "person_pose.onnx")
+            export_pose(pose, whole, scale)
+            return OnnxPoseEstimator(whole)
 
         crowd = sorted(check.with_name("crowd_check").glob("*.npz"))
         statures_m = [load_worker(str(path)).stature_m for path in crowd]
         scale, noise = limb_scale(with_scale, check, statures_m)
         print(f"limb scale against perception.anthropometry: {scale:.3f}, noise {noise:.3f}")
-        export_pose(pose, out / "person_pose.onnx", scale, noise)
+        export_pose(pose, whole, scale, noise)
+        crops = PoseData(check, seed, backgrounds).still(0, _RANGE_IMAGES)["image"]
+        _quantise(whole, _pose_train.normalised(crops), out)
     if "detector" in names:
         detector = _trained(DetectorNet(), checkpoints / "detector.pt")
-        export_detector(detector, out / "person_detector.onnx")
+        whole = checkpoints / "person_detector.onnx"
+        export_detector(detector, whole)
+        images = DetectorData(check, seed, backgrounds).batch(0, _RANGE_IMAGES)["image"]
+        _quantise(whole, _detector_train.normalised(images), out)
     written = {_FILES[name] for name in names}
     print("written", update_manifest(out, [each for each in _ENTRIES if each["name"] in written]))
+
+
+def _quantise(whole: Path, images: torch.Tensor, out: Path) -> None:
+    """Write a network in 8 bits, with the ranges of its activations from images (N, 3, H, W)."""
+    (name,) = (each.name for each in onnx.load(str(whole)).graph.input)
+    quantise(whole, [{name: image[None].numpy()} for image in images], out / whole.name)
 
 
 def _trained(net: _Net, checkpoint: Path) -> _Net:

@@ -35,14 +35,15 @@ def photographed(images: Tensor, generator: torch.Generator, strength: float = 1
     A scene's and a screen's variety; noise and exposure are the camera's (``_degradation``).
 
     Args:
-        images: (N, 3, H, W) in 0–255.
-        generator: source of all randomness.
+        images: (N, 3, H, W) in 0–255, on any device.
+        generator: source of all randomness, on the processor.
         strength: 1 for the full effect, 0 for none.
     """
     n = len(images)
 
     def uniform(low: float, high: float, *shape: int) -> Tensor:
-        return low + (high - low) * torch.rand(n, *shape, generator=generator)
+        drawn = low + (high - low) * torch.rand(n, *shape, generator=generator)
+        return drawn.to(images.device)
 
     contrast, brightness = uniform(0.6, 1.4, 1, 1, 1), uniform(-35.0, 35.0, 1, 1, 1)
     cast = uniform(0.85, 1.15, 3, 1, 1)
@@ -75,7 +76,6 @@ def output_on_photographed(
         strength: see :func:`photographed`.
     """
     generator = torch.Generator().manual_seed(seed % (2**31))
-    device = batch["image"].device
-    images = photographed(batch["image"].cpu(), generator, strength).to(device)
-    with torch.autocast(device.type, dtype=torch.bfloat16):
+    images = photographed(batch["image"], generator, strength)
+    with torch.autocast(images.device.type, dtype=torch.bfloat16):
         return net(normalised(images))

@@ -80,7 +80,7 @@ def cross(a: Tensor, b: Tensor) -> Tensor:
 
 def soft_labels(position: Tensor, bins: int, per_unit: float, sigma_bins: float) -> Tensor:
     """Return Gaussian labels (…, bins) of positions (…,), each with sum one (SimCC)."""
-    index = torch.arange(bins, dtype=torch.float32)
+    index = torch.arange(bins, dtype=torch.float32, device=position.device)
     label = torch.exp(-0.5 * ((index - position[..., None] * per_unit) / sigma_bins) ** 2)
     return label / (label.sum(-1, keepdim=True) + 1e-6)
 

@@ -5,21 +5,22 @@ from __future__ import annotations
 import copy
 import json
 import math
+import multiprocessing
 import os
 import time
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, Final
 
 import torch
 from torch import Tensor, nn
+from torch.utils.data import DataLoader, Dataset
 
 from ._batch import Batch
 
-# Steps between two checkpoints, and batches that are prepared ahead.
+# Steps between two checkpoints, and batches that every helper prepares ahead.
 _CHECKPOINT_STEPS: Final = 500
-_AHEAD: Final = 4
+_AHEAD: Final = 2
 #: The device that PyTorch finds: the first GPU, or the processor.
 AUTO: Final = "auto"
 
@@ -54,6 +55,7 @@ def fit(
     folder: Path,
     learning_rate: float = 2e-3,
     weight_decay: float = 0.02,
+    average_over: int = 500,
     judge: Callable[[nn.Module], dict[str, float]] | None = None,
     device: str = AUTO,
     helpers: int | None = None,
@@ -70,16 +72,17 @@ def fit(
         folder: folder of the checkpoints and the log.
         learning_rate: highest learning rate.
         weight_decay: weight decay of AdamW.
+        average_over: steps over which the weights are averaged.
         judge: returns figures on held-out data, called at every fourth checkpoint.
         device: see :func:`torch_device`.
-        helpers: threads that prepare batches; None is two beside a processor, and all but one core
-            beside a GPU.
+        helpers: processes that prepare batches; None is one beside a processor, and all but one
+            core beside a GPU. They are forked, so they share the data. Where there is no fork, the
+            training prepares them itself.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.pt"
     place = torch_device(device)
     helpers = _helpers(place) if helpers is None else helpers
-    ahead = max(_AHEAD, 2 * helpers)
     net = net.to(place, memory_format=torch.channels_last)
     average = copy.deepcopy(net).eval()
     optimiser = _optimiser(net, learning_rate, weight_decay)
@@ -90,17 +93,12 @@ def fit(
         average.load_state_dict(saved["average"])
         optimiser.load_state_dict(saved["optimiser"])
         first = saved["step"]
-    log = (folder / f"{name}.jsonl").open("a", encoding="utf-8")
-    sums: dict[str, float] = {}
+    keep = 1.0 - 1.0 / average_over
+    sums: dict[str, Tensor] = {}
     started = time.perf_counter()
-    with ThreadPoolExecutor(helpers) as pool, log:
-        queue: list[Future[Batch]] = [
-            pool.submit(batch_of, step) for step in range(first, min(first + ahead, steps))
-        ]
-        for step in range(first, steps):
-            batch = {key: value.to(place) for key, value in queue.pop(0).result().items()}
-            if step + ahead < steps:
-                queue.append(pool.submit(batch_of, step + ahead))
+    with (folder / f"{name}.jsonl").open("a", encoding="utf-8") as log:
+        for step, prepared in enumerate(_prepared(batch_of, first, steps, helpers), first):
+            batch = {key: value.to(place, non_blocking=True) for key, value in prepared.items()}
             done = step / steps
             warm = min(1.0, (step + 1) / min(300.0, 0.1 * steps + 1.0))
             for group in optimiser.param_groups:
@@ -113,16 +111,16 @@ def fit(
                 total.backward()
                 nn.utils.clip_grad_norm_(net.parameters(), 5.0)
                 optimiser.step()
-            _update_average(average, net, min(0.998, (step + 1) / (step + 10)))
+            _update_average(average, net, min(keep, (step + 1) / (step + 10)))
             for key, value in losses.items():
-                sums[key] = sums.get(key, 0.0) + float(value.detach())
+                sums[key] = sums.get(key, 0.0) + value.detach()
             if (step + 1) % _CHECKPOINT_STEPS == 0 or step + 1 == steps:
                 since = (step % _CHECKPOINT_STEPS) + 1
                 record: dict[str, Any] = {
                     "step": step + 1,
                     "minutes": (time.perf_counter() - started) / 60,
                 }
-                record |= {key: value / since for key, value in sums.items()}
+                record |= {key: float(value) / since for key, value in sums.items()}
                 is_judged = (step + 1) % (4 * _CHECKPOINT_STEPS) == 0 or step + 1 == steps
                 if judge is not None and is_judged:
                     record |= judge(average)
@@ -145,9 +143,37 @@ def _optimiser(net: nn.Module, learning_rate: float, weight_decay: float) -> tor
     )
 
 
+class _Steps(Dataset[Batch]):
+    """The batches of the steps from ``first`` on."""
+
+    def __init__(self, batch_of: Callable[[int], Batch], first: int, steps: int) -> None:
+        self._batch_of, self._first, self._steps = batch_of, first, steps
+
+    def __len__(self) -> int:
+        return max(0, self._steps - self._first)
+
+    def __getitem__(self, index: int) -> Batch:
+        return self._batch_of(self._first + index)
+
+
+def _prepared(
+    batch_of: Callable[[int], Batch], first: int, steps: int, helpers: int
+) -> Iterable[Batch]:
+    """Return the batches of the steps in order, prepared ahead by other processes."""
+    if "fork" not in multiprocessing.get_all_start_methods():
+        helpers = 0
+    return DataLoader(
+        _Steps(batch_of, first, steps),
+        batch_size=None,
+        num_workers=helpers,
+        prefetch_factor=_AHEAD if helpers else None,
+        multiprocessing_context="fork" if helpers else None,
+    )
+
+
 def _helpers(place: torch.device) -> int:
-    """Return the threads that prepare batches beside a device that trains."""
-    return 2 if place.type == "cpu" else max(2, (os.cpu_count() or 2) - 1)
+    """Return the number of processes that prepare batches beside a device that trains."""
+    return 1 if place.type == "cpu" else max(1, (os.cpu_count() or 2) - 1)
 
 
 def _update_average(average: nn.Module, net: nn.Module, keep: float) -> None:

@@ -13,6 +13,8 @@ from ._blocks import Residual, conv, rotation_from_6d
 BINS: Final = 96
 SPAN: Final = (-0.25, 1.25)
 KEYPOINTS: Final = 5
+# Channels at strides 2, 4, 8 and 16.
+_WIDTHS: Final = (32, 64, 144, 288)
 _SWAP: Final = [0, 2, 1, 4, 3]
 
 
@@ -26,19 +28,21 @@ class HeadNet(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
+        first, second, third, fourth = _WIDTHS
         self.fine = nn.Sequential(
-            conv(3, 20, 3, 2),
-            conv(20, 40, 3, 2),
-            Residual(40),
-            conv(40, 80, 3, 2),
-            Residual(80),
-            Residual(80),
+            conv(3, first, 3, 2),
+            conv(first, second, 3, 2),
+            Residual(second),
+            conv(second, third, 3, 2),
+            *(Residual(third) for _ in range(3)),
         )
-        self.coarse = nn.Sequential(conv(80, 160, 3, 2), Residual(160), Residual(160))
+        self.coarse = nn.Sequential(
+            conv(third, fourth, 3, 2), *(Residual(fourth) for _ in range(3))
+        )
         self.trunk = nn.Sequential(
-            nn.Flatten(), nn.Dropout(0.1), nn.Linear(160 * 16, 320), nn.ReLU(inplace=True)
+            nn.Flatten(), nn.Dropout(0.1), nn.Linear(fourth * 16, 320), nn.ReLU(inplace=True)
         )
-        self.maps = nn.Conv2d(80, KEYPOINTS, 3, padding=1)
+        self.maps = nn.Conv2d(third, KEYPOINTS, 3, padding=1)
         self.tokens = nn.Sequential(nn.Linear(64, 128), nn.ReLU(inplace=True))
         self.u, self.v = nn.Linear(128, BINS), nn.Linear(128, BINS)
         self.rotation = nn.Linear(320, 6)

@@ -19,8 +19,9 @@ from ._start import start_from, unseen
 
 MEAN, STD = 120.0, 60.0
 _DEGREES_OF_FREEDOM = 5.0
-# Highest learning rate from nothing, and from a trained network, which 1.5e-3 would undo.
-_LEARNING_RATES = (2.5e-3, 6e-4)
+# Highest learning rate from a trained network, which 1.5e-3 would undo.
+_RATE_FROM_TRAINED = 6e-4
+_WEIGHT_DECAY = 0.03
 
 
 def train_head(run: Run) -> nn.Module:
@@ -37,12 +38,16 @@ def train_head(run: Run) -> nn.Module:
     return fit(
         "head",
         net,
-        lambda step: data.batch(step, step / recipe.head_steps),
+        lambda step: data.batch(
+            step, step / recipe.head_steps, recipe.head_batch, recipe.head_crops
+        ),
         head_loss,
         steps=recipe.head_steps,
         folder=run.checkpoints,
         device=run.device,
-        learning_rate=run.learning_rate(*_LEARNING_RATES),
+        learning_rate=run.learning_rate(recipe.head_rate, _RATE_FROM_TRAINED),
+        weight_decay=_WEIGHT_DECAY,
+        average_over=1000,
         judge=lambda net: judge_head(net, check),
     )
 
@@ -75,12 +80,8 @@ def head_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
     within = ((target > low) & (target < high)).all(-1).float()
     # Hidden keypoints count too, but weigh less.
     keypoint_weight = within * (0.3 + 0.7 * batch["visible"])
-    entropy = cross_entropy(
-        out["u"], soft_labels(bins[..., 0].cpu(), BINS, 1.0, 1.2).to(bins.device)
-    )
-    entropy = entropy + cross_entropy(
-        out["v"], soft_labels(bins[..., 1].cpu(), BINS, 1.0, 1.2).to(bins.device)
-    )
+    entropy = cross_entropy(out["u"], soft_labels(bins[..., 0], BINS, 1.0, 1.2))
+    entropy = entropy + cross_entropy(out["v"], soft_labels(bins[..., 1], BINS, 1.0, 1.2))
     means = torch.stack([keypoint_means(out["u"]), keypoint_means(out["v"])], dim=2)
     away = (means - target).abs().sum(-1)
     losses["keypoints"] = mean((keypoint_weight * (0.12 * entropy + 4.0 * away)).mean(1))

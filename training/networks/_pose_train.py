@@ -64,7 +64,6 @@ def _bins(batch: Batch) -> tuple[Tensor, Tensor, Tensor]:
 
 def pose_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
     """Return the losses of a batch by name."""
-    device = batch["image"].device
     out = output_on_photographed(net, batch, normalised, int(batch["keypoints"].sum().abs()))
     x, y, z, seen = (part.float() for part in out)
     target_x, target_y, target_z = _bins(batch)
@@ -73,7 +72,7 @@ def pose_loss(net: nn.Module, batch: Batch, done: float) -> dict[str, Tensor]:
     count = weight.sum().clamp(min=1.0)
 
     def label(target: Tensor, bins: int, sigma: float) -> Tensor:
-        return soft_labels(target.cpu(), bins, 1.0, sigma).to(device)
+        return soft_labels(target, bins, 1.0, sigma)
 
     entropy = cross_entropy(x, label(target_x, BINS_X, _SIGMA_XY_BINS))
     entropy = entropy + cross_entropy(y, label(target_y, BINS_Y, _SIGMA_XY_BINS))

@@ -8,7 +8,7 @@ network is the same function, and can be trained.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +22,10 @@ from torch import Tensor, nn
 _BATCHES: Final = 16
 # Number of the first of them, beyond those that are trained on.
 _BEYOND: Final = 2**31
+# The exported module holds the network under this name.
+_PREFIX: Final = "net."
+# What quantisation adds to the name of a weight that is stored in 8 bits.
+_DEQUANTISED: Final = "_DequantizeLinear_Output"
 
 
 def unseen(batch_of: Callable[[int], Tensor]) -> Iterator[Tensor]:
@@ -34,45 +38,50 @@ def start_from(net: nn.Module, path: Path, inputs: Iterable[Tensor]) -> None:
 
     Args:
         net: the network.
-        path: ``.onnx`` file that :mod:`._export` wrote of such a network.
-        inputs: normalised batches (N, 3, H, W), at least one, for the order in which the layers
-            run and the statistics of the normalisation.
+        path: ``.onnx`` file that :mod:`._export` wrote of such a network, in 8 bits or not.
+        inputs: normalised batches (N, 3, H, W), at least one, for the statistics of the
+            normalisation.
 
     Raises:
         ValueError: for a file of another network.
     """
-    arrays, named, folded, multiplied = _weights(path)
+    arrays, layers = _weights(path)
     state = net.state_dict()
+    named = {
+        name.removeprefix(_PREFIX): array
+        for name, array in arrays.items()
+        if name.startswith(_PREFIX)
+    }
     for name, array in named.items():
         if name not in state or tuple(state[name].shape) != array.shape:
             raise ValueError(f"{path} is not a file of {type(net).__name__}: {name} {array.shape}")
         state[name] = torch.from_numpy(array)
     for name, parameter in net.named_parameters(recurse=False):
         if name not in named:
-            state[name] = _parameter_of_shape(path, arrays, tuple(parameter.shape))
+            state[name] = _parameter_of_shape(path, list(arrays.values()), tuple(parameter.shape))
     net.load_state_dict(state)
-    batches = iter(inputs)
-    first = next(batches)
-    running = _running_order(net, first)
-    norm_of = _normalised_convolutions(net)
-    pairs = [(each, norm_of[each]) for each in running if each in norm_of]
-    known = {module for name, module in net.named_modules() if f"{name}.weight" in named}
-    linear = [each for each in running if isinstance(each, nn.Linear) and each not in known]
-    if len(pairs) != len(folded) or len(linear) != len(multiplied):
+    modules, norm_of = dict(net.named_modules()), _normalised_convolutions(net)
+    unknown = [name for name in layers if name not in modules]
+    folded = {modules[name] for name in layers if name in modules} & set(norm_of)
+    if unknown or len(folded) != len(norm_of):
         raise ValueError(
-            f"{path} is not a file of {type(net).__name__}: {len(folded)} convolutions and "
-            f"{len(multiplied)} matrices for {len(pairs)} and {len(linear)} layers"
+            f"{path} is not a file of {type(net).__name__}: it has {len(folded)} of "
+            f"{len(norm_of)} normalised convolutions"
+            + (f", and layers such as {unknown[0]}" if unknown else "")
         )
     with torch.no_grad():
-        for module, matrix in zip(linear, multiplied, strict=True):
-            module.weight.copy_(torch.from_numpy(matrix.T.copy()))
-        for (conv, norm), (weight, bias) in zip(pairs, folded, strict=True):
-            conv.weight.copy_(torch.from_numpy(weight))
+        for name, (weight, bias) in layers.items():
+            module = modules[name]
+            if module not in norm_of:
+                module.weight.copy_(torch.from_numpy(weight.T.copy()))
+                continue
+            norm = norm_of[module]
+            module.weight.copy_(torch.from_numpy(weight))
             norm.weight.fill_(1.0)
             norm.bias.copy_(torch.from_numpy(bias))
             norm.running_mean.zero_()
             norm.running_var.fill_(1.0 - norm.eps)
-    _normalise(net, pairs, chain([first], batches))
+    _normalise(net, list(norm_of.items()), inputs)
 
 
 def _normalise(
@@ -116,22 +125,6 @@ def _normalised_convolutions(net: nn.Module) -> dict[nn.Module, nn.BatchNorm2d]:
     }
 
 
-def _running_order(net: nn.Module, batch: Tensor) -> list[nn.Module]:
-    """Return the layers in the order in which they run, as the nodes of an exported file stand."""
-    running: list[nn.Module] = []
-    hooks = [
-        module.register_forward_hook(lambda module, _, __: running.append(module))
-        for module in net.modules()
-        if not list(module.children())
-    ]
-    net.eval()
-    with torch.no_grad():
-        net(batch)
-    for hook in hooks:
-        hook.remove()
-    return running
-
-
 def _parameter_of_shape(path: Path, arrays: list[np.ndarray], shape: tuple[int, ...]) -> Tensor:
     """Return a parameter that export stores without its name, with axes of one before it."""
     found = [
@@ -146,37 +139,52 @@ def _parameter_of_shape(path: Path, arrays: list[np.ndarray], shape: tuple[int, 
 
 def _weights(
     path: Path,
-) -> tuple[
-    list[np.ndarray],
-    dict[str, np.ndarray],
-    list[tuple[np.ndarray, np.ndarray]],
-    list[np.ndarray],
-]:
-    """Return all arrays, those with a name, folded convolutions and unnamed matrices in order."""
+) -> tuple[dict[str, np.ndarray], dict[str, tuple[np.ndarray, np.ndarray | None]]]:
+    """Return the arrays by name, and weights and bias by layer of those that have no name."""
     graph = onnx.load(str(path)).graph
-    arrays = {
-        each.name: numpy_helper.to_array(each).astype(np.float32) for each in graph.initializer
-    }
-    # Weights stored in half precision are cast first.
-    stored = {
-        node.output[0]: node.input[0]
-        for node in graph.node
-        if node.op_type == "Cast" and node.input[0] in arrays
-    }
-    named = {
-        name.removeprefix("net.").removesuffix("_half"): array
-        for name, array in arrays.items()
-        if name.startswith("net.")
-    }
-    folded, multiplied = [], []
+    arrays = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    for node in graph.node:
+        if not node.input or node.input[0] not in arrays:
+            continue
+        if node.op_type == "Cast":  # weights in half precision
+            arrays[node.output[0]] = arrays.pop(node.input[0])
+        elif node.op_type == "Identity":  # two weights with the same numbers are stored once
+            arrays[node.output[0]] = arrays[node.input[0]]
+        elif node.op_type == "DequantizeLinear":  # weights in 8 bits
+            integers, scale, zero = (arrays.pop(name) for name in node.input)
+            name = node.output[0].removesuffix(_DEQUANTISED)
+            axis = next((each.i for each in node.attribute if each.name == "axis"), 1)
+            arrays[name] = _dequantised(integers, scale, zero, axis)
+    arrays = {name: array.astype(np.float32) for name, array in arrays.items()}
+    layers = {}
     for node in graph.node:
         if node.op_type not in ("Conv", "MatMul"):
             continue
-        name = stored.get(node.input[1], node.input[1])
-        if name.startswith("net.") or name not in arrays:
-            continue
-        if node.op_type == "Conv":
-            folded.append((arrays[name], arrays[stored.get(node.input[2], node.input[2])]))
-        else:
-            multiplied.append(arrays[name])
-    return list(arrays.values()), named, folded, multiplied
+        weight, *bias = (name.removesuffix(_DEQUANTISED) for name in node.input[1:])
+        if weight in arrays and not weight.startswith(_PREFIX):
+            layers[_layer(node.name)] = arrays[weight], arrays[bias[0]] if bias else None
+    return arrays, layers
+
+
+def _dequantised(
+    integers: np.ndarray, scale: np.ndarray, zero: np.ndarray, axis: int
+) -> np.ndarray:
+    """Return integers as numbers, with a scale and a zero point each along an axis, or of all."""
+    shape = [1] * integers.ndim
+    if scale.ndim:
+        shape[axis] = -1
+    return np.asarray(
+        (integers.astype(np.float32) - zero.astype(np.float32).reshape(shape))
+        * scale.reshape(shape)
+    )
+
+
+def _layer(node: str) -> str:
+    """Return the name of the layer of a node: ``/net/a/a.2/b/b.0/Conv`` is layer ``a.2.b.0``."""
+    parts = node.strip("/").split("/")[:-1]
+    inner = [
+        part
+        for part, after in zip(parts, [*parts[1:], ""], strict=True)
+        if not after.startswith(f"{part}.")
+    ]
+    return ".".join(inner).removeprefix(_PREFIX)
