@@ -143,6 +143,7 @@ def _weights(
     """Return the arrays by name, and weights and bias by layer of those that have no name."""
     graph = onnx.load(str(path)).graph
     arrays = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    quantised: set[str] = set()
     for node in graph.node:
         if not node.input or node.input[0] not in arrays:
             continue
@@ -151,11 +152,14 @@ def _weights(
         elif node.op_type == "Identity":  # two weights with the same numbers are stored once
             arrays[node.output[0]] = arrays[node.input[0]]
         elif node.op_type == "DequantizeLinear":  # weights in 8 bits
-            integers, scale, zero = (arrays.pop(name) for name in node.input)
+            integers, scale, zero = (arrays[name] for name in node.input)
+            quantised.update(node.input)
             name = node.output[0].removesuffix(_DEQUANTISED)
             axis = next((each.i for each in node.attribute if each.name == "axis"), 1)
             arrays[name] = _dequantised(integers, scale, zero, axis)
-    arrays = {name: array.astype(np.float32) for name, array in arrays.items()}
+    arrays = {
+        name: array.astype(np.float32) for name, array in arrays.items() if name not in quantised
+    }
     layers = {}
     for node in graph.node:
         if node.op_type not in ("Conv", "MatMul"):
