@@ -18,6 +18,8 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
+from .quantise import dequantised
+
 # Batches for the statistics of the normalisation.
 _BATCHES: Final = 16
 # Number of the first of them, beyond those that are trained on.
@@ -152,11 +154,8 @@ def _weights(
         elif node.op_type == "Identity":  # two weights with the same numbers are stored once
             arrays[node.output[0]] = arrays[node.input[0]]
         elif node.op_type == "DequantizeLinear":  # weights in 8 bits
-            integers, scale, zero = (arrays[name] for name in node.input)
             quantised.update(node.input)
-            name = node.output[0].removesuffix(_DEQUANTISED)
-            axis = next((each.i for each in node.attribute if each.name == "axis"), 1)
-            arrays[name] = _dequantised(integers, scale, zero, axis)
+            arrays[node.output[0].removesuffix(_DEQUANTISED)] = dequantised(node, arrays)
     arrays = {
         name: array.astype(np.float32) for name, array in arrays.items() if name not in quantised
     }
@@ -168,19 +167,6 @@ def _weights(
         if weight in arrays and not weight.startswith(_PREFIX):
             layers[_layer(node.name)] = arrays[weight], arrays[bias[0]] if bias else None
     return arrays, layers
-
-
-def _dequantised(
-    integers: np.ndarray, scale: np.ndarray, zero: np.ndarray, axis: int
-) -> np.ndarray:
-    """Return integers as numbers, with a scale and a zero point each along an axis, or of all."""
-    shape = [1] * integers.ndim
-    if scale.ndim:
-        shape[axis] = -1
-    return np.asarray(
-        (integers.astype(np.float32) - zero.astype(np.float32).reshape(shape))
-        * scale.reshape(shape)
-    )
 
 
 def _layer(node: str) -> str:

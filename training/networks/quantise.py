@@ -2,6 +2,7 @@
 
     awarenav render --frames 60 --range 1.5 6 --layouts aisles open blind_corner --out images
     python -m training.networks.quantise images --out build/int8
+    python -m training.networks.quantise --undo --out build/float
 
 The networks see the images as the pipeline shows them; the ranges of their activations come from
 that (static quantisation, QDQ, weights per channel). Convolutions and matrix products become
@@ -20,7 +21,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import cv2
+import numpy as np
 import onnx
+import onnx.numpy_helper
 import onnxruntime as ort
 from numpy.typing import NDArray
 from onnxruntime.quantization import (
@@ -151,6 +154,62 @@ def is_quantised(path: Path) -> bool:
     return any(node.op_type == "DequantizeLinear" for node in onnx.load(str(path)).graph.node)
 
 
+def in_floating_point(source: Path, out: Path) -> None:
+    """Write an 8-bit network in floating point, with its rounded weights.
+
+    Accelerators that take no activations with a zero point, such as TensorRT, need it.
+
+    Args:
+        source: file that :func:`quantise` wrote.
+        out: file to write.
+    """
+    model = onnx.load(str(source))
+    graph = model.graph
+    arrays = {each.name: onnx.numpy_helper.to_array(each) for each in graph.initializer}
+    known: dict[str, str] = {}  # tensors that are gone, and what stands for them
+    nodes, weights, gone = [], [], set()
+    for node in graph.node:
+        if node.op_type == "DequantizeLinear" and node.input[0] in arrays:
+            name = node.output[0]
+            array = dequantised(node, arrays)
+            weights.append(onnx.numpy_helper.from_array(array, name))
+            gone.update(node.input)
+        elif node.op_type == "DequantizeLinear":
+            known[node.output[0]] = known[node.input[0]]
+        elif node.op_type == "QuantizeLinear":
+            name = known.get(node.input[0], node.input[0])
+            known[node.output[0]] = name
+            if not arrays[node.input[2]].any():
+                # Integers from 0 on cut off what is negative: quantisation has left out the ReLU.
+                known[node.output[0]] = f"{node.output[0]}_relu"
+                nodes.append(onnx.helper.make_node("Relu", [name], [known[node.output[0]]]))
+            gone.update(node.input[1:])
+        else:
+            node.input[:] = [known.get(each, each) for each in node.input]
+            nodes.append(node)
+    kept = [each for each in graph.initializer if each.name not in gone]
+    del graph.node[:], graph.initializer[:], graph.value_info[:]
+    graph.node.extend(nodes)
+    graph.initializer.extend([*kept, *weights])
+    onnx.checker.check_model(model)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_bytes(model.SerializeToString(deterministic=True))
+
+
+def dequantised(node: onnx.NodeProto, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.float32]:
+    """Return the weights that a node reads, in floating point, from arrays by name.
+
+    They are integers with a scale and a zero point for each index along an axis, or for all.
+    """
+    integers, scale, zero = (arrays[name] for name in node.input)
+    axis = next((each.i for each in node.attribute if each.name == "axis"), 1)
+    shape = [1] * integers.ndim
+    if scale.ndim:
+        shape[axis] = -1
+    less = integers.astype(np.float32) - zero.astype(np.float32).reshape(shape)
+    return np.asarray(less * scale.reshape(shape), dtype=np.float32)
+
+
 def run_ms(path: Path, feeds: Sequence[Feeds]) -> float:
     """Return the processor milliseconds of a run on one thread, the shortest of 20."""
     model = OnnxModel(path, settings=OnnxSettings(intra_op_threads=1))
@@ -165,7 +224,9 @@ def run_ms(path: Path, feeds: Sequence[Feeds]) -> float:
 def main() -> None:
     """Quantise the networks that are not in 8 bits, and say how much faster they are."""
     parser = argparse.ArgumentParser(prog="python -m training.networks.quantise")
-    parser.add_argument("images", type=Path, help="folder that `awarenav render` wrote")
+    parser.add_argument(
+        "images", type=Path, nargs="?", help="folder that `awarenav render` wrote; not with --undo"
+    )
     parser.add_argument("--models", type=Path, help="folder of the networks (default: the shipped)")
     parser.add_argument("--out", type=Path, required=True, help="folder of the 8-bit networks")
     parser.add_argument(
@@ -173,13 +234,27 @@ def main() -> None:
         action="store_true",
         help="8 bits of weight in place of 7, for processors with VNNI or of Arm",
     )
+    parser.add_argument(
+        "--undo",
+        action="store_true",
+        help="write networks that have 8 bits in floating point, with their rounded weights, for "
+        "accelerators that take no activations with a zero point (TensorRT)",
+    )
     chosen = parser.parse_args()
+    if chosen.undo == (chosen.images is not None):
+        parser.error("name a folder of images, or --undo")
     paths = {
         name: shipped_model_path(name)
         if chosen.models is None
         else chosen.models / shipped_model_path(name).name
         for name in _NAMES
     }
+    if chosen.undo:
+        for path in paths.values():
+            out = chosen.out / path.name
+            in_floating_point(path, out)
+            print(f"{out}: in floating point")
+        return
     feeds = calibration_feeds(chosen.images, paths)
     for name, path in paths.items():
         out = chosen.out / path.name
