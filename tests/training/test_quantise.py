@@ -10,6 +10,7 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from perception.networks import OnnxModel
+from perception.networks.heads import OnnxHeadPoseEstimator
 from perception.shipped import DETECTOR, HEAD, POSE, shipped_model_path
 from training.networks.quantise import in_floating_point, is_quantised, quantise
 
@@ -102,6 +103,10 @@ def test_the_shipped_networks_have_8_bits_and_are_not_quantised_again(name, tmp_
     ]
     assert kernels
     assert max(int(np.abs(each.astype(int)).max()) for each in kernels) <= 64
+    sizes = {}
+    for tensor in model.graph.initializer:
+        sizes[tensor.data_type] = sizes.get(tensor.data_type, 0) + int(np.prod(tensor.dims))
+    assert sizes[TensorProto.INT8] > 0.9 * sum(sizes.values())
     with pytest.raises(ValueError, match="8 bits already"):
         quantise(path, [], tmp_path / "again.onnx")
     assert not (tmp_path / "again.onnx").exists()
@@ -126,6 +131,9 @@ def test_a_shipped_network_in_floating_point_is_nearly_the_same(name, tmp_path):
     in_floating_point(shipped.path, path)
     network = OnnxModel(path)
     assert network.metadata == shipped.metadata
+    if name == HEAD:
+        assert OnnxHeadPoseEstimator(shipped).layout.is_awarenav
+        assert OnnxHeadPoseEstimator(network).layout.is_awarenav
     (entry,) = shipped.inputs
     shape = [2 if not isinstance(n, int) else n for n in entry.shape]
     if name == DETECTOR:

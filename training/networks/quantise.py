@@ -144,9 +144,7 @@ def quantise(source: Path, feeds: Sequence[Feeds], out: Path, *, full_range: boo
     for key in sorted(metadata):
         entry = model.metadata_props.add()
         entry.key, entry.value = key, metadata[key]
-    onnx.checker.check_model(model)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_bytes(model.SerializeToString(deterministic=True))
+    _write(model, out)
 
 
 def is_quantised(path: Path) -> bool:
@@ -191,6 +189,11 @@ def in_floating_point(source: Path, out: Path) -> None:
     del graph.node[:], graph.initializer[:], graph.value_info[:]
     graph.node.extend(nodes)
     graph.initializer.extend([*kept, *weights])
+    _write(model, out)
+
+
+def _write(model: onnx.ModelProto, out: Path) -> None:
+    """Write a valid network; the same network gives the same file."""
     onnx.checker.check_model(model)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_bytes(model.SerializeToString(deterministic=True))
