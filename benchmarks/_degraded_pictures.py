@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from awarenav.records import Record
 from benchmarks._harness import add_seed, count
 from perception import AwarenessPipeline, Camera, HeadPoseEstimator
+from perception.confirmation import KeypointConfirmation
 from perception.networks import OnnxPersonDetector, OnnxPoseEstimator
 from perception.networks.heads import OnnxHeadPoseEstimator
 from perception.shipped import DETECTOR, HEAD, POSE, detector_input_size, load_shipped
@@ -232,14 +233,20 @@ def pipeline_of(
         head: another head pose estimator than the network.
         eye_in_head_std_rad: how far eyes wander; None takes the pipeline's default.
     """
-    options = {} if eye_in_head_std_rad is None else {"eye_in_head_std_rad": eye_in_head_std_rad}
+    options: dict[str, Any] = {}
+    if eye_in_head_std_rad is not None:
+        options["eye_in_head_std_rad"] = eye_in_head_std_rad
+    confirmation = KeypointConfirmation()
     return AwarenessPipeline(
         camera,
         OnnxPersonDetector(
-            load_shipped(DETECTOR, folder=folder), input_size_hw_px=detector_input_size(camera)
+            load_shipped(DETECTOR, folder=folder),
+            score_threshold=confirmation.detector_threshold,
+            input_size_hw_px=detector_input_size(camera),
         ),
         OnnxPoseEstimator(load_shipped(POSE, folder=folder)),
         OnnxHeadPoseEstimator(load_shipped(HEAD, folder=folder)) if head is None else head,
+        confirmation=confirmation,
         **options,
     )
 

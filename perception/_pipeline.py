@@ -4,34 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from ._attention import AttentionCone
 from ._camera import Camera
-from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
 from ._detection import PersonDetection
 from ._floor import FloorPlane
-from ._frame_time import FrameBudget, StageClock, StageTimings
+from ._frame_time import StageClock, StageTimings
 from ._head_pose import HeadPose
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import PersonObservation
+from ._people_finder import PeopleFinder, check_count
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
-from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator, ResizableDetector
+from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
 from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AwarenessEstimate, estimate_awareness
 from .body import middle_of_shanks, place_bodies
+from .confirmation import KeypointConfirmation
 from .depth_image import checked_depth
 from .errors import PerceptionError
 from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import OnnxSettings
-from .ownership import disowned_keypoints, without_disowned
 from .shipped import shipped_detector, shipped_head_pose_estimator, shipped_pose_estimator
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
@@ -77,6 +76,9 @@ class AwarenessPipeline:
         unusual_size_probability: probability in [0, 0.9] that a person has not the size of an adult
             who stands: a child, somebody bent or seated. 0 where only adults walk and stand: then
             5 % of range are left of unknown stature, which count as noise of each image.
+        confirmation: lets the scores of the keypoints confirm or refute detections; the detector
+            must then report its candidates. Default ``KeypointConfirmation()`` if detector and
+            pose estimator are the shipped ones, else none.
 
     Raises:
         PerceptionError: for an invalid value, or a shipped network that cannot be loaded.
@@ -100,6 +102,7 @@ class AwarenessPipeline:
         frame_budget_s: float | None = None,
         unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
         eye_estimator: EyeEstimator | None = None,
+        confirmation: KeypointConfirmation | None = None,
     ) -> None:
         if not isinstance(camera, Camera):
             raise PerceptionError(f"camera must be a Camera, got {type(camera).__name__}")
@@ -120,30 +123,26 @@ class AwarenessPipeline:
         self._eye_std_rad = _checked_eye_std(eye_in_head_std_rad)
         shipped_pose = pose_estimator is None
         if detector is None:
-            detector = shipped_detector(onnx_settings, camera)
+            if shipped_pose and confirmation is None:
+                confirmation = KeypointConfirmation()
+            threshold = 0.25 if confirmation is None else confirmation.detector_threshold
+            detector = shipped_detector(onnx_settings, camera, score_threshold=threshold)
         if pose_estimator is None:
             pose_estimator = shipped_pose_estimator(onnx_settings)
         if head_pose_estimator is None:
             head_pose_estimator = PnpHeadPoseEstimator(self._std_px, self._min_score)
             if shipped_pose:
                 head_pose_estimator = shipped_head_pose_estimator(onnx_settings)
-        self._detector: PersonDetector = detector
-        self._pose_estimator: PoseEstimator = pose_estimator
-        self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator
-        detect_every_s = finite_number(
-            "detect_every_s", detect_every_s, minimum=0.0, maximum=MAX_DETECT_EVERY_S
+        self._people = PeopleFinder(
+            camera,
+            detector,
+            pose_estimator,
+            self._min_score,
+            confirmation,
+            detect_every_s,
+            frame_budget_s,
         )
-        self._budget: FrameBudget | None = None
-        self._carrier: CarriedBoxes | None = None
-        if frame_budget_s is not None:
-            if detect_every_s > 0.0:
-                raise PerceptionError("give detect_every_s or frame_budget_s, got both")
-            finite_number("frame_budget_s", frame_budget_s, minimum=0.0, exclusive_minimum=True)
-            smaller = detector.smaller() if isinstance(detector, ResizableDetector) else ()
-            self._budget = FrameBudget(frame_budget_s, (1.0, *(share for _, share in smaller)))
-            self._carrier = CarriedBoxes((detector, *(d for d, _ in smaller)), 0.0, self._min_score)
-        elif detect_every_s > 0.0:
-            self._carrier = CarriedBoxes((detector,), detect_every_s, self._min_score)
+        self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator
         if eye_estimator is not None and not isinstance(eye_estimator, EyeEstimator):
             raise PerceptionError(
                 "eye_estimator must have the method estimate(image_rgb, camera, heads), got "
@@ -198,11 +197,11 @@ class AwarenessPipeline:
         elif depth_stamp_s is not None:
             raise PerceptionError("depth_stamp_s needs depth_m, got None")
         clock.count("rest")
-        detections, people, disowned = self._people(image_rgb, stamp_s, clock)
+        detections, people, disowned = self._people.find(image_rgb, stamp_s, clock)
         observations: tuple[PersonObservation, ...] = ()
         if detections:
             heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
-            _check_count("head_pose_estimator", len(heads), len(people))
+            check_count("head_pose_estimator", len(heads), len(people))
             eyes = self._eyes(image_rgb, heads)
             clock.count("head_pose")
             places = place_people(
@@ -221,30 +220,8 @@ class AwarenessPipeline:
                 stamp_s, detections, people, places, heads, eyes, estimates, reasons
             )
             clock.count("rest")
-        self._note(clock.timings())
+        self._timings = self._people.note(clock.timings())
         return observations
-
-    def _people(
-        self, image_rgb: ImageRgb, stamp_s: float, clock: StageClock
-    ) -> tuple[
-        tuple[PersonDetection, ...], tuple[PersonKeypoints, ...], list[AwarenessReason | None]
-    ]:
-        """Return detections, their keypoints, and why these are not the person's or None."""
-        if self._carrier is None:
-            detections = tuple(self._detector.detect(image_rgb))
-        else:
-            detections = self._carrier.detections(image_rgb, stamp_s)
-        clock.count("detector")
-        people, disowned = self._keypoints(image_rgb, detections)
-        if self._carrier is not None and not self._carrier.follow(detections, people, disowned):
-            # A carried box has lost its person: look at once.
-            clock.count("pose")
-            detections = self._carrier.detect(image_rgb)
-            clock.count("detector")
-            people, disowned = self._keypoints(image_rgb, detections)
-            self._carrier.follow(detections, people, disowned)
-        clock.count("pose")
-        return detections, people, disowned
 
     def _observations(
         self,
@@ -293,26 +270,6 @@ class AwarenessPipeline:
             "size_range_relative_std": place.size_range_relative_std,
         }
 
-    def _note(self, timings: StageTimings) -> None:
-        """Keep the times of a frame, and choose when the detector looks next."""
-        self._timings = timings
-        if self._budget is not None and self._carrier is not None:
-            self._timings = replace(timings, detector_share=self._budget.share)
-            looked = timings.detector_s if self._carrier.looked else None
-            self._budget.record(looked, timings.total_s - timings.detector_s)
-            self._carrier.every_s, self._carrier.size = self._budget.every_s, self._budget.size
-
-    def _keypoints(
-        self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
-    ) -> tuple[tuple[PersonKeypoints, ...], list[AwarenessReason | None]]:
-        """Return the keypoints of each detection, and why they are not the person's or None."""
-        if not detections:
-            return (), []
-        people = tuple(self._pose_estimator.estimate(image_rgb, detections))
-        _check_count("pose_estimator", len(people), len(detections))
-        disowned = disowned_keypoints(self.camera, detections, people, self._min_score)
-        return tuple(map(without_disowned, people, disowned)), disowned
-
     def _eyes(
         self, image_rgb: ImageRgb, heads: tuple[HeadPose | None, ...]
     ) -> tuple[EyeGaze | None, ...]:
@@ -320,7 +277,7 @@ class AwarenessPipeline:
         if self._eye_estimator is None:
             return (None,) * len(heads)
         measured = tuple(self._eye_estimator.estimate(image_rgb, self.camera, heads))
-        _check_count("eye_estimator", len(measured), len(heads))
+        check_count("eye_estimator", len(measured), len(heads))
         return known_eyes(measured, self._eye_std_rad)
 
     def _awareness(
@@ -379,11 +336,6 @@ def _gaze(head: HeadPose, eyes: EyeGaze | None) -> FloatArray:
     if eyes is None:
         return head.gaze_camera
     return np.asarray(head.rotation_camera_head @ eyes.rotation_head_eyes[:, 1])
-
-
-def _check_count(name: str, got: int, wanted: int) -> None:
-    if got != wanted:
-        raise PerceptionError(f"{name} must return one result per person ({wanted}), got {got}")
 
 
 def _checked_floor(floor: Any) -> FloorPlane | None:

@@ -17,6 +17,7 @@ from perception import (
     PnpHeadPoseEstimator,
     PoseEstimator,
 )
+from perception.confirmation import KeypointConfirmation
 from perception.networks import (
     MediaPipeEyeEstimator,
     MediaPipePoseEstimator,
@@ -124,13 +125,17 @@ def choose_networks(
     if head == "auto":
         head = "network" if pose == SHIPPED else _WITHOUT_NETWORK
     settings = OnnxSettings(((provider, parse_provider_options(provider_options)),), threads)
+    options: dict[str, Any] = {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s}
+    if (detector, pose) == (SHIPPED, SHIPPED):
+        confirmation = KeypointConfirmation(score_threshold=min_score)
+        options["confirmation"] = confirmation
+        min_score = confirmation.detector_threshold
     detector_used, detector_domain = _detector(detector, min_score, settings)
     pose_used, pose_domain = _pose(pose, settings)
     head_used, head_domain = _head(head, settings)
     domains = {"detector": detector_domain, "pose": pose_domain}
     if head != _WITHOUT_NETWORK:
         domains["head"] = head_domain
-    options: dict[str, Any] = {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s}
     if eyes == _MEDIAPIPE:
         options["eye_estimator"] = MediaPipeEyeEstimator()
     return Networks(detector_used, pose_used, head_used, options, training_domains=domains)

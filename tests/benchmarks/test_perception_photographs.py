@@ -91,10 +91,10 @@ def test_a_picture_of_noise_has_nobody_and_gets_a_sheet(tmp_path, capsys):
 
 @pytest.mark.skipif(not DEV.is_dir(), reason="the photographs of ../shared are not here")
 def test_the_shipped_networks_on_photographs_are_measured_as_they_are():
-    """The networks know renders: the test holds the measurement together, not their quality."""
+    """The networks know renders; keypoints confirm what the detector is unsure of."""
     results = judge_folder(DEV)
     found = figures(results)
     assert (found["people"], found["pictures"]) == (19, 14)
-    assert 0.2 < found["recall"] <= 1.0
-    assert 0.0 <= found["false_per_picture"] < 3.0
+    assert found["recall"] > 0.6
+    assert found["false_per_picture"] <= 0.3
     assert sheet(DEV, results).shape == (1920, 1920, 3)

@@ -328,10 +328,10 @@ def test_a_budget_lets_the_detector_look_more_often_again(monkeypatch):
     monkeypatch.setattr("perception._frame_time.perf_counter", lambda: world.clock_s)
     pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
     world.run_on_clock(pipe, 1.5)
-    assert pipe._carrier.every_s > 0.1
+    assert pipe._people._carrier.every_s > 0.1
     world.detector_s, world.pose_s = 0.01, 0.01
     world.run_on_clock(pipe, 6.0)
-    assert pipe._carrier.every_s == 0.0
+    assert pipe._people._carrier.every_s == 0.0
 
 
 def test_a_budget_between_two_intervals_does_not_swing():
@@ -366,12 +366,12 @@ def test_where_seldom_looks_are_not_enough_the_input_gets_smaller(monkeypatch):
     pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
     assert pipe.last_timings.detector_share == 1.0
     world.run_on_clock(pipe, 2.0)
-    assert pipe._carrier.every_s == 0.2
+    assert pipe._people._carrier.every_s == 0.2
     assert pipe.last_timings.detector_share == 0.5
     world.detector_s, world.pose_s = 0.04, 0.02
     world.run_on_clock(pipe, 6.0)
     assert pipe.last_timings.detector_share == 1.0
-    assert pipe._carrier.every_s > 0.0
+    assert pipe._people._carrier.every_s > 0.0
 
 
 def test_the_input_gets_no_smaller_while_the_interval_can_grow():

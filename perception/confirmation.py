@@ -1,0 +1,153 @@
+"""Confirmation of people by their keypoints: a second network's word on what the detector found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from . import layouts as kp
+from ._detection import PersonDetection
+from ._keypoints import PersonKeypoints
+from .arrays import FloatArray, finite_number, set_fields
+from .evidence import AwarenessReason
+
+# Logarithm of the odds below which the other end counts: scores of 0 and 1 have none.
+_LEAST_PROBABILITY: Final = 1e-4
+# A box of which more lies within another shows a part of that person.
+_MOSTLY: Final = 0.6
+_ANOTHERS: Final = ("skeleton of another person", "head of another person")
+
+
+@dataclass(frozen=True, slots=True)
+class KeypointConfirmation:
+    """How the keypoints' scores change the score of a detection.
+
+    A detector that has learned from few kinds of pictures is unsure on others. Its pose network
+    then still tells a body from a chair: the peaks of its keypoints are high and narrow. So weak
+    detections become candidates, and the odds of each one are multiplied by those of its keypoints:
+
+        logit(score) = logit(detector's score) + weight (logit(keypoints) - logit(neutral))
+
+    where ``keypoints`` is the mean of the thirteen best scores of the seventeen of the body. Four
+    may be hidden. Nobody is found twice: a candidate that the detector alone would not report must
+    have a skeleton of its own (:func:`~perception.ownership.disowned_keypoints`) and may not lie
+    within a better one, of which it then shows a part; one that is not certain may not lie within
+    a better one whose skeleton or head it shares.
+
+    The defaults are made for the shipped detector with the shipped pose network. Scores of other
+    networks mean something else.
+
+    Attributes:
+        score_threshold: people with a lower score are dropped.
+        candidate_score: detector's score from which on a detection is a candidate, in
+            (0, ``score_threshold``].
+        certain_score: detector's score from which on a person is kept whatever the keypoints say:
+            of somebody half hidden few are seen.
+        weight: of the keypoints' odds, ≥ 0.
+        neutral: mean of the keypoints' scores that leaves a detection's score as it is, in (0, 1).
+        most: number of candidates below ``score_threshold`` that are looked at, the best first;
+            each costs a run of the pose network.
+
+    Raises:
+        PerceptionError: for a value outside its range.
+    """
+
+    score_threshold: float = 0.25
+    candidate_score: float = 0.05
+    certain_score: float = 0.4
+    weight: float = 3.0
+    neutral: float = 0.4
+    most: int = 8
+
+    def __post_init__(self) -> None:
+        threshold = finite_number("score_threshold", self.score_threshold, minimum=0.0, maximum=1.0)
+        set_fields(
+            self,
+            score_threshold=threshold,
+            candidate_score=finite_number(
+                "candidate_score", self.candidate_score, minimum=0.0, maximum=1.0
+            ),
+            certain_score=finite_number(
+                "certain_score", self.certain_score, minimum=0.0, maximum=1.0
+            ),
+            weight=finite_number("weight", self.weight, minimum=0.0),
+            neutral=finite_number("neutral", self.neutral, minimum=0.01, maximum=0.99),
+            most=int(finite_number("most", self.most, minimum=0.0, maximum=1000.0)),
+        )
+
+    @property
+    def detector_threshold(self) -> float:
+        """The score threshold that the detector must have, so that candidates are found."""
+        return min(self.candidate_score, self.score_threshold)
+
+    def candidates(self, detections: Sequence[PersonDetection]) -> tuple[PersonDetection, ...]:
+        """Return the detections whose keypoints are worth a look, in their order."""
+        weak = [each.score for each in detections if each.score < self.score_threshold]
+        if len(weak) <= self.most:
+            return tuple(detections)
+        least = sorted(weak, reverse=True)[self.most - 1] if self.most else self.score_threshold
+        return tuple(each for each in detections if each.score >= least)
+
+    def score(self, detection: PersonDetection, person: PersonKeypoints) -> float:
+        """Return the score of a detection with its keypoints, in [0, 1]."""
+        best = np.sort(person.scores[kp.BODY])[4:]
+        odds = _logit(float(best.mean())) - _logit(self.neutral)
+        score = 1.0 / (1.0 + math.exp(-_logit(detection.score) - self.weight * odds))
+        if detection.score >= self.certain_score:
+            score = max(score, min(detection.score, self.score_threshold))
+        return score
+
+    def confirmed(
+        self,
+        detections: Sequence[PersonDetection],
+        people: Sequence[PersonKeypoints],
+        disowned: Sequence[AwarenessReason | None],
+    ) -> tuple[list[int], tuple[PersonDetection, ...]]:
+        """Return the rows of the detections that are people, and these with their new scores.
+
+        Args:
+            detections: of the detector.
+            people: their keypoints.
+            disowned: why the keypoints are not theirs, or None.
+        """
+        scores = [self.score(*pair) for pair in zip(detections, people, strict=True)]
+        kept: list[int] = []
+        for row in sorted(range(len(scores)), key=lambda each: -scores[each]):
+            if scores[row] < self.score_threshold:
+                break
+            box = detections[row].box_xyxy_px
+            within = max(
+                (_share_within(box, detections[each].box_xyxy_px) for each in kept), default=0.0
+            )
+            is_part = within > _MOSTLY
+            if detections[row].score < self.score_threshold:
+                drop = is_part or disowned[row] is not None
+            elif detections[row].score < self.certain_score:
+                drop = is_part and disowned[row] in _ANOTHERS
+            else:
+                drop = False
+            if not drop:
+                kept.append(row)
+        kept.sort()
+        return kept, tuple(
+            PersonDetection(detections[row].box_xyxy_px, scores[row]) for row in kept
+        )
+
+
+def _share_within(box: FloatArray, other: FloatArray) -> float:
+    """Return the share of a box (4,) that lies within another."""
+    left, top, right, bottom = box.tolist()
+    low_u, low_v, high_u, high_v = other.tolist()
+    across = max(min(right, high_u) - max(left, low_u), 0.0)
+    down = max(min(bottom, high_v) - max(top, low_v), 0.0)
+    return float(across * down / max((right - left) * (bottom - top), 1e-9))
+
+
+def _logit(probability: float) -> float:
+    """Return the logarithm of the odds, finite for 0 and 1 too."""
+    within = min(max(probability, _LEAST_PROBABILITY), 1.0 - _LEAST_PROBABILITY)
+    return math.log(within / (1.0 - within))

@@ -1,0 +1,180 @@
+"""Keypoints confirm or refute what the detector found."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from synthetic_people import person_at
+
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    PerceptionError,
+    PersonDetection,
+    PersonKeypoints,
+    PnpHeadPoseEstimator,
+)
+from perception.confirmation import KeypointConfirmation
+from perception.shipped import shipped_detector, shipped_pose_estimator
+
+CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+FRAME = np.zeros((480, 640, 3), np.uint8)
+RULE = KeypointConfirmation()
+probabilities = st.floats(0.0, 1.0)
+
+
+def detection(score, box=(10.0, 10.0, 60.0, 200.0)):
+    return PersonDetection(np.array(box), score)
+
+
+def keypoints(*scores):
+    """Keypoints with 17 scores, or one for all of them."""
+    values = np.full(17, scores[0]) if len(scores) == 1 else np.array(scores)
+    return PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), values, "coco")
+
+
+@given(probabilities)
+def test_neutral_keypoints_leave_the_score_as_it_is(score):
+    assert RULE.score(detection(score), keypoints(RULE.neutral)) == pytest.approx(score, abs=2e-4)
+
+
+@given(probabilities, probabilities, probabilities, probabilities)
+def test_the_score_grows_with_the_detectors_and_with_the_keypoints(first, second, low, high):
+    first, second = sorted((first, second))
+    low, high = sorted((low, high))
+    least = RULE.score(detection(first), keypoints(low))
+    assert 0.0 <= least <= RULE.score(detection(second), keypoints(low)) <= 1.0
+    assert least <= RULE.score(detection(first), keypoints(high))
+
+
+@given(probabilities, st.floats(0.01, 0.99), st.floats(0.0, 6.0))
+def test_the_odds_are_multiplied(score, seen, weight):
+    rule = KeypointConfirmation(certain_score=1.0, weight=weight)
+    found = rule.score(detection(min(max(score, 0.01), 0.99)), keypoints(seen))
+
+    def odds(probability):
+        return probability / (1.0 - probability)
+
+    wanted = odds(min(max(score, 0.01), 0.99)) * (odds(seen) / odds(rule.neutral)) ** weight
+    assert found == pytest.approx(wanted / (1.0 + wanted), rel=1e-6, abs=1e-9)
+
+
+def test_four_hidden_keypoints_do_not_count():
+    half = keypoints(*[0.0] * 4, *[0.8] * 13)
+    assert RULE.score(detection(0.3), half) == RULE.score(detection(0.3), keypoints(0.8))
+
+
+@given(st.floats(RULE.certain_score, 1.0), probabilities)
+def test_a_certain_detection_is_kept_whatever_the_keypoints_say(score, seen):
+    pair = [detection(score)], [keypoints(seen)]
+    rows, (kept,) = RULE.confirmed(*pair, [None])
+    assert rows == [0]
+    assert kept.score >= RULE.score_threshold
+
+
+def test_candidates_of_the_detector_need_good_keypoints_of_their_own():
+    found = [detection(0.1, (100.0 * k, 0.0, 100.0 * k + 50.0, 200.0)) for k in range(3)]
+    people = [keypoints(0.8), keypoints(0.3), keypoints(0.8)]
+    rows, kept = RULE.confirmed(found, people, [None, None, "no body has such limbs"])
+    assert rows == [0]
+    assert kept[0].score == RULE.score(found[0], people[0]) > 0.5
+    # What the detector reports by itself stays without an owner of its skeleton, as before.
+    strong = [detection(0.3)]
+    assert RULE.confirmed(strong, [keypoints(0.8)], ["no body has such limbs"])[0] == [0]
+
+
+def test_a_part_of_a_better_person_is_nobody_of_its_own():
+    whole = detection(0.6, (100.0, 100.0, 200.0, 400.0))
+    trunk = (120.0, 110.0, 190.0, 250.0)
+    good = [keypoints(0.7), keypoints(0.7)]
+    assert RULE.confirmed([detection(0.1, trunk), whole], good, [None, None])[0] == [1]
+    assert RULE.confirmed([whole, detection(0.3, trunk)], good, [None, None])[0] == [0, 1]
+    shared = [None, "head of another person"]
+    assert RULE.confirmed([whole, detection(0.3, trunk)], good, shared)[0] == [0]
+    assert RULE.confirmed([whole, detection(0.5, trunk)], good, shared)[0] == [0, 1]
+    beside = detection(0.1, (180.0, 100.0, 280.0, 400.0))
+    assert RULE.confirmed([whole, beside], good, [None, None])[0] == [0, 1]
+
+
+@given(st.lists(probabilities, max_size=30), st.integers(0, 10))
+def test_only_the_best_candidates_cost_a_run(scores, most):
+    rule = KeypointConfirmation(most=most)
+    found = [detection(score) for score in scores]
+    looked_at = [each.score for each in rule.candidates(found)]
+    strong = [score for score in scores if score >= rule.score_threshold]
+    weak = sorted((s for s in scores if s < rule.score_threshold), reverse=True)
+    assert [score for score in looked_at if score >= rule.score_threshold] == strong
+    kept = sorted((s for s in looked_at if s < rule.score_threshold), reverse=True)
+    assert kept == weak[: len(kept)]
+    assert len(kept) >= min(most, len(weak))
+    # Equal scores are all looked at.
+    assert len(kept) <= most or kept[-1] == weak[most - 1]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"score_threshold": 1.5}, "score_threshold"),
+        ({"candidate_score": float("nan")}, "candidate_score"),
+        ({"weight": -1.0}, "weight"),
+        ({"neutral": 0.0}, "neutral"),
+        ({"most": -1}, "most"),
+    ],
+)
+def test_bad_values_are_refused(values, message):
+    with pytest.raises(PerceptionError, match=message):
+        KeypointConfirmation(**values)
+
+
+class Weak:
+    """A detector with one weak box, and a pose network that sees a person in it, or nothing."""
+
+    def __init__(self, score, seen):
+        self.person = person_at((0.2, 0.4, 3.0))
+        self.box_score, self.seen = score, seen
+        self.looks = 0
+
+    def detect(self, image_rgb):
+        self.looks += 1
+        pixels = CAMERA.project(self.person.points_camera_m)
+        box = np.r_[pixels.min(axis=0) - 8.0, pixels.max(axis=0) + 8.0]
+        return (PersonDetection(np.clip(box, 0, (640, 480, 640, 480)), self.box_score),)
+
+    def estimate(self, image_rgb, detections):
+        rng = np.random.default_rng(0)
+        return tuple(
+            self.person.keypoints(CAMERA, 0.5, rng, seen=np.full(17, self.seen)) for _ in detections
+        )
+
+
+def pipeline_of(world, **options):
+    return AwarenessPipeline(CAMERA, world, world, PnpHeadPoseEstimator(), **options)
+
+
+def test_a_pipeline_reports_confirmed_people_alone_and_with_their_new_score():
+    (one,) = pipeline_of(Weak(0.1, 0.8), confirmation=RULE).process(FRAME, 0.0)
+    assert one.score == pytest.approx(RULE.score(detection(0.1), keypoints(0.8)))
+    assert one.awareness is not None
+    assert pipeline_of(Weak(0.1, 0.35), confirmation=RULE).process(FRAME, 0.0) == ()
+    # Without the rule a detector's word is final.
+    (other,) = pipeline_of(Weak(0.1, 0.35)).process(FRAME, 0.0)
+    assert other.score == 0.1
+
+
+def test_a_carried_box_is_not_judged_again():
+    world = Weak(0.1, 0.8)
+    pipe = pipeline_of(world, confirmation=RULE, detect_every_s=0.2)
+    scores = [pipe.process(FRAME, 0.05 * step)[0].score for step in range(8)]
+    assert world.looks < 8
+    assert scores == pytest.approx([scores[0]] * 8)
+
+
+def test_the_shipped_detector_is_confirmed_by_the_shipped_pose_network_only():
+    whole = AwarenessPipeline(CAMERA)
+    assert whole._people._confirmation == RULE
+    own_pose = AwarenessPipeline(CAMERA, pose_estimator=shipped_pose_estimator())
+    assert own_pose._people._confirmation is None
+    own_detector = AwarenessPipeline(CAMERA, shipped_detector())
+    assert own_detector._people._confirmation is None
