@@ -24,7 +24,7 @@ _ANOTHERS: Final = ("skeleton of another person", "head of another person")
 
 @dataclass(frozen=True, slots=True)
 class KeypointConfirmation:
-    """How the keypoints' scores change the score of a detection.
+    """The rule by which the keypoints' scores change the score of a detection.
 
     A detector that has learned from few kinds of pictures is unsure on others. Its pose network
     then still tells a body from a chair: the peaks of its keypoints are high and narrow. So weak
