@@ -12,7 +12,7 @@ from ._frame_time import FrameBudget, StageClock, StageTimings
 from ._keypoints import PersonKeypoints
 from ._protocols import PersonDetector, PoseEstimator, ResizableDetector
 from .arrays import ImageRgb, finite_number
-from .confirmation import KeypointConfirmation
+from .confirmation import KeypointConfirmation, keypoint_score
 from .errors import PerceptionError
 from .evidence import AwarenessReason
 from .ownership import disowned_keypoints, without_disowned
@@ -118,14 +118,52 @@ class PeopleFinder:
             detections = confirmation.candidates(detections)
         if not detections:
             return FoundPeople((), (), [])
-        people = tuple(self._pose.estimate(image_rgb, detections))
-        check_count("pose_estimator", len(people), len(detections))
+        people = self._keypoints(image_rgb, detections)
         disowned = disowned_keypoints(self._camera, detections, people, self._min_score)
         if confirmation is not None:
+            detections, people, disowned = self._grown(
+                image_rgb, FoundPeople(detections, people, disowned), confirmation
+            )
             rows, detections = confirmation.confirmed(detections, people, disowned)
             people = tuple(people[row] for row in rows)
             disowned = [disowned[row] for row in rows]
         return FoundPeople(detections, tuple(map(without_disowned, people, disowned)), disowned)
+
+    def _grown(
+        self, image_rgb: ImageRgb, found: FoundPeople, confirmation: KeypointConfirmation
+    ) -> FoundPeople:
+        """Return the people with boxes that have grown to their keypoints, where that is better.
+
+        It is better if the keypoints in the new box have a higher score, and if the person does
+        not lose them to another one.
+        """
+        height, width = image_rgb.shape[:2]
+        grown = {
+            row: larger
+            for row, pair in enumerate(zip(found.detections, found.keypoints, strict=True))
+            if (larger := confirmation.grown(*pair, (width, height), self._min_score)) is not None
+        }
+        if not grown:
+            return found
+        again = self._keypoints(image_rgb, tuple(grown.values()))
+        detections, people = list(found.detections), list(found.keypoints)
+        for (row, larger), person in zip(grown.items(), again, strict=True):
+            if keypoint_score(person) >= keypoint_score(people[row]):
+                detections[row], people[row] = larger, person
+        disowned = disowned_keypoints(self._camera, detections, people, self._min_score)
+        lost = [row for row in grown if disowned[row] is not None and found.disowned[row] is None]
+        if lost:
+            for row in lost:
+                detections[row], people[row] = found.detections[row], found.keypoints[row]
+            disowned = disowned_keypoints(self._camera, detections, people, self._min_score)
+        return FoundPeople(tuple(detections), tuple(people), disowned)
+
+    def _keypoints(
+        self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
+    ) -> tuple[PersonKeypoints, ...]:
+        people = tuple(self._pose.estimate(image_rgb, detections))
+        check_count("pose_estimator", len(people), len(detections))
+        return people
 
 
 def check_count(name: str, got: int, wanted: int) -> None:

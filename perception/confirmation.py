@@ -19,6 +19,13 @@ from .evidence import AwarenessReason
 _LEAST_PROBABILITY: Final = 1e-4
 # A box of which more lies within another shows a part of that person.
 _MOSTLY: Final = 0.6
+# A box that the detector is less sure of than this often shows a part of a person. It grows to the
+# keypoints with a margin (a share of their larger extent), if so many are seen and it grows by more
+# than this share of a side.
+_WHOLE_SCORE: Final = 0.6
+_MARGIN: Final = 0.06
+_FEWEST_SEEN: Final = 6
+_LEAST_GROWTH: Final = 0.1
 _ANOTHERS: Final = ("skeleton of another person", "head of another person")
 
 
@@ -94,12 +101,45 @@ class KeypointConfirmation:
 
     def score(self, detection: PersonDetection, person: PersonKeypoints) -> float:
         """Return the score of a detection with its keypoints, in [0, 1]."""
-        best = np.sort(person.scores[kp.BODY])[4:]
-        odds = _logit(float(best.mean())) - _logit(self.neutral)
+        odds = _logit(keypoint_score(person)) - _logit(self.neutral)
         score = 1.0 / (1.0 + math.exp(-_logit(detection.score) - self.weight * odds))
         if detection.score >= self.certain_score:
             score = max(score, min(detection.score, self.score_threshold))
         return score
+
+    def grown(
+        self,
+        detection: PersonDetection,
+        person: PersonKeypoints,
+        size_wh_px: tuple[int, int],
+        min_score: float,
+    ) -> PersonDetection | None:
+        """Return the box with the keypoints that lie outside it; None if it is large enough.
+
+        Args:
+            detection: of the detector.
+            person: its keypoints, which are searched beyond the box too.
+            size_wh_px: width and height of the image.
+            min_score: keypoints with a lower score count as not seen.
+        """
+        if detection.score >= _WHOLE_SCORE:
+            return None
+        shown = person.keypoints_px[kp.BODY][person.scores[kp.BODY] >= min_score]
+        if len(shown) < _FEWEST_SEEN:
+            return None
+        low, high = shown.min(axis=0), shown.max(axis=0)
+        margin = _MARGIN * float((high - low).max())
+        box = detection.box_xyxy_px
+        grown = np.concatenate(
+            [np.minimum(box[:2], low - margin), np.maximum(box[2:], high + margin)]
+        )
+        grown = np.clip(grown, 0.0, np.tile(size_wh_px, 2))
+        # A box that reaches beyond the image is not made smaller.
+        grown[:2], grown[2:] = np.minimum(grown[:2], box[:2]), np.maximum(grown[2:], box[2:])
+        sides = np.tile(np.maximum(box[2:] - box[:2], 1e-9), 2)
+        if (np.abs(grown - box) / sides).max() <= _LEAST_GROWTH:
+            return None
+        return PersonDetection(grown, detection.score)
 
     def confirmed(
         self,
@@ -136,6 +176,11 @@ class KeypointConfirmation:
         return kept, tuple(
             PersonDetection(detections[row].box_xyxy_px, scores[row]) for row in kept
         )
+
+
+def keypoint_score(person: PersonKeypoints) -> float:
+    """Return the mean of the thirteen best scores of the body's seventeen keypoints."""
+    return float(np.sort(person.scores[kp.BODY])[4:].mean())
 
 
 def _share_within(box: FloatArray, other: FloatArray) -> float:

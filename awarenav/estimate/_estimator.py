@@ -71,12 +71,15 @@ class RecordingPoseEstimator:
     def __init__(self, estimator: PoseEstimator) -> None:
         self._estimator = estimator
         self._last: dict[bytes, PersonKeypoints] = {}
+        # A pipeline looks again at boxes that have grown, and keeps those that have not.
+        self._before: dict[bytes, PersonKeypoints] = {}
 
     def estimate(
         self, image_rgb: NDArray[np.uint8], detections: tuple[PersonDetection, ...]
     ) -> tuple[PersonKeypoints, ...]:
         """Return the keypoints from the other estimator."""
         people = tuple(self._estimator.estimate(image_rgb, detections))
+        self._before = self._last
         self._last = {
             detection.box_xyxy_px.tobytes(): person
             for detection, person in zip(detections, people, strict=False)
@@ -85,12 +88,15 @@ class RecordingPoseEstimator:
 
     def forget(self) -> None:
         """Forget the last image; without a detection, :meth:`estimate` is not called for it."""
-        self._last = {}
+        self._last, self._before = {}, {}
 
     def keypoints_of(self, observation: PersonObservation) -> PersonKeypoints | None:
         """Return the keypoints of an observation in the last image, found by its box."""
         box = observation.box_xyxy_px
-        return None if box is None else self._last.get(box.tobytes())
+        if box is None:
+            return None
+        key = box.tobytes()
+        return self._last.get(key) or self._before.get(key)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -163,6 +163,101 @@ def test_a_pipeline_reports_confirmed_people_alone_and_with_their_new_score():
     assert other.score == 0.1
 
 
+class Cut(Weak):
+    """A detector whose box ends below the shoulders; the pose network sees the whole person."""
+
+    def __init__(self, score, seen, regrown=None):
+        super().__init__(score, seen)
+        self.boxes = []
+        self.regrown = seen if regrown is None else regrown
+
+    def detect(self, image_rgb):
+        (whole,) = super().detect(image_rgb)
+        left, top, right, bottom = whole.box_xyxy_px
+        box = np.array([left, 0.6 * top + 0.4 * bottom, right, bottom])
+        return (PersonDetection(box, whole.score),)
+
+    def estimate(self, image_rgb, detections):
+        self.boxes += [each.box_xyxy_px for each in detections]
+        self.seen = self.seen if len(self.boxes) == 1 else self.regrown
+        return super().estimate(image_rgb, detections)
+
+
+def test_an_unsure_box_grows_to_the_keypoints_beyond_it():
+    world = Cut(0.3, 0.8)
+    (one,) = pipeline_of(world, confirmation=RULE).process(FRAME, 0.0)
+    before, after = world.boxes
+    assert one.box_xyxy_px.tolist() == after.tolist()
+    assert after[1] < before[1] - 50.0
+    assert after[3] >= before[3]
+    head = CAMERA.project(world.person.points_camera_m)[:5]
+    assert after[1] <= head[:, 1].min()
+
+
+def test_a_grown_box_must_be_better_and_sure_boxes_stay():
+    worse = Cut(0.3, 0.8, regrown=0.7)
+    (one,) = pipeline_of(worse, confirmation=RULE).process(FRAME, 0.0)
+    assert one.box_xyxy_px.tolist() == worse.boxes[0].tolist()
+    sure = Cut(0.7, 0.8)
+    pipeline_of(sure, confirmation=RULE).process(FRAME, 0.0)
+    assert len(sure.boxes) == 1
+    without = Cut(0.3, 0.8)
+    pipeline_of(without).process(FRAME, 0.0)
+    assert len(without.boxes) == 1
+
+
+@given(
+    st.lists(st.tuples(st.floats(-50.0, 700.0), st.floats(-50.0, 500.0)), min_size=17, max_size=17),
+    st.integers(0, 17),
+)
+def test_a_grown_box_holds_the_old_one_and_stays_in_the_image(points, hidden):
+    scores = np.r_[np.zeros(hidden), np.full(17 - hidden, 0.8)]
+    person = PersonKeypoints(np.array(points), np.zeros((17, 3)), scores, "coco")
+    old = detection(0.3, (100.0, 100.0, 200.0, 400.0))
+    new = RULE.grown(old, person, (640, 480), 0.3)
+    if 17 - hidden < 6:
+        assert new is None
+    if new is not None:
+        assert (new.box_xyxy_px[:2] <= old.box_xyxy_px[:2]).all()
+        assert (new.box_xyxy_px[2:] >= old.box_xyxy_px[2:]).all()
+        assert (new.box_xyxy_px >= 0.0).all()
+        assert (new.box_xyxy_px <= [640, 480, 640, 480]).all()
+        assert new.score == old.score
+
+
+def test_two_people_do_not_become_one_where_a_box_grows():
+    """The pose network finds the other, better seen person in the grown box."""
+
+    class Neighbours(Weak):
+        calls = 0
+
+        def detect(self, image_rgb):
+            pixels = [CAMERA.project(each.points_camera_m) for each in self.people]
+            boxes = [np.r_[p.min(axis=0) - 4.0, p.max(axis=0) + 4.0] for p in pixels]
+            boxes[1][0] += 0.5 * (boxes[1][2] - boxes[1][0])
+            return tuple(
+                PersonDetection(np.clip(box, 0, (640, 480, 640, 480)), score)
+                for box, score in zip(boxes, (0.9, 0.45), strict=True)
+            )
+
+        def estimate(self, image_rgb, detections):
+            rng = np.random.default_rng(0)
+            self.calls += 1
+            rows = (0, 1) if self.calls == 1 else (0,)
+            scores = (0.9, 0.6) if self.calls == 1 else (0.9,)
+            return tuple(
+                self.people[row].keypoints(CAMERA, 0.5, rng, seen=np.full(17, score))
+                for row, score in zip(rows, scores, strict=True)
+            )
+
+    world = Neighbours(0.0, 0.0)
+    world.people = [person_at((-0.2, 0.4, 3.0)), person_at((0.5, 0.4, 3.2))]
+    two = pipeline_of(world, confirmation=RULE).process(FRAME, 0.0)
+    assert world.calls == 2
+    assert len(two) == 2
+    assert all(each.awareness is not None for each in two)
+
+
 def test_a_carried_box_is_not_judged_again():
     world = Weak(0.1, 0.8)
     pipe = pipeline_of(world, confirmation=RULE, detect_every_s=0.2)
