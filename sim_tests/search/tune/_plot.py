@@ -82,8 +82,9 @@ def _draw_front(axes: Axes, tuning: Tuning) -> None:
         )
     settings = tuning.settings
     axes.set_title(
-        f"{counted(len(tuning.trials), 'trial')}, {counted(settings.episodes, 'seed')} in "
-        f"{counted(len(settings.scenarios), 'scenario')} each",
+        f"{counted(len(tuning.trials), 'trial')} in "
+        f"{counted(len(settings.tuning_templates), 'scenario')}, "
+        f"{counted(settings.episodes, 'seed')} each unless it ended early",
         loc="left",
         fontsize=10,
     )
@@ -100,5 +101,8 @@ def _draw_importances(axes: Axes, objective: str, importance: Mapping[str, float
     axes.barh(names, values, color=_FRONT)
     axes.set_title(f"what decided {objective.replace('_', ' ')[:-2]}", loc="left", fontsize=10)
     axes.tick_params(labelsize=8)
+    if not any(values):
+        axes.set_axis_off()
+        axes.text(0.0, 0.9, "nothing: all trials are equal", transform=axes.transAxes, va="top")
     axes.set_xlim(0.0, max(1e-9, *values) * 1.1 if any(values) else 1.0)
     axes.grid(alpha=0.25, axis="x")
