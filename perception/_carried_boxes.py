@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import layouts as kp
+from ._boxes import area, common_area, extent, iou
 from ._detection import PersonDetection
 from ._keypoints import PersonKeypoints
 from ._protocols import PersonDetector
@@ -154,13 +155,13 @@ class CarriedBoxes:
                 wanted = last.wanted
             if count < wanted:
                 return not self._carrying
-            extent = _extent(points, seen)
-            margins = detection.box_xyxy_px - extent
+            around = extent(points, seen)
+            margins = detection.box_xyxy_px - around
             if self._carrying and last is not None:
                 margins = last.margins_px
             carried.append(
                 _Carried(
-                    extent + margins,
+                    around + margins,
                     margins,
                     points,
                     seen,
@@ -171,12 +172,6 @@ class CarriedBoxes:
             )
         self._people = carried
         return True
-
-
-def _extent(points: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
-    """Return left, top, right, bottom (4,) of the seen points."""
-    shown = points[seen]
-    return np.concatenate([shown.min(axis=0), shown.max(axis=0)])
 
 
 def _velocity(
@@ -200,31 +195,15 @@ def _moved(person: _Carried, gap_s: float, shape: tuple[int, ...]) -> FloatArray
 
 def _same(people: Sequence[_Carried], box: FloatArray) -> _Carried | None:
     """Return the person whose box is that of a detection."""
-    best = max(people, key=lambda person: _iou(person.box_px, box), default=None)
-    return best if best is not None and _iou(best.box_px, box) >= _SAME_IOU else None
-
-
-def _iou(first: FloatArray, second: FloatArray) -> float:
-    common = _common(first, second)
-    return common / max(_area(first) + _area(second) - common, 1e-9)
+    best = max(people, key=lambda person: iou(person.box_px, box), default=None)
+    return best if best is not None and iou(best.box_px, box) >= _SAME_IOU else None
 
 
 def _overlap(boxes: Sequence[FloatArray]) -> bool:
     """Return whether one of the boxes covers a part of another, or has no extent."""
-    areas = [_area(box) for box in boxes]
-    return any(area <= 0.0 for area in areas) or any(
-        _common(box, boxes[other]) > _OVERLAP * min(areas[row], areas[other])
+    areas = [area(box) for box in boxes]
+    return any(each <= 0.0 for each in areas) or any(
+        common_area(box, boxes[other]) > _OVERLAP * min(areas[row], areas[other])
         for row, box in enumerate(boxes)
         for other in range(row)
     )
-
-
-def _common(first: FloatArray, second: FloatArray) -> float:
-    low, high = np.maximum(first[:2], second[:2]), np.minimum(first[2:], second[2:])
-    across, down = (high - low).tolist()
-    return float(max(across, 0.0) * max(down, 0.0))
-
-
-def _area(box: FloatArray) -> float:
-    left, top, right, bottom = box.tolist()
-    return float(max(right - left, 0.0) * max(bottom - top, 0.0))

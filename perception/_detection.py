@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 from .arrays import FloatArray, finite_array, finite_number, set_fields
 from .errors import PerceptionError
+
+#: People with a lower score are not reported by default.
+DEFAULT_SCORE_THRESHOLD: Final = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -146,12 +146,18 @@ class PeopleFinder:
         if not grown:
             return found
         again = self._keypoints(image_rgb, tuple(grown.values()))
+        better = {
+            row: (larger, person)
+            for (row, larger), person in zip(grown.items(), again, strict=True)
+            if keypoint_score(person) >= keypoint_score(found.keypoints[row])
+        }
+        if not better:
+            return found
         detections, people = list(found.detections), list(found.keypoints)
-        for (row, larger), person in zip(grown.items(), again, strict=True):
-            if keypoint_score(person) >= keypoint_score(people[row]):
-                detections[row], people[row] = larger, person
+        for row, pair in better.items():
+            detections[row], people[row] = pair
         disowned = disowned_keypoints(self._camera, detections, people, self._min_score)
-        lost = [row for row in grown if disowned[row] is not None and found.disowned[row] is None]
+        lost = [row for row in better if disowned[row] is not None and found.disowned[row] is None]
         if lost:
             for row in lost:
                 detections[row], people[row] = found.detections[row], found.keypoints[row]

@@ -10,7 +10,7 @@ import numpy as np
 
 from ._attention import AttentionCone
 from ._camera import Camera
-from ._detection import PersonDetection
+from ._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ._floor import FloorPlane
 from ._frame_time import StageClock, StageTimings
 from ._head_pose import HeadPose
@@ -125,7 +125,9 @@ class AwarenessPipeline:
         if detector is None:
             if shipped_pose and confirmation is None:
                 confirmation = KeypointConfirmation()
-            threshold = 0.25 if confirmation is None else confirmation.detector_threshold
+            threshold = DEFAULT_SCORE_THRESHOLD
+            if confirmation is not None:
+                threshold = confirmation.detector_threshold
             detector = shipped_detector(onnx_settings, camera, score_threshold=threshold)
         if pose_estimator is None:
             pose_estimator = shipped_pose_estimator(onnx_settings)

@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 
 from . import layouts as kp
-from ._detection import PersonDetection
+from ._boxes import area, common_area, extent
+from ._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ._keypoints import PersonKeypoints
-from .arrays import FloatArray, finite_number, set_fields
+from .arrays import finite_number, set_fields
 from .evidence import AwarenessReason
 
 # Logarithm of the odds below which the other end counts: scores of 0 and 1 have none.
@@ -26,7 +27,11 @@ _WHOLE_SCORE: Final = 0.6
 _MARGIN: Final = 0.06
 _FEWEST_SEEN: Final = 6
 _LEAST_GROWTH: Final = 0.1
-_ANOTHERS: Final = ("skeleton of another person", "head of another person")
+_OUTWARDS: Final = np.array([-1.0, -1.0, 1.0, 1.0])
+_ANOTHERS: Final[tuple[AwarenessReason, ...]] = (
+    "skeleton of another person",
+    "head of another person",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +55,8 @@ class KeypointConfirmation:
 
     Attributes:
         score_threshold: people with a lower score are dropped.
-        candidate_score: detector's score from which on a detection is a candidate, in
-            (0, ``score_threshold``].
+        candidate_score: detector's score from which on a detection is a candidate; one above
+            ``score_threshold`` counts as that.
         certain_score: detector's score from which on a person is kept whatever the keypoints say:
             of somebody half hidden few are seen.
         weight: of the keypoints' odds, ≥ 0.
@@ -63,7 +68,7 @@ class KeypointConfirmation:
         PerceptionError: for a value outside its range.
     """
 
-    score_threshold: float = 0.25
+    score_threshold: float = DEFAULT_SCORE_THRESHOLD
     candidate_score: float = 0.05
     certain_score: float = 0.4
     weight: float = 3.0
@@ -124,18 +129,14 @@ class KeypointConfirmation:
         """
         if detection.score >= _WHOLE_SCORE:
             return None
-        shown = person.keypoints_px[kp.BODY][person.scores[kp.BODY] >= min_score]
-        if len(shown) < _FEWEST_SEEN:
+        seen = person.scores[kp.BODY] >= min_score
+        if np.count_nonzero(seen) < _FEWEST_SEEN:
             return None
-        low, high = shown.min(axis=0), shown.max(axis=0)
-        margin = _MARGIN * float((high - low).max())
+        around = extent(person.keypoints_px[kp.BODY], seen)
+        margin = _MARGIN * float((around[2:] - around[:2]).max())
+        around = np.clip(around + margin * _OUTWARDS, 0.0, np.tile(size_wh_px, 2))
         box = detection.box_xyxy_px
-        grown = np.concatenate(
-            [np.minimum(box[:2], low - margin), np.maximum(box[2:], high + margin)]
-        )
-        grown = np.clip(grown, 0.0, np.tile(size_wh_px, 2))
-        # A box that reaches beyond the image is not made smaller.
-        grown[:2], grown[2:] = np.minimum(grown[:2], box[:2]), np.maximum(grown[2:], box[2:])
+        grown = np.concatenate([np.minimum(box[:2], around[:2]), np.maximum(box[2:], around[2:])])
         sides = np.tile(np.maximum(box[2:] - box[:2], 1e-9), 2)
         if (np.abs(grown - box) / sides).max() <= _LEAST_GROWTH:
             return None
@@ -161,9 +162,9 @@ class KeypointConfirmation:
                 break
             box = detections[row].box_xyxy_px
             within = max(
-                (_share_within(box, detections[each].box_xyxy_px) for each in kept), default=0.0
+                (common_area(box, detections[each].box_xyxy_px) for each in kept), default=0.0
             )
-            is_part = within > _MOSTLY
+            is_part = within > _MOSTLY * area(box)
             if detections[row].score < self.score_threshold:
                 drop = is_part or disowned[row] is not None
             elif detections[row].score < self.certain_score:
@@ -181,15 +182,6 @@ class KeypointConfirmation:
 def keypoint_score(person: PersonKeypoints) -> float:
     """Return the mean of the thirteen best scores of the body's seventeen keypoints."""
     return float(np.sort(person.scores[kp.BODY])[4:].mean())
-
-
-def _share_within(box: FloatArray, other: FloatArray) -> float:
-    """Return the share of a box (4,) that lies within another."""
-    left, top, right, bottom = box.tolist()
-    low_u, low_v, high_u, high_v = other.tolist()
-    across = max(min(right, high_u) - max(left, low_u), 0.0)
-    down = max(min(bottom, high_v) - max(top, low_v), 0.0)
-    return float(across * down / max((right - left) * (bottom - top), 1e-9))
 
 
 def _logit(probability: float) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from ._camera import Camera
+from ._detection import DEFAULT_SCORE_THRESHOLD
 from ._manifest import (
     DETECTOR,
     HEAD,
@@ -67,7 +68,7 @@ def shipped_detector(
     settings: OnnxSettings | None = None,
     camera: Camera | None = None,
     *,
-    score_threshold: float = 0.25,
+    score_threshold: float = DEFAULT_SCORE_THRESHOLD,
 ) -> OnnxPersonDetector:
     """Return the shipped person detector; errors as in :func:`load_shipped`.
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._detection import PersonDetection
+from ..._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ...arrays import ImageRgb, finite_number
 from ...errors import PerceptionError
 from .._image import rgb_image
@@ -62,7 +62,7 @@ class OnnxPersonDetector:
         self,
         path: ModelSource,
         *,
-        score_threshold: float = 0.25,
+        score_threshold: float = DEFAULT_SCORE_THRESHOLD,
         iou_threshold: float = 0.5,
         input_size_hw_px: tuple[int, int] | None = None,
         person_class: int | None = None,
