@@ -79,6 +79,7 @@ def row_of(name: str, metrics: dict[str, Any]) -> str:
             f"{overall['found']} of {overall['people']}",
             shown(overall["recall"], " %", 100.0),
             f"{detection['false_positives_per_frame']:.2f}",
+            shown(overall["gaze_none"], " %", 100.0),
             shown(overall["head_median_deg"], "°"),
             shown(overall["head_p90_deg"], "°"),
             f"{overall['false_aware_count']} of {overall['unaware_judged']}",
@@ -89,8 +90,8 @@ def row_of(name: str, metrics: dict[str, Any]) -> str:
 
 
 HEADER: Final = (
-    "| pictures | found | recall | false a picture | head median | head p90 | falsely aware "
-    "| position / range | α within 1σ |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+    "| pictures | found | recall | false a picture | no direction | head median | head p90 "
+    "| falsely aware | position / range | α within 1σ |\n" + "| --- " * 10 + "|"
 )
 
 

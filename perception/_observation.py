@@ -32,7 +32,8 @@ class PersonObservation:
         position_camera_m: (3,) centre line of the body at chest height, in the camera frame.
         position_covariance_m2: (3, 3) covariance of the position.
         gaze_camera: (3,) unit vector of the gaze in the camera frame: the head's forward axis, or
-            with ``eyes_seen`` that of the eyes. None without evidence.
+            with ``eyes_seen`` that of the eyes. None without evidence, and where no face is seen
+            and the head's direction is unknown.
         awareness: α in [0, 1], eqs. (1)–(3) of the paper, or None without evidence.
         awareness_std: standard deviation of α, ≥ 0; None if and only if ``awareness`` is None.
         score: confidence of the detection in [0, 1].

@@ -170,7 +170,8 @@ class AwarenessPipeline:
         """Return one observation per detected person.
 
         If the keypoints do not determine the position, it comes from the box, with a larger
-        covariance. A person without a usable head pose has awareness None.
+        covariance. A person without a usable head pose has awareness None. Somebody who turns the
+        back of a blurred head has an awareness of 0 and no gaze.
 
         Args:
             image_rgb: (H, W, 3) uint8 of the camera's size.
@@ -217,9 +218,9 @@ class AwarenessPipeline:
                 depth_m,
                 self._unusual_size,
             )
-            estimates, reasons = self._awareness(people, heads, eyes, disowned)
+            estimates, gazes, reasons = self._awareness(people, heads, eyes, disowned)
             observations = self._observations(
-                stamp_s, detections, people, places, heads, eyes, estimates, reasons
+                stamp_s, detections, people, places, eyes, estimates, gazes, reasons
             )
             clock.count("rest")
         self._timings = self._people.note(clock.timings())
@@ -231,9 +232,9 @@ class AwarenessPipeline:
         detections: tuple[PersonDetection, ...],
         people: tuple[PersonKeypoints, ...],
         places: Sequence[PersonPlace | None],
-        heads: tuple[HeadPose | None, ...],
         eyes: tuple[EyeGaze | None, ...],
         estimates: Sequence[AwarenessEstimate | None],
+        gazes: Sequence[FloatArray | None],
         reasons: Sequence[AwarenessReason | None],
     ) -> tuple[PersonObservation, ...]:
         """Return the observation of everybody who has a place."""
@@ -244,7 +245,7 @@ class AwarenessPipeline:
                 stamp_s=stamp_s,
                 position_camera_m=place.position_camera_m,
                 position_covariance_m2=place.covariance_m2,
-                gaze_camera=None if head is None or estimate is None else _gaze(head, turn),
+                gaze_camera=gaze,
                 awareness=None if estimate is None else estimate.awareness,
                 awareness_std=None if estimate is None else estimate.awareness_std,
                 score=detection.score,
@@ -256,8 +257,8 @@ class AwarenessPipeline:
                 **self._sizes(place),
                 eyes_seen=estimate is not None and turn is not None,
             )
-            for detection, place, head, turn, estimate, reason, person, body in zip(
-                detections, places, heads, eyes, estimates, reasons, people, bodies, strict=True
+            for detection, place, turn, estimate, gaze, reason, person, body in zip(
+                detections, places, eyes, estimates, gazes, reasons, people, bodies, strict=True
             )
             if place is not None
         )
@@ -288,11 +289,14 @@ class AwarenessPipeline:
         heads: tuple[HeadPose | None, ...],
         eyes: tuple[EyeGaze | None, ...],
         reasons: Sequence[AwarenessReason | None],
-    ) -> tuple[list[AwarenessEstimate | None], list[AwarenessReason | None]]:
-        """Return the awareness of each person, or None and why there is no evidence.
+    ) -> tuple[
+        list[AwarenessEstimate | None], list[FloatArray | None], list[AwarenessReason | None]
+    ]:
+        """Return awareness and gaze of each person, or None and why there is no evidence.
 
         There is none of somebody whose keypoints or head are not their own, for a reason.
         """
+        gazes: list[FloatArray | None] = [None] * len(people)
         estimates: list[AwarenessEstimate | None] = [None] * len(people)
         missing = list(reasons)
         faces = []
@@ -316,9 +320,11 @@ class AwarenessPipeline:
             face_seen=np.array([evidence.seen for *_, evidence in faces]),
             eyes=[eyes[row] for row, *_ in faces],
         )
-        for (row, *_), estimate in zip(faces, face_estimates, strict=True):
+        for (row, head, evidence), estimate in zip(faces, face_estimates, strict=True):
             estimates[row] = estimate
-        return estimates, missing
+            if evidence.direction_known:
+                gazes[row] = _gaze(head, eyes[row])
+        return estimates, gazes, missing
 
     def _check_image(self, image_rgb: Any) -> None:
         wanted = (self.camera.height_px, self.camera.width_px, 3)

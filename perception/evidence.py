@@ -24,6 +24,7 @@ AwarenessReason = Literal[
     "face too small",
     "face cut by the border",
     "no keypoint of the head",
+    "head direction unknown",
 ]
 AWARENESS_REASONS: Final[tuple[AwarenessReason, ...]] = get_args(AwarenessReason)
 
@@ -33,6 +34,11 @@ _MIN_FACE_PX: Final = 5.0
 _WEAK_FACE_PX: Final = 12.0
 _WEAK_FACE_STD_RAD: Final = math.radians(20.0)
 _SIZE_POWER: Final = 4.0
+# Beyond this standard deviation a network's direction of a head is no evidence: of its largest
+# errors, some of half a turn, a network knows too little.
+_MAX_DIRECTION_STD_RAD: Final = math.radians(15.0)
+# Up to this probability of a face, somebody does not see the robot whatever their head's direction.
+_NO_FACE_SEEN: Final = 0.2
 # Errors of keypoints that agree with a pose: up to so many standard deviations of the noise, with a
 # share of the face's width for the head's own shape; in small faces up to a share alone. Beyond it,
 # the same again is the standard deviation of a Gaussian that lowers the probability.
@@ -66,11 +72,13 @@ class FaceEvidence:
         width_px: width of the face, ear to ear.
         extra_std_rad: standard deviation that the small size of the face adds to each of the two
             angles of the gaze.
+        direction_known: False if the head's direction says nothing; then no face is seen.
     """
 
     seen: float
     width_px: float
     extra_std_rad: float
+    direction_known: bool = True
 
 
 def judge_face(
@@ -99,6 +107,10 @@ def judge_face(
     the head is larger than the body can carry, or if nose or eyes are missing from a head at the
     border of the image: what the border cuts off is missing from the pose too, and so the pose may
     be far off.
+
+    The direction is unknown if a network that gives ``head.face_seen`` is unsure of it by more than
+    15°: of a head that is blurred, dark or small. Then there is no evidence, unless a face is seen
+    with a probability of at most 0.2. Somebody without a face sees nothing, wherever they look.
 
     Args:
         camera: camera that saw the person.
@@ -134,8 +146,11 @@ def judge_face(
     excess = head.reprojection_error_px / consistent_px - 1.0
     if excess > 0.0:
         seen *= math.exp(-0.5 * (excess / _ERROR_SCALE) ** 2)
+    known = head.face_seen is None or _direction_std_rad(head) <= _MAX_DIRECTION_STD_RAD
+    if not known and seen > _NO_FACE_SEEN:
+        return "head direction unknown"
     extra = _WEAK_FACE_STD_RAD * (_WEAK_FACE_PX / width_px) ** _SIZE_POWER
-    return FaceEvidence(seen, width_px, extra)
+    return FaceEvidence(seen, width_px, extra, known)
 
 
 def _is_too_large(person: PersonKeypoints, width_px: float, min_score: float) -> bool:
@@ -145,6 +160,13 @@ def _is_too_large(person: PersonKeypoints, width_px: float, min_score: float) ->
         return False
     extent_px = float(np.ptp(person.keypoints_px[kp.BODY][seen], axis=0).max())
     return width_px > _LARGEST_SHARE * extent_px
+
+
+def _direction_std_rad(head: HeadPose) -> float:
+    """Return the standard deviation of the head's direction where it is largest."""
+    across = head.rotation_camera_head[:, ::2]
+    (xx, xz), (_, zz) = (across.T @ head.covariance[:3, :3] @ across).tolist()
+    return math.sqrt(0.5 * (xx + zz) + math.hypot(0.5 * (xx - zz), xz))
 
 
 def _is_cut(camera: Camera, person: PersonKeypoints, width_px: float, min_score: float) -> bool:

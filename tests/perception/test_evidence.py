@@ -139,6 +139,31 @@ def test_the_head_estimators_probability_comes_before_the_scores():
     assert judge_face(CAMERA, with_scores(), head_at(seen=0.9), 0.3).seen == pytest.approx(0.9)
 
 
+def test_an_unknown_direction_is_evidence_of_the_back_of_a_head_only():
+    """15° bound what a network may say of a face; keypoints without a network have no bound."""
+    sure, unsure = (head_at(std_rad=math.radians(deg), seen=0.9) for deg in (14.9, 15.1))
+    assert judge_face(CAMERA, ALL, sure, 0.3).direction_known
+    assert judge_face(CAMERA, ALL, unsure, 0.3) == "head direction unknown"
+    back = judge_face(CAMERA, ALL, head_at(std_rad=0.6, seen=0.05), 0.3)
+    assert not back.direction_known
+    assert back.seen == pytest.approx(0.05)
+    assert judge_face(CAMERA, ALL, head_at(std_rad=0.6), 0.3).direction_known
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 70.0, 180.0])
+@pytest.mark.parametrize("axis", range(3))
+def test_a_tilt_about_the_gaze_is_no_uncertainty_of_the_direction(yaw_deg, axis):
+    head = head_at(yaw_deg, seen=0.9)
+    direction = head.rotation_camera_head[:, axis]
+    covariance = head.covariance + 0.0
+    covariance[:3, :3] += 0.5**2 * np.outer(direction, direction)
+    wide = HeadPose(
+        head.position_camera_m, head.rotation_camera_head, covariance, 0.0, head.face_seen
+    )
+    judged = judge_face(CAMERA, ALL, wide, 0.3)
+    assert (judged == "head direction unknown") == (axis != 1)
+
+
 def test_where_no_face_was_found_one_is_unlikely_but_possible():
     mediapipe = with_scores(1, 1, 1, 1, 1, face_evidence=False)
     assert judge_face(CAMERA, mediapipe, head_at(), 0.3).seen == 0.2

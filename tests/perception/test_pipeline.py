@@ -163,6 +163,33 @@ def test_the_back_of_a_head_is_unaware_with_certainty():
     assert seen.awareness_std < 0.05
 
 
+class UnsureHeads:
+    """A head pose network whose direction is off by up to 30°."""
+
+    def __init__(self, face_seen):
+        self.face_seen = face_seen
+
+    def estimate(self, image_rgb, camera, people):
+        rotation = person_at((0.0, 0.4, 3.0)).rotation_camera_head
+        covariance = np.diag([math.radians(30.0) ** 2] * 3 + [0.01**2] * 3)
+        pose = HeadPose((0.0, -0.1, 3.0), rotation, covariance, 0.0, self.face_seen)
+        return tuple(pose for _ in people)
+
+
+def test_a_head_of_unknown_direction_is_no_evidence_unless_it_shows_no_face():
+    face, back = (
+        pipeline(
+            KnownPeople([person_at((0.0, 0.4, 3.0))]), head_pose_estimator=UnsureHeads(seen)
+        ).process(FRAME, 0.0)[0]
+        for seen in (0.9, 0.01)
+    )
+    assert face.awareness is face.awareness_std is face.gaze_camera is back.gaze_camera is None
+    assert face.awareness_reason == "head direction unknown"
+    assert back.awareness == pytest.approx(0.0, abs=0.01)
+    assert back.awareness_std < 0.1
+    np.testing.assert_array_equal(face.position_camera_m, back.position_camera_m)
+
+
 def test_eye_movements_increase_the_standard_deviation_and_do_not_change_alpha():
     person = person_at((0.0, 0.4, 2.5), head_yaw_rad=math.radians(25.0))
     steady, wandering = (

@@ -148,16 +148,6 @@ class HeadCrops:
         """Focal length of the views along the rays."""
         return ray_focal_px(self.camera)
 
-    def subset(self, rows: NDArray[np.intp]) -> HeadCrops:
-        """Return the crops ``rows``."""
-        return HeadCrops(
-            self.camera,
-            self.centre_px[rows],
-            self.side_px[rows],
-            self.axes[rows],
-            self.stretch[rows],
-        )
-
     def recentred(self, rows: NDArray[np.intp], to: FloatArray, factor: FloatArray) -> HeadCrops:
         """Return all crops, of which K have new centres and sides.
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._camera import Camera
 from ..._head_pose import HeadPose
@@ -20,6 +22,7 @@ from .._image import rgb_image
 from .._image_input import run_on_images
 from .._model import ModelSource, OnnxModel, as_onnx_model
 from .._settings import OnnxSettings
+from ._blur import uncertainty_factors
 from ._crops import HeadCrops
 from ._layouts import recognise
 from ._locate import locate_heads
@@ -52,7 +55,8 @@ class OnnxHeadPoseEstimator:
     all people of a frame form one batch if the network's batch axis is free. A network of
     awarenav's layout gives the head's centre in the crop and the size of the crop, so a second pass
     cuts the crop better. What the two see differently joins the covariance: a network knows little
-    of the errors that blur and compression cause, but they differ from crop to crop. A network of
+    of the errors that blur and compression cause, but they differ from crop to crop. The covariance
+    also grows with the blur that the crop shows. A network of
     the 6DRepNet kind (224 × 224, a rotation matrix or six numbers) gives a rotation only: its pose
     has a fixed standard deviation of 10° per axis, and the distance comes from the body's scale.
 
@@ -119,11 +123,13 @@ class OnnxHeadPoseEstimator:
             return tuple(poses)
         places = [place for place in (found[row] for row in rows) if place is not None]
         size_px = self.layout.crop_side_m * np.array([place[1] for place in places])
-        output_rows, crops, scatter = self._run_passes(
-            image, HeadCrops.of_sizes(camera, np.array([place[0] for place in places]), size_px)
-        )
+        crops = HeadCrops.of_sizes(camera, np.array([place[0] for place in places]), size_px)
+        output_rows, crops, pictures, scatter = self._run_passes(image, crops)
         outputs = read_outputs(self.layout, self.model, output_rows)
-        outputs = replace(outputs, covariance_ray=outputs.covariance_ray + scatter)
+        covariance = outputs.covariance_ray + scatter
+        if self.layout.is_awarenav:
+            covariance *= (uncertainty_factors(pictures) ** 2)[:, None, None]
+        outputs = replace(outputs, covariance_ray=covariance)
         found_poses = _poses(outputs, crops, self.layout.crop_side_m)
         for index, row in enumerate(rows):
             if outputs.head is None or outputs.head[index] >= self._min_head:
@@ -140,13 +146,17 @@ class OnnxHeadPoseEstimator:
 
     def _run_passes(
         self, image: ImageRgb, crops: HeadCrops
-    ) -> tuple[FloatArray, HeadCrops, FloatArray]:
-        """Return the network's rows for the last crop of each head, these crops, and the scatter.
+    ) -> tuple[FloatArray, HeadCrops, list[NDArray[np.uint8]], FloatArray]:
+        """Return the network's rows for the last crop of each head, and what belongs to them.
 
-        The scatter (N, 3, 3) of the last two crops' rotations, in ray axes, is the covariance of
-        one of them if their errors are independent; 0 for a head that was cut once.
+        Returns:
+            The rows; the crops; their pictures; the scatter (N, 3, 3) of the last two crops'
+            rotations, in ray axes: the covariance of one of them if their errors are independent,
+            and 0 for a head that was cut once.
         """
-        rows = self._run(image, crops)
+        size = self.layout.size_px
+        pictures = [crops.cut(image, row, size) for row in range(len(crops.side_px))]
+        rows = self._run(pictures)
         scatter = np.zeros((len(rows), 3, 3))
         for _ in range(self._passes - 1 if self.layout.is_awarenav else 0):
             centre, side_m, head = read_placement(rows)
@@ -160,18 +170,20 @@ class OnnxHeadPoseEstimator:
             # The limits keep a wrong output from leading to a crop of the whole image or one pixel.
             factor = 1.0 / np.minimum(np.maximum(larger[again], 0.5), 2.0)
             crops = crops.recentred(again, centre[again], factor)
-            rows[again] = self._run(image, crops.subset(again))
+            for row in again:
+                pictures[row] = crops.cut(image, row, size)
+            rows[again] = self._run([pictures[row] for row in again])
             now = read_rotations(self.model, rows[again])
             turn = rotation_log(crops.axes[again].swapaxes(1, 2) @ before @ now.swapaxes(1, 2))
             scatter[again] = 0.5 * turn[:, :, None] * turn[:, None, :]
-        return rows, crops, scatter
+        return rows, crops, pictures, scatter
 
-    def _run(self, image: ImageRgb, crops: HeadCrops) -> FloatArray:
-        """Return the network's row of outputs for each crop."""
-        layout, size, count = self.layout, self.layout.size_px, len(crops.side_px)
+    def _run(self, pictures: Sequence[NDArray[np.uint8]]) -> FloatArray:
+        """Return the network's row of outputs for each crop's picture."""
+        layout, size, count = self.layout, self.layout.size_px, len(pictures)
         blob = layout.pixels.empty_blob(count, size, size)
-        for row in range(count):
-            layout.pixels.write(crops.cut(image, row, size), blob[row])
+        for row, picture in enumerate(pictures):
+            layout.pixels.write(picture, blob[row])
         blob = layout.pixels.as_input(blob)
         step = layout.batch or count
         parts = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 import scipy.linalg
@@ -141,8 +142,8 @@ def test_what_two_passes_see_differently_joins_the_covariance(monkeypatch):
     estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD, rotation_std=rotation_std))
     run, runs = estimator._run, []
 
-    def with_error(image, crops):
-        rows = run(image, crops)
+    def with_error(pictures):
+        rows = run(pictures)
         wrong = Rotation.from_rotvec(rng.normal(0.0, error_std, 3)).as_matrix()
         rows[0, :9] = (wrong @ rows[0, :9].reshape(3, 3)).ravel()
         runs.append(rows)
@@ -167,6 +168,23 @@ def test_what_two_passes_see_differently_joins_the_covariance(monkeypatch):
     (head,) = estimator.estimate(image, CAMERA, (once,))
     assert len(runs) == 1
     np.testing.assert_allclose(head.covariance[:3, :3], known * np.eye(3), atol=1e-9)
+
+
+def test_blur_makes_the_direction_less_certain_and_nothing_else():
+    estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD, rotation_std=0.05), passes=1)
+    # The network does not see a chequered scenery, which has the detail of a head.
+    image, pixel = disc_at(np.array([0.1, -0.2, 2.5]))
+    v, u = np.mgrid[: CAMERA.height_px, : CAMERA.width_px]
+    image = np.where(image > 0, image, 40 * ((u // 5 + v // 5) % 2)[..., None]).astype(np.uint8)
+    person = person_about(pixel, CAMERA.fx_px / 2.5)
+    (sharp,) = estimator.estimate(image, CAMERA, (person,))
+    (blurred,) = estimator.estimate(cv2.blur(image, (17, 1)), CAMERA, (person,))
+    ratio = blurred.covariance[0, 0] / sharp.covariance[0, 0]
+    assert ratio > 1.3
+    turns = blurred.covariance[:3, :3] - math.radians(0.5) ** 2 * np.eye(3)
+    assert turns[0, 0] > 0.05**2
+    np.testing.assert_allclose(turns, turns[0, 0] * np.eye(3), atol=1e-9)
+    assert blurred.range_relative_std == sharp.range_relative_std
 
 
 def test_head_poses_are_in_the_order_of_the_people_for_any_batch_size():
