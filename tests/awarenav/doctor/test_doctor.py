@@ -112,6 +112,21 @@ def test_pictures_of_a_bad_camera(capsys, renders, tmp_path, change, subject, se
     assert severities(found, "calibration") == {"warning"}
 
 
+def test_people_who_are_blurred_by_motion_need_a_shorter_exposure(capsys, renders, tmp_path):
+    """The edges of a picture stay sharp across the motion, so the sharpness is fine."""
+    sharp = copied(renders, tmp_path / "sharp", lambda image: image)
+    found = findings(capsys, sharp, "--out", "none", "--fov-deg", 60)
+    assert severities(found, "people") == {"fine"}
+    blurred = copied(renders, tmp_path / "blurred", lambda image: cv2.blur(image, (1, 25)))
+    found = findings(capsys, blurred, "--out", "none", "--fov-deg", 60)
+    assert severities(found, "people") == {"fine", "warning"}
+    (told,) = (each for each in found["people"] if each.severity == "warning")
+    assert "heads show no direction" in told.text
+    assert "shorter time" in told.remedy
+    (counts,) = (each for each in found["people"] if each.severity == "fine")
+    assert "head direction unknown: " in counts.text
+
+
 def test_without_a_calibration_distances_are_wrong(capsys, renders, tmp_path):
     folder = copied(renders, tmp_path / "set", lambda image: image)
     found = findings(capsys, folder, "--out", "none")
