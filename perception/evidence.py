@@ -165,8 +165,8 @@ def _is_too_large(person: PersonKeypoints, width_px: float, min_score: float) ->
 def _direction_std_rad(head: HeadPose) -> float:
     """Return the standard deviation of the head's direction where it is largest."""
     across = head.rotation_camera_head[:, ::2]
-    (xx, xz), (_, zz) = (across.T @ head.covariance[:3, :3] @ across).tolist()
-    return math.sqrt(0.5 * (xx + zz) + math.hypot(0.5 * (xx - zz), xz))
+    largest = float(np.linalg.eigvalsh(across.T @ head.covariance[:3, :3] @ across)[-1])
+    return math.sqrt(max(largest, 0.0))
 
 
 def _is_cut(camera: Camera, person: PersonKeypoints, width_px: float, min_score: float) -> bool:

@@ -80,8 +80,7 @@ class _Examined:
     figures: list[PictureFigures] = field(default_factory=list)
     times_s: list[float] = field(default_factory=list)
     people: list[int] = field(default_factory=list)
-    without_evidence: int = 0
-    reasons: Counter[str] = field(default_factory=Counter)
+    without_evidence: Counter[AwarenessReason | None] = field(default_factory=Counter)
     problems: list[str] = field(default_factory=list)
     best: FrameEstimate | None = None
 
@@ -164,9 +163,9 @@ def _examine(source: ImageSource, estimator: PeopleEstimator, most: int) -> _Exa
         if seen.best is None or len(people) > len(seen.best.observations):
             seen.best = estimate
         seen.people.append(len(people))
-        unjudged = [each for each in people if each.awareness is None]
-        seen.without_evidence += len(unjudged)
-        seen.reasons.update(each.awareness_reason for each in unjudged if each.awareness_reason)
+        seen.without_evidence.update(
+            each.awareness_reason for each in people if each.awareness is None
+        )
     return seen
 
 
@@ -284,14 +283,15 @@ def _people_findings(seen: _Examined) -> list[Finding]:
             )
         ]
     with_people = sum(number > 0 for number in seen.people)
+    reasons = seen.without_evidence
     text = (
         f"{counted(total, 'person', 'people')} in {with_people} of {counted(images, 'image')}, "
-        f"{seen.without_evidence} of them without evidence of awareness"
+        f"{reasons.total()} of them without evidence of awareness"
     )
-    if seen.reasons:
-        text += f" ({', '.join(f'{reason}: {n}' for reason, n in seen.reasons.most_common())})"
+    if reasons:
+        text += f" ({', '.join(f'{reason}: {n}' for reason, n in reasons.most_common())})"
     found = [Finding("fine", "people", text)]
-    unknown = seen.reasons[_UNKNOWN]
+    unknown = reasons[_UNKNOWN]
     if unknown > _UNKNOWN_SHARE * total:
         found.append(
             Finding(
