@@ -1,4 +1,4 @@
-"""Whether poses, twists and tf tell of one motion, or contradict each other."""
+"""Contradictions between the poses of odometry, its twists, and tf."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from collections import deque
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
@@ -34,6 +33,8 @@ _FARTHEST_M: Final = 10.0
 _APART_M: Final = 0.1
 _APART_RAD: Final = 0.1
 _STAMPS_S: Final = 0.1
+# More often would cost more than it tells.
+_COMPARED_EVERY_S: Final = 0.04
 # A contradiction that has just ended may come again with the next motion.
 _HELD_S: Final = 2.0
 # Units other than metres per second.
@@ -73,6 +74,7 @@ class OdometryCheck:
         self._frames = frames
         self._samples: deque[_Sample] = deque()
         self._problem, self._seen_s = "", -math.inf
+        self._compared_s = -math.inf
 
     @property
     def problem(self) -> str:
@@ -112,8 +114,7 @@ class OdometryCheck:
         if samples:
             last = samples[-1]
             driven = last.driven + 0.5 * (stamp_s - last.stamp_s) * (last.rates + rates)
-            step = Rotation.from_matrix(rotation @ last.rotation.T).as_rotvec()
-            turned = last.turned_rad + float(step[2])
+            turned = last.turned_rad + _yaw_rad(rotation @ last.rotation.T)
         samples.append(_Sample(stamp_s, T_odom_child[:2, 3], rotation, rates, driven, turned))
         while stamp_s - samples[0].stamp_s > _WINDOW_S:
             samples.popleft()
@@ -137,6 +138,9 @@ class OdometryCheck:
             state: the latest, for what the robot drives between two stamps.
         """
         odom, base = self._frames.odom, self._frames.base
+        if 0.0 <= state.stamp_s - self._compared_s < _COMPARED_EVERY_S:
+            return
+        self._compared_s = state.stamp_s
         try:
             if min(len(way) for way in transforms.ways(odom, base)) > 1:
                 return  # by way of a map: localisation, which may differ
@@ -145,8 +149,7 @@ class OdometryCheck:
         except NavError:
             return  # tf has no pose of the robot, or none of this time
         apart_m = math.hypot(*(T_tf[:2, 3] - T[:2, 3]))
-        turn = T_tf[:3, :3] @ T[:3, :3].T
-        apart_rad = abs(math.atan2(turn[1, 0], turn[0, 0]))
+        apart_rad = abs(_yaw_rad(T_tf[:3, :3] @ T[:3, :3].T))
         if (
             apart_m > _APART_M + _STAMPS_S * state.travel_mps
             or apart_rad > _APART_RAD + _STAMPS_S * abs(state.yaw_rate_radps)
@@ -205,3 +208,8 @@ def _of_turn(turned_rad: float, claimed_rad: float) -> str:
         f"the robot turned by {math.degrees(turned_rad):.0f}°, by its yaw rates by "
         f"{math.degrees(claimed_rad):.0f}°"
     )
+
+
+def _yaw_rad(turn: FloatArray) -> float:
+    """Return the turn about z of a rotation (3, 3) that is small about the other axes."""
+    return math.atan2(turn[1, 0], turn[0, 0])

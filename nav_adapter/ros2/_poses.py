@@ -110,18 +110,15 @@ class RobotPoses:
 
     def _base_in(self, child: str, stamp_s: float) -> FloatArray:
         """Return the pose (4, 4) of the base frame in another frame of the robot."""
-        try:
-            if not self._is_on_robot(child):
-                raise NavError("it may be anywhere")
-            return self.transforms.lookup(child, self._frames.base, stamp_s)
-        except NavError as cause:
-            base = self._frames.base
+        base = self._frames.base
+        if not self._is_on_robot(child):
             self.problem = (
                 f"the odometry is that of {child!r}, and tf does not tell where it is on {base!r}: "
                 "publish the static transform between them, or, if both are one place, set the "
                 f"base frame to {child!r} (--base-frame, base_frame)"
             )
-            raise NavError(self.problem) from cause
+            raise NavError(self.problem)
+        return self.transforms.lookup(child, base, stamp_s)
 
     def _is_on_robot(self, frame: str) -> bool:
         """Return whether tf knows the frame beside the base frame, and not by way of odom."""

@@ -382,3 +382,16 @@ def test_the_function_for_recordings_says_the_same_as_the_bridge() -> None:
     in_map = [replace(each, header=Header(each.header.stamp, "map")) for each in drifted]
     (problem,) = odometry_problems(in_map, poses)
     assert "must be in frame 'odom'" in problem
+
+
+def test_a_frame_that_moves_on_the_robot_is_followed_although_its_tf_is_slow() -> None:
+    """A message whose time tf does not reach yet is left out, and does not stop the robot."""
+    robot = Robot()
+
+    def lifted(now: float) -> list[TFMessage]:
+        tick = round((now - START_S) / PERIOD_S)
+        return [] if tick % 5 else [tf("base_link", "lift", placed(0.1, z=0.1), now)]
+
+    constraints = robot.drive(3.0, on_base(placed(0.1, z=0.1), "lift"), lifted)
+    assert 0.5 * reference_limit() < constraints[-1].speed_limit_mps <= reference_limit()
+    assert {each.stale for each in constraints[5:]} == {False}
