@@ -35,8 +35,10 @@ _APART_RAD: Final = 0.1
 _STAMPS_S: Final = 0.1
 # More often would cost more than it tells.
 _COMPARED_EVERY_S: Final = 0.04
-# A contradiction that has just ended may come again with the next motion.
+# A contradiction that has just ended may come again with the next motion. Each further one holds
+# twice as long, up to a limit.
 _HELD_S: Final = 2.0
+_LONGEST_HELD_S: Final = 32.0
 # Units other than metres per second.
 _UNITS: Final = {"mm/s": 1000.0, "cm/s": 100.0, "km/h": 3.6}
 
@@ -64,7 +66,8 @@ class _Sample(NamedTuple):
 class OdometryCheck:
     """Compares the poses of odometry with its twists, and with tf.
 
-    A contradiction lasts until 2 s have passed without one.
+    A contradiction lasts until 2 s have passed without one, the next one until 4 s have, and so on
+    up to 32 s.
 
     Args:
         frames: names of the frames.
@@ -75,6 +78,7 @@ class OdometryCheck:
         self._samples: deque[_Sample] = deque()
         self._problem, self._seen_s = "", -math.inf
         self._compared_s = -math.inf
+        self._held_s = 0.0
 
     @property
     def problem(self) -> str:
@@ -98,7 +102,7 @@ class OdometryCheck:
             turning_child_radps: (3,) as in the message.
             child: name of the frame.
         """
-        if not 0.0 <= stamp_s - self._seen_s <= _HELD_S:
+        if not 0.0 <= stamp_s - self._seen_s <= self._held_s:
             self._problem = ""
         rotation = T_odom_child[:3, :3]
         rates = np.array(
@@ -164,6 +168,8 @@ class OdometryCheck:
 
     def _report(self, stamp_s: float, problem: str) -> None:
         """Keep the words of the first sight, so that one contradiction is reported once."""
+        if not self._problem:
+            self._held_s = min(max(2.0 * self._held_s, _HELD_S), _LONGEST_HELD_S)
         self._problem, self._seen_s = self._problem or problem, stamp_s
 
 
