@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import camera_of, picture_of
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
+from nav_adapter.ros2 import (
+    TransformBuffer,
+    camera_of,
+    is_rectified,
+    optical_problem,
+    picture_of,
+)
+from nav_adapter.ros2.conversions import from_ros, pose_matrix
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import Camera
 from perception.arrays import ImageRgb
 
@@ -22,13 +31,14 @@ from ._source import SourceFrame
 _IMAGE: Final = "sensor_msgs/msg/Image"
 _COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
 _INFO: Final = "sensor_msgs/msg/CameraInfo"
+_TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
 
 
 class BagSource:
     """One image topic of a recording: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
 
     The stamp of a frame is that of its message's header. The ``camera_info`` topic beside the
-    images is their camera.
+    images is their camera; the topic's name tells whether they are rectified.
 
     Args:
         path: of the recording.
@@ -43,7 +53,7 @@ class BagSource:
         self._reader = open_bag(path)
         try:
             self._topic = self._chosen_topic(topic)
-            self.camera = self._read_camera()
+            self.rectified = is_rectified(self._topic)
         except BaseException:
             self._reader.close()
             raise
@@ -55,6 +65,33 @@ class BagSource:
             self.rate_hz = (self.count - 1) / duration_s
         self.live = False
         self.rendered = False
+
+    @cached_property
+    def camera(self) -> Camera | None:
+        """The camera of ``camera_info``; None without one, or from an uncalibrated driver.
+
+        Raises:
+            AwarenavError: for a calibration that cannot be used.
+        """
+        topic, info = self._info()
+        if info is None or (
+            _is_zero(info, "kK") and not (self.rectified and not _is_zero(info, "pP"))
+        ):
+            return None
+        first, size_px = self._first(self._connections), None
+        with contextlib.suppress(NavError):  # a damaged image is told with its frame
+            if first is not None:
+                height_px, width_px = picture_of(first).shape[:2]
+                size_px = (width_px, height_px)
+        try:
+            return camera_of(info, rectified=self.rectified, image_size_px=size_px)
+        except NavError as cause:
+            raise AwarenavError(f"{topic}: {cause}") from cause
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """Which matrix of camera_info counts, and a frame of the images that is not optical."""
+        return tuple(note for note in (self._matrix_note(), self._frame_note()) if note)
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield the images of the topic, numbered from 000000."""
@@ -105,44 +142,60 @@ class BagSource:
             )
         return images[0] if topic is None else topic
 
-    def _read_camera(self) -> Camera | None:
-        """Return the camera of the first ``camera_info`` message in the images' namespace."""
+    def _matrix_note(self) -> str:
+        """Return that P counts; empty for raw images."""
+        if not self.rectified:
+            return ""
+        return f"{self._topic} has rectified images: P of camera_info counts, without distortion"
+
+    def _frame_note(self) -> str:
+        """Return why the frame of the images is not optical by the static transforms, if so."""
+        first, transforms = self._first(self._connections), TransformBuffer()
+        frame = "" if first is None else str(first.header.frame_id).lstrip("/")
+        static = [each for each in self._of(_TRANSFORMS) if each.topic.endswith("tf_static")]
+        parents: dict[str, str] = {}
+        for connection, _, raw in self._reader.messages(static) if static and frame else ():
+            message = from_ros(TFMessage, self._reader.deserialize(raw, connection.msgtype))
+            for each in message.transforms:
+                move = each.transform.translation
+                T = pose_matrix((move.x, move.y, move.z), each.transform.rotation)
+                transforms.add(each.header.frame_id, each.child_frame_id, 0.0, T, static=True)
+                parents[each.child_frame_id.lstrip("/")] = each.header.frame_id.lstrip("/")
+        root = frame
+        while root in parents:
+            root = parents[root]
+        if root == frame:
+            return ""
+        return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
+
+    def _info(self) -> tuple[str, Any]:
+        """Return topic and first message of the images' camera_info; None without one."""
         parts = self._topic.split("/")
         topics = [
             "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
         ]
         for topic in topics[:2]:  # beside image_raw, or beside the parent of image_raw/compressed
-            connections = [
-                each
-                for each in self._reader.connections
-                if each.topic == topic and each.msgtype == _INFO
-            ]
-            for connection, _, raw in (
-                self._reader.messages(connections=connections) if connections else ()
-            ):
-                message: Any = self._reader.deserialize(raw, connection.msgtype)
-                return _camera(message, topic)
+            message = self._first([each for each in self._of(_INFO) if each.topic == topic])
+            if message is not None:
+                return topic, message
+        return "", None
+
+    def _of(self, kind: str) -> list[Any]:
+        return [each for each in self._reader.connections if each.msgtype == kind]
+
+    def _first(self, connections: list[Any]) -> Any:
+        """Return the first message of some connections; None if there is none or it is damaged."""
+        try:
+            for connection, _, raw in self._reader.messages(connections) if connections else ():
+                return self._reader.deserialize(raw, connection.msgtype)
+        except Exception:  # the library raises many kinds; frames() tells
+            pass
         return None
 
 
-def _camera(message: Any, topic: str) -> Camera | None:
-    """Return the camera of a ``camera_info`` message; None from an uncalibrated driver."""
-    # ROS 1 names the matrices in capitals. An uncalibrated driver sends zeros.
-    matrix = np.asarray(getattr(message, "k", getattr(message, "K", ())), dtype=float).reshape(-1)
-    distortion = np.asarray(getattr(message, "d", getattr(message, "D", ())), dtype=float)
-    if matrix.size != 9 or not matrix[0] > 0.0:
-        return None
-    info = CameraInfo(
-        height=int(message.height),
-        width=int(message.width),
-        distortion_model=str(message.distortion_model),
-        d=tuple(distortion.tolist()),
-        k=tuple(matrix.tolist()),
-    )
-    try:
-        return camera_of(info)
-    except NavError as cause:
-        raise AwarenavError(f"{topic}: {cause}") from cause
+def _is_zero(info: Any, names: str) -> bool:
+    """Return whether a matrix is zero, as an uncalibrated driver sends it; in capitals in ROS 1."""
+    return not any(np.any(getattr(info, name, 0.0)) for name in names)
 
 
 def _stamp_s(message: Any) -> float | None:

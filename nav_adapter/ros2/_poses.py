@@ -11,6 +11,7 @@ from perception.laser import RobotMotion
 
 from .._errors import NavError
 from .._robot import RobotState
+from ._optical import optical_problem
 from ._outgoing import Frames
 from ._transforms import TransformBuffer
 from .conversions import pose_matrix, to_seconds
@@ -94,11 +95,15 @@ class RobotPoses:
             stamp_s: of the image.
 
         Raises:
-            NavError: for a pose that is not known at that time.
+            NavError: for a pose that is not known at that time, or not of an optical frame.
         """
         frames = self._frames
         if self._T_base_camera is None:
-            return self.transforms.lookup(frames.odom, frames.camera or frame, stamp_s)
+            frame = frames.camera or frame
+            T_odom_camera = self.transforms.lookup(frames.odom, frame, stamp_s)
+            if problem := optical_problem(T_odom_camera, frame, frames.odom):
+                raise NavError(problem)
+            return T_odom_camera
         T_odom_base = self.transforms.lookup(frames.odom, frames.base, stamp_s)
         return np.asarray(T_odom_base @ self._T_base_camera, dtype=np.float64)
 
