@@ -91,6 +91,8 @@ class CameraInfo:
         try:
             # Each echoed message ends with "---"; the first message counts.
             data = read_yaml(path, first_document=True)
+            if not isinstance(data, dict):
+                raise PerceptionError(f"{path} must hold the keys of a ROS camera_info file")
         except PerceptionError as cause:
             if _is_of_opencv(path):
                 raise PerceptionError(
@@ -99,8 +101,6 @@ class CameraInfo:
                     "and distortion_coefficients, without !!opencv-matrix and %YAML:1.0)"
                 ) from cause
             raise
-        if not isinstance(data, dict):
-            raise PerceptionError(f"{path} must hold the keys of a ROS camera_info file")
         try:
             return cls.of(data)
         except PerceptionError as cause:
@@ -121,8 +121,9 @@ class CameraInfo:
             coefficients = np.ravel(_entries(fields.get("distortion_coefficients")))
             model = _model(fields, coefficients)
             return cls(
-                pixel_count("image_width", fields["image_width"]),
-                pixel_count("image_height", fields["image_height"]),
+                # Zeros of an uncalibrated driver are refused for their matrix.
+                fields["image_width"] and pixel_count("image_width", fields["image_width"]),
+                fields["image_height"] and pixel_count("image_height", fields["image_height"]),
                 np.reshape(_entries(fields["camera_matrix"]), (3, 3)),
                 _without_spare_zeros(coefficients, _COUNTS.get(model, ())),
                 model,

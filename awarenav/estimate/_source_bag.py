@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -53,11 +52,20 @@ class BagSource:
         self._reader = open_bag(path)
         try:
             self._topic = self._chosen_topic(topic)
+            self._connections = self._of(self._topic, _IMAGE, _COMPRESSED)
             self.rectified = is_rectified(self._topic)
+            shown = None
+            with contextlib.suppress(AwarenavError):  # a damaged image is told with its frame
+                shown = self._first(self._connections)
+            try:
+                self._camera: Camera | AwarenavError | None = self._read_camera(shown)
+            except AwarenavError as refusal:  # only if nobody gives another calibration
+                self._camera = refusal
+            notes = (self._matrix_note(), self._frame_note(shown))
+            self.notes = tuple(note for note in notes if note)
         except BaseException:
             self._reader.close()
             raise
-        self._connections = [each for each in self._reader.connections if each.topic == self._topic]
         self.count: int | None = sum(each.msgcount for each in self._connections) or None
         duration_s = self._reader.duration * 1.0e-9
         self.rate_hz: float | None = None
@@ -66,32 +74,16 @@ class BagSource:
         self.live = False
         self.rendered = False
 
-    @cached_property
+    @property
     def camera(self) -> Camera | None:
         """The camera of ``camera_info``; None without one, or from an uncalibrated driver.
 
         Raises:
             AwarenavError: for a calibration that cannot be used.
         """
-        topic, info = self._info()
-        if info is None or (
-            _is_zero(info, "kK") and not (self.rectified and not _is_zero(info, "pP"))
-        ):
-            return None
-        first, size_px = self._first(self._connections), None
-        with contextlib.suppress(NavError):  # a damaged image is told with its frame
-            if first is not None:
-                height_px, width_px = picture_of(first).shape[:2]
-                size_px = (width_px, height_px)
-        try:
-            return camera_of(info, rectified=self.rectified, image_size_px=size_px)
-        except NavError as cause:
-            raise AwarenavError(f"{topic}: {cause}") from cause
-
-    @cached_property
-    def notes(self) -> tuple[str, ...]:
-        """Which matrix of camera_info counts, and a frame of the images that is not optical."""
-        return tuple(note for note in (self._matrix_note(), self._frame_note()) if note)
+        if isinstance(self._camera, AwarenavError):
+            raise self._camera
+        return self._camera
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield the images of the topic, numbered from 000000."""
@@ -142,55 +134,73 @@ class BagSource:
             )
         return images[0] if topic is None else topic
 
+    def _read_camera(self, shown: Any) -> Camera | None:
+        """Return the camera of the first ``camera_info`` message in the images' namespace."""
+        size_px = None
+        with contextlib.suppress(AwarenavError):
+            if shown is not None:
+                height_px, width_px = picture_of(shown).shape[:2]
+                size_px = (width_px, height_px)
+        parts = self._topic.split("/")
+        topics = [
+            "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
+        ]
+        for topic in topics[:2]:  # beside image_raw, or beside the parent of image_raw/compressed
+            info = self._first(self._of(topic, _INFO))
+            if info is None:
+                continue
+            if _is_zero(info, "kK") and not (self.rectified and not _is_zero(info, "pP")):
+                return None
+            try:
+                return camera_of(info, rectified=self.rectified, image_size_px=size_px)
+            except NavError as cause:
+                raise AwarenavError(f"{topic}: {cause}") from cause
+        return None
+
     def _matrix_note(self) -> str:
         """Return that P counts; empty for raw images."""
         if not self.rectified:
             return ""
         return f"{self._topic} has rectified images: P of camera_info counts, without distortion"
 
-    def _frame_note(self) -> str:
+    def _frame_note(self, shown: Any) -> str:
         """Return why the frame of the images is not optical by the static transforms, if so."""
-        first, transforms = self._first(self._connections), TransformBuffer()
-        frame = "" if first is None else str(first.header.frame_id).lstrip("/")
-        static = [each for each in self._of(_TRANSFORMS) if each.topic.endswith("tf_static")]
-        parents: dict[str, str] = {}
-        for connection, _, raw in self._reader.messages(static) if static and frame else ():
-            message = from_ros(TFMessage, self._reader.deserialize(raw, connection.msgtype))
-            for each in message.transforms:
-                move = each.transform.translation
-                T = pose_matrix((move.x, move.y, move.z), each.transform.rotation)
-                transforms.add(each.header.frame_id, each.child_frame_id, 0.0, T, static=True)
-                parents[each.child_frame_id.lstrip("/")] = each.header.frame_id.lstrip("/")
-        root = frame
-        while root in parents:
-            root = parents[root]
-        if root == frame:
-            return ""
-        return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
+        transforms, parents = TransformBuffer(), {}
+        # Damaged transforms, and those of ROS 1 with other fields, tell nothing.
+        with contextlib.suppress(ValueError, TypeError, AttributeError):
+            frame = root = str(shown.header.frame_id).lstrip("/")
+            for message in self._messages(self._of("/tf_static", _TRANSFORMS)):
+                for each in from_ros(TFMessage, message).transforms:
+                    move = each.transform.translation
+                    T = pose_matrix((move.x, move.y, move.z), each.transform.rotation)
+                    parent, child = each.header.frame_id, each.child_frame_id
+                    transforms.add(parent, child, 0.0, T, static=True)
+                    parents[child.lstrip("/")] = parent.lstrip("/")
+            while root in parents:
+                root = parents[root]
+            return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
+        return ""
 
-    def _info(self) -> tuple[str, Any]:
-        """Return topic and first message of the images' camera_info; None without one."""
-        parts = self._topic.split("/")
-        topics = [
-            "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
-        ]
-        for topic in topics[:2]:  # beside image_raw, or beside the parent of image_raw/compressed
-            message = self._first([each for each in self._of(_INFO) if each.topic == topic])
-            if message is not None:
-                return topic, message
-        return "", None
-
-    def _of(self, kind: str) -> list[Any]:
-        return [each for each in self._reader.connections if each.msgtype == kind]
+    def _of(self, topic: str, *kinds: str) -> list[Any]:
+        """Return the connections of a topic."""
+        found = self._reader.connections
+        return [each for each in found if each.topic == topic and each.msgtype in kinds]
 
     def _first(self, connections: list[Any]) -> Any:
-        """Return the first message of some connections; None if there is none or it is damaged."""
+        """Return the first message of some connections; None if there is none."""
+        return next(self._messages(connections), None)
+
+    def _messages(self, connections: list[Any]) -> Iterator[Any]:
+        """Yield the messages of some connections.
+
+        Raises:
+            AwarenavError: for one that cannot be read.
+        """
         try:
             for connection, _, raw in self._reader.messages(connections) if connections else ():
-                return self._reader.deserialize(raw, connection.msgtype)
-        except Exception:  # the library raises many kinds; frames() tells
-            pass
-        return None
+                yield self._reader.deserialize(raw, connection.msgtype)
+        except Exception as cause:  # the library raises many kinds
+            raise AwarenavError(f"{self._path}: a message cannot be read: {cause}") from cause
 
 
 def _is_zero(info: Any, names: str) -> bool:
