@@ -51,7 +51,7 @@ class BridgeInputs:
 
     @property
     def rectified(self) -> bool:
-        """Whether the images are rectified, by the name of their topic."""
+        """True if the images are rectified, by the name of their topic."""
         return self.image is not None and is_rectified(self.image.name)
 
 

@@ -178,7 +178,11 @@ class BagSource:
                     parents[child.lstrip("/")] = parent.lstrip("/")
             while root in parents:
                 root = parents[root]
-            return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
+            return (
+                ""
+                if root == frame
+                else optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
+            )
         return ""
 
     def _of(self, topic: str, *kinds: str) -> list[Any]:

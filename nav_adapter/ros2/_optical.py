@@ -1,4 +1,4 @@
-"""Whether the frame of the images is an optical one: z ahead, x right, y down (REP 103)."""
+"""A check that the frame of images is an optical one: z ahead, x right, y down (REP 103)."""
 
 from __future__ import annotations
 
@@ -38,6 +38,6 @@ def optical_problem(T_level_camera: FloatArray, frame: str, level_frame: str) ->
     optical = f"{frame.removesuffix('_link').removesuffix('_frame')}_optical_frame"
     return (
         f"the frame {frame!r} of the images is not an optical frame: its z axis, the view, points "
-        f"{abs(math.degrees(up_rad)):.0f} degrees {where} in {level_frame!r}; name the frame with "
-        f"z ahead, x right and y down, often {optical!r}: in the driver, or by --camera-frame"
+        f"{abs(math.degrees(up_rad)):.0f} degrees {where} in {level_frame!r}; the driver must name "
+        f"the frame with z ahead, x right and y down, often {optical!r}"
     )

@@ -102,7 +102,7 @@ class RobotPoses:
             frame = frames.camera or frame
             T_odom_camera = self.transforms.lookup(frames.odom, frame, stamp_s)
             if problem := optical_problem(T_odom_camera, frame, frames.odom):
-                raise NavError(problem)
+                raise NavError(f"{problem}, or the bridge's camera frame must be it")
             return T_odom_camera
         T_odom_base = self.transforms.lookup(frames.odom, frames.base, stamp_s)
         return np.asarray(T_odom_base @ self._T_base_camera, dtype=np.float64)
