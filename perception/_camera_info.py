@@ -51,8 +51,8 @@ _FISHEYE_NAMES: Final = (FISHEYE, "fisheye", "kannala_brandt", "kannala_brandt4"
 # Names that say that there is no distortion.
 _NO_DISTORTION: Final = ("", "none", "pinhole", "perspective")
 _COUNTS: Final = {PINHOLE: (0, 4, 5, 8, 12, 14), FISHEYE: (0, 4)}
-# A shorter focal length, in image widths, is a view of more than 168°.
-_SHORTEST_FOCAL: Final = 0.05
+# A shorter focal length, in image widths, is a view of more than 177°.
+_SHORTEST_FOCAL: Final = 0.02
 _LARGEST_SKEW: Final = 1e-3
 
 
@@ -271,7 +271,8 @@ def _check_names(fields: Mapping[Any, Any]) -> None:
     if others and "camera_matrix" in fields:
         raise PerceptionError(
             f"the key {', '.join(others)} is not read: the coefficients of the lens distortion "
-            "belong into distortion_coefficients, and the name of their model into distortion_model"
+            "belong into distortion_coefficients (an empty list for none), and the name of their "
+            "model into distortion_model"
         )
 
 

@@ -117,7 +117,7 @@ def _rows(message: Any, pixel_bytes: int) -> NDArray[np.uint8]:
     row = width * pixel_bytes
     if step < row:
         raise NavError(
-            f"step must be at least {row} bytes, a row of {width} px of {message.encoding}, got "
+            f"rows of {width} px of {message.encoding} need a step of at least {row} bytes, got "
             f"{step}: the driver fills in a wrong step, width or encoding"
         )
     if height * width == 0 or len(message.data) < height * step:

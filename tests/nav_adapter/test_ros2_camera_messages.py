@@ -133,7 +133,7 @@ def test_camera_of_takes_the_messages_of_other_libraries() -> None:
 
 def test_a_row_that_is_shorter_than_its_pixels_is_named() -> None:
     short = replace(picture(64, 48), step=100)
-    with pytest.raises(NavError, match="step must be at least 192 bytes, a row of 64 px of rgb8"):
+    with pytest.raises(NavError, match="rows of 64 px of rgb8 need a step of at least 192 bytes"):
         picture_of(short)
     for encoding, row in (("mono16", 128), ("yuyv", 128)):
         with pytest.raises(NavError, match=f"at least {row} bytes.*got 0: the driver fills in"):
