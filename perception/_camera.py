@@ -8,17 +8,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-import cv2
 import numpy as np
 import yaml
 
-from ._camera_info import read_camera_info
+from ._camera_info import PINHOLE, CameraInfo
+from ._lens_model import LensModel
 from .arrays import FloatArray, finite_array, finite_number, pixel_count, set_fields
 from .errors import PerceptionError
 
 # Numbers of coefficients that OpenCV accepts: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
-_DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
 # Intrinsics beyond these are errors of whoever sent them, and products with them may overflow.
 _SHORTEST_PX: Final = 1e-6
 _LONGEST_PX: Final = 1e9
@@ -96,31 +95,70 @@ class Camera:
         return cls(width_px, height_px, focal, focal, 0.5 * width_px, 0.5 * height_px)
 
     @classmethod
-    def from_yaml(cls, path: str | Path) -> Camera:
+    def from_camera_info(
+        cls,
+        info: Any,
+        *,
+        rectified: bool = False,
+        image_size_px: tuple[int, int] | None = None,
+    ) -> Camera:
+        """Return the camera of the images that a ``sensor_msgs/CameraInfo`` comes with.
+
+        K, D and P are for the full image: ``roi`` and ``binning`` lead to the delivered one.
+
+        Args:
+            info: a message of any library, or a mapping with its fields.
+            rectified: whether the images are rectified (``image_rect``): P counts, without
+                distortion, and not K and D.
+            image_size_px: width and height of the images, which may be the full ones; None for
+                what ``roi`` and ``binning`` say.
+
+        Raises:
+            PerceptionError: for fields that are missing or contradict each other or the images,
+                or a distortion model other than plumb_bob and rational_polynomial.
+        """
+        return cls._of(CameraInfo.of(info), rectified, image_size_px)
+
+    @classmethod
+    def from_yaml(
+        cls,
+        path: str | Path,
+        *,
+        rectified: bool = False,
+        image_size_px: tuple[int, int] | None = None,
+    ) -> Camera:
         """Read a ROS camera_info YAML file.
 
         The file may be written by ``camera_calibration`` (``camera_matrix`` and so on), or be a
-        ``sensor_msgs/CameraInfo`` message as ``ros2 topic echo`` prints it (``k``, ``d``). The
-        distortion models plumb_bob and rational_polynomial are accepted.
+        ``sensor_msgs/CameraInfo`` message as ``ros2 topic echo`` prints it (``k``, ``d``).
+
+        Args:
+            path: of the file.
+            rectified: as in :meth:`from_camera_info`.
+            image_size_px: likewise.
 
         Raises:
-            PerceptionError: for a file that cannot be read, is not complete, or has another
-                distortion model; the message names the file.
+            PerceptionError: for a file that cannot be read, and what :meth:`from_camera_info`
+                refuses; the message names the file.
         """
-        info = read_camera_info(path)
-        if np.any(info.coefficients) and info.model not in _DISTORTION_MODELS:
-            raise PerceptionError(
-                f"{path}: distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, "
-                f"got {info.model!r}; rectify the images first, or use perception.surround for a "
-                "fisheye camera"
-            )
+        info = CameraInfo.from_yaml(path)
         try:
-            return cls(
-                *info.intrinsics,
-                info.coefficients if info.coefficients.size else None,
-            )
-        except ValueError as cause:
+            return cls._of(info, rectified, image_size_px)
+        except PerceptionError as cause:
             raise PerceptionError(f"{path}: {cause}") from cause
+
+    @classmethod
+    def _of(
+        cls, info: CameraInfo, rectified: bool, image_size_px: tuple[int, int] | None
+    ) -> Camera:
+        if info.model != PINHOLE and not rectified:
+            raise PerceptionError(
+                "distortion_model must be plumb_bob or rational_polynomial, got "
+                f"{info.model!r}; rectify the images and use their topic (image_rect), or use "
+                "perception.surround for a fisheye camera"
+            )
+        intrinsics, coefficients = info.seen(image_size_px, rectified=rectified)
+        return cls(*intrinsics, coefficients if coefficients.size else None)
 
     def to_yaml(self, path: str | Path) -> None:
         """Write a ROS ``camera_info`` YAML file that :meth:`from_yaml` reads back."""
@@ -151,32 +189,38 @@ class Camera:
     def project(self, points_camera_m: Any) -> FloatArray:
         """Project points (N, 3) in the camera frame to pixels (N, 2), lens distortion included.
 
-        The row of a point at z ≤ 0, which has no image, is NaN.
+        The row of a point at z ≤ 0, or beyond the end of the distortion model, is NaN: it has no
+        image.
         """
         points = finite_array("points_camera_m", points_camera_m, ("N", 3))
         ahead = points[:, 2] > 0.0
         pixels = np.full((len(points), 2), np.nan)
         if not ahead.any():
             return pixels
-        if self.distortion is None:
-            front = points[ahead]
-            pixels[ahead] = front[:, :2] / front[:, 2:] * (self.fx_px, self.fy_px) + (
-                self.cx_px,
-                self.cy_px,
-            )
+        rays = points[ahead, :2] / points[ahead, 2:]
+        if self._lens is None:
+            pixels[ahead] = rays * (self.fx_px, self.fy_px) + (self.cx_px, self.cy_px)
         else:
-            image, _ = cv2.projectPoints(
-                points[ahead], np.zeros(3), np.zeros(3), self.matrix, self.distortion
-            )
-            pixels[ahead] = image.reshape(-1, 2)
+            image, _ = self._lens.project(rays)
+            image[np.hypot(*rays.T) > self._lens.end] = np.nan
+            pixels[ahead] = image
         return pixels
 
-    def normalise(self, pixels_px: Any) -> FloatArray:
-        """Return rays x/z, y/z (N, 2) of pixels (N, 2), with intrinsics and distortion removed."""
+    def normalise(self, pixels_px: Any, *, nearest: bool = False) -> FloatArray:
+        """Return rays x/z, y/z (N, 2) of pixels (N, 2), with intrinsics and distortion removed.
+
+        Args:
+            pixels_px: (N, 2).
+            nearest: for pixels beyond the end of the distortion model, which have no ray, return
+                a ray at its end instead of NaN: a bound, not a measurement.
+        """
         pixels = finite_array("pixels_px", pixels_px, ("N", 2))
-        if self.distortion is None or not len(pixels):
+        if self._lens is None or not len(pixels):
             return np.asarray(
                 (pixels - (self.cx_px, self.cy_px)) / (self.fx_px, self.fy_px), dtype=np.float64
             )
-        undistorted = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.matrix, self.distortion)
-        return np.asarray(undistorted, dtype=np.float64).reshape(-1, 2)
+        return self._lens.rays(pixels, nearest=nearest)
+
+    @cached_property
+    def _lens(self) -> LensModel | None:
+        return None if self.distortion is None else LensModel(self.matrix, self.distortion)

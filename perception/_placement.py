@@ -245,12 +245,11 @@ def _range_cues(
     return cues
 
 
-def _trunk_px(camera: Camera, body: BodyPlacement) -> FloatArray:
-    """Return the neck and the middle of the hips (2, 2) of a placed body in pixels."""
+def _trunk_px(camera: Camera, body: BodyPlacement) -> FloatArray | None:
+    """Return the neck and the middle of the hips (2, 2) of a placed body in pixels, if seen."""
     points = body.keypoints_camera_m
-    return camera.project(
-        np.array([points[kp.SHOULDERS].mean(axis=0), points[kp.HIPS].mean(axis=0)])
-    )
+    ends = camera.project([points[kp.SHOULDERS].mean(axis=0), points[kp.HIPS].mean(axis=0)])
+    return ends if np.isfinite(ends).all() else None
 
 
 def _chest_cue(position: FloatArray, depth_m: float, std_m: float, has_body: bool) -> DepthCue:
@@ -329,7 +328,7 @@ def _feet_on_floor(
         for box in (detection.box_xyxy_px for detection in detections)
     ]
     depth, std = floor.depth_of(
-        camera.normalise(pixels.reshape(-1, 2)),
+        camera.normalise(pixels.reshape(-1, 2), nearest=True),
         _ANKLE_M,
         _ANKLE_STD_M,
         np.repeat(label_px, 2) / camera.fy_px,
@@ -389,7 +388,7 @@ def _bottom_cue(
     left, top, right, bottom = detection.box_xyxy_px.tolist()
     if position[2] <= _TOE_AHEAD_M or cut_by_border(camera, detection.box_xyxy_px[None])[1][0]:
         return None
-    ray = camera.normalise([[0.5 * (left + right), bottom]])
+    ray = camera.normalise([[0.5 * (left + right), bottom]], nearest=True)
     ray_std = _BOTTOM_LABEL_STD * (bottom - top) / camera.fy_px
     depth, std = floor.depth_of(ray, 0.0, _BOTTOM_STD_M, ray_std)
     found, expected = float(depth[0]), float(position[2]) - _TOE_AHEAD_M

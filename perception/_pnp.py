@@ -157,7 +157,7 @@ class PnpHeadPoseEstimator:
         spread = float(np.max(np.ptp(pixels[rows], axis=0))) if len(rows) > 1 else 0.0
         if len(rows) > 1 and spread < _MIN_SPREAD_STD * self._std_px:
             return None
-        rays = camera.normalise(pixels)
+        rays = camera.normalise(pixels, nearest=True)
         whole = len(rows) >= 4
         # The printed formula's frame is pitched: a torso says little of it.
         prior = None if whole and self._head_model == "lifted" else body_prior(body, whole=whole)

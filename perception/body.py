@@ -136,7 +136,7 @@ def _place_bodies(
     ).T
     seen = (scores >= min_score) & (factor > 0.0)[:, None]
     points *= np.where(factor > 0.0, factor, 1.0)[:, None, None]
-    rays = camera.normalise(pixels.reshape(-1, 2)).reshape(pixels.shape)
+    rays = camera.normalise(pixels.reshape(-1, 2), nearest=True).reshape(pixels.shape)
     translation, covariance, valid = _translations(
         points, rays, seen, camera.fx_px, keypoint_std_px
     )
@@ -292,7 +292,7 @@ def place_boxes(
 ) -> list[tuple[FloatArray, FloatArray] | None]:
     """Estimate positions from several boxes at once, each as :func:`place_box` does."""
     pixels = np.reshape(boxes_xyxy_px, (-1, 2))
-    edges = camera.normalise(pixels).reshape(-1, 4)
+    edges = camera.normalise(pixels, nearest=True).reshape(-1, 4)
     low, extent = edges[:, :2], edges[:, 2:] - edges[:, :2]
     boxes = extent.min(axis=1) > 0.0
     over, under = cut_by_border(camera, pixels.reshape(-1, 4))

@@ -142,7 +142,7 @@ def without_disowned(person: PersonKeypoints, reason: AwarenessReason | None) ->
 def _unit_rays(camera: Camera, points: FloatArray) -> FloatArray:
     """Return unit vectors (P, 17, 3) towards the points (P, 17, 2) of each person."""
     rays = np.ones((len(points), 17, 3))
-    rays[..., :2] = camera.normalise(points.reshape(-1, 2)).reshape(-1, 17, 2)
+    rays[..., :2] = camera.normalise(points.reshape(-1, 2), nearest=True).reshape(-1, 17, 2)
     return np.asarray(rays / np.sqrt((rays * rays).sum(axis=2, keepdims=True)))
 
 

@@ -97,7 +97,8 @@ class CameraView:
                 [right, camera.cy_px],
                 [camera.cx_px, -0.5],
                 [camera.cx_px, bottom],
-            ]
+            ],
+            nearest=True,
         )
         set_fields(
             self,

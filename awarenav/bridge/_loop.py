@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol, TypeVar, cast
 
 from nav_adapter import NavConstraints, NavError
-from nav_adapter.ros2 import AwarenessBridge, PerceptionThread, ScanThread, Topic
+from nav_adapter.ros2 import AwarenessBridge, PerceptionThread, ScanThread, Topic, is_rectified
 from nav_adapter.ros2.messages import Message
 from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
@@ -48,6 +48,11 @@ class BridgeInputs:
     scans: tuple[Topic, ...] = ()
     map: Topic | None = None
     depth: Topic | None = None
+
+    @property
+    def rectified(self) -> bool:
+        """True if the images are rectified, by the name of their topic."""
+        return self.image is not None and is_rectified(self.image.name)
 
 
 class BridgeLoop:

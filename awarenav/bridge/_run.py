@@ -107,12 +107,16 @@ def bridge_command(options: BridgeOptions) -> int:
     robot = RobotFile.from_yaml(options.robot)
     policy = read_policy(options.policy)
     prediction = _prediction(options.prediction)
-    camera = None if options.camera is None else Camera.from_yaml(options.camera)
     published = _published_topics(
         options.topic, options.only, with_mask=options.speed_mask is not None
     )
     mask = _speed_mask(options, published)
     inputs = _inputs(options)
+    camera = (
+        None
+        if options.camera is None
+        else Camera.from_yaml(options.camera, rectified=inputs.rectified)
+    )
     map_cells = _map_cells(options)
     scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
     networks, unfit = _networks(options)
@@ -144,6 +148,7 @@ def bridge_command(options: BridgeOptions) -> int:
                 frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
                 T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
                 camera=camera,
+                rectified=inputs.rectified,
                 with_camera=not options.no_camera,
                 with_depth=inputs.depth is not None,
                 scanners=scanners,
@@ -285,10 +290,8 @@ def _prediction(path: Path | None) -> PredictionModel | None:
     return None if path is None else PredictionModel.from_calibration(path)
 
 
-def _seconds(option: float | None) -> float | None:
-    return (
-        None if option is None else finite_number("--seconds", option, AwarenavError, minimum=0.0)
-    )
+def _seconds(given: float | None) -> float | None:
+    return None if given is None else finite_number("--seconds", given, AwarenavError, minimum=0.0)
 
 
 def _domain(option: int | None) -> int:

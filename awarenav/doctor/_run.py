@@ -114,12 +114,7 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
         )
         networks = choose_networks(**choice.model_dump())
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
-        calibration = source.camera
-        if options.camera is not None:
-            calibration = Camera.from_yaml(options.camera)
-        elif options.fov_deg is not None:
-            calibration = None
-        cameras = CameraChoice(calibration, options.fov_deg, lambda _: None)
+        cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)
         estimator = PeopleEstimator(networks, cameras, unfit=unfit)
         seen = _examine(source, estimator, options.frames)
         findings = [_domain_finding(unfit, networks.training_domains, rendered=source.rendered)]
@@ -130,7 +125,7 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
         if seen.best is None:
             return findings
         findings += [
-            _calibration_finding(calibration, options.fov_deg),
+            _calibration_finding(seen.best.camera if cameras.calibrated else None, options.fov_deg),
             *_rate_findings(source, seen),
             *picture_findings(seen.figures),
             _resolution_finding(seen.best.camera),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +13,7 @@ from perception import Camera
 from perception.arrays import FloatArray, finite_number
 
 from ..errors import AwarenavError
+from ._source import ImageSource
 
 #: Assumed without a calibration; webcams and phones have 55 to 75 degrees.
 ASSUMED_FOV_DEG: Final = 60.0
@@ -55,19 +57,54 @@ class CameraChoice:
     """The camera for images of any size.
 
     Args:
-        calibrated: a calibration; an image of its aspect ratio in another size counts as scaled.
+        calibrated: a calibration, or the path of its file; an image of its aspect ratio in another
+            size counts as scaled.
         fov_deg: horizontal field of view without a calibration; None assumes
             :data:`ASSUMED_FOV_DEG`.
         log: gets one message about every assumption.
+        rectified: whether the images are rectified: P of the file counts.
+
+    Raises:
+        PerceptionError: for a file that cannot be used.
     """
 
     def __init__(
-        self, calibrated: Camera | None, fov_deg: float | None, log: Callable[[str], None]
+        self,
+        calibrated: Camera | Path | None,
+        fov_deg: float | None,
+        log: Callable[[str], None],
+        *,
+        rectified: bool = False,
     ) -> None:
-        self._calibrated = calibrated
+        if isinstance(calibrated, Path):
+            Camera.from_yaml(calibrated, rectified=rectified)  # refused before any work
+        self._calibrated, self._rectified = calibrated, rectified
         self._fov_deg = fov_deg
         self._log = log
         self._cameras: dict[tuple[int, int], Camera] = {}
+
+    @classmethod
+    def of_options(
+        cls,
+        camera: Path | None,
+        fov_deg: float | None,
+        source: ImageSource,
+        log: Callable[[str], None],
+    ) -> CameraChoice:
+        """Return the choice of ``--camera`` and ``--fov-deg``, else of the source.
+
+        Without them only, the source's own calibration is read.
+
+        Raises:
+            AwarenavError: for a calibration that cannot be used.
+        """
+        own = source.camera if camera is None and fov_deg is None else None
+        return cls(camera or own, fov_deg, log, rectified=source.rectified)
+
+    @property
+    def calibrated(self) -> bool:
+        """True if there is a calibration."""
+        return self._calibrated is not None
 
     @property
     def known(self) -> bool:
@@ -98,6 +135,9 @@ class CameraChoice:
                         "assumed, and distances may be wrong; give --camera or --fov-deg"
                     )
             return Camera.from_fov(width_px, height_px, math.radians(fov_deg))
+        if isinstance(camera, Path):
+            size_px = (width_px, height_px)
+            camera = Camera.from_yaml(camera, rectified=self._rectified, image_size_px=size_px)
         if (width_px, height_px) == (camera.width_px, camera.height_px):
             return camera
         scaled = scaled_camera(camera, width_px, height_px)

@@ -155,7 +155,7 @@ def _head_position(camera: Camera, person: _Person) -> FloatArray | None:
     depth = float(person.observation.position_camera_m[2])
     if depth <= 0.0:
         return None
-    return np.append(depth * camera.normalise(pixel[None])[0], depth)
+    return np.append(depth * camera.normalise(pixel[None], nearest=True)[0], depth)
 
 
 def _draw_skeleton(image: ImageRgb, person: PersonKeypoints, unit: float) -> None:

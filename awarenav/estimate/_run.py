@@ -12,7 +12,7 @@ from typing import Final
 
 from tqdm import tqdm
 
-from perception import AttentionCone, Camera
+from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.shipped import simulator_networks_warning
 
@@ -123,7 +123,9 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
         until_prefetched = stack.enter_context(contextlib.ExitStack())
         until_prefetched.callback(source.close)
         depth = _depth(options, source)
-        cameras = CameraChoice(_calibration(options, source), options.fov_deg, _log)
+        cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, _log)
+        for note in source.notes:
+            _log(note)
         choice = NetworkChoice.of_options(
             options.networks, options.detector, options.pose, options.head, options.eyes
         )
@@ -275,12 +277,6 @@ def _fixed_pose(options: EstimateOptions) -> FloatArray | None:
     if options.camera_height_m <= 0.0:
         raise AwarenavError(f"--camera-height-m must be above 0, got {options.camera_height_m:g} m")
     return fixed_camera_pose(options.camera_height_m, options.camera_pitch_deg)
-
-
-def _calibration(options: EstimateOptions, source: ImageSource) -> Camera | None:
-    if options.camera is not None:
-        return Camera.from_yaml(options.camera)
-    return None if options.fov_deg is not None else source.camera
 
 
 def _depth(options: EstimateOptions, source: ImageSource) -> DepthFiles | None:

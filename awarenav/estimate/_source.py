@@ -33,14 +33,23 @@ class ImageSource(Protocol):
     """A sequence of frames, with what the source knows about the camera.
 
     Attributes:
-        camera: its calibration, if the source has one.
+        camera: its calibration, if the source has one; reading it raises an AwarenavError for one
+            that cannot be used.
+        rectified: whether the images are rectified: P of a calibration counts, without distortion.
+        notes: what a user of the images should be told.
         count: number of frames, if known; the number that a video states may be wrong.
         rate_hz: frames per second, if the source has a rate.
         live: whether frames come in real time; a frame that is not taken in time is lost.
         rendered: whether all frames are renders of this package.
     """
 
-    camera: Camera | None
+    @property
+    def camera(self) -> Camera | None: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+    rectified: bool
     count: int | None
     rate_hz: float | None
     live: bool

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +11,15 @@ from typing import Any, Final
 import numpy as np
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import camera_of, picture_of
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
+from nav_adapter.ros2 import (
+    TransformBuffer,
+    camera_of,
+    is_rectified,
+    optical_problem,
+    picture_of,
+)
+from nav_adapter.ros2.conversions import from_ros, pose_matrix
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import Camera
 from perception.arrays import ImageRgb
 
@@ -22,13 +30,14 @@ from ._source import SourceFrame
 _IMAGE: Final = "sensor_msgs/msg/Image"
 _COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
 _INFO: Final = "sensor_msgs/msg/CameraInfo"
+_TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
 
 
 class BagSource:
     """One image topic of a recording: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
 
     The stamp of a frame is that of its message's header. The ``camera_info`` topic beside the
-    images is their camera.
+    images is their camera; the topic's name tells whether they are rectified.
 
     Args:
         path: of the recording.
@@ -43,11 +52,20 @@ class BagSource:
         self._reader = open_bag(path)
         try:
             self._topic = self._chosen_topic(topic)
-            self.camera = self._read_camera()
+            self._connections = self._of(self._topic, _IMAGE, _COMPRESSED)
+            self.rectified = is_rectified(self._topic)
+            shown = None
+            with contextlib.suppress(AwarenavError):  # a damaged image is told with its frame
+                shown = self._first(self._connections)
+            try:
+                self._camera: Camera | AwarenavError | None = self._read_camera(shown)
+            except AwarenavError as refusal:  # only if nobody gives another calibration
+                self._camera = refusal
+            notes = (self._matrix_note(), self._frame_note(shown))
+            self.notes = tuple(note for note in notes if note)
         except BaseException:
             self._reader.close()
             raise
-        self._connections = [each for each in self._reader.connections if each.topic == self._topic]
         self.count: int | None = sum(each.msgcount for each in self._connections) or None
         duration_s = self._reader.duration * 1.0e-9
         self.rate_hz: float | None = None
@@ -55,6 +73,17 @@ class BagSource:
             self.rate_hz = (self.count - 1) / duration_s
         self.live = False
         self.rendered = False
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera of ``camera_info``; None without one, or from an uncalibrated driver.
+
+        Raises:
+            AwarenavError: for a calibration that cannot be used.
+        """
+        if isinstance(self._camera, AwarenavError):
+            raise self._camera
+        return self._camera
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield the images of the topic, numbered from 000000."""
@@ -105,44 +134,82 @@ class BagSource:
             )
         return images[0] if topic is None else topic
 
-    def _read_camera(self) -> Camera | None:
+    def _read_camera(self, shown: Any) -> Camera | None:
         """Return the camera of the first ``camera_info`` message in the images' namespace."""
+        size_px = None
+        with contextlib.suppress(AwarenavError):
+            if shown is not None:
+                height_px, width_px = picture_of(shown).shape[:2]
+                size_px = (width_px, height_px)
         parts = self._topic.split("/")
         topics = [
             "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
         ]
         for topic in topics[:2]:  # beside image_raw, or beside the parent of image_raw/compressed
-            connections = [
-                each
-                for each in self._reader.connections
-                if each.topic == topic and each.msgtype == _INFO
-            ]
-            for connection, _, raw in (
-                self._reader.messages(connections=connections) if connections else ()
-            ):
-                message: Any = self._reader.deserialize(raw, connection.msgtype)
-                return _camera(message, topic)
+            info = self._first(self._of(topic, _INFO))
+            if info is None:
+                continue
+            if _is_zero(info, "kK") and not (self.rectified and not _is_zero(info, "pP")):
+                return None
+            try:
+                return camera_of(info, rectified=self.rectified, image_size_px=size_px)
+            except NavError as cause:
+                raise AwarenavError(f"{topic}: {cause}") from cause
         return None
 
+    def _matrix_note(self) -> str:
+        """Return that P counts; empty for raw images."""
+        if not self.rectified:
+            return ""
+        return f"{self._topic} has rectified images: P of camera_info counts, without distortion"
 
-def _camera(message: Any, topic: str) -> Camera | None:
-    """Return the camera of a ``camera_info`` message; None from an uncalibrated driver."""
-    # ROS 1 names the matrices in capitals. An uncalibrated driver sends zeros.
-    matrix = np.asarray(getattr(message, "k", getattr(message, "K", ())), dtype=float).reshape(-1)
-    distortion = np.asarray(getattr(message, "d", getattr(message, "D", ())), dtype=float)
-    if matrix.size != 9 or not matrix[0] > 0.0:
-        return None
-    info = CameraInfo(
-        height=int(message.height),
-        width=int(message.width),
-        distortion_model=str(message.distortion_model),
-        d=tuple(distortion.tolist()),
-        k=tuple(matrix.tolist()),
-    )
-    try:
-        return camera_of(info)
-    except NavError as cause:
-        raise AwarenavError(f"{topic}: {cause}") from cause
+    def _frame_note(self, shown: Any) -> str:
+        """Return why the frame of the images is not optical by the static transforms, if so."""
+        transforms, parents = TransformBuffer(), {}
+        # Damaged transforms, and those of ROS 1 with other fields, tell nothing.
+        with contextlib.suppress(ValueError, TypeError, AttributeError):
+            frame = root = str(shown.header.frame_id).lstrip("/")
+            for message in self._messages(self._of("/tf_static", _TRANSFORMS)):
+                for each in from_ros(TFMessage, message).transforms:
+                    move = each.transform.translation
+                    T = pose_matrix((move.x, move.y, move.z), each.transform.rotation)
+                    parent, child = each.header.frame_id, each.child_frame_id
+                    transforms.add(parent, child, 0.0, T, static=True)
+                    parents[child.lstrip("/")] = parent.lstrip("/")
+            while root in parents:
+                root = parents[root]
+            return (
+                ""
+                if root == frame
+                else optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
+            )
+        return ""
+
+    def _of(self, topic: str, *kinds: str) -> list[Any]:
+        """Return the connections of a topic."""
+        found = self._reader.connections
+        return [each for each in found if each.topic == topic and each.msgtype in kinds]
+
+    def _first(self, connections: list[Any]) -> Any:
+        """Return the first message of some connections; None if there is none."""
+        return next(self._messages(connections), None)
+
+    def _messages(self, connections: list[Any]) -> Iterator[Any]:
+        """Yield the messages of some connections.
+
+        Raises:
+            AwarenavError: for one that cannot be read.
+        """
+        try:
+            for connection, _, raw in self._reader.messages(connections) if connections else ():
+                yield self._reader.deserialize(raw, connection.msgtype)
+        except Exception as cause:  # the library raises many kinds
+            raise AwarenavError(f"{self._path}: a message cannot be read: {cause}") from cause
+
+
+def _is_zero(info: Any, names: str) -> bool:
+    """Return whether a matrix is zero, as an uncalibrated driver sends it; in capitals in ROS 1."""
+    return not any(np.any(getattr(info, name, 0.0)) for name in names)
 
 
 def _stamp_s(message: Any) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
@@ -55,13 +56,26 @@ class ImageFiles:
         self._files = sorted(files, key=natural_order)
         self._interval_s = interval_s
         self._known = _stamps_and_poses(folder / _TRUTH)
-        self.camera = Camera.from_yaml(folder / _CAMERA) if (folder / _CAMERA).exists() else None
+        self._calibration = folder / _CAMERA
+        self.rectified = False
+        self.notes: tuple[str, ...] = ()
         self.count: int | None = len(self._files)
         self.rate_hz: float | None = None
         self.live = False
         self.rendered = (folder / _RENDER).exists() and all(
             each.name in self._known for each in self._files
         )
+
+    @cached_property
+    def camera(self) -> Camera | None:
+        """The camera of ``camera.yaml``, for images of the first one's size; None without it."""
+        if not self._calibration.exists():
+            return None
+        try:
+            height_px, width_px = read_image(self._files[0]).shape[:2]
+        except AwarenavError:  # told with the frame
+            return Camera.from_yaml(self._calibration)
+        return Camera.from_yaml(self._calibration, image_size_px=(width_px, height_px))
 
     @property
     def files(self) -> tuple[Path, ...]:

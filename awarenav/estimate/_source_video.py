@@ -49,6 +49,8 @@ class VideoSource:
         self.live = live
         self.rendered = False
         self.camera: Camera | None = None
+        self.rectified = False
+        self.notes: tuple[str, ...] = ()
         count = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         self.count: int | None = int(count) if not live and 0 < count < 1e9 else None
         rate = capture.get(cv2.CAP_PROP_FPS)

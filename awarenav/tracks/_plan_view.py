@@ -120,7 +120,7 @@ def view_edges_rad(camera: Camera) -> tuple[float, float]:
     row = camera.cy_px
     # Pixel centres are at whole numbers.
     edges = np.array([[camera.width_px - 0.5, row], [-0.5, row]])
-    right, left = (-np.arctan(camera.normalise(edges)[:, 0])).tolist()
+    right, left = (-np.arctan(camera.normalise(edges, nearest=True)[:, 0])).tolist()
     return right, left
 
 

@@ -19,6 +19,7 @@ from ._image_perception import PerceivedFrame
 from ._images import camera_of, depth_of, picture_of
 from ._markers import markers
 from ._mask_stream import SpeedMaskSettings
+from ._optical import optical_problem
 from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
 from ._perception_thread import PerceptionThread
@@ -30,7 +31,7 @@ from ._scan_thread import ScanThread
 from ._scans import laser_scan_of, map_cells_of
 from ._speed_limit import SLOWEST_MPS, speed_limit
 from ._speed_mask import speed_mask
-from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, renamed
+from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, is_rectified, renamed
 from ._transforms import TransformBuffer
 
 if TYPE_CHECKING:
@@ -67,11 +68,13 @@ __all__ = [
     "depth_of",
     "detections",
     "encode",
+    "is_rectified",
     "laser_scan_of",
     "map_cells_of",
     "markers",
     "occupancy_grid",
     "odometry_problems",
+    "optical_problem",
     "outgoing",
     "people",
     "picture_of",

@@ -72,6 +72,7 @@ class AwarenessBridge:
         T_base_camera: pose of a fixed camera; None to look it up in tf.
         make_pipeline: makes perception for a camera once it is known; by default the shipped one.
         camera: calibration; None to read it from camera_info. With it, the pipeline is made here.
+        rectified: whether the images are rectified (:func:`is_rectified`): camera_info's P counts.
         with_camera: False for scanners alone; everybody then counts as unaware.
         with_depth: True if the camera has depth images (:meth:`on_depth`).
         scanners: the laser scanners.
@@ -93,6 +94,7 @@ class AwarenessBridge:
         T_base_camera: FloatArray | None = None,
         make_pipeline: Callable[[Camera], AwarenessPipeline] = AwarenessPipeline,
         camera: Camera | None = None,
+        rectified: bool = False,
         with_camera: bool = True,
         with_depth: bool = False,
         scanners: Sequence[ScannerInput] = (),
@@ -111,7 +113,7 @@ class AwarenessBridge:
             raise NavError("with_camera must be True, or scanners must name one or two, got none")
         config = TrackerConfig(awareness=policy.filter, standing_window_s=policy.standing_window_s)
         self._tracker = SharedTracker(config, len(scanners))
-        self._perception = ImagePerception(make_pipeline, self._tracker, camera)
+        self._perception = ImagePerception(make_pipeline, self._tracker, camera, rectified)
         self._adapter = NavAdapter(policy, robot, prediction=prediction)
         self._poses = RobotPoses(self.frames, T_base_camera)
         self._frame: PerceivedFrame | None = None
@@ -193,10 +195,9 @@ class AwarenessBridge:
 
     def on_camera_info(self, message: CameraInfo) -> None:
         """Make the pipeline from the first calibration; later ones are ignored."""
-        if not self._with_camera:
-            return
         try:
-            self._perception.calibrate(message)
+            if self._with_camera:
+                self._perception.calibrate(message)
         except (NavError, PerceptionError) as problem:
             self._warn(str(problem))
 
@@ -245,9 +246,8 @@ class AwarenessBridge:
         with self._lock:
             if frame is None or self._clock.restarts != restarts:
                 return False
-            self._frame = frame
+            self._frame, self._warned = frame, ""
             self._frames += 1
-            self._warned = ""
             assert self._perception.camera is not None
             T_base_camera = self._poses.camera_in_base(message.header.frame_id, stamp_s)
             self._watch.saw_image(stamp_s, self._perception.camera, T_base_camera)

@@ -16,6 +16,7 @@ from perception.arrays import FloatArray
 from perception.errors import DepthImageError
 from tracking import PersonTrack
 
+from .._errors import NavError
 from ._depth_reader import StampedDepth
 from ._images import camera_of, picture_of
 from ._shared_tracker import SharedTracker
@@ -58,6 +59,7 @@ class ImagePerception:
         make_pipeline: makes the pipeline for a camera.
         tracker: takes the people of each image.
         camera: calibration; None until :meth:`calibrate`.
+        rectified: whether the images are rectified: a calibration's P counts.
     """
 
     def __init__(
@@ -65,10 +67,13 @@ class ImagePerception:
         make_pipeline: Callable[[Camera], AwarenessPipeline],
         tracker: SharedTracker,
         camera: Camera | None,
+        rectified: bool = False,
     ) -> None:
         self._make_pipeline, self._tracker = make_pipeline, tracker
         self._busy = threading.Lock()
         self._camera: Camera | None = None
+        self._info: CameraInfo | None = None
+        self._rectified = rectified
         if camera is not None:
             self._start(camera)
 
@@ -85,7 +90,8 @@ class ImagePerception:
         """
         with self._busy:
             if self._camera is None:
-                self._start(camera_of(message))
+                self._start(camera_of(message, rectified=self._rectified))
+                self._info = message
 
     def process(
         self,
@@ -104,6 +110,7 @@ class ImagePerception:
         """
         with self._busy:
             image = picture_of(message)
+            self._fit(image.shape[1], image.shape[0])
             floor, problem = _floor(T_odom_camera), ""
             try:
                 given = {} if depth is None else _given(depth)
@@ -115,6 +122,25 @@ class ImagePerception:
         if tracks is None:
             return None
         return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera, depth, problem)
+
+    def _fit(self, width_px: int, height_px: int) -> None:
+        """Make sure that the camera is that of images of this size.
+
+        Raises:
+            NavError: if the calibration is for other images.
+        """
+        camera, size_px = self._camera, (width_px, height_px)
+        assert camera is not None
+        if (camera.width_px, camera.height_px) == size_px:
+            return
+        if self._info is not None:  # the images may be the full ones in spite of roi and binning
+            camera = camera_of(self._info, rectified=self._rectified, image_size_px=size_px)
+        if (camera.width_px, camera.height_px) != size_px:
+            raise NavError(
+                f"the camera is calibrated for {camera.width_px} x {camera.height_px} px, but the "
+                f"images have {width_px} x {height_px} px"
+            )
+        self._start(camera)
 
     def _start(self, camera: Camera) -> None:
         self._pipeline = self._make_pipeline(camera)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from perception import Camera, PerceptionError
 
 from .._errors import NavError
-from .messages.sensor_msgs import CameraInfo
 
 # sensor_msgs/image_encodings.hpp: samples per pixel, and OpenCV's conversion to RGB.
 _ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
@@ -39,7 +38,6 @@ _ENCODINGS: Final[dict[str, tuple[int, int | None]]] = {
 # REP 118: millimetres with 0 as hole, and metres with NaN as hole.
 _DEPTH_TYPES: Final = {"16UC1": "u2", "32FC1": "f4"}
 _SIXTEEN_BITS: Final = ("rgb16", "bgr16", "mono16")
-_DISTORTION_MODELS: Final = ("plumb_bob", "rational_polynomial")
 
 
 def picture_of(message: Any) -> NDArray[np.uint8]:
@@ -93,29 +91,22 @@ def depth_of(message: Any) -> NDArray[Any]:
     return rows.astype(stored.newbyteorder("="))
 
 
-def camera_of(message: CameraInfo) -> Camera:
-    """Return the camera of a ``camera_info`` message: its matrix k and distortion d.
+def camera_of(
+    message: Any, *, rectified: bool = False, image_size_px: tuple[int, int] | None = None
+) -> Camera:
+    """Return the camera of the images that a ``camera_info`` message comes with.
+
+    Args:
+        message: ``sensor_msgs`` CameraInfo, of this package or of another library.
+        rectified: as in :meth:`perception.Camera.from_camera_info`.
+        image_size_px: likewise.
 
     Raises:
-        NavError: for the zeros of an uncalibrated driver, or an unsupported distortion model.
+        NavError: for the zeros of an uncalibrated driver, an unsupported distortion model, or
+            fields that contradict each other or the images.
     """
-    if not message.k[0] > 0.0:
-        raise NavError("camera_info has no calibration (k is zero): calibrate the camera")
-    if message.distortion_model not in ("", *_DISTORTION_MODELS) and any(message.d):
-        raise NavError(
-            f"distortion_model must be one of {', '.join(_DISTORTION_MODELS)}, got "
-            f"{message.distortion_model!r}; rectify the images first"
-        )
     try:
-        return Camera(
-            message.width,
-            message.height,
-            message.k[0],
-            message.k[4],
-            message.k[2],
-            message.k[5],
-            np.array(message.d) if any(message.d) else None,
-        )
+        return Camera.from_camera_info(message, rectified=rectified, image_size_px=image_size_px)
     except PerceptionError as cause:
         raise NavError(f"camera_info: {cause}") from cause
 
@@ -124,10 +115,15 @@ def _rows(message: Any, pixel_bytes: int) -> NDArray[np.uint8]:
     """Return the rows of a message without their padding, (H, W · bytes of a pixel)."""
     height, width, step = int(message.height), int(message.width), int(message.step)
     row = width * pixel_bytes
-    if height * width == 0 or step < row or len(message.data) < height * step:
+    if step < row:
+        raise NavError(
+            f"rows of {width} px of {message.encoding} need a step of at least {row} bytes, got "
+            f"{step}: the driver fills in a wrong step, width or encoding"
+        )
+    if height * width == 0 or len(message.data) < height * step:
         raise NavError(
             f"{width} x {height} px of {message.encoding} with {step} bytes per row need "
-            f"{height * max(step, row)} bytes and at least one pixel, got {len(message.data)} bytes"
+            f"{height * step} bytes and at least one pixel, got {len(message.data)} bytes"
         )
     return np.frombuffer(message.data, np.uint8, height * step).reshape(height, step)[:, :row]
 

@@ -13,6 +13,7 @@ from perception.laser import RobotMotion
 from .._errors import NavError
 from .._robot import RobotState
 from ._odometry_check import OdometryCheck
+from ._optical import optical_problem
 from ._outgoing import Frames
 from ._transforms import TransformBuffer
 from .conversions import pose_matrix, to_seconds
@@ -149,14 +150,15 @@ class RobotPoses:
             stamp_s: of the image.
 
         Raises:
-            NavError: for a pose that is not known at that time.
+            NavError: for a pose that is not known at that time, or not of an optical frame.
         """
         T_base_camera = self._T_base_camera
         if T_base_camera is None:
             frame = self._frames.camera or frame
             if not self._is_on_robot(frame):
-                return self.transforms.lookup(self._frames.odom, frame, stamp_s)
-            T_base_camera = self.in_base(frame, stamp_s)
+                T_odom_camera = self.transforms.lookup(self._frames.odom, frame, stamp_s)
+                return _optical(T_odom_camera, frame, self._frames.odom)
+            T_base_camera = _optical(self.in_base(frame, stamp_s), frame, self._frames.base)
         return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
 
     def in_base(self, frame: str, stamp_s: float) -> FloatArray:
@@ -199,3 +201,14 @@ class RobotPoses:
 
     def _T_odom_base(self, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
         return self._odometry.lookup(self._frames.odom, self._frames.base, stamp_s)
+
+
+def _optical(T: FloatArray, frame: str, level_frame: str) -> FloatArray:
+    """Return the pose (4, 4) of a camera in a level frame.
+
+    Raises:
+        NavError: for one that is not of an optical frame.
+    """
+    if problem := optical_problem(T, frame, level_frame):
+        raise NavError(f"{problem}, or the bridge's camera frame must be it")
+    return T

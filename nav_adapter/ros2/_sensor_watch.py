@@ -166,7 +166,7 @@ def _field_of(camera: Camera, T_base_camera: FloatArray) -> tuple[float, float]:
     if np.hypot(*axis) < _STEEP:
         return 0.0, math.pi
     right, middle = camera.width_px - 0.5, camera.cy_px
-    sides = camera.normalise([[-0.5, middle], [right, middle]])
+    sides = camera.normalise([[-0.5, middle], [right, middle]], nearest=True)
     rays = np.column_stack((sides, np.ones(2))) @ T_base_camera[:3, :3].T
     bearing = math.atan2(axis[1], axis[0])
     off = [

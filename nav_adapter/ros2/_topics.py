@@ -88,6 +88,20 @@ READ: Final = MappingProxyType(
 )
 
 
+# Last parts of the topics of image_transport.
+_TRANSPORTS: Final = ("compressed", "compressedDepth", "theora", "ffmpeg", "zstd")
+
+
+def is_rectified(topic: str) -> bool:
+    """Return whether a topic of images has rectified ones, by its name.
+
+    ``image_proc`` and the drivers say so in the last part: ``image_rect``, ``image_rect_color``,
+    ``left/image_rect/compressed``.
+    """
+    parts = [part for part in topic.split("/") if part and part not in _TRANSPORTS]
+    return bool(parts) and not {"rect", "rectified"}.isdisjoint(parts[-1].lower().split("_"))
+
+
 def renamed(topic: Topic, name: str) -> Topic:
     """Return the topic with another name, as written in ROS (``/robot1/odom``).
 

@@ -50,7 +50,7 @@ from ._perception_thread import PerceptionThread
 from ._robot_file import RobotFile
 from ._scan_perception import scanner_inputs
 from ._scan_thread import ScanThread
-from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic
+from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, is_rectified
 from .conversions import from_ros, ros_class, to_ros
 from .messages import Message, ros_type
 from .messages.nav_msgs import OccupancyGrid, Odometry
@@ -92,6 +92,8 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         calibration = self._parameter("prediction_file", "")
         use_camera = self._parameter("use_camera", True)
         use_depth = use_camera and self._parameter("depth", False)
+        compressed = use_camera and self._parameter("compressed", False)
+        image = READ["compressed" if compressed else "image"]
         scans = self._scan_topics(self._parameter("scanners", 0))
         self._publishers_by_key: dict[str, Any] = {}
         for key, topic in PUBLISHED.items():
@@ -117,6 +119,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
                 allowed=self._parameter("allow_simulator_networks", False) or not use_camera,
             ),
             with_camera=use_camera,
+            rectified=use_camera and is_rectified(self.resolve_topic_name(image.name)),
             with_depth=use_depth,
             scanners=scanner_inputs([topic.name for topic in scans], robot),
             warn=self.get_logger().warning,
@@ -129,9 +132,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         use_map = bool(scans) and self._parameter("use_map", False)
         if use_camera:
             self._subscribe(READ["camera_info"], self._calibration)
-            compressed = self._parameter("compressed", False)
             kind: Any = CompressedImage if compressed else Image
-            image = READ["compressed" if compressed else "image"]
             self._subscribe(image, lambda m: self._image(kind, m))
         if use_depth:
             self._subscribe(READ["depth"], self._depth_image)

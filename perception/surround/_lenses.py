@@ -9,12 +9,11 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from .._camera_info import read_camera_info
+from .._camera_info import FISHEYE, CameraInfo
 from ..arrays import FloatArray, finite_array, finite_number, pixel_count, set_fields
 from ..errors import PerceptionError
 
 _DEFAULT_MAX_ANGLE_RAD: Final = math.radians(100.0)
-_KANNALA_BRANDT: Final = ("equidistant", "fisheye")
 
 
 class WideLens(Protocol):
@@ -95,25 +94,24 @@ class FisheyeLens:
     def from_yaml(
         cls, path: str | Path, max_angle_rad: float = _DEFAULT_MAX_ANGLE_RAD
     ) -> FisheyeLens:
-        """Read a ROS camera_info YAML file whose ``distortion_model`` is ``equidistant``.
+        """Read a ROS camera_info YAML file of a fisheye: ``distortion_model: equidistant``.
+
+        ``camera_calibration`` writes ``camera_model: fisheye`` instead.
 
         Raises:
             PerceptionError: for a file that cannot be read, is not complete, or has another
                 distortion model (:meth:`perception.Camera.from_yaml` reads pinhole models); the
                 message names the file.
         """
-        info = read_camera_info(path)
-        if info.model not in _KANNALA_BRANDT:
+        info = CameraInfo.from_yaml(path)
+        if info.model != FISHEYE:
             raise PerceptionError(
-                f"{path}: distortion_model of a fisheye must be one of "
-                f"{', '.join(_KANNALA_BRANDT)}, got {info.model!r}; Camera.from_yaml reads others"
+                f"{path}: distortion_model of a fisheye must be {FISHEYE} (or camera_model: "
+                f"fisheye), got {info.model!r}; Camera.from_yaml reads others"
             )
         try:
-            return cls(
-                *info.intrinsics,
-                info.coefficients if info.coefficients.size else None,
-                max_angle_rad,
-            )
+            intrinsics, coefficients = info.seen()
+            return cls(*intrinsics, coefficients if coefficients.size else None, max_angle_rad)
         except PerceptionError as cause:
             raise PerceptionError(f"{path}: {cause}") from cause
 

@@ -90,7 +90,8 @@ class FlatView:
 
     def _rays(self, pixels_px: FloatArray) -> FloatArray:
         """Return directions (N, 3) in the camera frame of pixels (N, 2) of the view."""
-        flat = np.column_stack((self.camera.normalise(pixels_px), np.ones(len(pixels_px))))
+        rays = self.camera.normalise(pixels_px, nearest=True)
+        flat = np.column_stack((rays, np.ones(len(rays))))
         return np.asarray(flat @ self.rotation_camera_view.T)
 
 

@@ -42,6 +42,9 @@ class StandInNode:
         given = {"robot_file": str(ROOT / "docs" / "nav2" / "robot.yaml"), **self.parameters}
         return SimpleNamespace(value=given.get(name, default))
 
+    def resolve_topic_name(self, name: str) -> str:
+        return f"/robot_1/{name}"
+
     def get_logger(self) -> Any:
         return SimpleNamespace(warning=lambda text: None)
 

@@ -69,15 +69,19 @@ def looking_at(camera: Camera, centre_px: FloatArray) -> tuple[FloatArray, Float
         the image, relative to the centre: exact at the centre, first order around it. The focal
         length of the turned camera is :func:`ray_focal_px`.
     """
-    rays = camera.normalise(centre_px)
+    rays = camera.normalise(centre_px, nearest=True)
     axes = ray_axes(rays)
     stretch = ray_stretch(axes)
     f = ray_focal_px(camera)
+    plain = stretch * (np.array([[camera.fx_px], [camera.fy_px]]) / f)
     if camera.distortion is None:
-        return axes, stretch * (np.array([[camera.fx_px], [camera.fy_px]]) / f)
+        return axes, plain
     steps = _STEP * stretch.swapaxes(1, 2)
     ends = np.ones((len(rays), 2, 2, 3))
     ends[:, 0, :, :2] = rays[:, None] + steps
     ends[:, 1, :, :2] = rays[:, None] - steps
     pixels = camera.project(ends.reshape(-1, 3)).reshape(-1, 2, 2, 2)
-    return axes, np.asarray((pixels[:, 0] - pixels[:, 1]).swapaxes(1, 2) / (2.0 * _STEP * f))
+    bent = (pixels[:, 0] - pixels[:, 1]).swapaxes(1, 2) / (2.0 * _STEP * f)
+    # The distortion model may end within a step.
+    known = np.isfinite(bent).all(axis=(1, 2), keepdims=True)
+    return axes, np.asarray(np.where(known, bent, plain))

@@ -103,6 +103,8 @@ class MediaPipeEyeEstimator(MediaPipeEstimator):
         if px_per_m * _IRIS_M < _MIN_IRIS_PX:
             return None
         centre_px = camera.project(centre_m[None])
+        if not np.isfinite(centre_px).all():
+            return None
         axes, stretch = looking_at(camera, centre_px)
         side_px = _CROP_M * focal_px / float(np.linalg.norm(centre_m))
         crop = head_crop(image, centre_px[0], side_px, _CROP_PX, stretch[0])
