@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -32,6 +33,7 @@ from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 from ..errors import AwarenavError
 from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
+from ._exif import FIRST_TRANSPOSED, UPRIGHT
 from ._source import SourceFrame
 
 # An observation farther than this from a track does not belong to it.
@@ -171,6 +173,7 @@ class PeopleEstimator:
         """
         assert frame.image_rgb is not None
         height, width = frame.image_rgb.shape[:2]
+        self._require_known_turn(frame)
         camera = self._cameras.of_size(width, height)
         pose = self._fixed_pose if frame.T_odom_camera is None else frame.T_odom_camera
         self._pose_estimator.forget()
@@ -202,6 +205,27 @@ class PeopleEstimator:
             track_ids,
             self._unfit,
             no_view,
+        )
+
+    def _require_known_turn(self, frame: SourceFrame) -> None:
+        """Refuse a picture that its file has turned where the pixels of the sensor count.
+
+        Nothing says whether a calibration or depth image is for the picture as stored or as shown;
+        only of a quarter turn, the size tells.
+        """
+        assert frame.image_rgb is not None
+        orientation = frame.orientation
+        height, width = frame.image_rgb.shape[:2]
+        if orientation == UPRIGHT or not (self._cameras.calibrated or self._depth is not None):
+            return
+        if orientation >= FIRST_TRANSPOSED and height != width:
+            with suppress(AwarenavError):
+                self._cameras.of_size(width, height)
+                return
+        raise AwarenavError(
+            f"the file turns the picture (EXIF orientation {orientation}), and the calibration or "
+            "depth image may be for the pixels as stored: save the pixels upright, without an "
+            "orientation in the file, or give --fov-deg and no --depth"
         )
 
     def _keypoints_of(self, observation: PersonObservation) -> PersonKeypoints | None:

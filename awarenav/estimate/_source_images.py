@@ -12,7 +12,7 @@ from perception.arrays import FloatArray, finite_number, rigid_transform
 
 from ..errors import AwarenavError
 from ..records import read_records
-from ._images import IMAGE_SUFFIXES, read_image
+from ._images import IMAGE_SUFFIXES, read_turned_image
 from ._source import SourceFrame
 
 _CAMERA: Final = "camera.yaml"
@@ -73,7 +73,8 @@ class ImageFiles:
         for index, path in enumerate(self._files):
             stamp_s, pose = self._known.get(path.name, (index * self._interval_s, None))
             try:
-                yield SourceFrame(path.name, stamp_s, read_image(path), pose)
+                image, turned = read_turned_image(path)
+                yield SourceFrame(path.name, stamp_s, image, pose, orientation=turned)
             except AwarenavError as error:
                 yield SourceFrame(path.name, stamp_s, None, pose, str(error))
 

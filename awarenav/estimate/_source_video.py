@@ -12,12 +12,15 @@ import cv2
 from perception import Camera
 
 from ..errors import AwarenavError, counted
+from ._exif import UPRIGHT
 from ._images import as_rgb
 from ._source import SourceFrame
 
 # Some containers only estimate their number of frames: so many may be missing.
 _MISCOUNTED_FRAMES: Final = 2
 _MISCOUNTED_SHARE: Final = 0.01
+# EXIF's numbers for the turns, in degrees, that OpenCV has made as a video file asks for.
+_ORIENTATIONS: Final = {90: 6, 180: 3, 270: 8}
 
 
 class VideoSource:
@@ -52,6 +55,8 @@ class VideoSource:
         count = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         self.count: int | None = int(count) if not live and 0 < count < 1e9 else None
         rate = capture.get(cv2.CAP_PROP_FPS)
+        turn_deg = capture.get(cv2.CAP_PROP_ORIENTATION_META)
+        self._orientation = UPRIGHT if live else _ORIENTATIONS.get(turn_deg % 360.0, UPRIGHT)
         self.rate_hz: float | None = rate if math.isfinite(rate) and 0.1 <= rate <= 1000.0 else None
 
     @classmethod
@@ -87,7 +92,8 @@ class VideoSource:
             last_s = stamp_s
             name = f"{number:06d}"
             try:
-                yield SourceFrame(name, stamp_s, as_rgb(image, f"{self._name}, frame {name}"))
+                picture = as_rgb(image, f"{self._name}, frame {name}")
+                yield SourceFrame(name, stamp_s, picture, orientation=self._orientation)
             except AwarenavError as error:
                 yield SourceFrame(name, stamp_s, None, None, str(error))
             number += 1
