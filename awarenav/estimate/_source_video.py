@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 import cv2
@@ -12,11 +13,12 @@ import cv2
 from perception import Camera
 
 from ..errors import AwarenavError, counted
+from ._containers import lists_frames, missing_bytes
 from ._exif import UPRIGHT
 from ._images import as_rgb
 from ._source import SourceFrame
 
-# Some containers only estimate their number of frames: so many may be missing.
+# Lists of frames have some that cannot be decoded: so many may be missing.
 _MISCOUNTED_FRAMES: Final = 2
 _MISCOUNTED_SHARE: Final = 0.01
 # EXIF's numbers for the turns, in degrees, that OpenCV has made as a video file asks for.
@@ -53,7 +55,8 @@ class VideoSource:
         self.rendered = False
         self.camera: Camera | None = None
         count = capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        self.count: int | None = int(count) if not live and 0 < count < 1e9 else None
+        stated = not live and 0 < count < 1e9 and lists_frames(Path(name))
+        self.count: int | None = int(count) if stated else None
         rate = capture.get(cv2.CAP_PROP_FPS)
         turn_deg = capture.get(cv2.CAP_PROP_ORIENTATION_META)
         self._orientation = UPRIGHT if live else _ORIENTATIONS.get(turn_deg % 360.0, UPRIGHT)
@@ -112,7 +115,9 @@ class VideoSource:
         if read == 0:
             return f"{self._name} has no frame that can be decoded"
         if self.count is None:
-            return ""
+            lost = missing_bytes(Path(self._name))
+            what = f"{self._name} ends after {counted(read, 'frame')}: it is cut off"
+            return f"{what}, {lost} bytes are missing" if lost else ""
         missing = self.count - read
         if missing <= max(_MISCOUNTED_FRAMES, _MISCOUNTED_SHARE * self.count):
             return ""
