@@ -1,4 +1,4 @@
-"""What the containers of videos say about their own length."""
+"""The length of a video, as its container states it."""
 
 from __future__ import annotations
 

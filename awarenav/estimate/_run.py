@@ -22,7 +22,7 @@ from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
 from ._estimator import FrameEstimate, Networks, PeopleEstimator
 from ._networks import NetworkChoice, admit_networks, choose_networks
-from ._open_source import open_source
+from ._open_source import CAMERA_NUMBER, open_source
 from ._overlay_writer import OverlayWriter
 from ._results import ResultsFile, estimate_record, settings_hash
 from ._source import ImageSource, SourceFrame
@@ -65,6 +65,8 @@ class EstimateOptions:
     pose: str
     head: str
     eyes: str
+    person_class: int | None = None
+    input_size: str | None = None
     allow_simulator_networks: bool
     min_score: float
     threads: int | None
@@ -129,9 +131,7 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
         until_prefetched.callback(source.close)
         depth = _depth(options, source)
         cameras = CameraChoice(_calibration(options, source), options.fov_deg, _log)
-        choice = NetworkChoice.of_options(
-            options.networks, options.detector, options.pose, options.head, options.eyes
-        )
+        choice = NetworkChoice.of_options(options)
         if networks is None:
             networks = choose_networks(
                 **choice.model_dump(),
@@ -155,7 +155,9 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
             depth=depth,
             unfit=unfit,
         )
-        chosen = {name: getattr(options, name) for name in _SETTINGS} | choice.model_dump()
+        chosen = {name: getattr(options, name) for name in _SETTINGS} | (
+            choice.model_dump(exclude_none=True)
+        )
         if options.depth is not None:
             chosen["depth"] = options.depth
         settings = settings_hash(chosen)
@@ -266,7 +268,7 @@ def _check(options: EstimateOptions) -> None:
         )
     if options.resume and draws_video:
         raise AwarenavError("--resume cannot continue a video; draw into a folder (--overlay DIR)")
-    if options.resume and (options.source.isdigit() or "://" in options.source):
+    if options.resume and (CAMERA_NUMBER.fullmatch(options.source) or "://" in options.source):
         raise AwarenavError("--resume cannot continue a camera: its frames are gone")
     if options.camera_pitch_deg and options.camera_height_m is None:
         raise AwarenavError("--camera-pitch-deg needs --camera-height-m")

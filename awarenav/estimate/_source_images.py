@@ -85,7 +85,7 @@ class ImageFiles:
 def natural_order(path: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
     """Return a sort key that counts numbers in a name as numbers: image9 before image10."""
     parts = re.split(r"(\d+)", path.name)
-    return tuple((0, int(part)) if part.isdigit() else (1, part) for part in parts), path.name
+    return tuple((0, int(part)) if part.isdecimal() else (1, part) for part in parts), path.name
 
 
 def _stamps_and_poses(truth: Path) -> dict[str, tuple[float, FloatArray | None]]:

@@ -58,8 +58,8 @@ class VideoSource:
         stated = not live and 0 < count < 1e9 and lists_frames(Path(name))
         self.count: int | None = int(count) if stated else None
         rate = capture.get(cv2.CAP_PROP_FPS)
-        turn_deg = capture.get(cv2.CAP_PROP_ORIENTATION_META)
-        self._orientation = UPRIGHT if live else _ORIENTATIONS.get(turn_deg % 360.0, UPRIGHT)
+        turn_deg = 0 if live else int(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
+        self._orientation = _ORIENTATIONS.get(turn_deg, UPRIGHT)
         self.rate_hz: float | None = rate if math.isfinite(rate) and 0.1 <= rate <= 1000.0 else None
 
     @classmethod

@@ -11,11 +11,11 @@ import pytest
 from numbered_images import HEIGHT, WIDTH, NumberReader, numbered
 from test_estimate import estimate
 
-av = pytest.importorskip("av", reason="PyAV is not installed")
-
 from awarenav import AwarenavError
 from awarenav.estimate import open_source
 from awarenav.records import read_records
+
+av = pytest.importorskip("av", reason="PyAV is not installed")
 
 COUNT = 24
 #: Stamps of a recorder that leaves out pictures, milliseconds.
