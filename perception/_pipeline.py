@@ -184,7 +184,8 @@ class AwarenessPipeline:
 
         If the keypoints do not determine the position, it comes from the box, with a larger
         covariance. A person without a usable head pose has awareness None. Somebody who turns the
-        back of a blurred head has an awareness of 0 and no gaze.
+        back of a blurred head has an awareness of 0 and no gaze. Black, one-coloured and repeated
+        pictures are no views: leave them out (:func:`~perception.no_view.why_no_view`).
 
         Args:
             image_rgb: (H, W, 3) uint8 of the camera's size.

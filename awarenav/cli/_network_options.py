@@ -29,7 +29,6 @@ _NETWORK_OPTIONS: Final = (
     option(
         "--person-class",
         group=_NETWORKS,
-        excludes="--networks",
         type=Whole(0),
         show_default="the class that the network calls 'person', else 0",
         metavar="N",
@@ -38,7 +37,6 @@ _NETWORK_OPTIONS: Final = (
     option(
         "--input-size",
         group=_NETWORKS,
-        excludes="--networks",
         show_default="the network's own",
         metavar="WxH",
         help="Width and height, in pixels, of the input of a --detector that leaves them free.",

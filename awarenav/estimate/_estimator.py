@@ -207,6 +207,10 @@ class PeopleEstimator:
             no_view,
         )
 
+    def pass_over(self, frame: SourceFrame) -> None:
+        """Note a frame that is not estimated: the next one may be the same picture."""
+        self._before = frame.image_rgb
+
     def _require_known_turn(self, frame: SourceFrame) -> None:
         """Refuse a picture that its file has turned where the pixels of the sensor count.
 

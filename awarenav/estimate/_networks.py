@@ -52,6 +52,8 @@ SHIPPED: Final = "shipped"
 _MEDIAPIPE: Final = "mediapipe"
 _WITHOUT_NETWORK: Final = "pnp"
 _EYES: Final = ("auto", _MEDIAPIPE, "none")
+# What can be said of a detector of one's own.
+_OWN: Final = ("person_class", "input_size")
 # What the messages of the networks' classes advise, and what the command has for it.
 _WORDS: Final = {
     "--detector": {
@@ -92,15 +94,19 @@ class NetworkChoice(StrictConfig):
     def of_options(cls, options: Any) -> NetworkChoice:
         """Return the choice of a command's options: that of the file, else of the other ones.
 
+        What an option says of a detector of one's own completes the file.
+
         Args:
             options: with ``networks``, a path or None, and an attribute for each name here.
 
         Raises:
             AwarenavError: for a file that cannot be read.
         """
-        if options.networks is not None:
-            return cls.from_yaml(options.networks)
-        return cls(**{name: getattr(options, name) for name in cls.model_fields})
+        given = {name: getattr(options, name) for name in cls.model_fields}
+        if options.networks is None:
+            return cls(**given)
+        own = {name: given[name] for name in _OWN if given[name] is not None}
+        return cls.from_yaml(options.networks).model_copy(update=own)
 
 
 def choose_networks(

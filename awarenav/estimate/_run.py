@@ -217,6 +217,7 @@ def run_estimate(
         for frame in frames:
             bar.update()
             if frame.name in results.done:
+                estimator.pass_over(frame)
                 continue
             estimate = _estimate(frame, estimator, summary)
             if estimate is None:

@@ -60,6 +60,16 @@ def test_tracks_of_the_file_leave_such_frames_out(tmp_path):
     assert history.seen_frames == 5
 
 
+def test_a_continued_file_has_the_same_marks(tmp_path):
+    source = folder_of(tmp_path / "set", [numbered(number) for number in (0, 1, 1, 2, 2)])
+    whole, parts = tmp_path / "whole.jsonl", tmp_path / "parts.jsonl"
+    assert estimate(NumberReader(), source, "--out", whole) == 0
+    assert estimate(NumberReader(), source, "--out", parts, "--frames", 2) == 0
+    assert estimate(NumberReader(), source, "--out", parts, "--resume") == 0
+    assert parts.read_bytes() == whole.read_bytes()
+    assert [frame.get("no_view") is None for frame in read_records(parts)] == [1, 1, 0, 1, 0]
+
+
 def test_a_recording_of_a_covered_camera_has_no_tracks(tmp_path):
     records = recorded(tmp_path, "covered", [BLACK, BLACK, GREY])
     assert [record["tracks"] for record in records] == [[], [], []]

@@ -102,6 +102,10 @@ def test_the_advice_works(tmp_path, picture, capsys, make, given) -> None:
     choice.to_yaml(tmp_path / "networks.yaml")
     arguments = ["--networks", tmp_path / "networks.yaml", "--overwrite", *out]
     assert said(capsys, picture, *arguments)[0] == 0
+    # An option completes a file that does not say it.
+    NetworkChoice(detector=str(detector)).to_yaml(tmp_path / "networks.yaml")
+    assert said(capsys, picture, *arguments)[0] == 2
+    assert said(capsys, picture, *arguments, *given)[0] == 0
 
 
 def test_a_pose_network_of_free_size_has_advice_that_can_be_taken(
