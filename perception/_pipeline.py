@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import Any, Final
@@ -153,6 +154,18 @@ class AwarenessPipeline:
         self._eye_estimator = eye_estimator
         self._timings = StageTimings()
 
+    def for_another_view(self) -> AwarenessPipeline:
+        """Return a pipeline with the same camera, networks and settings that has seen no image.
+
+        With ``detect_every_s`` or ``frame_budget_s``, a pipeline keeps people from one image to the
+        next. Each of several cameras, or views of one, therefore needs its own; this one shares
+        the networks.
+        """
+        other = copy.copy(self)
+        other._people = self._people.for_another_view()
+        other._timings = StageTimings()
+        return other
+
     @property
     def last_timings(self) -> StageTimings:
         """Times of the stages of the last processed frame; zeros before the first."""
@@ -171,7 +184,8 @@ class AwarenessPipeline:
 
         If the keypoints do not determine the position, it comes from the box, with a larger
         covariance. A person without a usable head pose has awareness None. Somebody who turns the
-        back of a blurred head has an awareness of 0 and no gaze.
+        back of a blurred head has an awareness of 0 and no gaze. Black, one-coloured and repeated
+        pictures are no views: leave them out (:func:`~perception.no_view.why_no_view`).
 
         Args:
             image_rgb: (H, W, 3) uint8 of the camera's size.

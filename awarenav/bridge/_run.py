@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 import time
@@ -69,6 +70,8 @@ class BridgeOptions:
     pose: str
     head: str
     eyes: str
+    person_class: int | None = None
+    input_size: str | None = None
     allow_simulator_networks: bool
     threads: int | None
     provider: str
@@ -186,9 +189,7 @@ def bridge_command(options: BridgeOptions) -> int:
 
 def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
     """Return the networks, and the roles of those that have seen renders only."""
-    choice = NetworkChoice.of_options(
-        options.networks, options.detector, options.pose, options.head, options.eyes
-    )
+    choice = NetworkChoice.of_options(options)
     networks = choose_networks(
         **choice.model_dump(),
         threads=options.threads,
@@ -299,8 +300,8 @@ def _domain(option: int | None) -> int:
     if option is not None:
         return option
     text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
-    if not text.isdigit():
-        raise AwarenavError(f"ROS_DOMAIN_ID must be a number from 0 to 232, got {text!r}")
+    if re.fullmatch("[0-9]{1,9}", text) is None:
+        raise AwarenavError(f"ROS_DOMAIN_ID must be a number from 0 to 232, got {text!r:.60}")
     return int(text)
 
 

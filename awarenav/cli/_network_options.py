@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from ._command import Decorator, option
-from ._types import POSITIVE, FilePath, Number, OneOf
+from ._types import POSITIVE, FilePath, Number, OneOf, Whole
 
 _NETWORKS: Final = "Networks"
 _NETWORK_OPTIONS: Final = (
@@ -25,6 +25,21 @@ _NETWORK_OPTIONS: Final = (
         metavar="NAME|FILE",
         help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
         "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet).",
+    ),
+    option(
+        "--person-class",
+        group=_NETWORKS,
+        type=Whole(0),
+        show_default="the class that the network calls 'person', else 0",
+        metavar="N",
+        help="Number of the class of a --detector that counts as people, from 0.",
+    ),
+    option(
+        "--input-size",
+        group=_NETWORKS,
+        show_default="the network's own",
+        metavar="WxH",
+        help="Width and height, in pixels, of the input of a --detector that leaves them free.",
     ),
     option(
         "--pose",
@@ -59,7 +74,7 @@ _NETWORK_OPTIONS: Final = (
 
 
 def networks(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--networks``, ``--detector``, ``--pose``, ``--head`` and ``--eyes``."""
+    """Add ``--networks``, and the options that choose detector, pose, head and eyes."""
     for add in reversed(_NETWORK_OPTIONS):
         function = add(function)
     return function

@@ -67,6 +67,8 @@ class DoctorOptions:
     pose: str
     head: str
     eyes: str
+    person_class: int | None = None
+    input_size: str | None = None
     camera: Path | None
     fov_deg: float | None
     as_json: bool
@@ -109,9 +111,7 @@ def doctor_command(options: DoctorOptions) -> int:
 def _source_findings(options: DoctorOptions) -> list[Finding]:
     assert options.source is not None
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
-        choice = NetworkChoice.of_options(
-            options.networks, options.detector, options.pose, options.head, options.eyes
-        )
+        choice = NetworkChoice.of_options(options)
         networks = choose_networks(**choice.model_dump())
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)

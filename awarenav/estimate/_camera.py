@@ -102,14 +102,14 @@ class CameraChoice:
         return cls(camera or own, fov_deg, log, rectified=source.rectified)
 
     @property
-    def calibrated(self) -> bool:
-        """True if there is a calibration."""
-        return self._calibrated is not None
-
-    @property
     def known(self) -> bool:
         """True if the field of view is known, False if it is assumed."""
         return self._calibrated is not None or self._fov_deg is not None
+
+    @property
+    def calibrated(self) -> bool:
+        """True if there is a calibration, which is for pixels where the camera has them."""
+        return self._calibrated is not None
 
     def of_size(self, width_px: int, height_px: int) -> Camera:
         """Return the camera of images of this size.

@@ -13,6 +13,7 @@ from perception.depth_image import checked_depth
 from perception.errors import DepthImageError
 
 from ..errors import AwarenavError, counted
+from ._exif import decode_upright
 from ._images import read_image
 from ._source import ImageSource
 from ._source_images import ImageFiles, natural_order
@@ -68,7 +69,9 @@ class DepthFiles:
 
 
 def read_depth(path: Path) -> Any:
-    """Return the array in a depth file, a PNG or TIFF or a NumPy ``.npy``, as it is stored.
+    """Return the array in a depth file, a PNG or TIFF or a NumPy ``.npy``, in its own unit.
+
+    An EXIF orientation is applied, as to pictures.
 
     Raises:
         AwarenavError: for a file that cannot be read.
@@ -77,8 +80,8 @@ def read_depth(path: Path) -> Any:
         if path.suffix.lower() == ".npy":
             # Mapped first: a wrong header then asks for no memory.
             return np.array(np.load(path, mmap_mode="r", allow_pickle=False))
-        data = np.frombuffer(path.read_bytes(), np.uint8)
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+        data = path.read_bytes()
+        image = decode_upright(data)[0] if data else None
     except OSError as cause:
         raise AwarenavError(f"cannot read {path}: {cause.strerror or cause}") from cause
     except (ValueError, EOFError, cv2.error) as cause:

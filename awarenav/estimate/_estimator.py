@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -22,8 +23,9 @@ from perception import (
     PersonObservation,
     PoseEstimator,
 )
-from perception.arrays import FloatArray
+from perception.arrays import FloatArray, ImageRgb
 from perception.errors import DepthImageError
+from perception.no_view import NoView, why_no_view
 from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
@@ -31,6 +33,7 @@ from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 from ..errors import AwarenavError
 from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
+from ._exif import FIRST_TRANSPOSED, UPRIGHT
 from ._source import SourceFrame
 
 # An observation farther than this from a track does not belong to it.
@@ -112,6 +115,7 @@ class FrameEstimate:
         tracks: all tracks; None without a tracker.
         track_ids: of each observation, the id of its track; None without a tracker.
         unfit: roles of the networks that have seen renders only, unless the image is one.
+        no_view: why the image shows nothing; None if it does. The tracks are then those without it.
     """
 
     frame: SourceFrame
@@ -122,6 +126,7 @@ class FrameEstimate:
     tracks: tuple[PersonTrack, ...] | None
     track_ids: tuple[int | None, ...]
     unfit: tuple[str, ...] = ()
+    no_view: NoView | None = None
 
 
 class PeopleEstimator:
@@ -155,6 +160,7 @@ class PeopleEstimator:
         self._pipelines: dict[Camera, AwarenessPipeline] = {}
         self._track, self._unfit, self._depth = track, unfit, depth
         self._tracker: PersonTracker | None = None
+        self._before: ImageRgb | None = None
 
     def estimate(self, frame: SourceFrame) -> FrameEstimate:
         """Estimate the people in a frame that has an image.
@@ -167,9 +173,12 @@ class PeopleEstimator:
         """
         assert frame.image_rgb is not None
         height, width = frame.image_rgb.shape[:2]
+        self._require_known_turn(frame)
         camera = self._cameras.of_size(width, height)
         pose = self._fixed_pose if frame.T_odom_camera is None else frame.T_odom_camera
         self._pose_estimator.forget()
+        no_view = why_no_view(frame.image_rgb, self._before)
+        self._before = frame.image_rgb
         observations = self._process(camera, frame)
         tracks: tuple[PersonTrack, ...] | None = None
         track_ids: tuple[int | None, ...] = (None,) * len(observations)
@@ -179,7 +188,12 @@ class PeopleEstimator:
                 # An assumed field of view would drop or keep people wrongly.
                 view = CameraView(camera) if self._cameras.known else None
                 self._tracker = PersonTracker(_OF_RECORDINGS, view=view)
-            tracks = self._tracker.update(observations, frame.stamp_s, pose)
+            if no_view is None:
+                tracks = self._tracker.update(observations, frame.stamp_s, pose)
+            else:
+                last_s = self._tracker.last_stamp_s
+                now_s = frame.stamp_s if last_s is None else max(frame.stamp_s, last_s)
+                tracks = self._tracker.predict(now_s)
             track_ids = ids_of_tracks(observations, tracks, pose)
         return FrameEstimate(
             frame,
@@ -190,6 +204,32 @@ class PeopleEstimator:
             tracks,
             track_ids,
             self._unfit,
+            no_view,
+        )
+
+    def pass_over(self, frame: SourceFrame) -> None:
+        """Note a frame that is not estimated: the next one may be the same picture."""
+        self._before = frame.image_rgb
+
+    def _require_known_turn(self, frame: SourceFrame) -> None:
+        """Refuse a picture that its file has turned where the pixels of the sensor count.
+
+        Nothing says whether a calibration or depth image is for the picture as stored or as shown;
+        only of a quarter turn, the size tells.
+        """
+        assert frame.image_rgb is not None
+        orientation = frame.orientation
+        height, width = frame.image_rgb.shape[:2]
+        if orientation == UPRIGHT or not (self._cameras.calibrated or self._depth is not None):
+            return
+        if orientation >= FIRST_TRANSPOSED and height != width:
+            with suppress(AwarenavError):
+                self._cameras.of_size(width, height)
+                return
+        raise AwarenavError(
+            f"the file turns the picture (EXIF orientation {orientation}), and the calibration or "
+            "depth image may be for the pixels as stored: save the pixels upright, without an "
+            "orientation in the file, or give --fov-deg and no --depth"
         )
 
     def _keypoints_of(self, observation: PersonObservation) -> PersonKeypoints | None:

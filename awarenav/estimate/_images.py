@@ -11,6 +11,7 @@ import numpy as np
 from perception.arrays import ImageRgb
 
 from ..errors import AwarenavError
+from ._exif import decode_upright
 
 #: Suffixes of the names of image files.
 IMAGE_SUFFIXES: Final = (
@@ -28,24 +29,34 @@ _FULL_RANGE: Final = {np.dtype(np.uint8): 255, np.dtype(np.uint16): 65535}
 
 
 def read_image(path: Path) -> ImageRgb:
-    """Read an image file; grey, 16-bit and transparent images are converted as by :func:`as_rgb`.
+    """Read an image file, upright as its EXIF orientation says.
+
+    Grey, 16-bit and transparent images are converted as by :func:`as_rgb`.
 
     Raises:
         AwarenavError: for a file that cannot be read or is not an image.
     """
+    return read_turned_image(path)[0]
+
+
+def read_turned_image(path: Path) -> tuple[ImageRgb, int]:
+    """Read an image file as :func:`read_image` does; return its EXIF orientation too.
+
+    The orientation is 1 for a file that is stored upright.
+    """
     try:
-        data = np.frombuffer(path.read_bytes(), np.uint8)
+        data = path.read_bytes()
     except OSError as cause:
         raise AwarenavError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    if not data.size:
+    if not data:
         raise AwarenavError(f"{path} is empty")
     try:
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
+        image, orientation = decode_upright(data)
     except cv2.error as cause:
         raise AwarenavError(f"{path} is not an image that can be read ({cause.err})") from cause
     if image is None:
         raise AwarenavError(f"{path} is not an image that can be read: damaged, or another format")
-    return as_rgb(image, str(path))
+    return as_rgb(image, str(path)), orientation
 
 
 def as_rgb(image: Any, name: str) -> ImageRgb:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import contextlib
+import re
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -13,6 +15,7 @@ from perception import (
     OnnxHeadPoseEstimator,
     OnnxPersonDetector,
     OnnxPoseEstimator,
+    PerceptionError,
     PersonDetector,
     PnpHeadPoseEstimator,
     PoseEstimator,
@@ -49,6 +52,20 @@ SHIPPED: Final = "shipped"
 _MEDIAPIPE: Final = "mediapipe"
 _WITHOUT_NETWORK: Final = "pnp"
 _EYES: Final = ("auto", _MEDIAPIPE, "none")
+# What can be said of a detector of one's own.
+_OWN: Final = ("person_class", "input_size")
+# What the messages of the networks' classes advise, and what the command has for it.
+_WORDS: Final = {
+    "--detector": {
+        "person_class": "--person-class",
+        "input_size_hw_px=(height, width)": "--input-size WxH",
+        "input_size_hw_px": "--input-size",
+    },
+    "--pose": {
+        "give it with input_size_hw_px=(height, width) in pixels": "export it with a fixed size",
+    },
+}
+_SIZE: Final = re.compile("([1-9][0-9]{0,4})x([1-9][0-9]{0,4})")
 _HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
 
 
@@ -60,6 +77,8 @@ class NetworkChoice(StrictConfig):
         pose: pose network.
         head: head pose.
         eyes: eyes of near people.
+        person_class: of the detector.
+        input_size: of the detector.
     """
 
     error: ClassVar[type[ValueError]] = AwarenavError
@@ -68,19 +87,26 @@ class NetworkChoice(StrictConfig):
     pose: str = SHIPPED
     head: str = _HEADS[0]
     eyes: str = _EYES[0]
+    person_class: int | None = None
+    input_size: str | None = None
 
     @classmethod
-    def of_options(
-        cls, file: Path | None, detector: str, pose: str, head: str, eyes: str = _EYES[0]
-    ) -> NetworkChoice:
-        """Return the file's choice, or without a file that of the four options.
+    def of_options(cls, options: Any) -> NetworkChoice:
+        """Return the choice of a command's options: that of the file, else of the other ones.
+
+        What an option says of a detector of one's own completes the file.
+
+        Args:
+            options: with ``networks``, a path or None, and an attribute for each name here.
 
         Raises:
             AwarenavError: for a file that cannot be read.
         """
-        if file is not None:
-            return cls.from_yaml(file)
-        return cls.model_validate({"detector": detector, "pose": pose, "head": head, "eyes": eyes})
+        given = {name: getattr(options, name) for name in cls.model_fields}
+        if options.networks is None:
+            return cls(**given)
+        own = {name: given[name] for name in _OWN if given[name] is not None}
+        return cls.from_yaml(options.networks).model_copy(update=own)
 
 
 def choose_networks(
@@ -88,6 +114,8 @@ def choose_networks(
     pose: str = SHIPPED,
     head: str = _HEADS[0],
     eyes: str = _EYES[0],
+    person_class: int | None = None,
+    input_size: str | None = None,
     *,
     min_score: float = 0.25,
     threads: int | None = None,
@@ -107,6 +135,10 @@ def choose_networks(
             the shipped pose network, else PnP.
         eyes: ``"mediapipe"`` (needs the extra), ``"none"``, or ``"auto"``: MediaPipe's with
             its pose network, else none.
+        person_class: number of the class that counts, for a detector of your own; None for the one
+            that it calls "person", else the first.
+        input_size: width and height in pixels, as ``"640x480"``, for a detector of your own that
+            leaves them free.
         min_score: people with a lower detection score are dropped.
         threads: of each network; None leaves the number to onnxruntime.
         provider: one of :data:`~perception.networks.PROVIDERS`.
@@ -130,8 +162,14 @@ def choose_networks(
         confirmation = KeypointConfirmation(score_threshold=min_score)
         options["confirmation"] = confirmation
         min_score = confirmation.detector_threshold
-    detector_used, detector_domain = _detector(detector, min_score, settings)
-    pose_used, pose_domain = _pose(pose, settings)
+    own: dict[str, Any] = {
+        "person_class": person_class,
+        "input_size_hw_px": _height_width(input_size),
+    }
+    with _in_words_of_options("--detector"):
+        detector_used, detector_domain = _detector(detector, min_score, settings, own)
+    with _in_words_of_options("--pose"):
+        pose_used, pose_domain = _pose(pose, settings)
     head_used, head_domain = _head(head, settings)
     domains = {"detector": detector_domain, "pose": pose_domain}
     if head != _WITHOUT_NETWORK:
@@ -161,17 +199,45 @@ def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tupl
     return roles
 
 
+@contextlib.contextmanager
+def _in_words_of_options(option: str) -> Iterator[None]:
+    """Let errors name the command's options in place of the arguments of a network's class."""
+    try:
+        yield
+    except PerceptionError as cause:
+        text = str(cause)
+        for argument, words in _WORDS[option].items():
+            text = text.replace(argument, words)
+        raise type(cause)(text) from cause
+
+
+def _height_width(size: str | None) -> tuple[int, int] | None:
+    """Return height and width of a size as ``"640x480"``.
+
+    Raises:
+        AwarenavError: for another text.
+    """
+    if size is None:
+        return None
+    match = _SIZE.fullmatch(size)
+    if match is None:
+        raise AwarenavError(f"--input-size must be WxH in pixels, as 640x480, got {size!r:.60}")
+    return int(match[2]), int(match[1])
+
+
 def _detector(
-    name: str, min_score: float, settings: OnnxSettings
+    name: str, min_score: float, settings: OnnxSettings, own: dict[str, Any]
 ) -> tuple[PersonDetector | Callable[[Camera], PersonDetector], TrainingDomain | None]:
     if name == SHIPPED:
+        if any(value is not None for value in own.values()):
+            raise AwarenavError("--person-class and --input-size are for a --detector of your own")
         verify_shipped_model(DETECTOR)  # now, not at the first frame
         return (
             lambda camera: shipped_detector(settings, camera, score_threshold=min_score),
             shipped_model(DETECTOR).training_domain,
         )
     model, domain = _onnx_model("--detector", name, (SHIPPED,), settings)
-    return OnnxPersonDetector(model, score_threshold=min_score), domain
+    return OnnxPersonDetector(model, score_threshold=min_score, **own), domain
 
 
 def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:

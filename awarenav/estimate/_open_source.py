@@ -14,6 +14,8 @@ from ._source_images import ImageFiles
 from ._source_video import VideoSource
 
 _BAG_SUFFIXES: Final = (".bag", ".db3", ".mcap")
+#: A camera's number, as a source.
+CAMERA_NUMBER: Final = re.compile("[0-9]{1,9}")
 _STREAM: Final = re.compile(r"^[a-z][a-z0-9+.-]*://")
 
 
@@ -28,12 +30,16 @@ def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0)
     Raises:
         AwarenavError: if there is no such source, or it cannot be read.
     """
-    if text.isdigit() and not Path(text).exists():
-        return VideoSource.of_camera(int(text))
     if _STREAM.match(text):
         return VideoSource.of_stream(text)
     path = Path(text)
-    if not path.exists():
+    try:
+        exists = path.exists()
+    except OSError as cause:
+        raise AwarenavError(f"cannot read {text[:60]}…: {cause.strerror or cause}") from cause
+    if not exists and CAMERA_NUMBER.fullmatch(text):
+        return VideoSource.of_camera(int(text))
+    if not exists:
         raise AwarenavError(
             f"no such file or folder: {text}{_nearest(path)}; SOURCE is an image, a folder of "
             "images, a video, the number of a camera, the address of a stream or a ROS recording"

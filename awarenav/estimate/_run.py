@@ -6,6 +6,7 @@ import contextlib
 import math
 import sys
 import time
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -21,7 +22,7 @@ from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
 from ._estimator import FrameEstimate, Networks, PeopleEstimator
 from ._networks import NetworkChoice, admit_networks, choose_networks
-from ._open_source import open_source
+from ._open_source import CAMERA_NUMBER, open_source
 from ._overlay_writer import OverlayWriter
 from ._results import ResultsFile, estimate_record, settings_hash
 from ._source import ImageSource, SourceFrame
@@ -64,6 +65,8 @@ class EstimateOptions:
     pose: str
     head: str
     eyes: str
+    person_class: int | None = None
+    input_size: str | None = None
     allow_simulator_networks: bool
     min_score: float
     threads: int | None
@@ -85,6 +88,7 @@ class EstimateSummary:
         frames: number of frames that were estimated.
         people: number of observations in them.
         without_evidence: number of these observations without an α.
+        no_view: number of frames that show nothing, by the reason.
         problems: of frames that could not be read or estimated.
         duration_s: of the run.
     """
@@ -92,6 +96,7 @@ class EstimateSummary:
     frames: int = 0
     people: int = 0
     without_evidence: int = 0
+    no_view: Counter[str] = field(default_factory=Counter)
     problems: list[str] = field(default_factory=list)
     duration_s: float = 0.0
 
@@ -100,6 +105,8 @@ class EstimateSummary:
         self.frames += 1
         self.people += len(estimate.observations)
         self.without_evidence += sum(each.awareness is None for each in estimate.observations)
+        if estimate.no_view is not None:
+            self.no_view[estimate.no_view] += 1
 
 
 def estimate_command(options: EstimateOptions, networks: Networks | None = None) -> int:
@@ -126,9 +133,7 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, _log)
         for note in source.notes:
             _log(note)
-        choice = NetworkChoice.of_options(
-            options.networks, options.detector, options.pose, options.head, options.eyes
-        )
+        choice = NetworkChoice.of_options(options)
         if networks is None:
             networks = choose_networks(
                 **choice.model_dump(),
@@ -152,7 +157,9 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
             depth=depth,
             unfit=unfit,
         )
-        chosen = {name: getattr(options, name) for name in _SETTINGS} | choice.model_dump()
+        chosen = {name: getattr(options, name) for name in _SETTINGS} | (
+            choice.model_dump(exclude_none=True)
+        )
         if options.depth is not None:
             chosen["depth"] = options.depth
         settings = settings_hash(chosen)
@@ -212,6 +219,7 @@ def run_estimate(
         for frame in frames:
             bar.update()
             if frame.name in results.done:
+                estimator.pass_over(frame)
                 continue
             estimate = _estimate(frame, estimator, summary)
             if estimate is None:
@@ -263,7 +271,7 @@ def _check(options: EstimateOptions) -> None:
         )
     if options.resume and draws_video:
         raise AwarenavError("--resume cannot continue a video; draw into a folder (--overlay DIR)")
-    if options.resume and (options.source.isdigit() or "://" in options.source):
+    if options.resume and (CAMERA_NUMBER.fullmatch(options.source) or "://" in options.source):
         raise AwarenavError("--resume cannot continue a camera: its frames are gone")
     if options.camera_pitch_deg and options.camera_height_m is None:
         raise AwarenavError("--camera-pitch-deg needs --camera-height-m")
@@ -309,6 +317,8 @@ def _report(options: EstimateOptions, summary: EstimateSummary) -> None:
         f"second), {counted(summary.people, 'observation')} of people, {summary.without_evidence} "
         "of them without evidence of awareness"
     )
+    for reason, count in summary.no_view.items():
+        _log(f"no view in {count} of {counted(summary.frames, 'frame')}: {reason}")
     if summary.problems:
         _log(f"{counted(len(summary.problems), 'frame')} could not be read or estimated")
 

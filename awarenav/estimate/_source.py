@@ -20,6 +20,8 @@ class SourceFrame:
         image_rgb: (H, W, 3) uint8; None if it could not be read.
         T_odom_camera: (4, 4) pose of the camera; None if the source does not know it.
         problem: why there is no image.
+        orientation: EXIF's number of the turn that the file asked for and the image has got; 1 for
+            none.
     """
 
     name: str
@@ -27,6 +29,7 @@ class SourceFrame:
     image_rgb: ImageRgb | None
     T_odom_camera: FloatArray | None = None
     problem: str = ""
+    orientation: int = 1
 
 
 class ImageSource(Protocol):

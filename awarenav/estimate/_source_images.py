@@ -13,7 +13,7 @@ from perception.arrays import FloatArray, finite_number, rigid_transform
 
 from ..errors import AwarenavError
 from ..records import read_records
-from ._images import IMAGE_SUFFIXES, read_image
+from ._images import IMAGE_SUFFIXES, read_image, read_turned_image
 from ._source import SourceFrame
 
 _CAMERA: Final = "camera.yaml"
@@ -87,7 +87,8 @@ class ImageFiles:
         for index, path in enumerate(self._files):
             stamp_s, pose = self._known.get(path.name, (index * self._interval_s, None))
             try:
-                yield SourceFrame(path.name, stamp_s, read_image(path), pose)
+                image, turned = read_turned_image(path)
+                yield SourceFrame(path.name, stamp_s, image, pose, orientation=turned)
             except AwarenavError as error:
                 yield SourceFrame(path.name, stamp_s, None, pose, str(error))
 
@@ -98,7 +99,7 @@ class ImageFiles:
 def natural_order(path: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
     """Return a sort key that counts numbers in a name as numbers: image9 before image10."""
     parts = re.split(r"(\d+)", path.name)
-    return tuple((0, int(part)) if part.isdigit() else (1, part) for part in parts), path.name
+    return tuple((0, int(part)) if part.isdecimal() else (1, part) for part in parts), path.name
 
 
 def _stamps_and_poses(truth: Path) -> dict[str, tuple[float, FloatArray | None]]:

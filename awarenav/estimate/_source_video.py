@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 import cv2
@@ -12,12 +13,16 @@ import cv2
 from perception import Camera
 
 from ..errors import AwarenavError, counted
+from ._containers import lists_frames, missing_bytes
+from ._exif import UPRIGHT
 from ._images import as_rgb
 from ._source import SourceFrame
 
-# Some containers only estimate their number of frames: so many may be missing.
+# Lists of frames have some that cannot be decoded: so many may be missing.
 _MISCOUNTED_FRAMES: Final = 2
 _MISCOUNTED_SHARE: Final = 0.01
+# EXIF's numbers for the turns, in degrees, that OpenCV has made as a video file asks for.
+_ORIENTATIONS: Final = {90: 6, 180: 3, 270: 8}
 
 
 class VideoSource:
@@ -52,8 +57,11 @@ class VideoSource:
         self.rectified = False
         self.notes: tuple[str, ...] = ()
         count = capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        self.count: int | None = int(count) if not live and 0 < count < 1e9 else None
+        stated = not live and 0 < count < 1e9 and lists_frames(Path(name))
+        self.count: int | None = int(count) if stated else None
         rate = capture.get(cv2.CAP_PROP_FPS)
+        turn_deg = 0 if live else int(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
+        self._orientation = _ORIENTATIONS.get(turn_deg, UPRIGHT)
         self.rate_hz: float | None = rate if math.isfinite(rate) and 0.1 <= rate <= 1000.0 else None
 
     @classmethod
@@ -89,7 +97,8 @@ class VideoSource:
             last_s = stamp_s
             name = f"{number:06d}"
             try:
-                yield SourceFrame(name, stamp_s, as_rgb(image, f"{self._name}, frame {name}"))
+                picture = as_rgb(image, f"{self._name}, frame {name}")
+                yield SourceFrame(name, stamp_s, picture, orientation=self._orientation)
             except AwarenavError as error:
                 yield SourceFrame(name, stamp_s, None, None, str(error))
             number += 1
@@ -108,7 +117,9 @@ class VideoSource:
         if read == 0:
             return f"{self._name} has no frame that can be decoded"
         if self.count is None:
-            return ""
+            lost = missing_bytes(Path(self._name))
+            what = f"{self._name} ends after {counted(read, 'frame')}: it is cut off"
+            return f"{what}, {lost} bytes are missing" if lost else ""
         missing = self.count - read
         if missing <= max(_MISCOUNTED_FRAMES, _MISCOUNTED_SHARE * self.count):
             return ""

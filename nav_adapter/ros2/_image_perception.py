@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
 from perception.errors import DepthImageError
+from perception.no_view import FROZEN, why_no_view
 from tracking import PersonTrack
 
 from .._errors import NavError
@@ -74,6 +75,7 @@ class ImagePerception:
         self._camera: Camera | None = None
         self._info: CameraInfo | None = None
         self._rectified = rectified
+        self._before: NDArray[np.uint8] | None = None
         if camera is not None:
             self._start(camera)
 
@@ -106,11 +108,13 @@ class ImagePerception:
         A depth image that does not fit is left out, and the frame says why.
 
         Raises:
-            NavError, PerceptionError, TrackingError: for an image that cannot be used.
+            NavError, PerceptionError, TrackingError: for an image that cannot be used, or shows
+                nothing (:func:`~perception.no_view.why_no_view`).
         """
         with self._busy:
             image = picture_of(message)
             self._fit(image.shape[1], image.shape[0])
+            self._require_view(image)
             floor, problem = _floor(T_odom_camera), ""
             try:
                 given = {} if depth is None else _given(depth)
@@ -141,6 +145,15 @@ class ImagePerception:
                 f"images have {width_px} x {height_px} px"
             )
         self._start(camera)
+
+    def _require_view(self, image: NDArray[np.uint8]) -> None:
+        """Refuse a picture that shows nothing: the camera then counts as silent."""
+        reason = why_no_view(image, self._before)
+        self._before = image
+        if reason is None:
+            return
+        hint = " (frozen? a simulated camera needs noise)" if reason == FROZEN else ""
+        raise NavError(f"the picture is no view: it is {reason}{hint}")
 
     def _start(self, camera: Camera) -> None:
         self._pipeline = self._make_pipeline(camera)

@@ -67,7 +67,7 @@ def input_size(
         if extent is not None and wanted is not None and wanted != extent:
             raise PerceptionError(
                 f"{model.name} takes an input of {fixed[0]} x {fixed[1]} pixels (height x width), "
-                f"got input_size_hw_px={requested}"
+                f"got {' x '.join(map(str, requested or ()))}"
             )
         known = extent if extent is not None else wanted
         if known is None and default_hw_px is not None:

@@ -83,8 +83,7 @@ def render(
     if len(done) == config.frames and (out / _SHEET).exists() and not resume:
         raise SimError(
             f"{out} holds a finished set of {counted(config.frames, 'image')}: replace it with "
-            "--overwrite (overwrite=True), choose another --out, or keep it with --resume "
-            "(resume=True)"
+            "--overwrite, choose another --out, or keep it with --resume"
         )
     write_records(truth, done.values())
     missing = [frame for frame in range(config.frames) if frame_name(frame) not in done]

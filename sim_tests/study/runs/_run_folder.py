@@ -134,20 +134,20 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         if about.get("state") == "running" and done > 0:
             raise SimError(
                 f"{folder} holds an unfinished run, with {done} of {about.get('episodes', '?')} "
-                "episodes done: go on with --resume (resume=True), replace it with --overwrite "
-                "(overwrite=True), or choose another --out"
+                "episodes done: go on with --resume, replace it with --overwrite, or choose "
+                "another --out"
             )
         if about.get("state") == "complete":
             raise SimError(
                 f"{folder} holds a finished run of {_episodes(about.get('episodes', '?'))}: "
-                "replace it with --overwrite (overwrite=True), choose another --out, or read its "
-                "table again with --resume (resume=True)"
+                "replace it with --overwrite, choose another --out, or read its table again with "
+                "--resume"
             )
         if about.get("state") != "running" and done >= 0:
             raise SimError(
                 f"{folder} holds a table {self._files.episodes.name} that is not of a run: there "
                 f"is no {self._files.run.name} beside it; choose another --out, or replace it "
-                "with --overwrite (overwrite=True)"
+                "with --overwrite"
             )
 
     def _start(self, jobs: Sequence[Job]) -> None:

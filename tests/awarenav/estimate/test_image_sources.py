@@ -86,6 +86,16 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
     assert source.camera is None
 
 
+@pytest.mark.parametrize("digit", "²①৪߅Ⅷ")
+def test_digits_that_are_no_decimals_of_ascii_may_stand_in_a_name(tmp_path, digit):
+    names = [f"5{digit}6.png", f"hall 10{digit}2.png", f"{digit}.png"]
+    for name in names:
+        save(tmp_path / name, numbered(3))
+    frames = list(ImageFiles(tmp_path).frames())
+    assert sorted(frame.name for frame in frames) == sorted(names)
+    assert all(number_of(frame.image_rgb) == 3 for frame in frames)
+
+
 def test_a_rendered_set_gives_stamps_poses_and_camera_but_not_people(tmp_path):
     camera = Camera.from_fov(64, 48, 1.0)
     camera.to_yaml(tmp_path / "camera.yaml")
@@ -173,6 +183,9 @@ def test_a_camera_that_is_unplugged_is_a_problem_after_its_last_frame(tmp_path):
         ("absent.mov", "cannot open video"),
         ("empty", "has no image"),
         ("99", "cannot open camera"),
+        ("²", "no such file or folder: .*²"),
+        ("9" * 30, "no such file or folder"),
+        ("9" * 5000, "cannot read .*: File name too long|no such file"),
     ],
 )
 def test_sources_that_cannot_be_opened_are_refused(tmp_path, name, message):

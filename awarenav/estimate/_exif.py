@@ -1,0 +1,102 @@
+"""The orientation in the EXIF data of an image file: how it is to be turned to be upright."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+_ORIENTATION: Final = 0x0112
+_SHORT: Final = 3
+_JPEG, _PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
+_TIFF: Final = {b"II*\0": "<", b"MM\0*": ">"}
+_EXIF: Final = b"Exif\0\0"
+#: Tag of a file that is stored upright.
+UPRIGHT: Final = 1
+# EXIF 2.32, 4.6.4: how the stored image becomes upright.
+_FLIPS: Final = {2: 1, 3: -1, 4: 0, 6: 1, 7: -1, 8: 0}
+_LAST: Final = 8
+#: From this one on, width and height of the upright image are exchanged.
+FIRST_TRANSPOSED: Final = 5
+
+
+def exif_orientation(data: bytes) -> int:
+    """Return the orientation of a JPEG, PNG, WebP or TIFF file, 1 to 8; 1 (upright) without one."""
+    try:
+        for block in _exif_blocks(data):
+            orientation = _in_tiff(block.removeprefix(_EXIF))
+            if 1 <= orientation <= _LAST:
+                return orientation
+    except struct.error:  # cut off
+        pass
+    return UPRIGHT
+
+
+def upright(image: NDArray[Any], orientation: int) -> NDArray[Any]:
+    """Return a stored image (H, W, …) as its EXIF orientation wants it shown."""
+    if orientation >= FIRST_TRANSPOSED:
+        image = np.ascontiguousarray(np.swapaxes(image, 0, 1))
+    flip = _FLIPS.get(orientation)
+    return image if flip is None else np.asarray(cv2.flip(image, flip))
+
+
+def decode_upright(data: bytes) -> tuple[NDArray[Any] | None, int]:
+    """Return the image in a file as OpenCV stores it, upright, and the file's EXIF orientation.
+
+    None for a file that cannot be decoded.
+
+    Raises:
+        cv2.error: for some of these.
+    """
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    orientation = exif_orientation(data)
+    if image is None or data[:4] in _TIFF:  # OpenCV turns a TIFF itself
+        return image, orientation
+    return upright(np.asarray(image), orientation), orientation
+
+
+def _exif_blocks(data: bytes) -> Iterator[bytes]:
+    """Yield the blocks of EXIF data in a file: each is a TIFF file without an image."""
+    if data[:4] in _TIFF:
+        yield data
+    elif data.startswith(_JPEG):
+        at = len(_JPEG)
+        while data[at : at + 1] == b"\xff":
+            marker, length = struct.unpack_from(">BH", data, at + 1)
+            if marker == 0xDA:  # the image
+                return
+            if marker == 0xE1 and data[at + 4 :].startswith(_EXIF):
+                yield data[at + 4 : at + 2 + length]
+            at += 2 + length
+    elif data.startswith(_PNG):
+        at = len(_PNG)
+        while at < len(data):
+            length, kind = struct.unpack_from(">I4s", data, at)
+            if kind == b"eXIf":
+                yield data[at + 8 : at + 8 + length]
+            at += 12 + length
+    elif data.startswith(b"RIFF") and data[8:12] == b"WEBP":
+        at = 12
+        while at < len(data):
+            kind, length = struct.unpack_from("<4sI", data, at)
+            if kind == b"EXIF":
+                yield data[at + 8 : at + 8 + length]
+            at += 8 + length + length % 2
+
+
+def _in_tiff(block: bytes) -> int:
+    """Return the orientation in the first directory of a TIFF file; 0 without one."""
+    order = _TIFF.get(block[:4])
+    if order is None:
+        return 0
+    (at,) = struct.unpack_from(order + "I", block, 4)
+    (entries,) = struct.unpack_from(order + "H", block, at)
+    for entry in range(entries):
+        tag, kind, _, value = struct.unpack_from(order + "HHIH", block, at + 2 + 12 * entry)
+        if tag == _ORIENTATION and kind == _SHORT:
+            return int(value)
+    return 0
