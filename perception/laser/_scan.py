@@ -13,6 +13,11 @@ from ..errors import PerceptionError
 
 # More than a full turn is no 2-D sweep; the rest is the rounding of 32-bit messages.
 _MAX_TURN_RAD: Final = 2.0 * np.pi + 0.02
+# Many drivers send range_max, or a little less, for a ray that met nothing. So many rays have
+# exactly that value; noise makes those of a wall differ. The 32 bits of a message round it up too.
+_NO_RETURN_SHARE: Final = 0.99
+_NO_RETURN_RAYS: Final = 3
+_ROUNDING: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +26,8 @@ class LaserScan:
 
     Ranges follow REP-117: −inf is an object too near to measure, +inf is no object within
     ``range_max_m``, NaN is an invalid measurement. A finite range outside the limits is discarded
-    like NaN.
+    like NaN. Where three rays or more have exactly ``range_max_m``, or one and the same range up to
+    1 per cent below it that no other ray exceeds, they met no object and are stored as +inf.
 
     Attributes:
         stamp_s: time of the first ray.
@@ -64,9 +70,16 @@ class LaserScan:
             raise PerceptionError(
                 f"range_max_m must exceed range_min_m, got {high:g} and {low:g} m"
             )
+        far = ranges[(ranges >= high * _NO_RETURN_SHARE) & (ranges <= high * (1.0 + _ROUNDING))]
+        if len(far) >= _NO_RETURN_RAYS:
+            nothing = ranges == far.max()
+            if np.count_nonzero(nothing) >= _NO_RETURN_RAYS:
+                ranges[nothing] = np.inf
+        ranges.setflags(write=False)
         intensities = self.intensities
         if intensities is not None:
             intensities = _numbers("intensities", intensities)
+            intensities.setflags(write=False)
             if intensities.shape != ranges.shape:
                 raise PerceptionError(
                     f"intensities must have the shape of ranges_m, {ranges.shape}, got "
@@ -130,12 +143,11 @@ class LaserScan:
 
 
 def _numbers(name: str, value: Any) -> FloatArray:
-    """Return a read-only (N,) copy; unlike elsewhere NaN and infinity are allowed."""
+    """Return an (N,) copy; unlike elsewhere NaN and infinity are allowed."""
     try:
         array = np.array(value, dtype=np.float64, copy=True)
     except (TypeError, ValueError):
         return finite_array(name, value, ("N",))  # raises, with the usual message
     if array.ndim != 1:
         raise PerceptionError(f"{name} must have shape (N,), got {array.shape}")
-    array.setflags(write=False)
     return array
