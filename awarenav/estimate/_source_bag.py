@@ -16,7 +16,7 @@ from perception import Camera
 from perception.arrays import ImageRgb
 
 from ..errors import AwarenavError
-from ._bag import open_bag
+from ._bag import open_bag, topic_name
 from ._source import SourceFrame
 
 _IMAGE: Final = "sensor_msgs/msg/Image"
@@ -97,13 +97,17 @@ class BagSource:
         )
         if not images:
             raise AwarenavError(f"{self._path} has no topic of type {_IMAGE} or {_COMPRESSED}")
-        if topic is not None and topic not in images:
-            raise AwarenavError(f"--topic must be one of {', '.join(images)}, got {topic}")
-        if topic is None and len(images) > 1:
+        if topic is not None:
+            # Recordings of ROS 1 may lack the leading slash.
+            same = [each for each in images if topic_name(each) == topic_name(topic)]
+            if not same:
+                raise AwarenavError(f"--topic must be one of {', '.join(images)}, got {topic}")
+            return same[0]
+        if len(images) > 1:
             raise AwarenavError(
                 f"{self._path} has several image topics: choose --topic {' | '.join(images)}"
             )
-        return images[0] if topic is None else topic
+        return images[0]
 
     def _read_camera(self) -> Camera | None:
         """Return the camera of the first ``camera_info`` message in the images' namespace."""
