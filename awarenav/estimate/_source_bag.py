@@ -88,7 +88,7 @@ class BagSource:
 
     def _chosen_topic(self, topic: str | None) -> str:
         """Return the image topic that was asked for, or the only one."""
-        images = sorted(
+        images: list[str] = sorted(
             {
                 each.topic
                 for each in self._reader.connections

@@ -172,7 +172,7 @@ def _one_turn(ranges_m: FloatArray, increment_rad: float) -> FloatArray:
     first = kept - round(turn)
     nearer = ranges_m[:kept].copy()
     nearer[first : first + extra] = np.fmin(nearer[first : first + extra], ranges_m[kept:])
-    return nearer
+    return np.asarray(nearer)
 
 
 def _check_ranges(scan: LaserScan) -> None:
