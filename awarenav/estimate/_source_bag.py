@@ -111,7 +111,7 @@ class BagSource:
 
     def _read_camera(self) -> Camera | None:
         """Return the camera of the first ``camera_info`` message in the images' namespace."""
-        parts = self._topic.split("/")
+        parts = topic_name(self._topic).split("/")
         topics = [
             "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
         ]
@@ -119,7 +119,7 @@ class BagSource:
             connections = [
                 each
                 for each in self._reader.connections
-                if each.topic == topic and each.msgtype == _INFO
+                if topic_name(each.topic) == topic and each.msgtype == _INFO
             ]
             for connection, _, raw in (
                 self._reader.messages(connections=connections) if connections else ()
