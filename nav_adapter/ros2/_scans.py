@@ -32,6 +32,8 @@ _SWEEP_SHARE: Final = 1.5
 _LONGEST_SWEEP_S: Final = 2.0
 # Ranges beyond the limit with fewer values are codes of a driver, not distances.
 _VALUES: Final = 4
+# So much longer than the limit are ranges in a smaller unit.
+_UNIT: Final = 10.0
 # map_server's default threshold of occupied cells, in per cent; larger numbers are unknown ones.
 _OCCUPIED: Final = (65, 100)
 
@@ -178,19 +180,19 @@ def _one_turn(ranges_m: FloatArray, increment_rad: float) -> FloatArray:
 def _check_ranges(scan: LaserScan) -> None:
     """Refuse ranges that cannot be metres."""
     beyond = scan.ranges_m[(scan.ranges_m > scan.range_max_m) & (scan.ranges_m < np.inf)]
-    if 2 * len(beyond) <= len(scan):
-        return
-    # One value for all rays is what some drivers send for no return.
+    within = int(np.count_nonzero(scan.measured & (scan.ranges_m > 0.0)))
     values = np.unique(beyond)
-    if len(values) < _VALUES:
+    if len(values) < _VALUES or len(beyond) <= within:
         return
     middle_m = float(np.median(values))
-    if middle_m > _FARTHEST_M or not (scan.measured & (scan.ranges_m > 0.0)).any():
-        raise NavError(
-            "ranges must be in metres: no ray measures anything within range_min "
-            f"{scan.range_min_m:g} to range_max {scan.range_max_m:g} m, most are about "
-            f"{middle_m:g}"
-        )
+    if middle_m <= _FARTHEST_M and (
+        within or (2 * len(beyond) <= len(scan) and middle_m <= _UNIT * scan.range_max_m)
+    ):
+        return
+    raise NavError(
+        f"ranges must be in metres: {within or 'no'} rays measure anything within range_min "
+        f"{scan.range_min_m:g} to range_max {scan.range_max_m:g} m, most are about {middle_m:g}"
+    )
 
 
 def map_cells_of(message: OccupancyGrid) -> MapCells:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -27,7 +27,7 @@ class LaserScan:
     Ranges follow REP-117: −inf is an object too near to measure, +inf is no object within
     ``range_max_m``, NaN is an invalid measurement. A finite range outside the limits is discarded
     like NaN. Where three rays or more have exactly ``range_max_m``, or one and the same range up to
-    1 per cent below it that no other ray exceeds, they met no object and are stored as +inf.
+    1 per cent below it that no other ray exceeds, they met no object, like those of +inf.
 
     Attributes:
         stamp_s: time of the first ray.
@@ -52,6 +52,8 @@ class LaserScan:
     range_max_m: float
     time_increment_s: float = 0.0
     intensities: FloatArray | None = None
+    # The range of a ray without a return, beside +inf; NaN if there is none.
+    _nothing_m: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         ranges = _numbers("ranges_m", self.ranges_m)
@@ -71,15 +73,12 @@ class LaserScan:
                 f"range_max_m must exceed range_min_m, got {high:g} and {low:g} m"
             )
         far = ranges[(ranges >= high * _NO_RETURN_SHARE) & (ranges <= high * (1.0 + _ROUNDING))]
-        if len(far) >= _NO_RETURN_RAYS:
-            nothing = ranges == far.max()
-            if np.count_nonzero(nothing) >= _NO_RETURN_RAYS:
-                ranges[nothing] = np.inf
-        ranges.setflags(write=False)
+        nothing = float(far.max()) if len(far) >= _NO_RETURN_RAYS else np.nan
+        if np.count_nonzero(far == nothing) < _NO_RETURN_RAYS:
+            nothing = np.nan
         intensities = self.intensities
         if intensities is not None:
             intensities = _numbers("intensities", intensities)
-            intensities.setflags(write=False)
             if intensities.shape != ranges.shape:
                 raise PerceptionError(
                     f"intensities must have the shape of ranges_m, {ranges.shape}, got "
@@ -95,6 +94,7 @@ class LaserScan:
             range_max_m=high,
             time_increment_s=finite_number("time_increment_s", self.time_increment_s, minimum=0.0),
             intensities=intensities,
+            _nothing_m=nothing,
         )
 
     def __len__(self) -> int:
@@ -120,7 +120,14 @@ class LaserScan:
     @property
     def measured(self) -> NDArray[np.bool_]:
         """(N,) True for rays that measured an object within the limits."""
-        return np.asarray((self.ranges_m >= self.range_min_m) & (self.ranges_m <= self.range_max_m))
+        ranges = self.ranges_m
+        within = (ranges >= self.range_min_m) & (ranges <= self.range_max_m)
+        return np.asarray(within & (ranges != self._nothing_m))
+
+    @property
+    def no_return(self) -> NDArray[np.bool_]:
+        """(N,) True for rays that met no object within ``range_max_m``."""
+        return np.asarray((self.ranges_m == np.inf) | (self.ranges_m == self._nothing_m))
 
     @property
     def too_near(self) -> NDArray[np.bool_]:
@@ -131,23 +138,25 @@ class LaserScan:
     def free_m(self) -> FloatArray:
         """The distance (N,) over which each ray met nothing.
 
-        It is the range where there is one, ``range_max_m`` for +inf, and 0 where nothing is known.
+        It is the range where there is one, ``range_max_m`` for :attr:`no_return`, and 0 where
+        nothing is known.
         """
         return self.free_of(self.measured)
 
     def free_of(self, measured: NDArray[np.bool_]) -> FloatArray:
         """Return :attr:`free_m` (N,) for rays of which :attr:`measured` is known."""
         free = np.where(measured, self.ranges_m, 0.0)
-        np.putmask(free, self.ranges_m == np.inf, self.range_max_m)
+        np.putmask(free, self.no_return, self.range_max_m)
         return free
 
 
 def _numbers(name: str, value: Any) -> FloatArray:
-    """Return an (N,) copy; unlike elsewhere NaN and infinity are allowed."""
+    """Return a read-only (N,) copy; unlike elsewhere NaN and infinity are allowed."""
     try:
         array = np.array(value, dtype=np.float64, copy=True)
     except (TypeError, ValueError):
         return finite_array(name, value, ("N",))  # raises, with the usual message
     if array.ndim != 1:
         raise PerceptionError(f"{name} must have shape (N,), got {array.shape}")
+    array.setflags(write=False)
     return array

@@ -108,8 +108,23 @@ def test_a_sweep_of_seconds_names_its_time_increment(increment: float) -> None:
 )
 def test_ranges_in_other_units_are_refused(factor: float, range_max: float) -> None:
     ranges = tuple(factor * each for each in SCAN.ranges)
-    with pytest.raises(NavError, match=r"ranges must be in metres: no ray measures anything"):
+    with pytest.raises(NavError, match=r"ranges must be in metres: no rays measure anything"):
         laser_scan_of(replace(SCAN, ranges=ranges, range_max=range_max))
+
+
+@pytest.mark.parametrize("range_max", [20.0, 20_000.0])
+def test_some_returns_in_millimetres_among_rays_without_one_are_refused(range_max: float) -> None:
+    ranges = tuple(1000.0 * each if each < 3.5 else math.inf for each in SCAN.ranges)
+    assert 10 < np.isfinite(ranges).sum() < 0.5 * len(ranges)
+    with pytest.raises(NavError, match="ranges must be in metres"):
+        laser_scan_of(replace(SCAN, ranges=ranges, range_max=range_max))
+
+
+def test_returns_beyond_a_low_range_max_are_no_other_unit() -> None:
+    """Whoever comes within it is still to be found."""
+    ranges = tuple(each if each < 6.0 else math.inf for each in SCAN.ranges)
+    scan = laser_scan_of(replace(SCAN, ranges=ranges, range_max=3.5))
+    assert 3 < scan.measured.sum() < 100
 
 
 def test_a_code_for_no_return_is_no_unit() -> None:

@@ -51,7 +51,8 @@ def test_somebody_near_range_max_is_found_as_among_rays_of_infinity(nothing_m: f
 
 def test_rays_of_range_max_met_nothing() -> None:
     scan = scan_of([4.0, 4.0, 3.0, 4.0])
-    assert scan.ranges_m.tolist() == [math.inf, math.inf, 3.0, math.inf]
+    assert scan.no_return.tolist() == [True, True, False, True]
+    assert scan.measured.tolist() == [False, False, True, False]
     assert scan.free_m.tolist() == [4.0, 4.0, 3.0, 4.0]
 
 
