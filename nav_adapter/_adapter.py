@@ -226,7 +226,7 @@ class NavAdapter:
         """Return the memory that an update at ``now`` follows, and the clock after it.
 
         Raises:
-            NavError: for a stamp that jumps, which is counted.
+            NavError: for a stamp that jumps. Only then the adapter changes: it counts the stamp.
         """
         memory, clock = self._memory, self._clock
         last_s = memory.stamp_s

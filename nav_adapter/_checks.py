@@ -11,6 +11,8 @@ from tracking import PersonTrack
 from ._errors import NavError
 from ._memory import PersonMemory, velocity_variance_m2ps2
 
+# Data older than this, over 30 000 years, have a stamp that was never a time.
+_MOST_S: Final = 1e12
 # Tolerated difference between the clocks of two computers, or of a camera and a control loop.
 _CLOCK_TOLERANCE_S: Final = 0.05
 # Positions, speeds and standard deviations beyond these are errors of whoever sent them. Beyond
@@ -20,11 +22,16 @@ _MOST_MPS: Final = 1e4
 
 
 def age_of_s(name: str, stamp_s: float, now: float) -> float:
-    """Return the age of data, at least 0; refuse data from the future."""
+    """Return the age of data, at least 0; refuse data from the future, and absurd stamps."""
     if stamp_s > now + _CLOCK_TOLERANCE_S:
         raise NavError(
             f"{name} must not lie after stamp_s, got {stamp_s:.6f} s and {now:.6f} s "
             f"(tolerance {_CLOCK_TOLERANCE_S:g} s)"
+        )
+    if now - stamp_s > _MOST_S:
+        raise NavError(
+            f"{name} must not lie more than {_MOST_S:g} s before stamp_s, got {stamp_s:g} s and "
+            f"{now:g} s"
         )
     return max(0.0, now - stamp_s)
 

@@ -19,7 +19,7 @@ _SAME_PLACE_M: Final = 0.05
 
 # Stamps closer than this are equal: the stamp of a sighting is a difference of floats, computed
 # anew for every frame.
-_SAME_STAMP_S = 1e-6
+_SAME_STAMP_S: Final = 1e-6
 # Tolerance for rounding where sums of frame periods are compared with a setting.
 ROUNDING_S: Final = 1e-9
 

@@ -47,7 +47,8 @@ class RobotProfile:
             robot whose state moves sideways, since one of the two is wrong. The base origin of
             these two lies on the axle that does not steer.
         max_yaw_rate_radps: > 0, the fastest turn, either way; None if it is not known. It limits
-            commands (:mod:`nav_adapter.motion`) and changes no speed limit.
+            commands (:mod:`nav_adapter.motion`) and Nav2's message
+            (:func:`nav_adapter.ros2.speed_limit`), and changes no limit of the constraints.
         max_yaw_acceleration_radps2: > 0, the fastest change of the yaw rate; None if it is not
             known.
         min_turning_radius_m: > 0, the tightest curve of the base origin, needed with

@@ -109,7 +109,7 @@ def bridge_command(options: BridgeOptions) -> int:
         options.topic, options.only, with_mask=options.speed_mask is not None
     )
     mask = _speed_mask(options, published)
-    inputs = _inputs(options, robot)
+    inputs = _inputs(options)
     map_cells = _map_cells(options)
     scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
     networks, unfit = _networks(options)
@@ -341,7 +341,7 @@ def _map_cells(options: BridgeOptions) -> MapCells | None:
     return MapCells.from_yaml(options.map, options.map_frame)
 
 
-def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
+def _inputs(options: BridgeOptions) -> BridgeInputs:
     """Return the topics to read."""
     scans = tuple(renamed(READ["scan"], name) for name in options.scan)
     names = [topic.name for topic in scans]
@@ -357,19 +357,14 @@ def _inputs(options: BridgeOptions, robot: RobotFile) -> BridgeInputs:
         raise AwarenavError("--no-camera and --depth exclude each other")
     if options.map is not None and not scans:
         raise AwarenavError("--map is for the scans: it needs --scan TOPIC")
-    fixed_map = _is_file(options.map) and options.map_frame == options.odom_frame
     image = READ["compressed" if options.compressed else "image"]
     with_info = options.camera is None and not options.no_camera
-    fixed = (options.no_camera or robot.camera is not None) and (
-        not scans or robot.scanners is not None
-    )
-    with_tf = not fixed or (options.map is not None and not fixed_map)
     return BridgeInputs(
         image=None if options.no_camera else renamed(image, options.image),
         odom=renamed(READ["odom"], options.odom),
         camera_info=renamed(READ["camera_info"], options.camera_info) if with_info else None,
-        tf=renamed(READ["tf"], options.tf) if with_tf else None,
-        tf_static=renamed(READ["tf_static"], f"{options.tf}_static") if with_tf else None,
+        tf=renamed(READ["tf"], options.tf),
+        tf_static=renamed(READ["tf_static"], f"{options.tf}_static"),
         scans=scans,
         map=None
         if options.map is None or _is_file(options.map)

@@ -1,4 +1,4 @@
-"""Assumptions on motion, and rules that lower the limit of speed and separation."""
+"""Assumptions on motion, and rules beside speed and separation."""
 
 from __future__ import annotations
 
@@ -220,7 +220,10 @@ class ProtectiveField(StrictConfig):
 
 
 class SpeedRules(StrictConfig):
-    """Assumptions on the motion of robot and people, and rules that only lower the speed limit.
+    """Assumptions on the motion of robot and people, and rules beside speed and separation.
+
+    ``standing`` and ``walking`` raise the limit where people need time to set off or to turn, and
+    ``protective_field`` replaces it. The other rules only lower it.
 
     Attributes:
         turn_within_stop_deg: largest turn of the robot off its direction of travel while it stops.

@@ -23,6 +23,7 @@ from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, people, teb_obstacles
 from ._perception_thread import PerceptionThread
 from ._polygons import STOP_POLYGON_ID, collision_polygons, stop_zone
+from ._pose_reader import odometry_problems
 from ._robot_file import CameraMount, RobotFile, ScannerMount
 from ._scan_perception import ScannerInput, scanner_inputs
 from ._scan_thread import ScanThread
@@ -70,6 +71,7 @@ __all__ = [
     "map_cells_of",
     "markers",
     "occupancy_grid",
+    "odometry_problems",
     "outgoing",
     "people",
     "picture_of",

@@ -45,9 +45,9 @@ class AwarenessBridge:
     """Turns camera, scanner and odometry messages of a ROS graph into constraints for its planners.
 
     Pass on messages as they come (``on_…``) and call :meth:`tick` at a fixed rate, with or without
-    new images: each tick publishes every topic. If input is missing, late or refused, the bridge
-    publishes a stop with the reason. It never stops publishing by itself, and missing data never
-    make a person count as aware.
+    new images: each tick publishes every topic. If input is missing, late, refused, or contradicts
+    other input (odometry, tf), the bridge publishes a stop with the reason. It never stops
+    publishing by itself, and missing data never make a person count as aware.
 
     Perception may have a thread of its own, as :class:`PerceptionThread` gives it one: while
     :meth:`on_image` and :meth:`on_camera_info` run, :meth:`tick` and the other methods go on with
@@ -61,8 +61,8 @@ class AwarenessBridge:
 
     Messages whose stamp lies more than 0.05 s ahead of ``now_s`` are refused and counted in
     :attr:`counts`. The clock of ``now_s`` may be stepped back: by up to 0.05 s, time stands still
-    until it has caught up; by more, the robot stops, and if the clock goes on from there for 1 s,
-    tracks and transforms are forgotten with a warning. Static transforms are always kept.
+    until it has caught up; by more, the robot stops, and if the clock goes on for 1 s from there,
+    tracks and moving transforms are forgotten with a warning, and the limit rises slowly.
 
     Args:
         policy: of the adapter and of the awareness filter.
@@ -104,10 +104,8 @@ class AwarenessBridge:
         wanted: Callable[[str], bool] = lambda key: True,
     ) -> None:
         self.frames = frames or Frames()
-        self._policy, self._robot = policy, robot
         self._sender = Sender(publish, robot, self.frames, percentage=percentage, mask=speed_mask)
-        self._with_camera = with_camera
-        self._wanted = wanted
+        self._with_camera, self._wanted = with_camera, wanted
         self._warn_user, self._warned = warn, ""
         if not with_camera and not scanners:
             raise NavError("with_camera must be True, or scanners must name one or two, got none")
@@ -128,7 +126,7 @@ class AwarenessBridge:
             with_depth=with_depth,
         )
         self._frames = self._perception_failures = 0
-        # For all of the above but the perception, which is not held up by it.
+        # For all of the above but perception, which is not held up.
         self._lock = threading.RLock()
         # Keeps the messages of one publication together.
         self._sending = threading.Lock()
@@ -216,10 +214,10 @@ class AwarenessBridge:
             self._pose_reader.read_transforms(message, now_s, static=static)
 
     def on_odometry(self, message: Odometry, now_s: float | None = None) -> None:
-        """Store the robot's state, and its pose as a transform.
+        """Store the robot's state and pose.
 
         Args:
-            message: in the odom frame.
+            message: in the odom frame; of the base frame, or of one that tf knows on the robot.
             now_s: the present time; None to check the stamp in the next :meth:`tick` only.
         """
         with self._lock:
@@ -359,7 +357,9 @@ class AwarenessBridge:
         return guarded_update(self._adapter, tracks, state, now_s, seen_s, self._warn)
 
     def _missing(self) -> str:
-        """Return what has not come yet; empty if nothing is missing."""
+        """Return what has not come yet or cannot be trusted; empty if nothing is missing."""
+        if self._poses.problem:
+            return f"odometry: {self._poses.problem}"
         if self._poses.state is None:
             return "no odometry yet"
         if self._with_camera and self._perception.camera is None:
@@ -368,7 +368,7 @@ class AwarenessBridge:
 
     def _restart(self) -> None:
         """Forget all that has a stamp of the clock before it was set."""
-        self._adapter = NavAdapter(self._policy, self._robot)
+        self._adapter.reset()
         self._tracker.forget()
         self._frame = None
         self._pose_reader.forget()

@@ -14,6 +14,7 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from .._robot import RobotState
 from ..exporters import SpeedMap
+from ._speed_limit import fastest_point_per_axis
 from ._speed_mask import speed_mask
 from .messages import Message
 
@@ -116,13 +117,17 @@ class SpeedMaskStream:
     def _map_of(self, constraints: NavConstraints, state: RobotState | None) -> SpeedMap | None:
         if state is None:
             return None
-        return SpeedMap.around(
+        chart = SpeedMap.around(
             constraints,
             state.position_odom_m,
             size_m=self._settings.size_m,
             resolution_m=self._settings.resolution_m,
             times_s=(0.0, 1.0 / self._settings.rate_hz),
         )
+        assert constraints.robot is not None
+        limits = chart.limits_mps
+        lower = limits / fastest_point_per_axis(constraints.robot)
+        return replace(chart, limits_mps=np.where(limits < chart.max_speed_mps, lower, limits))
 
     def _stop_map(self, stamp_s: float) -> SpeedMap | None:
         """Return a stop where the latest mask is; None before the first mask."""

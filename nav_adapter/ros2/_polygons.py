@@ -12,7 +12,7 @@ from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
-from ._speed_limit import SLOWEST_MPS
+from ._speed_limit import SLOWEST_MPS, controller_limit_mps
 from .conversions import header
 from .messages.geometry_msgs import Point32, PolygonInstance, PolygonInstanceStamped, PolygonStamped
 from .messages.geometry_msgs import Polygon as PolygonMessage
@@ -63,7 +63,7 @@ def collision_polygons(
         for each in obstacles
     ]
     corners = _within_footprint(robot)
-    if constraints.speed_limit_mps >= SLOWEST_MPS:
+    if controller_limit_mps(constraints) >= SLOWEST_MPS:
         corners = corners - np.array([_PARKED_M, 0.0])
     stop = _instance(Polygon(corners), STOP_POLYGON_ID, constraints.stamp_s, base_frame)
     return (*people, stop)

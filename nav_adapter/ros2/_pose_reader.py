@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 
 from .._errors import NavError
 from ._clock import CLOCK_TOLERANCE_S, BridgeClock, InputKind
+from ._outgoing import Frames
 from ._poses import RobotPoses
 from .conversions import to_seconds
 from .messages.geometry_msgs import TransformStamped
@@ -38,7 +40,9 @@ class PoseReader:
         self._warn, self._with_map = warn, with_map
         self._ahead: set[InputKind] = set()
 
-    def read_transforms(self, message: TFMessage, now_s: float | None, *, static: bool) -> None:
+    def read_transforms(
+        self, message: TFMessage, now_s: float | None, *, static: bool = False
+    ) -> None:
         """Store the transforms of /tf or /tf_static.
 
         Args:
@@ -57,7 +61,7 @@ class PoseReader:
                 self._warn(f"tf: {problem}")
 
     def read_odometry(self, message: Odometry, now_s: float | None) -> None:
-        """Store the robot's state, and its pose as a transform.
+        """Store the robot's state and pose.
 
         Args:
             message: in the odom frame.
@@ -71,9 +75,13 @@ class PoseReader:
             return
         if self._is_future("odometry", to_seconds(message.header.stamp), now_s):
             return
+        before = self._poses.problem
         try:
             self._poses.add_odometry(message)
-        except NavError as problem:
+            problem = self._poses.problem
+        except NavError as refused:
+            problem = str(refused)
+        if problem and problem != before:
             self._warn(f"odometry: {problem}")
 
     def drop_future(self, now_s: float) -> None:
@@ -81,7 +89,7 @@ class PoseReader:
         state = self._poses.state
         if state is not None and self._is_future("odometry", state.stamp_s, now_s):
             self._poses.state = None
-        self._poses.transforms.forget(after_s=now_s + CLOCK_TOLERANCE_S)
+        self._poses.drop_after(now_s + CLOCK_TOLERANCE_S)
 
     def forget(self) -> None:
         """Forget all but static transforms, and which problems have been reported."""
@@ -103,3 +111,42 @@ class PoseReader:
             # Localisation stamps map -> odom ahead on purpose, and it is not needed here.
             return stamp_s > self._clock.read(now_s) + CLOCK_TOLERANCE_S
         return self._is_future("transforms", stamp_s, now_s)
+
+
+def odometry_problems(
+    odometry: Iterable[Odometry],
+    transforms: Iterable[TFMessage] = (),
+    static_transforms: Iterable[TFMessage] = (),
+    *,
+    frames: Frames | None = None,
+) -> tuple[str, ...]:
+    """Return in words what the bridge would find wrong with a recording's odometry and tf.
+
+    For example that they contradict each other, or that the odometry is in another frame.
+
+    Args:
+        odometry: all messages of its topic.
+        transforms: all messages of /tf.
+        static_transforms: all messages of /tf_static.
+        frames: names of the frames.
+
+    Returns:
+        Each problem once, in the order of their first sight; none if nothing is wrong.
+    """
+    named = frames or Frames()
+    problems: dict[str, None] = {}
+    poses = RobotPoses(named, None)
+    reader = PoseReader(poses, BridgeClock(), named.odom, problems.setdefault, with_map=False)
+    for message in static_transforms:
+        reader.read_transforms(message, None, static=True)
+    moving = [
+        (to_seconds(each.header.stamp), 0, partial(reader.read_transforms, TFMessage((each,))))
+        for message in transforms
+        for each in message.transforms
+    ]
+    driven = [
+        (to_seconds(each.header.stamp), 1, partial(reader.read_odometry, each)) for each in odometry
+    ]
+    for _, _, read in sorted([*moving, *driven], key=lambda entry: entry[:2]):
+        read(None)
+    return tuple(problems)

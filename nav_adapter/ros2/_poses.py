@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 
@@ -11,14 +12,16 @@ from perception.laser import RobotMotion
 
 from .._errors import NavError
 from .._robot import RobotState
+from ._odometry_check import OdometryCheck
 from ._outgoing import Frames
 from ._transforms import TransformBuffer
 from .conversions import pose_matrix, to_seconds
 from .messages.geometry_msgs import TransformStamped
 from .messages.nav_msgs import Odometry
 
-# No robot drives so fast: a higher speed is an error of the sender.
-_FASTEST_MPS = 100.0
+# No robot drives or turns so fast: more is an error of the sender.
+_FASTEST_MPS: Final = 100.0
+_FASTEST_RADPS: Final = 100.0
 
 
 class RobotPoses:
@@ -29,14 +32,20 @@ class RobotPoses:
         T_base_camera: (4, 4) pose of a fixed camera; None to look it up in tf.
 
     Attributes:
-        transforms: from tf and odometry.
+        transforms: from tf.
         state: the latest state of the robot, or None.
+        problem: why the odometry cannot be trusted; empty if nothing is wrong with it.
     """
 
     def __init__(self, frames: Frames, T_base_camera: FloatArray | None) -> None:
         self._frames, self._T_base_camera = frames, T_base_camera
         self.transforms = TransformBuffer()
+        # Apart from tf, which may have a pose of the robot too: two sources in one history would
+        # be one robot that jumps.
+        self._odometry = TransformBuffer()
+        self._check = OdometryCheck(frames)
         self.state: RobotState | None = None
+        self.problem = ""
 
     def add_transform(self, message: TransformStamped, *, static: bool) -> None:
         """Store a transform.
@@ -54,36 +63,82 @@ class RobotPoses:
         )
 
     def add_odometry(self, message: Odometry) -> None:
-        """Store the robot's state, unless a newer one is known, and its pose as a transform.
+        """Store the robot's state, unless a newer one is known, and its pose.
+
+        Pose and twist of another frame on the robot are moved to the base frame. The place of that
+        frame comes from tf, and never by way of odom, where it would be somebody else's odometry.
 
         Raises:
-            NavError: for numbers that cannot be used.
+            NavError: for numbers that cannot be used, and for a child frame whose place on the
+                robot is unknown.
         """
+        base = self._frames.base.lstrip("/")
+        child = message.child_frame_id.lstrip("/") or base
         position, rotation = message.pose.pose.position, message.pose.pose.orientation
         stamp_s = to_seconds(message.header.stamp)
-        T = pose_matrix((position.x, position.y, position.z), rotation)
-        linear = message.twist.twist.linear
-        speed_mps = math.hypot(linear.x, linear.y)
-        # Written so that NaN is refused too.
-        if not speed_mps <= _FASTEST_MPS:
-            raise NavError(f"speed_mps must be within {_FASTEST_MPS:g} m/s, got {speed_mps:g}")
+        T_odom_child = pose_matrix((position.x, position.y, position.z), rotation)
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        velocity, turning = np.array([linear.x, linear.y, 0.0]), np.array([0.0, 0.0, angular.z])
+        if child != base:
+            velocity[2], turning[:2] = linear.z, (angular.x, angular.y)
+        for name, value, most, unit in (
+            ("speed_mps", math.hypot(*velocity), _FASTEST_MPS, "m/s"),
+            ("yaw_rate_radps", math.hypot(*turning), _FASTEST_RADPS, "rad/s"),
+        ):
+            # Written so that NaN is refused too.
+            if not value <= most:
+                raise NavError(f"{name} must be within {most:g} {unit}, got {value:g}")
+        T_child_base = np.eye(4) if child == base else self._base_in(child, stamp_s)
+        T_odom_base = T_odom_child @ T_child_base
+        arm = T_child_base[:3, 3]
+        velocity_base = T_child_base[:3, :3].T @ (velocity + np.cross(turning, arm))
+        turning_base = T_child_base[:3, :3].T @ turning
         state = RobotState(
             stamp_s,
-            T[:2, 3],
-            math.atan2(T[1, 0], T[0, 0]),
-            linear.x,
-            message.twist.twist.angular.z,
-            np.array([linear.x, linear.y]),
+            T_odom_base[:2, 3],
+            math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
+            velocity_base[0],
+            turning_base[2],
+            velocity_base[:2],
         )
-        child = message.child_frame_id or self._frames.base
-        self.transforms.add(self._frames.odom, child, stamp_s, T)
+        self._odometry.add(self._frames.odom, base, stamp_s, T_odom_base)
         if self.state is None or stamp_s >= self.state.stamp_s:
             self.state = state
+            self._check.add(stamp_s, T_odom_child, velocity, turning, child)
+            self._check.compare(self._odometry, self.transforms, state)
+            self.problem = self._check.problem
+
+    def _base_in(self, child: str, stamp_s: float) -> FloatArray:
+        """Return the pose (4, 4) of the base frame in another frame of the robot."""
+        base = self._frames.base
+        if not self._is_on_robot(child):
+            self.problem = (
+                f"the odometry is that of {child!r}, and tf does not tell where it is on {base!r}: "
+                "publish the static transform between them, or, if both are one place, set the "
+                f"base frame to {child!r} (--base-frame, base_frame)"
+            )
+            raise NavError(self.problem)
+        return self.transforms.lookup(child, base, stamp_s)
+
+    def _is_on_robot(self, frame: str) -> bool:
+        """Return whether tf knows the frame beside the base frame, and not by way of odom."""
+        try:
+            ways = self.transforms.ways(self._frames.base, frame)
+        except NavError:
+            return False
+        return not any(self._frames.odom.lstrip("/") in way for way in ways)
 
     def forget(self) -> None:
         """Forget the state and all transforms but the static ones."""
-        self.state = None
+        self.state, self.problem = None, ""
         self.transforms.forget()
+        self._odometry.forget()
+        self._check = OdometryCheck(self._frames)
+
+    def drop_after(self, stamp_s: float) -> None:
+        """Forget the poses after a time, but for static transforms."""
+        self.transforms.forget(after_s=stamp_s)
+        self._odometry.forget(after_s=stamp_s)
 
     def T_odom_camera(self, frame: str, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
         """Return the pose (4, 4) of the camera.
@@ -96,11 +151,13 @@ class RobotPoses:
         Raises:
             NavError: for a pose that is not known at that time.
         """
-        frames = self._frames
-        if self._T_base_camera is None:
-            return self.transforms.lookup(frames.odom, frames.camera or frame, stamp_s)
-        T_odom_base = self.transforms.lookup(frames.odom, frames.base, stamp_s)
-        return np.asarray(T_odom_base @ self._T_base_camera, dtype=np.float64)
+        T_base_camera = self._T_base_camera
+        if T_base_camera is None:
+            frame = self._frames.camera or frame
+            if not self._is_on_robot(frame):
+                return self.transforms.lookup(self._frames.odom, frame, stamp_s)
+            T_base_camera = self.in_base(frame, stamp_s)
+        return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
 
     def in_base(self, frame: str, stamp_s: float) -> FloatArray:
         """Return the pose (4, 4) of a frame of the robot in the base frame.
@@ -127,16 +184,18 @@ class RobotPoses:
         Raises:
             NavError: for poses that are not known, or end too long before.
         """
-        state, frames = self.state, self._frames
+        state = self.state
         if state is None:
             raise NavError("no odometry yet: the pose of the robot is unknown")
         velocity_mps = np.array([state.speed_mps, state.lateral_mps])
-        T_end = self.transforms.lookup(frames.odom, frames.base, end_s)
+        # Also for its error, where the odometry ends too long before.
+        T_end = self._T_odom_base(end_s)
         if end_s > state.stamp_s:
-            pose_s = state.stamp_s
-            T = self.transforms.lookup(frames.odom, frames.base, pose_s)
-            return RobotMotion(pose_s, T, velocity_mps, state.yaw_rate_radps)
+            T = self._T_odom_base(state.stamp_s)
+            return RobotMotion(state.stamp_s, T, velocity_mps, state.yaw_rate_radps)
         if end_s <= start_s:
             return RobotMotion(end_s, T_end, velocity_mps, state.yaw_rate_radps)
-        T_start = self.transforms.lookup(frames.odom, frames.base, start_s)
-        return RobotMotion.between(start_s, T_start, end_s, T_end)
+        return RobotMotion.between(start_s, self._T_odom_base(start_s), end_s, T_end)
+
+    def _T_odom_base(self, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
+        return self._odometry.lookup(self._frames.odom, self._frames.base, stamp_s)

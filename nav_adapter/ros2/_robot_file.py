@@ -110,10 +110,12 @@ class RobotFile(StrictConfig):
         max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
         reaction_time_s: ≥ 0, from exposure to the start of braking.
         drive: ``differential``; ``ackermann`` for a robot that steers; ``holonomic`` for one that
-            can move sideways. Without it the odometry tells. A ``differential`` or ``ackermann``
-            robot whose odometry moves sideways is stopped.
-        max_yaw_rate_radps: > 0, the fastest turn, either way. This and the next two limit commands
-            (``constraints.yaw_rate_limit_radps``, :mod:`nav_adapter.motion`), not the speed.
+            can move sideways. Without it the odometry tells, and Nav2's limit is as for
+            ``holonomic`` (:func:`speed_limit`). A ``differential`` or ``ackermann`` robot whose
+            odometry moves sideways is stopped.
+        max_yaw_rate_radps: > 0, the fastest turn of the controller, either way. This and the next
+            two limit commands (``constraints.yaw_rate_limit_radps``, :mod:`nav_adapter.motion`),
+            not the speed. Nav2's limit is lower for this one (:func:`speed_limit`).
         max_yaw_acceleration_radps2: > 0, the fastest change of the yaw rate.
         min_turning_radius_m: > 0, the tightest curve of the base origin; needed with ``ackermann``
             and refused with another drive.

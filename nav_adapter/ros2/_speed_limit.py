@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from perception.arrays import finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
+from .._robot import RobotProfile
 from .conversions import header
 from .messages.nav2_msgs import SpeedLimit
 
@@ -15,6 +17,37 @@ from .messages.nav2_msgs import SpeedLimit
 SLOWEST_MPS: Final = 0.01
 # DWB keeps its previous limit if it gets an absolute one at or above its maximum.
 _BELOW_MAXIMUM: Final = 0.999
+# Of a robot whose profile has none: the fastest default among Nav2's controllers (MPPI, wz_max).
+_YAW_RATE_RADPS: Final = 1.9
+
+
+def controller_limit_mps(constraints: NavConstraints) -> float:
+    """Return the limit of the base, per axis, with which no point of the robot is too fast.
+
+    It is the lower of the speed limit and of ``fastest_point_limit_mps`` divided by
+    :func:`fastest_point_per_axis`. Constraints without ``robot`` have only the former.
+    """
+    if constraints.robot is None:
+        return constraints.speed_limit_mps
+    assert constraints.fastest_point_limit_mps is not None
+    fastest_mps = constraints.fastest_point_limit_mps / fastest_point_per_axis(constraints.robot)
+    return min(constraints.speed_limit_mps, fastest_mps)
+
+
+def fastest_point_per_axis(robot: RobotProfile) -> float:
+    """Return how much faster than a limit per axis the fastest point of the robot can be, ≥ 1.
+
+    Nav2's controllers keep a limit L for x and y each, and scale the yaw rate with it: on the
+    diagonal √2 L + R ω L / v, with the circumscribed radius R, ω = ``max_yaw_rate_radps`` (1.9
+    rad/s if it is not given) and v = ``max_speed_mps``. A robot whose ``drive`` cannot move
+    sideways has L instead of √2 L, and one that steers at most L / ``min_turning_radius_m`` of yaw
+    rate.
+    """
+    turning = (robot.max_yaw_rate_radps or _YAW_RATE_RADPS) / robot.max_speed_mps
+    if robot.min_turning_radius_m is not None:
+        turning = min(turning, 1.0 / robot.min_turning_radius_m)
+    straight = 1.0 if robot.moves_sideways is False else math.sqrt(2.0)
+    return straight + robot.circumscribed_radius_m * turning
 
 
 def speed_limit(
@@ -26,10 +59,14 @@ def speed_limit(
 ) -> SpeedLimit:
     """Return ``nav2_msgs/SpeedLimit``, in m/s or in per cent.
 
+    Nav2's controllers keep it for the base, per axis, and the limit of the constraints is for the
+    fastest point of the robot. So the value is lower (``docs/nav2.md``), if the constraints have
+    their ``robot``, as those of ``NavAdapter.update`` do.
+
     The value is never 0.0, which Nav2 reads as "no limit". A stop becomes 0.01 m/s, and the stop
     polygon (:func:`collision_polygons`) makes the collision monitor stop the robot. The value is
     never above 99.9 % of the maximum: MPPI and RPP would raise their maximum to it, and DWB would
-    ignore it and keep an old limit. Other limits are not rounded.
+    ignore it and keep an old limit.
 
     Args:
         constraints: the limit and its stamp.
@@ -44,7 +81,7 @@ def speed_limit(
     maximum = finite_number(
         "max_speed_mps", max_speed_mps, NavError, minimum=SLOWEST_MPS, exclusive_minimum=True
     )
-    limit = max(SLOWEST_MPS, min(constraints.speed_limit_mps, _BELOW_MAXIMUM * maximum))
+    limit = max(SLOWEST_MPS, min(controller_limit_mps(constraints), _BELOW_MAXIMUM * maximum))
     return SpeedLimit(
         header(constraints.stamp_s, frame_id),
         percentage,

@@ -86,6 +86,17 @@ class TransformBuffer:
             NavError: for frames that are not connected, or not known at that time.
         """
         stamp = finite_number("stamp_s", stamp_s, NavError)
+        source_way, target_way = self.ways(target, source)
+        T_common_source = self._chain(source_way[:-1], stamp)
+        T_common_target = self._chain(target_way[:-1], stamp)
+        return np.asarray(np.linalg.inv(T_common_target) @ T_common_source, dtype=np.float64)
+
+    def ways(self, target: str, source: str) -> tuple[list[str], list[str]]:
+        """Return the frames from ``source``, and from ``target``, up to the nearest one above both.
+
+        Raises:
+            NavError: for frames that are not connected.
+        """
         target, source = target.lstrip("/"), source.lstrip("/")
         source_path, target_path = self._path(source), self._path(target)
         common = next((frame for frame in source_path if frame in target_path), None)
@@ -94,9 +105,20 @@ class TransformBuffer:
                 f"no transform between {source!r} and {target!r}: known are "
                 f"{', '.join(f'{p} -> {c}' for c, p in self._parents.items()) or 'none'}"
             )
-        T_common_source = self._chain(source_path[: source_path.index(common)], stamp)
-        T_common_target = self._chain(target_path[: target_path.index(common)], stamp)
-        return np.asarray(np.linalg.inv(T_common_target) @ T_common_source, dtype=np.float64)
+        source_end, target_end = source_path.index(common) + 1, target_path.index(common) + 1
+        return source_path[:source_end], target_path[:target_end]
+
+    def latest_s(self, target: str, source: str) -> float:
+        """Return the newest stamp that all transforms between two frames have reached.
+
+        It is infinite if all of them are static.
+
+        Raises:
+            NavError: for frames that are not connected.
+        """
+        children = [child for way in self.ways(target, source) for child in way[:-1]]
+        moving = (child for child in children if child not in self._static)
+        return min((self._histories[child][-1][0] for child in moving), default=math.inf)
 
     def _path(self, frame: str) -> list[str]:
         """Return the frame and all its ancestors, up to the root."""

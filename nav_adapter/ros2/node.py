@@ -124,10 +124,9 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         )
         self._perception = PerceptionThread(self._bridge, self._now_s)
         self._subscribe(READ["odom"], self._odometry)
+        self._subscribe(READ["tf"], lambda m: self._transforms(m, False))
+        self._subscribe(READ["tf_static"], lambda m: self._transforms(m, True))
         use_map = bool(scans) and self._parameter("use_map", False)
-        in_tf = (use_camera and robot.camera is None) or (scans and robot.scanners is None)
-        if in_tf or use_map:
-            self._subscribe_tf()
         if use_camera:
             self._subscribe(READ["camera_info"], self._calibration)
             compressed = self._parameter("compressed", False)
@@ -216,10 +215,6 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         if count not in range(len(known) + 1):
             raise NavError(f"scanners must be 0, 1 or 2, got {count!r}")
         return known[:count]
-
-    def _subscribe_tf(self) -> None:
-        self._subscribe(READ["tf"], lambda m: self._transforms(m, False))
-        self._subscribe(READ["tf_static"], lambda m: self._transforms(m, True))
 
     def _subscribe(self, topic: Topic, callback: Any) -> None:
         self.create_subscription(ros_class(topic.message), topic.name, callback, _qos(topic))

@@ -184,6 +184,20 @@ def test_numbers_beyond_any_float_are_refused(call) -> None:
         call(adapter())
 
 
+@pytest.mark.parametrize("stamp_s", [-1e155, -1e308, -1e13])
+@pytest.mark.parametrize("of", ["robot_state", "tracks", "perception"])
+def test_a_stamp_that_was_never_a_time_is_refused(stamp_s: float, of: str) -> None:
+    nav = adapter()
+    state = robot_at(stamp_s if of == "robot_state" else 0.0, speed_mps=0.5)
+    track = person(stamp_s if of == "tracks" else 0.0)
+    perceived_s = stamp_s if of == "perception" else 0.0
+    with pytest.raises(NavError, match=f"{of}.*more than 1e\\+12 s before stamp_s"):
+        nav.update([track], state, 0.0, perception_stamp_s=perceived_s)
+    assert nav.update([person()], robot_at(), 0.0).speed_limit_mps > 0.0
+    # An empty header is old, not absurd.
+    assert "stale" in adapter().update([person(1.7e9)], robot_at(), 1.7e9).limited_by
+
+
 def test_an_absurd_variance_of_the_velocity_is_refused() -> None:
     policy = AwarenessPolicy(outline=ObstacleOutline(sweep_s=1.0, unaware_ahead_s=1.0))
     track = replace(person(), covariance_odom=np.diag([0.01, 0.01, 1.7e308, 1.7e308]))

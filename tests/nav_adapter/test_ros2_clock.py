@@ -22,6 +22,7 @@ from nav_adapter.ros2.messages.geometry_msgs import (
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import PersonObservation
+from tracking.prediction import PredictionModel
 
 PERIOD_S = 0.05
 HERE = pose_matrix((0.0, 0.0, 0.0), yaw_quaternion(0.0))
@@ -115,6 +116,24 @@ def test_a_clock_that_was_set_back_starts_the_buffers_anew_after_1_s() -> None:
     (after,) = robot.bridge.tracks
     assert after.id > before.id
     assert after.stamp_s == constraints[-1].stamp_s
+
+
+def test_after_a_clock_step_the_limit_rises_slowly_and_the_prediction_stays() -> None:
+    """The way to start anew is the adapter's own; a new adapter would allow 1.5 m/s at once."""
+    eyes = OneStanding()
+    prediction = PredictionModel(lag_per_s2=0.5)
+    robot = Robot(make_pipeline=lambda camera: eyes, prediction=prediction)
+    before = robot.drive(START_S, 2.0)[-1].speed_limit_mps
+    assert 0.0 < before < 1.2
+    eyes.process = lambda *_, **__: ()  # nobody is seen after the step
+    constraints = robot.drive(START_S - 500.0, 3.0)
+    limits = [each.speed_limit_mps for each in constraints]
+    first = next(index for index, limit in enumerate(limits) if limit > 0.0)
+    assert limits[first] <= before + 0.3
+    assert constraints[first].limited_by == "recovery after stale data"
+    assert max(np.diff(limits[first:])) <= 0.05 + 1e-9
+    assert limits[-1] == 1.5
+    assert {each.speed_basis.prediction for each in constraints[first:]} == {prediction}
 
 
 def test_one_wrong_reading_of_the_clock_does_not_delete_people() -> None:

@@ -116,7 +116,7 @@ def two_scanners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_node_reads_scanners_without_a_camera(node_module: Any, two_scanners: None) -> None:
     ros_node = node_module.AwarenessNode()
-    assert set(ros_node.callbacks) == {"odom", "scan", "scan_2"}
+    assert set(ros_node.callbacks) == {"odom", "tf", "tf_static", "scan", "scan_2"}
 
     def hear(key: str, message: Any) -> None:
         ros_node.callbacks[READ[key].name](to_ros(message, lambda kind: SimpleNamespace))
@@ -170,7 +170,7 @@ def test_the_node_takes_a_calibrated_prediction_or_refuses_the_file(
         ros_node.stop()
 
 
-def test_the_node_reads_a_map_and_tf_beside_fixed_mounts(
+def test_the_node_reads_a_map_beside_fixed_mounts(
     node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(StandInNode.parameters, "use_map", True)
