@@ -9,7 +9,7 @@ from ..lazy import lazy_names
 if TYPE_CHECKING:
     from ._loop import BridgeInputs, BridgeLoop
     from ._publisher import TopicPublisher
-    from ._replay import BagReplay, ReplayPublisher
+    from ._replay import BagReplay, ReplayPublisher, recorded_messages, static_transforms
     from ._rerun import RerunRecorder, cone_lines
 
 __all__ = [
@@ -20,6 +20,8 @@ __all__ = [
     "RerunRecorder",
     "TopicPublisher",
     "cone_lines",
+    "recorded_messages",
+    "static_transforms",
 ]
 
 __getattr__ = lazy_names(
@@ -27,7 +29,12 @@ __getattr__ = lazy_names(
     {
         "._loop": ("BridgeInputs", "BridgeLoop"),
         "._publisher": ("TopicPublisher",),
-        "._replay": ("BagReplay", "ReplayPublisher"),
+        "._replay": (
+            "BagReplay",
+            "ReplayPublisher",
+            "recorded_messages",
+            "static_transforms",
+        ),
         "._rerun": ("RerunRecorder", "cone_lines"),
     },
 )

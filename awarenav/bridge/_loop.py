@@ -23,6 +23,9 @@ _REPORT_PERIOD_S: Final = 2.0
 # So that no queue of poses overflows at a low rate of publishing.
 _LONGEST_WAIT_S: Final = 0.05
 
+# A publisher has been found by then, and has sent its last message.
+_LATCHED_AFTER_S: Final = 5.0
+
 _Message = TypeVar("_Message", bound=Message)
 
 
@@ -96,6 +99,7 @@ class BridgeLoop:
                 node.subscribe(topic, wakes=False)
         self._perception = PerceptionThread(bridge, time.time, on_frame=self._on_frame)
         self._scans = ScanThread(bridge, time.time) if inputs.scans else None
+        self._unheard = [topic for topic in (inputs.map, inputs.tf_static) if topic is not None]
 
     def run(
         self, seconds: float | None = None, *, report: Callable[[str], None] = lambda text: None
@@ -112,6 +116,8 @@ class BridgeLoop:
             if self._viewer is not None:
                 self._viewer.draw(self._bridge, constraints)
             now = time.monotonic()
+            if self._unheard and now - began >= _LATCHED_AFTER_S:
+                self._report_unheard(report)
             due = max(due + self._period_s, now)
             if now - reported >= _REPORT_PERIOD_S:
                 total = self._processed
@@ -121,6 +127,21 @@ class BridgeLoop:
                     f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
                 )
                 reported, before = now, total
+
+    def _report_unheard(self, report: Callable[[str], None]) -> None:
+        """Say once which topics that are sent only once have sent nothing, and why."""
+        for topic in self._unheard:
+            if self._node.has_unfit_publisher(topic):
+                report(
+                    f"nothing comes from the publisher of /{topic.name}: its durability is "
+                    "volatile, and must be transient_local"
+                )
+            elif topic is self._inputs.map:
+                report(
+                    f"no map yet on /{topic.name} after {_LATCHED_AFTER_S:g} s: is its publisher "
+                    "running, with the durability transient_local?"
+                )
+        self._unheard.clear()
 
     @property
     def _processed(self) -> int:
@@ -159,6 +180,7 @@ class BridgeLoop:
         """Pass the received map and scans on."""
         if self._inputs.map is not None:
             for cdr in self._node.take_cdr(self._inputs.map)[-1:]:
+                self._heard(self._inputs.map)
                 thread.submit_map(self._decoder(self._inputs.map, cdr, OccupancyGrid))
         for number, topic in enumerate(self._inputs.scans):
             for cdr in self._node.take_cdr(topic):
@@ -172,6 +194,7 @@ class BridgeLoop:
         if topic is None:
             return found
         for cdr in self._node.take_cdr(topic):
+            self._heard(topic)
             try:
                 found.append(self._decoder(topic, cdr, kind)())
             except NavError as problem:
@@ -180,6 +203,10 @@ class BridgeLoop:
             if self._recorder is not None:
                 self._recorder.write(topic, cdr, time.time())
         return found
+
+    def _heard(self, topic: Topic) -> None:
+        if topic in self._unheard:
+            self._unheard.remove(topic)
 
     def _decoder(self, topic: Topic, cdr: bytes, kind: type[_Message]) -> Callable[[], _Message]:
         """Return a function that decodes a message, or raises NavError with the topic's name."""

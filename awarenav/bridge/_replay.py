@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import AwarenessBridge, Topic
 from nav_adapter.ros2.conversions import from_ros
-from nav_adapter.ros2.messages import Message
+from nav_adapter.ros2.messages import Message, ros_type
 from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
@@ -20,7 +22,12 @@ from ._loop import BridgeInputs, BridgeViewer
 if TYPE_CHECKING:
     from nav_adapter.ros2 import McapRecorder
 
+    from ..estimate import BagMessages
+
 _REPORT_PERIOD_S: Final = 2.0
+# No message is so long on its way to the recorder, nor is a clock so far ahead of another's.
+_LATEST_S: Final = 1.0
+_AHEAD_S: Final = 0.05
 
 
 class ReplayPublisher:
@@ -50,6 +57,47 @@ class ReplayPublisher:
             self._recorder.write(self._topics[key], encode(message), self.now_s)
 
 
+def recorded_messages(path: Path, inputs: BridgeInputs) -> BagMessages:
+    """Return the messages of the inputs in a recording.
+
+    Raises:
+        AwarenavError: for a file that is not a recording, or that lacks a topic.
+    """
+    from ..estimate import BagMessages  # noqa: PLC0415 - needs the extra rosbag
+
+    topics = (
+        inputs.image,
+        inputs.depth,
+        inputs.camera_info,
+        inputs.odom,
+        inputs.map,
+        *inputs.scans,
+    )
+    optional = (inputs.tf, inputs.tf_static)
+    required, others = (
+        {f"/{topic.name}": ros_type(topic.message) for topic in group if topic is not None}
+        for group in (topics, optional)
+    )
+    return BagMessages(path, required, others)
+
+
+def static_transforms(
+    messages: BagMessages, inputs: BridgeInputs, say: Callable[[str], None]
+) -> tuple[tuple[str, float, Any], ...]:
+    """Return the messages of static transforms, the earliest last.
+
+    A recording whose transforms are on another topic is reported to ``say``.
+    """
+    if inputs.tf is None or inputs.tf_static is None:
+        return ()
+    kind = ros_type(inputs.tf.message)
+    have = {name for name, type_ in messages.topics if type_ == kind}
+    if have and not have & {f"/{inputs.tf.name}", f"/{inputs.tf_static.name}"}:
+        name = min(have).removesuffix("_static").strip("/")
+        say(f"the recording has no /{inputs.tf.name}; it has {min(have)}: --tf {name}")
+    return tuple(messages.of(f"/{inputs.tf_static.name}"))[::-1]
+
+
 class BagReplay:
     """Passes recorded messages to a bridge, and publishes at a fixed rate of recorded time.
 
@@ -61,6 +109,8 @@ class BagReplay:
         inputs: the topics that it reads.
         rate_hz: rate of publishing.
         publisher: is told the time.
+        static: messages of static transforms, which hold for the whole recording: read first, the
+            earliest last.
         viewer: shows the state of the bridge.
 
     Attributes:
@@ -75,9 +125,13 @@ class BagReplay:
         rate_hz: float,
         publisher: ReplayPublisher,
         *,
+        static: Iterable[tuple[str, float, Any]] = (),
         viewer: BridgeViewer | None = None,
     ) -> None:
         self._messages, self._bridge, self._publisher = messages, bridge, publisher
+        self._static = static
+        stamped = (inputs.odom, inputs.image, inputs.depth, *inputs.scans)
+        self._stamps = _Stamps({f"/{topic.name}" for topic in stamped if topic is not None})
         self._period_s, self._viewer = 1.0 / rate_hz, viewer
         self.now_s: float | None = None
         self._readers = self._readers_of(inputs)
@@ -90,6 +144,8 @@ class BagReplay:
         Return the time that was replayed, s.
         """
         began_s, ticks, reported_s = 0.0, 0, 0.0
+        for name, recorded_s, message in self._static:
+            self._read(name, message, recorded_s)
         for name, recorded_s, message in self._messages:
             if self.now_s is None:
                 began_s = reported_s = recorded_s
@@ -102,12 +158,17 @@ class BagReplay:
                 reported_s = tick_s if tick_s - reported_s >= _REPORT_PERIOD_S else reported_s
                 ticks += 1
             self.now_s = recorded_s
-            try:
-                self._readers[name](message, recorded_s)
-            # A message of ROS 1 may have other fields.
-            except (NavError, AttributeError, TypeError, ValueError) as problem:
-                self._bridge.refuse(f"{name}: {problem}")
+            if (problem := self._stamps.problem(name, message, recorded_s)) is not None:
+                report(problem)
+            self._read(name, message, recorded_s)
         return 0.0 if self.now_s is None else self.now_s - began_s
+
+    def _read(self, name: str, message: Any, recorded_s: float) -> None:
+        try:
+            self._readers[name](message, recorded_s)
+        # A message of ROS 1 may have other fields.
+        except (NavError, AttributeError, TypeError, ValueError) as problem:
+            self._bridge.refuse(f"{name}: {problem}")
 
     def _tick(self, now_s: float, report: Callable[[str], None] | None) -> None:
         self.now_s = self._publisher.now_s = now_s
@@ -156,3 +217,50 @@ class BagReplay:
         )
         readers |= {f"/{topic.name}": read for topic, read in optional if topic is not None}
         return readers
+
+
+class _Stamps:
+    """Compares the stamps of messages with the times at which they were recorded.
+
+    Args:
+        topics: whose messages are compared.
+    """
+
+    def __init__(self, topics: set[str]) -> None:
+        self._last_s = dict.fromkeys(topics, -math.inf)
+        self._said: set[str] = set()
+
+    def problem(self, name: str, message: Any, recorded_s: float) -> str | None:
+        """Return the first problem of its kind in this recording."""
+        if name not in self._last_s:
+            return None
+        stamp = message.header.stamp
+        stamp_s = stamp.sec + 1e-9 * stamp.nanosec
+        back_s, self._last_s[name] = self._last_s[name] - stamp_s, stamp_s
+        behind_s = recorded_s - stamp_s
+        if back_s > _LATEST_S:
+            kind, text = (
+                "back",
+                f"go back by {back_s:.1f} s at {recorded_s:.1f} s, as in a recording of a replay "
+                "in a loop or with a clock that was set back; until they are as late as before, "
+                "the robot stops",
+            )
+        elif behind_s > _LATEST_S:
+            kind, text = (
+                "behind",
+                f"are {behind_s:.1f} s behind the times of recording, as with simulated time that "
+                "was recorded in real time (ros2 bag record --use-sim-time) or with another "
+                "computer's clock; everything is too old, and the robot stops",
+            )
+        elif behind_s < -_AHEAD_S:
+            kind, text = (
+                "ahead",
+                f"are {-behind_s:.3f} s ahead of the times of recording, as with another "
+                "computer's clock; these messages are refused",
+            )
+        else:
+            return None
+        if kind in self._said or "back" in self._said:
+            return None
+        self._said.add(kind)
+        return f"{name}: the stamps {text}"

@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import Final, NoReturn
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import (
@@ -27,7 +27,6 @@ from nav_adapter.ros2 import (
     renamed,
     scanner_inputs,
 )
-from nav_adapter.ros2.messages import ros_type
 from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
 from perception.arrays import finite_number
 from perception.laser import MapCells
@@ -45,10 +44,7 @@ from ..estimate import (
 from ..policies import read_policy
 from ._loop import BridgeInputs, BridgeLoop
 from ._publisher import TopicPublisher
-from ._replay import BagReplay, ReplayPublisher
-
-if TYPE_CHECKING:
-    from ..estimate import BagMessages
+from ._replay import BagReplay, ReplayPublisher, recorded_messages, static_transforms
 
 # The last messages need so long to leave before the node is closed.
 _SEND_TIME_S: Final = 0.1
@@ -88,6 +84,7 @@ class BridgeOptions:
     map: str | None
     map_frame: str
     odom: str
+    tf: str = "tf"
     odom_frame: str
     base_frame: str
     camera_frame: str
@@ -168,10 +165,18 @@ def bridge_command(options: BridgeOptions) -> int:
 
         if options.bag is not None:
             replayed = ReplayPublisher(published, recorder)
-            messages = _recorded(options.bag, inputs)
+            messages = recorded_messages(options.bag, inputs)
             stack.callback(messages.close)
             bridge = bridge_to(replayed)
-            replay = BagReplay(messages, bridge, inputs, rate_hz, replayed, viewer=viewer)
+            replay = BagReplay(
+                messages,
+                bridge,
+                inputs,
+                rate_hz,
+                replayed,
+                static=static_transforms(messages, inputs, _log),
+                viewer=viewer,
+            )
             _log(f"replayed {replay.run(seconds, report=_log):.1f} s: {_summary(bridge)}")
             return 0
         node = DdsNode(domain)
@@ -229,26 +234,6 @@ def _run_until_interrupted(
         signal.signal(signal.SIGTERM, before)
         bridge.stop(time.time(), "awarenav bridge has ended")
         time.sleep(_SEND_TIME_S)
-
-
-def _recorded(path: Path, inputs: BridgeInputs) -> BagMessages:
-    """Return the messages of the inputs in a recording."""
-    from ..estimate import BagMessages  # noqa: PLC0415 - needs the extra rosbag
-
-    topics = (
-        inputs.image,
-        inputs.depth,
-        inputs.camera_info,
-        inputs.odom,
-        inputs.map,
-        *inputs.scans,
-    )
-    optional = (inputs.tf, inputs.tf_static)
-    required, others = (
-        {f"/{topic.name}": ros_type(topic.message) for topic in group if topic is not None}
-        for group in (topics, optional)
-    )
-    return BagMessages(path, required, others)
 
 
 def _summary(bridge: AwarenessBridge) -> str:
@@ -382,8 +367,8 @@ def _inputs(options: BridgeOptions) -> BridgeInputs:
         image=None if options.no_camera else renamed(image, options.image),
         odom=renamed(READ["odom"], options.odom),
         camera_info=renamed(READ["camera_info"], options.camera_info) if with_info else None,
-        tf=READ["tf"],
-        tf_static=READ["tf_static"],
+        tf=renamed(READ["tf"], options.tf),
+        tf_static=renamed(READ["tf_static"], f"{options.tf}_static"),
         scans=scans,
         map=None
         if options.map is None or _is_file(options.map)

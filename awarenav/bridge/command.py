@@ -123,6 +123,13 @@ _LOG: Final = "Recordings"
     help="Replay a recording (rosbag2 folder, .db3, .mcap, .bag) instead; nothing is published.",
 )
 @option("--odom", group=_READ, default="odom", metavar="TOPIC", help="nav_msgs/Odometry.")
+@option(
+    "--tf",
+    group=_READ,
+    default="tf",
+    metavar="TOPIC",
+    help="tf2_msgs/TFMessage, as robot1/tf; the static ones are in robot1/tf_static.",
+)
 @option("--odom-frame", group=_READ, default="odom", metavar="FRAME", help="Fixed frame in tf.")
 @option("--base-frame", group=_READ, default="base_link", metavar="FRAME", help="Robot's frame.")
 @option(

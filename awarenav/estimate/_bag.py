@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from perception.documents import read_yaml
 from perception.installation import install_command
@@ -21,24 +22,74 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
     ) from cause
 
 
+# What the library says of a file, and its usual cause.
+_CAUSES: Final = {
+    "end magic": "its recorder was not ended: `mcap recover` makes a readable copy",
+    "Header could not be read": "its recorder was not ended: try `rosbag reindex`",
+    "not indexed": "its recorder was not ended: `rosbag reindex` writes the index",
+    "CDR encapsulation": "compressed messages can be read only with the metadata.yaml beside them",
+    "storage format": "a compressed file can be read only with the metadata.yaml beside it",
+}
+
+
+def topic_name(name: str) -> str:
+    """Return a topic's name with its leading slash, which recordings of ROS 1 may lack."""
+    return f"/{name.strip('/')}"
+
+
 def open_bag(path: Path) -> Any:
     """Return an open ``rosbags`` reader of a recording.
 
     Args:
-        path: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
+        path: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``. A folder without
+            ``metadata.yaml`` is read as the files in it.
 
     Raises:
         AwarenavError: for a file that is not a recording.
     """
-    if (metadata := path / "metadata.yaml").is_file():
-        read_yaml(metadata, AwarenavError)  # refuses what would harm the library
+    files = _files_of(path)
     try:
-        reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+        reader = AnyReader(files, default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         reader.open()
     # The library also raises errors of its storage layers.
     except Exception as cause:
-        raise AwarenavError(f"cannot read the recording {path}: {cause}") from cause
+        raise AwarenavError(f"cannot read the recording {path}: {_explained(cause)}") from cause
     return reader
+
+
+def _files_of(path: Path) -> list[Path]:
+    """Return what the library opens."""
+    if not path.exists():
+        raise AwarenavError(f"cannot read the recording {path}: there is no such file or folder")
+    folder = path if path.is_dir() else path.parent
+    if (metadata := folder / "metadata.yaml").is_file():
+        # This refuses what would harm the library as well.
+        content = read_yaml(metadata, AwarenavError)
+        about = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
+        names = about.get("relative_file_paths") if isinstance(about, dict) else None
+        # Only the metadata tell that a file is compressed.
+        return [folder] if path.is_dir() or names == [path.name] else [path]
+    if not path.is_dir():
+        return [path]
+    files = sorted(each for each in path.iterdir() if each.suffix in (".db3", ".mcap"))
+    if not files:
+        raise AwarenavError(
+            f"cannot read the recording {path}: the folder has no metadata.yaml, and no .db3 or "
+            ".mcap file"
+        )
+    # The files of a split recording differ in their numbers.
+    if len({re.sub(r"_\d+$", "", each.stem) for each in files}) > 1:
+        raise AwarenavError(
+            f"cannot read the recording {path}: the folder has no metadata.yaml, and holds several "
+            f"recordings: give one of {', '.join(each.name for each in files)}"
+        )
+    return files
+
+
+def _explained(cause: Exception) -> str:
+    """Return an error of the library with its usual cause, if that is known."""
+    text = str(cause)
+    return next((f"{text} ({why})" for said, why in _CAUSES.items() if said in text), text)
 
 
 class BagMessages:
@@ -47,7 +98,11 @@ class BagMessages:
     Args:
         path: of the recording, as in :func:`open_bag`.
         required: the topics, ``/scan`` or similar, and their types, ``sensor_msgs/msg/LaserScan``.
+            A topic that was recorded without a leading slash is the same one.
         optional: topics that the recording may lack.
+
+    Attributes:
+        topics: name and type of everything that was recorded.
 
     Raises:
         AwarenavError: for a file that is not a recording, or that lacks a topic of this type.
@@ -57,17 +112,18 @@ class BagMessages:
         self, path: Path, required: Mapping[str, str], optional: Mapping[str, str]
     ) -> None:
         self._path, self._reader = path, open_bag(path)
-        kinds = {each.topic: each.msgtype for each in self._reader.connections}
+        connections = self._reader.connections
+        self.topics = {(topic_name(each.topic), str(each.msgtype)) for each in connections}
         for topic, kind in required.items():
-            if kinds.get(topic) != kind:
+            if (topic, kind) not in self.topics:
                 self._reader.close()
-                known = ", ".join(f"{name} ({type_})" for name, type_ in sorted(kinds.items()))
+                known = ", ".join(f"{name} ({type_})" for name, type_ in sorted(self.topics))
                 raise AwarenavError(
                     f"{path} has no topic {topic} of type {kind}; it has {known or 'none'}"
                 )
         wanted = {**optional, **required}
         self._connections = [
-            each for each in self._reader.connections if wanted.get(each.topic) == each.msgtype
+            each for each in connections if wanted.get(topic_name(each.topic)) == each.msgtype
         ]
 
     def __iter__(self) -> Iterator[tuple[str, float, Any]]:
@@ -76,7 +132,19 @@ class BagMessages:
         Raises:
             AwarenavError: for a message that cannot be read.
         """
-        messages = self._reader.messages(connections=self._connections)
+        return self._read(self._connections)
+
+    def of(self, topic: str) -> Iterator[tuple[str, float, Any]]:
+        """Yield the messages of one topic, as iterating over all does.
+
+        Raises:
+            AwarenavError: for a message that cannot be read.
+        """
+        return self._read([each for each in self._connections if topic_name(each.topic) == topic])
+
+    def _read(self, connections: list[Any]) -> Iterator[tuple[str, float, Any]]:
+        # The library takes none for all.
+        messages = self._reader.messages(connections=connections) if connections else iter(())
         while True:
             try:
                 connection, recorded_ns, raw = next(messages)
@@ -84,8 +152,10 @@ class BagMessages:
             except StopIteration:
                 return
             except Exception as cause:
-                raise AwarenavError(f"{self._path}: the rest cannot be read: {cause}") from cause
-            yield connection.topic, recorded_ns * 1e-9, message
+                raise AwarenavError(
+                    f"{self._path}: the rest cannot be read: {_explained(cause)}"
+                ) from cause
+            yield topic_name(connection.topic), recorded_ns * 1e-9, message
 
     def close(self) -> None:
         """Close the recording."""

@@ -24,7 +24,7 @@ from perception import Camera
 from perception.arrays import ImageRgb
 
 from ..errors import AwarenavError
-from ._bag import open_bag
+from ._bag import open_bag, topic_name
 from ._source import SourceFrame
 
 _IMAGE: Final = "sensor_msgs/msg/Image"
@@ -117,7 +117,7 @@ class BagSource:
 
     def _chosen_topic(self, topic: str | None) -> str:
         """Return the image topic that was asked for, or the only one."""
-        images = sorted(
+        images: list[str] = sorted(
             {
                 each.topic
                 for each in self._reader.connections
@@ -126,13 +126,17 @@ class BagSource:
         )
         if not images:
             raise AwarenavError(f"{self._path} has no topic of type {_IMAGE} or {_COMPRESSED}")
-        if topic is not None and topic not in images:
-            raise AwarenavError(f"--topic must be one of {', '.join(images)}, got {topic}")
-        if topic is None and len(images) > 1:
+        if topic is not None:
+            # Recordings of ROS 1 may lack the leading slash.
+            same = [each for each in images if topic_name(each) == topic_name(topic)]
+            if not same:
+                raise AwarenavError(f"--topic must be one of {', '.join(images)}, got {topic}")
+            return same[0]
+        if len(images) > 1:
             raise AwarenavError(
                 f"{self._path} has several image topics: choose --topic {' | '.join(images)}"
             )
-        return images[0] if topic is None else topic
+        return images[0]
 
     def _read_camera(self, shown: Any) -> Camera | None:
         """Return the camera of the first ``camera_info`` message in the images' namespace."""
@@ -141,7 +145,7 @@ class BagSource:
             if shown is not None:
                 height_px, width_px = picture_of(shown).shape[:2]
                 size_px = (width_px, height_px)
-        parts = self._topic.split("/")
+        parts = topic_name(self._topic).split("/")
         topics = [
             "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
         ]
@@ -188,7 +192,8 @@ class BagSource:
     def _of(self, topic: str, *kinds: str) -> list[Any]:
         """Return the connections of a topic."""
         found = self._reader.connections
-        return [each for each in found if each.topic == topic and each.msgtype in kinds]
+        name = topic_name(topic)
+        return [each for each in found if topic_name(each.topic) == name and each.msgtype in kinds]
 
     def _first(self, connections: list[Any]) -> Any:
         """Return the first message of some connections; None if there is none."""

@@ -108,6 +108,11 @@ class DdsNode:
         """Return the number of matched subscribers."""
         return len(self._writers[topic.name][1].get_matched_subscriptions())
 
+    def has_unfit_publisher(self, topic: Topic) -> bool:
+        """Return whether a publisher was found whose quality of service lets nothing through."""
+        status = self._readers[topic.name][1].get_requested_incompatible_qos_status()
+        return bool(status.total_count)
+
     def close(self) -> None:
         """Leave the domain."""
         self._readers.clear()

@@ -16,7 +16,7 @@ from .._errors import NavError
 from ._clock import BridgeClock
 from ._poses import RobotPoses
 from ._scan_perception import PerceivedScan, ScannerInput, ScanPerception
-from ._scans import laser_scan_of, map_cells_of
+from ._scans import ScanMessages, map_cells_of
 from ._sensor_watch import SensorWatch
 from ._shared_tracker import SharedTracker
 from .messages.nav_msgs import OccupancyGrid
@@ -61,6 +61,7 @@ class ScanReader:
         self._lock, self._warn, self._odom_frame = lock, warn, odom_frame
         self._last_s = [-math.inf] * len(inputs)
         self._warned_s = [-math.inf] * len(inputs)
+        self._messages = [ScanMessages(each.name, warn) for each in inputs]
         self._map: MapCells | None = None
         # None until the first scan after a new map; each change is reported once.
         self._map_used: bool | None = None
@@ -124,7 +125,7 @@ class ScanReader:
         self._warned_s = [-math.inf] * len(self._inputs)
 
     def _process(self, number: int, message: LaserScanMessage, now_s: float) -> bool:
-        scan = laser_scan_of(message)
+        scan = self._messages[number].read(message, now_s)
         middle_s = 0.5 * (scan.stamp_s + scan.end_s)
         with self._lock:
             refusal = self._clock.refusal("scans", middle_s, now_s)

@@ -3,60 +3,196 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
 from perception import PerceptionError
-from perception.arrays import finite_number
+from perception.arrays import FloatArray, finite_number
 from perception.laser import LaserScan, MapCells
 
 from .._errors import NavError
+from ._clock import CLOCK_TOLERANCE_S
 from .conversions import pose_matrix
 from .messages.nav_msgs import OccupancyGrid
 
 # No scanner has more rays.
 _MAX_RAYS: Final = 20_000
-# The last angle may be given as that of the ray after the last one, and is rounded by drivers.
+# angle_max may be rounded or be that of a ray beside the last one, and rays may be lost. With rays
+# too many, a sweep may be longer than a full turn by the same share.
 _ANGLE_SLACK_RAD: Final = math.radians(1.0)
+_ANGLE_SLACK_SHARE: Final = 0.03
+# No 2-D scanner measures farther. The limit of a driver without one is infinite.
+_FARTHEST_M: Final = 250.0
+# A sweep is no longer than the time between scans.
+_SWEEP_SHARE: Final = 1.5
+# No scanner that is used on a robot sweeps more slowly.
+_LONGEST_SWEEP_S: Final = 2.0
+# Ranges beyond the limit with fewer values are codes of a driver, not distances.
+_VALUES: Final = 4
+# So much longer than the limit are ranges in a smaller unit.
+_UNIT: Final = 10.0
 # map_server's default threshold of occupied cells, in per cent; larger numbers are unknown ones.
 _OCCUPIED: Final = (65, 100)
+
+
+class ScanMessages:
+    """Reads the messages of one scanner, and says once what is put right in them.
+
+    Args:
+        name: of the scanner.
+        warn: called with each correction, once.
+    """
+
+    def __init__(self, name: str, warn: Callable[[str], object]) -> None:
+        self._name, self._warn = name, warn
+        self._stamped_at_end = False
+        self._said: set[str] = set()
+
+    def read(self, message: Any, now_s: float) -> LaserScan:
+        """Return the scan of a message that came at ``now_s``.
+
+        A scanner whose sweep ends after its message has come is stamped at the end of the sweep.
+        From then on its scans are read so.
+
+        Raises:
+            NavError: as :func:`laser_scan_of`, and for a sweep that ends in the future because
+                time_increment and scan_time disagree.
+        """
+        scan = laser_scan_of(message)
+        given, count = len(message.intensities), len(message.ranges)
+        if given not in (0, count):
+            self._say("intensities", f"{count} ranges but {given} intensities, which are not used")
+        if message.time_increment < 0.0:
+            self._say("time_increment", "time_increment is negative: the last ray is the oldest")
+        sweep_s = scan.end_s - scan.stamp_s
+        latest_s = now_s + CLOCK_TOLERANCE_S
+        if not self._stamped_at_end and scan.stamp_s <= latest_s < scan.end_s:
+            if 0.0 < _SWEEP_SHARE * message.scan_time < sweep_s:
+                raise NavError(
+                    f"time_increment × rays is {sweep_s:.3f} s, but scan_time "
+                    f"{message.scan_time:.3f} s: the last ray would be {scan.end_s - now_s:.3f} s "
+                    "ahead of this computer's clock"
+                )
+            self._stamped_at_end = True
+            self._say(
+                "stamp",
+                f"the sweep ends {scan.end_s - now_s:.3f} s after its message came "
+                f"(time_increment × rays is {sweep_s:.3f} s): the stamp is taken for that of the "
+                "last ray",
+            )
+        return replace(scan, stamp_s=scan.stamp_s - sweep_s) if self._stamped_at_end else scan
+
+    def _say(self, what: str, text: str) -> None:
+        if what not in self._said:
+            self._said.add(what)
+            self._warn(f"{self._name}: {text}")
 
 
 def laser_scan_of(message: Any) -> LaserScan:
     """Return the scan of a message.
 
+    Ray i is at angle_min + i · angle_increment; angle_max is only compared. Rays beyond a full turn
+    count as those of the same direction, of which the nearer range is kept. A range_max above 250 m
+    is 250 m. Intensities of another number than the ranges are left out. A negative time_increment
+    means that the last ray is the oldest; the scan is returned in the order of time.
+
     Args:
         message: ``sensor_msgs`` LaserScan, of this package or of another library.
 
     Raises:
-        NavError: for a scan without rays, angles or limits that are wrong, or that disagree.
+        NavError: for a scan without rays, angles or limits that are wrong, or that disagree, a
+            sweep of more than 2 s, or ranges that are not in metres.
     """
     count = len(message.ranges)
     if count > _MAX_RAYS:
         raise NavError(f"a scan must have at most {_MAX_RAYS} rays, got {count}")
     stamp = message.header.stamp
     try:
-        scan = LaserScan(
-            stamp.sec + 1e-9 * stamp.nanosec,
-            message.angle_min,
-            message.angle_increment,
-            message.ranges,
-            message.range_min,
-            message.range_max,
-            message.time_increment,
-            message.intensities if len(message.intensities) else None,
-        )
+        first = finite_number("angle_min_rad", message.angle_min)
         last = finite_number("angle_max", message.angle_max)
-    except PerceptionError as problem:
-        raise NavError(str(problem)) from problem
-    given = float(scan.angle_min_rad + scan.angle_increment_rad * (count - 1))
-    if abs(given - last) > 2.0 * abs(scan.angle_increment_rad) + _ANGLE_SLACK_RAD:
-        raise NavError(
-            f"angle_max must be the angle of the last ray, {given:.4f} rad for {count} rays, got "
-            f"{last:.4f} rad"
+        increment = finite_number("angle_increment_rad", message.angle_increment)
+        ray_s = finite_number("time_increment_s", message.time_increment)
+        stamp_s = stamp.sec + 1e-9 * stamp.nanosec
+        ranges = np.asarray(message.ranges, dtype=np.float64)
+        intensities = message.intensities if len(message.intensities) == count else None
+        if ray_s < 0.0:
+            first, increment = first + increment * (count - 1), -increment
+            stamp_s += ray_s * (count - 1)
+            ranges = ranges[::-1]
+            intensities = None if intensities is None else intensities[::-1]
+        ranges = _one_turn(ranges, increment)
+        scan = LaserScan(
+            stamp_s,
+            first,
+            increment,
+            ranges,
+            message.range_min,
+            min(message.range_max, _FARTHEST_M),
+            abs(ray_s),
+            None if intensities is None else intensities[: len(ranges)],
         )
+    except (PerceptionError, TypeError, ValueError) as problem:
+        raise NavError(str(problem)) from problem
+    _check_angles(message.angle_min, message.angle_increment, count, last)
+    sweep_s = scan.end_s - scan.stamp_s
+    if sweep_s > _LONGEST_SWEEP_S:
+        raise NavError(
+            f"time_increment must be the seconds from ray to ray: {count} rays of {ray_s:g} s make "
+            f"a sweep of {sweep_s:g} s, and scan_time says {message.scan_time:g} s"
+        )
+    _check_ranges(scan)
     return scan
+
+
+def _check_angles(first_rad: float, increment_rad: float, count: int, angle_max_rad: float) -> None:
+    """Refuse an angle_max that says that the rays are elsewhere."""
+    turn = increment_rad * (count - 1)
+    slack = max(2.0 * abs(increment_rad) + _ANGLE_SLACK_RAD, _ANGLE_SLACK_SHARE * abs(turn))
+    off = first_rad + turn - angle_max_rad
+    if abs(off) <= slack or angle_max_rad == 0.0:
+        return  # drivers that do not set it leave 0
+    # It may be given within ±π, but not where the rays could as well turn the other way.
+    backwards = abs(first_rad - turn - angle_max_rad) <= slack
+    if abs(math.remainder(off, math.tau)) > slack or backwards:
+        raise NavError(
+            "angle_max must be the angle of the last ray, angle_min + (rays − 1) · "
+            f"angle_increment, {first_rad + turn:.4f} rad for {count} rays, got "
+            f"{angle_max_rad:.4f} rad"
+        )
+
+
+def _one_turn(ranges_m: FloatArray, increment_rad: float) -> FloatArray:
+    """Return the ranges of a full turn at most, of rays of one direction the nearer one."""
+    turn = math.tau / max(abs(increment_rad), 1e-9)
+    kept = math.floor(turn + 1e-3) + 1
+    extra = len(ranges_m) - kept
+    if extra <= 0 or extra > _ANGLE_SLACK_SHARE * turn:
+        return ranges_m
+    first = kept - round(turn)
+    nearer = ranges_m[:kept].copy()
+    nearer[first : first + extra] = np.fmin(nearer[first : first + extra], ranges_m[kept:])
+    return np.asarray(nearer)
+
+
+def _check_ranges(scan: LaserScan) -> None:
+    """Refuse ranges that cannot be metres."""
+    beyond = scan.ranges_m[(scan.ranges_m > scan.range_max_m) & (scan.ranges_m < np.inf)]
+    within = int(np.count_nonzero(scan.measured & (scan.ranges_m > 0.0)))
+    values = np.unique(beyond)
+    if len(values) < _VALUES or len(beyond) <= within:
+        return
+    middle_m = float(np.median(values))
+    if middle_m <= _FARTHEST_M and (
+        within or (2 * len(beyond) <= len(scan) and middle_m <= _UNIT * scan.range_max_m)
+    ):
+        return
+    raise NavError(
+        f"ranges must be in metres: {within or 'no'} rays measure anything within range_min "
+        f"{scan.range_min_m:g} to range_max {scan.range_max_m:g} m, most are about {middle_m:g}"
+    )
 
 
 def map_cells_of(message: OccupancyGrid) -> MapCells:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +13,11 @@ from ..errors import PerceptionError
 
 # More than a full turn is no 2-D sweep; the rest is the rounding of 32-bit messages.
 _MAX_TURN_RAD: Final = 2.0 * np.pi + 0.02
+# Many drivers send range_max, or a little less, for a ray that met nothing. So many rays have
+# exactly that value; noise makes those of a wall differ. The 32 bits of a message round it up too.
+_NO_RETURN_SHARE: Final = 0.99
+_NO_RETURN_RAYS: Final = 3
+_ROUNDING: Final = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +26,8 @@ class LaserScan:
 
     Ranges follow REP-117: −inf is an object too near to measure, +inf is no object within
     ``range_max_m``, NaN is an invalid measurement. A finite range outside the limits is discarded
-    like NaN.
+    like NaN. Where three rays or more have exactly ``range_max_m``, or one and the same range up to
+    1 per cent below it that no other ray exceeds, they met no object, like those of +inf.
 
     Attributes:
         stamp_s: time of the first ray.
@@ -46,6 +52,8 @@ class LaserScan:
     range_max_m: float
     time_increment_s: float = 0.0
     intensities: FloatArray | None = None
+    # The range of a ray without a return, beside +inf; NaN if there is none.
+    _nothing_m: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         ranges = _numbers("ranges_m", self.ranges_m)
@@ -64,6 +72,10 @@ class LaserScan:
             raise PerceptionError(
                 f"range_max_m must exceed range_min_m, got {high:g} and {low:g} m"
             )
+        far = ranges[(ranges >= high * _NO_RETURN_SHARE) & (ranges <= high * (1.0 + _ROUNDING))]
+        nothing = float(far.max()) if len(far) >= _NO_RETURN_RAYS else np.nan
+        if np.count_nonzero(far == nothing) < _NO_RETURN_RAYS:
+            nothing = np.nan
         intensities = self.intensities
         if intensities is not None:
             intensities = _numbers("intensities", intensities)
@@ -82,6 +94,7 @@ class LaserScan:
             range_max_m=high,
             time_increment_s=finite_number("time_increment_s", self.time_increment_s, minimum=0.0),
             intensities=intensities,
+            _nothing_m=nothing,
         )
 
     def __len__(self) -> int:
@@ -107,7 +120,14 @@ class LaserScan:
     @property
     def measured(self) -> NDArray[np.bool_]:
         """(N,) True for rays that measured an object within the limits."""
-        return np.asarray((self.ranges_m >= self.range_min_m) & (self.ranges_m <= self.range_max_m))
+        ranges = self.ranges_m
+        within = (ranges >= self.range_min_m) & (ranges <= self.range_max_m)
+        return np.asarray(within & (ranges != self._nothing_m))
+
+    @property
+    def no_return(self) -> NDArray[np.bool_]:
+        """(N,) True for rays that met no object within ``range_max_m``."""
+        return np.asarray((self.ranges_m == np.inf) | (self.ranges_m == self._nothing_m))
 
     @property
     def too_near(self) -> NDArray[np.bool_]:
@@ -118,14 +138,15 @@ class LaserScan:
     def free_m(self) -> FloatArray:
         """The distance (N,) over which each ray met nothing.
 
-        It is the range where there is one, ``range_max_m`` for +inf, and 0 where nothing is known.
+        It is the range where there is one, ``range_max_m`` for :attr:`no_return`, and 0 where
+        nothing is known.
         """
         return self.free_of(self.measured)
 
     def free_of(self, measured: NDArray[np.bool_]) -> FloatArray:
         """Return :attr:`free_m` (N,) for rays of which :attr:`measured` is known."""
         free = np.where(measured, self.ranges_m, 0.0)
-        np.putmask(free, self.ranges_m == np.inf, self.range_max_m)
+        np.putmask(free, self.no_return, self.range_max_m)
         return free
 
 

@@ -68,13 +68,11 @@ def test_a_scan_of_rclpy_is_read() -> None:
         ({"angle_increment": 0.1}, "at most a full turn"),
         ({"angle_min": math.inf}, "angle_min_rad"),
         ({"angle_max": math.nan}, "angle_max"),
-        ({"angle_max": 0.0}, "angle_max must be the angle of the last ray, 2.3562 rad"),
+        ({"angle_max": 1.5}, r"angle_max must be the angle of the last ray, .*, 2.3562 rad"),
         ({"range_max": 0.05}, "range_max_m must exceed range_min_m"),
         ({"range_min": -1.0}, "range_min_m"),
-        ({"range_max": math.inf}, "range_max_m"),
-        ({"time_increment": -1e-4}, "time_increment_s"),
-        ({"time_increment": math.nan}, "time_increment_s"),
-        ({"intensities": (1.0,)}, "intensities must have the shape"),
+        ({"range_max": math.nan}, "range_max_m"),
+        ({"time_increment": math.nan}, "time_increment"),
     ],
 )
 def test_a_scan_that_contradicts_itself_is_refused(change, text: str) -> None:

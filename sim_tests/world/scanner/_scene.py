@@ -80,6 +80,10 @@ class ScanScene:
             ]
             + [_BRIGHT]
         )
+        #: (actors + 1,) True for the robot that carries the scanners; the last is the scenery.
+        self.carrier: NDArray[np.bool_] = np.array(
+            [getattr(actor, "kind", "") == "robot" for actor in self._occluders] + [False]
+        )
         # The last cut of the scenery, and of each actor's last surface: the scanners of a robot
         # mostly have the same plane.
         self._scenery: tuple[_Plane, FloatArray] | None = None

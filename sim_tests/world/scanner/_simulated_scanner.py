@@ -22,7 +22,8 @@ _DARK: Final = 0.3
 class SimulatedScanner:
     """A laser scanner that sees the surfaces of a scene.
 
-    People stand still during one sweep; the robot moves, each ray starts where it is at its time.
+    People stand still during one sweep. The robot moves with its body, and each ray starts where it
+    is at its time.
 
     Args:
         scene: what it sees.
@@ -55,7 +56,18 @@ class SimulatedScanner:
         T_base_scanner = self.mounting.T_base_scanner
         segments, owners = self._scene.cut(motion.T_odom_base @ T_base_scanner, spec.range_max_m)
         origins, turns = _seen_from(motion, stamps, T_base_scanner)
-        exact, hits = cast_rays(segments, low, step, origins, turns)
+        own = self._scene.carrier[owners]
+        if own.any():  # last, so that the others keep their rows
+            order = np.argsort(own, kind="stable")
+            segments, owners, own = segments[order], owners[order], own[order]
+        others = len(own) - int(own.sum())
+        exact, hits = cast_rays(segments[:others], low, step, origins, turns)
+        if others < len(own):
+            # The robot's own body moves with the scanner.
+            still = np.zeros_like(origins)
+            body, rows = cast_rays(segments[others:], low, step, still, still[:, 0])
+            hits = np.where(body < exact, others + rows, hits)
+            exact = np.minimum(exact, body)
         met = hits >= 0
         self.hit_by = np.where(met, owners[hits] if len(owners) else SCENERY, SCENERY)
         noise, chance = self._rng.standard_normal(count), self._rng.random(count)

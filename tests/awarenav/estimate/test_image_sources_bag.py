@@ -62,6 +62,27 @@ def stamps(count: int) -> list[int]:
     return [10**9 + 50_000_000 * k for k in range(count)]
 
 
+@pytest.mark.parametrize("recorded", ["image_raw", "/image_raw", "front/image_raw"])
+@pytest.mark.parametrize("slash", ["", "/"])
+def test_a_topic_without_a_leading_slash_is_the_same_topic(tmp_path, recorded, slash):
+    info = recorded.replace("image_raw", "camera_info")
+    images = [(t, image(numbered(k), "rgb8", t)) for k, t in enumerate(stamps(2))]
+    others = [(t, image(numbered(9), "rgb8", t)) for t in stamps(2)]
+    path = record(
+        tmp_path / "bag",
+        {
+            recorded: (IMAGE, images),
+            "rear/image_raw": (IMAGE, others),
+            info: (INFO, [(t, camera_info(t)) for t in stamps(1)]),
+        },
+    )
+    source = open_source(str(path), topic=f"{slash}{recorded.strip('/')}")
+    assert [number_of(frame.image_rgb) for frame in source.frames()] == [0, 1]
+    source.close()
+    assert source.camera is not None
+    assert source.camera.fx_px == 300.0
+
+
 @pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 @pytest.mark.parametrize("inside", [False, True], ids=["folder", "file"])
 def test_images_stamps_and_camera_come_from_the_recording(tmp_path, plugin, inside):

@@ -199,6 +199,30 @@ def test_the_diagonal_scanners_see_all_around_and_not_their_robot() -> None:
         assert not (scan.ranges_m > 1.0).any()
 
 
+@pytest.mark.parametrize(
+    ("velocity_mps", "yaw_rate_radps"), [((1.5, 0.0), 0.1), ((-0.8, 0.0), -0.5), ((0.5, 0.7), 1.2)]
+)
+def test_the_scanners_of_a_moving_robot_see_as_little_of_it(velocity_mps, yaw_rate_radps) -> None:
+    """Its body moves with them, so that no ray starts behind its own front."""
+    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+        amr = Amr(warehouse)
+        warehouse.add_actor(AmrLook.of(warehouse, amr))
+        scene = ScanScene(warehouse.layout, 0, warehouse.actors)
+        motion = RobotMotion(0.0, amr.T_odom_base, np.array(velocity_mps), yaw_rate_radps)
+        for spec in DIAGONAL_SCANNERS:
+            scanner = SimulatedScanner(scene, spec, np.random.default_rng(0))
+            scan = scanner.scan(motion)
+            assert (scanner.hit_by == -1).all()
+            assert not scan.too_near.any()
+        # A scanner within the body sees it as if it stood still.
+        within = CENTRE.model_copy(update={"x_m": 0.3})
+        standing, moving = (
+            SimulatedScanner(scene, within, np.random.default_rng(0)).scan(each).ranges_m
+            for each in (RobotMotion(0.0, amr.T_odom_base), motion)
+        )
+        np.testing.assert_allclose(moving, standing)
+
+
 def test_a_moving_robot_sees_a_straight_wall_once_its_motion_is_corrected() -> None:
     wall = Thing(box((4.0, 0.0, 0.5), (2.0, 8.0, 1.0)))
     motion = RobotMotion(3.0, np.eye(4), np.array([1.4, 0.0]), 0.8)
