@@ -81,6 +81,7 @@ class CarriedBoxes:
         self, detectors: Sequence[PersonDetector], every_s: float, min_score: float
     ) -> None:
         self._detectors = tuple(detectors)
+        self._first_every_s = every_s
         self.every_s, self.size = every_s, 0
         self._min_score = min_score
         self._changes = SceneChanges()
@@ -90,6 +91,10 @@ class CarriedBoxes:
         self._looked_s = self._stamp_s = -np.inf
         self._gap_s = np.inf
         self._carrying = False
+
+    def unused(self) -> CarriedBoxes:
+        """Return carried boxes of the same detectors that have seen no image yet."""
+        return CarriedBoxes(self._detectors, self._first_every_s, self._min_score)
 
     def detections(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonDetection, ...]:
         """Return the boxes of the people in an image: carried, or detected."""

@@ -118,6 +118,10 @@ class FrameBudget:
         """Pixels of the input in use, as a share of the whole one."""
         return self._shares[self.size]
 
+    def unused(self) -> FrameBudget:
+        """Return the same budget before its first frame."""
+        return FrameBudget(self._budget_s, self._shares)
+
     def mean_s(self, level: int) -> float:
         """Return the mean time of a frame with a choice: intervals first, then smaller inputs."""
         every_s, size = self._levels[level]

@@ -94,8 +94,9 @@ def metric_scales(
     return _metric_scales(tuple(people), min_score)
 
 
-# Head poses and positions of a frame need the scales of the same people, so they are cached.
-@lru_cache(maxsize=1)
+# Head poses and positions of a frame need the scales of the same people, so they are cached, for as
+# many cameras as work side by side.
+@lru_cache(maxsize=8)
 def _metric_scales(
     people: tuple[PersonKeypoints, ...], min_score: float
 ) -> tuple[MetricScale | None, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -74,6 +75,15 @@ class PeopleFinder:
             self._carrier = CarriedBoxes((detector, *(d for d, _ in smaller)), 0.0, min_score)
         elif detect_every_s > 0.0:
             self._carrier = CarriedBoxes((detector,), detect_every_s, min_score)
+
+    def for_another_view(self) -> PeopleFinder:
+        """Return a finder with the same networks and settings that has seen no image yet."""
+        other = copy.copy(self)
+        if self._carrier is not None:
+            other._carrier = self._carrier.unused()
+        if self._budget is not None:
+            other._budget = self._budget.unused()
+        return other
 
     def find(self, image_rgb: ImageRgb, stamp_s: float, clock: StageClock) -> FoundPeople:
         """Return the people of an image; the clock counts detector and pose."""

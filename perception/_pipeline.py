@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from typing import Any, Final
@@ -152,6 +153,18 @@ class AwarenessPipeline:
             )
         self._eye_estimator = eye_estimator
         self._timings = StageTimings()
+
+    def for_another_view(self) -> AwarenessPipeline:
+        """Return a pipeline with the same camera, networks and settings that has seen no image.
+
+        With ``detect_every_s`` or ``frame_budget_s``, a pipeline keeps people from one image to the
+        next. Each of several cameras, or views of one, therefore needs its own; this one shares
+        the networks.
+        """
+        other = copy.copy(self)
+        other._people = self._people.for_another_view()
+        other._timings = StageTimings()
+        return other
 
     @property
     def last_timings(self) -> StageTimings:

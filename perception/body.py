@@ -118,8 +118,9 @@ def place_bodies(
     return _place_bodies(camera, tuple(people), keypoint_std_px, min_score)
 
 
-# Head pose and position of a frame's only person need the same placement, so it is cached.
-@lru_cache(maxsize=1)
+# Head poses and positions of a frame need the same placements, so they are cached, for as many
+# cameras as work side by side.
+@lru_cache(maxsize=8)
 def _place_bodies(
     camera: Camera, people: tuple[PersonKeypoints, ...], keypoint_std_px: float, min_score: float
 ) -> tuple[BodyPlacement | None, ...]:

@@ -22,8 +22,9 @@ from perception import (
     PersonObservation,
     PoseEstimator,
 )
-from perception.arrays import FloatArray
+from perception.arrays import FloatArray, ImageRgb
 from perception.errors import DepthImageError
+from perception.no_view import NoView, why_no_view
 from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
@@ -112,6 +113,7 @@ class FrameEstimate:
         tracks: all tracks; None without a tracker.
         track_ids: of each observation, the id of its track; None without a tracker.
         unfit: roles of the networks that have seen renders only, unless the image is one.
+        no_view: why the image shows nothing; None if it does. The tracks are then those without it.
     """
 
     frame: SourceFrame
@@ -122,6 +124,7 @@ class FrameEstimate:
     tracks: tuple[PersonTrack, ...] | None
     track_ids: tuple[int | None, ...]
     unfit: tuple[str, ...] = ()
+    no_view: NoView | None = None
 
 
 class PeopleEstimator:
@@ -155,6 +158,7 @@ class PeopleEstimator:
         self._pipelines: dict[Camera, AwarenessPipeline] = {}
         self._track, self._unfit, self._depth = track, unfit, depth
         self._tracker: PersonTracker | None = None
+        self._before: ImageRgb | None = None
 
     def estimate(self, frame: SourceFrame) -> FrameEstimate:
         """Estimate the people in a frame that has an image.
@@ -170,6 +174,8 @@ class PeopleEstimator:
         camera = self._cameras.of_size(width, height)
         pose = self._fixed_pose if frame.T_odom_camera is None else frame.T_odom_camera
         self._pose_estimator.forget()
+        no_view = why_no_view(frame.image_rgb, self._before)
+        self._before = frame.image_rgb
         observations = self._process(camera, frame)
         tracks: tuple[PersonTrack, ...] | None = None
         track_ids: tuple[int | None, ...] = (None,) * len(observations)
@@ -179,7 +185,12 @@ class PeopleEstimator:
                 # An assumed field of view would drop or keep people wrongly.
                 view = CameraView(camera) if self._cameras.known else None
                 self._tracker = PersonTracker(_OF_RECORDINGS, view=view)
-            tracks = self._tracker.update(observations, frame.stamp_s, pose)
+            if no_view is None:
+                tracks = self._tracker.update(observations, frame.stamp_s, pose)
+            else:
+                last_s = self._tracker.last_stamp_s
+                now_s = frame.stamp_s if last_s is None else max(frame.stamp_s, last_s)
+                tracks = self._tracker.predict(now_s)
             track_ids = ids_of_tracks(observations, tracks, pose)
         return FrameEstimate(
             frame,
@@ -190,6 +201,7 @@ class PeopleEstimator:
             tracks,
             track_ids,
             self._unfit,
+            no_view,
         )
 
     def _keypoints_of(self, observation: PersonObservation) -> PersonKeypoints | None:

@@ -51,6 +51,8 @@ def estimate_record(estimate: FrameEstimate, settings: str) -> Record:
     }
     if estimate.unfit:
         record["simulator_networks"] = list(estimate.unfit)
+    if estimate.no_view is not None:
+        record["no_view"] = estimate.no_view
     if estimate.tracks is not None:
         record["tracks"] = [track_record(track) for track in estimate.tracks]
     return record

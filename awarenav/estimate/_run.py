@@ -6,6 +6,7 @@ import contextlib
 import math
 import sys
 import time
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -85,6 +86,7 @@ class EstimateSummary:
         frames: number of frames that were estimated.
         people: number of observations in them.
         without_evidence: number of these observations without an α.
+        no_view: number of frames that show nothing, by the reason.
         problems: of frames that could not be read or estimated.
         duration_s: of the run.
     """
@@ -92,6 +94,7 @@ class EstimateSummary:
     frames: int = 0
     people: int = 0
     without_evidence: int = 0
+    no_view: Counter[str] = field(default_factory=Counter)
     problems: list[str] = field(default_factory=list)
     duration_s: float = 0.0
 
@@ -100,6 +103,8 @@ class EstimateSummary:
         self.frames += 1
         self.people += len(estimate.observations)
         self.without_evidence += sum(each.awareness is None for each in estimate.observations)
+        if estimate.no_view is not None:
+            self.no_view[estimate.no_view] += 1
 
 
 def estimate_command(options: EstimateOptions, networks: Networks | None = None) -> int:
@@ -313,6 +318,8 @@ def _report(options: EstimateOptions, summary: EstimateSummary) -> None:
         f"second), {counted(summary.people, 'observation')} of people, {summary.without_evidence} "
         "of them without evidence of awareness"
     )
+    for reason, count in summary.no_view.items():
+        _log(f"no view in {count} of {counted(summary.frames, 'frame')}: {reason}")
     if summary.problems:
         _log(f"{counted(len(summary.problems), 'frame')} could not be read or estimated")
 

@@ -80,6 +80,9 @@ def read_recording(path: Path) -> Recording:
     fixed = all(record["T_odom_camera"] is None for record in records)
     frames = []
     for record in records:
+        if record.get("no_view") is not None:
+            counts["no view"] += 1
+            continue
         if record["T_odom_camera"] is None and not fixed:
             counts["no pose"] += 1
             continue
@@ -180,11 +183,12 @@ def _remarks(counts: Counter[str]) -> list[str]:
         "incomplete": "the last line is incomplete and is left out",
         "fixed camera": "no frame has a T_odom_camera: the camera is assumed to be fixed, and odom "
         "is on the floor under it",
+        "no view": "{} left out whose picture shows nothing (no_view)",
         "no pose": "{} without T_odom_camera left out, since other frames have one",
         "no position": "{} without position_camera_m left out",
         "no std": "{} with an awareness but no awareness_std: it counts as no evidence",
     }
-    nouns = {"no pose": "frame"}
+    nouns = {"no pose": "frame", "no view": "frame"}
     return [
         sentence.format(counted(counts[key], nouns.get(key, "observation")))
         for key, sentence in sentences.items()

@@ -1,4 +1,4 @@
-"""Drivers of a robot on DDS: a camera that sends one rendered image, and odometry."""
+"""Drivers of a robot on DDS: a camera that sends a rendered image, and odometry."""
 
 from __future__ import annotations
 
@@ -56,9 +56,16 @@ class RobotDrivers:
         for topic in PUBLISHED.values():
             self.node.subscribe(topic)
         self.people = len(frame["people"])
-        self._pixels = cv2.imread(str(folder / frame["frame"]))
-        self._jpeg = cv2.imencode(".jpg", self._pixels)[1].tobytes() if compressed else b""
-        self._bytes = self._pixels.tobytes()
+        pixels = cv2.imread(str(folder / frame["frame"]))
+        self._shape = pixels.shape
+        # Two pictures in turn, as the one before again is no view.
+        self._pictures: list[bytes] = []
+        for corner in (0, 255):
+            pixels[:8, :8] = corner
+            self._pictures.append(
+                cv2.imencode(".jpg", pixels)[1].tobytes() if compressed else pixels.tobytes()
+            )
+        self._compressed = compressed
         self._camera = Camera.from_yaml(folder / "camera.yaml")
         self._T_base_camera = np.array(frame["T_odom_camera"])
         self._odometry_due_s = 0.0
@@ -82,13 +89,13 @@ class RobotDrivers:
     def send_image(self) -> None:
         """Send odometry, then the image."""
         self.send_odometry()
-        if self._jpeg:
-            message: Image | CompressedImage = CompressedImage(
-                _header("camera"), "jpeg", self._jpeg
-            )
+        self._pictures.reverse()
+        data = self._pictures[0]
+        if self._compressed:
+            message: Image | CompressedImage = CompressedImage(_header("camera"), "jpeg", data)
         else:
-            height, width, _ = self._pixels.shape
-            message = Image(_header("camera"), height, width, "bgr8", 0, 3 * width, self._bytes)
+            height, width, _ = self._shape
+            message = Image(_header("camera"), height, width, "bgr8", 0, 3 * width, data)
         self.node.publish_cdr(self._image, encode(message))
 
     def send_odometry(self) -> None:

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
 from perception.errors import DepthImageError
+from perception.no_view import FROZEN, why_no_view
 from tracking import PersonTrack
 
+from .._errors import NavError
 from ._depth_reader import StampedDepth
 from ._images import camera_of, picture_of
 from ._shared_tracker import SharedTracker
@@ -69,6 +71,7 @@ class ImagePerception:
         self._make_pipeline, self._tracker = make_pipeline, tracker
         self._busy = threading.Lock()
         self._camera: Camera | None = None
+        self._before: NDArray[np.uint8] | None = None
         if camera is not None:
             self._start(camera)
 
@@ -100,10 +103,12 @@ class ImagePerception:
         A depth image that does not fit is left out, and the frame says why.
 
         Raises:
-            NavError, PerceptionError, TrackingError: for an image that cannot be used.
+            NavError, PerceptionError, TrackingError: for an image that cannot be used, or shows
+                nothing (:func:`~perception.no_view.why_no_view`).
         """
         with self._busy:
             image = picture_of(message)
+            self._require_view(image)
             floor, problem = _floor(T_odom_camera), ""
             try:
                 given = {} if depth is None else _given(depth)
@@ -115,6 +120,19 @@ class ImagePerception:
         if tracks is None:
             return None
         return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera, depth, problem)
+
+    def _require_view(self, image: NDArray[np.uint8]) -> None:
+        """Refuse a picture that shows nothing: the camera then counts as silent.
+
+        The pipeline refuses one of another size than the camera's.
+        """
+        reason = why_no_view(image, self._before)
+        self._before = image
+        assert self._camera is not None
+        if reason is None or image.shape[:2] != (self._camera.height_px, self._camera.width_px):
+            return
+        hint = " (frozen? a simulated camera needs noise)" if reason == FROZEN else ""
+        raise NavError(f"the picture is no view: it is {reason}{hint}")
 
     def _start(self, camera: Camera) -> None:
         self._pipeline = self._make_pipeline(camera)

@@ -26,7 +26,8 @@ class SurroundPipeline:
         lens: lens of the camera.
         views: flat views to cut from an image, for example from :func:`ring_of_views`.
         make_pipeline: makes the pipeline for the camera of a view; default one with the shipped
-            networks. Views with the same camera object share a pipeline.
+            networks. It is called once for each camera object; the views with that camera share its
+            networks.
 
     Raises:
         PerceptionError: without views, or from ``make_pipeline``.
@@ -43,10 +44,15 @@ class SurroundPipeline:
         self.lens = lens
         self.views = tuple(views)
         made: dict[int, AwarenessPipeline] = {}
+        self._pipelines: list[AwarenessPipeline] = []
         for view in self.views:
             if id(view.camera) not in made:
                 made[id(view.camera)] = make_pipeline(view.camera)
-        self._pipelines = [made[id(view.camera)] for view in self.views]
+            pipeline = made[id(view.camera)]
+            # A pipeline keeps people from one image of its view to the next.
+            if any(pipeline is other for other in self._pipelines):
+                pipeline = pipeline.for_another_view()
+            self._pipelines.append(pipeline)
         self._maps = [
             # Fixed-point maps make cv2.remap several times faster.
             cv2.convertMaps(*view.sampling_maps(lens), cv2.CV_16SC2)

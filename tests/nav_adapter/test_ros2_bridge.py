@@ -72,9 +72,11 @@ def odometry(stamp_s: float, x: float = 0.0, yaw: float = 0.0, speed: float = 0.
     )
 
 
-def image(stamp_s: float) -> Image:
+def image(stamp_s: float, data: bytes | None = None) -> Image:
+    """Return a picture of noise, another one for each stamp, or one of the bytes given."""
     header = Header(to_time(stamp_s), "camera")
-    return Image(header, 48, 64, "rgb8", 0, 192, bytes(48 * 192))
+    noise = np.random.default_rng(round(1e6 * stamp_s)).bytes(48 * 192)
+    return Image(header, 48, 64, "rgb8", 0, 192, noise if data is None else data)
 
 
 class Listener:

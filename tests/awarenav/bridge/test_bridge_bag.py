@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cv2
@@ -54,7 +55,7 @@ def messages(*, camera: bool = False, depth: bool = False):
             header = Header(to_time(now), "camera")
             k = (50.0, 0.0, 32.0, 0.0, 50.0, 24.0, 0.0, 0.0, 1.0)
             yield "/camera/camera_info", now, CameraInfo(header, 48, 64, k=k)
-            picture = Image(header, 48, 64, "rgb8", 0, 192, bytes(48 * 192))
+            picture = Image(header, 48, 64, "rgb8", 0, 192, os.urandom(48 * 192))
             yield "/camera/image_raw", now + 0.01, picture
         if depth:  # it comes after its picture; the one before is near enough in time
             far = np.full((48, 64), 3000 if tick != 10 else 30, "<u2" if tick != 10 else "u1")

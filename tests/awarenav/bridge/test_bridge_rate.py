@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -48,7 +49,7 @@ def drive(node: DdsNode, seconds: float) -> Iterator[tuple[float, str, bytes]]:
         now = time.time()
         node.publish(READ["odom"], odometry(now))
         header = stamped(now, "camera")
-        node.publish(READ["image"], Image(header, 48, 64, "rgb8", 0, 192, bytes(48 * 192)))
+        node.publish(READ["image"], Image(header, 48, 64, "rgb8", 0, 192, os.urandom(48 * 192)))
         due += PERIOD_S
         while (left := due - time.monotonic()) > 0.0:
             node.wait(left)

@@ -1,4 +1,4 @@
-"""Images whose grey level is their number, and networks that place a person by that number."""
+"""Images whose mean grey level is their number, and networks that place a person by that number."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ _BODY_M = np.array(
 
 def numbered(number: int, size_px: tuple[int, int] = (WIDTH, HEIGHT)) -> np.ndarray:
     """(H, W, 3) RGB image of a number from 0 to 29."""
-    return np.full((size_px[1], size_px[0], 3), 8 + _STEP * number, np.uint8)
+    image = np.full((size_px[1], size_px[0], 3), 8 + _STEP * number, np.uint8)
+    # One colour would be no view.
+    image[:, : size_px[0] // 2] -= _STEP // 2
+    image[:, size_px[0] // 2 :] += _STEP // 2
+    return image
 
 
 def number_of(image_rgb: np.ndarray) -> int:

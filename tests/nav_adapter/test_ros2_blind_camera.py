@@ -1,0 +1,102 @@
+"""A camera that sends pictures without a view counts as a silent one."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from test_ros2_bridge import image
+from two_sensor_scenes import FRONT, PERIOD_S, Attentive, Robot
+
+from nav_adapter.ros2.conversions import to_time
+from nav_adapter.ros2.messages.sensor_msgs import CompressedImage
+from nav_adapter.ros2.messages.std_msgs import Header
+
+HEIGHT, WIDTH = 48, 64
+START_S = 1000.0
+BLACK = bytes(HEIGHT * WIDTH * 3)
+GREY = bytes([118]) * len(BLACK)
+FROZEN = image(0.0).data
+
+
+def jpeg_of(data: bytes, stamp_s: float) -> CompressedImage:
+    picture = np.frombuffer(data, np.uint8).reshape(HEIGHT, WIDTH, 3)
+    coded = cv2.imencode(".jpg", picture)[1].tobytes()
+    return CompressedImage(Header(to_time(stamp_s), "camera"), "jpeg", coded)
+
+
+class BlindedRobot(Robot):
+    """A robot whose camera has a view until ``picture`` is set."""
+
+    picture: bytes | None = None
+    compressed = False
+
+    def step(self, now_s: float):
+        if self.picture is None:
+            return super().step(now_s)
+        self.silent.add("camera")
+        sent = image(now_s, self.picture)
+        if self.compressed:
+            sent = jpeg_of(self.picture, now_s)
+        self.used = self.bridge.on_image(sent, now_s)
+        return super().step(now_s)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize(
+    ("picture", "reason"),
+    [(BLACK, "black"), (GREY, "of one colour"), (FROZEN, "the same picture as before")],
+)
+def test_the_robot_stops_as_if_the_camera_were_silent(picture, reason, compressed) -> None:
+    robot, silent = (BlindedRobot(make_pipeline=lambda camera: Attentive()) for _ in range(2))
+    robot.compressed = compressed
+    assert robot.drive(START_S, 1.0)[-1].speed_limit_mps > 0.3
+    # The first of the frozen pictures is a view.
+    silent.drive(START_S, 1.0 + PERIOD_S * (picture is FROZEN))
+    frames = silent.bridge.counts["frames"]
+    robot.picture = picture
+    silent.silent.add("camera")
+    blind = robot.drive(START_S + 1.0, 2.0)
+    unseen = silent.drive(START_S + 1.0 + PERIOD_S * (picture is FROZEN), 2.0)
+    for one, other in zip(blind[picture is FROZEN :], unseen, strict=False):
+        assert one.speed_limit_mps == pytest.approx(other.speed_limit_mps)
+    assert blind[-1].speed_limit_mps == 0.0
+    assert robot.warnings == [warning for warning in robot.warnings if reason in warning] != []
+    assert robot.bridge.counts["frames"] == frames
+
+
+def test_the_camera_is_back_with_its_first_view() -> None:
+    robot = BlindedRobot(make_pipeline=lambda camera: Attentive())
+    robot.drive(START_S, 1.0)
+    robot.picture = BLACK
+    robot.drive(START_S + 1.0, 1.5)
+    robot.picture = None
+    robot.silent.clear()
+    assert robot.drive(START_S + 2.5, 2.0)[-1].speed_limit_mps > 0.3
+
+
+def test_one_picture_that_is_sent_twice_costs_nothing() -> None:
+    limits = []
+    for twice in (False, True):
+        robot = BlindedRobot(make_pipeline=lambda camera: Attentive())
+        robot.drive(START_S, 1.0)
+        if twice:
+            robot.picture = image(START_S + 1.0 - PERIOD_S).data
+            robot.step(START_S + 1.0)
+            assert not robot.used
+            robot.picture = None
+            robot.silent.clear()
+        limits.append(robot.drive(START_S + 1.0 + PERIOD_S, 1.0)[-1].speed_limit_mps)
+    assert limits[1] == pytest.approx(limits[0], abs=0.05)
+
+
+def test_beside_scanners_a_black_camera_makes_everybody_unaware() -> None:
+    robot = BlindedRobot(FRONT, people=[(3.2, -0.2)], make_pipeline=lambda camera: Attentive())
+    robot.drive(START_S, 2.0)
+    robot.picture = BLACK
+    blind = robot.drive(START_S + 2.0, 2.0)[-1]
+    assert max(each.awareness_lower for each in blind.obstacles) == 0.0
+    assert any("camera has been silent" in warning for warning in robot.warnings)
