@@ -106,8 +106,11 @@ class Sensing:
                 camera_rng,
                 pipeline,
                 injection.T_camera_assumed,
+                injection.picture,
             )
-            self._camera = injection.eyes(TimedEyes(eyes, timing, timing_rng), model)
+            self._camera = injection.eyes(
+                TimedEyes(eyes, timing, timing_rng), model, pictures=perception.kind == "pixels"
+            )
         self._odometry = injection.odometry()
         self._scanners: ScannerEyes | None = None
         if perception.has_scanners:

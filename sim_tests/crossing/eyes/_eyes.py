@@ -27,8 +27,10 @@ class Eyes(Protocol):
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> WorkerObservations:
-        """Return the observations of people in the image taken now.
+    ) -> WorkerObservations | None:
+        """Return the observations of people in the image taken now; None if it shows nothing.
+
+        An image that shows nothing is no view of nobody. It does not arrive at the tracker.
 
         Args:
             stamp_s: time of the image.
@@ -52,9 +54,12 @@ class SurroundEyes:
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> WorkerObservations:
-        """Return the merged observations; only those of the first view keep their boxes."""
-        observed = [
+    ) -> WorkerObservations | None:
+        """Return the merged observations; only those of the first view keep their boxes.
+
+        The views are cut from one image, which shows nothing only if none of them does.
+        """
+        seen = [
             eyes.observe(
                 stamp_s,
                 T_odom_camera @ view.T_camera_view,
@@ -62,6 +67,9 @@ class SurroundEyes:
             )
             for view, eyes in zip(self._views, self._eyes, strict=True)
         ]
+        if all(each is None for each in seen):
+            return None
+        observed = [each or () for each in seen]
         merged = merge_views(self._views, [[each for each, _ in rows] for rows in observed])
         return tuple(
             (
@@ -112,6 +120,8 @@ class TimedEyes:
 
     def __init__(self, eyes: Eyes, timing: CameraTiming, rng: np.random.Generator) -> None:
         self._eyes = eyes
+        #: An image arrives at most this long after it was taken.
+        self.longest_delay_s = timing.latency_s + timing.latency_jitter_s
         self._clock = FrameClock(timing, rng)
         self._queue: FrameQueue[Sighting] = FrameQueue()
 
@@ -122,5 +132,6 @@ class TimedEyes:
         due, delivery_s = self._clock.tick(now_s)
         if due and delivery_s is not None:
             observations = self._eyes.observe(now_s, T_odom_camera, truth)
-            self._queue.put(now_s, delivery_s, Sighting(now_s, T_odom_camera, observations))
+            if observations is not None:
+                self._queue.put(now_s, delivery_s, Sighting(now_s, T_odom_camera, observations))
         return self._queue.take(now_s)

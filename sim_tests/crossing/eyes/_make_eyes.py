@@ -23,7 +23,7 @@ from ._eyes import Eyes, SurroundEyes
 from ._keypoint_camera import KeypointNoise
 from ._keypoint_eyes import KeypointEyes
 from ._map_view import MapView
-from ._pixel_eyes import PixelEyes
+from ._pixel_eyes import PictureChange, PixelEyes
 from ._sensors import ORACLE, PerceptionKind
 from ._true_eyes import TrueEyes
 
@@ -40,6 +40,7 @@ def make_eyes(
     rng: np.random.Generator,
     pipeline: AwarenessPipeline | None = None,
     T_camera_assumed: FloatArray | None = None,
+    change: PictureChange | None = None,
 ) -> Eyes:
     """Return the eyes of a perception.
 
@@ -52,6 +53,7 @@ def make_eyes(
         rng: random generator of the noise.
         pipeline: pipeline for pixels; None for the shipped networks.
         T_camera_assumed: see :class:`PixelEyes`.
+        change: a fault of the pictures, for pixels; None for none.
 
     Raises:
         SimError: for another kind.
@@ -69,7 +71,7 @@ def make_eyes(
             KeypointEyes(stage, camera, cone, noise, rng, sight, unusual) for _ in views
         ]
     elif kind == "pixels":
-        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed)
+        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed, change)
     else:
         valid = ", ".join(map(repr, get_args(PerceptionKind)))
         raise SimError(f"perception must be one of {valid}, got {kind!r}")
@@ -131,6 +133,7 @@ def _pixel_eyes(
     rng: np.random.Generator,
     pipeline: AwarenessPipeline | None,
     T_camera_assumed: FloatArray | None,
+    change: PictureChange | None,
 ) -> list[Eyes]:
     """Return the eyes of every view; they share networks and renderer."""
     spec, camera = stage.scenario.camera, views[0].camera
@@ -148,6 +151,7 @@ def _pixel_eyes(
             None
             if T_camera_assumed is None
             else view.T_camera_view.T @ T_camera_assumed @ view.T_camera_view,
+            change,
         )
         for view, view_rng in zip(
             views, [rng] if len(views) == 1 else rng.spawn(len(views)), strict=True
