@@ -28,6 +28,7 @@ from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
 from ._seated import SeatedPeople
+from ._sight import ScannerSight, sight_of
 from ._static_map import MapCells, StaticMap
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "RobotMotion",
     "ScanPoints",
     "Scanner",
+    "ScannerSight",
     "SeatedPeople",
     "StaticMap",
     "clusters_of",
@@ -54,4 +56,5 @@ __all__ = [
     "merge_candidates",
     "observations_of",
     "scan_points",
+    "sight_of",
 ]

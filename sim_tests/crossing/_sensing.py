@@ -155,8 +155,11 @@ class Sensing:
                 sighting.stamp_s,
                 sighting.T_odom_camera,
                 sensor=sighting.sensor,
+                view=sighting.view,
             )
-            if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
+            if sighting.sees_ahead and sighting.stamp_s > self._newest_s.get(
+                sighting.sensor, -_NEVER_S
+            ):
                 self._newest_s[sighting.sensor] = sighting.stamp_s
                 if sighting.points_odom_m is None:
                     observed = sighting.observations
