@@ -22,8 +22,6 @@ _WITHIN_RAD: Final = math.radians(15.0)
 # "Nothing there" (+inf) counts as an answer while this share of the rays meets something: a scanner
 # that measures nothing at all may publish it as well.
 _ALIVE_SHARE: Final = 0.05
-# A ray on which a point at this distance lies on the robot's body looks across the body.
-_ACROSS_M: Final = 0.2
 _FULL_TURN_RAD: Final = 2.0 * math.pi
 
 
@@ -39,8 +37,8 @@ class ScannerSight:
         scan: the scan.
         scanner: its mounting.
         seen: (N,) True for rays in the field of view around which at most half have no answer.
-        blind: (N,) True for the other rays in the field of view, but for those that the robot's own
-            body hides.
+        blind: (N,) True for the other rays in the field of view, but for those that end on the
+            robot's own body, farther away than a cover.
     """
 
     scan: LaserScan
@@ -138,13 +136,7 @@ def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None
         points = scan_points(scan, scanner, RobotMotion(scan.stamp_s, np.eye(4)))
     covered = scanner.sees(scan)
     answered = points.usable & (scan.ranges_m >= COVER_M)
-    own = np.zeros_like(covered)
-    rows = np.flatnonzero(covered & ~answered & (scan.ranges_m != np.inf))
-    if len(rows) and scanner.body_base_m is not None:
-        angles = scan.angles_rad[rows]
-        rays = _ACROSS_M * np.stack((np.cos(angles), np.sin(angles)))
-        T = scanner.T_base_scanner
-        own[rows] = scanner.is_body((T[:2, :2] @ rays).T + T[:2, 3])
+    own = covered & scan.measured & ~points.usable & (scan.ranges_m >= COVER_M)
     if np.count_nonzero(answered) >= _ALIVE_SHARE * np.count_nonzero(covered & ~own):
         answered |= covered & (scan.ranges_m == np.inf)
     dead = covered & ~answered
