@@ -10,15 +10,13 @@ import numpy as np
 
 from perception import Camera
 from perception.arrays import FloatArray
-from perception.laser import ScannerSight
+from perception.laser import ScannerSight, SeenDirections
 
 CAMERA: Final = "camera"
 #: The camera's depth images, without which it goes on.
 DEPTH: Final = "depth images"
 # Without a camera, scanners must see this far to either side of straight ahead.
 _AHEAD_RAD: Final = math.radians(60.0)
-# Bearings in the base frame for which it is known when each scanner last saw them.
-_BEARINGS_RAD: Final = np.radians(np.arange(360.0))
 # A camera whose axis is steeper than this looks everywhere.
 _STEEP: Final = 0.2
 
@@ -51,7 +49,7 @@ class SensorWatch:
         self._with_camera = with_camera
         self._needed_rad = (0.0, _AHEAD_RAD)
         self._stamps_s: dict[str, float] = {}
-        self._seen_s: dict[str, FloatArray] = {}
+        self._seen = SeenDirections()
         # Since when a scanner has been blind, and its sectors in words.
         self._blind: dict[str, tuple[float, str]] = {}
         self._reported: dict[str, str] = {}
@@ -76,9 +74,7 @@ class SensorWatch:
         if sight.nothing:
             return
         self._stamps_s[name] = max(stamp_s, self._stamps_s.get(name, -math.inf))
-        before = self._seen_s.get(name, np.full(len(_BEARINGS_RAD), -math.inf))
-        seen = np.where(sight.sees(_BEARINGS_RAD), stamp_s, -math.inf)
-        self._seen_s[name] = np.maximum(before, seen)
+        self._seen.note(sight, stamp_s)
 
     @property
     def stamp_s(self) -> float | None:
@@ -87,7 +83,7 @@ class SensorWatch:
         Without a camera the field is 60° to either side of straight ahead. None if nothing has seen
         the field.
         """
-        stamps = [self._scanners_stamp_s()]
+        stamps = [self._seen.stamp_s(*self._needed_rad)]
         if self._with_camera:
             stamps.append(self._stamps_s.get(CAMERA))
         return max((each for each in stamps if each is not None), default=None)
@@ -147,8 +143,10 @@ class SensorWatch:
 
     def forget(self) -> None:
         """Forget all stamps."""
-        for each in (self._stamps_s, self._seen_s, self._blind, self._reported):
-            each.clear()
+        self._stamps_s.clear()
+        self._blind.clear()
+        self._reported.clear()
+        self._seen = SeenDirections()
 
     def _consequence(self, lost: set[str], now_s: float) -> str:
         left = [name for name in self._names if name not in lost and name != DEPTH]
@@ -161,16 +159,6 @@ class SensorWatch:
         if DEPTH in lost:
             return f"{goes_on}, and distances are less sure"
         return goes_on
-
-    def _scanners_stamp_s(self) -> float | None:
-        """Return the time from which scanners have seen all of the needed field."""
-        if not self._seen_s:
-            return None
-        middle, half = self._needed_rad
-        off = np.abs(np.remainder(_BEARINGS_RAD - middle + math.pi, 2.0 * math.pi) - math.pi)
-        seen_s = np.max(list(self._seen_s.values()), axis=0)
-        oldest_s = float(seen_s[off <= max(half, float(off.min())) + 1e-9].min())
-        return oldest_s if math.isfinite(oldest_s) else None
 
 
 def _field_of(camera: Camera, T_base_camera: FloatArray) -> tuple[float, float]:

@@ -28,7 +28,7 @@ from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
 from ._seated import SeatedPeople
-from ._sight import ScannerSight, sight_of
+from ._sight import ScannerSight, SeenDirections, sight_of
 from ._static_map import MapCells, StaticMap
 
 __all__ = [
@@ -50,6 +50,7 @@ __all__ = [
     "Scanner",
     "ScannerSight",
     "SeatedPeople",
+    "SeenDirections",
     "StaticMap",
     "clusters_of",
     "hypotheses_of",

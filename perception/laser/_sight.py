@@ -22,6 +22,8 @@ _WITHIN_RAD: Final = math.radians(15.0)
 # "Nothing there" (+inf) counts as an answer while this share of the rays meets something: a scanner
 # that measures nothing at all may publish it as well.
 _ALIVE_SHARE: Final = 0.05
+# Directions in the base frame for which it is known when they were last seen.
+_BEARINGS_RAD: Final = np.radians(np.arange(360.0))
 _FULL_TURN_RAD: Final = 2.0 * math.pi
 
 
@@ -53,14 +55,6 @@ class ScannerSight:
 
     def sees(self, bearings_base_rad: FloatArray) -> NDArray[np.bool_]:
         """Return (K,) whether the scan shows what is in directions (K,) of the base frame."""
-        return self._at(bearings_base_rad, self.seen)
-
-    def is_blind(self, bearings_base_rad: FloatArray) -> NDArray[np.bool_]:
-        """Return (K,) whether directions (K,) of the base frame lie in a blind sector."""
-        return self._at(bearings_base_rad, self.blind)
-
-    def _at(self, bearings_base_rad: FloatArray, flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return (K,) the flags of the nearest rays; False for directions without one."""
         ahead = np.stack((np.cos(bearings_base_rad), np.sin(bearings_base_rad)))
         x, y = self.scanner.T_base_scanner[:2, :2].T @ ahead
         step, middle = self.scan.angle_increment_rad, 0.5 * (len(self.scan) - 1)
@@ -68,7 +62,7 @@ class ScannerSight:
         # The number of the nearest ray, from -0.5 to half a ray after the last.
         ray = middle + (np.remainder(off + math.pi, _FULL_TURN_RAD) - math.pi) / step
         near = np.clip(np.rint(ray).astype(np.int64), 0, len(self.scan) - 1)
-        return np.asarray(flags[near] & (np.abs(ray - near) <= 0.5 + 1e-6))
+        return np.asarray(self.seen[near] & (np.abs(ray - near) <= 0.5 + 1e-6))
 
     @property
     def blind_sectors_base_rad(self) -> tuple[tuple[float, float], ...]:
@@ -122,6 +116,33 @@ class ScannerSight:
         if np.mean((ranges >= self.scan.range_min_m) & (ranges < COVER_M)) > 0.5:
             return f"its rays end within {COVER_M:.2f} m, as under a cover"
         return "most of its rays have no answer"
+
+
+class SeenDirections:
+    """The time at which the scanners of a robot last saw what is in each direction.
+
+    A scanner that is blind has not seen what is there, as if it were silent.
+    """
+
+    def __init__(self) -> None:
+        self._seen_s = np.full(len(_BEARINGS_RAD), -math.inf)
+
+    def note(self, sight: ScannerSight, stamp_s: float) -> None:
+        """Note a scan of any scanner."""
+        seen_s = np.where(sight.sees(_BEARINGS_RAD), stamp_s, -math.inf)
+        self._seen_s = np.maximum(self._seen_s, seen_s)
+
+    def stamp_s(self, middle_rad: float, half_rad: float) -> float | None:
+        """Return the time from which all of a sector is; None if not all of it has been seen.
+
+        Args:
+            middle_rad: bearing of its middle in the base frame.
+            half_rad: angle from there to either side.
+        """
+        off = np.remainder(_BEARINGS_RAD - middle_rad + math.pi, _FULL_TURN_RAD) - math.pi
+        inside = np.abs(off) <= max(half_rad, float(np.abs(off).min())) + 1e-9
+        oldest_s = float(self._seen_s[inside].min())
+        return oldest_s if math.isfinite(oldest_s) else None
 
 
 def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None) -> ScannerSight:

@@ -10,6 +10,7 @@ import numpy as np
 
 from perception import PersonObservation
 from perception.arrays import FloatArray
+from perception.laser import ScannerSight
 from perception.surround import FlatView, merge_views
 from tracking import View
 
@@ -94,7 +95,7 @@ class Sighting:
         sensor: the tracker's name of the sensor.
         points_odom_m: (N, 2) points of a scan; None for an image.
         view: where a scan could have shown people; None for an image.
-        sees_ahead: False for a scan whose scanner is blind ahead.
+        sight: where a scan shows what is there; None for an image.
     """
 
     stamp_s: float
@@ -103,7 +104,7 @@ class Sighting:
     sensor: str = "camera"
     points_odom_m: FloatArray | None = None
     view: View | None = None
-    sees_ahead: bool = True
+    sight: ScannerSight | None = None
 
 
 class TimedEyes:

@@ -38,8 +38,6 @@ _STREAM: Final = 0x5CA7
 # People farther away are not recognised in scans.
 _RANGE_M: Final = 8.0
 _MAP_RESOLUTION_M: Final = 0.05
-# As the bridge on a robot without a camera, which must see this far to either side of ahead.
-_AHEAD_RAD: Final = np.radians(np.arange(-60.0, 61.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +139,7 @@ class ScannerEyes:
             sensor=sensor_name(taken.number),
             points_odom_m=points.points_odom_m[points.usable, :2],
             view=replace(self._map_view, camera=replace(self._views[taken.number], points=points)),
-            sees_ahead=not sight.is_blind(_AHEAD_RAD).any(),
+            sight=sight,
         )
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, two_legs
 
-from perception.laser import LaserScan, Scanner, ScannerSight, sight_of
+from perception.laser import LaserScan, Scanner, ScannerSight, SeenDirections, sight_of
 
 STEP_RAD = math.radians(0.5)
 ANGLES_DEG = np.arange(-135.0, 135.25, 0.5)
@@ -38,7 +38,6 @@ def inside(low_deg: float, high_deg: float) -> np.ndarray:
 def test_a_scanner_without_any_answer_shows_nothing(value: float) -> None:
     sight = seen(value)
     assert sight.nothing
-    assert sight.is_blind(AHEAD_RAD).all()
     assert not sight.sees(AHEAD_RAD).any()
     assert sight.blind_text.startswith("blind (")
 
@@ -60,7 +59,6 @@ def test_a_sector_without_answers_is_blind(value: float, low_deg: int, high_deg:
     assert (low, high) == pytest.approx((low_deg - 0.25, high_deg + 0.25))
     bearings = np.radians(np.arange(low_deg, high_deg + 1.0))
     assert not sight.sees(bearings).any()
-    assert sight.is_blind(bearings).all()
     assert sight.sees(np.radians([low_deg - 1.0, high_deg + 1.0])).all()
 
 
@@ -119,7 +117,7 @@ def test_a_sector_behind_a_scanner_that_sees_all_around_is_one() -> None:
     scan = LaserScan(0.0, -math.pi, STEP_RAD, ranges, 0.05, 20.0)
     sight = sight_of(scan, Scanner.mounted(0.0, 0.0, 0.2))
     assert sight.blind_text == "blind from 160° to -150°"
-    assert sight.is_blind(np.array([math.pi, -math.pi])).all()
+    assert sight.sees(np.array([math.pi, -math.pi, 0.0])).tolist() == [False, False, True]
 
 
 def test_people_and_walls_are_answers() -> None:
@@ -146,3 +144,17 @@ def test_no_ray_in_a_dead_sector_is_seen(
     far = ~inside(low_deg - 5.0, low_deg + width_deg + 5.0)
     if not sight.nothing and np.count_nonzero(far) > 60:
         assert sight.seen[far].mean() > 0.9
+
+
+def test_directions_are_as_old_as_the_last_scan_that_saw_them() -> None:
+    half = math.radians(60.0)
+    directions = SeenDirections()
+    assert directions.stamp_s(0.0, half) is None
+    directions.note(seen(5.0), 1.0)
+    directions.note(seen(between(-20.0, 10.0, math.nan)), 2.0)
+    assert directions.stamp_s(0.0, half) == 1.0
+    assert directions.stamp_s(math.radians(80.0), half) == 2.0
+    assert directions.stamp_s(math.pi, half) is None
+    # The other scanner looks there; a late scan makes nothing older.
+    directions.note(seen(5.0), 1.5)
+    assert directions.stamp_s(0.0, half) == 1.5
