@@ -50,7 +50,7 @@ class ScannerSight:
 
     @property
     def nothing(self) -> bool:
-        """Whether the scan shows nothing at all, as if it had not been published."""
+        """True if the scan shows nothing at all, as if it had not been published."""
         return not self.seen.any()
 
     def sees(self, bearings_base_rad: FloatArray) -> NDArray[np.bool_]:
