@@ -10,7 +10,9 @@ import numpy as np
 
 from perception import PersonObservation
 from perception.arrays import FloatArray
+from perception.laser import ScannerSight
 from perception.surround import FlatView, merge_views
+from tracking import View
 
 from ...world.camera import CameraTiming, FrameClock, FrameQueue
 from .._stage import TrueView
@@ -100,6 +102,8 @@ class Sighting:
         observations: observations of people, each with the index of its worker.
         sensor: the tracker's name of the sensor.
         points_odom_m: (N, 2) points of a scan; None for an image.
+        view: where a scan could have shown people; None for an image.
+        sight: where a scan shows what is there; None for an image.
     """
 
     stamp_s: float
@@ -107,6 +111,8 @@ class Sighting:
     observations: WorkerObservations
     sensor: str = "camera"
     points_odom_m: FloatArray | None = None
+    view: View | None = None
+    sight: ScannerSight | None = None
 
 
 class TimedEyes:
