@@ -177,3 +177,20 @@ def test_both_are_joined_and_kept_as_text(tmp_path):
     path.write_text("scanner: {blind: {returns: nothing}}")
     with pytest.raises(SimError, match="returns"):
         Fault.from_yaml(path)
+
+
+@pytest.mark.parametrize("form", NO_ANSWERS)
+def test_a_robot_with_blind_scanners_alone_stops(form):
+    """Whatever a driver writes for no answer: it is not a view of nobody."""
+    blind = BlindSector(width_deg=360.0, returns=form, after_s=2.0)
+    scenario = MET.model_copy(update={"duration_s": 5.5})
+    result = run_crossing(
+        scenario,
+        policy="balanced",
+        perception="scanner",
+        fault=Fault(name="blind", scanner=ScannerFault(blind=blind)),
+    )
+    assert max(frame.robot_state.speed_mps for frame in result.frames) > 0.5
+    late = [frame for frame in result.frames if frame.t_s > 3.6]
+    assert all(frame.constraints.speed_limit_mps == 0.0 for frame in late)
+    assert result.frames[-1].robot_state.travel_mps < 0.05
