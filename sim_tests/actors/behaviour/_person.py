@@ -178,19 +178,19 @@ class PersonOutcome:
         reaction: first reaction to the robot: ``"walk_on"``, ``"wait"``, ``"hurry"``,
             ``"pass_behind"`` or ``"claim"``; empty without an encounter.
         time_s: from the start to the end of the route; None if the end was not reached.
-        late_s: of somebody on the way: how much longer than alone they took to come so far, or
-            more. None before the start, at the end of the route, and without ``free_time_s``.
         free_time_s: the same without robot and other people, pauses included; None without a route
             or without an end of it.
         length_m: length of the path walked.
         free_length_m: the same without robot and other people; None as ``free_time_s``.
+        late_s: of somebody on the way: how much longer than alone they took to come so far, or
+            more. None before the start, at the end of the route, and without ``free_time_s``.
     """
 
     name: str
     noticed_s: float | None = None
     reaction: str = ""
     time_s: float | None = None
-    late_s: float | None = None
     free_time_s: float | None = None
     length_m: float = 0.0
     free_length_m: float | None = None
+    late_s: float | None = None
