@@ -9,6 +9,7 @@ scanner goes on. Your images and scans replace the scripts at the end.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,8 +21,10 @@ from perception.laser import (
     LegDetector,
     RobotMotion,
     Scanner,
+    SeenDirections,
     observations_of,
     scan_points,
+    sight_of,
 )
 from tracking import CameraView, PersonTracker, ScannerView, SensorConfig, TrackerConfig
 
@@ -33,6 +36,9 @@ T_BASE_CAMERA = np.array(
 )
 # A scanner on a corner of the robot sees 270°; returns on the robot's own body are dropped.
 SCANNER = Scanner.mounted(0.36, 0.25, 0.2, math.radians(45.0), body_base_m=FOOTPRINT_M)
+SCANNER_VIEW = ScannerView(field_rad=math.radians(270.0))
+# Half the field of the camera: while it is lost, scans must show all of that.
+AHEAD_RAD = math.radians(60.0)
 SPEED_MPS = 0.8
 PERIOD_S = 0.04
 CAMERA_FAILS_S = 6.0
@@ -54,30 +60,40 @@ class People:
         self.tracker = PersonTracker(
             TrackerConfig(awareness=policy.filter, standing_window_s=policy.standing_window_s),
             view=CameraView(CAMERA),
-            sensors={"laser": SensorConfig(view=ScannerView(field_rad=math.radians(270.0)))},
+            sensors={"laser": SensorConfig(view=SCANNER_VIEW)},
         )
         self.adapter = NavAdapter(policy, self.robot)
         self.tracks = self.tracker.predict(0.0)
+        self.imaged_s, self.scanned = -math.inf, SeenDirections()
 
     def see_image(
         self, people: tuple[PersonObservation, ...], stamp_s: float, T_odom_base: FloatArray
     ) -> None:
         """Take the people of an image: those of ``AwarenessPipeline(CAMERA).process``."""
         self.tracks = self.tracker.update(people, stamp_s, T_odom_base @ T_BASE_CAMERA)
+        self.imaged_s = stamp_s
 
     def see_scan(self, scan: LaserScan, motion: RobotMotion) -> None:
         """Find the people in a scan, and take them."""
         points = scan_points(scan, SCANNER, motion)
+        sight = sight_of(scan, SCANNER, points)
+        self.scanned.note(sight, points.stamp_s)
+        if sight.nothing:  # a scanner that is blind is as good as silent
+            print(f"{scan.stamp_s:4.1f} s  the scanner is {sight.blind_text}")
+            return
         T_odom_scanner = motion.pose_at(points.stamp_s) @ SCANNER.T_base_scanner
         people = observations_of(self.detector.detect(points), T_odom_scanner)
-        self.tracks = self.tracker.update(people, points.stamp_s, T_odom_scanner, sensor="laser")
+        # People are gone only from places that the rays of this scan have passed.
+        view = replace(SCANNER_VIEW, points=points)
+        self.tracks = self.tracker.update(
+            people, points.stamp_s, T_odom_scanner, sensor="laser", view=view
+        )
 
     def constraints(self, state: RobotState) -> NavConstraints:
         """Return the planner's input."""
-        # The scanner sees more than all of the camera's field, so the later of both counts.
-        return self.adapter.update(
-            self.tracks, state, state.stamp_s, perception_stamp_s=self.tracker.last_stamp_s
-        )
+        scanned_s = self.scanned.stamp_s(0.0, AHEAD_RAD)
+        seen_s = self.imaged_s if scanned_s is None else max(self.imaged_s, scanned_s)
+        return self.adapter.update(self.tracks, state, state.stamp_s, perception_stamp_s=seen_s)
 
 
 def main() -> None:

@@ -14,13 +14,14 @@ from ._errors import TrackingError
 from ._sensors import SensorConfig
 from ._track import PersonTrack, TrackStatus
 from ._tracker import PersonTracker
-from ._views import CameraView, ScannerView, SurroundView, View
+from ._views import CameraView, RangedView, ScannerView, SurroundView, View
 
 __all__ = [
     "AwarenessFilterConfig",
     "CameraView",
     "PersonTrack",
     "PersonTracker",
+    "RangedView",
     "ScannerView",
     "SensorConfig",
     "SurroundView",

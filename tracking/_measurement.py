@@ -14,6 +14,7 @@ from perception.arrays import FloatArray
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._table import BoolArray
+from ._views import View
 from .awareness_filter import evidence, trusted_std
 
 # Limits far beyond any place a robot drives; the squares of larger numbers may overflow.
@@ -60,12 +61,14 @@ class Frame:
         T_odom_camera: (4, 4) pose of the camera, or of the other sensor.
         measurements: of the people in the frame.
         sensor: index of the sensor, 0 for the camera.
+        view: of this frame alone; None for that of the sensor.
     """
 
     stamp_s: float
     T_odom_camera: FloatArray
     measurements: Measurements
     sensor: int = 0
+    view: View | None = None
 
 
 _NO_EVIDENCE = np.empty(0)

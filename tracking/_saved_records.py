@@ -35,6 +35,7 @@ class TracksRecord(StrictConfig):
     standing: list[bool]
     seen_stamps_s: list[list[float | None]]
     missed_s: list[list[float]]
+    passed_stamps_s: list[list[float | None]] | None = None
     existence_logits: list[float]
     birth_stamps_s: list[float]
     birth_places_camera_m: list[_Two]
@@ -124,10 +125,15 @@ class StateRecord(StrictConfig):
                 raise ValueError(
                     f"hit_stamps_s must end in a stamp of at most {self.stamp_s} s, got {row}"
                 )
-        rows: list[Any] = [*self.tracks.seen_stamps_s, *self.tracks.missed_s]
+        tracks = self.tracks
+        rows: list[Any] = [
+            *tracks.seen_stamps_s,
+            *tracks.missed_s,
+            *(tracks.passed_stamps_s or ()),
+        ]
         if any(len(row) != len(self.clocks) for row in rows):
             raise ValueError(
-                "seen_stamps_s and missed_s must hold one number per sensor, "
+                "seen_stamps_s, missed_s and passed_stamps_s must hold one number per sensor, "
                 f"{len(self.clocks)} in all"
             )
         return self

@@ -157,6 +157,10 @@ def state_of(
             [stamp for row in tracks.seen_stamps_s for stamp in row], -math.inf
         ).reshape(count, len(names)),
         missed_s=_array([one for row in tracks.missed_s for one in row]).reshape(count, len(names)),
+        passed_stamps_s=_array(
+            [one for row in tracks.passed_stamps_s or [[None] * len(names)] * count for one in row],
+            -math.inf,
+        ).reshape(count, len(names)),
         existence_logits=_array(tracks.existence_logits),
         birth_stamps_s=_array(tracks.birth_stamps_s),
         birth_places_camera_m=_array(tracks.birth_places_camera_m).reshape(count, 2),
@@ -275,6 +279,7 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
             "standing": tracks.standing.tolist(),
             "seen_stamps_s": [_finite_or_none(row) for row in tracks.seen_stamps_s],
             "missed_s": tracks.missed_s.tolist(),
+            "passed_stamps_s": [_finite_or_none(row) for row in tracks.passed_stamps_s],
             "existence_logits": tracks.existence_logits.tolist(),
             "birth_stamps_s": tracks.birth_stamps_s.tolist(),
             "birth_places_camera_m": tracks.birth_places_camera_m.tolist(),

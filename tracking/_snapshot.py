@@ -93,9 +93,9 @@ def _expired(state: TrackerState, stamp_s: float, sensors: Sensors) -> BoolArray
 
 
 def _places_empty(state: TrackerState, tracks: TrackTable, sensors: Sensors) -> list[bool]:
-    if not tracks.missed_s.any():
+    if state.stamp_s is None or not np.isfinite(tracks.passed_stamps_s).any():
         return [False] * len(tracks)
-    empty: list[bool] = shown_empty(tracks, state.periods_s, sensors.config).tolist()
+    empty: list[bool] = shown_empty(tracks, state.stamp_s, state.periods_s, sensors.config).tolist()
     return empty
 
 

@@ -31,6 +31,7 @@ from ._track_management import (
     expired_before,
     initiate,
     missed_time_s,
+    passed_stamps_s,
 )
 from ._twins import doubted, with_hosts, with_lower_evidence, with_twins, without
 
@@ -112,8 +113,11 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
     tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
     tracks = with_noticed(before, tracks, frame, found, earlier.faces, dt_s, state.clocks, sensors)
     tracks = with_places(tracks, frame, found, sensors)
-    missed_s = missed_time_s(tracks, ~found.seen, dt_s, frame, config, sensor.view)
-    tracks = tracks.replaced(missed_s=missed_s)
+    view = sensor.view if frame.view is None else frame.view
+    tracks = tracks.replaced(
+        missed_s=missed_time_s(tracks, ~found.seen, dt_s, frame, config, view),
+        passed_stamps_s=passed_stamps_s(tracks, ~found.seen, frame, config, view),
+    )
     tracks, exits = _without_deleted(tracks, exits, found.seen, frame, state, sensors)
     double = duplicates(tracks, frame, state.clocks, sensors)
     if double.any():

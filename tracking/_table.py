@@ -36,6 +36,8 @@ class TrackTable:
             for none. The latest of them ends ``hit_stamps_s``.
         missed_s: (N, S) time since each sensor last saw the person in which its frames should have
             shown them.
+        passed_stamps_s: (N, S) stamp of each sensor's latest frame if it has shown the person's
+            place empty (:class:`~tracking.RangedView`); −∞ if it has not.
         existence_logits: (N,) log-likelihood ratio of a person to clutter, of the detections after
             the first; 0 at the first.
         birth_stamps_s: (N,) stamps of the first frames that showed the people.
@@ -72,6 +74,7 @@ class TrackTable:
     standing: BoolArray
     seen_stamps_s: FloatArray
     missed_s: FloatArray
+    passed_stamps_s: FloatArray
     existence_logits: FloatArray
     birth_stamps_s: FloatArray
     birth_places_camera_m: FloatArray
@@ -110,6 +113,7 @@ class TrackTable:
             standing=no_flags,
             seen_stamps_s=np.empty((0, sensors)),
             missed_s=np.empty((0, sensors)),
+            passed_stamps_s=np.empty((0, sensors)),
             existence_logits=no_numbers,
             birth_stamps_s=no_numbers,
             birth_places_camera_m=np.empty((0, 2)),

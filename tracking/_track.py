@@ -30,9 +30,10 @@ class PersonTrack:
         awareness_lower: lower bound of α in [0, 1]; only this value may shrink an obstacle.
         height_m: the person's assumed stature, > 0.
         time_since_seen_s: ≥ 0, time since a frame of any sensor last showed this person.
-        place_empty: whether the sensor that last saw this person has shown the place empty for so
-            long that its next frame ends the track. If a track ends without it, the person was out
-            of sight and may still be there.
+        place_empty: whether the sensor that last saw this person should have shown them for so
+            long that its next frame without them ends the track, and a scanner has seen through all
+            of their place. A camera never shows a place empty. If a track ends without it, the
+            person was out of sight and may still be there.
         noticed: lower bound, in [0, 1], of the probability that this person has noticed the robot
             by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
         moved_m: upper bound (99.9 %) of the distance between where this person stood in the last

@@ -20,7 +20,7 @@ from ._kalman import inverse_2x2
 from ._measurement import Frame
 from ._places import no_places
 from ._table import BoolArray, IndexArray, TrackTable
-from ._views import View
+from ._views import RangedView, View
 from .awareness_filter import prior
 
 # χ² with two degrees of freedom: 90 % of the estimated velocities of a standing person pass.
@@ -29,6 +29,8 @@ _STANDING_CHI2: Final = 4.605
 _STANDING_HOLD_S: Final = 0.5
 # One frame counts for at most this share of max_missed_s, however long the pause before it.
 _MAX_SHARE_OF_ONE_FRAME: Final = 0.5
+# A place is empty if nobody is within so many standard deviations of where the person should be.
+_PLACE_SIGMAS: Final = 2.0
 
 
 def initiate(
@@ -64,6 +66,7 @@ def initiate(
         standing=np.zeros(count, dtype=np.bool_),
         seen_stamps_s=seen_stamps,
         missed_s=np.zeros((count, sensors)),
+        passed_stamps_s=np.full((count, sensors), -np.inf),
         existence_logits=np.zeros(count),
         birth_stamps_s=np.full(count, frame.stamp_s),
         birth_places_camera_m=places,
@@ -261,22 +264,56 @@ def missed_time_s(
     return missed_s
 
 
-def shown_empty(tracks: TrackTable, periods_s: FloatArray, config: TrackerConfig) -> BoolArray:
-    """Return (N,) True where the next frame without the person would end the track.
+def passed_stamps_s(
+    tracks: TrackTable, unseen: BoolArray, frame: Frame, config: TrackerConfig, view: View | None
+) -> FloatArray:
+    """Return (N, S), ``passed_stamps_s`` after a frame.
 
-    Only the sensor that saw the person last counts: another one may never have been able to see
-    them, for a reason that its view does not know. Frames may come as much as a half later than
-    usual.
+    The place is as large as a body and two standard deviations of the position.
+
+    Args:
+        tracks: at the frame's stamp.
+        unseen: (N,) True for people who are not in the frame.
+        frame: whose sensor's column changes.
+        config: settings.
+        view: of the frame.
+    """
+    stamps_s: FloatArray = tracks.passed_stamps_s.copy()
+    stamps_s[:, frame.sensor] = -np.inf
+    rows = np.flatnonzero(unseen & tracks.confirmed)
+    if not len(rows) or not isinstance(view, RangedView):
+        return stamps_s
+    spread = tracks.covariances[rows, :2, :2]
+    half = 0.5 * (spread[:, 0, 0] - spread[:, 1, 1])
+    largest = 0.5 * (spread[:, 0, 0] + spread[:, 1, 1]) + np.hypot(half, spread[:, 0, 1])
+    radii_m = config.body_radius_m + _PLACE_SIGMAS * np.sqrt(largest)
+    passed = view.passed(tracks.states[rows, :2], radii_m, frame.T_odom_camera)
+    stamps_s[rows[passed], frame.sensor] = frame.stamp_s
+    return stamps_s
+
+
+def shown_empty(
+    tracks: TrackTable, stamp_s: float, periods_s: FloatArray, config: TrackerConfig
+) -> BoolArray:
+    """Return (N,) True where the next frame without the person would end the track, rightly.
+
+    The sensor that saw the person last must have missed them: another one may never have been able
+    to see them, for a reason that its view does not know. And the latest frame of it, or of a
+    sensor that saw them until shortly before, must have shown the place empty. Frames may come as
+    much as a half later than usual.
 
     Args:
         tracks: N tracks.
+        stamp_s: of the latest frame.
         periods_s: (S,) usual time between frames of each sensor, 0 if unknown.
         config: settings.
     """
     last = tracks.seen_stamps_s.argmax(axis=1)
     share_s = np.minimum(1.5 * periods_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
     missed_s = tracks.missed_s[np.arange(len(tracks)), last] + share_s[last]
-    return np.asarray(tracks.confirmed & (missed_s > config.max_missed_s))
+    lately = tracks.seen_stamps_s >= tracks.last_seen_s[:, None] - config.max_missed_s
+    passed = (lately & (tracks.passed_stamps_s >= stamp_s - 1.5 * periods_s)).any(axis=1)
+    return np.asarray(tracks.confirmed & (missed_s > config.max_missed_s) & passed)
 
 
 def _visibility(

@@ -75,11 +75,7 @@ class PersonTracker:
             config = TrackerConfig()
         if not isinstance(config, TrackerConfig):
             raise TrackingError(f"config must be a TrackerConfig, got {type(config).__name__}")
-        if view is not None and not isinstance(view, View):
-            raise TrackingError(
-                "view must have a method visibility(positions_odom_m, T_odom_camera), "
-                f"got {type(view).__name__}"
-            )
+        _check_view(view)
         self._config = config
         self._sensors = sensors_of(config, view, sensors)
         self._admission = Admission(config, self._sensors)
@@ -150,6 +146,7 @@ class PersonTracker:
         *,
         pose_covariance_odom: Any = None,
         sensor: str = CAMERA,
+        view: View | None = None,
     ) -> tuple[PersonTrack, ...]:
         """Process one frame and return every track at the latest stamp, in the order of their ids.
 
@@ -165,16 +162,19 @@ class PersonTracker:
                 the pose error; the tracker adds it to each of them as if it were independent.
             sensor: name of the sensor that took the frame. Stamps of all sensors are times of one
                 clock, the robot's.
+            view: of this frame alone, for example a :class:`ScannerView` with the points of the
+                scan; None for that of the sensor. A state that is saved does not include it.
 
         Raises:
             TrackingError: for an unknown sensor, for a stamp that is not finite, lies too far back
                 or ahead, or differs from that of an observation by more than
                 ``stamp_tolerance_s``, for a ``T_odom_camera`` that is not a rigid transform, for a
-                ``pose_covariance_odom`` that is not a covariance, and for anything in
-                ``observations`` that is not a :class:`~perception.PersonObservation` or lies out of
-                bounds.
+                ``pose_covariance_odom`` that is not a covariance, for a view without its method,
+                and for anything in ``observations`` that is not a
+                :class:`~perception.PersonObservation` or lies out of bounds.
         """
         source = self._sensors.named(sensor)
+        _check_view(view)
         stamp = finite_number("stamp_s", stamp_s, TrackingError)
         T = rigid_transform("T_odom_camera", T_odom_camera, TrackingError)
         pose = None
@@ -188,7 +188,7 @@ class PersonTracker:
             self.reset()
             self._admission.restarts += 1
         history = self._history if entry.history is None else entry.history
-        history.insert(Frame(stamp, T, measurements, source.index))
+        history.insert(Frame(stamp, T, measurements, source.index, view))
         self._history = history
         self._admission.taken(entry, source)
         latest = self._history.latest
@@ -287,3 +287,11 @@ class PersonTracker:
 
     def _snapshots(self, stamp_s: float) -> tuple[PersonTrack, ...]:
         return snapshots(self._history.latest, stamp_s, self._sensors)
+
+
+def _check_view(view: Any) -> None:
+    if view is not None and not isinstance(view, View):
+        raise TrackingError(
+            "view must have a method visibility(positions_odom_m, T_odom_camera), "
+            f"got {type(view).__name__}"
+        )

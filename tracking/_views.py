@@ -1,9 +1,9 @@
-"""Views: where a camera would have detected a person, if one had been there."""
+"""Views: where a sensor would have detected a person, and which places it has seen empty."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,15 @@ from perception.arrays import (
 )
 
 from ._errors import TrackingError
+from ._table import BoolArray
+
+if TYPE_CHECKING:
+    from perception.laser import ScanPoints
+
+# Half the width of a person.
+_BODY_M: Final = 0.25
+# A gap between the rays that have passed a place hides nobody if it is no wider than a child's leg.
+_GAP_M: Final = 0.08
 
 
 @runtime_checkable
@@ -35,6 +44,27 @@ class View(Protocol):
         Args:
             positions_odom_m: (N, 2) on the floor plane.
             T_odom_camera: (4, 4) pose of the camera.
+        """
+        ...
+
+
+@runtime_checkable
+class RangedView(View, Protocol):
+    """A view whose sensor measures how far it sees: it can show that a place is empty.
+
+    Without one, a frame that does not show a person does not prove that the place is empty: before
+    it may stand something that neither the map nor the tracker knows.
+    """
+
+    def passed(
+        self, positions_odom_m: FloatArray, radii_m: FloatArray, T_odom_camera: FloatArray
+    ) -> BoolArray:
+        """Return (N,) whether the frame has seen through all of each place, to what lies behind.
+
+        Args:
+            positions_odom_m: (N, 2) on the floor plane.
+            radii_m: (N,) of the places.
+            T_odom_camera: (4, 4) pose of the sensor.
         """
         ...
 
@@ -137,17 +167,21 @@ class CameraView:
 class ScannerView:
     """The view of a laser scanner whose frame has x ahead and y to the left, as in REP-103.
 
-    Visibility falls linearly from 1 to 0 over the last fifth of the range.
+    Visibility falls linearly from 1 to 0 over the last fifth of the range. With the points of one
+    scan it is the view of that scan (``PersonTracker.update(..., view=...)``): people are visible
+    only as far as rays have reached, and places are empty that rays have passed.
 
     Attributes:
         max_range_m: > 0, horizontal distance from which people are not recognised.
         min_range_m: ≥ 0; nearer than this, visibility is 0.
         field_rad: in (0, 2π], the angle over which the scanner scans, centred ahead.
+        points: of the scan, in odom; None for a view of which the ranges are unknown.
     """
 
     max_range_m: float = 8.0
     min_range_m: float = 0.1
     field_rad: float = 2.0 * np.pi
+    points: ScanPoints | None = None
 
     def __post_init__(self) -> None:
         def number(name: str, high: float, *, positive: bool) -> float:
@@ -166,11 +200,16 @@ class ScannerView:
             min_range_m=number("min_range_m", self.max_range_m, positive=False),
             field_rad=number("field_rad", 2.0 * np.pi, positive=True),
         )
+        if not (self.points is None or hasattr(self.points, "ends_odom_m")):
+            raise TrackingError(
+                f"points must be ScanPoints or None, got {type(self.points).__name__}"
+            )
 
     def visibility(self, positions_odom_m: Any, T_odom_camera: Any) -> FloatArray:
         """Return (N,) in [0, 1] for people at ``positions_odom_m`` (N, 2).
 
-        ``T_odom_camera`` (4, 4) is the pose of the scanner.
+        ``T_odom_camera`` (4, 4) is the pose of the scanner. With points, of the rays towards a body
+        those count that have come as far as its near side, or have met nothing.
 
         Raises:
             TrackingError: for positions that are not finite or not (N, 2), and for a
@@ -184,7 +223,58 @@ class ScannerView:
         x, y = (offset @ T[:2, :2]).T
         inside = (np.abs(np.arctan2(y, x)) <= 0.5 * self.field_rad) & (ranges >= self.min_range_m)
         from_range = (self.max_range_m - ranges) / (0.2 * self.max_range_m)
-        return np.where(inside, np.clip(from_range, 0.0, 1.0), 0.0)
+        in_view = np.where(inside, np.clip(from_range, 0.0, 1.0), 0.0)
+        if self.points is None:
+            return in_view
+        along, across, free, _ = _towards(positions, self.points)
+        at_body = (along > 0.0) & (np.abs(across) <= _BODY_M)
+        reached = (at_body & (free >= along - _BODY_M)).sum(axis=1)
+        # Rays that saw nothing are not among those at the body: as many as it takes must be there.
+        whole_rad = 2.0 * np.arcsin(_BODY_M / np.maximum(ranges, _BODY_M))
+        wanted = np.floor(whole_rad / abs(self.points.angle_increment_rad))
+        wanted = np.maximum(np.maximum(wanted, at_body.sum(axis=1)), 1.0)
+        return np.asarray(in_view * reached / wanted)
+
+    def passed(self, positions_odom_m: Any, radii_m: Any, T_odom_camera: Any) -> BoolArray:
+        """Return (N,) whether the rays show that nobody is within ``radii_m`` (N,) of each place.
+
+        They do if those that have met something behind the place leave no gap across it that is
+        wider than a leg. A ray that met nothing (+inf) proves nothing, since dark clothes return
+        nothing either. Without points nothing is proved.
+
+        Raises:
+            TrackingError: for positions or radii that are not finite or not (N, 2) and (N,).
+        """
+        positions = finite_array("positions_odom_m", positions_odom_m, ("N", 2), TrackingError)
+        radii = finite_array("radii_m", radii_m, (len(positions),), TrackingError)
+        found = np.zeros(len(positions), dtype=np.bool_)
+        if self.points is None:
+            return found
+        along, across, free, measured = _towards(positions, self.points)
+        at_place = (along > 0.0) & (np.abs(across) < radii[:, None])
+        behind = along + np.sqrt(np.maximum(radii[:, None] ** 2 - across * across, 0.0))
+        beyond = at_place & measured & (free > behind)
+        for row, radius_m in enumerate(radii.tolist()):
+            sides = np.sort(np.concatenate(([-radius_m, radius_m], across[row, beyond[row]])))
+            found[row] = np.diff(sides).max() <= _GAP_M
+        return found
+
+
+def _towards(
+    positions_m: FloatArray, points: ScanPoints
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Return where N places lie as seen along the R rays of a scan that saw something.
+
+    The place's distance along each ray (N, R) and to its left (N, R), the distance over which each
+    ray met nothing (R,), and whether it then met something (R,); all on the floor plane.
+    """
+    known = np.isfinite(points.ends_odom_m[:, 0])
+    origins, ends = points.origins_odom_m[known, :2], points.ends_odom_m[known, :2]
+    x, y = (ends - origins).T
+    free = np.hypot(x, y)
+    x, y = x / free, y / free
+    to_x, to_y = np.moveaxis(positions_m[:, None] - origins, 2, 0)
+    return to_x * x + to_y * y, to_y * x - to_x * y, free, points.usable[known]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,7 +21,7 @@ from .._robot import RobotProfile, RobotState
 from ._alerts import sensor_status
 from ._clock import BridgeClock
 from ._depth_reader import DepthReader
-from ._guard import guarded_update, stopped
+from ._guard import explained, guarded_update, stopped
 from ._image_perception import ImagePerception, PerceivedFrame
 from ._mask_stream import SpeedMaskSettings
 from ._outgoing import Frames, Sender
@@ -56,8 +56,8 @@ class AwarenessBridge:
 
     With scanners, the robot stands until every sensor has been heard. If the camera is lost for
     longer than ``stale_after_s``, everybody counts as unaware, and the robot goes on only while
-    scanners see all of the camera's field. If scanners are lost, the camera goes on as if it were
-    alone. Each loss and return is a warning and a status of the alerts.
+    scanners see all of the camera's field. If scanners are lost, or blind, the camera goes on as if
+    it were alone. Each loss and return is a warning and a status of the alerts.
 
     Messages whose stamp lies more than 0.05 s ahead of ``now_s`` are refused and counted in
     :attr:`counts`. The clock of ``now_s`` may be stepped back: by up to 0.05 s, time stands still
@@ -313,7 +313,7 @@ class AwarenessBridge:
                     constraints = stopped(now_s, "the clock went backward")
                 else:
                     self._pose_reader.drop_future(time_s)
-                    constraints = self._constraints(time_s)
+                    constraints = explained(self._constraints(time_s), self._watch.blind_text)
                 tracks, state = self.tracks, self._poses.state
                 details = {name: str(count) for name, count in self.counts.items()}
                 if self._frame is not None:

@@ -58,6 +58,13 @@ def guarded_update(
     )
 
 
+def explained(constraints: NavConstraints, blind: str) -> NavConstraints:
+    """Return constraints whose reason says which scanners are blind, where data are stale."""
+    if not blind or not constraints.stale:
+        return constraints
+    return replace(constraints, limited_by=f"{constraints.limited_by}; {blind}")
+
+
 def stopped(now_s: float, reason: str) -> NavConstraints:
     """Return constraints without people that stop the robot."""
     return NavConstraints(now_s, (), 0.0, reason, True)

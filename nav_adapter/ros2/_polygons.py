@@ -80,8 +80,8 @@ def stop_zone(
     """Return ``geometry_msgs/PolygonStamped``: the area that a robot passes when it brakes now.
 
     It is the footprint, stretched along the direction of travel by the stopping distance
-    v·T + v²/2a (decision 8 without the person): a stop zone that grows with speed, for the
-    collision monitor's ``polygon_sub_topic``. ``lateral_mps`` is the speed to the left.
+    v·T + v²/2a (speed and separation without the person): a stop zone that grows with speed, for
+    the collision monitor's ``polygon_sub_topic``. ``lateral_mps`` is the speed to the left.
     """
     travel_mps = math.hypot(speed_mps, lateral_mps)
     # The stopping distance over the speed, so that a standing robot has no direction to divide by.

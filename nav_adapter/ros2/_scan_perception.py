@@ -19,9 +19,11 @@ from perception.laser import (
     PersonCandidate,
     RobotMotion,
     Scanner,
+    ScannerSight,
     merge_candidates,
     observations_of,
     scan_points,
+    sight_of,
 )
 from tracking import ScannerView
 
@@ -77,14 +79,14 @@ class PerceivedScan:
         stamp_s: of the middle of the scan.
         T_odom_scanner: (4, 4) pose at that time of the scanner's frame, turned about its z axis so
             that x points to the middle of the rays.
-        T_base_scanner: the same in the base frame.
-        view: of the scanner in that frame.
+        sight: where the scan shows what is there.
+        view: of the scan in that frame.
         observations: of the people, in that frame.
     """
 
     stamp_s: float
     T_odom_scanner: FloatArray
-    T_base_scanner: FloatArray
+    sight: ScannerSight
     view: ScannerView
     observations: tuple[PersonObservation, ...]
 
@@ -163,8 +165,8 @@ class ScanPerception:
         return PerceivedScan(
             points.stamp_s,
             T_odom_scanner,
-            turned,
-            ScannerView(reach_m, nearest_m, field_rad),
+            sight_of(scan, scanner, points),
+            ScannerView(reach_m, nearest_m, field_rad, points),
             observations_of(own, T_odom_scanner),
         )
 

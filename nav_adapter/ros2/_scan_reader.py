@@ -15,7 +15,7 @@ from tracking import TrackingError
 from .._errors import NavError
 from ._clock import BridgeClock
 from ._poses import RobotPoses
-from ._scan_perception import PerceivedScan, ScannerInput, ScanPerception
+from ._scan_perception import ScannerInput, ScanPerception
 from ._scans import ScanMessages, map_cells_of
 from ._sensor_watch import SensorWatch
 from ._shared_tracker import SharedTracker
@@ -30,7 +30,7 @@ class ScanReader:
     """Turns the scans of the robot's scanners into frames of the tracker.
 
     A scan that cannot be used is refused, counted and reported; the next one is read as if it had
-    not come.
+    not come. So it is, but for its stamp, with a scan that shows nothing: its scanner is blind.
 
     Args:
         inputs: the scanners.
@@ -145,6 +145,12 @@ class ScanReader:
             motion = self._poses.motion(scan.stamp_s, scan.end_s)
             static_map = self._map_in_odom(scan.stamp_s)
         seen = self._perception.process(number, scan, T_base_scanner, motion, static_map)
+        if seen.sight.nothing:
+            with self._lock:
+                if self._clock.restarts == restarts:
+                    self._last_s[number] = scan.stamp_s
+                    self._watch.saw_scan(number, seen.stamp_s, seen.sight)
+            return False
         tracks = self._tracker.update(
             seen.observations,
             seen.stamp_s,
@@ -157,12 +163,9 @@ class ScanReader:
             if tracks is None or self._clock.restarts != restarts:
                 return False
             self._last_s[number] = scan.stamp_s
-            self._note(number, seen)
+            self._watch.saw_scan(number, seen.stamp_s, seen.sight)
+            self._read += 1
         return True
-
-    def _note(self, number: int, seen: PerceivedScan) -> None:
-        self._watch.saw_scan(number, seen.stamp_s, seen.T_base_scanner, seen.view.field_rad)
-        self._read += 1
 
     def _map_in_odom(self, stamp_s: float) -> tuple[MapCells, FloatArray] | None:
         """Return the map and its pose, or None without a map, or while its pose is unknown."""

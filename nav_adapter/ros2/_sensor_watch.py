@@ -10,23 +10,24 @@ import numpy as np
 
 from perception import Camera
 from perception.arrays import FloatArray
+from perception.laser import ScannerSight, SeenDirections
 
 CAMERA: Final = "camera"
 #: The camera's depth images, without which it goes on.
 DEPTH: Final = "depth images"
 # Without a camera, scanners must see this far to either side of straight ahead.
 _AHEAD_RAD: Final = math.radians(60.0)
-# Directions are compared at this distance.
-_STEP_RAD: Final = math.radians(1.0)
 # A camera whose axis is steeper than this looks everywhere.
 _STEEP: Final = 0.2
 
 
 class SensorWatch:
-    """Keeps the latest stamp and the field of every sensor. One thread at a time may use it.
+    """Keeps when every sensor last saw something, and where. One thread at a time may use it.
 
-    While the camera is lost, scanners replace it only if they see all of its field: the robot must
-    not drive on with less in view than the camera alone would have.
+    A scan counts only where it shows what is there: what lies in the blind sectors of a scanner is
+    as old as if the scanner were silent. While the camera is lost, scanners replace it only if they
+    see all of its field: the robot must not drive on with less in view than the camera alone would
+    have.
 
     Args:
         scanners: names of the scanners.
@@ -48,8 +49,10 @@ class SensorWatch:
         self._with_camera = with_camera
         self._needed_rad = (0.0, _AHEAD_RAD)
         self._stamps_s: dict[str, float] = {}
-        self._fields_rad: dict[str, tuple[float, float]] = {}
-        self._reported: set[str] = set()
+        self._seen = SeenDirections()
+        # Since when a scanner has been blind, and its sectors in words.
+        self._blind: dict[str, tuple[float, str]] = {}
+        self._reported: dict[str, str] = {}
 
     def saw_image(self, stamp_s: float, camera: Camera, T_base_camera: FloatArray | None) -> None:
         """Note an image, and the camera's pose (4, 4); None leaves its field as it was."""
@@ -61,14 +64,17 @@ class SensorWatch:
         """Note a depth image that was used."""
         self._stamps_s[DEPTH] = max(stamp_s, self._stamps_s.get(DEPTH, -math.inf))
 
-    def saw_scan(
-        self, number: int, stamp_s: float, T_base_scanner: FloatArray, field_rad: float
-    ) -> None:
-        """Note a scan of a scanner whose x axis points to the middle of its field."""
-        name = self._scanners[number]
+    def saw_scan(self, number: int, stamp_s: float, sight: ScannerSight) -> None:
+        """Note a scan of a scanner, and where it shows what is there."""
+        name, blind = self._scanners[number], sight.blind_text
+        if blind:
+            self._blind[name] = self._blind.get(name, (stamp_s,))[0], blind
+        else:
+            self._blind.pop(name, None)
+        if sight.nothing:
+            return
         self._stamps_s[name] = max(stamp_s, self._stamps_s.get(name, -math.inf))
-        bearing_rad = math.atan2(T_base_scanner[1, 0], T_base_scanner[0, 0])
-        self._fields_rad[name] = bearing_rad, 0.5 * field_rad
+        self._seen.note(sight, stamp_s)
 
     @property
     def stamp_s(self) -> float | None:
@@ -77,7 +83,7 @@ class SensorWatch:
         Without a camera the field is 60° to either side of straight ahead. None if nothing has seen
         the field.
         """
-        stamps = [self._scanners_stamp_s()]
+        stamps = [self._seen.stamp_s(*self._needed_rad)]
         if self._with_camera:
             stamps.append(self._stamps_s.get(CAMERA))
         return max((each for each in stamps if each is not None), default=None)
@@ -95,7 +101,12 @@ class SensorWatch:
             return ""
         if missing == DEPTH:
             return "no depth image yet"
-        return f"no {missing} {'frame' if missing == CAMERA else 'scan'} yet"
+        return "no camera frame yet" if missing == CAMERA else f"no scan yet from {missing!r}"
+
+    @property
+    def blind_text(self) -> str:
+        """The scanners that are blind and their sectors, in words; empty if there are none."""
+        return "; ".join(f"{name}: {blind}" for name, (_, blind) in self._blind.items())
 
     def ages_s(self, now_s: float) -> dict[str, float]:
         """Return the age of the latest frame of every sensor; infinite before the first."""
@@ -110,27 +121,37 @@ class SensorWatch:
     def news(self, now_s: float) -> list[str]:
         """Return a line for every sensor that has been lost, or has come back, since last asked.
 
-        A sensor that has never been heard is no news.
+        So is one that has become blind, in a sector or all of it. A sensor that has never been
+        heard is no news.
         """
-        lost = {name for name in self.lost(now_s) if name in self._stamps_s}
-        lines = [
-            f"{name} has been silent for {self.ages_s(now_s)[name]:.1f} s: "
-            f"{self._consequence(lost)}"
-            for name in self._names
-            if name in lost - self._reported
-        ]
-        lines += [f"{name} is back" for name in self._names if name in (self._reported - lost)]
-        self._reported = lost
+        lost, ages_s = set(self.lost(now_s)), self.ages_s(now_s)
+        troubles: dict[str, str] = {}
+        lines = []
+        for name in self._names:
+            blind_since_s, blind = self._blind.get(name, (now_s, ""))
+            if blind and (name in lost or now_s - blind_since_s > self._lost_after_s):
+                troubles[name] = "all blind" if name in lost else "blind"
+                what = f"{name}: {blind}"
+            elif name in lost and name in self._stamps_s:
+                troubles[name] = "silent"
+                what = f"{name} has been silent for {ages_s[name]:.1f} s"
+            if name in troubles and troubles[name] != self._reported.get(name):
+                lines.append(f"{what}: {self._consequence(lost, now_s)}")
+        lines += [f"{name} is back" for name in self._reported if name not in troubles]
+        self._reported = troubles
         return lines
 
     def forget(self) -> None:
         """Forget all stamps."""
         self._stamps_s.clear()
+        self._blind.clear()
         self._reported.clear()
+        self._seen = SeenDirections()
 
-    def _consequence(self, lost: set[str]) -> str:
+    def _consequence(self, lost: set[str], now_s: float) -> str:
         left = [name for name in self._names if name not in lost and name != DEPTH]
-        if not left:
+        seen_s = self.stamp_s
+        if not left or seen_s is None or now_s - seen_s > self._lost_after_s:
             return "the robot stops"
         goes_on = f"{' and '.join(left)} {'goes' if len(left) == 1 else 'go'} on"
         if CAMERA in lost:
@@ -138,26 +159,6 @@ class SensorWatch:
         if DEPTH in lost:
             return f"{goes_on}, and distances are less sure"
         return goes_on
-
-    def _scanners_stamp_s(self) -> float | None:
-        """Return the time from which scanners have seen all of the needed field."""
-        middle, half = self._needed_rad
-        bearings = middle + np.linspace(-half, half, 2 * math.ceil(half / _STEP_RAD) + 1)
-        unseen = np.ones(len(bearings), dtype=np.bool_)
-        newest_first = sorted(
-            (
-                (self._stamps_s[name], field)
-                for name, field in self._fields_rad.items()
-                if name in self._stamps_s
-            ),
-            reverse=True,
-        )
-        for stamp_s, (bearing, half_field) in newest_first:
-            off = np.abs(np.remainder(bearings - bearing + math.pi, 2.0 * math.pi) - math.pi)
-            unseen &= off > half_field + 1e-9
-            if not unseen.any():
-                return stamp_s
-        return None
 
 
 def _field_of(camera: Camera, T_base_camera: FloatArray) -> tuple[float, float]:

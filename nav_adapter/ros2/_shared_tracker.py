@@ -25,7 +25,7 @@ _MAX_LAG_S: Final = 1.0
 
 
 class LaterView:
-    """A view that becomes known with the first message of its sensor; nobody is in it before.
+    """A view of a camera that becomes known with its first message; nobody is in it before.
 
     Attributes:
         view: None until it is known.
@@ -51,7 +51,6 @@ class SharedTracker:
 
     def __init__(self, config: TrackerConfig, scanners: int = 0) -> None:
         self._camera_view = LaterView()
-        self._views = tuple(LaterView() for _ in range(scanners))
         self._names = tuple(f"laser_{number + 1}" for number in range(scanners))
         if scanners:
             lag_s = max(config.max_lag_s, _MAX_LAG_S)
@@ -59,10 +58,8 @@ class SharedTracker:
         self._tracker = PersonTracker(
             config,
             view=self._camera_view,
-            sensors={
-                name: SensorConfig(view=view)
-                for name, view in zip(self._names, self._views, strict=True)
-            },
+            # Each scan brings a view of its own.
+            sensors={name: SensorConfig(view=ScannerView()) for name in self._names},
         )
         self._busy = threading.Lock()
         self._latest: tuple[PersonTrack, ...] = ()
@@ -108,7 +105,7 @@ class SharedTracker:
             T_odom_sensor: (4, 4) pose of camera or scanner.
             is_current: called once the tracker is free, and reset if that was wanted.
             scanner: number of the scanner; None for the camera.
-            view: of the scanner from this frame on.
+            view: of the scan.
 
         Raises:
             TrackingError: for a frame that the tracker refuses.
@@ -125,9 +122,8 @@ class SharedTracker:
             if scanner is None:
                 tracks = self._tracker.update(observations, stamp_s, T_odom_sensor)
             else:
-                self._views[scanner].view = view
                 tracks = self._tracker.update(
-                    observations, stamp_s, T_odom_sensor, sensor=self._names[scanner]
+                    observations, stamp_s, T_odom_sensor, sensor=self._names[scanner], view=view
                 )
             with self._handing_over:
                 if not self._reset_wanted:

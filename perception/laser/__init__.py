@@ -28,6 +28,7 @@ from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
 from ._seated import SeatedPeople
+from ._sight import ScannerSight, SeenDirections, sight_of
 from ._static_map import MapCells, StaticMap
 
 __all__ = [
@@ -47,11 +48,14 @@ __all__ = [
     "RobotMotion",
     "ScanPoints",
     "Scanner",
+    "ScannerSight",
     "SeatedPeople",
+    "SeenDirections",
     "StaticMap",
     "clusters_of",
     "hypotheses_of",
     "merge_candidates",
     "observations_of",
     "scan_points",
+    "sight_of",
 ]

@@ -16,7 +16,7 @@ from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
 
 from ..actors.behaviour import PersonOutcome
-from ..actors.robot import NOVA_CARTER, RobotModel
+from ..actors.robot import RobotModel
 from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
 from ..world.errors import SimError
 from ..world.render import RendererName
@@ -136,7 +136,7 @@ class Crossing(AbstractContextManager["Crossing"]):
         jitter = scenario.start_jitter_s
         offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
         self._cone = AttentionCone()
-        self.robot = _profile_of(scenario)
+        self.robot = scenario.robot_profile
         self.meter = SafetyMeter(self.robot)
         self.stage = Stage(scenario, offsets, people_rng, renderer=renderer)
         try:
@@ -324,11 +324,7 @@ def _default_planner(scenario: Scenario) -> LocalPlanner:
     straight = scenario.robot.straight_on_speed_mps
     if straight is not None:
         return StraightOn(straight)
-    return SamplingPlanner(_profile_of(scenario), scenario.planner_boxes_odom_m)
-
-
-def _profile_of(scenario: Scenario) -> RobotProfile:
-    return NOVA_CARTER if scenario.robot_model is None else scenario.robot_model.profile
+    return SamplingPlanner(scenario.robot_profile, scenario.planner_boxes_odom_m)
 
 
 def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
@@ -383,5 +379,5 @@ def _result(
         frames=tuple(frames),
         people=people,
         scripted=len(scenario.workers),
-        robot=_profile_of(scenario),
+        robot=scenario.robot_profile,
     )

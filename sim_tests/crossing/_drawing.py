@@ -171,7 +171,7 @@ class TopView:
 def _captions(frame: CrossingFrame) -> list[str]:
     limit = frame.constraints
     lines = [
-        f"{frame.t_s:5.2f} s   robot {frame.robot_state.speed_mps:.2f} m/s",
+        f"{frame.t_s:5.2f} s   robot {frame.robot_state.travel_mps:.2f} m/s",
         f"limit {limit.speed_limit_mps:.2f} m/s: {limit.limited_by}",
     ]
     return lines + [

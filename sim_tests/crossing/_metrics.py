@@ -11,7 +11,7 @@ from perception.arrays import FloatArray
 
 #: A robot at this speed or slower counts as standing (wheel motors never hold exactly zero).
 STANDING_SPEED_MPS: Final = 0.03
-#: C + Z of the separation margin, as in decision 8 of the design.
+#: C + Z of the separation margin, as in speed-and-separation monitoring (ISO 13855).
 CLEARANCE_M: Final = 0.10
 #: Distance to a person within which the robot's highest speed is reported.
 NEAR_M: Final = 2.0

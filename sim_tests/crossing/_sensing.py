@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,7 +11,7 @@ import numpy as np
 from nav_adapter import AwarenessPolicy, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import FloatArray
-from perception.laser import RobotMotion
+from perception.laser import RobotMotion, SeenDirections
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
 from ..world.camera import CameraTiming
@@ -36,6 +37,8 @@ from .faults import Fault, FaultInjection, FaultyEyes
 _NEVER_S: Final = 1.0e6
 # An image without a person is no evidence about people farther away than this.
 _DETECTION_RANGE_M: Final = 10.0
+# Without a camera, scanners must see this far to either side of straight ahead.
+_AHEAD_RAD: Final = math.radians(60.0)
 # Images and scans with stamps farther ahead are refused, as the bridge on a robot refuses them.
 _AHEAD_S: Final = 0.05
 
@@ -47,7 +50,7 @@ class Sensed:
     Attributes:
         state: its own state.
         tracks: tracks of the people.
-        stamp_s: stamp of the newest image or scan that has arrived.
+        stamp_s: stamp of the newest image, or of scans that show all that is ahead.
         observed: observations of the newest image if it arrived in this cycle, else none.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle.
     """
@@ -106,8 +109,11 @@ class Sensing:
                 camera_rng,
                 pipeline,
                 injection.T_camera_assumed,
+                injection.picture,
             )
-            self._camera = injection.eyes(TimedEyes(eyes, timing, timing_rng), model)
+            self._camera = injection.eyes(
+                TimedEyes(eyes, timing, timing_rng), model, pictures=perception.kind == "pixels"
+            )
         self._odometry = injection.odometry()
         self._scanners: ScannerEyes | None = None
         if perception.has_scanners:
@@ -127,6 +133,7 @@ class Sensing:
             )
         self._tracker = _make_tracker(perception, policy, stage, model)
         self._newest_s: dict[str, float] = {}
+        self._seen = SeenDirections()
 
     def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
         """Take the images and scans that are due; return what the robot knows then.
@@ -155,12 +162,14 @@ class Sensing:
                 sighting.stamp_s,
                 sighting.T_odom_camera,
                 sensor=sighting.sensor,
+                view=sighting.view,
             )
+            if sighting.sight is not None:
+                self._seen.note(sighting.sight, sighting.stamp_s)
             if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
                 self._newest_s[sighting.sensor] = sighting.stamp_s
                 if sighting.points_odom_m is None:
                     observed = sighting.observations
-        newest_s = max(self._newest_s.values(), default=-_NEVER_S)
         latest_s = self._tracker.last_stamp_s
         if latest_s != t_s or not tracks:
             # A sensor's clock may be a little ahead.
@@ -169,10 +178,15 @@ class Sensing:
         return Sensed(
             known.state,
             tracks,
-            newest_s,
+            self._perceived_s(),
             observed,
             np.concatenate(points) if points else np.zeros((0, 2)),
         )
+
+    def _perceived_s(self) -> float:
+        """Return the time from which camera or scanners know what is ahead, as on a robot."""
+        stamps_s = (self._newest_s.get("camera"), self._seen.stamp_s(0.0, _AHEAD_RAD))
+        return max((each for each in stamps_s if each is not None), default=-_NEVER_S)
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:
         """Return whether the tracker takes a sighting.

@@ -61,7 +61,7 @@ def plot_comparison(path: Path, rows: Rows) -> None:
     met = [row for row in rows if row[1].frames[0].truth]
     aware = [row for row in met if row[1].policy not in WITHOUT_AWARENESS]
     for axes, name, shown, pick, top in (
-        (speed, "speed (m/s)", rows, lambda frame: frame.robot_state.speed_mps, 1.8),
+        (speed, "speed (m/s)", rows, lambda frame: frame.robot_state.travel_mps, 1.8),
         (bound, "awareness α: the lower bound that acts", aware, lowest_bound, 1.1),
         (radius, "obstacle radius (m)", met, largest_radius_m, 2.5),
     ):
@@ -223,13 +223,13 @@ def _free_place(
 def _mark_limits(axes: Axes, rows: Rows) -> list[_Box]:
     """Mark the places at which the worker begins to limit the speed of a robot."""
     free = rows[0][1]
-    along, speeds = _along_m(free), [frame.robot_state.speed_mps for frame in free.frames]
+    along, speeds = _along_m(free), [frame.robot_state.travel_mps for frame in free.frames]
     first: dict[float, tuple[float, str]] = {}
     for (_, result), colour in zip(rows[1:], _COLOURS[1:], strict=False):
         for x, frame in zip(_along_m(result).tolist(), result.frames, strict=True):
             if frame.constraints.speed_limit_mps < np.interp(x, along, speeds) - _SLOWER_MPS:
                 if all(abs(x - other) > 0.1 for other in first):
-                    first[x] = (frame.robot_state.speed_mps, colour)
+                    first[x] = (frame.robot_state.travel_mps, colour)
                 break
     boxes: list[_Box] = []
     for x, (speed_mps, colour) in sorted(first.items()):

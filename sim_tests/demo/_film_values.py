@@ -88,7 +88,7 @@ def film_values(result: CrossingResult, free: CrossingResult, t_s: float) -> Fil
         t_s=frame.t_s,
         alpha=alpha,
         radius_m=largest_radius_m(frame),
-        speed_mps=frame.robot_state.speed_mps,
+        speed_mps=frame.robot_state.travel_mps,
         speed_limit_mps=constraints.speed_limit_mps,
         limited_by=constraints.limited_by.rpartition(": ")[2],
         lost_s=time_lost_s(result, free) if finished else time_behind_s(frame, free),

@@ -48,6 +48,7 @@ except ImportError as cause:
 
 View = Literal["top", "camera"]
 _VIEWS: Final = ("top", "camera")
+_NO_EPISODE: Final = "the environment has no episode: call reset first"
 # The plan shows the robot's way with this margin.
 _PLAN_MARGIN_M: Final = 4.0
 _PICTURE_PX: Final = (640, 480)
@@ -175,14 +176,14 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
     def crossing(self) -> Crossing:
         """The crossing of the present episode; raises SimError before the first reset."""
         if self._crossing is None:
-            raise SimError("the environment has no episode: call reset first")
+            raise SimError(_NO_EPISODE)
         return self._crossing
 
     @property
     def situation(self) -> Situation:
         """The present control cycle, with the constraints a planner gets."""
-        assert self.crossing is not None
-        assert self._situation is not None
+        if self._situation is None:
+            raise SimError(_NO_EPISODE)
         return self._situation
 
     @property
@@ -284,7 +285,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         """End the physics world of the episode; a second call does nothing."""
         if self._crossing is not None:
             self._crossing.close()
-        self._crossing, self._plan, self._camera = None, None, None
+        self._crossing, self._situation = None, None
+        self._plan, self._camera = None, None
 
     def _observation(self) -> Observation:
         now = self.situation
@@ -361,8 +363,7 @@ def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
 
 
 def _violates(now: Situation) -> bool:
-    moving = abs(now.state.speed_mps) > STANDING_SPEED_MPS
-    return moving and min(now.margins_m, default=0.0) < 0.0
+    return now.state.travel_mps > STANDING_SPEED_MPS and min(now.margins_m, default=0.0) < 0.0
 
 
 def _by_robot(crossing: Crossing) -> int:

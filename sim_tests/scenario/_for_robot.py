@@ -7,7 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from nav_adapter import RobotProfile
+from perception.arrays import FloatArray
 
 from ..actors.robot import NOVA_CARTER, RobotModel
 from ._scenario import Scenario
@@ -23,12 +26,13 @@ def scenario_for_robot(
 
     *Room.* The lane, the aisle along it, and everything beside it move outward by what the robot is
     wider, and by half of what it reaches farther from its base. Places within the aisle are
-    stretched; racks and people's routes beyond it are shifted. The hall is longer by what the robot
-    is longer.
+    stretched; racks and people's routes beyond it are shifted. Pauses and turns stay at the same
+    place of the route. The hall is longer by what the robot is longer.
 
     *Time.* The duration grows with the time that the way takes at the robot's speed and
     acceleration. People start later by what the robot takes longer for half of the way, so that
-    they still meet. Smaller and faster robots change neither.
+    they still meet. Smaller and faster robots change neither. Recorded people (``replay_csv``) stay
+    as they were recorded, in place and in time.
 
     The name becomes ``scenario_robot``, such as ``blind_corner_forklift``.
 
@@ -118,10 +122,62 @@ def _move_people(data: dict[str, Any], across: str, moved: Callable[[float], flo
         {**worker, "path": [{**key, across: moved(key[across])} for key in worker["path"]]}
         for worker in data["workers"]
     ]
-    data["people"] = [
-        {**person, "route": [{**key, across: moved(key[across])} for key in person["route"]]}
-        for person in data["people"]
-    ]
+    data["people"] = [_moved_person(person, across, moved) for person in data["people"]]
+
+
+def _moved_person(
+    person: dict[str, Any], across: str, moved: Callable[[float], float]
+) -> dict[str, Any]:
+    """Return a person whose route has moved, with the stops and the turn where they were on it."""
+    route = [{**key, across: moved(key[across])} for key in person["route"]]
+    before, after = (
+        np.array([[key["x_m"], key["y_m"]] for key in keys]) for keys in (person["route"], route)
+    )
+
+    def length_m(at_m: float) -> float:
+        return _length_after(before, after, at_m, int(across == "y_m"), moved)
+
+    fitted = {**person, "route": route}
+    end_m = _reached_m(before)[-1]
+    turn_m = person["turns_back_at_m"]
+    turns = turn_m is not None and turn_m < end_m
+    if turn_m is not None:
+        fitted["turns_back_at_m"] = length_m(turn_m)
+
+    def stop_m(at_m: float) -> float:
+        if turns and at_m > turn_m:  # on the way back
+            return 2.0 * length_m(turn_m) - length_m(2.0 * turn_m - at_m)
+        return length_m(at_m)
+
+    fitted["pauses"] = [{**pause, "at_m": stop_m(pause["at_m"])} for pause in person["pauses"]]
+    return fitted
+
+
+def _length_after(
+    before: FloatArray, after: FloatArray, at_m: float, axis: int, moved: Callable[[float], float]
+) -> float:
+    """Return the length of a moved route (N, 2) at the place that was at a length of the old one.
+
+    Beyond the ends of the old route the difference stays the same.
+    """
+    old_m, new_m = _reached_m(before), _reached_m(after)
+    if at_m >= old_m[-1] or len(before) == 1:
+        return float(new_m[-1] + at_m - old_m[-1])
+    if at_m <= 0.0:
+        return at_m
+    piece = int(np.searchsorted(old_m, at_m)) - 1
+    share = (at_m - old_m[piece]) / (old_m[piece + 1] - old_m[piece])
+    place = before[piece] + share * (before[piece + 1] - before[piece])
+    place[axis] = moved(place[axis])
+    step = after[piece + 1] - after[piece]
+    share = float(np.clip((place - after[piece]) @ step / (step @ step), 0.0, 1.0))
+    return float(new_m[piece] + share * (new_m[piece + 1] - new_m[piece]))
+
+
+def _reached_m(corners: FloatArray) -> FloatArray:
+    """Return the (N,) lengths of a route at its corners (N, 2)."""
+    legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(legs)])
 
 
 def _delay(data: dict[str, Any], later_s: float) -> None:

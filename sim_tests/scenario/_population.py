@@ -19,9 +19,12 @@ def person_of_script(script: WorkerScript, name: str) -> PersonSpec:
     on the way are left out.
     """
     points, pauses, moving_s, length_m = [script.path[0]], [], 0.0, 0.0
+    start_s = script.path[0].t_s
     for before, after in itertools.pairwise(script.path):
         step_m = math.dist((before.x_m, before.y_m), (after.x_m, after.y_m))
         if step_m > 0.0:
+            if length_m == 0.0:
+                start_s = before.t_s  # after a wait at the first point
             points.append(after)
             moving_s += after.t_s - before.t_s
             length_m += step_m
@@ -33,7 +36,7 @@ def person_of_script(script: WorkerScript, name: str) -> PersonSpec:
         "stature_m": script.stature_m,
         "look": script.look,
         "route": [{"x_m": point.x_m, "y_m": point.y_m} for point in points],
-        "start_s": max(script.path[0].t_s, 0.0),
+        "start_s": max(start_s, 0.0),
         "pauses": pauses,
         "activity": script.activities[0].activity if script.activities else "none",
         "glances": {"notices_within_m": _SEES_WITHIN_M if watches else 0.0, "watches": watches},

@@ -12,6 +12,7 @@ import numpy as np
 import yaml
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
+from nav_adapter import RobotProfile
 from perception import Camera
 from perception.arrays import FloatArray
 from perception.surround import FlatView, ring_of_views
@@ -24,7 +25,7 @@ from ..actors.behaviour import (
     WorkerScript,
     known_population,
 )
-from ..actors.robot import RobotModel
+from ..actors.robot import NOVA_CARTER, RobotModel
 from ..world.camera import CameraTiming, SensorConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
@@ -283,6 +284,11 @@ class Scenario(StrictConfig):
     @classmethod
     def _at_medians(cls, data: dict[str, Any], source: str) -> Scenario:
         return cls.from_data(with_numbers(data, find_parameters(data, source), {}, source), source)
+
+    @property
+    def robot_profile(self) -> RobotProfile:
+        """Outline and limits of the robot that drives: its ``robot_model``, or the Nova Carter."""
+        return NOVA_CARTER if self.robot_model is None else self.robot_model.profile
 
     @property
     def planner_boxes_odom_m(self) -> FloatArray:

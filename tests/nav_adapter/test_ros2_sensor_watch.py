@@ -13,6 +13,7 @@ from scan_scenes import planar
 from nav_adapter.ros2 import CameraMount
 from nav_adapter.ros2._sensor_watch import SensorWatch
 from perception import Camera
+from perception.laser import LaserScan, Scanner, sight_of
 
 CAMERA = Camera.from_fov(640, 480, math.radians(90.0))
 AHEAD = CameraMount(position_base_m=[0.2, 0.0, 1.4]).T_base_camera()
@@ -26,9 +27,26 @@ def looking(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> SensorWatch:
     return watch
 
 
-def scanned(watch: SensorWatch, number: int, stamp_s: float, yaw_deg: float, field_deg: float):
-    T = planar(0.3, 0.2, math.radians(yaw_deg))
-    watch.saw_scan(number, stamp_s, T, math.radians(field_deg))
+def scanned(
+    watch: SensorWatch,
+    number: int,
+    stamp_s: float,
+    yaw_deg: float,
+    field_deg: float,
+    dead_deg: tuple[float, float] | None = None,
+) -> None:
+    """Note a scan; the rays between two angles from its middle have no answer."""
+    rays = math.ceil(2.0 * field_deg)
+    step_deg = field_deg / rays
+    angles_deg = step_deg * (np.arange(rays) + 0.5) - 0.5 * field_deg
+    ranges = np.full(rays, 5.0)
+    if dead_deg is not None:
+        ranges[(angles_deg >= dead_deg[0]) & (angles_deg <= dead_deg[1])] = 0.0
+    scan = LaserScan(
+        stamp_s, math.radians(angles_deg[0]), math.radians(step_deg), ranges, 0.05, 20.0
+    )
+    scanner = Scanner(planar(0.3, 0.2, math.radians(yaw_deg)))
+    watch.saw_scan(number, stamp_s, sight_of(scan, scanner))
 
 
 @given(st.floats(-180.0, 180.0), st.floats(-180.0, 180.0), st.floats(1.0, 360.0))
@@ -101,3 +119,50 @@ def test_losses_and_returns_are_told_once() -> None:
     assert watch.news(2.0) == []
     assert watch.stamp_s is None
     assert np.isinf(list(watch.ages_s(2.0).values())).all()
+
+
+def test_a_blind_sector_is_as_old_as_the_last_scan_that_saw_it() -> None:
+    watch = SensorWatch(("one", "two"), with_camera=False, lost_after_s=0.5)
+    scanned(watch, 0, 1.0, 0.0, 270.0)
+    scanned(watch, 1, 1.0, 180.0, 270.0)
+    assert watch.stamp_s == 1.0
+    scanned(watch, 0, 1.2, 0.0, 270.0, (-70.0, -30.0))
+    scanned(watch, 1, 1.2, 180.0, 270.0)
+    assert watch.stamp_s == 1.0
+    assert watch.blind_text == "one: blind from -70° to -30°"
+    assert watch.lost(1.2) == ()
+    # Beside what must be seen it changes nothing.
+    scanned(watch, 0, 1.4, 0.0, 270.0, (80.0, 110.0))
+    assert watch.stamp_s == 1.4
+    # Another scanner that sees there is enough.
+    scanned(watch, 0, 1.6, 0.0, 270.0, (-70.0, -30.0))
+    scanned(watch, 1, 1.5, 0.0, 270.0)
+    assert watch.stamp_s == 1.5
+
+
+def test_a_blind_scanner_is_told_with_its_sector_once_it_has_lasted() -> None:
+    watch = SensorWatch(("one",), with_camera=False, lost_after_s=0.5)
+    assert watch.missing_text == "no scan yet from 'one'"
+    scanned(watch, 0, 0.0, 0.0, 270.0)
+    for tick in range(1, 6):
+        scanned(watch, 0, 0.1 * tick, 0.0, 270.0, (-20.0, 60.0))
+        assert watch.news(0.1 * tick) == []
+    scanned(watch, 0, 0.7, 0.0, 270.0, (-20.0, 60.0))
+    assert watch.news(0.7) == ["one: blind from -20° to 60°: the robot stops"]
+    scanned(watch, 0, 0.8, 0.0, 270.0, (-135.0, 135.0))
+    assert watch.news(0.8) == []
+    assert watch.news(1.3) == ["one: blind (most of its rays have no answer): the robot stops"]
+    assert watch.lost(1.3) == ("one",)
+    scanned(watch, 0, 1.4, 0.0, 270.0)
+    assert watch.news(1.4) == ["one is back"]
+    assert watch.blind_text == ""
+    assert watch.stamp_s == 1.4
+
+
+def test_a_scanner_that_has_never_measured_anything_has_not_been_heard() -> None:
+    watch = SensorWatch(("scan",), with_camera=False, lost_after_s=0.5)
+    for tick in range(8):
+        scanned(watch, 0, 0.1 * tick, 0.0, 270.0, (-135.0, 135.0))
+    assert watch.stamp_s is None
+    assert watch.missing_text == "no scan yet from 'scan'"
+    assert watch.news(0.8) == ["scan: blind (most of its rays have no answer): the robot stops"]

@@ -24,8 +24,11 @@ def test_the_robot_stands_until_every_sensor_has_been_heard() -> None:
         (lambda: None, "no odometry yet"),
         (lambda: nav.bridge.on_odometry(odometry(START_S)), "no camera_info yet"),
         (lambda: nav.bridge.on_camera_info(INFO), "no camera frame yet"),
-        (lambda: nav.bridge.on_image(image(START_S), START_S), "no scan_front scan yet"),
-        (lambda: nav.bridge.on_scan(0, scan_message(START_S), START_S), "no scan_rear scan yet"),
+        (lambda: nav.bridge.on_image(image(START_S), START_S), "no scan yet from 'scan_front'"),
+        (
+            lambda: nav.bridge.on_scan(0, scan_message(START_S), START_S),
+            "no scan yet from 'scan_rear'",
+        ),
     )
     for send, reason in sent:
         send()

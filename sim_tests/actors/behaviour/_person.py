@@ -182,6 +182,8 @@ class PersonOutcome:
             or without an end of it.
         length_m: length of the path walked.
         free_length_m: the same without robot and other people; None as ``free_time_s``.
+        late_s: of somebody on the way: how much longer than alone they took to come so far, or
+            more. None before the start, at the end of the route, and without ``free_time_s``.
     """
 
     name: str
@@ -191,3 +193,4 @@ class PersonOutcome:
     free_time_s: float | None = None
     length_m: float = 0.0
     free_length_m: float | None = None
+    late_s: float | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from ._spec import PersonSpec
 
@@ -132,6 +132,30 @@ class Route:
         return max(bisect.bisect_right(self._along_m, along_m) - 1, 0)
 
 
+class FreeWalk(NamedTuple):
+    """A walk along a route without robot and other people.
+
+    Attributes:
+        time_s: from the start to the end.
+        length_m: length of the path walked.
+        tick_s: time from one of ``along_m`` to the next.
+        along_m: length of the route covered at each tick, from the start on.
+    """
+
+    time_s: float
+    length_m: float
+    tick_s: float
+    along_m: tuple[float, ...]
+
+    def late_s(self, elapsed_s: float, along_m: float) -> float:
+        """Return how much longer than this walk somebody took to come so far, or more.
+
+        The free walk's pause at that place counts as taken, because it may not be over.
+        """
+        ticks = bisect.bisect_right(self.along_m, along_m + _REACHED_M)
+        return max(elapsed_s - ticks * self.tick_s, 0.0)
+
+
 class RouteFollower:
     """Leads one person along a route with its stops.
 
@@ -144,13 +168,14 @@ class RouteFollower:
         route: as given.
         started_s: time at which the person started; None before.
         arrived_s: time at which the end was reached; None before.
+        along_m: length of the route covered so far.
         walking: whether the person is on the way, neither before the start nor at a stop.
     """
 
     def __init__(self, route: Route, speed_mps: float, start_s: float) -> None:
         self.route = route
         self._speed_mps, self._start_s = speed_mps, start_s
-        self._along_m = 0.0
+        self.along_m = 0.0
         self._next_stop = 0
         self._resumes_s: float | None = None
         self.started_s: float | None = None
@@ -163,11 +188,11 @@ class RouteFollower:
         stop = self.route.stops[self._next_stop]
         if not self.walking:
             return self._stay(x, y)
-        aim_x, aim_y = self.route.point(min(self._along_m + _LOOK_AHEAD_M, stop.at_m))
+        aim_x, aim_y = self.route.point(min(self.along_m + _LOOK_AHEAD_M, stop.at_m))
         dx, dy = aim_x - x, aim_y - y
         away = math.hypot(dx, dy)
-        ux, uy = (dx / away, dy / away) if away > 1e-6 else self.route.direction(self._along_m)
-        left_m = stop.at_m - self._along_m
+        ux, uy = (dx / away, dy / away) if away > 1e-6 else self.route.direction(self.along_m)
+        left_m = stop.at_m - self.along_m
         if math.isinf(stop.for_s) and left_m < _LOOK_AHEAD_M:
             left_m = max(left_m, away)  # the end point itself has to be reached
         limit = min(math.sqrt(2.0 * _BRAKING_MPS2 * left_m), _APPROACH_HZ * left_m)
@@ -190,11 +215,11 @@ class RouteFollower:
                 return False
             self._resumes_s = None
             # Continue from the stop itself, also where the route turns back on itself.
-            self._along_m = self.route.stops[self._next_stop].at_m
+            self.along_m = self.route.stops[self._next_stop].at_m
             self._next_stop += 1
         stop = self.route.stops[self._next_stop]
-        self._along_m = self.route.progress(self._along_m, x, y, stop.at_m)
-        if stop.at_m - self._along_m > _REACHED_M:
+        self.along_m = self.route.progress(self.along_m, x, y, stop.at_m)
+        if stop.at_m - self.along_m > _REACHED_M:
             return True
         last = math.isinf(stop.for_s)
         if last and math.dist(self.route.point(stop.at_m), (x, y)) > _END_REACHED_M:
@@ -213,5 +238,5 @@ class RouteFollower:
         dx, dy = stop_x - x, stop_y - y
         away = math.hypot(dx, dy)
         if away <= (_PUSHED_AWAY_M if settled else _NOT_SETTLED_M):
-            return DesiredVelocity(*self.route.direction(self._along_m), 0.0)
+            return DesiredVelocity(*self.route.direction(self.along_m), 0.0)
         return DesiredVelocity(dx / away, dy / away, min(_RETURN_MPS, _APPROACH_HZ * away))

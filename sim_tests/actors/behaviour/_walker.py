@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -15,7 +16,7 @@ from ._gaze import Gaze
 from ._obstacles import Obstacles
 from ._person import ALONE, PersonMotion, PersonOutcome, RobotBody, Surroundings
 from ._reactions import ReactionModel
-from ._route import STANDING_BELOW_MPS, DesiredVelocity, Route, RouteFollower
+from ._route import STANDING_BELOW_MPS, DesiredVelocity, FreeWalk, Route, RouteFollower
 from ._social_force import RELAXATION_S, people_force, robot_force
 from ._spec import PersonSpec
 from ._trajectory import Trajectory
@@ -109,10 +110,9 @@ class Walker:
         along = math.atan2(uy, ux) + (self._reverse_rad if route.length_m > 0.0 else 0.0)
         self._heading = along if self._standing_heading is None else self._standing_heading
         self._turning = 0.0
-        # Length walked so far, when the end was reached, and of the free walk with its time.
+        # Length walked so far, and when the end was reached.
         self._walked_m = 0.0
         self._walked_to_end_m: float | None = None
-        self._free_walk: tuple[float | None, float] | None = None
         # The robot: last known state and its time, contact direction and time, first contact.
         self._known_robot: tuple[RobotBody, float] | None = None
         self._touch: tuple[float, float, float] | None = None
@@ -159,19 +159,22 @@ class Walker:
 
     def outcome(self) -> PersonOutcome:
         """Return the outcome for the person up to now."""
-        time_s = None
-        follower = self._task
-        if follower.arrived_s is not None and follower.started_s is not None:
-            time_s = follower.arrived_s - follower.started_s
-        free_time_s, free_length_m = self._free_time_and_length()
+        time_s = late_s = None
+        task, free = self._task, self._free_walk
+        if free is not None and task.started_s is not None:
+            if task.arrived_s is not None:
+                time_s = task.arrived_s - task.started_s
+            else:
+                late_s = free.late_s(self._now_s - task.started_s, task.along_m)
         return PersonOutcome(
             name=self.spec.name,
             noticed_s=self._gaze.noticed_s,
             reaction=self._reactions.first_reaction,
-            time_s=time_s if free_time_s is not None else None,
-            free_time_s=free_time_s,
+            time_s=time_s,
+            late_s=late_s,
+            free_time_s=None if free is None else free.time_s,
             length_m=self._walked_m if self._walked_to_end_m is None else self._walked_to_end_m,
-            free_length_m=None if free_time_s is None else free_length_m,
+            free_length_m=None if free is None else free.length_m,
         )
 
     def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
@@ -377,22 +380,20 @@ class Walker:
                 ax, ay = ax + fx, ay + fy
         return ax, ay
 
-    def _free_time_and_length(self) -> tuple[float | None, float]:
-        """Return time and length of the walk without robot and people; time None without an end."""
-        if self._free_walk is None:
-            self._free_walk = (None, 0.0)
-            if self._task.route.length_m > 0.0:
-                self._free_walk = self._walk_alone()
-        return self._free_walk
-
-    def _walk_alone(self) -> tuple[float | None, float]:
+    @cached_property
+    def _free_walk(self) -> FreeWalk | None:
+        """The walk without robot and people; None without a route or without an end of it."""
+        if self._task.route.length_m == 0.0:
+            return None
         spec = self.spec.model_copy(update={"start_s": 0.0})
         alone = Walker(spec, np.random.default_rng(0), self._boxes_odom_m)
         route = self._task.route
         pauses = sum(stop.for_s for stop in route.stops[:-1])
         longest_s = _MAX_FREE_TIME_FACTOR * (route.length_m / spec.speed_mps + 5.0) + pauses
-        while not alone.arrived:
+        along_m = []
+        while alone._task.arrived_s is None:
             alone.advance((alone._tick + 1) * DECISION_PERIOD_S, ALONE)
+            along_m.append(alone._task.along_m)
             if alone._tick * DECISION_PERIOD_S > longest_s:
-                return None, 0.0
-        return alone._follower.arrived_s, alone._walked_m
+                return None
+        return FreeWalk(alone._task.arrived_s, alone._walked_m, DECISION_PERIOD_S, tuple(along_m))

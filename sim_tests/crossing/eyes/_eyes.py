@@ -10,7 +10,9 @@ import numpy as np
 
 from perception import PersonObservation
 from perception.arrays import FloatArray
+from perception.laser import ScannerSight
 from perception.surround import FlatView, merge_views
+from tracking import View
 
 from ...world.camera import CameraTiming, FrameClock, FrameQueue
 from .._stage import TrueView
@@ -27,8 +29,10 @@ class Eyes(Protocol):
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> WorkerObservations:
-        """Return the observations of people in the image taken now.
+    ) -> WorkerObservations | None:
+        """Return the observations of people in the image taken now; None if it shows nothing.
+
+        An image that shows nothing is no view of nobody. It does not arrive at the tracker.
 
         Args:
             stamp_s: time of the image.
@@ -52,9 +56,12 @@ class SurroundEyes:
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> WorkerObservations:
-        """Return the merged observations; only those of the first view keep their boxes."""
-        observed = [
+    ) -> WorkerObservations | None:
+        """Return the merged observations; only those of the first view keep their boxes.
+
+        The views are cut from one image, which shows nothing only if none of them does.
+        """
+        seen = [
             eyes.observe(
                 stamp_s,
                 T_odom_camera @ view.T_camera_view,
@@ -62,6 +69,9 @@ class SurroundEyes:
             )
             for view, eyes in zip(self._views, self._eyes, strict=True)
         ]
+        if all(each is None for each in seen):
+            return None
+        observed = [each or () for each in seen]
         merged = merge_views(self._views, [[each for each, _ in rows] for rows in observed])
         return tuple(
             (
@@ -92,6 +102,8 @@ class Sighting:
         observations: observations of people, each with the index of its worker.
         sensor: the tracker's name of the sensor.
         points_odom_m: (N, 2) points of a scan; None for an image.
+        view: where a scan could have shown people; None for an image.
+        sight: where a scan shows what is there; None for an image.
     """
 
     stamp_s: float
@@ -99,6 +111,8 @@ class Sighting:
     observations: WorkerObservations
     sensor: str = "camera"
     points_odom_m: FloatArray | None = None
+    view: View | None = None
+    sight: ScannerSight | None = None
 
 
 class TimedEyes:
@@ -112,6 +126,8 @@ class TimedEyes:
 
     def __init__(self, eyes: Eyes, timing: CameraTiming, rng: np.random.Generator) -> None:
         self._eyes = eyes
+        #: An image arrives at most this long after it was taken.
+        self.longest_delay_s = timing.latency_s + timing.latency_jitter_s
         self._clock = FrameClock(timing, rng)
         self._queue: FrameQueue[Sighting] = FrameQueue()
 
@@ -122,5 +138,6 @@ class TimedEyes:
         due, delivery_s = self._clock.tick(now_s)
         if due and delivery_s is not None:
             observations = self._eyes.observe(now_s, T_odom_camera, truth)
-            self._queue.put(now_s, delivery_s, Sighting(now_s, T_odom_camera, observations))
+            if observations is not None:
+                self._queue.put(now_s, delivery_s, Sighting(now_s, T_odom_camera, observations))
         return self._queue.take(now_s)

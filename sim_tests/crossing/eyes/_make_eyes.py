@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Final, get_args
 
 import numpy as np
@@ -9,10 +10,11 @@ import numpy as np
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.anthropometry import UNUSUAL_SIZE_PROBABILITY
 from perception.arrays import FloatArray
+from perception.networks import OnnxSettings
 from perception.surround import FlatView
 
 from ...actors.behaviour import PersonSpec, WorkerScript
-from ...scenario import Scenario
+from ...scenario import CameraSpec, Scenario
 from ...world.camera import CoarseSceneryRenderer
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
@@ -21,7 +23,7 @@ from ._eyes import Eyes, SurroundEyes
 from ._keypoint_camera import KeypointNoise
 from ._keypoint_eyes import KeypointEyes
 from ._map_view import MapView
-from ._pixel_eyes import PixelEyes
+from ._pixel_eyes import PictureChange, PixelEyes
 from ._sensors import ORACLE, PerceptionKind
 from ._true_eyes import TrueEyes
 
@@ -38,6 +40,7 @@ def make_eyes(
     rng: np.random.Generator,
     pipeline: AwarenessPipeline | None = None,
     T_camera_assumed: FloatArray | None = None,
+    change: PictureChange | None = None,
 ) -> Eyes:
     """Return the eyes of a perception.
 
@@ -50,6 +53,7 @@ def make_eyes(
         rng: random generator of the noise.
         pipeline: pipeline for pixels; None for the shipped networks.
         T_camera_assumed: see :class:`PixelEyes`.
+        change: a fault of the pictures, for pixels; None for none.
 
     Raises:
         SimError: for another kind.
@@ -67,7 +71,7 @@ def make_eyes(
             KeypointEyes(stage, camera, cone, noise, rng, sight, unusual) for _ in views
         ]
     elif kind == "pixels":
-        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed)
+        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed, change)
     else:
         valid = ", ".join(map(repr, get_args(PerceptionKind)))
         raise SimError(f"perception must be one of {valid}, got {kind!r}")
@@ -82,6 +86,46 @@ def unusual_size_probability(scenario: Scenario) -> float:
     return UNUSUAL_SIZE_PROBABILITY
 
 
+def pixel_pipeline(
+    scenario: Scenario,
+    *,
+    cone: AttentionCone | None = None,
+    onnx_settings: OnnxSettings | None = None,
+) -> AwarenessPipeline:
+    """Return the pipeline with the shipped networks for the rendered images of a scenario.
+
+    Scenarios with the same camera and the same people share one, because networks load slowly.
+
+    Args:
+        scenario: has the camera, and the people whose sizes the robot may assume.
+        cone: attention cone; None for the default.
+        onnx_settings: how the networks run.
+
+    Raises:
+        PerceptionError: the shipped networks cannot be loaded.
+    """
+    return _pipeline(
+        scenario.camera,
+        unusual_size_probability(scenario),
+        AttentionCone() if cone is None else cone,
+        onnx_settings,
+    )
+
+
+@lru_cache(maxsize=4)
+def _pipeline(
+    camera: CameraSpec, unusual: float, cone: AttentionCone, onnx_settings: OnnxSettings | None
+) -> AwarenessPipeline:
+    return AwarenessPipeline(
+        camera.camera(camera.picture_scale),
+        cone=cone,
+        # Workers in a crossing turn their heads; their eyes follow.
+        eye_in_head_std_rad=0.0,
+        unusual_size_probability=unusual,
+        onnx_settings=onnx_settings,
+    )
+
+
 def _pixel_eyes(
     stage: Stage,
     views: tuple[FlatView, ...],
@@ -89,18 +133,13 @@ def _pixel_eyes(
     rng: np.random.Generator,
     pipeline: AwarenessPipeline | None,
     T_camera_assumed: FloatArray | None,
+    change: PictureChange | None,
 ) -> list[Eyes]:
     """Return the eyes of every view; they share networks and renderer."""
     spec, camera = stage.scenario.camera, views[0].camera
     renderer = CoarseSceneryRenderer(stage.warehouse, spec.scenery_divisor)
     if pipeline is None:
-        # Workers in a crossing turn their heads; their eyes follow.
-        pipeline = AwarenessPipeline(
-            camera,
-            cone=cone,
-            eye_in_head_std_rad=0.0,
-            unusual_size_probability=unusual_size_probability(stage.scenario),
-        )
+        pipeline = pixel_pipeline(stage.scenario, cone=cone)
     return [
         PixelEyes(
             stage,
@@ -112,6 +151,7 @@ def _pixel_eyes(
             None
             if T_camera_assumed is None
             else view.T_camera_view.T @ T_camera_assumed @ view.T_camera_view,
+            change,
         )
         for view, view_rng in zip(
             views, [rng] if len(views) == 1 else rng.spawn(len(views)), strict=True

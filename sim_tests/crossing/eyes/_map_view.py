@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
-from tracking import View
+from tracking import RangedView, View
 
 from ...world import Warehouse, crosses_boxes
 
@@ -40,3 +41,11 @@ class MapView:
         if self.camera is None:
             return np.where(hidden, 0.0, 1.0)
         return np.where(hidden, 0.0, self.camera.visibility(positions_odom_m, T_odom_camera))
+
+    def passed(
+        self, positions_odom_m: FloatArray, radii_m: FloatArray, T_odom_camera: FloatArray
+    ) -> NDArray[np.bool_]:
+        """Return (N,) whether each place was seen empty; see :class:`tracking.RangedView`."""
+        if not isinstance(self.camera, RangedView):
+            return np.zeros(len(positions_odom_m), dtype=np.bool_)
+        return np.asarray(self.camera.passed(positions_odom_m, radii_m, T_odom_camera))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
-from perception.arrays import FloatArray
+from perception.arrays import FloatArray, ImageRgb
+from perception.no_view import why_no_view
 
 from ...world.camera import CameraTiming, ImageRenderer, SensorConfig, SimulatedCamera
 from ...world.errors import SimError
 from .._stage import Stage, TrueView
 from ._eyes import NOBODY, WorkerObservations
 
+#: A change of a picture on its way to the robot: picture and stamp give the one that arrives.
+PictureChange = Callable[[ImageRgb, float], ImageRgb]
 #: Frame rate of rendered cameras whose scenario gives none: images are costly to render.
 PIXEL_RATE_HZ: Final = 10.0
 # An observation shows a worker if the boxes overlap this much, or the positions are this close.
@@ -40,6 +43,7 @@ class PixelEyes:
         renderer: renderer of the images; None for a :class:`~sim_tests.CameraRenderer`.
         T_camera_assumed: (4, 4) pose of the camera as the robot assumes it, in the true camera's
             frame; None where they are the same.
+        change: a fault of the pictures; None for none.
 
     Raises:
         SimError: for a pipeline with another camera.
@@ -54,6 +58,7 @@ class PixelEyes:
         pipeline: AwarenessPipeline,
         renderer: ImageRenderer | None = None,
         T_camera_assumed: FloatArray | None = None,
+        change: PictureChange | None = None,
     ) -> None:
         self._stage = stage
         self._pipeline = pipeline
@@ -68,6 +73,7 @@ class PixelEyes:
                 f"{theirs.width_px} x {theirs.height_px} px, {theirs.fx_px:.1f} px"
             )
         self._T_camera_assumed = T_camera_assumed
+        self._change = change
         self._camera = SimulatedCamera(
             stage.warehouse,
             camera,
@@ -78,15 +84,20 @@ class PixelEyes:
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> WorkerObservations:
-        """Render an image; return the observations of the pipeline, each with its worker."""
+    ) -> WorkerObservations | None:
+        """Render an image; return the observations of the pipeline, each with its worker.
+
+        None for an image that is no view, such as a black one.
+        """
         frame = self._camera.capture(stamp_s, T_odom_camera)
+        rgb = frame.rgb if self._change is None else self._change(frame.rgb, stamp_s)
+        # Not compared with the image before: a sensor without noise sees the same thing twice.
+        if why_no_view(rgb) is not None:
+            return None
         assumed = frame.T_odom_camera
         if self._T_camera_assumed is not None:
             assumed = assumed @ self._T_camera_assumed
-        observations = self._pipeline.process(
-            frame.rgb, stamp_s, floor=FloorPlane.from_pose(assumed)
-        )
+        observations = self._pipeline.process(rgb, stamp_s, floor=FloorPlane.from_pose(assumed))
         boxes = [_box_of(frame.actors == worker.actor) for worker in self._stage.workers]
         workers = match_to_workers(observations, truth, boxes)
         return tuple(zip(observations, workers, strict=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -19,6 +19,7 @@ from perception.laser import (
     StaticMap,
     observations_of,
     scan_points,
+    sight_of,
 )
 from tracking import ScannerView, SensorConfig
 
@@ -82,6 +83,8 @@ class ScannerEyes:
         self._mountings = (
             [spec.scanner(body_base_m) for spec in specs] if mountings is None else list(mountings)
         )
+        self._views = [scanner_view(spec) for spec in specs]
+        self._map_view = MapView.of(warehouse)
         self._change = change
         self._queue: FrameQueue[_Taken] = FrameQueue()
         self._detector = LegDetector(static_map=map_of(warehouse))
@@ -108,9 +111,10 @@ class ScannerEyes:
                     continue
                 scan, delivery_s = changed
             self._queue.put(now_s, delivery_s, _Taken(scan, number, known))
-        return tuple(
+        sightings = [
             self._sighting(taken) for taken in self._queue.take(now_s) if self._is_new(taken)
-        )
+        ]
+        return tuple(each for each in sightings if each is not None)
 
     def _is_new(self, taken: _Taken) -> bool:
         """Return whether a scan is later than those before it; the detector needs their order."""
@@ -119,9 +123,13 @@ class ScannerEyes:
         self._latest_s[taken.number] = taken.scan.end_s
         return True
 
-    def _sighting(self, taken: _Taken) -> Sighting:
+    def _sighting(self, taken: _Taken) -> Sighting | None:
+        """Return the people in a scan; None for a scan that shows nothing, as on a robot."""
         mounting = self._mountings[taken.number]
         points = scan_points(taken.scan, mounting, taken.known)
+        sight = sight_of(taken.scan, mounting, points)
+        if sight.nothing:
+            return None
         found = self._detector.detect(points, taken.number)
         T_odom_scanner = taken.known.T_odom_base @ mounting.T_base_scanner
         return Sighting(
@@ -130,6 +138,8 @@ class ScannerEyes:
             tuple((each, NOBODY) for each in observations_of(found, T_odom_scanner)),
             sensor=sensor_name(taken.number),
             points_odom_m=points.points_odom_m[points.usable, :2],
+            view=replace(self._map_view, camera=replace(self._views[taken.number], points=points)),
+            sight=sight,
         )
 
 
@@ -138,16 +148,20 @@ def sensor_name(number: int) -> str:
     return f"scanner_{number + 1}"
 
 
+def scanner_view(spec: ScannerSpec) -> ScannerView:
+    """Return the view of a scanner, of which the ranges are unknown."""
+    low, high = np.radians(spec.field_of_view_deg).tolist()
+    # The view is symmetrical about the scanner's x axis.
+    field_rad = math.tau if high - low >= math.tau else max(2.0 * min(-low, high), 1e-3)
+    return ScannerView(max_range_m=min(_RANGE_M, spec.range_max_m), field_rad=field_rad)
+
+
 def scanner_sensors(warehouse: Warehouse, specs: Iterable[ScannerSpec]) -> dict[str, SensorConfig]:
     """Return the scanners as sensors of a tracker whose robot knows the racks of its hall."""
-    sensors = {}
-    for number, spec in enumerate(specs):
-        low, high = np.radians(spec.field_of_view_deg).tolist()
-        # The view is symmetrical about the scanner's x axis.
-        field_rad = math.tau if high - low >= math.tau else max(2.0 * min(-low, high), 1e-3)
-        view = ScannerView(max_range_m=min(_RANGE_M, spec.range_max_m), field_rad=field_rad)
-        sensors[sensor_name(number)] = SensorConfig(view=MapView.of(warehouse, view))
-    return sensors
+    return {
+        sensor_name(number): SensorConfig(view=MapView.of(warehouse, scanner_view(spec)))
+        for number, spec in enumerate(specs)
+    }
 
 
 def known_motion(state: RobotState) -> RobotMotion:

@@ -6,7 +6,7 @@ from ._detections import FaultyDetections
 from ._fault import Bursts, Fault, Ghosts, shipped_faults
 from ._frames import FaultyEyes
 from ._injection import FaultInjection
-from ._outage import Outage
+from ._outage import Onset, Outage
 from ._scanner_fault import Appearances, BlindSector, ScannerFault
 from ._scans import FaultyScans
 
@@ -20,6 +20,7 @@ __all__ = [
     "FaultyEyes",
     "FaultyScans",
     "Ghosts",
+    "Onset",
     "Outage",
     "ScannerFault",
     "shipped_faults",

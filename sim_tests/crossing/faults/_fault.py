@@ -15,7 +15,7 @@ from perception.documents import parse_yaml
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
-from ._outage import Outage
+from ._outage import Onset, Outage
 from ._scanner_fault import ScannerFault
 
 _JOINT: Final = "+"
@@ -69,6 +69,8 @@ class Fault(StrictConfig):
         latency_jitter_s: largest additional delay, uniformly distributed.
         frozen_camera: the last image is delivered again and again. With fresh stamps people seem to
             stand still in the image, and so to move with the robot.
+        black_camera: pictures are black from a time on, while their stamps go on; None never. The
+            robot takes no such picture for a view.
         pitch_error_deg: the robot assumes that its camera looks this much higher than it does.
         yaw_error_deg: the same to the left.
         odometry_delay_s: age of the newest pose and speed that the robot knows; they have their
@@ -91,6 +93,7 @@ class Fault(StrictConfig):
     latency_s: float = Field(default=0.0, ge=0.0, le=10.0)
     latency_jitter_s: float = Field(default=0.0, ge=0.0, le=10.0)
     frozen_camera: Outage = Outage()
+    black_camera: Onset | None = None
     pitch_error_deg: float = Field(default=0.0, ge=-45.0, le=45.0)
     yaw_error_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
     odometry_delay_s: float = Field(default=0.0, ge=0.0, le=10.0)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from ..eyes import Sighting, TimedEyes
 from ._detections import FaultyDetections
 from ._fault import Fault
 
+# Tolerance for times that are sums of many steps.
+_EARLY_S: Final = 1.0e-6
+
 
 class FaultyEyes:
     """The robot's eyes with a fault.
@@ -24,13 +29,20 @@ class FaultyEyes:
         eyes: eyes without it.
         camera: camera of the robot.
         rng: random generator of the fault.
+        black_s: from this time on, no image shows anything, and none arrives.
     """
 
     def __init__(
-        self, fault: Fault, eyes: TimedEyes, camera: Camera, rng: np.random.Generator
+        self,
+        fault: Fault,
+        eyes: TimedEyes,
+        camera: Camera,
+        rng: np.random.Generator,
+        *,
+        black_s: float = math.inf,
     ) -> None:
         detection_rng, self._timing_rng, freeze_rng = rng.spawn(3)
-        self._eyes = eyes
+        self._eyes, self._black_s = eyes, black_s
         self._detections = FaultyDetections(fault, camera, detection_rng)
         self._freeze = fault.frozen_camera
         self._first_freeze_s = float(freeze_rng.uniform(0.0, self._freeze.every_s))
@@ -59,6 +71,8 @@ class FaultyEyes:
             truth: the truth about each person.
         """
         self._poses[now_s] = (T_odom_camera, T_odom_camera_known)
+        while next(iter(self._poses)) < now_s - self._eyes.longest_delay_s - _EARLY_S:
+            del self._poses[next(iter(self._poses))]  # no image of that time can still arrive
         for taken in self._eyes.look(now_s, T_odom_camera, truth):
             sighting = self._with_fault(taken)
             delivery_s = self._timing.delivery_s(now_s, self._timing_rng)
@@ -70,6 +84,8 @@ class FaultyEyes:
         """Return the image that is delivered instead of the one taken; None for none."""
         true, known = self._poses[taken.stamp_s]
         observations = self._detections.apply(taken.observations, taken.stamp_s, true)
+        if taken.stamp_s >= self._black_s:
+            return None
         if not self._freeze.holds(taken.stamp_s, self._first_freeze_s):
             self._last = Sighting(taken.stamp_s, known, observations)
             return self._last

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from perception import Camera
-from perception.arrays import FloatArray
+from perception.arrays import FloatArray, ImageRgb
 from perception.laser import Scanner
 
 from ...world.scanner import ScannerSpec
@@ -38,14 +38,23 @@ class FaultInjection:
 
     def __init__(self, fault: Fault | None, seed: int) -> None:
         self._fault = Fault() if fault is None else fault
-        self._eyes_rng, self._odometry_rng, self._scans_rng = np.random.default_rng(
+        self._eyes_rng, self._odometry_rng, self._scans_rng, black_rng = np.random.default_rng(
             [_STREAM, seed]
-        ).spawn(3)
+        ).spawn(4)
+        onset, draw = self._fault.black_camera, float(black_rng.random())
+        self._black_s = math.inf if onset is None else onset.begins_s(draw)
         self.T_camera_assumed = _mounting_error(self._fault)
 
-    def eyes(self, eyes: TimedEyes, camera: Camera) -> FaultyEyes:
-        """Return the eyes with the fault."""
-        return FaultyEyes(self._fault, eyes, camera, self._eyes_rng)
+    def picture(self, rgb: ImageRgb, stamp_s: float) -> ImageRgb:
+        """Return the picture (H, W, 3) that the camera delivers instead of one that it took."""
+        return np.zeros_like(rgb) if stamp_s >= self._black_s else rgb
+
+    def eyes(self, eyes: TimedEyes, camera: Camera, *, pictures: bool) -> FaultyEyes:
+        """Return the eyes with the fault; with ``pictures`` they use :meth:`picture` themselves."""
+        # Eyes without pictures have none to judge: a black one arrives as no frame, as it does
+        # where the judgement of real pictures is used.
+        black_s = math.inf if pictures else self._black_s
+        return FaultyEyes(self._fault, eyes, camera, self._eyes_rng, black_s=black_s)
 
     def odometry(self) -> FaultyOdometry:
         """Return the robot's odometry with the fault."""

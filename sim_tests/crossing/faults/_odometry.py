@@ -1,4 +1,4 @@
-"""OdometryReading that is delayed, lost, or wrong about the mounting of the camera."""
+"""Odometry that is delayed, lost, or wrong about the mounting of the camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Repeated outages of a sensor as data."""
+"""Outages of a sensor as data: repeated ones, and one without an end."""
 
 from __future__ import annotations
 
@@ -9,6 +9,25 @@ from pydantic import Field, model_validator
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
+
+
+class Onset(StrictConfig):
+    """The time from which something holds until the end; the default is the start of the episode.
+
+    Attributes:
+        after_s: it begins then at the earliest.
+        within_s: and at most this much later, evenly distributed over the episodes; 0 for exactly
+            then.
+    """
+
+    error: ClassVar[type[ValueError]] = SimError
+
+    after_s: float = Field(default=0.0, ge=0.0, le=600.0)
+    within_s: float = Field(default=0.0, ge=0.0, le=600.0)
+
+    def begins_s(self, draw: float) -> float:
+        """Return the time for a number drawn evenly from 0 to 1."""
+        return self.after_s + draw * self.within_s
 
 
 class Outage(StrictConfig):

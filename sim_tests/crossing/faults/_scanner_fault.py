@@ -2,33 +2,40 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Final, Literal
 
 from pydantic import Field
 
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
-from ._outage import Outage
+from ._outage import Onset, Outage
+
+#: What a driver publishes for a ray without an answer.
+NO_ANSWERS: Final = ("inf", "minus_inf", "nan", "zero", "below_min", "above_max")
 
 
-class BlindSector(StrictConfig):
+class BlindSector(Onset):
     """A sector in which no ray returns, as behind dirt on the window; the default has none.
 
+    It begins as an :class:`Onset` does, at the same time for all scanners.
+
     Attributes:
-        width_deg: width of the sector; 0 for none.
+        width_deg: width of the sector; 0 for none, 360 for a scanner that sees nothing.
         at_deg: direction of its middle from the robot's heading, left positive; None draws it in
             each episode, evenly over the circle. All scanners are blind in the same direction, so
             that none of them replaces another.
         returns: ``"inf"``: no return, as from empty space; ``"max"``: the longest range, as some
-            drivers write it; ``"nan"``: an invalid measurement.
+            drivers write it; ``"nan"``: an invalid measurement; ``"zero"``: 0; ``"minus_inf"``: too
+            near; ``"below_min"``, ``"above_max"``: half the shortest and twice the longest range.
+            ``"any"`` draws one of all but ``"max"`` in each episode.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     width_deg: float = Field(default=0.0, ge=0.0, le=360.0)
     at_deg: float | None = Field(default=None, ge=-180.0, le=180.0)
-    returns: str = Field(default="inf", pattern="^(inf|max|nan)$")
+    returns: Literal["inf", "max", "nan", "zero", "minus_inf", "below_min", "above_max", "any"] = (
+        "inf"
+    )
 
 
 class Appearances(StrictConfig):

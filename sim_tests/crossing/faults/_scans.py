@@ -15,9 +15,8 @@ from perception.laser import LaserScan, RobotMotion, Scanner
 from ...world.scanner import ScannerSpec
 from ._false_returns import Appearing, Legs, Mirror, new_legs, new_mirror, with_legs, with_mirror
 from ._fault import Fault
-from ._scanner_fault import ScannerFault
+from ._scanner_fault import NO_ANSWERS, BlindSector, ScannerFault
 
-_BLIND_RANGES: Final = {"inf": math.inf, "nan": math.nan}
 # Streams of each scanner.
 _STREAMS: Final = 5
 
@@ -35,14 +34,12 @@ class FaultyScans:
         self, fault: Fault, specs: Sequence[ScannerSpec], rng: np.random.Generator
     ) -> None:
         common_rng, *own = rng.spawn(1 + _STREAMS * len(specs))
-        at_deg = fault.scanner.blind.at_deg
-        drawn_deg = float(common_rng.uniform(-180.0, 180.0))
-        blind_rad = math.radians(drawn_deg if at_deg is None else at_deg)
+        blind = _Blindness(fault.scanner.blind, common_rng)
         self._scanners = [
             _FaultyScanner(
                 fault.scanner,
                 spec.scanner(),
-                blind_rad,
+                blind,
                 own[_STREAMS * number : _STREAMS * (number + 1)],
             )
             if fault.scanner.only in (None, number + 1)
@@ -65,6 +62,38 @@ class FaultyScans:
         return (scan, delivery_s) if scanner is None else scanner.change(scan, delivery_s, motion)
 
 
+class _Blindness:
+    """The sector of an episode in which no scanner gets an answer."""
+
+    def __init__(self, sector: BlindSector, rng: np.random.Generator) -> None:
+        drawn_deg = float(rng.uniform(-180.0, 180.0))
+        begins, form = rng.random(2).tolist()
+        at_deg = drawn_deg if sector.at_deg is None else sector.at_deg
+        self._width_deg, self._middle_rad = sector.width_deg, math.radians(at_deg)
+        self._begins_s = sector.begins_s(begins)
+        drawn = NO_ANSWERS[int(form * len(NO_ANSWERS))]
+        self._returns = drawn if sector.returns == "any" else sector.returns
+
+    def blinded(self, scan: LaserScan, t_s: float, mounting: Scanner) -> LaserScan:
+        """Return a scan taken at ``t_s`` without the answers of the sector."""
+        if self._width_deg == 0.0 or t_s < self._begins_s:
+            return scan
+        directions = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad)))
+        x, y = (mounting.T_base_scanner[:2, :2] @ directions.T).tolist()
+        off = np.arctan2(y, x) - self._middle_rad
+        inside = np.cos(off) >= math.cos(math.radians(0.5 * self._width_deg)) - 1e-9
+        no_answer = {
+            "inf": math.inf,
+            "max": scan.range_max_m,
+            "nan": math.nan,
+            "zero": 0.0,
+            "minus_inf": -math.inf,
+            "below_min": 0.5 * scan.range_min_m,
+            "above_max": 2.0 * scan.range_max_m,
+        }[self._returns]
+        return replace(scan, ranges_m=np.where(inside, no_answer, scan.ranges_m))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
     """A scan as it was measured, and the pose of its scanner in odom (4, 4)."""
@@ -80,11 +109,11 @@ class _FaultyScanner:
         self,
         fault: ScannerFault,
         mounting: Scanner,
-        blind_rad: float,
+        blind: _Blindness,
         rngs: Sequence[np.random.Generator],
     ) -> None:
         timing_rng, self._drop_rng, self._noise_rng, mirror_rng, legs_rng = rngs
-        self._fault, self._mounting, self._blind_rad = fault, mounting, blind_rad
+        self._fault, self._mounting, self._blind = fault, mounting, blind
         freeze, death = timing_rng.random(2).tolist()
         self._first_freeze_s = freeze * fault.frozen.every_s
         within_s = fault.dies_within_s
@@ -107,7 +136,7 @@ class _FaultyScanner:
             scan = with_mirror(scan, mirror, T_odom_scanner)
         for legs in self._legs.now(motion.stamp_s):
             scan = with_legs(scan, legs, motion.stamp_s, T_odom_scanner, noise)
-        scan = self._blinded(scan)
+        scan = self._blind.blinded(scan, motion.stamp_s, self._mounting)
         if self._fault.frozen.holds(motion.stamp_s, self._first_freeze_s):
             if self._last is None:
                 return None
@@ -119,17 +148,6 @@ class _FaultyScanner:
             return None
         stamped = replace(scan, stamp_s=scan.stamp_s + self._fault.clock_error_s)
         return stamped, delivery_s + self._fault.latency_s
-
-    def _blinded(self, scan: LaserScan) -> LaserScan:
-        blind = self._fault.blind
-        if blind.width_deg == 0.0:
-            return scan
-        directions = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad)))
-        x, y = (self._mounting.T_base_scanner[:2, :2] @ directions.T).tolist()
-        off = np.arctan2(y, x) - self._blind_rad
-        inside = np.cos(off) >= math.cos(math.radians(0.5 * blind.width_deg)) - 1e-9
-        nothing = _BLIND_RANGES.get(blind.returns, scan.range_max_m)
-        return replace(scan, ranges_m=np.where(inside, nothing, scan.ranges_m))
 
     def _new_mirror(self, rng: np.random.Generator, _: float) -> Mirror | None:
         assert self._seen is not None  # only called from change()

@@ -12,7 +12,6 @@ import numpy as np
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ...actors.robot import NOVA_CARTER
 from ...world import crosses_boxes
 from ...world.errors import SimError
 from .._scenario import Scenario
@@ -43,7 +42,7 @@ def scenario_problems(scenario: Scenario) -> tuple[str, ...]:
     inner = (hall.x_min_m, hall.y_min_m, hall.x_max_m, hall.y_max_m)
     task = scenario.robot
     start, goal = (task.start_x_m, task.start_y_m), (task.goal_x_m, task.goal_y_m)
-    reach = NOVA_CARTER.circumscribed_radius_m
+    reach = scenario.robot_profile.circumscribed_radius_m  # room to turn
     found = [
         *_place_problems("the robot's start", start, boxes, inner, reach),
         *_place_problems("the robot's goal", goal, boxes, inner, reach),

@@ -25,7 +25,6 @@ from awarenav.figures import (
 from perception.arrays import FloatArray
 
 from ...actors.behaviour import PersonSpec, RecordedPath, WorkerScript, read_recordings
-from ...actors.robot import NOVA_CARTER
 from ...world.errors import SimError
 from .._scenario import Scenario
 from .._template import ScenarioTemplate
@@ -80,7 +79,7 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
     _draw_hall(axes, scenario)
     now_s = _drawn_time_s(scenario)
     _draw_robot(axes, scenario, now_s)
-    robot_m = robot_plan(scenario.robot, np.array([now_s]))[0]
+    robot_m = robot_plan(scenario.robot, np.array([now_s]), scenario.robot_profile)[0]
     others = [template.for_seed(seed).people for seed in range(_DRAWS)]
     for number, spec in enumerate(scenario.people):
         for people in others:
@@ -152,19 +151,19 @@ def _draw_hall(axes: Axes, scenario: Scenario) -> None:
 
 
 def _draw_robot(axes: Axes, scenario: Scenario, now_s: float) -> None:
-    task = scenario.robot
+    task, robot = scenario.robot, scenario.robot_profile
     times = np.arange(0.0, scenario.duration_s, _DOT_STEP_S)
-    path = robot_plan(task, times)
+    path = robot_plan(task, times, robot)
     arrived = 1 + int(np.flatnonzero((path == path[-1]).all(axis=1))[0])
     axes.plot(
         [task.start_x_m, task.goal_x_m], [task.start_y_m, task.goal_y_m], color=_ROBOT, lw=1.6
     )
     _draw_times(axes, path[:arrived], times[:arrived], _ROBOT, below=True)
     axes.plot(task.goal_x_m, task.goal_y_m, "s", color=_ROBOT, mfc="white", ms=7, zorder=4)
-    here = robot_plan(task, np.array([now_s]))[0]
+    here = robot_plan(task, np.array([now_s]), robot)[0]
     heading = math.atan2(task.goal_y_m - task.start_y_m, task.goal_x_m - task.start_x_m)
     cos, sin = math.cos(heading), math.sin(heading)
-    outline = NOVA_CARTER.footprint_m @ np.array([[cos, sin], [-sin, cos]]) + here
+    outline = robot.footprint_m @ np.array([[cos, sin], [-sin, cos]]) + here
     axes.add_patch(Polygon(outline, fc=_ROBOT, ec="black", lw=0.8, zorder=5))
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from nav_adapter import RobotProfile
 from perception.arrays import FloatArray
 
 from ...actors.behaviour import PersonSpec
@@ -19,7 +20,7 @@ CONFLICT_M: Final = 1.0
 _STEP_S: Final = 0.02
 
 
-def robot_plan(task: RobotTask, t_s: FloatArray) -> FloatArray:
+def robot_plan(task: RobotTask, t_s: FloatArray, robot: RobotProfile = NOVA_CARTER) -> FloatArray:
     """Return the positions (T, 2) in odom of a robot that drives straight to its goal and stops.
 
     It accelerates to its maximum speed, or to the speed of the task; braking is not modelled.
@@ -27,9 +28,9 @@ def robot_plan(task: RobotTask, t_s: FloatArray) -> FloatArray:
     start = np.array([task.start_x_m, task.start_y_m])
     goal = np.array([task.goal_x_m, task.goal_y_m])
     length = float(np.linalg.norm(goal - start))
-    speed = task.straight_on_speed_mps or NOVA_CARTER.max_speed_mps
-    speed_up_s = np.minimum(t_s, speed / NOVA_CARTER.max_acceleration_mps2)
-    driven = 0.5 * NOVA_CARTER.max_acceleration_mps2 * speed_up_s**2 + speed * (t_s - speed_up_s)
+    speed = task.straight_on_speed_mps or robot.max_speed_mps
+    speed_up_s = np.minimum(t_s, speed / robot.max_acceleration_mps2)
+    driven = 0.5 * robot.max_acceleration_mps2 * speed_up_s**2 + speed * (t_s - speed_up_s)
     share = np.minimum(driven / max(length, 1e-9), 1.0)
     return np.asarray(start + share[:, None] * (goal - start))
 
@@ -74,7 +75,7 @@ def closest_approaches(scenario: Scenario) -> dict[str, tuple[float, float]]:
         time in seconds.
     """
     t_s = np.arange(0.0, scenario.duration_s, _STEP_S)
-    robot = robot_plan(scenario.robot, t_s)
+    robot = robot_plan(scenario.robot, t_s, scenario.robot_profile)
     arrived = np.flatnonzero((robot == robot[-1]).all(axis=1))[0] + 1
     t_s, robot = t_s[:arrived], robot[:arrived]
     paths = {spec.name: person_plan(spec, t_s)[0] for spec in scenario.people}

@@ -90,7 +90,8 @@ def scenario_from_recording(
 
     Raises:
         SimError: for a table that cannot be used, see :func:`read_table`; an unknown ``robot_id``;
-            nobody in the chosen time; and a start or a goal on top of a person.
+            nobody in the chosen time; a start on top of a person; and a goal where somebody stands
+            until they leave.
     """
     options = RecordingOptions() if options is None else options
     _check_options(options)
@@ -116,7 +117,8 @@ def scenario_from_recording(
             + (f" up to {end_s:g} s" if math.isfinite(end_s) else "")
         )
     start, goal = _task(table, people, robot, options)
-    _check_place("start", start, people, at_s=0.0)
+    _check_start(start, people)
+    _check_goal(start, goal, people)
     data = _scenario_data(table, people_file.name, people, (start, goal), options)
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
     template = ScenarioTemplate.from_text(text, str(out))
@@ -217,18 +219,35 @@ def _rounded(point: FloatArray) -> _Point:
     return x, y
 
 
-def _check_place(what: str, place: _Point, people: list[RecordedTrack], at_s: float) -> None:
+def _check_start(start: _Point, people: list[RecordedTrack]) -> None:
     """Raise SimError if somebody is where the robot starts."""
-    apart_m = NOVA_CARTER.circumscribed_radius_m + BODY_RADIUS_M
     for track in people:
-        if track.times_s[0] <= at_s <= track.times_s[-1]:
-            row = int(np.searchsorted(track.times_s, at_s))
-            gap_m = math.dist(place, track.positions_odom_m[row].tolist())
-            if gap_m < apart_m:
-                raise SimError(
-                    f"the robot's {what} ({place[0]:g}, {place[1]:g}) m is {gap_m:.2f} m from "
-                    f"{track.name!r} at that time; it needs {apart_m:.2f} m: give another --{what}"
-                )
+        if track.times_s[0] <= 0.0 <= track.times_s[-1]:
+            row = int(np.searchsorted(track.times_s, 0.0))
+            gap_m = math.dist(start, track.positions_odom_m[row].tolist())
+            _refuse_near("start", start, track.name, gap_m, 0.0)
+
+
+def _check_goal(start: _Point, goal: _Point, people: list[RecordedTrack]) -> None:
+    """Raise SimError if somebody stands at the goal from the robot's earliest arrival on.
+
+    People who pass, or leave before the robot comes, are no obstacle.
+    """
+    arrival_s = math.dist(start, goal) / NOVA_CARTER.max_speed_mps
+    for track in people:
+        later = track.positions_odom_m[track.times_s >= arrival_s]
+        if len(later):
+            gap_m = float(np.linalg.norm(later - goal, axis=1).max())
+            _refuse_near("goal", goal, track.name, gap_m, arrival_s)
+
+
+def _refuse_near(what: str, place: _Point, name: str, gap_m: float, at_s: float) -> None:
+    apart_m = NOVA_CARTER.circumscribed_radius_m + BODY_RADIUS_M
+    if gap_m < apart_m:
+        raise SimError(
+            f"the robot's {what} ({place[0]:g}, {place[1]:g}) m is {gap_m:.2f} m from {name!r} at "
+            f"{at_s:.1f} s; it needs {apart_m:.2f} m: give another --{what}"
+        )
 
 
 def _scenario_data(
@@ -311,7 +330,7 @@ def _remarks(
     )
     nearest = []
     for track in people:
-        robot = robot_plan(task, track.times_s)
+        robot = robot_plan(task, track.times_s, scenario.robot_profile)
         gaps_m = np.linalg.norm(track.positions_odom_m - robot, axis=1)
         row = int(gaps_m.argmin())
         nearest.append((float(gaps_m[row]), float(track.times_s[row]), track.name))

@@ -99,9 +99,7 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
 def _draw_plan(axes: Axes, case: WorstCase) -> None:
     frames = case.result.frames
     margins = [
-        min(frame.margins_m, default=math.inf)
-        if abs(frame.robot_state.speed_mps) > 0.03
-        else math.inf
+        min(frame.margins_m, default=math.inf) if frame.robot_state.travel_mps > 0.03 else math.inf
         for frame in frames
     ]
     worst = int(np.argmin(margins))
@@ -140,7 +138,7 @@ def _draw_plan(axes: Axes, case: WorstCase) -> None:
     record = case.record
     touched = f", {record.contact_by} touched" if record.contact_by else ""
     margin = "none" if record.min_margin_m is None else f"{record.min_margin_m:.2f} m"
-    speed_mps = frame.robot_state.speed_mps
+    speed_mps = frame.robot_state.travel_mps
     if case.result.contacts:
         speed_mps = case.result.contacts[0].robot_speed_mps
     axes.set_title(

@@ -60,10 +60,8 @@ class ScenarioSpace:
         median = template.median()
         self._median: dict[str, Any] = median.model_dump(mode="json")
         self._boxes = median.layout.obstacle_boxes_odom
-        self._longer_m = 0.0
-        if median.robot_model is not None:
-            reach_m = median.robot_model.profile.circumscribed_radius_m
-            self._longer_m = max(reach_m - NOVA_CARTER.circumscribed_radius_m, 0.0)
+        reach_m = median.robot_profile.circumscribed_radius_m
+        self._longer_m = max(reach_m - NOVA_CARTER.circumscribed_radius_m, 0.0)
         self._is_recorded = median.population == "recorded"
         everybody = [(kind, row) for kind in _KINDS for row in range(len(self._median[kind]))]
         varied = everybody[:people]

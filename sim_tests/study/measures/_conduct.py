@@ -78,15 +78,16 @@ class Conduct:
 def limit_excess_mps(frames: Sequence[CrossingFrame], robot: RobotProfile) -> float | None:
     """Return the largest excess of the speed over the allowed one, m/s.
 
-    Allowed is ``speed_limit_mps`` of the cycle before. Where the limit falls faster than the robot
-    can brake, full braking from the allowed speed of the cycle before is allowed as well. So the
-    excess of a robot that does not brake grows until it is the whole difference to the limit. It is
-    negative for a robot that was always slower than allowed, and None for fewer than two cycles.
+    The speed is that in the direction of travel, whatever the heading. Allowed is
+    ``speed_limit_mps`` of the cycle before. Where the limit falls faster than the robot can brake,
+    full braking from the allowed speed of the cycle before is allowed as well. So the excess of a
+    robot that does not brake grows until it is the whole difference to the limit. It is negative
+    for a robot that was always slower than allowed, and None for fewer than two cycles.
     """
     return _largest_excess(
         frames,
         robot,
-        [abs(frame.robot_state.speed_mps) for frame in frames],
+        [frame.robot_state.travel_mps for frame in frames],
         [frame.constraints.speed_limit_mps for frame in frames],
     )
 
@@ -104,7 +105,7 @@ def fastest_point_excess_mps(frames: Sequence[CrossingFrame], robot: RobotProfil
     return _largest_excess(
         frames,
         robot,
-        [abs(state.speed_mps) + abs(state.yaw_rate_radps) * radius_m for state in states],
+        [state.travel_mps + abs(state.yaw_rate_radps) * radius_m for state in states],
         [math.inf if limit is None else limit for limit in limits],
     )
 

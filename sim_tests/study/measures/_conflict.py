@@ -118,11 +118,9 @@ def min_time_to_collision_s(
     if not trace.people:
         return None
     relative = trace.people_odom_m - trace.robot_odom_m[:, None, :]
-    ahead = np.stack([np.cos(trace.heading_odom_rad), np.sin(trace.heading_odom_rad)], axis=1)
-    velocity = trace.people_odom_mps - (trace.speed_mps[:, None] * ahead)[:, None, :]
     times = outline.time_to_disc(
         trace.to_base(relative).reshape(-1, 2),
-        trace.to_base(velocity).reshape(-1, 2),
+        (trace.to_base(trace.people_odom_mps) - trace.velocity_base_mps[:, None, :]).reshape(-1, 2),
         body_radius_m,
     )
     smallest = float(times.min())

@@ -43,7 +43,7 @@ def count_stops(
     """Return how often the robot came to a stand.
 
     Args:
-        speeds_mps: (N,) signed speeds.
+        speeds_mps: (N,) speeds, signed or not.
         arrived: the goal was reached at the end; standing at the goal is not a stop.
         standing_mps: the robot stands below this speed.
         moving_mps: after a stop, the robot must exceed this speed before it can stop again.
@@ -58,17 +58,18 @@ def count_stops(
 
 
 def peak_deceleration_and_jerk(
-    t_s: FloatArray, speeds_mps: FloatArray
+    t_s: FloatArray, velocities_mps: FloatArray
 ) -> tuple[float | None, float | None]:
-    """Return the highest deceleration (m/s²) and the largest jerk (m/s³) of the actual speed.
+    """Return the highest deceleration (m/s²) and the largest jerk (m/s³) of the actual velocity.
 
-    They are the first and second derivatives of a parabola fitted to the speeds within ±0.25 s of
-    each instant (Savitzky and Golay 1964). The first and last 0.25 s have no full window and are
-    left out. Deceleration is the decrease of the speed's magnitude; 0 if it never decreased.
+    They are the first and second derivatives of a parabola fitted to the velocities within ±0.25 s
+    of each instant (Savitzky and Golay 1964). The first and last 0.25 s have no full window and are
+    left out. Deceleration is the decrease of the speed; 0 if it never decreased. In the base frame
+    the turning of a robot counts for neither.
 
     Args:
         t_s: (N,) evenly spaced.
-        speeds_mps: (N,) signed speeds.
+        velocities_mps: (N,) signed speeds, or (N, 2) velocities in the base frame.
 
     Returns:
         None and None for an episode shorter than the window.
@@ -83,12 +84,18 @@ def peak_deceleration_and_jerk(
     from scipy.signal import savgol_filter  # noqa: PLC0415
 
     whole = slice(window // 2, len(t_s) - window // 2)
+    velocity = velocities_mps.reshape(len(t_s), -1)
     slope, curvature = (
-        savgol_filter(speeds_mps, window, _DEGREE, deriv=order, delta=dt_s)[whole]
+        savgol_filter(velocity, window, _DEGREE, deriv=order, delta=dt_s, axis=0)[whole]
         for order in (1, 2)
     )
-    deceleration = -slope * np.sign(speeds_mps[whole])
-    return max(float(deceleration.max()), 0.0), float(np.abs(curvature).max())
+    speed = np.linalg.norm(velocity[whole], axis=1)
+    moving = speed > 0.0
+    deceleration = -np.sum(slope * velocity[whole], axis=1)[moving] / speed[moving]
+    return (
+        float(deceleration.max(initial=0.0)),
+        float(np.linalg.norm(curvature, axis=1).max()),
+    )
 
 
 def _window_samples(dt_s: float) -> int:

@@ -62,7 +62,7 @@ def measure(
     outline = Outline(result.robot.footprint_m)
     nearest_m = trace.separation_m.min(axis=1, initial=np.inf)
     path_m = path_length_m(trace.robot_odom_m)
-    deceleration, jerk = peak_deceleration_and_jerk(trace.t_s, trace.speed_mps)
+    deceleration, jerk = peak_deceleration_and_jerk(trace.t_s, trace.velocity_base_mps)
     delay_s, detour_m = human_cost(result.people)
     awareness, reaction, error = _awareness_of_nearest(result, trace)
     by_robot = [contact for contact in result.contacts if contact.by == "robot"]
@@ -104,7 +104,7 @@ def measure(
             peak_deceleration_mps2=deceleration,
             peak_jerk_mps3=jerk,
             stops=count_stops(
-                trace.speed_mps, result.time_to_goal_s is not None, STANDING_SPEED_MPS
+                trace.travel_mps, result.time_to_goal_s is not None, STANDING_SPEED_MPS
             ),
             human_delay_s=delay_s,
             human_detour_m=detour_m,
@@ -133,19 +133,19 @@ def time_lost_s(
 def human_cost(people: Iterable[PersonOutcome]) -> tuple[float | None, float | None]:
     """Return the summed delay (s) and detour (m) of people over their free walks.
 
-    Only people who reached the end of their route count; the loss of the others is not known. Both
-    are None when nobody reached it.
+    Somebody who is still on the way counts with the delay so far, which is the least it can become:
+    a robot that blocks somebody for good must not score better than one that delays them. The
+    detour is that of people who reached the end of their route. Each is None when nobody counts.
     """
-    arrived = [
-        (person.time_s - person.free_time_s, person.length_m - person.free_length_m)
-        for person in people
-        if person.time_s is not None
-        and person.free_time_s is not None
-        and person.free_length_m is not None
-    ]
-    if not arrived:
-        return None, None
-    return sum(delay for delay, _ in arrived), sum(detour for _, detour in arrived)
+    delays, detours = [], []
+    for person in people:
+        if person.time_s is not None and person.free_time_s is not None:
+            delays.append(person.time_s - person.free_time_s)
+            if person.free_length_m is not None:
+                detours.append(person.length_m - person.free_length_m)
+        elif person.late_s is not None:
+            delays.append(person.late_s)
+    return sum(delays) if delays else None, sum(detours) if detours else None
 
 
 def _smallest_separation(
@@ -157,7 +157,7 @@ def _smallest_separation(
     if result.contacts:
         return 0.0, max(contact.robot_speed_mps for contact in result.contacts)
     row = int(np.argmin(nearest_m))
-    return float(nearest_m[row]), abs(float(trace.speed_mps[row]))
+    return float(nearest_m[row]), float(trace.travel_mps[row])
 
 
 def _awareness_of_nearest(

@@ -57,7 +57,7 @@ class EpisodeRecord:
         peak_deceleration_mps2: highest deceleration of the robot.
         peak_jerk_mps3: largest jerk of the robot.
         stops: how often the robot came to a stand before the goal.
-        human_delay_s: delay of all people, over their free walks.
+        human_delay_s: delay of all people over their free walks, of those on the way so far.
         human_detour_m: detour of all people, over their free walks.
         warnings: number of alerts that the robot asked for.
         awareness_error: mean |α of the track − true α| over the tracked people.

@@ -24,7 +24,7 @@ class Trace:
         t_s: (N,) increasing.
         robot_odom_m: (N, 2) positions of the base origin.
         heading_odom_rad: (N,) headings of the robot.
-        speed_mps: (N,) speed of the base origin along the heading.
+        velocity_base_mps: (N, 2) velocity of the base origin, forward and to the left.
         people_odom_m: (N, P, 2) positions of the centre lines.
         people_odom_mps: (N, P, 2) velocities.
         awareness: (N, P) true α.
@@ -36,7 +36,7 @@ class Trace:
     t_s: FloatArray
     robot_odom_m: FloatArray
     heading_odom_rad: FloatArray
-    speed_mps: FloatArray
+    velocity_base_mps: FloatArray
     people_odom_m: FloatArray
     people_odom_mps: FloatArray
     awareness: FloatArray
@@ -71,7 +71,7 @@ class Trace:
             t_s=np.array([frame.t_s for frame in frames]),
             robot_odom_m=np.array([state.position_odom_m for state in states]),
             heading_odom_rad=np.array([state.heading_odom_rad for state in states]),
-            speed_mps=np.array([state.speed_mps for state in states]),
+            velocity_base_mps=np.array([[state.speed_mps, state.lateral_mps] for state in states]),
             people_odom_m=of_people("position_odom_m", (2,)),
             people_odom_mps=of_people("velocity_odom_mps", (2,)),
             awareness=of_people("awareness", ()),
@@ -83,6 +83,12 @@ class Trace:
     def people(self) -> int:
         """Number of people."""
         return int(self.separation_m.shape[1])
+
+    @property
+    def travel_mps(self) -> FloatArray:
+        """The (N,) speeds of the base origin in its direction of travel, at least 0."""
+        travel: FloatArray = np.hypot(*self.velocity_base_mps.T)
+        return travel
 
     def to_base(self, vectors_odom: FloatArray) -> FloatArray:
         """Return (N, P, 2) vectors in the axes of the base frame at their instant."""

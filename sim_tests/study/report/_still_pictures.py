@@ -47,7 +47,7 @@ class _WorstInstant:
 
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
         self._frames.append(frame)
-        speed = abs(frame.robot_state.speed_mps)
+        speed = frame.robot_state.travel_mps
         if not frame.margins_m or speed <= STANDING_SPEED_MPS:
             return
         self.least_m = min(self.least_m, *frame.margins_m)

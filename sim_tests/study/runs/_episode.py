@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from traceback import format_exc
+from typing import Final
 
-from perception import AttentionCone, AwarenessPipeline
 from perception.networks import OnnxSettings
 
 from ...crossing import CrossingResult, Observer
-from ...crossing.eyes import Perception
-from ...scenario import CameraSpec
+from ...crossing.eyes import Perception, pixel_pipeline
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, measure
 from ._job import Job
 from ._plan import fault_of, job_key, policy_of, template_of
 from ._planner_choice import planner_label
 from ._seeded_crossing import FreeRun, free_run, seeded_crossing
+
+# An episode runs on one core, beside others.
+_ONE_CORE: Final = OnnxSettings(intra_op_threads=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,9 @@ def observed_episode(
         policy=policy_of(job.policy),
         perception=job.perception,
         fault=fault,
-        pipeline=_pipeline(scenario.camera) if senses.kind == "pixels" else None,
+        pipeline=pixel_pipeline(scenario, onnx_settings=_ONE_CORE)
+        if senses.kind == "pixels"
+        else None,
     )
     record = measure(
         result,
@@ -115,15 +118,3 @@ def failed(job: Job, error: str, traceback: str = "") -> Attempt:
 def _error_text(error: str) -> str:
     """Return an error as it is read back from the table, where an episode is one line."""
     return " ".join(error.replace("\0", "").splitlines())[:500]
-
-
-# Networks load once per process, and run on the one core that an episode has.
-@lru_cache(maxsize=4)
-def _pipeline(camera: CameraSpec) -> AwarenessPipeline:
-    """Return the pipeline that :class:`~sim_tests.crossing.eyes.PixelEyes` would make itself."""
-    return AwarenessPipeline(
-        camera.camera(camera.picture_scale),
-        cone=AttentionCone(),
-        eye_in_head_std_rad=0.0,
-        onnx_settings=OnnxSettings(intra_op_threads=1),
-    )

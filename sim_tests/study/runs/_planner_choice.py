@@ -15,7 +15,6 @@ from typing import Any, Final, NamedTuple
 
 from nav_adapter import RobotProfile
 
-from ...actors.robot import NOVA_CARTER
 from ...crossing.planner import LocalPlanner, SamplingPlanner, StraightOn
 from ...scenario import Scenario
 from ...world.errors import SimError
@@ -96,8 +95,7 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
         _PATH: scenario.robot.path_odom_m,
         _SEED: seed,
     }
-    model = scenario.robot_model
-    robot = NOVA_CARTER if model is None else model.profile
+    robot = scenario.robot_profile
     available |= dict.fromkeys(_ROBOT, robot)
     arguments, keywords = _arguments(planner, factory, available, robot)
     try:

@@ -258,7 +258,9 @@ def _field_use(with_field: _Group, without: _Group) -> FieldUse:
 
 def _taken_s(record: EpisodeRecord) -> float:
     """Return the time to goal, or all of the time of an episode that did not reach it."""
-    return record.time_to_goal_s or record.duration_s or 0.0
+    if record.time_to_goal_s is not None:
+        return record.time_to_goal_s
+    return record.duration_s or 0.0
 
 
 def _failures(episodes: Iterable[_Episode]) -> tuple[Failure, ...]:

@@ -32,7 +32,7 @@ class Outcome:
         time_to_goal_s: None when the goal was not reached, too.
         reference_time_s: time to goal of the same planner in the empty hall.
         reference_length_m: length of the path that it drove there.
-        human_delay_s: delay of all people who arrived, over their walks without a robot.
+        human_delay_s: delay of all people so far, over their walks without a robot.
     """
 
     success: bool | None = None

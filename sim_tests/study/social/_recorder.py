@@ -114,8 +114,4 @@ def episode_of(job: Job) -> tuple[SocialEpisode, EpisodeRecord]:
 def _velocity(frame: CrossingFrame) -> tuple[float, float, float]:
     """Return the robot's velocity in odom, and its yaw rate."""
     state = frame.robot_state
-    forward, left = state.speed_mps, 0.0
-    if state.velocity_base_mps is not None:
-        forward, left = state.velocity_base_mps.tolist()
-    cos, sin = float(np.cos(state.heading_odom_rad)), float(np.sin(state.heading_odom_rad))
-    return cos * forward - sin * left, sin * forward + cos * left, state.yaw_rate_radps
+    return *state.velocity_odom_mps, state.yaw_rate_radps

@@ -67,7 +67,7 @@ def test_the_issue_faults_are_shipped():
     assert {
         "scanner_frozen", "scanner_frozen_old_stamps", "scanner_late", "scanner_blind_sector",
         "scanner_yawed", "scanner_ghosts", "scanner_dead", "scanner_one_dead",
-        "scanner_clock_ahead", "scanner_clock_behind",
+        "scanner_clock_ahead", "scanner_clock_behind", "scanner_blind",
     } == set(SCANNER_FAULTS)  # fmt: skip
     for name in SCANNER_FAULTS:
         # Camera and odometry stay as they are.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, SimError, shipped_scenarios
 from sim_tests.actors.robot import RobotModel
 from sim_tests.scenario import scenario_for_robot
+from sim_tests.scenario.catalogue import person_plan
 
 FORKLIFT = RobotModel.shipped("forklift")
 SHIPPED = [Scenario.shipped(name) for name in shipped_scenarios()]
@@ -108,3 +110,72 @@ def test_a_slow_robot_gets_more_time() -> None:
     later_s = after.people[0].start_s - before.people[0].start_s
     assert later_s == pytest.approx(half_m / 0.5 - half_m / 1.5, abs=1.0)
     assert after.layout == before.layout
+
+
+def _stops_and_turn(scenario: Scenario) -> list[np.ndarray]:
+    """Return the places at which the first person stops, in order, and turns back."""
+    (person, *_) = scenario.people
+    times = np.linspace(0.0, 120.0, 24001)
+    places, walked = person_plan(person, times)
+    found = []
+    for pause in sorted(person.pauses, key=lambda each: each.at_m):
+        standing = np.abs(walked - pause.at_m) < 1e-6
+        if standing.any():
+            found.append(places[standing][0])
+    if person.turns_back_at_m is not None:
+        found.append(places[int(np.argmin(np.abs(walked - person.turns_back_at_m)))])
+    return found
+
+
+def _with_person(**person: Any) -> Scenario:
+    data = Scenario.shipped("turns_back").model_dump()
+    data["people"] = [{"name": "p", "speed_mps": 1.0, **person}]
+    return Scenario.model_validate(data)
+
+
+@pytest.mark.parametrize("robot", ["forklift", "omni"])
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", ["stops_midway", "turns_back"])
+def test_people_stop_and_turn_where_they_did_beside_the_lane(
+    name: str, seed: int, robot: str
+) -> None:
+    before = ScenarioTemplate.shipped(name).for_seed(seed)
+    after = scenario_for_robot(before, robot)
+    stretch = after.layout.aisle_width_m / before.layout.aisle_width_m
+    (old,), (new,) = _stops_and_turn(before), _stops_and_turn(after)
+    assert new == pytest.approx([old[0], stretch * old[1]], abs=6e-3)
+
+
+def test_stops_keep_their_place_beyond_a_corner_and_on_the_way_back() -> None:
+    """The route goes along the aisle, across it, and back again from a turn beyond the aisle."""
+    route = [(10.0, -1.0), (6.0, -1.0), (6.0, 5.0)]
+    before = _with_person(
+        route=[{"x_m": x, "y_m": y} for x, y in route],
+        pauses=[{"at_m": at_m, "for_s": 2.0} for at_m in (2.0, 4.5, 8.0, 12.0)],
+        turns_back_at_m=8.5,
+    )
+    after = scenario_for_robot(before, FORKLIFT)
+    places = [(8.0, -1.0), (6.0, -0.5), (6.0, 3.0), (6.0, 0.0), (6.0, 3.5)]
+    assert np.array(_stops_and_turn(before)) == pytest.approx(np.array(places), abs=6e-3)
+    inner_m, extra_m = (
+        0.5 * before.layout.aisle_width_m,
+        0.5 * (after.layout.aisle_width_m - before.layout.aisle_width_m),
+    )
+    assert extra_m > 0.3
+
+    def moved(y: float) -> float:
+        return y * (1.0 + extra_m / inner_m) if abs(y) <= inner_m else y + math.copysign(extra_m, y)
+
+    fitted = [(x, moved(y)) for x, y in places]
+    assert np.array(_stops_and_turn(after)) == pytest.approx(np.array(fitted), abs=6e-3)
+
+
+def test_a_stop_after_the_end_of_a_route_stays_after_it() -> None:
+    ends = [{"x_m": 7.0, "y_m": -3.0}, {"x_m": 7.0, "y_m": 3.0}]
+    before = _with_person(route=ends, pauses=[{"at_m": 6.5, "for_s": 1.0}], turns_back_at_m=7.0)
+    (person,) = scenario_for_robot(before, FORKLIFT).people
+    length_m = abs(person.route[1].y_m - person.route[0].y_m)
+    assert length_m > 6.0
+    assert person.pauses[0].at_m == pytest.approx(length_m + 0.5)
+    assert person.turns_back_at_m is not None
+    assert person.turns_back_at_m > length_m

@@ -53,12 +53,14 @@ def crossing(
 ):
     """A result whose frames follow formulas.
 
-    ``robot(t)`` gives x, y, heading, speed; each of ``walks``, of t, gives x, y, vx, vy;
-    ``awareness(t, person)`` the truth, ``tracked(t, person)`` α and lower bound or None.
+    ``robot(t)`` gives x, y, heading, forward speed, and perhaps the speed to the left; each of
+    ``walks``, of t, gives x, y, vx, vy; ``awareness(t, person)`` the truth, ``tracked(t, person)``
+    α and lower bound or None.
     """
     frames = []
     for t in np.asarray(times).tolist():
-        x, y, heading, speed = robot(t)
+        x, y, heading, *velocity = robot(t)
+        speed = velocity[0]
         outline = footprint_at((x, y), heading)
         views, tracks, separations = [], [], []
         for index, person in enumerate(walks):
@@ -88,7 +90,14 @@ def crossing(
         frames.append(
             CrossingFrame(
                 t_s=t,
-                robot_state=RobotState(t, np.array([x, y]), heading, speed, 0.0),
+                robot_state=RobotState(
+                    t,
+                    np.array([x, y]),
+                    heading,
+                    speed,
+                    0.0,
+                    velocity_base_mps=None if len(velocity) == 1 else np.array(velocity),
+                ),
                 T_odom_camera=np.eye(4),
                 truth=tuple(views),
                 observations=(),
@@ -149,7 +158,7 @@ def trace(times, robot, people):
         t_s=np.asarray(times, dtype=float),
         robot_odom_m=poses[:, :2],
         heading_odom_rad=poses[:, 2],
-        speed_mps=poses[:, 3],
+        velocity_base_mps=np.column_stack((poses[:, 3], np.zeros(len(poses)))),
         people_odom_m=walks.reshape(len(times), len(people), 4)[..., :2],
         people_odom_mps=walks.reshape(len(times), len(people), 4)[..., 2:],
         awareness=nothing,

@@ -91,10 +91,23 @@ def outcome(**values):
 def test_people_are_delayed_by_what_is_over_their_free_walk():
     done = outcome(time_s=12.0, free_time_s=10.0, length_m=14.5, free_length_m=13.0)
     early = outcome(time_s=9.5, free_time_s=10.0, length_m=13.0, free_length_m=13.0)
-    on_the_way = outcome(time_s=None, free_time_s=10.0, length_m=5.0, free_length_m=13.0)
+    not_started = outcome(free_time_s=10.0, free_length_m=13.0)
     standing = outcome()
-    assert human_cost([done, early, on_the_way, standing]) == (1.5, 1.5)
-    assert human_cost([on_the_way, standing]) == (None, None)
+    assert human_cost([done, early, not_started, standing]) == (1.5, 1.5)
+    assert human_cost([not_started, standing]) == (None, None)
+
+
+def test_somebody_who_is_blocked_for_good_costs_more_than_somebody_who_is_delayed():
+    delayed = outcome(time_s=15.0, free_time_s=10.0, length_m=13.0, free_length_m=13.0)
+    blocked = outcome(late_s=24.0, free_time_s=10.0, length_m=5.0, free_length_m=13.0)
+
+    def cost(*people):
+        record = measure(crossing(T_S, straight(1.0), people=people))
+        return record.human_delay_s, record.human_detour_m
+
+    assert cost(delayed) == (5.0, 0.0)
+    assert cost(blocked) == (24.0, None)
+    assert cost(delayed, blocked) == (29.0, 0.0)
 
 
 def test_the_reaction_is_that_of_who_came_nearest():

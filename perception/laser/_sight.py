@@ -1,0 +1,198 @@
+"""The directions in which a scan shows what is there, and those in which its scanner is blind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import FloatArray
+from ._points import RobotMotion, ScanPoints, scan_points
+from ._scan import LaserScan
+from ._scanner import Scanner
+
+#: A return this near to the scanner is of a cover: behind it the ray sees nothing.
+COVER_M: Final = 0.10
+# A ray is blind if of those within this angle to either side more than half have no answer. So a
+# gap of up to 15 degrees is no blindness; at 2 m it is as wide as a person.
+_WITHIN_RAD: Final = math.radians(15.0)
+# "Nothing there" (+inf) counts as an answer while this share of the rays meets something: a scanner
+# that measures nothing at all may publish it as well.
+_ALIVE_SHARE: Final = 0.05
+# Directions in the base frame for which it is known when they were last seen.
+_BEARINGS_RAD: Final = np.radians(np.arange(360.0))
+_FULL_TURN_RAD: Final = 2.0 * math.pi
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScannerSight:
+    """The rays of one scan that show what is there.
+
+    A ray has an answer if it met something within the limits that is not the robot's own body and
+    no cover, or if it met nothing (+inf, REP-117) while other rays met something. NaN, -inf, 0 and
+    whatever else lies outside the limits is no answer.
+
+    Attributes:
+        scan: the scan.
+        scanner: its mounting.
+        seen: (N,) True for rays in the field of view around which at most half have no answer.
+        blind: (N,) True for the other rays in the field of view, but for those that end on the
+            robot's own body, farther away than a cover.
+    """
+
+    scan: LaserScan
+    scanner: Scanner
+    seen: NDArray[np.bool_]
+    blind: NDArray[np.bool_]
+
+    @property
+    def nothing(self) -> bool:
+        """True if the scan shows nothing at all, as if it had not been published."""
+        return not self.seen.any()
+
+    def sees(self, bearings_base_rad: FloatArray) -> NDArray[np.bool_]:
+        """Return (K,) whether the scan shows what is in directions (K,) of the base frame."""
+        ahead = np.stack((np.cos(bearings_base_rad), np.sin(bearings_base_rad)))
+        x, y = self.scanner.T_base_scanner[:2, :2].T @ ahead
+        step, middle = self.scan.angle_increment_rad, 0.5 * (len(self.scan) - 1)
+        off = np.arctan2(y, x) - (self.scan.angle_min_rad + step * middle)
+        # The number of the nearest ray, from -0.5 to half a ray after the last.
+        ray = middle + (np.remainder(off + math.pi, _FULL_TURN_RAD) - math.pi) / step
+        near = np.clip(np.rint(ray).astype(np.int64), 0, len(self.scan) - 1)
+        return np.asarray(self.seen[near] & (np.abs(ray - near) <= 0.5 + 1e-6))
+
+    @property
+    def blind_sectors_base_rad(self) -> tuple[tuple[float, float], ...]:
+        """The blind sectors: from one bearing in the base frame counter-clockwise to another.
+
+        Sectors less than 15 degrees apart are given as one.
+        """
+        if not self.blind.any():
+            return ()
+        shift = 0
+        if _is_full_turn(self.scan) and not self.blind.all():
+            shift = int(np.argmin(self.blind))
+        blind = np.roll(self.blind, -shift)
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], blind, [False])).astype(np.int8)))
+        mount = self.scanner.T_base_scanner[:2, :2]
+        flipped = (np.linalg.det(mount) < 0.0) != (self.scan.angle_increment_rad < 0.0)
+        apart = _WITHIN_RAD / abs(self.scan.angle_increment_rad)
+        runs: list[list[int]] = []
+        for first, end in edges.reshape(-1, 2).tolist():
+            if runs and first - runs[-1][1] < apart:
+                runs[-1][1] = end - 1
+            else:
+                runs.append([first, end - 1])
+        # To the middle between the last ray that is blind and the next.
+        rays = np.array(runs) + shift + (-0.5, 0.5)
+        angles = self.scan.angle_min_rad + self.scan.angle_increment_rad * rays
+        x, y = mount @ np.stack((np.cos(angles), np.sin(angles))).reshape(2, -1)
+        sides = np.arctan2(y, x).reshape(-1, 2)
+        return tuple((low, high) for low, high in sides[:, :: -1 if flipped else 1].tolist())
+
+    @property
+    def blind_text(self) -> str:
+        """The blind sectors in words, for example ``blind from -45° to 45°``; empty without.
+
+        Bearings are those of the base frame: 0 is ahead, to the left is positive.
+        """
+        if self.nothing:
+            return f"blind ({self._why_nothing()})"
+        sectors = [
+            f"from {math.degrees(low):.0f}° to {math.degrees(high):.0f}°"
+            for low, high in self.blind_sectors_base_rad
+        ]
+        return f"blind {' and '.join(sectors)}" if sectors else ""
+
+    def _why_nothing(self) -> str:
+        ranges = self.scan.ranges_m[self.scanner.sees(self.scan)]
+        if not len(ranges):
+            return "none of its rays lies in its field of view"
+        if np.mean(ranges == np.inf) > 0.5:
+            return "its rays meet nothing, which a scanner that measures nothing may publish too"
+        if np.mean((ranges >= self.scan.range_min_m) & (ranges < COVER_M)) > 0.5:
+            return f"its rays end within {COVER_M:.2f} m, as under a cover"
+        return "most of its rays have no answer"
+
+
+class SeenDirections:
+    """The time at which the scanners of a robot last saw what is in each direction.
+
+    A scanner that is blind has not seen what is there, as if it were silent.
+    """
+
+    def __init__(self) -> None:
+        self._seen_s = np.full(len(_BEARINGS_RAD), -math.inf)
+
+    def note(self, sight: ScannerSight, stamp_s: float) -> None:
+        """Note a scan of any scanner."""
+        seen_s = np.where(sight.sees(_BEARINGS_RAD), stamp_s, -math.inf)
+        self._seen_s = np.maximum(self._seen_s, seen_s)
+
+    def stamp_s(self, middle_rad: float, half_rad: float) -> float | None:
+        """Return the time from which all of a sector is; None if not all of it has been seen.
+
+        Args:
+            middle_rad: bearing of its middle in the base frame.
+            half_rad: angle from there to either side.
+        """
+        off = np.remainder(_BEARINGS_RAD - middle_rad + math.pi, _FULL_TURN_RAD) - math.pi
+        inside = np.abs(off) <= max(half_rad, float(np.abs(off).min())) + 1e-9
+        oldest_s = float(self._seen_s[inside].min())
+        return oldest_s if math.isfinite(oldest_s) else None
+
+
+def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None) -> ScannerSight:
+    """Return the directions in which a scan shows what is there.
+
+    Args:
+        scan: the scan.
+        scanner: its mounting.
+        points: of the scan, if they are known already.
+    """
+    if points is None:
+        points = scan_points(scan, scanner, RobotMotion(scan.stamp_s, np.eye(4)))
+    covered = scanner.sees(scan)
+    answered = points.usable & (scan.ranges_m >= COVER_M)
+    own = covered & scan.measured & ~points.usable & (scan.ranges_m >= COVER_M)
+    if np.count_nonzero(answered) >= _ALIVE_SHARE * np.count_nonzero(covered & ~own):
+        answered |= covered & (scan.ranges_m == np.inf)
+    dead = covered & ~answered
+    half = round(_WITHIN_RAD / abs(scan.angle_increment_rad))
+    turn = _is_full_turn(scan)
+    unseen = _with_dead_beside(
+        covered & (2 * _near(dead, half, turn) > _near(covered, half, turn)), dead, turn
+    )
+    return ScannerSight(scan, scanner, covered & ~unseen, unseen & ~own)
+
+
+def _near(flags: NDArray[np.bool_], half: int, turn: bool) -> NDArray[np.int64]:
+    """Return (N,) the number of flags set within ``half`` rays to either side of each."""
+    half = min(half, (len(flags) - 1) // 2 if turn else len(flags) - 1)
+    none = np.zeros(half, dtype=np.bool_)
+    before, after = (flags[len(flags) - half :], flags[:half]) if turn else (none, none)
+    sums = np.cumsum(np.concatenate(([False], before, flags, after)), dtype=np.int64)
+    return np.asarray(sums[2 * half + 1 :] - sums[: -2 * half - 1])
+
+
+def _with_dead_beside(
+    unseen: NDArray[np.bool_], dead: NDArray[np.bool_], turn: bool
+) -> NDArray[np.bool_]:
+    """Return (N,) with the rays without an answer that lie directly beside unseen ones."""
+    either = unseen | dead
+    if not unseen.any() or either.all():
+        return either & unseen.any()
+    shift = int(np.argmin(either)) if turn else 0
+    rolled = np.roll(either, -shift)
+    starts = np.diff(rolled.astype(np.int8), prepend=0) == 1
+    runs = np.where(rolled, np.cumsum(starts), 0)
+    wanted = np.unique(runs[np.roll(unseen, -shift)])
+    return np.roll(np.isin(runs, wanted[wanted > 0]), shift)
+
+
+def _is_full_turn(scan: LaserScan) -> bool:
+    step = abs(scan.angle_increment_rad)
+    return bool(step * len(scan) >= _FULL_TURN_RAD - 1.5 * step)

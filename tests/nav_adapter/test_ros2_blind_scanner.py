@@ -1,0 +1,176 @@
+"""The bridge with scanners that publish and see nothing: they count as silent.
+
+Hazard H23 and claim C30 of docs/safety.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
+from scan_scenes import RAYS, STEP_RAD, scan_message
+from test_ros2_bridge import START_S, image, odometry
+from two_sensor_scenes import FRONT, PERIOD_S, REAR, TIMING, Attentive, Robot
+
+from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
+
+NEAR = (1.5, 0.0)
+ANGLES_DEG = np.degrees(STEP_RAD) * np.arange(RAYS) - 135.0
+NO_ANSWERS = (0.0, math.nan, math.inf, -math.inf, 65.535, 0.02, 0.06)
+
+Change = Callable[[np.ndarray], np.ndarray]
+
+
+class Blinded(Robot):
+    """A robot whose front scanner has its ranges changed."""
+
+    change: Change = staticmethod(lambda ranges: ranges)
+
+    def step(self, now_s: float):
+        self.bridge.on_odometry(odometry(now_s, speed=0.0), now_s)
+        if "camera" not in self.silent:
+            self.bridge.on_image(image(now_s), now_s)
+        for number, scanner in enumerate(self.scanners):
+            scan = scan_message(now_s, self.people, scanner.mount.T_base_scanner())
+            if number == 0:
+                scan = replace(scan, ranges=tuple(self.change(np.array(scan.ranges)).tolist()))
+            self.bridge.on_scan(number, scan, now_s)
+        return self.bridge.tick(now_s)
+
+
+def alone(*scanners, **settings) -> Blinded:
+    nav = Blinded(*(scanners or (FRONT,)), with_camera=False, **settings)
+    nav.silent.add("camera")
+    return nav
+
+
+def every_ray(value: float) -> Change:
+    return lambda ranges: np.full(len(ranges), value)
+
+
+def sector(low_deg: float, high_deg: float, value: float) -> Change:
+    inside = np.clip(ANGLES_DEG, low_deg, high_deg) == ANGLES_DEG
+    return lambda ranges: np.where(inside, value, ranges)
+
+
+@pytest.mark.parametrize("value", NO_ANSWERS)
+def test_a_blind_scanner_keeps_the_robot_before_somebody_whom_it_saw(value: float) -> None:
+    nav = alone(people=[NEAR])
+    before_mps = nav.drive(START_S, 2.0)[-1].speed_limit_mps
+    nav.change = every_ray(value)
+    after = nav.drive(START_S + 2.0, 6.0)
+    assert max(each.speed_limit_mps for each in after) <= before_mps + 1e-9
+    for each in after:
+        if each.stamp_s - (START_S + 2.0) > TIMING.stop_after_s + PERIOD_S:
+            assert each.speed_limit_mps == 0.0
+            assert "scan_front: blind (" in each.limited_by
+    assert nav.standing()
+    (told,) = nav.warnings
+    assert told.startswith("scan_front: blind (")
+    assert told.endswith("): the robot stops")
+    assert nav.sensors().level == DiagnosticStatus.ERROR
+
+
+def test_scans_go_on_only_while_they_see_when_the_camera_falls_silent() -> None:
+    """C21: of a scanner that has gone blind before, nothing goes on."""
+    nav = Blinded(FRONT, people=[NEAR], make_pipeline=lambda camera: Attentive())
+    nav.drive(START_S, 1.6)
+    nav.change = every_ray(math.nan)
+    goes_on = nav.drive(START_S + 1.6, 2.0)[-1]
+    assert not goes_on.stale
+    assert nav.warnings == ["scan_front: blind (most of its rays have no answer): camera goes on"]
+    nav.silent.add("camera")
+    last = nav.drive(START_S + 3.6, 3.0)[-1]
+    assert last.stale
+    assert nav.standing()
+    assert nav.sensors().message == "lost: camera, scan_front"
+
+
+def test_a_scanner_that_never_measures_has_not_been_heard() -> None:
+    nav = Blinded(FRONT, people=[NEAR])
+    nav.change = every_ray(0.0)
+    last = nav.drive(START_S, 2.0)[-1]
+    assert nav.standing()
+    assert last.limited_by == (
+        "no scan yet from 'scan_front'; scan_front: blind (most of its rays have no answer)"
+    )
+    nav.change = every_ray(5.0)
+    assert nav.drive(START_S + 2.0, 1.0)[-1].speed_limit_mps > 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (sector(-45.0, 45.0, math.nan), "blind from -45° to 45°"),
+        (sector(20.0, 50.0, 0.06), "blind from 20° to 50°"),
+        (sector(-75.0, -50.0, 0.0), "blind from -75° to -50°"),
+    ],
+)
+def test_a_sector_ahead_that_is_blind_stops_the_robot_and_is_named(
+    change: Change, words: str
+) -> None:
+    nav = alone()
+    assert nav.drive(START_S, 1.0)[-1].speed_limit_mps == 1.5
+    nav.change = change
+    last = nav.drive(START_S + 1.0, 4.0)[-1]
+    assert nav.standing()
+    assert last.limited_by.endswith(f"; scan_front: {words}")
+    assert nav.warnings == [f"scan_front: {words}: the robot stops"]
+    nav.change = lambda ranges: ranges
+    assert nav.drive(START_S + 5.0, 3.0)[-1].speed_limit_mps > 1.0
+    assert nav.warnings[1:] == ["scan_front is back"]
+
+
+def test_a_blind_sector_beside_the_robot_is_told_and_does_not_stop_it() -> None:
+    nav = alone()
+    nav.drive(START_S, 1.0)
+    nav.change = sector(80.0, 120.0, math.nan)
+    assert nav.drive(START_S + 1.0, 3.0)[-1].speed_limit_mps == 1.5
+    (told,) = nav.warnings
+    assert told.startswith("scan_front: blind from 80° to 1")
+
+
+def test_another_scanner_that_sees_there_replaces_a_blind_one() -> None:
+    second = replace(REAR, mount=FRONT.mount)
+    nav = alone(FRONT, second)
+    nav.drive(START_S, 1.0)
+    nav.change = every_ray(math.nan)
+    assert nav.drive(START_S + 1.0, 3.0)[-1].speed_limit_mps == 1.5
+    assert nav.warnings == [
+        "scan_front: blind (most of its rays have no answer): scan_rear goes on"
+    ]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6])
+def test_a_scanner_in_an_open_hall_is_not_blind(share: float) -> None:
+    """Rays that meet nothing within the range are +inf; others show that the scanner lives."""
+    nav = alone()
+    nav.change = sector(-135.0, -135.0 + 270.0 * share, math.inf)
+    assert nav.drive(START_S, 2.0)[-1].speed_limit_mps == 1.5
+    assert nav.warnings == []
+
+
+def test_lost_single_rays_and_a_black_rack_do_not_stop_the_robot() -> None:
+    nav = alone()
+    rng = np.random.default_rng(0)
+    rack = sector(30.0, 42.0, 0.0)
+    nav.change = lambda ranges: np.where(rng.random(RAYS) < 0.01, math.nan, rack(ranges))
+    assert nav.drive(START_S, 2.0)[-1].speed_limit_mps == 1.5
+    assert nav.warnings == []
+
+
+def test_somebody_behind_a_blind_sector_stays_a_person() -> None:
+    nav = Blinded(FRONT, people=[(2.5, 1.2)])
+    nav.drive(START_S, 2.0)
+    assert len(nav.bridge.tracks) == 1
+    nav.change = sector(10.0, 60.0, math.nan)
+    nav.drive(START_S + 2.0, 2.5)
+    (track,) = nav.bridge.tracks
+    assert track.status == "coasting"
+    assert not track.place_empty

@@ -1,0 +1,96 @@
+"""Scenarios are checked and planned with the body and the limits of their own robot."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, SimError, shipped_scenarios
+from sim_tests.scenario import scenario_for_robot
+from sim_tests.scenario.catalogue import (
+    closest_approaches,
+    robot_plan,
+    scenario_problems,
+)
+from sim_tests.scenario.recordings import RecordingOptions, scenario_from_recording
+
+RACK = {"x_m": 2.0, "y_m": 0.0, "length_m": 1.0, "width_m": 1.0}
+
+
+def facing_a_rack(robot: str | None, start_x_m: float) -> tuple[str, ...]:
+    """Return the problems of a robot that starts in front of a rack whose face is at x = 1.5 m."""
+    data = {
+        "name": "rack",
+        "duration_s": 9.0,
+        "layout": {"x_min_m": -9.0, "y_min_m": -5.0, "x_max_m": 9.0, "y_max_m": 5.0},
+        "robot": {"start_x_m": start_x_m, "goal_x_m": -4.0},
+        "robot_model": robot,
+    }
+    data["layout"]["racks"] = [RACK]  # type: ignore[index]
+    return scenario_problems(Scenario.model_validate(data))
+
+
+def test_a_long_robot_needs_more_room_at_its_start() -> None:
+    assert facing_a_rack(None, 1.0) == ()
+    (problem,) = facing_a_rack("forklift", 1.0)
+    assert "the robot's start at (1, 0) m is in, or nearer than 1.3" in problem
+    assert facing_a_rack("forklift", 0.0) == ()
+    # A small robot has room where the Nova Carter has none.
+    assert facing_a_rack("delivery", 1.1) == ()
+    assert facing_a_rack(None, 1.1) != ()
+
+
+@pytest.mark.parametrize("robot", ["forklift", "omni"])
+def test_every_fitted_scenario_passes_with_its_robot(robot: str) -> None:
+    for name in shipped_scenarios():
+        fitted = scenario_for_robot(ScenarioTemplate.shipped(name).for_seed(0), robot)
+        assert scenario_problems(fitted) == (), name
+
+
+def test_the_plan_has_the_speed_of_the_robot() -> None:
+    before = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
+    slow = before.model_copy(
+        update={"robot_model": scenario_for_robot(before, "delivery").robot_model}
+    )
+    assert slow.robot_profile.max_speed_mps == 1.0
+    assert before.robot_profile is NOVA_CARTER
+    t_s = np.array([0.0, 6.0])
+    driven_m = robot_plan(slow.robot, t_s, slow.robot_profile)[1, 0] - slow.robot.start_x_m
+    assert driven_m < 6.0
+    # It comes later to the place where somebody crosses.
+    assert closest_approaches(slow) != closest_approaches(before)
+
+
+def recording(path: Path, places: dict[str, list[tuple[float, float, float]]]) -> Path:
+    rows = ["t_s,id,x_m,y_m"]
+    rows += [f"{t},{name},{x},{y}" for name, track in places.items() for t, x, y in track]
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def standing(x: float, y: float, until_s: float) -> list[tuple[float, float, float]]:
+    return [(0.1 * tick, x, y) for tick in range(round(until_s / 0.1) + 1)]
+
+
+WALKER = [(0.1 * tick, 0.1 * tick, 3.0) for tick in range(121)]
+
+
+def test_a_goal_on_top_of_somebody_is_refused(tmp_path: Path) -> None:
+    table = recording(tmp_path / "a.csv", {"walks": WALKER, "stands": standing(6.0, 0.0, 12.0)})
+    for goal in ((6.0, 0.0), (6.5, 0.2)):
+        options = RecordingOptions(start_odom_m=(0.0, 0.0), goal_odom_m=goal)
+        with pytest.raises(SimError, match=r"the robot's goal .* from 'stands'.*another --goal"):
+            scenario_from_recording(table, tmp_path / "out.yaml", options)
+    assert not (tmp_path / "out.yaml").exists()
+    options = RecordingOptions(start_odom_m=(6.0, 0.3), goal_odom_m=(0.0, 0.0))
+    with pytest.raises(SimError, match=r"the robot's start .* from 'stands'.*another --start"):
+        scenario_from_recording(table, tmp_path / "out.yaml", options)
+
+
+def test_people_who_pass_a_goal_or_have_left_it_are_no_obstacle(tmp_path: Path) -> None:
+    """The robot needs 4 s at least; the walker is over the goal at 6 s."""
+    people = {"walks": WALKER, "left": standing(6.0, 3.0, 3.5)}
+    table = recording(tmp_path / "a.csv", people)
+    options = RecordingOptions(start_odom_m=(0.0, 0.0), goal_odom_m=(6.0, 3.0))
+    made = scenario_from_recording(table, tmp_path / "out.yaml", options)
+    assert made.scenario.exists()
