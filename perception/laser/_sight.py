@@ -16,6 +16,8 @@ from ._scanner import Scanner
 
 #: A return this near to the scanner is of a cover: behind it the ray sees nothing.
 COVER_M: Final = 0.10
+#: So is every return within this distance if most of the rays end there: a bag, a tarpaulin.
+WRAPPED_M: Final = 0.30
 # A ray is blind if of those within this angle to either side more than half have no answer. So a
 # gap of up to 15 degrees is no blindness; at 2 m it is as wide as a person.
 _WITHIN_RAD: Final = math.radians(15.0)
@@ -113,8 +115,8 @@ class ScannerSight:
             return "none of its rays lies in its field of view"
         if np.mean(ranges == np.inf) > 0.5:
             return "its rays meet nothing, which a scanner that measures nothing may publish too"
-        if np.mean((ranges >= self.scan.range_min_m) & (ranges < COVER_M)) > 0.5:
-            return f"its rays end within {COVER_M:.2f} m, as under a cover"
+        if np.mean((ranges >= self.scan.range_min_m) & (ranges < WRAPPED_M)) > 0.5:
+            return f"its rays end within {WRAPPED_M:.2f} m, as under a cover"
         return "most of its rays have no answer"
 
 
@@ -158,6 +160,9 @@ def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None
     covered = scanner.sees(scan)
     answered = points.usable & (scan.ranges_m >= COVER_M)
     own = covered & scan.measured & ~points.usable & (scan.ranges_m >= COVER_M)
+    wrapped = answered & (scan.ranges_m < WRAPPED_M)
+    if 2 * np.count_nonzero(wrapped) > np.count_nonzero(covered & ~own):
+        answered &= ~wrapped
     if np.count_nonzero(answered) >= _ALIVE_SHARE * np.count_nonzero(covered & ~own):
         answered |= covered & (scan.ranges_m == np.inf)
     dead = covered & ~answered

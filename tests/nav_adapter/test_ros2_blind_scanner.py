@@ -22,7 +22,7 @@ from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
 
 NEAR = (1.5, 0.0)
 ANGLES_DEG = np.degrees(STEP_RAD) * np.arange(RAYS) - 135.0
-NO_ANSWERS = (0.0, math.nan, math.inf, -math.inf, 65.535, 0.02, 0.06)
+NO_ANSWERS = (0.0, math.nan, math.inf, -math.inf, 65.535, 0.02, 0.06, 0.2)
 
 Change = Callable[[np.ndarray], np.ndarray]
 

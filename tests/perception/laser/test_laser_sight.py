@@ -43,7 +43,7 @@ def test_a_scanner_without_any_answer_shows_nothing(value: float) -> None:
 
 
 def test_the_words_tell_what_the_rays_of_a_blind_scanner_have() -> None:
-    assert "within 0.10 m, as under a cover" in seen(0.06).blind_text
+    assert "its rays end within 0.30 m, as under a cover" in seen(0.06).blind_text
     assert "its rays meet nothing" in seen(math.inf).blind_text
     assert seen(math.nan).blind_text == "blind (most of its rays have no answer)"
     outside = Scanner.mounted(0.3, 0.0, 0.2, field_of_view_rad=(2.6, 2.8))
@@ -60,6 +60,15 @@ def test_a_sector_without_answers_is_blind(value: float, low_deg: int, high_deg:
     bearings = np.radians(np.arange(low_deg, high_deg + 1.0))
     assert not sight.sees(bearings).any()
     assert sight.sees(np.radians([low_deg - 1.0, high_deg + 1.0])).all()
+
+
+def test_a_cover_all_around_may_hang_farther_away_than_a_thing_beside_the_robot() -> None:
+    bare = Scanner.mounted(0.3, 0.0, 0.2)
+    rng = np.random.default_rng(0)
+    assert seen(rng.uniform(0.12, 0.28, len(ANGLES_DEG)), bare).nothing
+    # A dock ahead and a wall beside: they are things, at which nobody can be.
+    dock = 0.2 / np.maximum(np.cos(np.radians(ANGLES_DEG)), 0.05)
+    assert seen(np.minimum(dock, 5.0), bare).blind_text == ""
 
 
 def test_small_gaps_and_single_lost_rays_are_no_blindness() -> None:
