@@ -110,10 +110,11 @@ class ScannerSight:
         return f"blind {' and '.join(sectors)}" if sectors else ""
 
     def _why_nothing(self) -> str:
-        ranges = self.scan.ranges_m[self.scanner.sees(self.scan)]
+        inside = self.scanner.sees(self.scan)
+        ranges = self.scan.ranges_m[inside]
         if not len(ranges):
             return "none of its rays lies in its field of view"
-        if np.mean(ranges == np.inf) > 0.5:
+        if np.mean(self.scan.no_return[inside]) > 0.5:
             return "its rays meet nothing, which a scanner that measures nothing may publish too"
         if np.mean((ranges >= self.scan.range_min_m) & (ranges < WRAPPED_M)) > 0.5:
             return f"its rays end within {WRAPPED_M:.2f} m, as under a cover"
@@ -164,7 +165,7 @@ def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None
     if 2 * np.count_nonzero(wrapped) > np.count_nonzero(covered & ~own):
         answered &= ~wrapped
     if np.count_nonzero(answered) >= _ALIVE_SHARE * np.count_nonzero(covered & ~own):
-        answered |= covered & (scan.ranges_m == np.inf)
+        answered |= covered & scan.no_return
     dead = covered & ~answered
     half = round(_WITHIN_RAD / abs(scan.angle_increment_rad))
     turn = _is_full_turn(scan)
