@@ -10,11 +10,10 @@ import difflib
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from perception.documents import read_yaml
+from perception.documents import read_yaml, yaml_text
 
 from ._errors import TrackingError
 
@@ -87,6 +86,4 @@ class StrictConfig(BaseModel):
 
     def yaml_text(self) -> str:
         """Return the text that :meth:`to_yaml` writes."""
-        return str(
-            yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-        )
+        return yaml_text(self.model_dump(mode="json"))

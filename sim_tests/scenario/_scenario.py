@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
-import yaml
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from perception import Camera
 from perception.arrays import FloatArray
+from perception.documents import yaml_text
 from perception.surround import FlatView, ring_of_views
 from tracking.config import StrictConfig
 
@@ -306,7 +306,7 @@ class Scenario(StrictConfig):
         data = self.model_dump(mode="json")
         if self.robot_model is None:
             del data["robot_model"]
-        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+        return yaml_text(data)
 
     def with_population(self, name: str) -> Scenario:
         """Return the same task among people of another population.

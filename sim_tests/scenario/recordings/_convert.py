@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
 from awarenav.files import write_text
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number
+from perception.documents import yaml_text
 
 from ...actors.robot import NOVA_CARTER
 from ...world.errors import SimError
@@ -118,7 +118,7 @@ def scenario_from_recording(
     start, goal = _task(table, people, robot, options)
     _check_place("start", start, people, at_s=0.0)
     data = _scenario_data(table, people_file.name, people, (start, goal), options)
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+    text = yaml_text(data, width=100)
     template = ScenarioTemplate.from_text(text, str(out))
     write_text(people_file, _people_text(people), SimError)
     write_text(out, text, SimError)
