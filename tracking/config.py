@@ -7,8 +7,10 @@ nearest valid name, values are checked, and a config that is written and read ag
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails
@@ -37,6 +39,31 @@ def complaint(details: ErrorDetails) -> str:
     return f"{path}: {message}" if path else message
 
 
+@cache
+def _number_keys(config: type[BaseModel]) -> frozenset[str]:
+    """Return the keys that hold numbers and no booleans, which pydantic takes for 0 and 1."""
+    return frozenset(
+        name
+        for name, field in config.model_fields.items()
+        if (kinds := set(_kinds(field.annotation))) & {int, float} and bool not in kinds
+    )
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    """Yield the types that an annotation is made of."""
+    if get_origin(annotation) is not Literal:
+        yield annotation if isinstance(annotation, type) else None
+        for part in get_args(annotation):
+            yield from _kinds(part)
+
+
+def _has_boolean(value: Any) -> bool:
+    """Return whether a value is a boolean, or a list with one."""
+    if isinstance(value, list | tuple):
+        return any(map(_has_boolean, value))
+    return isinstance(value, bool)
+
+
 class StrictConfig(BaseModel):
     """Base of every config: frozen, with finite numbers only; unknown keys are refused by name."""
 
@@ -49,11 +76,16 @@ class StrictConfig(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _name_unknown_keys(cls, data: Any) -> Any:
+    def _check_keys(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
         valid = list(cls.model_fields)
-        for key in data:
+        for key, value in data.items():
+            if key in _number_keys(cls) and _has_boolean(value):
+                raise ValueError(
+                    f"{key} must be a number, got {value!r:.80}; YAML reads on, off, yes and no as "
+                    "true and false"
+                )
             if key not in valid:
                 near = difflib.get_close_matches(str(key), valid, n=1, cutoff=0.5)
                 hint = f"did you mean {near[0]!r}?" if near else f"valid keys: {', '.join(valid)}"

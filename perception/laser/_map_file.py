@@ -96,7 +96,7 @@ def read_map_file(path: Path) -> MapImage:
 
 
 def _between(name: str, value: Any, low: float, high: float) -> float:
-    if isinstance(value, bool | str):  # float() takes both
+    if isinstance(value, str):  # float() takes it
         raise PerceptionError(f"{name} must be a number, got {value!r}")
     return finite_number(name, value, minimum=low, maximum=high)
 
