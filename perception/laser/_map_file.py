@@ -152,7 +152,7 @@ def _transparent_grey(data: bytes) -> float | None:
     at = data.find(b"tRNS", 0, data.find(b"IDAT"))
     if not data.startswith(b"\x89PNG") or not is_grey or at < 0:
         return None
-    return int.from_bytes(data[at + 4 : at + 6], "big") / (2 ** bits[0] - 1)
+    return int.from_bytes(data[at + 4 : at + 6], "big") / ((1 << bits[0]) - 1)
 
 
 def _netpbm_shades(path: Path, data: bytes, head: re.Match[bytes]) -> FloatArray:

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from awarenav.files import write_text
+from awarenav.tracks import person_id
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number
 from perception.documents import yaml_text
@@ -143,13 +144,14 @@ def _split(
     """Return the tracks of the robot and of the people."""
     if options.robot_id is None:
         return (), recorded.tracks
-    robot = recorded.of(options.robot_id)
+    robot_id = person_id(options.robot_id)
+    robot = recorded.of(robot_id)
     if not robot:
         ids = dict.fromkeys(track.id for track in recorded.tracks)
         raise SimError(
             f"{table} has no rows of the robot {options.robot_id!r}; its ids are {', '.join(ids)}"
         )
-    people = tuple(track for track in recorded.tracks if track.id != options.robot_id)
+    people = tuple(track for track in recorded.tracks if track.id != robot_id)
     if not people:
         raise SimError(f"{table} has only rows of the robot {options.robot_id!r}")
     return robot, people
