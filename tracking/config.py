@@ -117,5 +117,15 @@ class StrictConfig(BaseModel):
         partial.replace(path)
 
     def yaml_text(self) -> str:
-        """Return the text that :meth:`to_yaml` writes."""
+        """Return the text that :meth:`to_yaml` writes.
+
+        Raises:
+            ValueError: the package's own error, for a setting that YAML cannot hold.
+        """
+        for name, field in type(self).model_fields.items():
+            if field.exclude and getattr(self, name) != field.default:
+                raise self.error(
+                    f"{name} of {type(self).__name__} cannot be written as YAML; write the config "
+                    f"without it, and set {name} when it is read"
+                )
         return yaml_text(self.model_dump(mode="json"))

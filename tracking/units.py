@@ -61,7 +61,7 @@ def refuse_other_units(
     if usual > FASTEST_MPS:
         unit = next(unit for most, unit in _OF_PLACES if usual < most * _USUAL_MPS)
         raise error(
-            f"{source}: people move at {usual:.3g} m/s, and nobody does at more than "
+            f"{source}: people move at {usual:.0f} m/s, and nobody does at more than "
             f"{FASTEST_MPS:g} m/s; times are in seconds, places in metres"
             + (f": these look like {unit}" if unit else "")
         )

@@ -89,7 +89,7 @@ def test_ids_may_be_any_text_and_tracks_numbers_them(tmp_path: Path, capsys) -> 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (table(place=lambda m: 1000.0 * m), "1.2e+03 m/s.*look like millimetres"),
+        (table(place=lambda m: 1000.0 * m), "1200 m/s.*look like millimetres"),
         (table(place=lambda m: 100.0 * m), "at 120 m/s.*look like centimetres"),
         (table(time=lambda s: 10.0 * 25.0 * s), "look like numbers of frames"),
         (table(time=lambda s: 780.0 + round(60.0 * s)), "0.02 m/s.*look like numbers of frames"),
@@ -102,7 +102,7 @@ def test_ids_may_be_any_text_and_tracks_numbers_them(tmp_path: Path, capsys) -> 
 def test_both_commands_and_calibrate_refuse_other_units(text, message, tmp_path, capsys) -> None:
     path = tmp_path / "people.csv"
     path.write_text(text)
-    with pytest.raises(AwarenavError, match=message.replace("+", r"\+")) as raised:
+    with pytest.raises(AwarenavError, match=message) as raised:
         read_people_table(path)
     assert both(path) == (2, 2)
     assert capsys.readouterr().err.count(str(raised.value)) == 2
