@@ -7,10 +7,10 @@ nearest valid name, values are checked, and a config that is written and read ag
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Final, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails
@@ -20,6 +20,23 @@ from perception.documents import read_yaml, yaml_text
 from ._errors import TrackingError
 
 _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
+
+
+# Keys by which files that are given in the wrong place are known.
+_KINDS: Final = {
+    "a policy": {"inflation", "speed", "outline", "rules", "margins", "timing", "filter"},
+    "a scenario": {"layout", "people", "workers", "population", "attention", "replay_csv"},
+    "the file of a robot": {"footprint_m", "max_speed_mps", "max_deceleration_mps2", "drive"},
+    "a camera_info file": {"image_width", "image_height", "camera_matrix", "distortion_model"},
+    "a map of map_server": {"image", "resolution", "occupied_thresh", "free_thresh"},
+}
+
+
+def other_kind(data: Mapping[str, Any], keys: Iterable[str]) -> str:
+    """Return what a file is that was given in place of one with these keys; empty if unknown."""
+    found = {kind: len(known & data.keys()) for kind, known in _KINDS.items()}
+    kind = max(found, key=lambda each: found[each])
+    return kind if found[kind] > len(data.keys() & set(keys)) else ""
 
 
 def complaints(error: ValidationError) -> str:
@@ -106,6 +123,9 @@ class StrictConfig(BaseModel):
         try:
             return cls.model_validate(data)
         except ValidationError as cause:
+            kind = other_kind(data, cls.model_fields)
+            if kind:
+                raise cls.error(f"{path} is {kind}, which {cls.__name__} cannot read") from cause
             raise cls.error(f"{path}: {complaints(cause)}") from cause
 
     def to_yaml(self, path: str | Path) -> None:

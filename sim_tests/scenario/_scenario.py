@@ -261,7 +261,7 @@ class Scenario(StrictConfig):
         Raises:
             SimError: naming the file and the wrong key.
         """
-        return cls._at_medians(read_file(Path(path)), str(path))
+        return cls._at_medians(read_file(Path(path), cls.model_fields), str(path))
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], source: str = "scenario") -> Scenario:

@@ -73,7 +73,7 @@ class ScenarioTemplate:
         Raises:
             SimError: naming the file, if it cannot be used.
         """
-        return cls(read_file(Path(path)), str(path))
+        return cls(read_file(Path(path), Scenario.model_fields), str(path))
 
     @classmethod
     def from_text(cls, text: str, source: str = "scenario") -> ScenarioTemplate:

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from awarenav.files import write_text
+from awarenav.files import printable, write_text
 from awarenav.tracks import person_id
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number
@@ -99,6 +99,8 @@ def scenario_from_recording(
     people_file = out.with_name(f"{out.stem}_people.csv")
     if out.suffix not in (".yaml", ".yml"):
         raise SimError(f"the scenario must be a file that ends in .yaml, got {out}")
+    if printable(out.name) != out.name:
+        raise SimError(f"the scenario's file must have a name in UTF-8, got {out}")
     if table.resolve() in (out.resolve(), people_file.resolve()):
         raise SimError(f"{people_file} would overwrite the recording {table}")
     recorded = read_table(table)
@@ -256,7 +258,7 @@ def _scenario_data(
     return {
         "name": Path(people_file).stem.removesuffix("_people"),
         "version": 1,
-        "description": f"People of {table.name}: {count} of {span_s:.1f} s. {does}",
+        "description": f"People of {printable(table.name)}: {count} of {span_s:.1f} s. {does}",
         "attention": "mixed",
         "extends": "hall",
         "duration_s": round(min(max(span_s, drive_s), _LONGEST_S), 1),
