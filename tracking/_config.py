@@ -111,7 +111,7 @@ class TrackingConfig(StrictConfig):
 
 
 class TrackedPolicy(Protocol):
-    """What a policy needs from the tracker; :class:`nav_adapter.AwarenessPolicy` has it."""
+    """The needs of a policy from the tracker, as :class:`nav_adapter.AwarenessPolicy` has them."""
 
     @property
     def filter(self) -> AwarenessFilterConfig:

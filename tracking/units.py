@@ -63,7 +63,7 @@ def refuse_other_units(
         raise error(
             f"{source}: people move at {usual:.0f} m/s, and nobody does at more than "
             f"{FASTEST_MPS:g} m/s; times are in seconds, places in metres"
-            + (f": these look like {unit}" if unit else "")
+            + (f": these look like {unit}" if unit else ", and an id is one person")
         )
     if fast < SLOWEST_MPS:
         unit = next(unit for most, unit in _OF_TIMES if most * fast > _USUAL_MPS)

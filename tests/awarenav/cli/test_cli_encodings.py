@@ -116,6 +116,6 @@ def test_a_file_of_another_kind_is_named(words, file: Path, kind: str, tmp_path,
 
 def test_a_misspelt_key_is_still_named_with_the_nearest(tmp_path: Path, capsys) -> None:
     own = tmp_path / "mine.yaml"
-    own.write_text(POLICY.read_text().replace("inflation:", "inflatoin:"))
+    own.write_text(POLICY.read_text().replace("inflation:", "inflations:"))
     assert main(["policy", "show", str(own)]) == 2
     assert "did you mean 'inflation'" in capsys.readouterr().err
