@@ -124,9 +124,10 @@ class StrictConfig(BaseModel):
             return cls.model_validate(data)
         except ValidationError as cause:
             kind = other_kind(data, cls.model_fields)
-            if kind:
-                raise cls.error(f"{path} is {kind}, which {cls.__name__} cannot read") from cause
-            raise cls.error(f"{path}: {complaints(cause)}") from cause
+            what = complaints(cause)
+            if kind:  # a near key of the wrong kind is no help
+                what = f"this is {kind}; {what.partition(';')[0]}"
+            raise cls.error(f"{path}: {what}") from cause
 
     def to_yaml(self, path: str | Path) -> None:
         """Write the config as YAML for :meth:`from_yaml`; the file is replaced in one step."""

@@ -99,7 +99,7 @@ def read_file(path: Path, keys: Iterable[str]) -> dict[str, Any]:
     data = _completed(documents.read_yaml(path, SimError), str(path))
     kind = other_kind(data, keys)
     if kind:
-        raise SimError(f"{path} is {kind}, not a scenario")
+        raise SimError(f"{path}: this is {kind}, no scenario")
     replay = data.get("replay_csv")
     if isinstance(replay, str):
         data["replay_csv"] = str((path.parent / replay).resolve())

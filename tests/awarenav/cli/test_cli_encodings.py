@@ -97,12 +97,16 @@ def test_a_policy_with_such_a_name_is_drawn(latin: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "file", "kind"),
     [
-        (["scenario", "validate"], POLICY, "is a policy, not a scenario"),
-        (["scenario", "validate"], ROBOT, "is the file of a robot, not a scenario"),
-        (["scenario", "draw"], POLICY, "is a policy, not a scenario"),
-        (["policy", "show"], SCENARIO, "is a scenario, which AwarenessPolicy cannot read"),
-        (["policy", "show"], ROBOT, "is the file of a robot, which AwarenessPolicy cannot read"),
-        (["tracks", "x.csv", "--config"], POLICY, "is a policy, which TrackerConfig cannot read"),
+        (["scenario", "validate"], POLICY, ": this is a policy, no scenario"),
+        (["scenario", "validate"], ROBOT, ": this is the file of a robot, no scenario"),
+        (["scenario", "draw"], POLICY, ": this is a policy, no scenario"),
+        (
+            ["policy", "show"],
+            SCENARIO,
+            ": this is a scenario; unknown key 'name' in Aw",
+        ),
+        (["policy", "show"], ROBOT, ": this is the file of a robot; unknown key 'footprint_m'"),
+        (["tracks", "x.csv", "--config"], POLICY, ": this is a policy; TrackerConfig: unknown key"),
     ],
 )
 def test_a_file_of_another_kind_is_named(words, file: Path, kind: str, tmp_path, capsys) -> None:
@@ -110,7 +114,7 @@ def test_a_file_of_another_kind_is_named(words, file: Path, kind: str, tmp_path,
     own.write_bytes(file.read_bytes())
     assert main([*words, str(own)]) == 2
     out, err = capsys.readouterr()
-    assert f"{own} {kind}" in out + err
+    assert f"{own}{kind}" in out + err
     assert "did you mean" not in out + err
 
 
