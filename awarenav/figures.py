@@ -7,7 +7,7 @@ from pathlib import Path
 from perception.installation import install_command
 
 from .errors import MissingExtraError
-from .files import atomic_path
+from .files import atomic_path, printable
 
 try:
     from matplotlib import rc_context
@@ -18,6 +18,7 @@ try:
     from matplotlib.gridspec import GridSpec
     from matplotlib.lines import Line2D
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon, Rectangle, Wedge
+    from matplotlib.text import Text
     from matplotlib.ticker import MultipleLocator
     from PIL import Image  # a dependency of matplotlib
 except ImportError as cause:  # pragma: no cover - depends on the installation
@@ -75,6 +76,9 @@ def save_figure(figure: Figure, path: Path) -> None:
         AwarenavError: for a place that cannot be written.
     """
     # A date and random names in the file would make two runs differ.
+    for text in figure.findobj(Text):
+        if (shown := printable(text.get_text())) != text.get_text():
+            text.set_text(shown)
     date = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix.lower())
     with atomic_path(path) as part, rc_context({"svg.hashsalt": "awarenav"}):
         figure.savefig(

@@ -36,11 +36,18 @@ def atomic_path(path: Path, error: type[AwarenavError] = AwarenavError) -> Itera
 def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError) -> None:
     """Write a UTF-8 file as :func:`atomic_path` does.
 
+    What is no text, as in a file name that is not UTF-8, is written as an escape.
+
     Raises:
         AwarenavError: or ``error``, for a place that cannot be written.
     """
     with atomic_path(path, error) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def printable(name: str) -> str:
+    """Return a text with ? for each byte of a file name that is not UTF-8."""
+    return name.encode("utf-8", "replace").decode("utf-8")
 
 
 def json_text(value: Any) -> str:

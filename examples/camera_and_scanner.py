@@ -58,7 +58,7 @@ class People:
         policy = AwarenessPolicy.preset("balanced")
         self.detector = LegDetector()
         self.tracker = PersonTracker(
-            TrackerConfig(awareness=policy.filter, standing_window_s=policy.standing_window_s),
+            TrackerConfig.for_policy(policy),
             view=CameraView(CAMERA),
             sensors={"laser": SensorConfig(view=SCANNER_VIEW)},
         )

@@ -35,7 +35,7 @@ Plan = Callable[[RobotState, NavConstraints], tuple[float, float]]
 def drive(plan: Plan) -> None:
     """Drive with a planner; print one line per second, and a summary at the end."""
     policy = AwarenessPolicy.preset("balanced")
-    tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
+    tracker = PersonTracker(TrackerConfig.for_policy(policy))
     adapter = NavAdapter(policy, ROBOT)
     state = RobotState(0.0, np.zeros(2), 0.0, 0.0, 0.0)
     least_gap_m, most_excess_mps = math.inf, -math.inf

@@ -47,7 +47,7 @@ def main() -> None:
         reaction_time_s=0.3,
     )
     policy = AwarenessPolicy.preset("balanced")
-    tracker = PersonTracker(TrackerConfig(awareness=policy.filter))
+    tracker = PersonTracker(TrackerConfig.for_policy(policy))
     adapter = NavAdapter(policy, robot)
     for tick in range(41):
         stamp_s = 0.1 * tick

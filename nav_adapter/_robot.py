@@ -14,8 +14,21 @@ from perception.arrays import FloatArray, finite_array, finite_number, set_field
 
 from ._errors import NavError
 
-# An outline below one square millimetre is a line or a point.
-_SMALLEST_FOOTPRINT_M2: Final = 1e-6
+# A robot of 5 cm by 4 cm. An outline below that is a line, a point, or in another unit.
+_SMALLEST_FOOTPRINT_M2: Final = 0.002
+# No corner of a rigid robot is further from its base origin.
+_LARGEST_REACH_M: Final = 10.0
+# The largest values that robots among people have: (number, unit, what a larger one is often in).
+# A tyre on a floor brakes with about 1 g at most.
+_LARGEST: Final = {
+    "max_speed_mps": (15.0, "m/s", "mm/s, cm/s or km/h"),
+    "max_acceleration_mps2": (10.0, "m/s²", "mm/s² or cm/s²"),
+    "max_deceleration_mps2": (10.0, "m/s²", "mm/s² or cm/s²"),
+    "reaction_time_s": (5.0, "s", "milliseconds"),
+    "max_yaw_rate_radps": (20.0, "rad/s", "degrees per second"),
+    "max_yaw_acceleration_radps2": (100.0, "rad/s²", "degrees per second squared"),
+    "min_turning_radius_m": (100.0, "m", "millimetres or centimetres"),
+}
 # Wheels slip and filters of odometry err: lateral speed up to this is noise.
 LATERAL_NOISE_MPS: Final = 0.1
 # The forward speed is given twice with velocity_base_mps.
@@ -35,28 +48,30 @@ class RobotProfile:
 
     Attributes:
         footprint_m: (M, 2), M ≥ 3, corners in the base frame (x forward, y left), clockwise or
-            counter-clockwise. The convex hull counts.
-        max_speed_mps: > 0.
-        max_acceleration_mps2: > 0.
-        max_deceleration_mps2: > 0, a deceleration that the brakes always reach.
-        reaction_time_s: ≥ 0, from a change in the scene to the start of braking: exposure,
+            counter-clockwise. The convex hull counts: at least 0.002 m², within 10 m of the base
+            origin.
+        max_speed_mps: > 0, up to 15 m/s.
+        max_acceleration_mps2: > 0, up to 10 m/s².
+        max_deceleration_mps2: > 0, up to 10 m/s², a deceleration that the brakes always reach.
+        reaction_time_s: 0 to 5 s, from a change in the scene to the start of braking: exposure,
             perception, the period of the control loop and the delay of the drive.
         drive: ``"differential"`` for a robot that turns on the spot and cannot move sideways,
             ``"ackermann"`` for one that steers (a car, a tricycle), ``"holonomic"`` for one that
             can move sideways, None if it is not known. With the first two the adapter stops a
             robot whose state moves sideways, since one of the two is wrong. The base origin of
             these two lies on the axle that does not steer.
-        max_yaw_rate_radps: > 0, the fastest turn, either way; None if it is not known. It limits
-            commands (:mod:`nav_adapter.motion`) and Nav2's message
+        max_yaw_rate_radps: > 0, up to 20 rad/s, the fastest turn, either way; None if it is not
+            known. It limits commands (:mod:`nav_adapter.motion`) and Nav2's message
             (:func:`nav_adapter.ros2.speed_limit`), and changes no limit of the constraints.
-        max_yaw_acceleration_radps2: > 0, the fastest change of the yaw rate; None if it is not
-            known.
-        min_turning_radius_m: > 0, the tightest curve of the base origin, needed with
+        max_yaw_acceleration_radps2: > 0, up to 100 rad/s², the fastest change of the yaw rate; None
+            if it is not known.
+        min_turning_radius_m: > 0, up to 100 m, the tightest curve of the base origin, needed with
             ``"ackermann"`` and refused with any other drive: |ω| ≤ |v| / radius. It limits
             commands and changes no speed limit.
 
     Raises:
-        NavError: for a value out of these bounds.
+        NavError: for a value out of these bounds, which no robot among people has: the message
+            names the unit, and the unit that the value may be in.
     """
 
     footprint_m: FloatArray
@@ -86,27 +101,35 @@ class RobotProfile:
         area = float(MultiPoint(footprint).convex_hull.area)
         if area < _SMALLEST_FOOTPRINT_M2:
             raise NavError(
-                f"footprint_m must enclose at least {_SMALLEST_FOOTPRINT_M2:g} m², got {area:g} m²"
+                f"footprint_m must enclose at least {_SMALLEST_FOOTPRINT_M2:g} m², got {area:g} "
+                "m²; its corners are in metres"
             )
-
-        def positive(name: str) -> float:
-            return finite_number(
-                name, getattr(self, name), NavError, minimum=0.0, exclusive_minimum=True
+        reach_m = float(np.linalg.norm(footprint, axis=1).max())
+        if reach_m > _LARGEST_REACH_M:
+            raise NavError(
+                f"footprint_m must lie within {_LARGEST_REACH_M:g} m of the base origin, got a "
+                f"corner at {reach_m:g} m; are the corners in millimetres or centimetres?"
             )
+        given = [
+            name
+            for name in _LARGEST
+            if name not in _OPTIONAL_LIMITS or getattr(self, name) is not None
+        ]
+        set_fields(self, footprint_m=footprint, **{name: self._checked(name) for name in given})
 
-        set_fields(
-            self,
-            footprint_m=footprint,
-            max_speed_mps=positive("max_speed_mps"),
-            max_acceleration_mps2=positive("max_acceleration_mps2"),
-            max_deceleration_mps2=positive("max_deceleration_mps2"),
-            reaction_time_s=finite_number(
-                "reaction_time_s", self.reaction_time_s, NavError, minimum=0.0
-            ),
-            **{
-                name: positive(name) for name in _OPTIONAL_LIMITS if getattr(self, name) is not None
-            },
+    def _checked(self, name: str) -> float:
+        """Return a limit of motion that is above 0 and no larger than any robot's."""
+        zero_is_valid = name == "reaction_time_s"
+        number = finite_number(
+            name, getattr(self, name), NavError, minimum=0.0, exclusive_minimum=not zero_is_valid
         )
+        largest, unit, other = _LARGEST[name]
+        if number > largest:
+            raise NavError(
+                f"{name} must be at most {largest:g} {unit}, got {number:g} {unit}; is it in "
+                f"{other}?"
+            )
+        return number
 
     @classmethod
     def of_settings(cls, settings: Any) -> RobotProfile:

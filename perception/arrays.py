@@ -88,8 +88,13 @@ def finite_number(
     maximum: float = math.inf,
     exclusive_minimum: bool = False,
 ) -> float:
-    """Return ``value`` as a float after checking that it is finite and within the bounds."""
+    """Return ``value`` as a float after checking that it is finite and within the bounds.
+
+    True and False are no numbers: YAML reads ``off`` as False.
+    """
     try:
+        if isinstance(value, bool | np.bool_):
+            raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError) as cause:
         raise error(

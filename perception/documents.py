@@ -1,9 +1,11 @@
-"""YAML and JSON from files, with limits on size, nesting and aliases.
+"""YAML and JSON from files, with unique keys, and limits on size, nesting and aliases.
 
 All packages read their files through these functions, and pass the error class of their own
 package. A hostile or damaged file is refused before it costs much time, memory or stack: PyYAML in
 C overflows the stack on 100 000 nested brackets, and 236 bytes of nested aliases stand for 10⁹
 values.
+
+A key that a mapping has twice is refused with both lines: parsers take the last without a word.
 """
 
 from __future__ import annotations
@@ -18,6 +20,11 @@ import yaml
 
 from .errors import PerceptionError
 
+try:  # the safe loader in C, ten times as fast, where PyYAML was built with it
+    from yaml import CSafeLoader as _SafeLoader
+except ImportError:  # pragma: no cover - depends on how PyYAML was built
+    from yaml import SafeLoader as _SafeLoader  # type: ignore[assignment]
+
 #: Largest YAML document.
 MAX_YAML_BYTES: Final = 1 << 20
 #: Most values of a YAML document, with every alias (``*name``) replaced by what it stands for.
@@ -29,14 +36,65 @@ MAX_LINE_BYTES: Final = 16 << 20
 #: Most lists and mappings within each other.
 MAX_DEPTH: Final = 64
 
-# The safe loader in C, ten times as fast, where PyYAML was built with it.
-_LOADER: Final[Any] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+# Numbers such as 5e-2 and 1E5, which ROS reads as numbers and YAML 1.1 as texts.
+_FLOAT: Final = "tag:yaml.org,2002:float"
+_EXPONENT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$")
+_STARTS: Final = list("-+.0123456789")
+_MERGE: Final = "tag:yaml.org,2002:merge"
+_NAMES: Final = (_MERGE, "tag:yaml.org,2002:value")  # << and =, which PyYAML cannot construct
+# Of the scanner of JSON that finds the lines of a repeated key.
+_JSON_TOKEN: Final = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"|[{}:]', re.DOTALL)
 # PyYAML needs quadratic time for numbers to the base 60, such as 1:00:00.
 _LONG_NUMBER: Final = re.compile(r"[-+0-9_:.]{65,}")
 # Styles of scalars that are texts, whatever they look like.
 _QUOTES: Final = ("'", '"', "|", ">")
 # What PyYAML raises for scalars that are not of their type, such as !!bool 3 or 2001-99-99.
 _WRONG_SCALARS: Final = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError)
+
+
+class _RepeatedKeyError(Exception):
+    """A mapping has a key twice, of which a parser would take the last."""
+
+    def __init__(self, key: Any, first_line: int, second_line: int) -> None:
+        self.key = key
+        self.lines = first_line, second_line
+
+    def message(self, source: str, text: str) -> str:
+        first, second = self.lines
+        where = f", in lines {first} and {second}" if first != second else f" in line {first}"
+        return f"{source} has the key {self.key!r} twice" + (where if "\n" in text.strip() else "")
+
+
+class _Loader(_SafeLoader):
+    """The safe loader, with keys that are unique in their mapping, and numbers like 5e-2."""
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._unique: set[yaml.MappingNode] = set()
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Check the keys that a mapping itself has, then add those that it merges (``<<``)."""
+        if node not in self._unique:  # a second time it has the merged keys as well
+            self._unique.add(node)
+            lines: dict[Any, int] = {}
+            for key_node, _ in node.value:
+                if not isinstance(key_node, yaml.ScalarNode):
+                    continue
+                named = key_node.tag in _NAMES
+                key = key_node.value if named else self.construct_object(key_node)
+                line = key_node.start_mark.line + 1
+                if key in lines:
+                    raise _RepeatedKeyError(key, lines[key], line)
+                lines[key] = line
+        super().flatten_mapping(node)
+
+
+class _Dumper(yaml.SafeDumper):
+    """The safe dumper, which quotes the texts that :class:`_Loader` would take for numbers."""
+
+
+_Loader.add_implicit_resolver(_FLOAT, _EXPONENT, _STARTS)
+_Dumper.add_implicit_resolver(_FLOAT, _EXPONENT, _STARTS)
 
 
 def read_yaml(
@@ -50,8 +108,8 @@ def read_yaml(
         first_document: leave out further documents, which are an error otherwise.
 
     Raises:
-        PerceptionError: or ``error``, naming the file: it cannot be read, is not valid YAML, or is
-            beyond a limit of this module.
+        PerceptionError: or ``error``, naming the file: it cannot be read, is not valid YAML, has a
+            key twice in one mapping, or is beyond a limit of this module.
     """
     text = _read_text(path, MAX_YAML_BYTES, "YAML", error)
     return parse_yaml(text, str(path), error, first_document=first_document)
@@ -82,20 +140,32 @@ def parse_yaml(
         if reason:
             raise error(f"{source} {reason}")
         if first_document:
-            return next(iter(yaml.load_all(text, _LOADER)), None)
-        return yaml.load(text, _LOADER)
+            return next(iter(yaml.load_all(text, _Loader)), None)
+        return yaml.load(text, _Loader)
     except error:
         raise
+    except _RepeatedKeyError as cause:
+        raise error(cause.message(source, text)) from None
     except (yaml.YAMLError, RecursionError, *_WRONG_SCALARS) as cause:
         raise error(f"{source} is not valid YAML: {cause}") from cause
+
+
+def yaml_text(value: Any, **settings: Any) -> str:
+    """Return a value as YAML that :func:`parse_yaml` reads back, with its keys in their order.
+
+    Args:
+        value: mappings, lists, texts, numbers, booleans and None.
+        settings: of PyYAML, such as ``width``.
+    """
+    return str(yaml.dump(value, Dumper=_Dumper, sort_keys=False, allow_unicode=True, **settings))
 
 
 def read_json(path: Path, error: type[ValueError] = PerceptionError) -> Any:
     """Return the value in a JSON file.
 
     Raises:
-        PerceptionError: or ``error``, naming the file: it cannot be read, is not valid JSON, or is
-            beyond a limit of this module.
+        PerceptionError: or ``error``, naming the file: it cannot be read, is not valid JSON, has a
+            key twice in one object, or is beyond a limit of this module.
     """
     return parse_json(_read_text(path, MAX_JSON_BYTES, "JSON", error), str(path), error)
 
@@ -116,15 +186,18 @@ def parse_json(
         finite: refuse NaN and infinities, which JSON does not have.
 
     Raises:
-        PerceptionError: or ``error``, naming the source: the text is not valid JSON, or is beyond a
-            limit of this module.
+        PerceptionError: or ``error``, naming the source: the text is not valid JSON, has a key
+            twice in one object, or is beyond a limit of this module.
     """
     if len(text) > MAX_JSON_BYTES:
         raise error(_too_large(source, MAX_JSON_BYTES))
     try:
         if isinstance(text, bytes):
             text = text.decode("utf-8")
-        value = json.loads(text, parse_constant=_refuse_constant) if finite else json.loads(text)
+        constant = _refuse_constant if finite else None
+        value = json.loads(text, parse_constant=constant, object_pairs_hook=_unique)
+    except _RepeatedKeyError:
+        raise error(_repeated_in(str(text)).message(source, str(text))) from None
     except RecursionError as cause:
         raise error(_too_deep(source)) from cause
     except ValueError as cause:
@@ -174,7 +247,7 @@ def _excess(text: str) -> str:
     Events come one by one, so that the work ends at the limit.
     """
     extent = _Extent()
-    for event in yaml.parse(text, _LOADER):
+    for event in yaml.parse(text, _SafeLoader):
         if isinstance(event, yaml.DocumentEndEvent):
             break
         excess = extent.add(event) or extent.excess
@@ -224,6 +297,35 @@ class _Extent:
             if not quoted and _LONG_NUMBER.fullmatch(event.value):
                 return f"has a number of {len(event.value)} characters; at most 64 are allowed"
         return ""
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the object of JSON that has these pairs."""
+    value = dict(pairs)
+    if len(value) < len(pairs):
+        raise _RepeatedKeyError("", 0, 0)  # the parser does not tell lines
+    return value
+
+
+def _repeated_in(text: str) -> _RepeatedKeyError:
+    """Return the first repeated key of a JSON text that has one."""
+    objects: list[dict[str, int]] = []
+    line, read = 1, 0
+    before = ""
+    for token in _JSON_TOKEN.finditer(text):
+        line += text.count("\n", read, token.start())
+        read = token.start()
+        if token[0] == "{":
+            objects.append({})
+        elif token[0] == "}":
+            objects.pop()
+        elif token[0] == ":":
+            key = json.loads(before)
+            if key in objects[-1]:
+                return _RepeatedKeyError(key, objects[-1][key], line)
+            objects[-1][key] = line
+        before = token[0]
+    raise AssertionError("no key is repeated")
 
 
 def _is_deeper(value: Any, depth: int) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -110,6 +110,20 @@ class TrackingConfig(StrictConfig):
                 raise TrackingError(f"{type(self).__name__}: {complaints(cause)}") from cause
 
 
+class TrackedPolicy(Protocol):
+    """The needs of a policy from the tracker, as :class:`nav_adapter.AwarenessPolicy` has them."""
+
+    @property
+    def filter(self) -> AwarenessFilterConfig:
+        """Settings of the awareness filter."""
+        ...
+
+    @property
+    def standing_window_s(self) -> float | None:
+        """The tracker's setting of this name."""
+        ...
+
+
 class TrackerConfig(TrackingConfig):
     """Settings of :class:`~tracking.PersonTracker`.
 
@@ -141,7 +155,15 @@ class TrackerConfig(TrackingConfig):
 
     confirm_logit: float = Field(default=2.3, ge=-1e3, le=1e3)
     """A track is confirmed once the log-likelihood ratio of its detections to clutter exceeds this
-    minus ln(time between frames / 1 s), …"""
+    minus ln(time between frames / 1 s), or by the next two settings."""
+
+    confirm_hits: int = Field(default=4, ge=1, le=20)
+    """A track is also confirmed once this many frames (distinct stamps) have shown the person
+    within ``confirm_window_s``."""
+
+    confirm_window_s: float = Field(default=0.5, ge=_LEAST_S, le=_MOST_S)
+    """Time for ``confirm_hits``; with a slow camera ``confirm_hits`` + 1 intervals of its frames if
+    that is more."""
 
     weak_score: float = Field(default=0.25, ge=0.0, le=1.0)
     """A detection with a score below this may continue a confirmed track that no other detection
@@ -163,12 +185,6 @@ class TrackerConfig(TrackingConfig):
     ambiguous_noise_factor: float = Field(default=2.0, ge=1.0, le=1e4)
     """Factor on the variance of a measured position whose match is ambiguous. When two people pass
     each other, a wrong match would otherwise reverse both velocities."""
-
-    confirm_hits: int = Field(default=4, ge=1, le=20)
-    """… or once this many frames (distinct stamps) have shown the person …"""
-
-    confirm_window_s: float = Field(default=0.5, ge=_LEAST_S, le=_MOST_S)
-    """… within this time, or within ``confirm_hits`` + 1 frame intervals of a slow camera."""
 
     max_tentative_gap_s: float = Field(default=0.12, ge=0.0, le=_MOST_S)
     """A tentative track unseen for longer than this is deleted, or after as many missed frames in a
@@ -231,3 +247,19 @@ class TrackerConfig(TrackingConfig):
 
     awareness: AwarenessFilterConfig = Field(default_factory=AwarenessFilterConfig)
     """Settings of the awareness filter."""
+
+    @classmethod
+    def for_policy(cls, policy: TrackedPolicy) -> TrackerConfig:
+        """Return the defaults with all that a policy needs from the tracker.
+
+        Without it a rule of the policy may never hold, and nothing tells.
+
+        Raises:
+            TrackingError: for an object that is no policy.
+        """
+        try:
+            return cls(awareness=policy.filter, standing_window_s=policy.standing_window_s)
+        except AttributeError as cause:
+            raise TrackingError(
+                f"policy must be an AwarenessPolicy, got {type(policy).__name__}: {cause}"
+            ) from None

@@ -30,10 +30,11 @@ class PersonTracker:
     """Track people with a moving camera and other sensors, at any frame rates.
 
     Each track has a constant-velocity Kalman filter on the floor plane (odom x and y) and a filter
-    of awareness in logit(α). A track is tentative until ``confirm_hits`` frames within
-    ``confirm_window_s`` have shown the person, and coasting while the latest frame does not. An id
-    is never used again. Tentative tracks are returned too, with ``awareness_lower`` 0: the person
-    may not exist, but navigation must treat them as one who has not seen the robot.
+    of awareness in logit(α). A track is tentative until its detections exceed ``confirm_logit``, or
+    ``confirm_hits`` frames within ``confirm_window_s`` have shown the person, and coasting while
+    the latest frame does not. An id is never used again. Tentative tracks are returned too, with
+    ``awareness_lower`` 0: the person may not exist, but navigation must treat them as one who has
+    not seen the robot.
 
     Other sensors of the robot, such as laser scanners, have names in ``sensors``. Each sensor has
     its own view, frame rate and latency; a track is deleted when all sensors would delete it. A

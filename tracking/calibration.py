@@ -26,6 +26,7 @@ from perception.arrays import FloatArray, finite_array
 from ._errors import TrackingError
 from .prediction import FITTED, REGION_SHARE, REGION_SIGMAS, PredictionModel, predict_states
 from .smoothing import SmoothedPath
+from .units import refuse_other_units
 
 #: Horizons that a calibration uses unless it is told otherwise, seconds.
 HORIZONS_S: Final = (0.2, 0.5, 1.0, 1.5, 2.0)
@@ -95,11 +96,16 @@ def calibrate(
         horizons_s: (T,) increasing, > 0.
 
     Raises:
-        TrackingError: for horizons that are not valid, or recordings that are too short.
+        TrackingError: for horizons that are not valid, recordings that are too short, and people
+            who walk at no speed of people, as numbers of frames for seconds give.
     """
     times = finite_array("horizons_s", horizons_s, ("T",), TrackingError)
     if not len(times) or times[0] <= 0.0 or bool((np.diff(times) <= 0.0).any()):
         raise TrackingError(f"horizons_s must increase from above 0 s, got {times.tolist()}")
+    refuse_other_units(
+        "the recordings",
+        ((each.reference.stamps_s, each.reference.states[:, :2]) for each in people),
+    )
     plain = model.model_copy(update={"horizons_s": (), "std_factors": ()})
     usable = [each for each in people if each.stamps_s[-1] - each.stamps_s[0] >= times[0]]
     if len(usable) < _LEAST_PEOPLE:

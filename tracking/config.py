@@ -7,18 +7,36 @@ nearest valid name, values are checked, and a config that is written and read ag
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, Final, Literal, TypeVar, get_args, get_origin
 
-import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from perception.documents import read_yaml
+from perception.documents import read_yaml, yaml_text
 
 from ._errors import TrackingError
 
 _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
+
+
+# Keys by which files that are given in the wrong place are known.
+_KINDS: Final = {
+    "a policy": {"inflation", "speed", "outline", "rules", "margins", "timing", "filter"},
+    "a scenario": {"layout", "people", "workers", "population", "attention", "replay_csv"},
+    "the file of a robot": {"footprint_m", "max_speed_mps", "max_deceleration_mps2", "drive"},
+    "a camera_info file": {"image_width", "image_height", "camera_matrix", "distortion_model"},
+    "a map of map_server": {"image", "resolution", "occupied_thresh", "free_thresh"},
+}
+
+
+def other_kind(data: Mapping[str, Any], keys: Iterable[str]) -> str:
+    """Return what a file is that was given in place of one with these keys; empty if unknown."""
+    found = {kind: len(known & data.keys()) for kind, known in _KINDS.items()}
+    kind = max(found, key=lambda each: found[each])
+    return kind if found[kind] > len(data.keys() & set(keys)) else ""
 
 
 def complaints(error: ValidationError) -> str:
@@ -38,6 +56,31 @@ def complaint(details: ErrorDetails) -> str:
     return f"{path}: {message}" if path else message
 
 
+@cache
+def _number_keys(config: type[BaseModel]) -> frozenset[str]:
+    """Return the keys that hold numbers and no booleans, which pydantic takes for 0 and 1."""
+    return frozenset(
+        name
+        for name, field in config.model_fields.items()
+        if (kinds := set(_kinds(field.annotation))) & {int, float} and bool not in kinds
+    )
+
+
+def _kinds(annotation: Any) -> Iterator[Any]:
+    """Yield the types that an annotation is made of."""
+    if get_origin(annotation) is not Literal:
+        yield annotation if isinstance(annotation, type) else None
+        for part in get_args(annotation):
+            yield from _kinds(part)
+
+
+def _has_boolean(value: Any) -> bool:
+    """Return whether a value is a boolean, or a list with one."""
+    if isinstance(value, list | tuple):
+        return any(map(_has_boolean, value))
+    return isinstance(value, bool)
+
+
 class StrictConfig(BaseModel):
     """Base of every config: frozen, with finite numbers only; unknown keys are refused by name."""
 
@@ -50,11 +93,16 @@ class StrictConfig(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _name_unknown_keys(cls, data: Any) -> Any:
+    def _check_keys(cls, data: Any) -> Any:
         if not isinstance(data, dict):
             return data
         valid = list(cls.model_fields)
-        for key in data:
+        for key, value in data.items():
+            if key in _number_keys(cls) and _has_boolean(value):
+                raise ValueError(
+                    f"{key} must be a number, got {value!r:.80}; YAML reads on, off, yes and no as "
+                    "true and false"
+                )
             if key not in valid:
                 near = difflib.get_close_matches(str(key), valid, n=1, cutoff=0.5)
                 hint = f"did you mean {near[0]!r}?" if near else f"valid keys: {', '.join(valid)}"
@@ -75,7 +123,11 @@ class StrictConfig(BaseModel):
         try:
             return cls.model_validate(data)
         except ValidationError as cause:
-            raise cls.error(f"{path}: {complaints(cause)}") from cause
+            kind = other_kind(data, cls.model_fields)
+            what = complaints(cause)
+            if kind:  # a near key of the wrong kind is no help
+                what = f"this is {kind}; {what.partition(';')[0]}"
+            raise cls.error(f"{path}: {what}") from cause
 
     def to_yaml(self, path: str | Path) -> None:
         """Write the config as YAML for :meth:`from_yaml`; the file is replaced in one step."""
@@ -86,7 +138,15 @@ class StrictConfig(BaseModel):
         partial.replace(path)
 
     def yaml_text(self) -> str:
-        """Return the text that :meth:`to_yaml` writes."""
-        return str(
-            yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-        )
+        """Return the text that :meth:`to_yaml` writes.
+
+        Raises:
+            ValueError: the package's own error, for a setting that YAML cannot hold.
+        """
+        for name, field in type(self).model_fields.items():
+            if field.exclude and getattr(self, name) != field.default:
+                raise self.error(
+                    f"{name} of {type(self).__name__} cannot be written as YAML; write the config "
+                    f"without it, and set {name} when it is read"
+                )
+        return yaml_text(self.model_dump(mode="json"))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import codecs
+import io
+import json
 import os
 import sys
 from collections.abc import Sequence
@@ -16,6 +19,7 @@ from ._command import BAD_INPUT, INTERRUPTED, CommandGroup
 from ._failure import CommandFailure
 
 _PROGRAM: Final = "awarenav"
+_ESCAPE: Final = "awarenav.escape"
 #: The environment variable through which a shell asks for completions.
 COMPLETION_VARIABLE: Final = "_AWARENAV_COMPLETE"
 
@@ -201,6 +205,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if instruction := os.environ.get(COMPLETION_VARIABLE):
         return shell_complete(app, {}, _PROGRAM, COMPLETION_VARIABLE, instruction)
     words = list(sys.argv[1:] if arguments is None else arguments)
+    _escape_what_cannot_be_printed()
     try:
         status = _run(words)
         sys.stdout.flush()
@@ -208,6 +213,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return status
+
+
+def _escape_what_cannot_be_printed() -> None:
+    """Print escapes where an output has no α, ×, → or a letter of a file name.
+
+    They are those of JSON, so that the output of ``--json`` stays the same document.
+    """
+    codecs.register_error(_ESCAPE, _escaped)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=_ESCAPE)
+
+
+def _escaped(error: UnicodeError) -> tuple[str, int]:
+    """Return the escapes of the letters that could not be encoded, and where to go on."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return json.dumps(error.object[error.start : error.end])[1:-1], error.end
 
 
 def _run(words: list[str]) -> int:

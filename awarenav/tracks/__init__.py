@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from ._file_tracks import tracks_in_file
     from ._history import HistoryBuilder, TrackedRecording, TrackHistory, TrackSample
     from ._page import track_colour
+    from ._people_table import PeopleTable, PersonRow, person_id, read_people_table
     from ._plan_view import covariance_ellipse, path_arrows, plan_limits, view_edges_rad
     from ._plot import shown_tracks, tracks_figure
     from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording, read_recording
@@ -28,6 +29,8 @@ __all__ = [
     "ASSUMED_POSITION_STD_M",
     "CSV_COLUMNS",
     "HistoryBuilder",
+    "PeopleTable",
+    "PersonRow",
     "RecordedFrame",
     "Recording",
     "TrackHistory",
@@ -38,8 +41,10 @@ __all__ = [
     "covariance_ellipse",
     "match_truth",
     "path_arrows",
+    "person_id",
     "person_ids_text",
     "plan_limits",
+    "read_people_table",
     "read_recording",
     "shown_tracks",
     "track_colour",
@@ -57,6 +62,12 @@ __getattr__ = lazy_names(
         "._file_tracks": ("tracks_in_file",),
         "._history": ("HistoryBuilder", "TrackHistory", "TrackSample", "TrackedRecording"),
         "._page": ("track_colour",),
+        "._people_table": (
+            "PeopleTable",
+            "PersonRow",
+            "person_id",
+            "read_people_table",
+        ),
         "._plan_view": ("covariance_ellipse", "path_arrows", "plan_limits", "view_edges_rad"),
         "._plot": ("shown_tracks", "tracks_figure"),
         "._recording": (

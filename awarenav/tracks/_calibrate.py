@@ -9,6 +9,7 @@ from typing import Any, Final
 from tracking import TrackerConfig
 from tracking.calibration import HORIZONS_S, Calibration, FollowedPerson, calibrate
 from tracking.prediction import REGION_SHARE
+from tracking.units import refuse_other_units
 
 from ..errors import AwarenavError
 from ..files import json_text, write_text
@@ -56,7 +57,11 @@ def calibrate_command(options: CalibrateOptions) -> int:
 
 
 def followed_people(path: Path, config: TrackerConfig | None) -> list[FollowedPerson]:
-    """Return the confirmed tracks of a recording, each with its smoothed path."""
+    """Return the confirmed tracks of a recording, each with its smoothed path.
+
+    Raises:
+        AwarenavError: for a recording that cannot be used, or in other units.
+    """
     tracked = track_recording(read_file(path), config)
     for remark in tracked.remarks:
         log(remark)
@@ -70,6 +75,8 @@ def followed_people(path: Path, config: TrackerConfig | None) -> list[FollowedPe
         samples = [each for each in history.frames if confirmed_s <= each.stamp_s <= end_s]
         if samples:
             people.append(FollowedPerson(*arrays_of(samples), path_m))
+    paths = ((each.reference.stamps_s, each.reference.states[:, :2]) for each in people)
+    refuse_other_units(str(path), paths, AwarenavError)
     return people
 
 

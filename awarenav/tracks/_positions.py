@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
-from collections.abc import Iterator
-from operator import itemgetter
+import re
+from operator import attrgetter
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from perception import PersonObservation
-from perception.arrays import finite_number
 
 from ..errors import AwarenavError
+from ._people_table import PersonRow, read_people_table
 from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording
 
-_COLUMNS: Final = ("t_s", "id", "x_m", "y_m")
 _STD: Final = "std_m"
+_WHOLE: Final = re.compile(r"-?[0-9]+")
+_MOST_NAMED: Final = 20
 # Observations need a sensor's frame: this one looks straight down from above the people. Its x is
 # odom's x, its y is against odom's y.
 _ABOVE_M: Final = 8.0
@@ -33,14 +33,6 @@ _T_ODOM_ABOVE: Final = np.array(
 )
 
 
-class _Row(NamedTuple):
-    stamp_s: float
-    id: int
-    x_m: float
-    y_m: float
-    std_m: float | None
-
-
 def is_positions(path: Path) -> bool:
     """Return whether a file holds positions, by its suffix."""
     return path.suffix.lower() == ".csv"
@@ -49,61 +41,45 @@ def is_positions(path: Path) -> bool:
 def read_positions(path: Path) -> Recording:
     """Read a CSV of positions on the floor, in metres of any fixed frame.
 
-    Rows of the same time are one frame.
+    Rows of the same time are one frame. Ids that are no whole numbers are numbered.
 
     Raises:
-        AwarenavError: for a file that cannot be read, without the columns, or with a value that is
-            not valid; the message names the line.
+        AwarenavError: for a file that cannot be read, without the columns, with a value that is not
+            valid, or in other units; see :func:`read_people_table`.
     """
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = sorted(_rows(path, csv.DictReader(file)), key=itemgetter(0))
-    except (OSError, UnicodeDecodeError, csv.Error) as cause:
-        raise AwarenavError(f"cannot read {path}: {cause}") from cause
+    rows = sorted(read_people_table(path, (_STD,)).rows, key=attrgetter("t_s"))
+    for row in rows:
+        std_m = row.more.get(_STD)
+        if std_m is not None and std_m <= 0.0:
+            raise AwarenavError(f"{path}, line {row.line}: {_STD} must be above 0 m, got {std_m:g}")
+    ids, remark = _numbered([row.id for row in rows])
     frames = [
-        _frame(stamp_s, list(group)) for stamp_s, group in itertools.groupby(rows, itemgetter(0))
+        _frame(stamp_s, list(group), ids)
+        for stamp_s, group in itertools.groupby(rows, attrgetter("t_s"))
     ]
-    assumed = sum(row.std_m is None for row in rows)
-    return Recording(path, tuple(frames), (), assumed, has_camera=False)
+    assumed = sum(row.more.get(_STD) is None for row in rows)
+    return Recording(path, tuple(frames), remark, assumed, has_camera=False)
 
 
-def _rows(path: Path, reader: csv.DictReader[str]) -> Iterator[_Row]:
-    names = reader.fieldnames or ()
-    missing = [name for name in _COLUMNS if name not in names]
-    if missing:
-        raise AwarenavError(
-            f"{path} must have the columns {', '.join(_COLUMNS)} and may have {_STD}; "
-            f"it lacks {', '.join(missing)}"
-        )
-    for row in reader:
-        where = f"{path}, line {reader.line_num}"
-        try:
-            person = int(row["id"])
-        except (TypeError, ValueError):
-            raise AwarenavError(f"{where}: id must be a whole number, got {row['id']!r}") from None
-        std_m = None
-        if row.get(_STD):
-            std_m = _number(where, row, _STD)
-            if std_m <= 0.0:
-                raise AwarenavError(f"{where}: {_STD} must be above 0 m, got {std_m:g}")
-        numbers = [_number(where, row, name) for name in ("t_s", "x_m", "y_m")]
-        yield _Row(numbers[0], person, numbers[1], numbers[2], std_m)
+def _numbered(ids: list[str]) -> tuple[dict[str, int], tuple[str, ...]]:
+    """Return the number of each id, and a remark if some are no whole numbers."""
+    numbers = {id: int(id) for id in ids if _WHOLE.fullmatch(id)}
+    first = max(numbers.values(), default=0) + 1
+    others = [id for id in dict.fromkeys(ids) if id not in numbers]
+    texts = {id: first + index for index, id in enumerate(others)}
+    if not texts:
+        return numbers, ()
+    named = ", ".join(f"{number} is {id!r}" for id, number in list(texts.items())[:_MOST_NAMED])
+    more = ", …" if len(texts) > _MOST_NAMED else ""
+    return {**numbers, **texts}, (f"ids that are no whole numbers are numbered: {named}{more}",)
 
 
-def _number(where: str, row: dict[str, str], name: str) -> float:
-    try:
-        value = float(row[name])
-    except (TypeError, ValueError):
-        raise AwarenavError(f"{where}: {name} must be a number, got {row[name]!r}") from None
-    return finite_number(f"{where}: {name}", value, AwarenavError)
-
-
-def _frame(stamp_s: float, rows: list[_Row]) -> RecordedFrame:
+def _frame(stamp_s: float, rows: list[PersonRow], ids: dict[str, int]) -> RecordedFrame:
     observations = tuple(
         PersonObservation(
             stamp_s=stamp_s,
             position_camera_m=np.array([row.x_m, -row.y_m, _ABOVE_M - _CHEST_M]),
-            position_covariance_m2=(row.std_m or ASSUMED_POSITION_STD_M) ** 2 * np.eye(3),
+            position_covariance_m2=(row.more.get(_STD) or ASSUMED_POSITION_STD_M) ** 2 * np.eye(3),
             gaze_camera=None,
             awareness=None,
             awareness_std=None,
@@ -116,6 +92,6 @@ def _frame(stamp_s: float, rows: list[_Row]) -> RecordedFrame:
         stamp_s=stamp_s,
         T_odom_camera=_T_ODOM_ABOVE,
         observations=observations,
-        ids=tuple(row.id for row in rows),
+        ids=tuple(ids[row.id] for row in rows),
         tracks=None,
     )

@@ -111,8 +111,7 @@ class AwarenessBridge:
         self._warn_user, self._warned = warn, ""
         if not with_camera and not scanners:
             raise NavError("with_camera must be True, or scanners must name one or two, got none")
-        config = TrackerConfig(awareness=policy.filter, standing_window_s=policy.standing_window_s)
-        self._tracker = SharedTracker(config, len(scanners))
+        self._tracker = SharedTracker(TrackerConfig.for_policy(policy), len(scanners))
         self._perception = ImagePerception(make_pipeline, self._tracker, camera, rectified)
         self._adapter = NavAdapter(policy, robot, prediction=prediction)
         self._poses = RobotPoses(self.frames, T_base_camera)

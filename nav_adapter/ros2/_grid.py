@@ -45,7 +45,7 @@ def occupancy_grid(
     center = finite_array("center_odom_m", center_odom_m, (2,), NavError)
     size = finite_number("size_m", size_m, NavError, minimum=0.0, exclusive_minimum=True)
     cell = finite_number("resolution_m", resolution_m, NavError, minimum=1e-3)
-    side = round(size / cell)
+    side = round(min(size / cell, 1e9))  # of a float, which may overflow
     if not 0 < side * side <= _LARGEST_CELLS:
         raise NavError(
             f"a grid must have 1 to {_LARGEST_CELLS} cells, got {side} x {side} "

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Final, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from perception.arrays import FloatArray
 from perception.laser import Scanner
@@ -15,7 +15,20 @@ from tracking.config import StrictConfig
 from .._errors import NavError
 from .._robot import RobotProfile
 
-_Position = Annotated[list[float], Field(min_length=3, max_length=3)]
+# No sensor is mounted further from the base origin.
+_FARTHEST_M: Final = 10.0
+
+
+def _near_base(position_m: list[float]) -> list[float]:
+    if math.hypot(*position_m) > _FARTHEST_M:
+        raise ValueError(
+            f"must lie within {_FARTHEST_M:g} m of the base origin, got {position_m} m; is it in "
+            "millimetres or centimetres?"
+        )
+    return position_m
+
+
+_Position = Annotated[list[float], Field(min_length=3, max_length=3), AfterValidator(_near_base)]
 _Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
@@ -103,6 +116,8 @@ class ScannerMount(StrictConfig):
 class RobotFile(StrictConfig):
     """The file that ``awarenav bridge --robot`` reads.
 
+    The bounds of :class:`~nav_adapter.RobotProfile` hold.
+
     Attributes:
         footprint_m: corners x, y in the base frame, metres.
         max_speed_mps: > 0.01, the maximum that the controller is configured with.
@@ -138,11 +153,11 @@ class RobotFile(StrictConfig):
     camera: CameraMount | None = None
     scanners: list[ScannerMount] | None = Field(default=None, min_length=1, max_length=2)
 
-    def profile(self) -> RobotProfile:
-        """Return the robot's profile.
+    @model_validator(mode="after")
+    def _has_a_profile(self) -> RobotFile:
+        self.profile()
+        return self
 
-        Raises:
-            NavError: for a footprint without area, and a turning radius that does not go with the
-                drive.
-        """
+    def profile(self) -> RobotProfile:
+        """Return the robot's profile."""
         return RobotProfile.of_settings(self)

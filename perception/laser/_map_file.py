@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import logging
 import re
+import warnings
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -30,10 +32,10 @@ _OCCUPIED: Final = (65, 100)
 _SIDE_M: Final = (0.005, 1.0)
 _MAX_IMAGE_BYTES: Final = 256 << 20
 _MAX_CELLS: Final = 100_000_000
-# The head of a binary PGM file: width, height and the value of white; "#" begins a comment.
-_PGM_HEAD: Final = re.compile(
-    rb"P5(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)(?:\s|#[^\n]*\n)+(\d+)\s"
-)
+# The head of a PGM or PPM file: kind, width, height, the value of white; "#" begins a comment.
+_NETPBM_HEAD: Final = re.compile(rb"P([2356])" + 3 * rb"(?:\s|#[^\n]*\n)+(\d{1,9})" + rb"\s")
+_COMMENT: Final = re.compile(rb"#[^\n]*")
+_LOG: Final = logging.getLogger("perception")
 
 
 class MapImage(NamedTuple):
@@ -59,12 +61,17 @@ def read_map_file(path: Path) -> MapImage:
     data = read_yaml(path)
     if not isinstance(data, dict):
         raise PerceptionError(f"{path} must hold the keys {', '.join(_REQUIRED)}")
-    for key in data:
-        if key not in (*_REQUIRED, "mode"):
-            near = difflib.get_close_matches(str(key), (*_REQUIRED, "mode"), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            valid = ", ".join((*_REQUIRED, "mode"))
-            raise PerceptionError(f"{path} has the unknown key {key!r}, valid are {valid}{hint}")
+    valid = (*_REQUIRED, "mode")
+    unknown = [key for key in data if key not in valid]
+    for key in unknown:
+        near = difflib.get_close_matches(str(key).lower(), valid, n=1, cutoff=0.8)
+        if near:
+            raise PerceptionError(
+                f"{path} has the unknown key {key!r}, valid are {', '.join(valid)}; did you mean "
+                f"{near[0]!r}?"
+            )
+    if unknown:  # such as those of tools that draw maps; map_server leaves them out as well
+        _LOG.warning("%s: not read: %s", path, ", ".join(map(repr, unknown)))
     missing = [key for key in _REQUIRED if key not in data]
     if missing:
         raise PerceptionError(f"{path} lacks the key {missing[0]!r} of a map_server file")
@@ -88,24 +95,25 @@ def read_map_file(path: Path) -> MapImage:
             raise PerceptionError(f"image must be the path of an image, got {image!r}")
     except PerceptionError as cause:
         raise PerceptionError(f"{path}: {cause}") from cause
-    shade, opaque = _shades(path.parent / image, mode)
-    percent = _percent(shade, opaque, mode, bool(negate), occupied, free)
+    shade, opaque = _shades(path.parent / image)
+    percent = _percent(shade, mode, bool(negate), occupied, free)
+    if opaque is not None:
+        percent[~opaque] = -1.0  # as nav2_map_server since 2025, in every mode
     cells = (percent >= _OCCUPIED[0]) & (percent <= _OCCUPIED[1])
     # The first row of an image is the highest of the map.
     return MapImage(cells[::-1], (x, y, yaw), side_m)
 
 
 def _between(name: str, value: Any, low: float, high: float) -> float:
-    if isinstance(value, bool | str):  # float() takes both
+    if isinstance(value, str):  # float() takes it
         raise PerceptionError(f"{name} must be a number, got {value!r}")
     return finite_number(name, value, minimum=low, maximum=high)
 
 
-def _shades(path: Path, mode: str) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+def _shades(path: Path) -> tuple[FloatArray, NDArray[np.bool_] | None]:
     """Return the brightness (H, W) of an image in [0, 1], and which pixels are opaque.
 
-    In ``trinary`` mode an alpha channel counts as a colour, as for ``nav2_map_server``. Without an
-    alpha channel the second value is None.
+    Without an alpha channel the second value is None.
     """
     try:
         with path.open("rb") as file:
@@ -116,35 +124,80 @@ def _shades(path: Path, mode: str) -> tuple[FloatArray, NDArray[np.bool_] | None
     if len(data) > _MAX_IMAGE_BYTES:
         limit = _MAX_IMAGE_BYTES >> 20
         raise PerceptionError(f"the map's image {path} is too large: at most {limit} MiB are read")
-    head = _PGM_HEAD.match(data)
-    if head is not None and int(head[3]) not in (255, 65535):
-        raise PerceptionError(
-            f"the map's image {path} must have 255 or 65535 for white, got {int(head[3])}"
-        )
+    head = _NETPBM_HEAD.match(data)
+    if head is not None:
+        return _netpbm_shades(path, data, head), None
+    if data.startswith(b"P7"):  # OpenCV takes its numbers for shares of 255 or 65535
+        raise PerceptionError(f"the map's image {path} is a PAM (P7); save it as PGM or PNG")
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     except cv2.error:
         image = None
     if image is None or image.dtype not in (np.uint8, np.uint16):
-        raise PerceptionError(
-            f"the map's image {path} is damaged, or no PGM, PNG or BMP of 8 or 16 bits"
-        )
-    if image.shape[0] * image.shape[1] > _MAX_CELLS:
-        raise PerceptionError(
-            f"the map's image {path} must have at most {_MAX_CELLS} pixels, got "
-            f"{image.shape[1]} x {image.shape[0]}"
-        )
+        raise _damaged(path)
+    _check_size(path, image.shape[1], image.shape[0])
     white = 255.0 if image.dtype == np.uint8 else 65535.0
     channels = image.reshape(*image.shape[:2], -1)
-    alpha = channels[..., 3] if channels.shape[2] == 4 else None
-    counted = channels if mode == "trinary" else channels[..., :3]
-    shade = np.asarray(counted.sum(axis=2, dtype=np.float64) / (white * counted.shape[2]))
-    return shade, None if alpha is None else np.asarray(alpha == white)
+    colours = channels[..., :3]
+    shade = np.asarray(colours.sum(axis=2, dtype=np.float64) / (white * colours.shape[2]))
+    if channels.shape[2] == 4:
+        return shade, np.asarray(channels[..., 3] == white)
+    clear = _transparent_grey(data)
+    return shade, None if clear is None else np.abs(shade - clear) > 0.5 / white
+
+
+def _transparent_grey(data: bytes) -> float | None:
+    """Return the brightness of the transparent pixels of a grey PNG, which OpenCV drops."""
+    bits, is_grey = data[24:25], data[25:26] == b"\x00"
+    at = data.find(b"tRNS", 0, data.find(b"IDAT"))
+    if not data.startswith(b"\x89PNG") or not is_grey or at < 0:
+        return None
+    return int.from_bytes(data[at + 4 : at + 6], "big") / ((1 << bits[0]) - 1)
+
+
+def _netpbm_shades(path: Path, data: bytes, head: re.Match[bytes]) -> FloatArray:
+    """Return the brightness (H, W) of a PGM or PPM file in [0, 1].
+
+    White is what the file says, not what the bits could hold: OpenCV reads 1023 of 1023 as 1 of 64.
+    """
+    kind, width, height, white = map(int, head.groups())
+    _check_size(path, width, height)
+    count = width * height * (3 if kind in (3, 6) else 1)
+    deep = white >= 256
+    body = data[head.end() :]
+    least_bytes = 2 * count - 1 if kind in (2, 3) else count * (2 if deep else 1)
+    if not count or not 0 < white < 65536 or len(body) < least_bytes:
+        raise _damaged(path)
+    if kind in (2, 3):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")  # older NumPy warns of what is no number
+                values = np.fromstring(_COMMENT.sub(b"", body), np.int64, sep=" ")[:count]
+        except (ValueError, DeprecationWarning) as cause:
+            raise _damaged(path) from cause
+    else:
+        values = np.frombuffer(body, ">u2" if deep else np.uint8, count)
+    if len(values) < count or values.min() < 0 or values.max() > white:
+        raise _damaged(path)
+    shade = values.reshape(height, width, -1).mean(axis=2, dtype=np.float64) / white
+    return np.asarray(shade)
+
+
+def _check_size(path: Path, width: int, height: int) -> None:
+    if width * height > _MAX_CELLS:
+        raise PerceptionError(
+            f"the map's image {path} must have at most {_MAX_CELLS} pixels, got {width} x {height}"
+        )
+
+
+def _damaged(path: Path) -> PerceptionError:
+    return PerceptionError(
+        f"the map's image {path} is damaged, or no PGM, PPM, PBM, PNG or BMP of 8 or 16 bits"
+    )
 
 
 def _percent(
     shade: FloatArray,
-    opaque: NDArray[np.bool_] | None,
     mode: str,
     negate: bool,
     occupied: float,
@@ -160,6 +213,4 @@ def _percent(
         percent = np.rint((share - free) / (occupied - free) * 100.0)
     percent[share < free] = 0.0
     percent[share > occupied] = 100.0
-    if mode == "scale" and opaque is not None:
-        percent[~opaque] = -1.0
     return percent

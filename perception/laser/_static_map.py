@@ -112,17 +112,18 @@ class MapCells:
     def from_yaml(cls, path: str | Path, frame_id: str = "map") -> MapCells:
         """Return the occupied cells of a map in the format of ROS's map_server.
 
-        The YAML file has ``image`` (PGM, PNG or BMP; a path from the file's folder), ``resolution``
-        in metres, ``origin`` (x, y and yaw of the lower left corner), ``negate``,
+        The YAML file has ``image`` (PGM, PPM, PBM, PNG or BMP; a path from the file's folder),
+        ``resolution`` in metres, ``origin`` (x, y and yaw of the lower left corner), ``negate``,
         ``occupied_thresh``, ``free_thresh`` and perhaps ``mode``: ``trinary``, ``scale`` or
         ``raw``. Cells count as occupied from 65 per cent on, as those of an OccupancyGrid.
+        Transparent cells are unknown. Other keys are not read, and a warning names them.
 
         Args:
             path: the YAML file.
             frame_id: name of the map's frame; map_server calls it ``"map"``.
 
         Raises:
-            PerceptionError: for a file that cannot be read, unknown or missing keys, values out of
+            PerceptionError: for a file that cannot be read, missing or misspelt keys, values out of
                 range, or a damaged image.
         """
         given = read_map_file(Path(path))

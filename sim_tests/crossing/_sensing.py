@@ -212,7 +212,7 @@ def _camera_and_timing(stage: Stage, kind: str) -> tuple[Camera, CameraTiming]:
 def _make_tracker(
     perception: Perception, policy: AwarenessPolicy, stage: Stage, camera: Camera
 ) -> PersonTracker:
-    config = TrackerConfig(awareness=policy.filter, standing_window_s=policy.standing_window_s)
+    config = TrackerConfig.for_policy(policy)
     if perception.kind == "truth":  # no limits of range or field of view
         return PersonTracker(config)
     if perception.kind == ORACLE:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
 from awarenav.errors import not_one_of
 from perception import documents
+from tracking.config import other_kind
 
 from ..world.errors import SimError
 
@@ -85,15 +87,19 @@ def camera_data(name: str) -> dict[str, Any]:
     return parse_yaml((_CAMERAS / f"{name}.yaml").read_text("utf-8"), name)
 
 
-def read_file(path: Path) -> dict[str, Any]:
+def read_file(path: Path, keys: Iterable[str]) -> dict[str, Any]:
     """Return the mapping in a scenario's file, with an absolute path as ``replay_csv``.
 
     In the file ``replay_csv`` is relative to the file's own folder.
 
     Raises:
-        SimError: naming the file, when it cannot be read or holds no YAML mapping.
+        SimError: naming the file, when it cannot be read, holds no YAML mapping or is of another
+            kind than a scenario, whose ``keys`` are given.
     """
     data = _completed(documents.read_yaml(path, SimError), str(path))
+    kind = other_kind(data, keys)
+    if kind:
+        raise SimError(f"{path}: this is {kind}, no scenario")
     replay = data.get("replay_csv")
     if isinstance(replay, str):
         data["replay_csv"] = str((path.parent / replay).resolve())

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, Literal
 
 import numpy as np
-import yaml
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from nav_adapter import RobotProfile
 from perception import Camera
 from perception.arrays import FloatArray
+from perception.documents import yaml_text
 from perception.surround import FlatView, ring_of_views
 from tracking.config import StrictConfig
 
@@ -262,7 +262,7 @@ class Scenario(StrictConfig):
         Raises:
             SimError: naming the file and the wrong key.
         """
-        return cls._at_medians(read_file(Path(path)), str(path))
+        return cls._at_medians(read_file(Path(path), cls.model_fields), str(path))
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], source: str = "scenario") -> Scenario:
@@ -312,7 +312,7 @@ class Scenario(StrictConfig):
         data = self.model_dump(mode="json")
         if self.robot_model is None:
             del data["robot_model"]
-        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+        return yaml_text(data)
 
     def with_population(self, name: str) -> Scenario:
         """Return the same task among people of another population.

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-import yaml
 from pydantic import ValidationError
 
 from nav_adapter import RobotProfile
+from perception.documents import yaml_text
 
 from ..actors.behaviour import known_population
 from ..actors.robot import RobotModel
@@ -73,7 +73,7 @@ class ScenarioTemplate:
         Raises:
             SimError: naming the file, if it cannot be used.
         """
-        return cls(read_file(Path(path)), str(path))
+        return cls(read_file(Path(path), Scenario.model_fields), str(path))
 
     @classmethod
     def from_text(cls, text: str, source: str = "scenario") -> ScenarioTemplate:
@@ -222,7 +222,7 @@ class ScenarioTemplate:
 
     def to_text(self) -> str:
         """Return YAML for :meth:`from_text`, with the shared defaults written out."""
-        return yaml.safe_dump(self._data, sort_keys=False, allow_unicode=True)
+        return yaml_text(self._data)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ScenarioTemplate) and self._data == other._data

@@ -17,7 +17,7 @@ from perception.arrays import FloatArray
 
 ROUNDING = 1e-9
 TURNS = replace(ROBOT, max_yaw_rate_radps=1.2, max_yaw_acceleration_radps2=3.0)
-UNLIMITED = replace(ROBOT, max_speed_mps=1e6)
+UNLIMITED = replace(ROBOT, max_speed_mps=15.0)
 STATES = st.builds(
     lambda heading, speed, yaw_rate: RobotState(0.0, (1.0, -2.0), heading, speed, yaw_rate),
     finite(-4.0, 4.0),

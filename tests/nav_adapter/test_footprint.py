@@ -57,7 +57,7 @@ def test_a_corner_given_twice_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("footprint", "message"),
     [
-        ([[0, 0], [1, 1], [2, 2]], "enclose at least 1e-06 m², got 0 m²"),
+        ([[0, 0], [1, 1], [2, 2]], "enclose at least 0.002 m², got 0 m²"),
         ([[0, 0], [1, 1]], "at least 3 corners"),
         ([[0, 0], [1, 0], [0, float("nan")]], "finite"),
     ],

@@ -140,7 +140,9 @@ def test_the_grid_is_occupied_where_the_costmap_is_lethal(tracks, x: float, y: f
     assert (np.abs(corner + 3.0 - [x, y]) <= 0.1 + 1e-9).all()
 
 
-@pytest.mark.parametrize("change", [{"size_m": 0.0}, {"size_m": 500.0}, {"resolution_m": 0.0}])
+@pytest.mark.parametrize(
+    "change", [{"size_m": 0.0}, {"size_m": 500.0}, {"size_m": 1e308}, {"resolution_m": 0.0}]
+)
 def test_a_grid_without_cells_or_with_too_many_is_refused(change) -> None:
     with pytest.raises(NavError):
         occupancy_grid(limited(1.0), (0.0, 0.0), **change)

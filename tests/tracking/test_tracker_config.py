@@ -14,7 +14,14 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 from tracking_scenes import CAMERA, observe
 
-from tracking import AwarenessFilterConfig, PersonTracker, TrackerConfig, TrackingError
+from tracking import (
+    AwarenessFilterConfig,
+    PersonTracker,
+    ScannerView,
+    SensorConfig,
+    TrackerConfig,
+    TrackingError,
+)
 
 
 def test_a_config_is_the_same_after_yaml(tmp_path: Path) -> None:
@@ -68,6 +75,16 @@ def test_an_unusable_file_is_refused_in_one_line_that_names_every_wrong_key(tmp_
 def test_a_hidden_face_must_not_keep_awareness_longer_than_being_unseen() -> None:
     with pytest.raises(ValidationError, match="no_face_time_constant_s <= unseen"):
         AwarenessFilterConfig(no_face_time_constant_s=0.5, unseen_time_constant_s=0.3)
+
+
+def test_a_view_is_not_lost_when_a_sensor_is_written(tmp_path: Path) -> None:
+    sensor = SensorConfig(view=ScannerView(), detection_probability=0.8)
+    path = tmp_path / "sensor.yaml"
+    with pytest.raises(TrackingError, match="view of SensorConfig cannot be written as YAML"):
+        sensor.to_yaml(path)
+    assert not path.exists()
+    sensor.model_copy(update={"view": None}).to_yaml(path)
+    assert SensorConfig.from_yaml(path) == SensorConfig(detection_probability=0.8)
 
 
 def test_the_tracker_accepts_only_a_tracker_config() -> None:

@@ -207,7 +207,7 @@ class FlowReader {
   }
 }
 
-/** The value of a plain scalar by the rules of YAML 1.1. */
+/** The value of a plain scalar by the rules of YAML 1.1; 5e-2 is a number as well. */
 function plainScalar(text, fail) {
   if (/^(~|null|Null|NULL|)$/.test(text)) return null;
   if (/^(yes|Yes|YES|true|True|TRUE|on|On|ON)$/.test(text)) return true;
@@ -217,7 +217,7 @@ function plainScalar(text, fail) {
   if (/^[-+]?0[0-9xXbBoO_]|^[-+]?\d+(:\d+)+|^[-+]?[\d.]*_/.test(text))
     return fail(`'${text}' is not a plain decimal number`);
   if (/^[-+]?(0|[1-9]\d*)$/.test(text)) return Number(text);
-  if (/^[-+]?(\d+\.\d*|\.\d+)([eE][-+]?\d+)?$/.test(text)) return Number(text);
+  if (/^[-+]?(\d+\.\d*|\.\d+|(\d+\.?\d*|\.\d+)[eE][-+]?\d+)$/.test(text)) return Number(text);
   return text;
 }
 

@@ -7,11 +7,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
-import yaml
 from pydantic import Field
 
 from awarenav.errors import not_one_of
-from perception.documents import parse_yaml
+from perception.documents import parse_yaml, yaml_text
 from tracking.config import StrictConfig
 
 from ...world.errors import SimError
@@ -145,7 +144,7 @@ class Fault(StrictConfig):
     def to_text(self) -> str:
         """Return the fault as YAML, without default values."""
         data = self.model_dump(mode="json", exclude_defaults=True)
-        return yaml.safe_dump({"name": self.name, **data}, sort_keys=False, allow_unicode=True)
+        return yaml_text({"name": self.name, **data})
 
 
 def shipped_faults() -> tuple[str, ...]:

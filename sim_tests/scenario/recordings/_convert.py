@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
-from awarenav.files import write_text
+from awarenav.files import printable, write_text
+from awarenav.tracks import person_id
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number
+from perception.documents import yaml_text
 
 from ...actors.robot import NOVA_CARTER
 from ...world.errors import SimError
@@ -99,6 +100,8 @@ def scenario_from_recording(
     people_file = out.with_name(f"{out.stem}_people.csv")
     if out.suffix not in (".yaml", ".yml"):
         raise SimError(f"the scenario must be a file that ends in .yaml, got {out}")
+    if printable(out.name) != out.name:
+        raise SimError(f"the scenario's file must have a name in UTF-8, got {out}")
     if table.resolve() in (out.resolve(), people_file.resolve()):
         raise SimError(f"{people_file} would overwrite the recording {table}")
     recorded = read_table(table)
@@ -120,7 +123,7 @@ def scenario_from_recording(
     _check_start(start, people)
     _check_goal(start, goal, people)
     data = _scenario_data(table, people_file.name, people, (start, goal), options)
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+    text = yaml_text(data, width=100)
     template = ScenarioTemplate.from_text(text, str(out))
     write_text(people_file, _people_text(people), SimError)
     write_text(out, text, SimError)
@@ -145,13 +148,14 @@ def _split(
     """Return the tracks of the robot and of the people."""
     if options.robot_id is None:
         return (), recorded.tracks
-    robot = recorded.of(options.robot_id)
+    robot_id = person_id(options.robot_id)
+    robot = recorded.of(robot_id)
     if not robot:
         ids = dict.fromkeys(track.id for track in recorded.tracks)
         raise SimError(
             f"{table} has no rows of the robot {options.robot_id!r}; its ids are {', '.join(ids)}"
         )
-    people = tuple(track for track in recorded.tracks if track.id != options.robot_id)
+    people = tuple(track for track in recorded.tracks if track.id != robot_id)
     if not people:
         raise SimError(f"{table} has only rows of the robot {options.robot_id!r}")
     return robot, people
@@ -273,7 +277,7 @@ def _scenario_data(
     return {
         "name": Path(people_file).stem.removesuffix("_people"),
         "version": 1,
-        "description": f"People of {table.name}: {count} of {span_s:.1f} s. {does}",
+        "description": f"People of {printable(table.name)}: {count} of {span_s:.1f} s. {does}",
         "attention": "mixed",
         "extends": "hall",
         "duration_s": round(min(max(span_s, drive_s), _LONGEST_S), 1),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,16 +10,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from awarenav.tracks import read_people_table
 from perception.arrays import FloatArray
+from tracking.units import FASTEST_MPS
 
 from ...world.errors import SimError
 
-_REQUIRED: Final = ("t_s", "id", "x_m", "y_m")
 _HEADINGS: Final = {"heading_rad": 1.0, "heading_deg": math.pi / 180.0}
 #: A longer time without a row is no gap to fill: the person was away.
 LONGEST_GAP_S: Final = 0.5
-# Nobody runs faster; nobody is recorded on a larger floor.
-_MAX_SPEED_MPS: Final = 12.0
+# Nobody is recorded on a larger floor.
 _LARGEST_FLOOR_M: Final = 300.0
 # A row this many usual steps after the one before it ends a gap.
 _GAP_STEPS: Final = 1.5
@@ -116,45 +115,18 @@ def _read_rows(
     path: Path,
 ) -> tuple[dict[str, list[tuple[int, list[float]]]], tuple[str, ...], float | None]:
     """Return (line, numbers) by id, the columns that are not read, and the unit of headings."""
+    table = read_people_table(path, tuple(_HEADINGS), SimError)
+    heading = next((name for name in _HEADINGS if name in table.rows[0].more), None)
     rows: dict[str, list[tuple[int, list[float]]]] = {}
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
-            names = [name.strip() for name in reader.fieldnames or ()]
-            missing = [name for name in _REQUIRED if name not in names]
-            if missing:
-                raise SimError(
-                    f"{path}: the header misses {', '.join(missing)}; it must name "
-                    f"{', '.join(_REQUIRED)} and may name heading_rad or heading_deg, got "
-                    f"{', '.join(names) or 'nothing'}"
-                )
-            reader.fieldnames = names
-            heading = next((name for name in _HEADINGS if name in names), None)
-            columns = ["t_s", "x_m", "y_m", *([] if heading is None else [heading])]
-            for row in reader:
-                line = reader.line_num
-                name = (row["id"] or "").strip()
-                if not name:
-                    raise SimError(f"{path}, line {line}: id is empty")
-                numbers = [_number(path, line, column, row[column]) for column in columns]
-                rows.setdefault(name, []).append((line, numbers))
-    except (OSError, UnicodeDecodeError, csv.Error) as cause:
-        reason = cause.strerror if isinstance(cause, OSError) and cause.strerror else cause
-        raise SimError(f"cannot read recorded people from {path}: {reason}") from cause
-    if not rows:
-        raise SimError(f"{path} holds no rows below its header {', '.join(names)}")
-    ignored = tuple(name for name in names if name not in (*columns, "id"))
-    return rows, ignored, None if heading is None else _HEADINGS[heading]
-
-
-def _number(path: Path, line: int, column: str, text: str | None) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise SimError(f"{path}, line {line}: {column} must be a finite number, got {text!r}")
-    return value
+    for row in table.rows:
+        numbers = [row.t_s, row.x_m, row.y_m]
+        if heading is not None:
+            angle = row.more[heading]
+            if angle is None:
+                raise SimError(f"{path}, line {row.line}: {heading} is empty; fill it in all rows")
+            numbers.append(angle)
+        rows.setdefault(row.id, []).append((row.line, numbers))
+    return rows, table.ignored, None if heading is None else _HEADINGS[heading]
 
 
 def _check_order(
@@ -181,16 +153,13 @@ def _check_speeds(
     gaps: NDArray[np.bool_],
 ) -> None:
     moved_m = np.linalg.norm(np.diff(values[:, 1:3], axis=0), axis=1)
-    wrong = np.flatnonzero((moved_m > _MAX_SPEED_MPS * steps_s) & ~gaps)
+    wrong = np.flatnonzero((moved_m > FASTEST_MPS * steps_s) & ~gaps)
     if len(wrong):
         row = int(wrong[0])
-        hint = ""
-        if np.median(moved_m / steps_s) > _MAX_SPEED_MPS:
-            hint = "; these look like millimetres"
         raise SimError(
             f"{path}, line {lines[row + 1]}: {name!r} moves {moved_m[row]:.3g} m in "
-            f"{steps_s[row]:.3g} s, faster than {_MAX_SPEED_MPS:g} m/s; t_s is in seconds, x_m and "
-            f"y_m are in metres{hint}"
+            f"{steps_s[row]:.3g} s, faster than {FASTEST_MPS:g} m/s; t_s is in seconds, x_m and "
+            f"y_m are in metres"
         )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import yaml
+from perception.documents import yaml_text
 
 from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
@@ -180,7 +180,7 @@ def job_of(settings: FalsifySettings, scenario: Scenario) -> Job:
 def scenario_text(scenario: Scenario) -> str:
     """Return a concrete scenario as YAML."""
     data = scenario.model_dump(mode="json")
-    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+    return yaml_text(data)
 
 
 def _search(

@@ -38,8 +38,9 @@ def write_parquet(path: Path, records: tuple[EpisodeRecord, ...]) -> None:
     columns = {
         name: [_parquet_value(getattr(record, name)) for record in records] for name in COLUMN_KINDS
     }
-    with atomic_path(path, SimError) as part:
-        pq.write_table(pa.table(columns, schema=_SCHEMA), part)
+    # Given a path, pyarrow takes only names in UTF-8.
+    with atomic_path(path, SimError) as part, part.open("wb") as file:
+        pq.write_table(pa.table(columns, schema=_SCHEMA), file)
 
 
 def read_parquet(path: Path) -> tuple[EpisodeRecord, ...]:
@@ -49,7 +50,8 @@ def read_parquet(path: Path) -> tuple[EpisodeRecord, ...]:
         SimError: the file cannot be read or is not a table of episodes.
     """
     try:
-        table = pq.read_table(path)
+        with path.open("rb") as file:
+            table = pq.read_table(file)
     except (OSError, pa.ArrowException) as cause:
         raise SimError(f"cannot read the episodes {path}: {cause}") from cause
     names = tuple(table.column_names)

@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from nav_adapter import AwarenessPolicy
 from perception.arrays import finite_number
-from perception.documents import parse_yaml
+from perception.documents import parse_yaml, yaml_text
 from tracking.config import StrictConfig, complaints
 
 from ...crossing.eyes import ORACLE, Perception
@@ -183,7 +183,7 @@ def policy_text(policy: AwarenessPolicy) -> str:
     """Return a policy as YAML; raise SimError for one with objects that YAML cannot hold."""
     try:
         data = policy.model_dump(mode="json")
-        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
+        return yaml_text(data)
     except (TypeError, ValueError, yaml.YAMLError) as cause:
         raise SimError(
             f"a policy must be one that YAML can hold, without objects of your own: {cause}"

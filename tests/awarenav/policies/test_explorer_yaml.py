@@ -90,6 +90,7 @@ FORMS = [
     "alerts: null\nrules: {standing: {delay_from_tracks: yes}, near_cap: {within_m: 2}}\n",
     "rules:\n  walking: {}  # as its defaults are\n  standing:\n",
     "filter: {clip_awareness: 1e-9, lower_bound_confidence: '0.95'}\n",
+    "filter: {clip_awareness: 1e-2, memory_s: 15E-1}\n",
     "\ufeffmargins:\r\n  maximum_radius_m: 3.0\r\n",
 ]
 

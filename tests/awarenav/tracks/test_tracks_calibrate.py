@@ -89,13 +89,13 @@ def test_a_recording_that_is_too_short_is_refused(people, seconds, words, tmp_pa
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("t_s,id,x_m\n0,1,2\n", "it lacks y_m"),
-        ("t_s,id,x_m,y_m\n0,1,2,far\n", "line 2: y_m must be a number, got 'far'"),
-        ("t_s,id,x_m,y_m\n0,1,2,3\n0,1.5,2,3\n", "line 3: id must be a whole number, got '1.5'"),
-        ("t_s,id,x_m,y_m\n0,1,2\n", "line 2: y_m must be a number, got None"),
+        ("t_s,id,x_m\n0,1,2\n", "the header misses y_m"),
+        ("t_s,id,x_m,y_m\n0,1,2,far\n", "line 2: y_m must be a finite number, got 'far'"),
+        ("t_s,id,x_m,y_m\n0,1,2,3\n0,,2,3\n", "line 3: id is empty"),
+        ("t_s,id,x_m,y_m\n0,1,2\n", "line 2: y_m must be a finite number, got None"),
         ("t_s,id,x_m,y_m\n0,1,2,nan\n", "line 2: y_m"),
         ("t_s,id,x_m,y_m,std_m\n0,1,2,3,0\n", "line 2: std_m must be above 0 m, got 0"),
-        ("", "must have the columns t_s, id, x_m, y_m"),
+        ("", "it must name t_s, id, x_m, y_m and may name std_m, got nothing"),
     ],
 )
 def test_positions_that_are_not_valid_are_refused_by_line(text, words, tmp_path, capsys):

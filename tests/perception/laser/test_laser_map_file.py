@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of
+from PIL import Image
 
 from perception import PerceptionError
 from perception.laser import LegDetector, LegDetectorConfig, MapCells, StaticMap
@@ -77,19 +78,55 @@ def test_brightness_counts_as_the_mode_says(keys, occupied, tmp_path: Path) -> N
     assert len(MapCells.from_yaml(deep).cells_m) == len(occupied)
 
 
-def test_transparent_pixels_are_unknown_in_scale_mode_and_darker_in_trinary_mode(
-    tmp_path: Path,
-) -> None:
-    pixels = np.zeros((1, 3, 4), np.uint8)
-    pixels[0, :, 3] = [255, 128, 255]
-    pixels[0, 2, :3] = 110  # opaque: a mean of 146, transparent: 82
-    scale = MapCells.from_yaml(written(tmp_path, pixels, "a.png", mode="scale"))
-    np.testing.assert_allclose(scale.cells_m[:, 0], [-0.95, -0.75])
-    trinary = MapCells.from_yaml(written(tmp_path, pixels, "a.png"))
-    np.testing.assert_allclose(trinary.cells_m[:, 0], [-0.95, -0.85])
-    pixels[0, 2, 3] = 0
-    trinary = MapCells.from_yaml(written(tmp_path, pixels, "a.png"))
-    assert len(trinary.cells_m) == 3
+@pytest.mark.parametrize("keys", [{}, {"mode": "scale"}, {"mode": "raw"}, {"negate": 1}])
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_transparent_pixels_are_unknown(keys: dict[str, object], kind: type, tmp_path) -> None:
+    """As for nav2_map_server since 2025; where somebody stands is then no part of the map."""
+    white, dark = np.iinfo(kind).max, {"raw": 90}.get(str(keys.get("mode")), 0)
+    pixels = np.full((1, 4, 4), white if "negate" in keys else dark * (white // 255), kind)
+    pixels[0, :, 3] = [white, white // 2, 0, white]
+    cells = MapCells.from_yaml(written(tmp_path, pixels, "a.png", **keys))
+    np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.65])
+
+
+@pytest.mark.parametrize("mode", ["P", "L", "1", "RGB", "LA", "I;16"])
+def test_the_transparent_colour_of_a_png_is_unknown(mode: str, tmp_path: Path) -> None:
+    """Floor that a drawing program erased: black, and transparent."""
+    grey = np.array([[0, 255], [100, 100]], np.uint8)
+    if mode == "LA":
+        drawn = Image.fromarray(np.dstack((grey, np.where(grey == 0, 0, 255).astype(np.uint8))))
+        drawn.save(tmp_path / "erased.png")
+    else:
+        wide = Image.fromarray(grey.astype(np.uint16) * 257)
+        drawn = wide if mode == "I;16" else Image.fromarray(grey).convert(mode)
+        clear = (0, 0, 0) if mode == "RGB" else 0
+        drawn.save(tmp_path / "erased.png", transparency=clear)
+    path = written(tmp_path, (tmp_path / "erased.png").read_bytes(), "erased.png")
+    assert not StaticMap.from_yaml(path, margin_m=0.0).occupied.any()
+    drawn.save(tmp_path / "drawn.png", **({} if mode == "LA" else {"transparency": None}))
+    drawn = written(tmp_path, (tmp_path / "drawn.png").read_bytes(), "drawn.png")
+    assert StaticMap.from_yaml(drawn, margin_m=0.0).occupied.any() == (mode != "LA")
+
+
+@pytest.mark.parametrize("white", [1, 15, 100, 255, 256, 1023, 4095, 65535])
+@pytest.mark.parametrize("kind", [2, 3, 5, 6])
+def test_netpbm_counts_up_to_its_own_white(kind: int, white: int, tmp_path: Path) -> None:
+    """Free floor of a map with another white is not occupied."""
+    shades = np.array([[0, white, white], [white, white, 0]])
+    values = np.repeat(shades, 3, axis=1) if kind in (3, 6) else shades
+    head = b"P%d\n# by hand\n3 # wide\n2\n%d\n" % (kind, white)
+    if kind in (2, 3):
+        body = b"# rows\n" + b"\n".join(b" ".join(b"%d" % v for v in row) for row in values)
+    else:
+        body = values.astype(np.uint8 if white < 256 else ">u2").tobytes()
+    held = StaticMap.from_yaml(written(tmp_path, head + body, "hall.pnm"), margin_m=0.0)
+    assert held.occupied[::-1].tolist() == (shades == 0).tolist()
+
+
+def test_bitmaps_of_netpbm_have_ones_for_black(tmp_path: Path) -> None:
+    for name, image in (("a.pbm", b"P1\n3 1\n100\n"), ("b.pbm", b"P4\n3 1\n\x80")):
+        held = StaticMap.from_yaml(written(tmp_path, image, name), margin_m=0.0)
+        assert held.occupied.tolist() == [[True, False, False]]
 
 
 def test_colours_count_by_their_mean(tmp_path: Path) -> None:
@@ -176,6 +213,7 @@ WHITE = np.full((2, 2), 255, np.uint8)
         ({"resolution": None}, "lacks the key 'resolution'"),
         ({"negate": None}, "lacks the key 'negate'"),
         ({"occupied_tresh": 0.6}, "unknown key 'occupied_tresh'.*did you mean 'occupied_thresh'"),
+        ({"Mode": "scale"}, "unknown key 'Mode'.*did you mean 'mode'"),
         ({"mode": "binary"}, "mode must be one of trinary, scale, raw, got 'binary'"),
         ({"resolution": 0.0}, r"resolution must lie in \[0.005, 1\]"),
         ({"resolution": "fine"}, "resolution must be a number"),
@@ -199,14 +237,31 @@ def test_a_map_file_that_makes_no_sense_is_refused(keys, text: str, tmp_path: Pa
     assert str(tmp_path) in str(raised.value)
 
 
+def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog) -> None:
+    """As map_server does; tools that draw maps add keys of their own."""
+    path = written(tmp_path, WHITE, cost_scaling=1, image_type="grid", resolution="5e-2")
+    held = StaticMap.from_yaml(path)
+    assert held.origin_odom_m.tolist() == [-1.0, -2.0]
+    assert held.resolution_m == 0.05
+    assert caplog.messages == [f"{path}: not read: 'cost_scaling', 'image_type'"]
+
+
 @pytest.mark.parametrize(
     ("image", "text"),
     [
         (b"", "damaged, or no PGM"),
         (b"no image", "damaged, or no PGM"),
         (b"P5 3 1 255\n\x00\x32", "damaged, or no PGM"),
-        (b"P5 9999999 9999999 255\n", "damaged, or no PGM"),
-        (b"P5 # made by hand\n 3 1\n100\n\x00\x32\x64", "255 or 65535 for white, got 100"),
+        (b"P5 9999999 9999999 255\n", "at most 100000000 pixels, got 9999999 x 9999999"),
+        (b"P5 2 1 0\n\x00\x00", "damaged, or no PGM"),
+        (b"P5 2 1 65536\n\x00\x00\x00\x00", "damaged, or no PGM"),
+        (b"P5 2 1 1000\n\x00\x00\x00", "damaged, or no PGM"),
+        (b"P5 2 1 100\n\x00\x65", "damaged, or no PGM"),
+        (b"P2 2 1 100\n0 101\n", "damaged, or no PGM"),
+        (b"P2 2 1 100\n0 -1\n", "damaged, or no PGM"),
+        (b"P2 2 1 100\n0 white\n", "damaged, or no PGM"),
+        (b"P2 9000 9000 100\n0 1\n", "damaged, or no PGM"),
+        (b"P7\nWIDTH 1\nHEIGHT 1\nDEPTH 1\nMAXVAL 15\nENDHDR\n\x0f", r"a PAM \(P7\); save it as"),
     ],
 )
 def test_a_damaged_image_is_refused(image: bytes, text: str, tmp_path: Path) -> None:

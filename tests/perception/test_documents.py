@@ -1,0 +1,123 @@
+"""Keys that stand twice, numbers as ROS writes them, and what is written and read again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from awarenav.errors import AwarenavError
+from awarenav.records import read_records
+from nav_adapter import AwarenessPolicy, NavError
+from nav_adapter.ros2 import RobotFile
+from perception import Camera, PerceptionError
+from perception.documents import parse_json, parse_yaml, read_json, read_yaml, yaml_text
+from perception.laser import MapCells
+from sim_tests import SimError
+from sim_tests.scenario import ScenarioTemplate
+from tracking import TrackerConfig, TrackingError
+
+SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text("-.0eE1")
+VALUES = st.recursive(SCALARS, lambda each: st.lists(each) | st.dictionaries(st.text("e1"), each))
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("a: 1\nb: 2\na: 1\n", "has the key 'a' twice, in lines 1 and 3"),
+        ("a: 1\n'a': 2\n", "has the key 'a' twice, in lines 1 and 2"),
+        ("x:\n- y: {k: 1,\n   k: 2}\n", "has the key 'k' twice, in lines 2 and 3"),
+        ("x: {k: 1, k: 2}\ny: 3\n", "has the key 'k' twice in line 1"),
+        ("{k: 1, k: 2}", "has the key 'k' twice$"),
+        ("16: a\n0x10: b\n", "has the key 16 twice, in lines 1 and 2"),
+        ("on: 1\n'on': 2\nyes: 3\n", "has the key True twice, in lines 1 and 3"),
+        ("b: &b {k: 1}\nc: &c {k: 2}\n<<: *b\n<<: *c\n", "has the key '<<' twice, in lines 3 and"),
+        ("b: &b {k: 1}\nc: {<<: {m: 1, m: 2}}\n", "has the key 'm' twice in line 2"),
+    ],
+)
+def test_a_key_that_stands_twice_in_yaml_is_refused_with_both_lines(text: str, what: str) -> None:
+    with pytest.raises(PerceptionError, match=f"^text {what}"):
+        parse_yaml(text, "text")
+
+
+def test_keys_of_further_documents_do_not_count() -> None:
+    """What `ros2 topic echo` prints holds many messages, and the last may be cut off."""
+    assert parse_yaml("a: 1\n---\na: 2\na: 3\n", "text", first_document=True) == {"a": 1}
+    with pytest.raises(PerceptionError, match="twice"):
+        parse_yaml("a: 1\na: 2\n---\na: 3\n", "text", first_document=True)
+
+
+def test_merge_keys_keep_their_meaning() -> None:
+    """A mapping's own key replaces a merged one, and an earlier merged mapping a later one."""
+    text = "a: &a {k: 1, l: 2}\nb: &b {<<: *a, k: 3}\nc: {<<: [*b, *a], l: 5}\nd: [*b, *b]\n"
+    b = {"k": 3, "l": 2}
+    assert parse_yaml(text, "text") == {
+        "a": {"k": 1, "l": 2},
+        "b": b,
+        "c": {"k": 3, "l": 5},
+        "d": [b, b],
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ('{"a": 1, "b": 2,\n\n"a": 3}', "has the key 'a' twice, in lines 1 and 3"),
+        ('{"x": [{"a": ": {\\"",\n"\\u0061": 2}]}', "has the key 'a' twice, in lines 1 and 2"),
+        (b'{"a": {"k": 1, "k": 1}}', "has the key 'k' twice$"),
+    ],
+)
+def test_a_key_that_stands_twice_in_json_is_refused_with_both_lines(
+    text: str | bytes, what: str
+) -> None:
+    with pytest.raises(PerceptionError, match=f"^text {what}"):
+        parse_json(text, "text", finite=True)
+
+
+def test_the_same_key_of_two_objects_is_no_repetition() -> None:
+    text = '[{"a": {"a": 1}}, {"a": [{"a": 2}]}]'
+    assert parse_json(text, "t") == parse_yaml(text, "t") == [{"a": {"a": 1}}, {"a": [{"a": 2}]}]
+
+
+@pytest.mark.parametrize(
+    ("read", "error", "text"),
+    [
+        (RobotFile.from_yaml, NavError, "max_speed_mps: 1.0\nmax_speed_mps: 9.9\n"),
+        (AwarenessPolicy.from_yaml, NavError, "speed: {}\nspeed: {}\n"),
+        (TrackerConfig.from_yaml, TrackingError, "awareness: {memory_s: 1,\n memory_s: 2}\n"),
+        (ScenarioTemplate.from_yaml, SimError, "name: a\nname: b\n"),
+        (Camera.from_yaml, PerceptionError, "image_width: 640\nimage_width: 320\n"),
+        (MapCells.from_yaml, PerceptionError, "resolution: 0.05\nresolution: 0.5\n"),
+        (read_json, PerceptionError, '{"a": 1,\n"a": 2}'),
+        (read_records, AwarenavError, '{"frame": "a", "frame": "b"}\n'),
+    ],
+)
+def test_every_reader_refuses_a_key_that_stands_twice(read, error, text, tmp_path: Path) -> None:
+    path = tmp_path / "file.yaml"
+    path.write_text(text)
+    with pytest.raises(error, match=r"file\.yaml.* has the key '\w+' twice"):
+        read(path)
+
+
+def test_numbers_with_an_exponent_are_numbers(tmp_path: Path) -> None:
+    text = "[5e-2, 1E5, -1e1, +.5e3, 5.e1, 1.0e-3, '5e-2', 5e, e5, 1e2x]"
+    read = parse_yaml(text, "text")
+    assert read == [0.05, 1e5, -10.0, 500.0, 50.0, 1e-3, "5e-2", "5e", "e5", "1e2x"]
+    (tmp_path / "tracker.yaml").write_text("awareness: {clip_awareness: 1e-2}\n")
+    config = TrackerConfig.from_yaml(tmp_path / "tracker.yaml")
+    assert config.awareness.clip_awareness == 0.01
+
+
+@given(VALUES)
+def test_what_is_written_as_yaml_is_read_again_as_it_was(value: object) -> None:
+    """Also texts that look like numbers, such as a scenario that is called 1e5."""
+    assert parse_yaml(yaml_text(value), "text") == value
+
+
+def test_a_long_document_of_unique_keys_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "long.yaml"
+    keys = {f"k{index}": {"a": index, "b": [index]} for index in range(3000)}
+    path.write_text(yaml_text(keys))
+    assert read_yaml(path) == keys
