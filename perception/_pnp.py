@@ -71,7 +71,7 @@ class _Head:
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
         prior: prior from the body, or None.
-        alone: True for a face in a skeleton without depth, of which the torso says too little.
+        alone: True for a face in a skeleton without depth and torso.
     """
 
     row: int
@@ -92,7 +92,8 @@ class PnpHeadPoseEstimator:
     equally well, the one wins whose visible side agrees with the keypoints that are seen, and
     without a torso the one that is upright in the camera. A torso that is seen adds a prior; with
     fewer keypoints (a profile, the back of a head) it tells most. Of a skeleton without depth and
-    torso (``lifted`` False), a head has no pose if one that looks elsewhere fits nearly as well.
+    torso (``lifted`` False), a head has no pose if one that looks elsewhere fits nearly as well;
+    without depth one or two keypoints of a face give none at all.
 
     Args:
         keypoint_std_px: standard deviation of the keypoint noise that the covariance assumes;
@@ -158,6 +159,11 @@ class PnpHeadPoseEstimator:
         rows = np.flatnonzero(seen)
         if not len(rows):
             return None
+        # Without depth, a torso leaves its own direction open by more than one or two points of a
+        # face can tell. Ears alone show no face, wherever it looks.
+        flat_face = not person.lifted and bool(seen[:3].any())
+        if flat_face and len(rows) < 3:
+            return None
         model = self._model(person, seen)
         if model is None:
             return None
@@ -169,7 +175,7 @@ class PnpHeadPoseEstimator:
         whole = len(rows) >= 4
         # The printed formula's frame is pitched: a torso says little of it.
         prior = None if whole and self._head_model == "lifted" else body_prior(body, whole=whole)
-        alone = not person.lifted and bool(seen[:3].any()) and (prior is None or len(rows) < 3)
+        alone = flat_face and prior is None
         if prior is None and len(rows) == 3:
             prior = upright_prior(model[rows], rays[rows])
         starts = []

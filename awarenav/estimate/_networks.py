@@ -101,6 +101,7 @@ def choose_networks(
     Args:
         detector: ``"shipped"``, an ONNX file, or the name of a network that
             ``awarenav models fetch`` has downloaded (this holds for the other two as well).
+            ``rtmdet:FILE`` and ``yolox:FILE`` say what a file is that does not tell it.
         pose: ``"shipped"``, ``"mediapipe"`` (needs the extra), or an ONNX file.
         head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
             weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with
@@ -170,8 +171,11 @@ def _detector(
             lambda camera: shipped_detector(settings, camera, score_threshold=min_score),
             shipped_model(DETECTOR).training_domain,
         )
-    model, domain = _onnx_model("--detector", name, (SHIPPED,), settings)
-    return OnnxPersonDetector(model, score_threshold=min_score), domain
+    family, colon, file = name.partition(":")
+    if not colon or Path(name).is_file():
+        family, file = "", name
+    model, domain = _onnx_model("--detector", file, (SHIPPED,), settings)
+    return OnnxPersonDetector(model, score_threshold=min_score, family=family or None), domain
 
 
 def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:
