@@ -52,10 +52,6 @@ _FIT_QUANTILE: Final = {1: 6.6, 2: 9.2, 3: 11.3, 4: 13.3, 5: 15.1, 6: 16.8}
 _MODE_CUTOFF_CHI2: Final = 16.0
 # Local optima closer than 8° to each other count as one.
 _SAME_MODE_COSINE: Final = math.cos(math.radians(8.0))
-# Of a skeleton without depth, a head has no direction if a pose that looks elsewhere, by more than
-# 45°, fits so nearly as well: if that pose has a probability of more than 1 %.
-_AMBIGUOUS_CHI2: Final = 9.2
-_ELSEWHERE_COSINE: Final = math.cos(math.radians(45.0))
 _MAX_ROTATION_STD_RAD: Final = math.radians(100.0)
 
 
@@ -71,7 +67,6 @@ class _Head:
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
         prior: prior from the body, or None.
-        alone: True for a face in a skeleton without depth and torso.
     """
 
     row: int
@@ -81,7 +76,6 @@ class _Head:
     rotations: FloatArray
     translations_m: FloatArray
     prior: HeadPrior | None
-    alone: bool
 
 
 class PnpHeadPoseEstimator:
@@ -91,9 +85,9 @@ class PnpHeadPoseEstimator:
     Levenberg–Marquardt refines them. Solutions behind the camera are rejected. If two solutions fit
     equally well, the one wins whose visible side agrees with the keypoints that are seen, and
     without a torso the one that is upright in the camera. A torso that is seen adds a prior; with
-    fewer keypoints (a profile, the back of a head) it tells most. Of a skeleton without depth and
-    torso (``lifted`` False), a head has no pose if one that looks elsewhere fits nearly as well;
-    without depth one or two keypoints of a face give none at all.
+    fewer keypoints (a profile, the back of a head) it tells most. Of a skeleton without depth
+    (``lifted`` False), one or two keypoints of a face give no pose, and without a torso nose, eye
+    and ear of one side give none either.
 
     Args:
         keypoint_std_px: standard deviation of the keypoint noise that the covariance assumes;
@@ -159,11 +153,6 @@ class PnpHeadPoseEstimator:
         rows = np.flatnonzero(seen)
         if not len(rows):
             return None
-        # Without depth, a torso leaves its own direction open by more than one or two points of a
-        # face can tell. Ears alone show no face, wherever it looks.
-        flat_face = not person.lifted and bool(seen[:3].any())
-        if flat_face and len(rows) < 3:
-            return None
         model = self._model(person, seen)
         if model is None:
             return None
@@ -175,7 +164,8 @@ class PnpHeadPoseEstimator:
         whole = len(rows) >= 4
         # The printed formula's frame is pitched: a torso says little of it.
         prior = None if whole and self._head_model == "lifted" else body_prior(body, whole=whole)
-        alone = flat_face and prior is None
+        if not person.lifted and not _is_determined(seen, with_torso=prior is not None):
+            return None
         if prior is None and len(rows) == 3:
             prior = upright_prior(model[rows], rays[rows])
         starts = []
@@ -187,7 +177,7 @@ class PnpHeadPoseEstimator:
         if not found:
             return None
         rotations, translations = (np.concatenate(each) for each in zip(*found, strict=True))
-        return _Head(row, model, rays, seen, rotations, translations, prior, alone)
+        return _Head(row, model, rays, seen, rotations, translations, prior)
 
     def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
         """Refine the starting poses of several heads at once and return their head poses."""
@@ -210,9 +200,8 @@ class PnpHeadPoseEstimator:
             own = [poses[start] for start in np.flatnonzero(owner == index)]
             rows = np.flatnonzero(head.seen)
             costs = _costs(own, head.model[rows], head.seen, without_body=head.prior is None)
-            determined = bool(costs) and not (head.alone and _is_ambiguous(costs))
             results.append(
-                self._finish(costs, len(rows), head.prior is not None) if determined else None
+                self._finish(costs, len(rows), head.prior is not None) if costs else None
             )
         return results
 
@@ -255,6 +244,18 @@ class PnpHeadPoseEstimator:
             covariance,
             float(np.sqrt(np.sum(pose.reprojection_px**2) / points)),
         )
+
+
+def _is_determined(seen: NDArray[np.bool_], *, with_torso: bool) -> bool:
+    """Return whether the seen points (5,) of a skeleton without depth determine a head's direction.
+
+    Two points of a face leave open what a flat torso leaves open too, and so do nose, eye and ear
+    of one side without a torso: a profile and a face that is half covered have one image. Ears
+    alone show no face, wherever it looks.
+    """
+    pair = bool(seen[1:3].all() or seen[3:].all())
+    several = bool(np.count_nonzero(seen) > 2)
+    return not bool(seen[:3].any()) or (several and (pair or with_torso))
 
 
 def _sqpnp(
@@ -344,19 +345,6 @@ def _costs(
             cost += (tilt_rad / UPRIGHT_STD_RAD) ** 2
         costs.append((cost, pose))
     return sorted(costs, key=lambda pair: pair[0])
-
-
-def _is_ambiguous(costs: list[tuple[float, RefinedPose]]) -> bool:
-    """Return whether a pose that looks elsewhere fits nearly as well as the best one.
-
-    No normal distribution holds both.
-    """
-    lowest, best = costs[0]
-    return any(
-        cost - lowest < _AMBIGUOUS_CHI2
-        and pose.rotation[:, 1] @ best.rotation[:, 1] < _ELSEWHERE_COSINE
-        for cost, pose in costs[1:]
-    )
 
 
 def _spread_of_modes(costs: list[tuple[float, RefinedPose]]) -> FloatArray:

@@ -49,6 +49,8 @@ SHIPPED: Final = "shipped"
 _MEDIAPIPE: Final = "mediapipe"
 _WITHOUT_NETWORK: Final = "pnp"
 _EYES: Final = ("auto", _MEDIAPIPE, "none")
+# Families of detectors that a file may not tell apart.
+_FAMILIES: Final = ("rtmdet", "yolox")
 _HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
 
 
@@ -171,11 +173,10 @@ def _detector(
             lambda camera: shipped_detector(settings, camera, score_threshold=min_score),
             shipped_model(DETECTOR).training_domain,
         )
-    family, colon, file = name.partition(":")
-    if not colon or Path(name).is_file():
-        family, file = "", name
-    model, domain = _onnx_model("--detector", file, (SHIPPED,), settings)
-    return OnnxPersonDetector(model, score_threshold=min_score, family=family or None), domain
+    prefix, colon, file = name.partition(":")
+    family = prefix if colon and prefix in _FAMILIES else None
+    model, domain = _onnx_model("--detector", file if family else name, (SHIPPED,), settings)
+    return OnnxPersonDetector(model, score_threshold=min_score, family=family), domain
 
 
 def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:

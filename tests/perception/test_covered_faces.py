@@ -103,9 +103,9 @@ def test_a_covered_face_is_never_surely_turned_away(covered, torso, noise_px, he
     error, std, nees, alpha, alpha_std, truth = rows.T
     assert ((error > 60.0) & (std < 15.0)).sum() <= 0.005 * COUNT
     assert (np.abs(alpha - truth) > 3.0 * alpha_std + 0.02).sum() <= 0.02 * COUNT
-    if covered not in ("hood", "one side", "one side without nose"):
+    if not covered.startswith("one side"):
         assert len(rows) == COUNT
-        assert (error > 60.0).sum() <= 0.005 * COUNT
+        assert (error > 60.0).sum() <= (0.02 if covered == "hood" else 0.005) * COUNT
         assert nees.mean() < 3.5
 
 
@@ -160,11 +160,21 @@ class Known:
         return (self.keypoints,)
 
 
-def test_three_points_of_one_side_without_a_torso_have_no_direction():
-    """A head that faces the camera, half covered, and a profile have one image."""
-    shown = list(people(7400, COVERED["one side"]))
-    heads = PnpHeadPoseEstimator().estimate(None, CAMERA, tuple(k for _, k in shown))
-    assert sum(head is None for head in heads) >= 0.9 * COUNT
+@pytest.mark.parametrize(
+    ("scores", "torso", "known"),
+    [
+        ((1, 0, 1, 0, 1), False, False),  # a profile, or half a face: they have one image
+        ((1, 0, 1, 0, 1), True, True),
+        ((0, 1, 0, 1, 0), True, False),
+        ((0, 1, 1, 0, 0), True, False),
+        ((1, 1, 1, 0, 0), False, True),
+        ((0, 0, 0, 1, 1), True, True),  # no face, wherever the head looks
+    ],
+)
+def test_few_points_without_depth_give_a_direction_or_none(scores, torso, known):
+    shown = tuple(keypoints for _, keypoints in people(7400, scores, torso=torso, count=20))
+    heads = PnpHeadPoseEstimator().estimate(None, CAMERA, shown)
+    assert sum(head is not None for head in heads) >= 18 if known else not any(heads)
 
 
 @pytest.mark.parametrize(

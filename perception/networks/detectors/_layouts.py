@@ -44,7 +44,10 @@ _YOLOX: Final = {"bgr": True}
 _RTMDET: Final = {"mean_rgb": IMAGENET_MEAN_RGB, "std_rgb": IMAGENET_STD_RGB, "bgr": True}
 # Families of detectors that OpenMMLab exports with the same outputs ``dets`` and ``labels``: name
 # of the layout, and pixels of the input.
-_FAMILIES: Final = {"rtmdet": ("RTMDet", _RTMDET), "yolox": ("YOLOX with NMS", _YOLOX)}
+_FAMILIES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "rtmdet": ("RTMDet", _RTMDET),
+    "yolox": ("YOLOX with NMS", _YOLOX),
+}
 # Words in the names of weights and nodes of their heads: of RTMDet's, and of YOLOX's branch for
 # objectness, in the code of Megvii and in that of OpenMMLab.
 _FAMILY_WORDS: Final = {
