@@ -21,8 +21,10 @@ _NECK_TO_PIVOT_M: Final = np.array([0.046, 0.0, 0.168])
 # Standard deviations of the head's rotation relative to the torso.
 _YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD = map(math.radians, (60.0, 15.0, 25.0))
 _PIVOT_STD_M: Final = 0.04
-# A head without a body is upright in the camera within this, and may look anywhere.
-_UPRIGHT_STD_RAD, _UNKNOWN_YAW_STD_RAD = math.radians(30.0), math.radians(150.0)
+#: A head without a body is upright in the camera within this standard deviation.
+UPRIGHT_STD_RAD: Final = math.radians(30.0)
+# It may look anywhere.
+_UNKNOWN_YAW_STD_RAD: Final = math.radians(150.0)
 _DOWN_CAMERA: Final = np.array([0.0, 1.0, 0.0])
 # Relative standard deviation of the body's range where the head has a range of its own.
 _LOOSE_SCALE_STD: Final = 0.25
@@ -88,7 +90,7 @@ def upright_prior(points: FloatArray, rays: FloatArray) -> HeadPrior:
     down = skew(-ray) @ right
     across, along = _PIVOT_STD_M + 0.1, 0.5 * float(np.linalg.norm(pivot))
     covariance = across**2 * (np.eye(3) - np.outer(ray, ray)) + along**2 * np.outer(ray, ray)
-    stds = np.array([_UNKNOWN_YAW_STD_RAD, _UPRIGHT_STD_RAD, _UPRIGHT_STD_RAD])
+    stds = np.array([_UNKNOWN_YAW_STD_RAD, UPRIGHT_STD_RAD, UPRIGHT_STD_RAD])
     return HeadPrior(
         np.stack([down, -ray, right], axis=1),
         np.diag(1.0 / stds**2),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from . import layouts as kp
 from ._camera import Camera
 from ._head_pose import HeadPose
-from ._head_prior import HeadPrior, body_prior, prior_starts, upright_prior
+from ._head_prior import UPRIGHT_STD_RAD, HeadPrior, body_prior, prior_starts, upright_prior
 from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
 from ._pose_refinement import RefinedPose, refine
@@ -83,8 +83,11 @@ class PnpHeadPoseEstimator:
 
     With four or more seen head keypoints, SQPnP gives the starts (OpenCV ``SOLVEPNP_SQPNP``) and
     Levenberg–Marquardt refines them. Solutions behind the camera are rejected. If two solutions fit
-    equally well, the one wins whose visible side agrees with the keypoints that are seen. With
-    fewer keypoints (a profile, the back of a head), a prior from the torso is added, if it is seen.
+    equally well, the one wins whose visible side agrees with the keypoints that are seen, and
+    without a torso the one that is upright in the camera. A torso that is seen adds a prior; with
+    fewer keypoints (a profile, the back of a head) it tells most. Of a skeleton without depth
+    (``lifted`` False), one or two keypoints of a face give no pose, and without a torso nose, eye
+    and ear of one side give none either.
 
     Args:
         keypoint_std_px: standard deviation of the keypoint noise that the covariance assumes;
@@ -161,9 +164,13 @@ class PnpHeadPoseEstimator:
         whole = len(rows) >= 4
         # The printed formula's frame is pitched: a torso says little of it.
         prior = None if whole and self._head_model == "lifted" else body_prior(body, whole=whole)
+        if not person.lifted and not _is_determined(seen, with_torso=prior is not None):
+            return None
         if prior is None and len(rows) == 3:
             prior = upright_prior(model[rows], rays[rows])
-        starts = [_sqpnp(model[rows], rays[rows])] if whole or prior is None else []
+        starts = []
+        if whole or prior is None:
+            starts.append(_sqpnp(model[rows], rays[rows], without_body=prior is None))
         if prior is not None:
             starts.append(prior_starts(prior))
         found = [start for start in starts if start is not None]
@@ -239,8 +246,22 @@ class PnpHeadPoseEstimator:
         )
 
 
-def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Return starting poses: each SQPnP solution in front of the camera, and its mirror image."""
+def _is_determined(seen: NDArray[np.bool_], *, with_torso: bool) -> bool:
+    """Return whether the seen points (5,) of a skeleton without depth determine a head's direction.
+
+    Two points of a face leave open what a flat torso leaves open too, and so do nose, eye and ear
+    of one side without a torso: a profile and a face that is half covered have one image. Ears
+    alone show no face, wherever it looks.
+    """
+    pair = bool(seen[1:3].all() or seen[3:].all())
+    several = bool(np.count_nonzero(seen) > 2)
+    return not bool(seen[:3].any()) or (several and (pair or with_torso))
+
+
+def _sqpnp(
+    points: FloatArray, rays: FloatArray, *, without_body: bool
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return starting poses: each SQPnP solution in front of the camera, and its mirror images."""
     if len(points) < 3:
         return None
     try:
@@ -251,6 +272,7 @@ def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray
     except cv2.error:  # raised on nearly coincident points
         return None
     centre = np.asarray(points.mean(axis=0), dtype=np.float64)
+    normal = np.linalg.svd(points - centre)[2][2] if without_body else None
     rotations, origins = [], []
     for vector, translation in zip(rotation_vectors, translations, strict=True):
         origin: FloatArray = np.ravel(translation).astype(np.float64)
@@ -261,20 +283,33 @@ def _sqpnp(points: FloatArray, rays: FloatArray) -> tuple[FloatArray, FloatArray
         rotation = rotation_exp(np.ravel(vector))
         rotations.append(rotation)
         origins.append(origin)
-        # The image of a small, distant head is nearly a weak-perspective one. Its second solution
-        # is the first, reflected in the image plane.
-        mirrored = _mirrored(rotation, origin, centre)
-        rotations.append(mirrored)
-        origins.append(origin + (rotation - mirrored) @ centre)
+        ray = rotation @ centre + origin
+        ray = ray / np.linalg.norm(ray)
+        mirrored = [_turned_gaze(rotation, ray)]
+        if normal is not None:
+            mirrored.append(_mirrored(rotation, ray, normal))
+        for second in mirrored:
+            rotations.append(second)
+            origins.append(origin + (rotation - second) @ centre)
     if not rotations:
         return None
     return np.array(rotations), np.array(origins)
 
 
-def _mirrored(rotation: FloatArray, origin: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return the second rotation that fits the image of a planar object (Oberkampf et al. 1996)."""
-    ray = rotation @ centre + origin
-    ray = ray / np.linalg.norm(ray)
+def _mirrored(rotation: FloatArray, ray: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return the second rotation that fits the image of a planar object (Oberkampf et al. 1996).
+
+    The image of a small, distant head is nearly a weak-perspective one. Then points of a plane keep
+    their image if they are reflected across the ray. The second reflection, in the plane itself,
+    moves none of them and makes a rotation of the first. ``normal`` is that of the plane in the
+    head frame: eyes and ears lie in one.
+    """
+    reflected = rotation - 2.0 * np.outer(ray, ray @ rotation)
+    return np.asarray(reflected - 2.0 * np.outer(reflected @ normal, normal))
+
+
+def _turned_gaze(rotation: FloatArray, ray: FloatArray) -> FloatArray:
+    """Return the rotation whose gaze is reflected across the ray, and which keeps the head up."""
     forward = rotation[:, 1]
     # Rotate the gaze to its reflection in the plane across the ray, about their common normal.
     reflected = forward - 2.0 * (forward @ ray) * ray
@@ -292,7 +327,7 @@ def _costs(
     """Return the poses in front of the camera with their costs, the lowest cost first.
 
     The cost is χ² of fit and prior, plus a fixed cost for each keypoint that should be visible and
-    was not seen, or the reverse.
+    was not seen, or the reverse. Without a body, a head that is far from upright costs too.
     """
     costs = []
     for pose in poses:
@@ -304,9 +339,10 @@ def _costs(
         facing = np.sum((_FACING @ pose.rotation.T) * to_camera, axis=1)
         expected = facing > _SIGHT_LIMIT
         cost = pose.cost + _VISIBILITY_COST * float(np.count_nonzero(expected != seen))
-        if without_body and pose.rotation[1, 0] < 0.0:
-            # Upside down in the camera: unlikely for a person who stands or sits.
-            cost += _VISIBILITY_COST
+        tilt_rad = math.acos(min(max(pose.rotation[1, 0], -1.0), 1.0))
+        # Smaller tilts tell no optimum from another, and starts that end in one differ a little.
+        if without_body and tilt_rad > 2.0 * UPRIGHT_STD_RAD:
+            cost += (tilt_rad / UPRIGHT_STD_RAD) ** 2
         costs.append((cost, pose))
     return sorted(costs, key=lambda pair: pair[0])
 

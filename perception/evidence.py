@@ -94,9 +94,11 @@ def judge_face(
 
     * Two of nose and eyes are seen, according to ``head.face_seen``, or else to the scores of the
       keypoints (probability 0 at half of ``min_score``, 1 at one and a half). If these scores are
-      no evidence of a face (``face_evidence`` False), the probability is 0.2. A nose or an eye
-      outside the image counts as seen with a probability of at least 0.5: it is cut off, not turned
-      away. If two of them are outside, a lower ``head.face_seen`` also counts as 0.5.
+      no evidence of a face (``face_evidence`` False), the probability is 0.2. Of a skeleton
+      without depth, one of nose and eyes alone counts half: sunglasses, a hand or a cup may cover
+      the others of a face that looks here. A nose or an eye outside the image counts as seen with a
+      probability of at least 0.5: it is cut off, not turned away. If two of them are outside, a
+      lower ``head.face_seen`` also counts as 0.5.
     * Nose, eyes and ears lie where a head in this pose has them. A root mean square error of more
       than 3.5 standard deviations of the noise together with 5 % of the face's width (the head's
       own shape), or of more than 15 % of the width, lowers the probability.
@@ -136,7 +138,8 @@ def judge_face(
         scale = max(min_score, _MIN_SCORE_SCALE)
         shown = np.clip((person.scores[:3] - 0.5 * scale) / scale, 0.0, 1.0)
         possible = np.where(outside, np.maximum(shown, _UNKNOWN), shown)
-        seen = float(np.sort(possible)[1])
+        second, first = np.sort(possible)[1:].tolist()
+        seen = second if person.lifted else max(second, _UNKNOWN * first)
     else:
         seen = _NO_FACE_FOUND
     consistent_px = min(

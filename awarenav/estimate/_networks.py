@@ -66,6 +66,8 @@ _WORDS: Final = {
     },
 }
 _SIZE: Final = re.compile("([1-9][0-9]{0,4})x([1-9][0-9]{0,4})")
+# Families of detectors that a file may not tell apart.
+_FAMILIES: Final = ("rtmdet", "yolox")
 _HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
 
 
@@ -129,6 +131,7 @@ def choose_networks(
     Args:
         detector: ``"shipped"``, an ONNX file, or the name of a network that
             ``awarenav models fetch`` has downloaded (this holds for the other two as well).
+            ``rtmdet:FILE`` and ``yolox:FILE`` say what a file is that does not tell it.
         pose: ``"shipped"``, ``"mediapipe"`` (needs the extra), or an ONNX file.
         head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
             weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with
@@ -236,8 +239,10 @@ def _detector(
             lambda camera: shipped_detector(settings, camera, score_threshold=min_score),
             shipped_model(DETECTOR).training_domain,
         )
-    model, domain = _onnx_model("--detector", name, (SHIPPED,), settings)
-    return OnnxPersonDetector(model, score_threshold=min_score, **own), domain
+    prefix, colon, file = name.partition(":")
+    family = prefix if colon and prefix in _FAMILIES else None
+    model, domain = _onnx_model("--detector", file if family else name, (SHIPPED,), settings)
+    return OnnxPersonDetector(model, score_threshold=min_score, family=family, **own), domain
 
 
 def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:

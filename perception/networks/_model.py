@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .._manifest import shipped_model, shipped_model_path, verify_shipped_model
 from .._training_domain import training_domain_of
 from ..errors import PerceptionError
+from ._part_names import part_names
 from ._settings import PROVIDERS, OnnxSettings, short_name
 
 # The newer Linux wheels of ONNX Runtime report processes, sessions and models to their maker from
@@ -93,6 +94,7 @@ class OnnxModel:
         path: of the file; None if the content was given.
         inputs, outputs: in the order of the graph.
         metadata: of the file.
+        part_names: names of the weights and nodes.
         training_domain: what the network has seen in training, one of
             :data:`~perception.shipped.TRAINING_DOMAINS`; None if the file does not say it.
 
@@ -116,6 +118,7 @@ class OnnxModel:
         self.inputs = tuple(_tensor(entry) for entry in self._session.get_inputs())
         self.outputs = tuple(_tensor(entry) for entry in self._session.get_outputs())
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
+        self.part_names = part_names(content)
         self.training_domain = training_domain_of(content, self.metadata)
         self._names = [tensor.name for tensor in self.outputs]
 

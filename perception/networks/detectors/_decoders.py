@@ -101,8 +101,10 @@ class YoloxDecoder:
         return centre_to_corners(centre, size), scores[selected]
 
 
-class RtmdetDecoder:
-    """RTMDet: outputs ``dets`` (1, N, 5) of x1, y1, x2, y2, score, and ``labels`` (1, N).
+class DetsDecoder:
+    """RTMDet, or YOLOX with its own NMS: outputs ``dets`` (1, N, 5) and ``labels`` (1, N).
+
+    A row of ``dets`` is x1, y1, x2, y2, score.
 
     Args:
         person_class: number of the class that counts.

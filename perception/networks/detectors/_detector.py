@@ -18,7 +18,14 @@ from .._image_input import input_batch, input_dtype, input_size, run_on_images
 from .._model import ModelSource, OnnxModel, as_onnx_model
 from .._settings import OnnxSettings
 from ._decoders import Floats
-from ._layouts import DetectorLayout, TrialRun, metadata_size, recognise
+from ._layouts import (
+    DetectorLayout,
+    TrialRun,
+    checked_family,
+    family_of,
+    metadata_size,
+    recognise,
+)
 from ._letterbox import Letterbox, LetterboxGeometry
 
 # RTMDet's exports leave the input size free; its person detector was trained at this size.
@@ -35,9 +42,9 @@ class OnnxPersonDetector:
     """A person detector from an ONNX file; its layout is recognised from shapes and metadata.
 
     Known layouts: YOLOv8, YOLO11 and relatives; networks that need no NMS or contain it, with
-    output (1, M, 6); YOLOX with its raw head; RTMDet. The class "person" of the metadata counts;
-    without class names the first class counts, as in COCO. Boxes of (1, M, 6) may be corners or
-    centre and size: see :class:`~perception.networks.detectors.BoxFormatVote`.
+    output (1, M, 6); YOLOX with its raw head or its own NMS; RTMDet. The class "person" of the
+    metadata counts; without class names the first class counts, as in COCO. Boxes of (1, M, 6) may
+    be corners or centre and size: see :class:`~perception.networks.detectors.BoxFormatVote`.
 
     Several threads may share a detector; their calls run one after another.
 
@@ -50,6 +57,10 @@ class OnnxPersonDetector:
             the metadata's ``imgsz``, and 320 × 320 for RTMDet.
         person_class: number of the class that counts, where the metadata do not name it.
         box_format: ``"xyxy"`` or ``"cxcywh"`` for (1, M, 6); None finds it out from the boxes.
+        family: ``"rtmdet"`` or ``"yolox"`` for a network with the outputs ``dets`` and ``labels``.
+            Both have these, and want different pixels. None takes it from the names of weights and
+            nodes, and refuses such a network if its names do not tell. A network with output
+            (1, M, 6) that is of neither gets its pixels as YOLOv8 does.
         settings: providers and threads, for a model that is not loaded yet.
         sha256: expected SHA-256 of the file, for a model that is not loaded yet.
 
@@ -67,6 +78,7 @@ class OnnxPersonDetector:
         input_size_hw_px: tuple[int, int] | None = None,
         person_class: int | None = None,
         box_format: str | None = None,
+        family: str | None = None,
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
     ) -> None:
@@ -81,9 +93,13 @@ class OnnxPersonDetector:
                 f"person_class must be a whole number of at least 0 or None, got {person_class!r}"
             )
         self.model = as_onnx_model(path, settings, sha256)
-        self.input_size_hw_px = _detector_input_size(self.model, input_size_hw_px)
-        self._layout = self._recognise(person_class, box_format)
-        self._told: dict[str, Any] = {"person_class": person_class, "box_format": box_format}
+        self._told: dict[str, Any] = {
+            "person_class": person_class,
+            "box_format": box_format,
+            "family": checked_family(family),
+        }
+        self.input_size_hw_px = _detector_input_size(self.model, input_size_hw_px, family)
+        self._layout = self._recognise()
         self._letterbox = Letterbox(
             *self.input_size_hw_px, self._layout.pixels, centred=self._layout.centred
         )
@@ -186,24 +202,24 @@ class OnnxPersonDetector:
         )
         return np.asarray(kept, dtype=np.intp).reshape(-1)
 
-    def _recognise(self, person_class: int | None, box_format: str | None) -> DetectorLayout:
+    def _recognise(self) -> DetectorLayout:
         height, width = self.input_size_hw_px
         dtype = input_dtype(self.model)
         # Some exports declare fixed extents as free. A run on an empty input shows all of them.
         outputs = run_on_images(self.model, np.zeros((1, 3, height, width), dtype))
         with np.errstate(all="ignore"):
-            return recognise(
-                TrialRun(self.model, outputs, height, width, dtype, person_class, box_format)
-            )
+            return recognise(TrialRun(self.model, outputs, height, width, dtype, **self._told))
 
 
-def _detector_input_size(model: OnnxModel, requested_hw_px: Any) -> tuple[int, int]:
+def _detector_input_size(
+    model: OnnxModel, requested_hw_px: Any, family: str | None
+) -> tuple[int, int]:
     batch = input_batch(model)
     if batch not in (1, None):
         raise PerceptionError(
             f"{model.name} takes {batch} images at a time, wanted 1: {model.inputs[0]}"
         )
     default = metadata_size(model)
-    if default is None and len(model.outputs) == 2:
+    if default is None and len(model.outputs) == 2 and (family or family_of(model)) != "yolox":
         default = _RTMDET_HW_PX
     return input_size(model, requested_hw_px, default)

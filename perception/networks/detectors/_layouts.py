@@ -17,8 +17,8 @@ from ._box_format import BoxFormatVote
 from ._decoders import (
     STRIDES,
     Decoder,
+    DetsDecoder,
     RowsDecoder,
-    RtmdetDecoder,
     YoloV8Decoder,
     YoloxDecoder,
     cell_count,
@@ -29,17 +29,31 @@ _KNOWN: Final = (
     "YOLOv8/11 and relatives (1, 4 + classes, N), N cells of strides 8, 16 and 32; "
     "rows of a network without or with its own NMS (1, M, 6); "
     "YOLOX raw (1, N, 5 + classes); "
-    "RTMDet dets (1, N, 5) and labels (1, N)"
+    "RTMDet, or YOLOX with its own NMS, dets (1, N, 5) and labels (1, N)"
 )
 # Feature pyramids of the YOLOv8 family: the usual one, with a coarser and with a finer level.
 _PYRAMIDS: Final = (STRIDES, (*STRIDES, 64), (4, *STRIDES))
 _COCO_CLASSES: Final = 80
 _ROW_LENGTH: Final = 6
+# YOLOX's raw offsets and logarithms of sizes, in cells, are smaller; boxes in pixels are not.
+_LARGEST_RAW: Final = 16.0
 
 _ULTRALYTICS: Final = {"std_rgb": (255.0, 255.0, 255.0)}
 _YOLOX: Final = {"bgr": True}
 # OpenMMLab's configs of RTMDet list mean and standard deviation in the order blue, green, red.
 _RTMDET: Final = {"mean_rgb": IMAGENET_MEAN_RGB, "std_rgb": IMAGENET_STD_RGB, "bgr": True}
+# Families of detectors that OpenMMLab exports with the same outputs ``dets`` and ``labels``: name
+# of the layout, and pixels of the input.
+_FAMILIES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "rtmdet": ("RTMDet", _RTMDET),
+    "yolox": ("YOLOX with NMS", _YOLOX),
+}
+# Words in the names of weights and nodes of their heads: of RTMDet's, and of YOLOX's branch for
+# objectness, in the code of Megvii and in that of OpenMMLab.
+_FAMILY_WORDS: Final = {
+    "rtmdet": ("rtm_cls", "rtm_reg"),
+    "yolox": ("obj_preds", "multi_level_conv_obj"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +85,7 @@ class TrialRun:
         dtype: number type of the input.
         person_class: class number given by the caller, or None.
         box_format: box format given by the caller, or None.
+        family: family given by the caller, or None.
     """
 
     model: OnnxModel
@@ -80,6 +95,7 @@ class TrialRun:
     dtype: str
     person_class: int | None = None
     box_format: str | None = None
+    family: str | None = None
 
     def refusal(self, reason: str) -> PerceptionError:
         """Return an error that says what was found and which layouts are known."""
@@ -105,7 +121,7 @@ def recognise(trial: TrialRun) -> DetectorLayout:
     if any(0 in shape[:1] or shape[0] != 1 for shape in shapes if shape):
         raise trial.refusal("its outputs do not have batch size 1 for one image")
     if len(shapes) == 2:
-        return _rtmdet(trial)
+        return _dets(trial)
     if len(shapes) != 1 or len(shapes[0]) != 3:
         raise trial.refusal("no known detector has such outputs")
     return _single_output(trial, shapes[0][1], shapes[0][2])
@@ -119,15 +135,16 @@ def _single_output(trial: TrialRun, first: int, second: int) -> DetectorLayout:
     candidates: dict[str, Any] = {}
     if second in counts and first >= 5 and (names is None or first == 4 + len(names)):
         candidates["YOLOv8"] = lambda: _yolov8(trial, first - 4)
-    if first == cell_count(*size):
+    in_cells = first == cell_count(*size)
+    if second == _ROW_LENGTH and (not in_cells or _are_boxes(trial)):
+        candidates["rows"] = lambda: _rows(trial)
+    elif in_cells:
         if second >= 6 and (names is None or second == 5 + len(names)):
             candidates["YOLOX raw"] = lambda: _yolox(trial, second - 5)
         # Without class names, a transposed YOLOv8 is recognised only with 1 or COCO's 80 classes.
         classes = second - 4
         if classes in ((1, _COCO_CLASSES) if names is None else (len(names),)):
             candidates["YOLOv8 with its axes swapped"] = None
-    elif second == _ROW_LENGTH:
-        candidates["rows"] = lambda: _rows(trial)
     if len(candidates) > 1:
         raise trial.refusal(f"it could be {' or '.join(candidates)}")
     make = next(iter(candidates.values()), None)
@@ -135,6 +152,16 @@ def _single_output(trial: TrialRun, first: int, second: int) -> DetectorLayout:
         raise trial.refusal(_refusal_reason(trial, first, second, candidates))
     layout: DetectorLayout = make()
     return layout
+
+
+def _are_boxes(trial: TrialRun) -> bool:
+    """Return whether (1, cells, 6) are boxes in pixels with a class, not YOLOX's raw numbers."""
+    if trial.box_format is not None:
+        return True
+    numbers = trial.outputs[0][0].astype(np.float32)
+    classes = numbers[:, 5]
+    whole = bool((classes == np.rint(classes)).all())
+    return whole and float(np.abs(numbers[:, :4]).max()) > _LARGEST_RAW
 
 
 def _refusal_reason(trial: TrialRun, first: int, second: int, candidates: dict[str, Any]) -> str:
@@ -160,7 +187,9 @@ def _rows(trial: TrialRun) -> DetectorLayout:
     rows = trial.outputs[0][0].astype(np.float32)
     vote.update(rows[:, :4], rows[:, 4], input_px)
     decoder = RowsDecoder(_person_class(trial, None), vote, input_px)
-    return DetectorLayout("rows (NMS inside)", _pixels(trial, _ULTRALYTICS), True, decoder)
+    family = trial.family or family_of(trial.model)
+    pixels = _ULTRALYTICS if family is None else _FAMILIES[family][1]
+    return DetectorLayout("rows (NMS inside)", _pixels(trial, pixels), family is None, decoder)
 
 
 def _yolox(trial: TrialRun, classes: int) -> DetectorLayout:
@@ -183,16 +212,48 @@ def _is_decoded(rows: NDArray[Any], height_px: int, width_px: int) -> bool:
     return float(near_cell.mean()) > max(0.5, float(near_zero.mean()))
 
 
-def _rtmdet(trial: TrialRun) -> DetectorLayout:
+def _dets(trial: TrialRun) -> DetectorLayout:
     shapes = [output.shape for output in trial.outputs]
     for dets, labels in ((0, 1), (1, 0)):
         integers = np.issubdtype(trial.outputs[labels].dtype, np.integer)
         if len(shapes[dets]) == 3 and shapes[dets][2] == 5 and shapes[labels] == shapes[dets][:2]:
             if not integers:
                 break
-            decoder = RtmdetDecoder(_person_class(trial, None), dets, labels)
-            return DetectorLayout("RTMDet", _pixels(trial, _RTMDET), False, decoder)
-    raise trial.refusal("of the known detectors only RTMDet has two outputs")
+            family = trial.family or family_of(trial.model)
+            if family is None:
+                raise PerceptionError(
+                    f"{trial.model.name} has the outputs of RTMDet and of YOLOX with its own NMS, "
+                    "which want different pixels, and the names of its parts do not tell which it "
+                    "is; say it with family='rtmdet' or family='yolox' (--detector rtmdet:FILE "
+                    "or yolox:FILE on the command line)"
+                )
+            name, pixels = _FAMILIES[family]
+            decoder = DetsDecoder(_person_class(trial, None), dets, labels)
+            return DetectorLayout(name, _pixels(trial, pixels), False, decoder)
+    raise trial.refusal("of the known detectors only RTMDet and YOLOX with NMS have two outputs")
+
+
+def family_of(model: OnnxModel) -> str | None:
+    """Return ``"rtmdet"`` or ``"yolox"`` by the names of its parts; None if they do not tell."""
+    found = [
+        family
+        for family, words in _FAMILY_WORDS.items()
+        if any(word in name for name in model.part_names for word in words)
+    ]
+    return found[0] if len(found) == 1 else None
+
+
+def checked_family(family: Any) -> str | None:
+    """Return the family that a caller gives, or None.
+
+    Raises:
+        PerceptionError: for another one.
+    """
+    if family is not None and family not in _FAMILIES:
+        raise PerceptionError(
+            f"family must be one of {', '.join(map(repr, _FAMILIES))} or None, got {family!r}"
+        )
+    return None if family is None else str(family)
 
 
 def _pixels(trial: TrialRun, values: dict[str, Any]) -> PixelFormat:

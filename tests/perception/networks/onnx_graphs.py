@@ -21,6 +21,9 @@ _TYPES = {
     "float16": TensorProto.FLOAT16,
     "uint8": TensorProto.UINT8,
 }
+# Names of weights in the heads of OpenMMLab's detectors.
+RTMDET_HEAD = "bbox_head.rtm_cls.0.weight"
+YOLOX_HEAD = "bbox_head.multi_level_conv_obj.0.weight"
 
 
 class Graph:
@@ -33,7 +36,9 @@ class Graph:
         *,
         dtype: str = "float32",
         opset: int = 13,
+        part: str = "constant",
     ) -> None:
+        self._part = part
         self._nodes: list[Any] = []
         self._constants: list[Any] = []
         self._outputs: list[Any] = []
@@ -44,7 +49,7 @@ class Graph:
             self.pixels = self.node("Cast", input_name, to=TensorProto.FLOAT)
 
     def constant(self, values: Any, dtype: Any = np.float32) -> str:
-        name = f"constant_{len(self._constants)}"
+        name = f"{self._part}_{len(self._constants)}"
         self._constants.append(numpy_helper.from_array(np.asarray(values, dtype), name))
         return name
 
@@ -87,9 +92,13 @@ def fixed(
     batch: int | str = 1,
     dtype: str = "float32",
     declared: dict[str, Sequence[int | str | None]] | None = None,
+    part: str = "constant",
 ) -> bytes:
-    """Return a network with fixed outputs; a NaN in the image makes them NaN."""
-    graph = Graph("images", (batch, 3, *size), dtype=dtype)
+    """Return a network with fixed outputs; a NaN in the image makes them NaN.
+
+    ``part`` begins the names of its weights.
+    """
+    graph = Graph("images", (batch, 3, *size), dtype=dtype, part=part)
     zero = graph.zero()
     for name, value in outputs.items():
         shape = (declared or {}).get(name, value.shape)
@@ -163,17 +172,18 @@ def colour_yolox(height: int, width: int) -> bytes:
     return graph.bytes()
 
 
-def colour_rtmdet(height: int, width: int) -> bytes:
-    """Return an RTMDet of free input size; the scores are the mean red of each cell.
+def colour_dets(height: int, width: int, part: str = RTMDET_HEAD, *, rtmdet: bool = True) -> bytes:
+    """Return an RTMDet or a YOLOX with NMS of free input size; scores are each cell's mean red.
 
-    ``dets`` are the cells of an input of height × width.
+    ``dets`` are the cells of an input of height × width. ``part`` begins the names of its weights.
     """
-    graph = Graph("input", ("batch", 3, "height", "width"))
+    graph = Graph("input", ("batch", 3, "height", "width"), part=part)
     centres, strides = cell_centres(height, width)
     half = 0.5 * strides[:, None]
     boxes = np.concatenate([centres - half, centres + half], axis=1).T
     # From standardised red back to 0–1.
-    scores = colour_scores(graph, 2, STD_RGB[0] / 255.0, MEAN_RGB[0] / 255.0)
+    std, mean = (STD_RGB[0], MEAN_RGB[0]) if rtmdet else (1.0, 0.0)
+    scores = colour_scores(graph, 2, std / 255.0, mean / 255.0)
     columns = graph.node("Concat", graph.constant(boxes[None]), scores, axis=1)
     rows = graph.node("Transpose", columns, perm=[0, 2, 1])
     graph.output(rows, "dets", ("batch", "num", "five"))

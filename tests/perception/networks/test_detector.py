@@ -7,7 +7,16 @@ from threading import Thread
 
 import numpy as np
 import pytest
-from onnx_graphs import cell_centres, cell_count, colour_rtmdet, colour_yolov8, colour_yolox, fixed
+from onnx_graphs import (
+    RTMDET_HEAD,
+    YOLOX_HEAD,
+    cell_centres,
+    cell_count,
+    colour_dets,
+    colour_yolov8,
+    colour_yolox,
+    fixed,
+)
 
 from perception import Camera, PerceptionError, PersonDetector
 from perception.networks import OnnxModel, OnnxPersonDetector
@@ -61,7 +70,7 @@ def yolox(boxes: np.ndarray, scores: np.ndarray) -> bytes:
 def rtmdet(boxes: np.ndarray, scores: np.ndarray) -> bytes:
     dets = np.concatenate([boxes, scores[:, None]], axis=1)[None]
     labels = np.zeros((1, len(boxes)), np.int64)
-    return fixed({"dets": dets, "labels": labels}, (HEIGHT, WIDTH))
+    return fixed({"dets": dets, "labels": labels}, (HEIGHT, WIDTH), part=RTMDET_HEAD)
 
 
 LAYOUTS: dict[str, tuple[Layout, bool]] = {
@@ -119,8 +128,10 @@ def test_boxes_and_scores_that_are_not_finite_are_dropped(name: str) -> None:
         (colour_yolov8(HEIGHT, WIDTH, dtype="float16"), None),
         (colour_yolov8(HEIGHT, WIDTH, dtype="uint8"), None),
         (colour_yolox(HEIGHT, WIDTH), None),
-        (colour_rtmdet(HEIGHT, WIDTH), (HEIGHT, WIDTH)),
-        (colour_rtmdet(320, 320), None),
+        (colour_dets(HEIGHT, WIDTH), (HEIGHT, WIDTH)),
+        (colour_dets(320, 320), None),
+        (colour_dets(HEIGHT, WIDTH, YOLOX_HEAD, rtmdet=False), (HEIGHT, WIDTH)),
+        (colour_dets(HEIGHT, WIDTH, "head.obj_preds.1.bias", rtmdet=False), (HEIGHT, WIDTH)),
     ],
 )
 @pytest.mark.parametrize("image_size", [(512, 640), (300, 500)])
@@ -160,7 +171,7 @@ def test_smaller_inputs_are_multiples_of_the_stride_with_fewer_pixels() -> None:
 def test_a_network_of_one_size_has_no_smaller_inputs() -> None:
     assert OnnxPersonDetector(yolov8(np.zeros((0, 4)), np.zeros(0))).smaller() == ()
     # It declares a free size, and takes one only.
-    one = OnnxPersonDetector(colour_rtmdet(HEIGHT, WIDTH), input_size_hw_px=(HEIGHT, WIDTH))
+    one = OnnxPersonDetector(colour_dets(HEIGHT, WIDTH), input_size_hw_px=(HEIGHT, WIDTH))
     assert one.smaller() == ()
 
 
@@ -184,7 +195,8 @@ def test_only_the_person_class_is_returned() -> None:
     (person,) = OnnxPersonDetector(graph).detect(image)
     np.testing.assert_allclose(person.box_xyxy_px, [100, 20, 160, 200])
     dets = np.array([[[10, 20, 60, 200, 0.9], [100, 20, 160, 200, 0.8]]])
-    graph = fixed({"dets": dets, "labels": np.array([[1, 0]])}, (HEIGHT, WIDTH))
+    outputs = {"dets": dets, "labels": np.array([[1, 0]])}
+    graph = fixed(outputs, (HEIGHT, WIDTH), part=RTMDET_HEAD)
     (person,) = OnnxPersonDetector(graph).detect(image)
     np.testing.assert_allclose(person.box_xyxy_px, [100, 20, 160, 200])
 
@@ -252,6 +264,7 @@ def test_several_threads_may_share_a_detector() -> None:
         ({"iou_threshold": float("nan")}, "iou_threshold must be finite"),
         ({"person_class": -1}, "person_class must be a whole number"),
         ({"person_class": 3}, r"person_class must lie in \[0, 0\]"),
+        ({"family": "yolo"}, "family must be one of 'rtmdet', 'yolox' or None, got 'yolo'"),
         ({"input_size_hw_px": (320, 320)}, "takes an input of 256 x 320"),
         ({"input_size_hw_px": 320}, "two whole numbers"),
         ({"input_size_hw_px": (0, 320)}, "two whole numbers"),

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from onnx_graphs import cell_centres, cell_count, fixed, red_point_pose
+from onnx_graphs import (
+    RTMDET_HEAD,
+    YOLOX_HEAD,
+    cell_centres,
+    cell_count,
+    colour_dets,
+    fixed,
+    red_point_pose,
+)
 
 from perception import PerceptionError
 from perception.networks import OnnxPersonDetector
@@ -77,11 +85,90 @@ def test_other_tasks_and_other_numbers_of_outputs_are_refused() -> None:
     with pytest.raises(PerceptionError, match="its task is 'pose'"):
         layout((1, 56, CELLS), task="pose")
     two = {"a": np.zeros((1, 84, CELLS)), "b": np.zeros((1, 32, 64, 80))}
-    with pytest.raises(PerceptionError, match="only RTMDet has two outputs"):
+    with pytest.raises(PerceptionError, match="only RTMDet and YOLOX with NMS have two"):
         OnnxPersonDetector(fixed(two, SIZE))
     three = {name: np.zeros((1, 4, 4)) for name in "abc"}
     with pytest.raises(PerceptionError, match="no known detector"):
         OnnxPersonDetector(fixed(three, SIZE))
+
+
+RED = np.full((*SIZE, 3), (255, 0, 0), np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("part", "wanted"),
+    [
+        (RTMDET_HEAD, "RTMDet"),
+        ("model.bbox_head.rtm_reg.2.bias", "RTMDet"),
+        (YOLOX_HEAD, "YOLOX with NMS"),
+        ("head.obj_preds.0.weight_quantized", "YOLOX with NMS"),
+    ],
+)
+def test_names_of_weights_tell_what_has_dets_and_labels(part: str, wanted: str) -> None:
+    graph = colour_dets(*SIZE, part, rtmdet=wanted == "RTMDet")
+    detector = OnnxPersonDetector(graph, input_size_hw_px=SIZE, score_threshold=0.99)
+    assert detector.layout == wanted
+    assert detector.detect(RED)
+    # With the pixels of the other family it would find nothing, or this red as well.
+    assert not detector.detect(np.full((*SIZE, 3), (250, 255, 255), np.uint8))
+
+
+@pytest.mark.parametrize("part", ["constant", "rpn_head.rpn_cls.weight", "rtm_cls.obj_preds"])
+def test_dets_and_labels_of_an_unknown_network_are_asked_for(part: str) -> None:
+    graph = colour_dets(*SIZE, part, rtmdet=False)
+    with pytest.raises(PerceptionError, match="family='rtmdet' or family='yolox'") as refused:
+        OnnxPersonDetector(graph, input_size_hw_px=SIZE)
+    assert "--detector rtmdet:FILE or yolox:FILE" in str(refused.value)
+    detector = OnnxPersonDetector(
+        graph, input_size_hw_px=SIZE, family="yolox", score_threshold=0.99
+    )
+    assert detector.layout == "YOLOX with NMS"
+    assert detector.detect(RED)
+    assert OnnxPersonDetector(graph, input_size_hw_px=SIZE, family="rtmdet").layout == "RTMDet"
+
+
+def test_only_rtmdet_has_an_input_size_of_its_own() -> None:
+    assert OnnxPersonDetector(colour_dets(320, 320)).input_size_hw_px == (320, 320)
+    with pytest.raises(PerceptionError, match="input_size_hw_px"):
+        OnnxPersonDetector(colour_dets(320, 320, YOLOX_HEAD))
+
+
+def one_class_with_nms() -> np.ndarray:
+    """Return a row for each cell, as an NMS of fixed size leaves them."""
+    rows = np.zeros((1, CELLS, 6))
+    rows[0, :2, :4] = BOXES
+    rows[0, :2, 4] = 0.9
+    return rows
+
+
+def test_rows_of_one_class_are_not_read_as_raw_yolox() -> None:
+    detector = OnnxPersonDetector(fixed({"out": one_class_with_nms()}, SIZE))
+    assert detector.layout == "rows (NMS inside)"
+    np.testing.assert_allclose([p.box_xyxy_px for p in detector.detect(IMAGE)], BOXES)
+
+
+def test_a_box_format_says_that_a_network_gives_rows() -> None:
+    graph = fixed({"out": np.zeros((1, CELLS, 6))}, SIZE)
+    assert OnnxPersonDetector(graph, box_format="xyxy").layout == "rows (NMS inside)"
+
+
+def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw() -> None:
+    rng = np.random.default_rng(3)
+    rows = np.concatenate(
+        [rng.normal(0.0, 1.0, (1, CELLS, 4)), rng.uniform(0.001, 0.02, (1, CELLS, 2))], axis=2
+    )
+    graph = fixed({"out": rows}, SIZE, declared={"out": (1, "cells", 6)})
+    assert OnnxPersonDetector(graph).layout == "YOLOX raw"
+
+
+def test_rows_of_a_yolox_with_nms_get_its_input() -> None:
+    """A narrow image lies at the left of the input, not in its middle."""
+    rows = {"out": np.zeros((1, 100, 6))}
+    rows["out"][0, 0] = (0, 0, 80, 256, 0.9, 0)
+    image = IMAGE[:, :160]
+    (person,) = OnnxPersonDetector(fixed(rows, SIZE, part=YOLOX_HEAD)).detect(image)
+    np.testing.assert_allclose(person.box_xyxy_px, [0, 0, 80, 256])
+    assert OnnxPersonDetector(fixed(rows, SIZE)).detect(image) == ()
 
 
 def test_yolox_with_boxes_decoded_in_the_network_is_refused() -> None:
