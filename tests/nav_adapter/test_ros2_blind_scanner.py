@@ -22,7 +22,8 @@ from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
 
 NEAR = (1.5, 0.0)
 ANGLES_DEG = np.degrees(STEP_RAD) * np.arange(RAYS) - 135.0
-NO_ANSWERS = (0.0, math.nan, math.inf, -math.inf, 65.535, 0.02, 0.06, 0.2)
+COVERS_M = (0.06, 0.2)
+NO_ANSWERS = (0.0, math.nan, math.inf, -math.inf, 65.535, 0.02, *COVERS_M)
 
 Change = Callable[[np.ndarray], np.ndarray]
 
@@ -51,12 +52,28 @@ def alone(*scanners, **settings) -> Blinded:
 
 
 def every_ray(value: float) -> Change:
+    if value in COVERS_M:  # rays that end under a cover have noise
+        return lambda ranges: value + 1e-3 * np.sin(1e3 * np.minimum(ranges, 20.0))
     return lambda ranges: np.full(len(ranges), value)
 
 
 def sector(low_deg: float, high_deg: float, value: float) -> Change:
     inside = np.clip(ANGLES_DEG, low_deg, high_deg) == ANGLES_DEG
     return lambda ranges: np.where(inside, value, ranges)
+
+
+def test_a_scanner_that_repeats_its_last_scan_counts_as_silent() -> None:
+    nav = alone(people=[])
+    assert nav.drive(START_S, 2.0)[-1].speed_limit_mps > 1.0
+    repeated: list[np.ndarray] = []
+    nav.change = lambda ranges: repeated[0] if repeated else (repeated.append(ranges), ranges)[1]
+    nav.people.append(NEAR)  # whom the frozen scan does not show
+    after = nav.drive(START_S + 2.0, 3.0)
+    for each in after:
+        if each.stamp_s - (START_S + 2.0) > TIMING.stop_after_s + 2.0 * PERIOD_S:
+            assert each.speed_limit_mps == 0.0
+    assert any("scanner is frozen" in each for each in nav.warnings)
+    assert any("silent" in each for each in nav.warnings)
 
 
 @pytest.mark.parametrize("value", NO_ANSWERS)
