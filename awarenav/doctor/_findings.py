@@ -13,6 +13,8 @@ SUBJECTS: Final = (
     "packages",
     "shipped networks",
     "networks",
+    "odometry",
+    "scanners",
     "images",
     "calibration",
     "frame rate",

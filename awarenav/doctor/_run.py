@@ -27,6 +27,7 @@ from ..estimate import (
     PeopleEstimator,
     SourceFrame,
     choose_networks,
+    is_recording,
     open_source,
 )
 from ..files import json_text
@@ -110,6 +111,13 @@ def doctor_command(options: DoctorOptions) -> int:
 
 def _source_findings(options: DoctorOptions) -> list[Finding]:
     assert options.source is not None
+    findings: list[Finding] = []
+    if is_recording(Path(options.source)):
+        from ._recording import recording_findings  # noqa: PLC0415 - needs the extra rosbag
+
+        findings, has_images = recording_findings(Path(options.source))
+        if not has_images:
+            return findings
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
         choice = NetworkChoice.of_options(options)
         networks = choose_networks(**choice.model_dump())
@@ -117,7 +125,10 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)
         estimator = PeopleEstimator(networks, cameras, unfit=unfit)
         seen = _examine(source, estimator, options.frames)
-        findings = [_domain_finding(unfit, networks.training_domains, rendered=source.rendered)]
+        findings += [
+            _domain_finding(unfit, networks.training_domains, rendered=source.rendered),
+            *(Finding("error", "images", note) for note in source.notes),
+        ]
         if seen.problems:
             text = f"{counted(len(seen.problems), 'image')} of {options.frames}: {seen.problems[0]}"
             severity: Severity = "warning" if seen.figures else "error"
@@ -125,7 +136,7 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
         if seen.best is None:
             return findings
         findings += [
-            _calibration_finding(seen.best.camera if cameras.calibrated else None, options.fov_deg),
+            _calibration_finding(seen.best.camera if cameras.calibrated else None, options, source),
             *_rate_findings(source, seen),
             *picture_findings(seen.figures),
             _resolution_finding(seen.best.camera),
@@ -195,7 +206,10 @@ def _domain_finding(
     return Finding("fine", "networks", f"trained on: {told}; the images are {kind}")
 
 
-def _calibration_finding(camera: Camera | None, fov_deg: float | None) -> Finding:
+def _calibration_finding(
+    camera: Camera | None, options: DoctorOptions, source: ImageSource
+) -> Finding:
+    fov_deg = options.fov_deg
     if camera is None and fov_deg is None:
         return Finding(
             "error",
@@ -214,6 +228,11 @@ def _calibration_finding(camera: Camera | None, fov_deg: float | None) -> Findin
     across = math.degrees(2.0 * math.atan(0.5 * camera.width_px / camera.fx_px))
     off = abs(camera.cx_px - 0.5 * camera.width_px) / camera.width_px
     text = f"{camera.width_px} × {camera.height_px} pixels, {across:.0f} degrees across"
+    if source.rectified:
+        text += "; by the topic's name the images are rectified: P counts, without distortion"
+    elif is_recording(Path(str(options.source))):
+        text += "; by the topic's name the images are raw: K and the distortion count, and P is not"
+        text += " used"
     if off > _OFF_CENTRE:
         return Finding(
             "warning",

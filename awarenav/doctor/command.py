@@ -15,6 +15,7 @@ _CAMERA: Final = "Camera"
         "awarenav doctor",
         "awarenav doctor 0 --networks robot_networks.yaml --camera camera.yaml",
         "awarenav doctor photographs/",
+        "awarenav doctor drive/ --topic /camera/image_raw",
     ],
     exit_status={
         0: "No errors.",
@@ -26,7 +27,8 @@ _CAMERA: Final = "Camera"
     "source",
     required=False,
     help="Images as `awarenav estimate` reads them: a camera's number (0), a stream, a video, a "
-    "folder, an image or a recording. Without it only the installation is examined.",
+    "folder, an image or a ROS recording, which may also hold scans, odometry and tf. Without it "
+    "only the installation is examined.",
 )
 @option(
     "--out",
@@ -59,7 +61,9 @@ def doctor(**values: Any) -> int:
     """Say what is wrong with the installation and the camera, the most important first.
 
     Looks at packages and networks; and with SOURCE at what the networks were trained on, the
-    calibration, the frame rate reached, exposure, sharpness, and the people found.
+    calibration, the frame rate reached, exposure, sharpness, and the people found. In the first
+    minute of a ROS recording it also looks for blind scanners, for odometry that contradicts tf or
+    itself, and for images in a frame that is not optical.
     """
     from ._run import DoctorOptions, doctor_command  # noqa: PLC0415 - help needs no networks
 

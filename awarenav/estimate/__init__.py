@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     )
     from ._images import as_rgb, read_image
     from ._networks import NetworkChoice, admit_networks, choose_networks
-    from ._open_source import open_source
+    from ._open_source import is_recording, open_source
     from ._overlay import draw_overlay
     from ._overlay_writer import OverlayWriter, fit_image
     from ._results import estimate_record, track_record
@@ -53,6 +53,7 @@ __all__ = [
     "fit_image",
     "fixed_camera_pose",
     "ids_of_tracks",
+    "is_recording",
     "open_source",
     "read_image",
     "scaled_camera",
@@ -73,7 +74,7 @@ __getattr__ = lazy_names(
         ),
         "._images": ("as_rgb", "read_image"),
         "._networks": ("NetworkChoice", "admit_networks", "choose_networks"),
-        "._open_source": ("open_source",),
+        "._open_source": ("is_recording", "open_source"),
         "._overlay": ("draw_overlay",),
         "._overlay_writer": ("OverlayWriter", "fit_image"),
         "._results": ("estimate_record", "track_record"),

@@ -44,7 +44,7 @@ def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0)
             f"no such file or folder: {text}{_nearest(path)}; SOURCE is an image, a folder of "
             "images, a video, the number of a camera, the address of a stream or a ROS recording"
         )
-    if path.suffix.lower() in _BAG_SUFFIXES or (path / "metadata.yaml").exists():
+    if is_recording(path):
         from ._source_bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
 
         return BagSource(path, topic)
@@ -53,6 +53,14 @@ def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0)
     if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
         return ImageFiles(path, interval_s)
     return VideoSource.of_file(text)
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether a path is that of a ROS recording."""
+    if path.is_dir():
+        names = ("metadata.yaml", *(f"*{suffix}" for suffix in _BAG_SUFFIXES[1:]))
+        return any(next(path.glob(name), None) for name in names)
+    return path.suffix.lower() in _BAG_SUFFIXES
 
 
 def _nearest(path: Path) -> str:

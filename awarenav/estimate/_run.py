@@ -131,6 +131,8 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
         until_prefetched.callback(source.close)
         depth = _depth(options, source)
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, _log)
+        if source.rectified and cameras.calibrated:
+            _log("the images are rectified: P of the calibration counts, without distortion")
         for note in source.notes:
             _log(note)
         choice = NetworkChoice.of_options(options)

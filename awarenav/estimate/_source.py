@@ -39,7 +39,7 @@ class ImageSource(Protocol):
         camera: its calibration, if the source has one; reading it raises an AwarenavError for one
             that cannot be used.
         rectified: whether the images are rectified: P of a calibration counts, without distortion.
-        notes: what a user of the images should be told.
+        notes: what is wrong with the frame of the images.
         count: number of frames, if known; the number that a video states may be wrong.
         rate_hz: frames per second, if the source has a rate.
         live: whether frames come in real time; a frame that is not taken in time is lost.

@@ -18,7 +18,7 @@ from nav_adapter.ros2 import (
     optical_problem,
     picture_of,
 )
-from nav_adapter.ros2.conversions import from_ros, pose_matrix
+from nav_adapter.ros2.conversions import from_ros
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import Camera
 from perception.arrays import ImageRgb
@@ -61,8 +61,7 @@ class BagSource:
                 self._camera: Camera | AwarenavError | None = self._read_camera(shown)
             except AwarenavError as refusal:  # only if nobody gives another calibration
                 self._camera = refusal
-            notes = (self._matrix_note(), self._frame_note(shown))
-            self.notes = tuple(note for note in notes if note)
+            self.notes = tuple(filter(None, [self._frame_note(shown)]))
         except BaseException:
             self._reader.close()
             raise
@@ -161,32 +160,17 @@ class BagSource:
                 raise AwarenavError(f"{topic}: {cause}") from cause
         return None
 
-    def _matrix_note(self) -> str:
-        """Return that P counts; empty for raw images."""
-        if not self.rectified:
-            return ""
-        return f"{self._topic} has rectified images: P of camera_info counts, without distortion"
-
     def _frame_note(self, shown: Any) -> str:
         """Return why the frame of the images is not optical by the static transforms, if so."""
-        transforms, parents = TransformBuffer(), {}
+        transforms = TransformBuffer()
         # Damaged transforms, and those of ROS 1 with other fields, tell nothing.
         with contextlib.suppress(ValueError, TypeError, AttributeError):
-            frame = root = str(shown.header.frame_id).lstrip("/")
+            frame = str(shown.header.frame_id).lstrip("/")
             for message in self._messages(self._of("/tf_static", _TRANSFORMS)):
                 for each in from_ros(TFMessage, message).transforms:
-                    move = each.transform.translation
-                    T = pose_matrix((move.x, move.y, move.z), each.transform.rotation)
-                    parent, child = each.header.frame_id, each.child_frame_id
-                    transforms.add(parent, child, 0.0, T, static=True)
-                    parents[child.lstrip("/")] = parent.lstrip("/")
-            while root in parents:
-                root = parents[root]
-            return (
-                ""
-                if root == frame
-                else optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
-            )
+                    transforms.add_message(each, static=True)
+            if (root := transforms.root(frame)) != frame:
+                return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
         return ""
 
     def _of(self, topic: str, *kinds: str) -> list[Any]:

@@ -28,7 +28,7 @@ from ._pose_reader import odometry_problems
 from ._robot_file import CameraMount, RobotFile, ScannerMount
 from ._scan_perception import ScannerInput, scanner_inputs
 from ._scan_thread import ScanThread
-from ._scans import laser_scan_of, map_cells_of
+from ._scans import ScanMessages, laser_scan_of, map_cells_of
 from ._speed_limit import SLOWEST_MPS, speed_limit
 from ._speed_mask import speed_mask
 from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, is_rectified, renamed
@@ -54,6 +54,7 @@ __all__ = [
     "PerceivedFrame",
     "PerceptionThread",
     "RobotFile",
+    "ScanMessages",
     "ScanThread",
     "ScannerInput",
     "ScannerMount",

@@ -54,14 +54,7 @@ class RobotPoses:
         Raises:
             NavError: for a pose or a stamp that cannot be used.
         """
-        translation, rotation = message.transform.translation, message.transform.rotation
-        self.transforms.add(
-            message.header.frame_id,
-            message.child_frame_id,
-            to_seconds(message.header.stamp),
-            pose_matrix((translation.x, translation.y, translation.z), rotation),
-            static=static,
-        )
+        self.transforms.add_message(message, static=static)
 
     def add_odometry(self, message: Odometry) -> None:
         """Store the robot's state, unless a newer one is known, and its pose.

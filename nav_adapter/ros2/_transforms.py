@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from perception.arrays import FloatArray, finite_number, rigid_transform
 
 from .._errors import NavError
+from .conversions import pose_matrix, to_seconds
+from .messages.geometry_msgs import TransformStamped
 
 _KEPT_S: Final = 5.0
 #: The newest transform is used for at most this long after its stamp.
@@ -61,6 +63,25 @@ class TransformBuffer:
         insort(history, (stamp, T), key=lambda entry: entry[0])
         while history[-1][0] - history[0][0] > _KEPT_S:
             del history[0]
+
+    def add_message(self, message: TransformStamped, *, static: bool) -> None:
+        """Store the transform of a message.
+
+        Raises:
+            NavError: as :meth:`add`, and for a rotation that is none.
+        """
+        move = message.transform.translation
+        self.add(
+            message.header.frame_id,
+            message.child_frame_id,
+            to_seconds(message.header.stamp),
+            pose_matrix((move.x, move.y, move.z), message.transform.rotation),
+            static=static,
+        )
+
+    def root(self, frame: str) -> str:
+        """Return the topmost frame above a frame; itself if it has no parent."""
+        return self._path(frame.lstrip("/"))[-1]
 
     def forget(self, *, after_s: float = -math.inf) -> int:
         """Forget transforms with later stamps, by default all, and return how many.

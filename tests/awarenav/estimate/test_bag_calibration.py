@@ -83,11 +83,7 @@ def test_the_topic_tells_whether_p_or_k_is_the_camera(tmp_path, topic, rectified
     camera = source.camera
     assert (camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px) == wanted
     assert (camera.distortion is None) == rectified
-    assert source.notes == (
-        (f"{topic} has rectified images: P of camera_info counts, without distortion",)
-        if rectified
-        else ()
-    )
+    assert source.notes == ()
 
 
 def test_rectified_images_of_a_fisheye_need_its_p_only(tmp_path) -> None:

@@ -1,0 +1,191 @@
+"""What ``awarenav doctor`` says of recordings with one thing wrong at a time."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from awarenav.cli import main
+from nav_adapter.ros2.conversions import to_time, yaw_quaternion
+from nav_adapter.ros2.messages import ros_type
+from nav_adapter.ros2.messages.geometry_msgs import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from nav_adapter.ros2.messages.nav_msgs import Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
+from nav_adapter.ros2.messages.std_msgs import Header
+from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+
+pytest.importorskip("rosbags", reason="the extra 'rosbag' is not installed")
+pytest.importorskip("cyclonedds", reason="the extra 'ros2' is not installed")
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from nav_adapter.ros2 import encode
+
+START_S, PERIOD_S, COUNT = 1000.0, 0.05, 60
+SPEED_MPS = 0.5
+STEP_RAD = math.radians(1.0)
+ANGLES_RAD = math.radians(-135.0) + STEP_RAD * np.arange(271)
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+OPTICAL = Quaternion(-0.5, 0.5, -0.5, 0.5)
+K = (300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0)
+P = (250.0, 0.0, 150.0, 0.0, 0.0, 255.0, 110.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+def transform(parent: str, child: str, place: Vector3, turn: Quaternion, stamp_s: float = START_S):
+    header = Header(to_time(stamp_s), parent)
+    return TFMessage((TransformStamped(header, child, Transform(place, turn)),))
+
+
+class Drive:
+    """A recording of a robot that drives to the left at 0.5 m/s; its parts may be changed."""
+
+    scanner_yaw_rad = 0.0
+    tf_ahead_m = 0.0
+    twist = Vector3(SPEED_MPS)
+    heading_rad = 0.5 * math.pi
+    image_topic = ""
+    camera_turn = OPTICAL
+    ranges: Callable[[np.ndarray], np.ndarray] = staticmethod(lambda ranges: ranges)
+
+    def messages(self):
+        yaw = yaw_quaternion(self.scanner_yaw_rad)
+        yield "/tf_static", 0.0, transform("base_link", "laser", Vector3(0.3, 0.0, 0.2), yaw)
+        mast = Vector3(0.2, 0.0, 1.4)
+        yield "/tf_static", 0.0, transform("base_link", "cam_link", mast, self.camera_turn)
+        rng = np.random.default_rng(0)
+        for k in range(COUNT):
+            time_s, stamp = PERIOD_S * k, to_time(START_S + PERIOD_S * k)
+            ahead = np.array([math.cos(self.heading_rad), math.sin(self.heading_rad)])
+            x, y = (SPEED_MPS * time_s * ahead).tolist()
+            turn = yaw_quaternion(self.heading_rad)
+            pose = PoseWithCovariance(Pose(Point(x, y), turn))
+            twist = TwistWithCovariance(Twist(self.twist))
+            yield "/odom", time_s, Odometry(Header(stamp, "odom"), "base_link", pose, twist)
+            place = Vector3(*((SPEED_MPS * time_s + self.tf_ahead_m) * ahead).tolist())
+            yield "/tf", time_s, transform("odom", "base_link", place, turn, START_S + time_s)
+            ranges = self.ranges(4.0 + 0.01 * rng.normal(size=len(ANGLES_RAD)))
+            scan = LaserScan(
+                Header(stamp, "laser"), float(ANGLES_RAD[0]), float(ANGLES_RAD[-1]), STEP_RAD,
+                0.0, PERIOD_S, 0.05, 20.0, tuple(ranges.tolist()),
+            )  # fmt: skip
+            yield "/scan", time_s, scan
+            if self.image_topic and k < 2:
+                header, noise = Header(stamp, "cam_link"), rng.bytes(240 * 960)
+                yield self.image_topic, time_s, Image(header, 240, 320, "rgb8", 0, 960, noise)
+                yield (
+                    f"{self.image_topic.rpartition('/')[0]}/camera_info", time_s,
+                    CameraInfo(header, 240, 320, "plumb_bob", (-0.1, 0.0, 0.0, 0.0, 0.0), K, p=P),
+                )  # fmt: skip
+
+    def record(self, path: Path) -> Path:
+        connections: dict[str, object] = {}
+        with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            for topic, time_s, message in self.messages():
+                if topic not in connections:
+                    kind = ros_type(type(message))
+                    connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
+                stamp_ns = round(1e9 * (START_S + time_s))
+                writer.write(connections[topic], stamp_ns, encode(message))
+        return path
+
+
+def findings(capsys, path: Path, *options: str) -> dict[str, list[tuple[str, str]]]:
+    """Return severity and text of the findings, by subject."""
+    main(["doctor", str(path), "--out", "none", "--json", *options])
+    found: dict[str, list[tuple[str, str]]] = {}
+    for each in json.loads(capsys.readouterr().out):
+        found.setdefault(each["subject"], []).append((each["severity"], each["text"]))
+    return found
+
+
+@pytest.fixture
+def drive() -> Drive:
+    return Drive()
+
+
+def test_a_good_recording_without_images(capsys, tmp_path, drive) -> None:
+    found = findings(capsys, drive.record(tmp_path / "bag"))
+    assert [severity for severity, _ in found["scanners"]] == ["fine"]
+    assert [severity for severity, _ in found["odometry"]] == ["fine"]
+    assert found["images"] == [("warning", "the recording has none")]
+
+
+@pytest.mark.parametrize("nothing", [math.nan, 0.0, -math.inf, 65.535])
+@pytest.mark.parametrize("yaw_deg", [0, 40])
+def test_a_blind_sector_is_named_in_the_frame_of_the_robot(
+    capsys, tmp_path, drive, nothing, yaw_deg
+) -> None:
+    drive.scanner_yaw_rad = math.radians(yaw_deg)
+    sector = np.abs(ANGLES_RAD) <= math.radians(45.0)
+    drive.ranges = lambda ranges: np.where(sector, nothing, ranges)
+    ((severity, text),) = findings(capsys, drive.record(tmp_path / "bag"))["scanners"]
+    assert severity == "error"
+    assert f"/scan: in {COUNT} of {COUNT} scans" in text
+    sides_deg = [int(each) for each in re.findall(r"(-?\d+)°", text)[:2]]
+    assert sides_deg == pytest.approx([yaw_deg - 45, yaw_deg + 45], abs=1)
+    assert "in 'base_link'" in text
+
+
+def test_a_scanner_that_sees_nothing_or_repeats_itself(capsys, tmp_path, drive) -> None:
+    drive.ranges = lambda ranges: np.full_like(ranges, np.inf)
+    ((severity, text),) = findings(capsys, drive.record(tmp_path / "inf"))["scanners"]
+    assert (severity, "meet nothing" in text) == ("error", True)
+    drive.ranges = lambda ranges: np.full_like(ranges, 3.0)
+    ((severity, text),) = findings(capsys, drive.record(tmp_path / "frozen"))["scanners"]
+    assert (severity, "frozen" in text) == ("error", True)
+    drive.ranges = lambda ranges: 1000.0 * ranges
+    ((severity, text),) = findings(capsys, drive.record(tmp_path / "mm"))["scanners"]
+    assert (severity, "metres" in text) == ("error", True)
+
+
+def test_odometry_that_contradicts_tf(capsys, tmp_path, drive) -> None:
+    drive.tf_ahead_m = 0.6
+    ((severity, text),) = findings(capsys, drive.record(tmp_path / "bag"))["odometry"]
+    assert severity == "error"
+    assert "odometry and tf contradict each other" in text
+    assert "0.60 m" in text
+
+
+def test_a_twist_in_the_odom_frame(capsys, tmp_path, drive) -> None:
+    drive.twist = Vector3(0.0, SPEED_MPS)  # the robot heads along y of odom
+    ((severity, text),) = findings(capsys, drive.record(tmp_path / "bag"))["odometry"]
+    assert severity == "error"
+    assert "poses and twists contradict each other" in text
+
+
+@pytest.mark.parametrize(
+    ("topic", "said"),
+    [("/cam/image_rect", "P counts"), ("/cam/image_raw", "P is not used")],
+)
+def test_which_matrix_counts_is_said(capsys, tmp_path, drive, topic, said) -> None:
+    drive.image_topic = topic
+    found = findings(capsys, drive.record(tmp_path / "bag"), "--frames", "2")
+    ((_, text),) = found["calibration"]
+    assert said in text
+    assert "images" not in found
+
+
+def test_images_in_a_body_frame(capsys, tmp_path, drive) -> None:
+    drive.image_topic, drive.camera_turn = "/cam/image_raw", Quaternion()
+    found = findings(capsys, drive.record(tmp_path / "bag"), "--frames", "1")
+    (text,) = [text for severity, text in found["images"] if severity == "error"]
+    assert "'cam_link'" in text
+    assert "'base_link'" in text
+    assert "cam_optical_frame" in text
