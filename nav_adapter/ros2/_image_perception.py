@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 # Uncertainty of the height and the tilt of a camera on a driving robot.
 _HEIGHT_STD_M = 0.05
 _TILT_STD_RAD = math.radians(2.0)
+_NO_VIEW: Final = "the picture is no view: it is"
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +77,7 @@ class ImagePerception:
         self._info: CameraInfo | None = None
         self._rectified = rectified
         self._before: NDArray[np.uint8] | None = None
+        self._has_had_view = False
         if camera is not None:
             self._start(camera)
 
@@ -114,7 +116,12 @@ class ImagePerception:
         with self._busy:
             image = picture_of(message)
             self._fit(image.shape[1], image.shape[0])
-            self._require_view(image)
+            no_view, self._before = why_no_view(image, self._before), image
+            if no_view == FROZEN:
+                raise NavError(f"{_NO_VIEW} {no_view} (frozen? a simulated camera needs noise)")
+            if no_view and self._has_had_view:
+                raise NavError(f"{_NO_VIEW} {no_view}")
+            self._has_had_view |= no_view is None
             floor, problem = _floor(T_odom_camera), ""
             try:
                 given = {} if depth is None else _given(depth)
@@ -122,6 +129,10 @@ class ImagePerception:
             except DepthImageError as cause:  # before any network has run
                 depth, problem = None, str(cause)
                 observations = self._pipeline.process(image, stamp_s, floor=floor)
+            # Of a camera that has never had a view, such as a stand-in with blank pictures, people
+            # who are found count; that nobody is found means nothing.
+            if no_view and not observations:
+                raise NavError(f"{_NO_VIEW} {no_view}")
             tracks = self._tracker.update(observations, stamp_s, T_odom_camera, is_current)
         if tracks is None:
             return None
@@ -145,15 +156,6 @@ class ImagePerception:
                 f"images have {width_px} x {height_px} px"
             )
         self._start(camera)
-
-    def _require_view(self, image: NDArray[np.uint8]) -> None:
-        """Refuse a picture that shows nothing: the camera then counts as silent."""
-        reason = why_no_view(image, self._before)
-        self._before = image
-        if reason is None:
-            return
-        hint = " (frozen? a simulated camera needs noise)" if reason == FROZEN else ""
-        raise NavError(f"the picture is no view: it is {reason}{hint}")
 
     def _start(self, camera: Camera) -> None:
         self._pipeline = self._make_pipeline(camera)

@@ -23,7 +23,9 @@ WRAPPED_M: Final = 0.30
 _WITHIN_RAD: Final = math.radians(15.0)
 # "Nothing there" (+inf) counts as an answer while this share of the rays meets something: a scanner
 # that measures nothing at all may publish it as well.
-_ALIVE_SHARE: Final = 0.05
+_ALIVE_SHARE: Final = 0.01
+# So many rays with one range beyond the longest are a code of the driver, and no measurement.
+_CODED: Final = 3
 # Directions in the base frame for which it is known when they were last seen.
 _BEARINGS_RAD: Final = np.radians(np.arange(360.0))
 _FULL_TURN_RAD: Final = 2.0 * math.pi
@@ -33,9 +35,10 @@ _FULL_TURN_RAD: Final = 2.0 * math.pi
 class ScannerSight:
     """The rays of one scan that show what is there.
 
-    A ray has an answer if it met something within the limits that is not the robot's own body and
-    no cover, or if it met nothing (+inf, REP-117) while other rays met something. NaN, -inf, 0 and
-    whatever else lies outside the limits is no answer.
+    A ray has an answer if it met something that is not the robot's own body and no cover, or if it
+    met nothing (+inf, REP-117) while other rays met something. NaN, -inf, 0, what is nearer than
+    the shortest range, and a code beyond the longest one (three rays or more have this number) are
+    no answers.
 
     Attributes:
         scan: the scan.
@@ -159,7 +162,7 @@ def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None
     if points is None:
         points = scan_points(scan, scanner, RobotMotion(scan.stamp_s, np.eye(4)))
     covered = scanner.sees(scan)
-    answered = points.usable & (scan.ranges_m >= COVER_M)
+    answered = (points.usable & (scan.ranges_m >= COVER_M)) | (covered & _beyond(scan))
     own = covered & scan.measured & ~points.usable & (scan.ranges_m >= COVER_M)
     wrapped = answered & (scan.ranges_m < WRAPPED_M)
     if 2 * np.count_nonzero(wrapped) > np.count_nonzero(covered & ~own):
@@ -173,6 +176,16 @@ def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None
         covered & (2 * _near(dead, half, turn) > _near(covered, half, turn)), dead, turn
     )
     return ScannerSight(scan, scanner, covered & ~unseen, unseen & ~own)
+
+
+def _beyond(scan: LaserScan) -> NDArray[np.bool_]:
+    """Return (N,) True for rays that measured something beyond the longest range that counts."""
+    beyond = np.isfinite(scan.ranges_m) & (scan.ranges_m > scan.range_max_m) & ~scan.no_return
+    if not beyond.any():
+        return beyond
+    _, which, numbers = np.unique(scan.ranges_m[beyond], return_inverse=True, return_counts=True)
+    beyond[beyond] = numbers[which] < _CODED
+    return beyond
 
 
 def _near(flags: NDArray[np.bool_], half: int, turn: bool) -> NDArray[np.int64]:
