@@ -59,11 +59,15 @@ def test_the_five_lines_of_the_readme_give_obstacles_and_a_limit() -> None:
     exec(compile(block.text, "README.md", "exec"), names)
     T_odom_camera = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1]]
     state = RobotState(0.0, [0.0, 0.0], 0.0, 0.5, 0.0)
-    image_rgb = np.zeros((480, 640, 3), np.uint8)
-    obstacles, limit_mps, reason = names["on_image"](image_rgb, 0.0, T_odom_camera, state)
-    assert obstacles.shape == (0, 5)
-    assert limit_mps == 1.5
-    assert reason == "robot maximum"
+    black_rgb = np.zeros((480, 640, 3), np.uint8)
+    wall_rgb = np.random.default_rng(0).integers(90, 110, (480, 640, 3), np.uint8)
+    for image_rgb, limit, why in (
+        (black_rgb, 0.0, "stale data: none yet"),
+        (wall_rgb, 1.5, "robot maximum"),
+    ):
+        obstacles, limit_mps, reason = names["on_image"](image_rgb, 0.0, T_odom_camera, state)
+        assert obstacles.shape == (0, 5)
+        assert (limit_mps, reason) == (limit, why)
     lines = block.text.partition("def on_image")[2].splitlines()[1:]
     assert len([line for line in lines if line.strip()]) == 5
 
