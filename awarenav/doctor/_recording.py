@@ -161,6 +161,9 @@ def _odometry_findings(
     frames = Frames(odometry[0].header.frame_id.lstrip("/") or "odom", recording.base)
     problems = odometry_problems(odometry, recording.transforms, recording.static, frames=frames)
     if problems:
-        return [Finding("error", "odometry", f"{topic}: {text}") for text in problems]
-    text = f"{topic}: {counted(len(odometry), 'message')}, no contradiction with tf or themselves"
+        return [
+            Finding("error", "odometry", f"{topic}: {text.removeprefix('odometry: ')}")
+            for text in problems
+        ]
+    text = f"{topic}: {counted(len(odometry), 'message')} that contradict neither tf nor themselves"
     return [Finding("fine", "odometry", text)]

@@ -118,7 +118,13 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
         findings, has_images = recording_findings(Path(options.source))
         if not has_images:
             return findings
-    with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
+    try:
+        opened = open_source(options.source, topic=options.topic)
+    except AwarenavError as error:
+        if not findings:
+            raise
+        return [*findings, Finding("error", "images", str(error))]
+    with contextlib.closing(opened) as source:
         choice = NetworkChoice.of_options(options)
         networks = choose_networks(**choice.model_dump())
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
