@@ -161,7 +161,8 @@ def _are_boxes(trial: TrialRun) -> bool:
     numbers = trial.outputs[0][0].astype(np.float32)
     classes = numbers[:, 5]
     whole = bool((classes == np.rint(classes)).all())
-    return whole and float(np.abs(numbers[:, :4]).max()) > _LARGEST_RAW
+    # An NMS that finds nobody may leave nothing but zeros, a raw head never does.
+    return whole and (not numbers.any() or float(np.abs(numbers[:, :4]).max()) > _LARGEST_RAW)
 
 
 def _refusal_reason(trial: TrialRun, first: int, second: int, candidates: dict[str, Any]) -> str:

@@ -41,8 +41,8 @@ def layout(shape: tuple[int, ...], names: str | None = None, **metadata: str) ->
         ((1, 300, 6), None, "rows (NMS inside)"),
         ((1, 100, 6), "{0: 'person', 1: 'dog'}", "rows (NMS inside)"),
         ((1, CELLS, 85), None, "YOLOX raw"),
-        ((1, CELLS, 6), None, "YOLOX raw"),
-        ((1, CELLS, 6), "['person']", "YOLOX raw"),
+        ((1, CELLS, 6), None, "rows (NMS inside)"),  # of zeros, as it finds nobody
+        ((1, CELLS, 6), "['person']", "rows (NMS inside)"),
     ],
 )
 def test_the_layout_is_recognised_from_shapes(
@@ -62,7 +62,6 @@ def test_the_metadata_end2end_do_not_affect_the_layout(end2end: str) -> None:
     [
         ((1, CELLS, 84), None, "could be YOLOX raw or YOLOv8 with its axes swapped"),
         ((1, CELLS, 5), None, "looks like YOLOv8 with its axes swapped"),
-        ((1, CELLS, 6), "['person', 'dog']", "looks like YOLOv8 with its axes swapped"),
         ((1, 84, CELLS), "['person', 'dog']", "do not agree with the classes"),
         ((1, 3 * CELLS, 85), None, "three outputs per cell, as YOLOv5"),
         ((1, 84, 8400), None, rf"an input of this size has {CELLS} cells"),
@@ -152,13 +151,19 @@ def test_a_box_format_says_that_a_network_gives_rows() -> None:
     assert OnnxPersonDetector(graph, box_format="xyxy").layout == "rows (NMS inside)"
 
 
-def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw() -> None:
+@pytest.mark.parametrize("names", [None, "['person']"])
+def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw(names: str | None) -> None:
     rng = np.random.default_rng(3)
     rows = np.concatenate(
         [rng.normal(0.0, 1.0, (1, CELLS, 4)), rng.uniform(0.001, 0.02, (1, CELLS, 2))], axis=2
     )
-    graph = fixed({"out": rows}, SIZE, declared={"out": (1, "cells", 6)})
+    metadata = {} if names is None else {"names": names}
+    declared = {"out": (1, "cells", 6)}
+    graph = fixed({"out": rows}, SIZE, metadata=metadata, declared=declared)
     assert OnnxPersonDetector(graph).layout == "YOLOX raw"
+    graph = fixed({"out": rows}, SIZE, metadata={"names": "['person', 'dog']"}, declared=declared)
+    with pytest.raises(PerceptionError, match="looks like YOLOv8 with its axes swapped"):
+        OnnxPersonDetector(graph)
 
 
 def test_rows_of_a_yolox_with_nms_get_its_input() -> None:
