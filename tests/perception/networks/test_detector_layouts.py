@@ -38,11 +38,10 @@ def layout(shape: tuple[int, ...], names: str | None = None, **metadata: str) ->
         ((1, 5, CELLS), None, "YOLOv8"),
         ((1, 6, CELLS), "{0: 'person', 1: 'dog'}", "YOLOv8"),
         ((1, 84, CELLS + 4 * 5), None, "YOLOv8"),  # with stride 64
-        ((1, 300, 6), None, "rows (NMS inside)"),
+        ((1, 300, 6), "{0: 'person'}", "rows (NMS inside)"),
         ((1, 100, 6), "{0: 'person', 1: 'dog'}", "rows (NMS inside)"),
         ((1, CELLS, 85), None, "YOLOX raw"),
-        ((1, CELLS, 6), None, "rows (NMS inside)"),  # of zeros, as it finds nobody
-        ((1, CELLS, 6), "['person']", "rows (NMS inside)"),
+        ((1, CELLS, 6), "['person']", "rows (NMS inside)"),  # of zeros, as it finds nobody
     ],
 )
 def test_the_layout_is_recognised_from_shapes(
@@ -141,14 +140,15 @@ def one_class_with_nms() -> np.ndarray:
 
 
 def test_rows_of_one_class_are_not_read_as_raw_yolox() -> None:
-    detector = OnnxPersonDetector(fixed({"out": one_class_with_nms()}, SIZE))
+    detector = OnnxPersonDetector(fixed({"out": one_class_with_nms()}, SIZE), family="ultralytics")
     assert detector.layout == "rows (NMS inside)"
     np.testing.assert_allclose([p.box_xyxy_px for p in detector.detect(IMAGE)], BOXES)
 
 
 def test_a_box_format_says_that_a_network_gives_rows() -> None:
     graph = fixed({"out": np.zeros((1, CELLS, 6))}, SIZE)
-    assert OnnxPersonDetector(graph, box_format="xyxy").layout == "rows (NMS inside)"
+    detector = OnnxPersonDetector(graph, box_format="xyxy", family="ultralytics")
+    assert detector.layout == "rows (NMS inside)"
 
 
 @pytest.mark.parametrize("names", [None, "['person']"])
@@ -166,14 +166,28 @@ def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw(names: str | None) 
         OnnxPersonDetector(graph)
 
 
-def test_rows_of_a_yolox_with_nms_get_its_input() -> None:
-    """A narrow image lies at the left of the input, not in its middle."""
+def test_rows_get_the_input_of_their_family_or_are_asked_for() -> None:
+    """A narrow image lies at the left of YOLOX's input, and in the middle of Ultralytics'."""
     rows = {"out": np.zeros((1, 100, 6))}
     rows["out"][0, 0] = (0, 0, 80, 256, 0.9, 0)
     image = IMAGE[:, :160]
-    (person,) = OnnxPersonDetector(fixed(rows, SIZE, part=YOLOX_HEAD)).detect(image)
-    np.testing.assert_allclose(person.box_xyxy_px, [0, 0, 80, 256])
-    assert OnnxPersonDetector(fixed(rows, SIZE)).detect(image) == ()
+    untold = fixed(rows, SIZE)
+    for graph, family in ((fixed(rows, SIZE, part=YOLOX_HEAD), None), (untold, "yolox")):
+        (person,) = OnnxPersonDetector(graph, family=family).detect(image)
+        np.testing.assert_allclose(person.box_xyxy_px, [0, 0, 80, 256])
+    assert OnnxPersonDetector(untold, family="ultralytics").detect(image) == ()
+    told = fixed(rows, SIZE, metadata={"task": "detect"})
+    assert OnnxPersonDetector(told).detect(image) == ()
+    for metadata in ({}, {"onnx.infer": "onnxruntime.quant"}):
+        with pytest.raises(PerceptionError, match=r"\(1, M, 6\).*family='ultralytics'") as refused:
+            OnnxPersonDetector(fixed(rows, SIZE, metadata=metadata))
+        assert "--detector ultralytics:FILE, yolox:FILE or rtmdet:FILE" in str(refused.value)
+
+
+def test_dets_and_labels_are_not_those_of_ultralytics() -> None:
+    graph = colour_dets(*SIZE, "constant")
+    with pytest.raises(PerceptionError, match="family='rtmdet' or family='yolox'"):
+        OnnxPersonDetector(graph, family="ultralytics", input_size_hw_px=SIZE)
 
 
 def test_yolox_with_boxes_decoded_in_the_network_is_refused() -> None:
