@@ -35,7 +35,9 @@ _KEYS: Final = {
 }
 _READ: Final = frozenset((*_KEYS.values(), "header", "camera_name", "camera_model"))
 # Names under which other tools store a distortion.
-_DISTORTION_KEY: Final = re.compile(r"dist(?!ance)|fisheye|radial|tangential", re.IGNORECASE)
+_DISTORTION_KEY: Final = re.compile(
+    r"dist(?!ance)|fisheye|radial|tangential|coef|^[kp]_?[1-6]$", re.IGNORECASE
+)
 #: The models whose coefficients are OpenCV's k1, k2, p1, p2, k3, …, under all their names.
 PINHOLE: Final = "plumb_bob"
 _PINHOLE_NAMES: Final = (
@@ -54,6 +56,8 @@ _COUNTS: Final = {PINHOLE: (0, 4, 5, 8, 12, 14), FISHEYE: (0, 4)}
 # A shorter focal length, in image widths, is a view of more than 177°.
 _SHORTEST_FOCAL: Final = 0.02
 _LARGEST_SKEW: Final = 1e-3
+# No lens has its axis further from the middle, in shares of width and height, both at once.
+_OFF_CENTRE: Final = 0.4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,28 +119,28 @@ class CameraInfo:
         """
         if not isinstance(info, Mapping):
             info = {name: getattr(info, name) for name in _KEYS if hasattr(info, name)}
-        fields = {_KEYS.get(key, key): value for key, value in info.items()}
-        _check_names(fields)
         try:
+            fields = _by_name(info)
+            _check_names(fields)
             coefficients = np.ravel(_entries(fields.get("distortion_coefficients")))
             model = _model(fields, coefficients)
             return cls(
                 # Zeros of an uncalibrated driver are refused for their matrix.
                 fields["image_width"] and pixel_count("image_width", fields["image_width"]),
                 fields["image_height"] and pixel_count("image_height", fields["image_height"]),
-                np.reshape(_entries(fields["camera_matrix"]), (3, 3)),
+                _matrix("camera_matrix", _entries(fields["camera_matrix"]), (3, 3)),
                 _without_spare_zeros(coefficients, _COUNTS.get(model, ())),
                 model,
                 _projection(_entries(fields.get("projection_matrix"))),
                 _roi(fields.get("roi")),
-                (_binning(fields.get("binning_x")), _binning(fields.get("binning_y"))),
+                (_binning(fields, "binning_x"), _binning(fields, "binning_y")),
             )
         except KeyError as missing:
             raise PerceptionError(
                 f"lacks the key {missing}; a camera_info file has image_width, image_height, "
                 f"camera_matrix and distortion_coefficients, this one {', '.join(map(str, info))}"
             ) from None
-        except (TypeError, ValueError, OverflowError) as cause:
+        except (TypeError, ValueError, OverflowError, AttributeError) as cause:
             raise PerceptionError(str(cause)) from cause
 
     def seen(
@@ -208,7 +212,8 @@ class CameraInfo:
             abs(self.width_px * over - width) < over and abs(self.height_px * down - height) < down
             for over, down in ((1, 1), self.binning)
         )
-        if not (self._is_part_of_full or of_part) or min(width, height) < 1:
+        lowest = min(*self.roi_px[:2], width - 1, height - 1)
+        if not (self._is_part_of_full or of_part) or lowest < 0:
             raise PerceptionError(
                 f"roi (x, y, width, height) = {self.roi_px} px is not a part of the image of "
                 f"{self.width_px} x {self.height_px} px"
@@ -234,7 +239,27 @@ class CameraInfo:
                     f"the matrix {name} must be in pixels, got a focal length of {focal:g} for "
                     f"{extent} px: is it in units of the image size, or in millimetres?"
                 )
+        size = self.width_px, self.height_px
+        whole = self.roi_px in ((0, 0, 0, 0), (0, 0, *size))
+        off = [abs(at / max(n, 1) - 0.5) for at, n in zip((cx, cy), size, strict=True)]
+        if whole and min(off) > _OFF_CENTRE:
+            raise PerceptionError(
+                f"the matrix {name} has its principal point, {cx:g}, {cy:g}, at a corner of "
+                f"{self.width_px} x {self.height_px} px or beyond: is it in pixels, and for images "
+                "of this size? For images that are cut out, give the full size and roi"
+            )
         return fx, fy, cx, cy
+
+
+def _by_name(info: Mapping[Any, Any]) -> dict[Any, Any]:
+    """Return the fields under their names in a file."""
+    fields: dict[Any, Any] = {}
+    for key, value in info.items():
+        name = _KEYS.get(key, key)
+        if name in fields and not np.array_equal(_entries(fields[name]), _entries(value)):
+            raise PerceptionError(f"has {name} twice, with other numbers the second time: {key}")
+        fields[name] = value
+    return fields
 
 
 def _entries(value: Any) -> FloatArray:
@@ -254,13 +279,19 @@ def _roi(roi: Any) -> tuple[int, int, int, int]:
     return x, y, width, height
 
 
-def _binning(value: Any) -> int:
+def _binning(fields: Mapping[Any, Any], name: str) -> int:
     """Return the number of pixels that are joined; 0 means 1."""
-    return max(int(value or 1), 1)
+    return pixel_count(name, fields.get(name) or 1)
 
 
 def _projection(entries: FloatArray) -> FloatArray:
-    return np.reshape(entries, (3, 4)) if entries.size else np.zeros((3, 4))
+    return _matrix("projection_matrix", entries, (3, 4)) if entries.size else np.zeros((3, 4))
+
+
+def _matrix(name: str, entries: FloatArray, shape: tuple[int, int]) -> FloatArray:
+    if entries.size != math.prod(shape):
+        raise PerceptionError(f"{name} must have {math.prod(shape)} numbers, got {entries.size}")
+    return entries.reshape(shape)
 
 
 def _check_names(fields: Mapping[Any, Any]) -> None:
@@ -310,6 +341,7 @@ def _without_spare_zeros(coefficients: FloatArray, counts: tuple[int, ...]) -> F
 def _is_of_opencv(path: Path) -> bool:
     try:
         with path.open("rb") as file:
-            return b"opencv" in file.read(4096)
+            start = file.read(4096)
     except OSError:
         return False
+    return b"opencv" in start or start.startswith(b"%YAML:")  # YAML itself has a blank there

@@ -24,8 +24,8 @@ _NETWORK_OPTIONS: Final = (
         default="shipped",
         metavar="NAME|FILE",
         help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
-        "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet). yolox:FILE and "
-        "rtmdet:FILE say what a file is that does not tell it.",
+        "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet). yolox:FILE, "
+        "rtmdet:FILE and ultralytics:FILE say what a file is that does not tell it.",
     ),
     option(
         "--person-class",

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 _ORIENTATION: Final = 0x0112
-_SHORT: Final = 3
+# Types of a number: the standard wants the first, some writers use the second.
+_SHORT, _LONG = 3, 4
 _JPEG, _PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
 _TIFF: Final = {b"II*\0": "<", b"MM\0*": ">"}
 _EXIF: Final = b"Exif\0\0"
@@ -66,6 +67,9 @@ def _exif_blocks(data: bytes) -> Iterator[bytes]:
     elif data.startswith(_JPEG):
         at = len(_JPEG)
         while data[at : at + 1] == b"\xff":
+            if data[at + 1 : at + 2] == b"\xff":  # any number of these may stand before a marker
+                at += 1
+                continue
             marker, length = struct.unpack_from(">BH", data, at + 1)
             if marker == 0xDA:  # the image
                 return
@@ -96,7 +100,10 @@ def _in_tiff(block: bytes) -> int:
     (at,) = struct.unpack_from(order + "I", block, 4)
     (entries,) = struct.unpack_from(order + "H", block, at)
     for entry in range(entries):
-        tag, kind, _, value = struct.unpack_from(order + "HHIH", block, at + 2 + 12 * entry)
-        if tag == _ORIENTATION and kind == _SHORT:
+        place = at + 2 + 12 * entry
+        tag, kind, _ = struct.unpack_from(order + "HHI", block, place)
+        if tag == _ORIENTATION and kind in (_SHORT, _LONG):
+            number = order + ("H" if kind == _SHORT else "I")
+            (value,) = struct.unpack_from(number, block, place + 8)
             return int(value)
     return 0

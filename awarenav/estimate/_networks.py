@@ -67,7 +67,7 @@ _WORDS: Final = {
 }
 _SIZE: Final = re.compile("([1-9][0-9]{0,4})x([1-9][0-9]{0,4})")
 # Families of detectors that a file may not tell apart.
-_FAMILIES: Final = ("rtmdet", "yolox")
+_FAMILIES: Final = ("rtmdet", "yolox", "ultralytics")
 _HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
 
 
@@ -131,7 +131,8 @@ def choose_networks(
     Args:
         detector: ``"shipped"``, an ONNX file, or the name of a network that
             ``awarenav models fetch`` has downloaded (this holds for the other two as well).
-            ``rtmdet:FILE`` and ``yolox:FILE`` say what a file is that does not tell it.
+            ``rtmdet:FILE``, ``yolox:FILE`` and ``ultralytics:FILE`` say what a file is that does
+            not tell it.
         pose: ``"shipped"``, ``"mediapipe"`` (needs the extra), or an ONNX file.
         head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
             weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with

@@ -26,12 +26,9 @@ def optical_problem(T_level_camera: FloatArray, frame: str, level_frame: str) ->
     """
     right, down, ahead = T_level_camera[2, :3].tolist()
     up_rad = math.asin(max(-1.0, min(1.0, ahead)))
-    if "optical" in frame.lower():  # at least the name is right
-        lowest_rad, highest_rad = -math.pi, _STEEPEST_RAD
-    else:
-        rolled = abs(down) <= abs(right)
-        lowest_rad = -_STEEPEST_RAD
-        highest_rad = _STEEPEST_ROLLED_RAD if rolled else _STEEPEST_RAD
+    highest_rad = _STEEPEST_ROLLED_RAD if abs(down) <= abs(right) else _STEEPEST_RAD
+    # A camera may look straight down, if at least the name is right.
+    lowest_rad = -math.pi if "optical" in frame.lower() else -_STEEPEST_RAD
     if lowest_rad <= up_rad <= highest_rad:
         return ""
     where = "up" if up_rad > 0.0 else "down"

@@ -90,16 +90,19 @@ READ: Final = MappingProxyType(
 
 # Last parts of the topics of image_transport.
 _TRANSPORTS: Final = ("compressed", "compressedDepth", "theora", "ffmpeg", "zstd")
+# Words in the name of a topic of rectified images.
+_RECTIFIED: Final = {"rect", "rectified", "undistorted"}
 
 
 def is_rectified(topic: str) -> bool:
     """Return whether a topic of images has rectified ones, by its name.
 
     ``image_proc`` and the drivers say so in the last part: ``image_rect``, ``image_rect_color``,
-    ``left/image_rect/compressed``.
+    ``left/image_rect/compressed``; before a mere ``image``, in the one before: ``rect/image``.
     """
-    parts = [part for part in topic.split("/") if part and part not in _TRANSPORTS]
-    return bool(parts) and not {"rect", "rectified"}.isdisjoint(parts[-1].lower().split("_"))
+    parts = [part.lower() for part in topic.split("/") if part and part not in _TRANSPORTS]
+    named = parts[-2:] if parts[-1:] == ["image"] else parts[-1:]
+    return not _RECTIFIED.isdisjoint(word for part in named for word in part.split("_"))
 
 
 def renamed(topic: Topic, name: str) -> Topic:

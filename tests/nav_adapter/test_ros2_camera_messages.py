@@ -68,6 +68,9 @@ def seen_from(nav: Listener, frame: str) -> bool:
         ("/camera/color/image_rect_raw", True),
         ("/oak/rgb_rect", True),
         ("/zed/image_rectified", True),
+        ("/zed/zed_node/rgb/color/rect/image/compressed", True),
+        ("/cam/undistorted/image", True),
+        ("/zed/zed_node/rgb/color/raw/image", False),
         ("/cam/image_raw", False),
         ("/cam/image_raw/compressed", False),
         ("/image_rect/image_raw", False),
@@ -156,6 +159,7 @@ def turned(yaw_deg: float, down_deg: float, roll_deg: float = 0.0) -> Rotation:
         (turned(0.0, 0.0, 175.0), "camera_frame"),
         (turned(0.0, -70.0) * OPTICAL, "camera_optical_frame"),
         (turned(0.0, 0.0), "camera_rgb_optical_frame"),  # the name is right, the transform is not
+        (turned(30.0, 45.0), "camera_optical_frame"),  # likewise, of a camera that looks down
     ],
 )
 def test_images_in_a_body_frame_are_refused_with_both_frames(turn, frame) -> None:

@@ -103,7 +103,7 @@ def test_an_echoed_camera_info_message_is_read(tmp_path):
             "distortion_model: equidistant\ndistortion_coefficients: [0.1, 0, 0, 0]\n",
             "equidistant",
         ),
-        ("image_width: 640\nimage_height: 480\ncamera_matrix: [1, 2]\n", "reshape"),
+        ("image_width: 640\nimage_height: 480\ncamera_matrix: [1, 2]\n", "must have 9 numbers"),
     ],
 )
 def test_invalid_files_are_refused_by_name(tmp_path, text, message):

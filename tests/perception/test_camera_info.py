@@ -197,6 +197,18 @@ UNREAD = "is not read: the coefficients of the lens distortion belong into"
         ({"k": [500, 25, 320, 0, 500, 240, 0, 0, 1]}, "must have no skew, got 25 px"),
         ({"k": [0.78, 0, 0.5, 0, 1.04, 0.5, 0, 0, 1]}, f"{F} of 0.78 for 640 px"),
         ({"k": [3.6, 0, 320, 0, 3.6, 240, 0, 0, 1]}, "or in millimetres"),
+        ({"k": [1000, 0, 640, 0, 1000, 480, 0, 0, 1]}, "for images of this size"),
+        ({"k": [500, 0, 0.5, 0, 500, 0.5, 0, 0, 1]}, "principal point, 0.5, 0.5, at a corner"),
+        ({"k": [5e5, 0, 3.2e5, 0, 5e5, 2.4e5, 0, 0, 1]}, "is it in pixels"),
+        ({"k": [500, 500, 320, 240]}, "camera_matrix must have 9 numbers, got 4"),
+        ({"K": [250, 0, 160, 0, 250, 120, 0, 0, 1]}, "has camera_matrix twice"),
+        ({"distortion_coefficients": [-0.3, 0.1, 0, 0]}, "has distortion_coefficients twice"),
+        ({"d": [0.0] * 5, "lens_coeffs": [-0.3, 0.1]}, f"lens_coeffs {UNREAD}"),
+        ({"d": [], "k1": -0.3, "k2": 0.1}, f"k1, k2 {UNREAD}"),
+        ({"binning_x": -2}, "binning_x must lie in"),
+        ({"roi": [0, 0, 320, 240]}, "x_offset"),
+        ({"roi": {"x_offset": -9, "y_offset": 0, "width": 9, "height": 9}}, "is not a part"),
+        ({"width": 0}, "width_px must lie in"),
         ({"k": [0.0] * 9}, "calibrate the camera"),
         ({"k": [math.nan] * 9}, "calibrate the camera"),
     ],
@@ -209,6 +221,13 @@ def test_what_would_be_read_wrongly_is_refused_with_the_reason(tmp_path, changes
     assert "camera.yaml" in str(refusal.value)
 
 
+def test_a_part_may_have_its_principal_point_at_a_corner() -> None:
+    """Lower right quarter of the image, with the numbers of the full image, or Baxter's."""
+    for size in ((640, 480), (320, 240)):
+        camera = Camera.from_camera_info(info(size, roi=(320, 240, 320, 240)))
+        assert numbers(camera) == (320, 240, 500, 500, 0, 0)
+
+
 def test_further_keys_of_a_calibrator_are_left_alone() -> None:
     fields = info(avg_reprojection_error=0.3, board_distance_m=1.2)
     assert Camera.from_camera_info(fields).fx_px == 500.0
@@ -218,6 +237,7 @@ def test_further_keys_of_a_calibrator_are_left_alone() -> None:
     "text",
     [
         "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n",
+        "%YAML:1.0\n\nCamera.fx: 500.0\nCamera.k1: -0.3\n",
         '<?xml version="1.0"?>\n<opencv_storage>\n<camera_matrix type_id="opencv-matrix">\n',
     ],
 )

@@ -57,10 +57,10 @@ class OnnxPersonDetector:
             the metadata's ``imgsz``, and 320 × 320 for RTMDet.
         person_class: number of the class that counts, where the metadata do not name it.
         box_format: ``"xyxy"`` or ``"cxcywh"`` for (1, M, 6); None finds it out from the boxes.
-        family: ``"rtmdet"`` or ``"yolox"`` for a network with the outputs ``dets`` and ``labels``.
-            Both have these, and want different pixels. None takes it from the names of weights and
-            nodes, and refuses such a network if its names do not tell. A network with output
-            (1, M, 6) that is of neither gets its pixels as YOLOv8 does.
+        family: ``"rtmdet"`` or ``"yolox"`` for a network with the outputs ``dets`` and ``labels``,
+            these or ``"ultralytics"`` for one with output (1, M, 6). They want different pixels.
+            None takes it from the names of weights and nodes and, for Ultralytics, from the
+            metadata, and refuses such a network if they do not tell.
         settings: providers and threads, for a model that is not loaded yet.
         sha256: expected SHA-256 of the file, for a model that is not loaded yet.
 

@@ -42,12 +42,16 @@ _ULTRALYTICS: Final = {"std_rgb": (255.0, 255.0, 255.0)}
 _YOLOX: Final = {"bgr": True}
 # OpenMMLab's configs of RTMDet list mean and standard deviation in the order blue, green, red.
 _RTMDET: Final = {"mean_rgb": IMAGENET_MEAN_RGB, "std_rgb": IMAGENET_STD_RGB, "bgr": True}
-# Families of detectors that OpenMMLab exports with the same outputs ``dets`` and ``labels``: name
-# of the layout, and pixels of the input.
-_FAMILIES: Final[dict[str, tuple[str, dict[str, Any]]]] = {
-    "rtmdet": ("RTMDet", _RTMDET),
-    "yolox": ("YOLOX with NMS", _YOLOX),
+# Pixels that families of detectors want, where their outputs do not tell them apart.
+_FAMILIES: Final[dict[str, dict[str, Any]]] = {
+    "rtmdet": _RTMDET,
+    "yolox": _YOLOX,
+    "ultralytics": _ULTRALYTICS,
 }
+# Those that OpenMMLab exports with the same outputs ``dets`` and ``labels``: names of the layouts.
+_WITH_DETS: Final = {"rtmdet": "RTMDet", "yolox": "YOLOX with NMS"}
+# Keys of the metadata that Ultralytics and its relatives write.
+_ULTRALYTICS_KEYS: Final = ("names", "task", "imgsz", "end2end")
 # Words in the names of weights and nodes of their heads: of RTMDet's, and of YOLOX's branch for
 # objectness, in the code of Megvii and in that of OpenMMLab.
 _FAMILY_WORDS: Final = {
@@ -161,7 +165,8 @@ def _are_boxes(trial: TrialRun) -> bool:
     numbers = trial.outputs[0][0].astype(np.float32)
     classes = numbers[:, 5]
     whole = bool((classes == np.rint(classes)).all())
-    return whole and float(np.abs(numbers[:, :4]).max()) > _LARGEST_RAW
+    # An NMS that finds nobody may leave nothing but zeros, a raw head never does.
+    return whole and (not numbers.any() or float(np.abs(numbers[:, :4]).max()) > _LARGEST_RAW)
 
 
 def _refusal_reason(trial: TrialRun, first: int, second: int, candidates: dict[str, Any]) -> str:
@@ -188,8 +193,17 @@ def _rows(trial: TrialRun) -> DetectorLayout:
     vote.update(rows[:, :4], rows[:, 4], input_px)
     decoder = RowsDecoder(_person_class(trial, None), vote, input_px)
     family = trial.family or family_of(trial.model)
-    pixels = _ULTRALYTICS if family is None else _FAMILIES[family][1]
-    return DetectorLayout("rows (NMS inside)", _pixels(trial, pixels), family is None, decoder)
+    if family is None:
+        if not any(key in trial.model.metadata for key in _ULTRALYTICS_KEYS):
+            raise PerceptionError(
+                f"{trial.model.name} has the output (1, M, 6) of several families of detectors, "
+                "which want different pixels, and neither its metadata nor the names of its parts "
+                "tell which it is; say it with family='ultralytics', 'yolox' or 'rtmdet' "
+                "(--detector ultralytics:FILE, yolox:FILE or rtmdet:FILE on the command line)"
+            )
+        family = "ultralytics"
+    pixels, centred = _FAMILIES[family], family == "ultralytics"
+    return DetectorLayout("rows (NMS inside)", _pixels(trial, pixels), centred, decoder)
 
 
 def _yolox(trial: TrialRun, classes: int) -> DetectorLayout:
@@ -220,16 +234,16 @@ def _dets(trial: TrialRun) -> DetectorLayout:
             if not integers:
                 break
             family = trial.family or family_of(trial.model)
-            if family is None:
+            if family not in _WITH_DETS:
                 raise PerceptionError(
                     f"{trial.model.name} has the outputs of RTMDet and of YOLOX with its own NMS, "
                     "which want different pixels, and the names of its parts do not tell which it "
                     "is; say it with family='rtmdet' or family='yolox' (--detector rtmdet:FILE "
                     "or yolox:FILE on the command line)"
                 )
-            name, pixels = _FAMILIES[family]
             decoder = DetsDecoder(_person_class(trial, None), dets, labels)
-            return DetectorLayout(name, _pixels(trial, pixels), False, decoder)
+            pixels = _pixels(trial, _FAMILIES[family])
+            return DetectorLayout(_WITH_DETS[family], pixels, False, decoder)
     raise trial.refusal("of the known detectors only RTMDet and YOLOX with NMS have two outputs")
 
 

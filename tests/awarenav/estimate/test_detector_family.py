@@ -48,6 +48,11 @@ def test_a_prefix_tells_it(unnamed: Path, family: str, layout: str) -> None:
     assert networks.detector.layout == layout  # type: ignore[union-attr]
 
 
+def test_a_prefix_that_does_not_go_with_the_outputs_is_refused(unnamed: Path) -> None:
+    with pytest.raises(PerceptionError, match="--detector rtmdet:FILE or yolox:FILE"):
+        choose_networks(f"ultralytics:{unnamed}", "shipped", "pnp")
+
+
 def test_other_prefixes_are_part_of_the_name(unnamed: Path) -> None:
     with pytest.raises(AwarenavError, match="there is no file 'yolo:"):
         choose_networks(f"yolo:{unnamed}", "shipped", "pnp")

@@ -62,16 +62,21 @@ def test_a_picture_is_read_upright(tmp_path: Path, suffix: str, orientation: int
     assert np.abs(read.astype(float) - scene()).mean() < 6.0
 
 
-def test_an_orientation_is_found_behind_other_blocks_and_in_either_byte_order(tmp_path) -> None:
+@pytest.mark.parametrize("kind", ["H", "I"])  # a short number as the standard wants, or a long one
+@pytest.mark.parametrize("fill", [b"", b"\xff\xff"])
+def test_an_orientation_is_found_behind_other_blocks_and_in_either_byte_order(
+    tmp_path, kind: str, fill: bytes
+) -> None:
     upside_down = np.ascontiguousarray(scene()[::-1, ::-1, ::-1])
     jpeg = cv2.imencode(".jpg", upside_down, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
     other = b"http://ns.adobe.com/xap/1.0/\0<x/>"
     for order, mark in (("<", b"II*\0"), (">", b"MM\0*")):
         entries = struct.pack(order + "HHIHH", 0x010F, 3, 1, 7, 0)
-        entries += struct.pack(order + "HHIHH", 0x0112, 3, 1, 3, 0)
+        number = struct.pack(order + kind, 3).ljust(4, b"\0")
+        entries += struct.pack(order + "HHI", 0x0112, 3 if kind == "H" else 4, 1) + number
         block = b"Exif\0\0" + mark + struct.pack(order + "IH", 8, 2) + entries + bytes(4)
         segments = b"".join(
-            b"\xff\xe1" + struct.pack(">H", len(each) + 2) + each for each in (other, block)
+            fill + b"\xff\xe1" + struct.pack(">H", len(each) + 2) + each for each in (other, block)
         )
         path = tmp_path / "a.jpg"
         path.write_bytes(jpeg[:2] + segments + jpeg[2:])

@@ -264,7 +264,10 @@ def test_several_threads_may_share_a_detector() -> None:
         ({"iou_threshold": float("nan")}, "iou_threshold must be finite"),
         ({"person_class": -1}, "person_class must be a whole number"),
         ({"person_class": 3}, r"person_class must lie in \[0, 0\]"),
-        ({"family": "yolo"}, "family must be one of 'rtmdet', 'yolox' or None, got 'yolo'"),
+        (
+            {"family": "yolo"},
+            "family must be one of 'rtmdet', 'yolox', 'ultralytics' or None, got 'yolo'",
+        ),
         ({"input_size_hw_px": (320, 320)}, "takes an input of 256 x 320"),
         ({"input_size_hw_px": 320}, "two whole numbers"),
         ({"input_size_hw_px": (0, 320)}, "two whole numbers"),

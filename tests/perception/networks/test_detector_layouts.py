@@ -38,11 +38,10 @@ def layout(shape: tuple[int, ...], names: str | None = None, **metadata: str) ->
         ((1, 5, CELLS), None, "YOLOv8"),
         ((1, 6, CELLS), "{0: 'person', 1: 'dog'}", "YOLOv8"),
         ((1, 84, CELLS + 4 * 5), None, "YOLOv8"),  # with stride 64
-        ((1, 300, 6), None, "rows (NMS inside)"),
+        ((1, 300, 6), "{0: 'person'}", "rows (NMS inside)"),
         ((1, 100, 6), "{0: 'person', 1: 'dog'}", "rows (NMS inside)"),
         ((1, CELLS, 85), None, "YOLOX raw"),
-        ((1, CELLS, 6), None, "YOLOX raw"),
-        ((1, CELLS, 6), "['person']", "YOLOX raw"),
+        ((1, CELLS, 6), "['person']", "rows (NMS inside)"),  # of zeros, as it finds nobody
     ],
 )
 def test_the_layout_is_recognised_from_shapes(
@@ -62,7 +61,6 @@ def test_the_metadata_end2end_do_not_affect_the_layout(end2end: str) -> None:
     [
         ((1, CELLS, 84), None, "could be YOLOX raw or YOLOv8 with its axes swapped"),
         ((1, CELLS, 5), None, "looks like YOLOv8 with its axes swapped"),
-        ((1, CELLS, 6), "['person', 'dog']", "looks like YOLOv8 with its axes swapped"),
         ((1, 84, CELLS), "['person', 'dog']", "do not agree with the classes"),
         ((1, 3 * CELLS, 85), None, "three outputs per cell, as YOLOv5"),
         ((1, 84, 8400), None, rf"an input of this size has {CELLS} cells"),
@@ -142,33 +140,54 @@ def one_class_with_nms() -> np.ndarray:
 
 
 def test_rows_of_one_class_are_not_read_as_raw_yolox() -> None:
-    detector = OnnxPersonDetector(fixed({"out": one_class_with_nms()}, SIZE))
+    detector = OnnxPersonDetector(fixed({"out": one_class_with_nms()}, SIZE), family="ultralytics")
     assert detector.layout == "rows (NMS inside)"
     np.testing.assert_allclose([p.box_xyxy_px for p in detector.detect(IMAGE)], BOXES)
 
 
 def test_a_box_format_says_that_a_network_gives_rows() -> None:
     graph = fixed({"out": np.zeros((1, CELLS, 6))}, SIZE)
-    assert OnnxPersonDetector(graph, box_format="xyxy").layout == "rows (NMS inside)"
+    detector = OnnxPersonDetector(graph, box_format="xyxy", family="ultralytics")
+    assert detector.layout == "rows (NMS inside)"
 
 
-def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw() -> None:
+@pytest.mark.parametrize("names", [None, "['person']"])
+def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw(names: str | None) -> None:
     rng = np.random.default_rng(3)
     rows = np.concatenate(
         [rng.normal(0.0, 1.0, (1, CELLS, 4)), rng.uniform(0.001, 0.02, (1, CELLS, 2))], axis=2
     )
-    graph = fixed({"out": rows}, SIZE, declared={"out": (1, "cells", 6)})
+    metadata = {} if names is None else {"names": names}
+    declared = {"out": (1, "cells", 6)}
+    graph = fixed({"out": rows}, SIZE, metadata=metadata, declared=declared)
     assert OnnxPersonDetector(graph).layout == "YOLOX raw"
+    graph = fixed({"out": rows}, SIZE, metadata={"names": "['person', 'dog']"}, declared=declared)
+    with pytest.raises(PerceptionError, match="looks like YOLOv8 with its axes swapped"):
+        OnnxPersonDetector(graph)
 
 
-def test_rows_of_a_yolox_with_nms_get_its_input() -> None:
-    """A narrow image lies at the left of the input, not in its middle."""
+def test_rows_get_the_input_of_their_family_or_are_asked_for() -> None:
+    """A narrow image lies at the left of YOLOX's input, and in the middle of Ultralytics'."""
     rows = {"out": np.zeros((1, 100, 6))}
     rows["out"][0, 0] = (0, 0, 80, 256, 0.9, 0)
     image = IMAGE[:, :160]
-    (person,) = OnnxPersonDetector(fixed(rows, SIZE, part=YOLOX_HEAD)).detect(image)
-    np.testing.assert_allclose(person.box_xyxy_px, [0, 0, 80, 256])
-    assert OnnxPersonDetector(fixed(rows, SIZE)).detect(image) == ()
+    untold = fixed(rows, SIZE)
+    for graph, family in ((fixed(rows, SIZE, part=YOLOX_HEAD), None), (untold, "yolox")):
+        (person,) = OnnxPersonDetector(graph, family=family).detect(image)
+        np.testing.assert_allclose(person.box_xyxy_px, [0, 0, 80, 256])
+    assert OnnxPersonDetector(untold, family="ultralytics").detect(image) == ()
+    told = fixed(rows, SIZE, metadata={"task": "detect"})
+    assert OnnxPersonDetector(told).detect(image) == ()
+    for metadata in ({}, {"onnx.infer": "onnxruntime.quant"}):
+        with pytest.raises(PerceptionError, match=r"\(1, M, 6\).*family='ultralytics'") as refused:
+            OnnxPersonDetector(fixed(rows, SIZE, metadata=metadata))
+        assert "--detector ultralytics:FILE, yolox:FILE or rtmdet:FILE" in str(refused.value)
+
+
+def test_dets_and_labels_are_not_those_of_ultralytics() -> None:
+    graph = colour_dets(*SIZE, "constant")
+    with pytest.raises(PerceptionError, match="family='rtmdet' or family='yolox'"):
+        OnnxPersonDetector(graph, family="ultralytics", input_size_hw_px=SIZE)
 
 
 def test_yolox_with_boxes_decoded_in_the_network_is_refused() -> None:
