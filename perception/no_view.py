@@ -50,10 +50,10 @@ def why_no_view(image_rgb: ImageRgb, before_rgb: ImageRgb | None = None) -> NoVi
         ("of one colour", level - _COLOUR_LEVELS, level + _COLOUR_LEVELS),
     )
     for reason, low, high in colours:
-        if _lie_within(blocks, low, high, _SEEN_SHARE) and _lie_within(
-            _blocks(cv2.medianBlur(np.ascontiguousarray(image_rgb), 3)), low, high, 0.0
-        ):
-            return reason
+        if _lie_within(blocks, low, high, _SEEN_SHARE):
+            calm = np.asarray(cv2.medianBlur(np.ascontiguousarray(image_rgb), 3), np.uint8)
+            if _lie_within(_blocks(calm), low, high, 0.0):
+                return reason
     if before_rgb is not None and np.array_equal(image_rgb, before_rgb):
         return FROZEN
     return None
