@@ -62,6 +62,7 @@ class Drive:
     heading_rad = 0.5 * math.pi
     image_topic = ""
     camera_turn = OPTICAL
+    projection = P
     mounts_topic = "/tf_static"
     ranges: Callable[[np.ndarray], np.ndarray] = staticmethod(lambda ranges: ranges)
 
@@ -92,7 +93,10 @@ class Drive:
                 yield self.image_topic, time_s, Image(header, 240, 320, "rgb8", 0, 960, noise)
                 yield (
                     f"{self.image_topic.rpartition('/')[0]}/camera_info", time_s,
-                    CameraInfo(header, 240, 320, "plumb_bob", (-0.1, 0.0, 0.0, 0.0, 0.0), K, p=P),
+                    CameraInfo(
+                        header, 240, 320, "plumb_bob", (-0.1, 0.0, 0.0, 0.0, 0.0), K,
+                        p=self.projection,
+                    ),
                 )  # fmt: skip
 
     def record(self, path: Path) -> Path:
@@ -210,3 +214,13 @@ def test_mounts_in_other_topics_are_read(capsys, tmp_path, drive, topic) -> None
     found = findings(capsys, drive.record(tmp_path / "bag"), "--frames", "1")
     assert "in 'base_link'" in found["scanners"][0][1]
     assert any("'cam_link'" in text for severity, text in found["images"] if severity == "error")
+
+
+def test_images_that_cannot_be_used_hide_nothing_else(capsys, tmp_path, drive) -> None:
+    drive.image_topic, drive.projection = "/cam/image_rect", (0.0,) * 12
+    drive.ranges, drive.tf_ahead_m = np.zeros_like, 0.6
+    found = findings(capsys, drive.record(tmp_path / "bag"), "--frames", "1")
+    assert [severity for severity, _ in found["scanners"]] == ["error"]
+    assert [severity for severity, _ in found["odometry"]] == ["error"]
+    ((severity, text),) = found["images"]
+    assert (severity, "projection matrix P" in text) == ("error", True)
