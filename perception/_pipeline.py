@@ -67,7 +67,8 @@ class AwarenessPipeline:
             image. In between, boxes follow the keypoints, which like the heads come from every
             image. The detector also looks where something has changed outside the boxes, where
             people overlap, and at once where the pose network finds a person no more. Images must
-            then follow each other; a jump in time needs the detector.
+            then follow each other; a jump in time needs the detector. Each camera needs a
+            pipeline of its own (:meth:`for_another_view`): one for two may find nobody.
         frame_budget_s: time for a frame, in place of ``detect_every_s``: the detector looks at
             every image while frames take less than that, else less often, down to every 0.2 s, and
             then with a smaller input, if its network takes one.

@@ -14,18 +14,17 @@ NoView: TypeAlias = Literal["black", "of one colour", "the same picture as befor
 #: The reason of a frozen camera.
 FROZEN: Final = "the same picture as before"
 
-# A picture without a pixel brighter than this is black: in it, no network finds anybody. A picture
-# taken at night has lamps, or noise that reaches higher.
+# A picture is looked at in blocks of so many pixels a side: the noise of a covered sensor averages
+# out in them, and what a scene shows does not.
+_BLOCK_PX: Final = 8
+# A picture without a block brighter than this is black: in it, no network finds anybody. A picture
+# taken at night has lamps.
 _BLACK_LEVEL: Final = 8
-# A codec rounds one colour to levels so far from their median.
-_ROUNDING_LEVELS: Final = 2
-# So large a share of the pixels may differ: they are hot pixels of a covered sensor. A lit person
-# far away is more than that.
-_HOT_SHARE: Final = 1e-4
-# Most pictures are told by about this many samples along the shorter side, in a larger share of
-# which something is to be seen.
-_SAMPLES: Final = 48
-_SAMPLE_SHARE: Final = 0.01
+# A codec rounds one colour to levels this near to their median. Averages of noise are as near.
+_COLOUR_LEVELS: Final = 3
+# Most pictures are told by their blocks before hot pixels are taken out: in a larger share of them
+# something is to be seen.
+_SEEN_SHARE: Final = 0.01
 
 
 def why_no_view(image_rgb: ImageRgb, before_rgb: ImageRgb | None = None) -> NoView | None:
@@ -37,33 +36,38 @@ def why_no_view(image_rgb: ImageRgb, before_rgb: ImageRgb | None = None) -> NoVi
         if why_no_view(image_rgb, before_rgb) is None:
             tracker.update(pipeline.process(image_rgb, stamp_s), stamp_s, T_odom_camera)
 
-    A live camera has noise, so no two of its pictures are equal to the bit. Dark pictures with
-    noise, and frozen ones into which a clock is drawn, count as views.
+    A live camera has noise, so no two of its pictures are equal to the bit. Noise alone is no view,
+    nor are single hot pixels. Frozen pictures into which a clock is drawn count as views.
 
     Args:
         image_rgb: (H, W, 3) uint8.
         before_rgb: the picture before it, in an array of its own; None for the first.
     """
-    step = max(min(image_rgb.shape[:2]) // _SAMPLES, 1)
-    sample = image_rgb[step // 2 :: step, step // 2 :: step]
-    level = np.median(sample.reshape(-1, 3), axis=0).round()
+    blocks = _blocks(image_rgb)
+    level = np.median(blocks.reshape(-1, 3), axis=0).round()
     colours: tuple[tuple[NoView, FloatArray, FloatArray], ...] = (
         ("black", np.zeros(3), np.full(3, float(_BLACK_LEVEL))),
-        ("of one colour", level - _ROUNDING_LEVELS, level + _ROUNDING_LEVELS),
+        ("of one colour", level - _COLOUR_LEVELS, level + _COLOUR_LEVELS),
     )
     for reason, low, high in colours:
-        # The sample decides quickly for most pictures, the whole picture for sure.
-        if _lie_within(sample, low, high, _SAMPLE_SHARE) and _lie_within(
-            image_rgb, low, high, _HOT_SHARE
-        ):
-            return reason
+        if _lie_within(blocks, low, high, _SEEN_SHARE):
+            calm = np.asarray(cv2.medianBlur(np.ascontiguousarray(image_rgb), 3), np.uint8)
+            if _lie_within(_blocks(calm), low, high, 0.0):
+                return reason
     if before_rgb is not None and np.array_equal(image_rgb, before_rgb):
         return FROZEN
     return None
 
 
-def _lie_within(image_rgb: ImageRgb, low: FloatArray, high: FloatArray, others: float) -> bool:
-    """Return whether all pixels but a share of others lie between two colours (3,)."""
-    pixels = image_rgb.shape[0] * image_rgb.shape[1]
-    within = cv2.countNonZero(cv2.inRange(np.ascontiguousarray(image_rgb), low, high))
-    return bool(pixels - within <= others * pixels)
+def _blocks(image_rgb: ImageRgb) -> ImageRgb:
+    """Return the mean colour of every block of a picture."""
+    height, width = image_rgb.shape[:2]
+    size = max(width // _BLOCK_PX, 1), max(height // _BLOCK_PX, 1)
+    return np.asarray(cv2.resize(image_rgb, size, interpolation=cv2.INTER_AREA))
+
+
+def _lie_within(blocks_rgb: ImageRgb, low: FloatArray, high: FloatArray, others: float) -> bool:
+    """Return whether all blocks but a share of others lie between two colours (3,)."""
+    count = blocks_rgb.shape[0] * blocks_rgb.shape[1]
+    within = cv2.countNonZero(cv2.inRange(blocks_rgb, low, high))
+    return bool(count - within <= others * count)

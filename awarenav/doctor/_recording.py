@@ -52,6 +52,7 @@ class _Recording:
         transforms: of /tf, whatever its namespace.
         static: of /tf_static.
         has_images: whether there is a topic of images.
+        whole: whether all of it has been read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,6 +60,7 @@ class _Recording:
         self.odometry: dict[str, list[Odometry]] = defaultdict(list)
         self.transforms: list[TFMessage] = []
         self.static: list[TFMessage] = []
+        self.whole = True
         with contextlib.closing(BagMessages(path, {}, {})) as recorded:
             topics = {name: kind for name, kind in recorded.topics if kind in _KINDS}
             self.has_images = any(kind in _IMAGES for _, kind in recorded.topics)
@@ -70,6 +72,7 @@ class _Recording:
                 with contextlib.suppress(NavError, AttributeError, TypeError, ValueError):
                     self._add(topic, recorded_s, from_ros(_KINDS[topics[topic]], message))
                 if recorded_s - began_s > _LONGEST_S:
+                    self.whole = False
                     break
 
     def _add(self, topic: str, recorded_s: float, message: Any) -> None:
@@ -103,7 +106,8 @@ def recording_findings(path: Path) -> tuple[list[Finding], bool]:
     """
     recording = _Recording(path)
     mounts = TransformBuffer()
-    for message in recording.static:
+    # Those of ROS 1 are in /tf. Between two frames of the robot the latest will do.
+    for message in (*recording.transforms, *recording.static):
         for each in message.transforms:
             with contextlib.suppress(NavError):
                 mounts.add_message(each, static=True)
@@ -112,6 +116,9 @@ def recording_findings(path: Path) -> tuple[list[Finding], bool]:
         found += _scanner_findings(topic, scans, mounts, recording.base)
     for topic, odometry in sorted(recording.odometry.items()):
         found += _odometry_findings(topic, odometry, recording)
+    if not recording.whole:
+        text = f"scanners and odometry were looked at for the first {_LONGEST_S:g} s"
+        found.append(Finding("fine", "recording", text))
     if not recording.has_images:
         found.append(Finding("warning", "images", "the recording has none"))
     return found, recording.has_images
@@ -149,9 +156,9 @@ def _scanner_findings(
             text = f"{topic}: in {reasons.total()} of {counted(len(scans), 'scan')}, {why}"
             severity = "error" if share > _OFTEN else "warning"
             found.append(Finding(severity, "scanners", text, remedy))  # type: ignore[arg-type]
-    return found or [
-        Finding("fine", "scanners", f"{topic}: {counted(len(scans), 'scan')}, none of them blind")
-    ]
+    few = refused.total() + blind.total()
+    text = f"{topic}: {counted(len(scans), 'scan')}, {few or 'none'} of them blind or refused"
+    return found or [Finding("fine", "scanners", text)]
 
 
 def _odometry_findings(

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from perception import AttentionCone, Camera
+from perception import AttentionCone, Camera, PerceptionError
 from perception.evidence import AwarenessReason
 from perception.shipped import simulator_networks, simulator_networks_warning
 
@@ -111,20 +111,24 @@ def doctor_command(options: DoctorOptions) -> int:
 
 def _source_findings(options: DoctorOptions) -> list[Finding]:
     assert options.source is not None
-    findings: list[Finding] = []
-    if is_recording(Path(options.source)):
-        from ._recording import recording_findings  # noqa: PLC0415 - needs the extra rosbag
+    if not is_recording(Path(options.source)):
+        return _image_findings(options)
+    from ._recording import recording_findings  # noqa: PLC0415 - needs the extra rosbag
 
-        findings, has_images = recording_findings(Path(options.source))
-        if not has_images:
-            return findings
+    findings, has_images = recording_findings(Path(options.source))
+    if not has_images:
+        return findings
     try:
-        opened = open_source(options.source, topic=options.topic)
-    except AwarenavError as error:
-        if not findings:
-            raise
-        return [*findings, Finding("error", "images", str(error))]
-    with contextlib.closing(opened) as source:
+        return findings + _image_findings(options)
+    except (AwarenavError, PerceptionError) as problem:
+        # What has been found of scanners and odometry is told all the same.
+        return [*findings, Finding("error", "images", str(problem))]
+
+
+def _image_findings(options: DoctorOptions) -> list[Finding]:
+    assert options.source is not None
+    findings: list[Finding] = []
+    with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
         choice = NetworkChoice.of_options(options)
         networks = choose_networks(**choice.model_dump())
         unfit = () if source.rendered else simulator_networks(networks.training_domains)

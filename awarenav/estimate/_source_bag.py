@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,6 +32,8 @@ _IMAGE: Final = "sensor_msgs/msg/Image"
 _COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
 _INFO: Final = "sensor_msgs/msg/CameraInfo"
 _TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
+# By then every mount has been sent.
+_MOST_TRANSFORMS: Final = 1000
 
 
 class BagSource:
@@ -161,16 +164,22 @@ class BagSource:
         return None
 
     def _frame_note(self, shown: Any) -> str:
-        """Return why the frame of the images is not optical by the static transforms, if so."""
+        """Return why the frame of the images is not optical by the transforms, if so.
+
+        Mounts are in /tf_static, those of ROS 1 in /tf, and both may have a namespace.
+        """
         transforms = TransformBuffer()
+        known = [each for each in self._reader.connections if each.msgtype == _TRANSFORMS]
+        static = [each for each in known if each.topic.endswith("_static")]
         # Damaged transforms, and those of ROS 1 with other fields, tell nothing.
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             frame = str(shown.header.frame_id).lstrip("/")
-            for message in self._messages(self._of("/tf_static", _TRANSFORMS)):
-                for each in from_ros(TFMessage, message).transforms:
-                    transforms.add_message(each, static=True)
-            if (root := transforms.root(frame)) != frame:
-                return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
+            for connections in (static, [each for each in known if each not in static]):
+                for message in islice(self._messages(connections), _MOST_TRANSFORMS):
+                    for each in from_ros(TFMessage, message).transforms:
+                        transforms.add_message(each, static=True)
+                if (root := transforms.root(frame)) != frame:
+                    return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
         return ""
 
     def _of(self, topic: str, *kinds: str) -> list[Any]:

@@ -197,7 +197,8 @@ def _of_speed(moved_m: FloatArray, claimed: FloatArray, child: str, odom: str) -
         causes.append("of the wrong sign")
     if claimed_m < _SHARE * way_m:
         causes.append("(nearly) 0 although the robot moves")
-    causes += [f"in {unit}" for unit, per in _UNITS.items() if fits(claimed[:2] / per)]
+    if claimed_m > 2.0 * way_m:  # a short way fits a claim of nothing too
+        causes += [f"in {unit}" for unit, per in _UNITS.items() if fits(claimed[:2] / per)]
     return (
         f"the robot moved by ({moved_m[0]:.2f}, {moved_m[1]:.2f}) m in {odom!r}, by its twists by "
         f"({claimed[0]:.2f}, {claimed[1]:.2f}) m; the twist seems to be "

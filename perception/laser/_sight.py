@@ -189,12 +189,16 @@ def _beyond(scan: LaserScan) -> NDArray[np.bool_]:
 
 
 def _near(flags: NDArray[np.bool_], half: int, turn: bool) -> NDArray[np.int64]:
-    """Return (N,) the number of flags set within ``half`` rays to either side of each."""
-    half = min(half, (len(flags) - 1) // 2 if turn else len(flags) - 1)
+    """Return (N,) twice the number of flags set within ``half`` rays to either side of each.
+
+    The outermost ones count half: every other ray is half of them, from wherever it is counted.
+    """
+    half = max(1, min(half, (len(flags) - 1) // 2 if turn else len(flags) - 1))
     none = np.zeros(half, dtype=np.bool_)
     before, after = (flags[len(flags) - half :], flags[:half]) if turn else (none, none)
     sums = np.cumsum(np.concatenate(([False], before, flags, after)), dtype=np.int64)
-    return np.asarray(sums[2 * half + 1 :] - sums[: -2 * half - 1])
+    wide = sums[2 * half + 1 :] - sums[: -2 * half - 1]
+    return np.asarray(wide + sums[2 * half : -1] - sums[1 : -2 * half])
 
 
 def _with_dead_beside(

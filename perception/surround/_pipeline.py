@@ -27,7 +27,8 @@ class SurroundPipeline:
         views: flat views to cut from an image, for example from :func:`ring_of_views`.
         make_pipeline: makes the pipeline for the camera of a view; default one with the shipped
             networks. It is called once for each camera object; the views with that camera share its
-            networks.
+            networks (:meth:`~perception.AwarenessPipeline.for_another_view`). Where it makes
+            pipelines without that method, it is called for each view.
 
     Raises:
         PerceptionError: without views, or from ``make_pipeline``.
@@ -51,7 +52,8 @@ class SurroundPipeline:
             pipeline = made[id(view.camera)]
             # A pipeline keeps people from one image of its view to the next.
             if any(pipeline is other for other in self._pipelines):
-                pipeline = pipeline.for_another_view()
+                anew = getattr(pipeline, "for_another_view", None)  # stand-ins may lack it
+                pipeline = make_pipeline(view.camera) if anew is None else anew()
             self._pipelines.append(pipeline)
         self._maps = [
             # Fixed-point maps make cv2.remap several times faster.

@@ -57,6 +57,15 @@ def test_a_heading_of_180_degrees_with_a_twist_in_odom_is_never_believed() -> No
     assert "'odom' instead of the child frame 'base_link'" in constraints[-1].limited_by
 
 
+@pytest.mark.parametrize("heading", [1.5, math.pi])
+def test_a_slow_twist_in_another_frame_is_not_called_another_unit(heading: float) -> None:
+    robot = Robot()
+    said = WRONG["in frame 'odom'"](np.array([0.2, 0.0, 0.0]), heading)
+    robot.drive(4.0, lambda now: odometry(now, driven(now, 0.2, 0.0, heading), said))
+    assert "in frame 'odom'" in robot.warnings[0]
+    assert not any(unit in robot.warnings[0] for unit in ("mm/s", "cm/s", "km/h"))
+
+
 @pytest.mark.parametrize("said", [-0.8, 0.0, math.degrees(0.8)])
 def test_yaw_rates_that_contradict_the_poses_stop_the_robot(said: float) -> None:
     robot = Robot()

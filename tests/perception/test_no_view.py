@@ -20,6 +20,13 @@ def one_colour(*rgb: int) -> np.ndarray:
     return np.full(SIZE, rgb, np.uint8)
 
 
+def night_with_noise() -> np.ndarray:
+    """Return a dark yard with a lit window far away, as a sensor with noise shows it."""
+    image = noise(mean=6.0, std=3.0).astype(float)
+    image[200:224, 301:313] += 30.0
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
 def with_hot_pixels(image: np.ndarray) -> np.ndarray:
     image[[7, 105, 400], [9, 15, 600]] = 255
     return image
@@ -37,7 +44,12 @@ def with_hot_pixels(image: np.ndarray) -> np.ndarray:
         (with_hot_pixels(one_colour(90, 90, 90)), "of one colour"),
         (np.zeros((1, 1, 3), np.uint8), "black"),
         (noise(), None),
-        (noise(mean=6.0, std=3.0), None),  # a night with the noise of a sensor
+        (night_with_noise(), None),
+        (noise(mean=6.0, std=3.0), "black"),  # a covered sensor with its gain at the highest
+        (noise(mean=11.0, std=4.0), "of one colour"),
+        (noise(mean=118.0, std=3.0), "of one colour"),  # a cloth over the lens
+        (noise(mean=253.0, std=4.0), "of one colour"),
+        (with_hot_pixels(noise(mean=6.0, std=3.0)), "black"),
         (noise()[:, ::-1], None),
     ],
 )

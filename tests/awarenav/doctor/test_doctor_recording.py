@@ -62,13 +62,15 @@ class Drive:
     heading_rad = 0.5 * math.pi
     image_topic = ""
     camera_turn = OPTICAL
+    projection = P
+    mounts_topic = "/tf_static"
     ranges: Callable[[np.ndarray], np.ndarray] = staticmethod(lambda ranges: ranges)
 
     def messages(self):
         yaw = yaw_quaternion(self.scanner_yaw_rad)
-        yield "/tf_static", 0.0, transform("base_link", "laser", Vector3(0.3, 0.0, 0.2), yaw)
+        yield self.mounts_topic, 0.0, transform("base_link", "laser", Vector3(0.3, 0.0, 0.2), yaw)
         mast = Vector3(0.2, 0.0, 1.4)
-        yield "/tf_static", 0.0, transform("base_link", "cam_link", mast, self.camera_turn)
+        yield self.mounts_topic, 0.0, transform("base_link", "cam_link", mast, self.camera_turn)
         rng = np.random.default_rng(0)
         for k in range(COUNT):
             time_s, stamp = PERIOD_S * k, to_time(START_S + PERIOD_S * k)
@@ -91,7 +93,10 @@ class Drive:
                 yield self.image_topic, time_s, Image(header, 240, 320, "rgb8", 0, 960, noise)
                 yield (
                     f"{self.image_topic.rpartition('/')[0]}/camera_info", time_s,
-                    CameraInfo(header, 240, 320, "plumb_bob", (-0.1, 0.0, 0.0, 0.0, 0.0), K, p=P),
+                    CameraInfo(
+                        header, 240, 320, "plumb_bob", (-0.1, 0.0, 0.0, 0.0, 0.0), K,
+                        p=self.projection,
+                    ),
                 )  # fmt: skip
 
     def record(self, path: Path) -> Path:
@@ -143,6 +148,13 @@ def test_a_blind_sector_is_named_in_the_frame_of_the_robot(
     assert "in 'base_link'" in text
 
 
+def test_few_blind_scans_are_counted(capsys, tmp_path, drive) -> None:
+    scans = iter(range(COUNT))
+    drive.ranges = lambda ranges: np.zeros_like(ranges) if next(scans) in (20, 21) else ranges
+    ((severity, text),) = findings(capsys, drive.record(tmp_path / "bag"))["scanners"]
+    assert (severity, f"{COUNT} scans, 2 of them blind" in text) == ("fine", True)
+
+
 def test_a_scanner_that_sees_nothing_or_repeats_itself(capsys, tmp_path, drive) -> None:
     drive.ranges = lambda ranges: np.full_like(ranges, np.inf)
     ((severity, text),) = findings(capsys, drive.record(tmp_path / "inf"))["scanners"]
@@ -168,6 +180,8 @@ def test_a_twist_in_the_odom_frame(capsys, tmp_path, drive) -> None:
     ((severity, text),) = findings(capsys, drive.record(tmp_path / "bag"))["odometry"]
     assert severity == "error"
     assert "poses and twists contradict each other" in text
+    assert "in frame 'odom'" in text
+    assert "mm/s" not in text
 
 
 @pytest.mark.parametrize(
@@ -189,3 +203,24 @@ def test_images_in_a_body_frame(capsys, tmp_path, drive) -> None:
     assert "'cam_link'" in text
     assert "'base_link'" in text
     assert "cam_optical_frame" in text
+
+
+@pytest.mark.parametrize("topic", ["/tf", "/robot1/tf_static"])
+def test_mounts_in_other_topics_are_read(capsys, tmp_path, drive, topic) -> None:
+    """Recordings of ROS 1 have no /tf_static; its publishers repeat mounts in /tf."""
+    drive.mounts_topic, drive.scanner_yaw_rad = topic, math.radians(40.0)
+    drive.image_topic, drive.camera_turn = "/cam/image_raw", Quaternion()
+    drive.ranges = lambda ranges: np.where(np.abs(ANGLES_RAD) < 0.6, 0.0, ranges)
+    found = findings(capsys, drive.record(tmp_path / "bag"), "--frames", "1")
+    assert "in 'base_link'" in found["scanners"][0][1]
+    assert any("'cam_link'" in text for severity, text in found["images"] if severity == "error")
+
+
+def test_images_that_cannot_be_used_hide_nothing_else(capsys, tmp_path, drive) -> None:
+    drive.image_topic, drive.projection = "/cam/image_rect", (0.0,) * 12
+    drive.ranges, drive.tf_ahead_m = np.zeros_like, 0.6
+    found = findings(capsys, drive.record(tmp_path / "bag"), "--frames", "1")
+    assert [severity for severity, _ in found["scanners"]] == ["error"]
+    assert [severity for severity, _ in found["odometry"]] == ["error"]
+    ((severity, text),) = found["images"]
+    assert (severity, "projection matrix P" in text) == ("error", True)

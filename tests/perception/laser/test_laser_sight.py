@@ -50,6 +50,15 @@ def test_the_words_tell_what_the_rays_of_a_blind_scanner_have() -> None:
     assert seen(5.0, outside).blind_text == "blind (none of its rays lies in its field of view)"
 
 
+@pytest.mark.parametrize("first", [0, 1])
+def test_every_other_ray_without_an_answer_is_half_whichever_it_is(first: int) -> None:
+    ranges = np.full(len(ANGLES_DEG), 5.0)
+    ranges[first::2] = 0.0
+    assert seen(ranges).sees(AHEAD_RAD).all()
+    ranges[200:330] = 0.0
+    assert not seen(ranges).sees(np.zeros(1)).any()
+
+
 @pytest.mark.parametrize("value", NO_ANSWERS)
 @pytest.mark.parametrize(("low_deg", "high_deg"), [(-45, 45), (10, 34), (-12, 9)])
 def test_a_sector_without_answers_is_blind(value: float, low_deg: int, high_deg: int) -> None:
