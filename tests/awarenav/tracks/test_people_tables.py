@@ -147,6 +147,17 @@ def test_people_who_stand_or_rest_are_no_error_of_units() -> None:
         refuse_other_units("recording", [(times, places)])
 
 
+def test_people_who_cross_a_narrow_view_are_judged_together() -> None:
+    """Each walks less than two metres; nobody stands."""
+    seconds = np.arange(0.0, 1.4, 0.1)
+    places = seconds[:, None] * [1.3, 0.0]
+    refuse_other_units("recording", [(seconds, places)] * 40)
+    with pytest.raises(TrackingError, match=r"0\.13 m/s.*look like numbers of frames"):
+        refuse_other_units("recording", [(10.0 * seconds, places)] * 40)
+    # A few people who shift slowly are no sample.
+    refuse_other_units("recording", [(10.0 * seconds, places)] * 9)
+
+
 @pytest.mark.parametrize("speed_mps", [0.1, 15.0])
 def test_a_calibration_from_python_refuses_them_as_well(speed_mps: float) -> None:
     """Such as frames at 12 Hz whose numbers are taken for seconds."""
