@@ -233,6 +233,9 @@ def _check_limits(scan: LaserScan) -> None:
     if scan.range_min_m > _NEAREST_M:
         raise NavError(f"range_min must be in metres, got {scan.range_min_m:g} m")
     met_m = scan.ranges_m[(scan.ranges_m > 0.0) & (scan.ranges_m < np.inf)]
+    most_m = met_m.max(initial=0.0)
+    if np.count_nonzero(met_m == most_m) >= _VALUES:  # a code for no return
+        met_m = met_m[met_m < most_m]
     near = int(np.count_nonzero(met_m <= _NEAR_M))
     if (
         scan.range_max_m >= _FARTHEST_M

@@ -123,7 +123,7 @@ def test_some_returns_in_millimetres_among_rays_without_one_are_refused(range_ma
 @pytest.mark.parametrize("range_max", [1200.0, math.inf])
 def test_ranges_in_centimetres_are_no_far_away_walls(range_max: float) -> None:
     """Most of a small room is less than 250 "m" away in centimetres."""
-    ranges = tuple(min(100.0 * each, 230.0) for each in SCAN.ranges)
+    ranges = tuple(min(100.0 * each, 200.0 + 0.05 * ray) for ray, each in enumerate(SCAN.ranges))
     with pytest.raises(NavError, match="ranges must be in metres: no of 541 are below 20 m"):
         laser_scan_of(replace(SCAN, ranges=ranges, range_min=2.0, range_max=range_max))
 
@@ -133,6 +133,8 @@ def test_far_walls_are_read_where_the_limit_vouches_for_the_unit() -> None:
     assert laser_scan_of(replace(SCAN, ranges=far, range_max=100.0)).measured.all()
     some = (3.0,) * 60 + far[60:]
     assert laser_scan_of(replace(SCAN, ranges=some, range_max=math.inf)).measured.all()
+    code = (3.0,) * 20 + (65.535,) * 521
+    assert laser_scan_of(replace(SCAN, ranges=code, range_max=math.inf)).measured.all()
 
 
 def test_a_range_min_in_another_unit_is_named() -> None:
