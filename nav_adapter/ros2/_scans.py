@@ -213,7 +213,7 @@ def _one_turn(ranges_m: FloatArray, increment_rad: float) -> FloatArray:
 def _check_ranges(scan: LaserScan) -> None:
     """Refuse ranges that cannot be metres."""
     beyond = scan.ranges_m[(scan.ranges_m > scan.range_max_m) & (scan.ranges_m < np.inf)]
-    within = int(np.count_nonzero(scan.measured & (scan.ranges_m > 0.0)))
+    within = int(np.count_nonzero(scan.measured))
     values = np.unique(beyond)
     if len(values) < _VALUES or len(beyond) <= within:
         return
