@@ -21,6 +21,8 @@ FASTEST_MPS: Final = 12.0
 #: Whoever walks two metres or more walks some of them faster than this.
 SLOWEST_MPS: Final = 0.3
 _USUAL_MPS: Final = 1.3
+# So many people who walk one metre are judged if nobody walks two.
+_SHORT_WALKS: Final = 10
 # A speed is measured over this distance, so that steps, noise and standing do not count.
 _STRETCH_M: Final = 1.0
 # The largest factor that each unit explains, of a time too long and of a place too large.
@@ -40,7 +42,8 @@ def refuse_other_units(
 ) -> None:
     """Refuse recorded people who move as people do only in other units.
 
-    People who walk less than two metres are not judged.
+    People who walk less than two metres are not judged, unless nobody walks farther and ten or
+    more walk one metre, as in a narrow view.
 
     Args:
         source: name of the recording in the message.
@@ -52,9 +55,12 @@ def refuse_other_units(
             12 m/s, or nine in ten slower than 0.3 m/s. The message names the likely unit.
     """
     speeds: list[float] = []
+    short: list[float] = []
     for times_s, places_m in paths:
         found = list(_stretch_speeds_mps(times_s.tolist(), places_m.tolist()))
-        speeds += found if len(found) > 1 else []
+        (speeds if len(found) > 1 else short).extend(found)
+    if not speeds and len(short) >= _SHORT_WALKS:
+        speeds = short
     if not speeds:
         return
     usual, fast = np.quantile(speeds, [0.5, 0.9]).tolist()

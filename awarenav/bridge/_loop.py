@@ -134,7 +134,8 @@ class BridgeLoop:
             if self._node.has_unfit_publisher(topic):
                 report(
                     f"nothing comes from the publisher of /{topic.name}: its durability is "
-                    "volatile, and must be transient_local"
+                    "volatile or its reliability best_effort; they must be transient_local and "
+                    "reliable"
                 )
             elif topic is self._inputs.map:
                 report(

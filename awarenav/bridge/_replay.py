@@ -91,11 +91,22 @@ def static_transforms(
     if inputs.tf is None or inputs.tf_static is None:
         return ()
     kind = ros_type(inputs.tf.message)
+    asked = {f"/{inputs.tf.name}", f"/{inputs.tf_static.name}"}
     have = {name for name, type_ in messages.topics if type_ == kind}
-    if have and not have & {f"/{inputs.tf.name}", f"/{inputs.tf_static.name}"}:
-        name = min(have).removesuffix("_static").strip("/")
-        say(f"the recording has no /{inputs.tf.name}; it has {min(have)}: --tf {name}")
+    if have and not have & asked:
+        # Another robot's transforms would place the sensors wrongly without a word.
+        roots = sorted({name.removesuffix("_static").strip("/") for name in have})
+        own = [each for each in roots if _namespace(each) == _namespace(inputs.odom.name)]
+        hint = own[0] if own else roots[0] if len(roots) == 1 else ""
+        say(
+            f"the recording has no /{inputs.tf.name}; it has {', '.join(sorted(have))}"
+            + (f": --tf {hint}" if hint else "")
+        )
     return tuple(messages.of(f"/{inputs.tf_static.name}"))[::-1]
+
+
+def _namespace(topic: str) -> str:
+    return topic.rpartition("/")[0]
 
 
 class BagReplay:

@@ -361,14 +361,15 @@ def _inputs(options: BridgeOptions) -> BridgeInputs:
         raise AwarenavError("--no-camera and --depth exclude each other")
     if options.map is not None and not scans:
         raise AwarenavError("--map is for the scans: it needs --scan TOPIC")
+    tf = options.tf.strip("/").removesuffix("_static")
     image = READ["compressed" if options.compressed else "image"]
     with_info = options.camera is None and not options.no_camera
     return BridgeInputs(
         image=None if options.no_camera else renamed(image, options.image),
         odom=renamed(READ["odom"], options.odom),
         camera_info=renamed(READ["camera_info"], options.camera_info) if with_info else None,
-        tf=renamed(READ["tf"], options.tf),
-        tf_static=renamed(READ["tf_static"], f"{options.tf}_static"),
+        tf=renamed(READ["tf"], tf),
+        tf_static=renamed(READ["tf_static"], f"{tf}_static"),
         scans=scans,
         map=None
         if options.map is None or _is_file(options.map)

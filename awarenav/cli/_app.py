@@ -208,7 +208,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _escape_what_cannot_be_printed()
     try:
         status = _run(words)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # a daemon may have none
+            sys.stdout.flush()
     except BrokenPipeError:  # the reader has closed the pipe, as `head` does: no error
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

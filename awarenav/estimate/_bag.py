@@ -27,8 +27,9 @@ _CAUSES: Final = {
     "end magic": "its recorder was not ended: `mcap recover` makes a readable copy",
     "Header could not be read": "its recorder was not ended: try `rosbag reindex`",
     "not indexed": "its recorder was not ended: `rosbag reindex` writes the index",
+    "disk image is malformed": "its recorder was not ended: `sqlite3 FILE .recover`",
     "CDR encapsulation": "compressed messages can be read only with the metadata.yaml beside them",
-    "storage format": "a compressed file can be read only with the metadata.yaml beside it",
+    "storage format '.zstd'": "a compressed file can be read only with the metadata.yaml beside it",
 }
 
 
@@ -42,7 +43,7 @@ def open_bag(path: Path) -> Any:
 
     Args:
         path: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``. A folder without
-            ``metadata.yaml`` is read as the files in it.
+            ``metadata.yaml``, or with an empty one, is read as the files in it.
 
     Raises:
         AwarenavError: for a file that is not a recording.
@@ -62,7 +63,7 @@ def _files_of(path: Path) -> list[Path]:
     if not path.exists():
         raise AwarenavError(f"cannot read the recording {path}: there is no such file or folder")
     folder = path if path.is_dir() else path.parent
-    if (metadata := folder / "metadata.yaml").is_file():
+    if (metadata := folder / "metadata.yaml").is_file() and not _is_blank(metadata):
         # This refuses what would harm the library as well.
         content = read_yaml(metadata, AwarenavError)
         about = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
@@ -71,11 +72,11 @@ def _files_of(path: Path) -> list[Path]:
         return [folder] if path.is_dir() or names == [path.name] else [path]
     if not path.is_dir():
         return [path]
-    files = sorted(each for each in path.iterdir() if each.suffix in (".db3", ".mcap"))
+    files = sorted(each for each in path.iterdir() if each.suffix in (".db3", ".mcap", ".bag"))
     if not files:
         raise AwarenavError(
-            f"cannot read the recording {path}: the folder has no metadata.yaml, and no .db3 or "
-            ".mcap file"
+            f"cannot read the recording {path}: the folder has no metadata.yaml, and no .db3, "
+            ".mcap or .bag file"
         )
     # The files of a split recording differ in their numbers.
     if len({re.sub(r"_\d+$", "", each.stem) for each in files}) > 1:
@@ -84,6 +85,12 @@ def _files_of(path: Path) -> list[Path]:
             f"recordings: give one of {', '.join(each.name for each in files)}"
         )
     return files
+
+
+def _is_blank(metadata: Path) -> bool:
+    """Return whether metadata were never written, as when the robot was switched off."""
+    with metadata.open("rb") as file:
+        return not file.read(64).strip(b"\0 \r\n")
 
 
 def _explained(cause: Exception) -> str:

@@ -75,6 +75,11 @@ def read_people_table(
             columns = [name for name in names if name in optional]
             for row in reader:
                 where = f"{path}, line {reader.line_num}"
+                if any(text.strip() for text in row.get(None, ())):  # 0,5 for 0.5
+                    raise error(
+                        f"{where}: more values than the header's {len(names)}; numbers have a "
+                        "decimal point, and a text with a comma is quoted"
+                    )
                 id = person_id(row["id"] or "")
                 if not id:
                     raise error(f"{where}: id is empty")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
@@ -28,12 +29,20 @@ _ANGLE_SLACK_SHARE: Final = 0.03
 _FARTHEST_M: Final = 250.0
 # A sweep is no longer than the time between scans.
 _SWEEP_SHARE: Final = 1.5
+# So many scans show how often they come. Two scanners may share a topic.
+_SCANS: Final = 5
+_SWEEPS_AT_ONCE: Final = 2.5
 # No scanner that is used on a robot sweeps more slowly.
 _LONGEST_SWEEP_S: Final = 2.0
 # Ranges beyond the limit with fewer values are codes of a driver, not distances.
 _VALUES: Final = 4
 # So much longer than the limit are ranges in a smaller unit.
 _UNIT: Final = 10.0
+# No scanner is blind up to here, and one without a limit of range meets something nearer than the
+# second: in centimetres this is a hand's breadth.
+_NEAREST_M: Final = 5.0
+_NEAR_M: Final = 20.0
+_NEAR_SHARE: Final = 0.1
 # map_server's default threshold of occupied cells, in per cent; larger numbers are unknown ones.
 _OCCUPIED: Final = (65, 100)
 
@@ -53,6 +62,7 @@ class ScanMessages:
         self._name, self._warn = name, warn
         self._stamped_at_end = False
         self._before_m: FloatArray | None = None
+        self._stamps_s: deque[float] = deque(maxlen=_SCANS)
         self._said: set[str] = set()
 
     def read(self, message: Any, now_s: float) -> LaserScan:
@@ -62,8 +72,9 @@ class ScanMessages:
         From then on its scans are read so.
 
         Raises:
-            NavError: as :func:`laser_scan_of`, for a scan that repeats the one before, and for a
-                sweep that ends in the future because time_increment and scan_time disagree.
+            NavError: as :func:`laser_scan_of`, for a scan that repeats the one before, for sweeps
+                that would go on while others begin, and for a sweep that ends in the future
+                because time_increment and scan_time disagree.
         """
         scan = laser_scan_of(message)
         before_m, self._before_m = self._before_m, scan.ranges_m
@@ -83,6 +94,12 @@ class ScanMessages:
         if message.time_increment < 0.0:
             self._say("time_increment", "time_increment is negative: the last ray is the oldest")
         sweep_s = scan.end_s - scan.stamp_s
+        self._stamps_s.append(scan.stamp_s)
+        every_s = (self._stamps_s[-1] - self._stamps_s[0]) / (_SCANS - 1)
+        if len(self._stamps_s) == _SCANS and 0.0 < _SWEEPS_AT_ONCE * every_s < sweep_s:
+            raise NavError(
+                f"time_increment × rays is {sweep_s:.3f} s, but scans come every {every_s:.3f} s"
+            )
         latest_s = now_s + CLOCK_TOLERANCE_S
         if not self._stamped_at_end and scan.stamp_s <= latest_s < scan.end_s:
             if 0.0 < _SWEEP_SHARE * message.scan_time < sweep_s:
@@ -159,6 +176,7 @@ def laser_scan_of(message: Any) -> LaserScan:
             f"a sweep of {sweep_s:g} s, and scan_time says {message.scan_time:g} s"
         )
     _check_ranges(scan)
+    _check_limits(scan)
     return scan
 
 
@@ -195,7 +213,7 @@ def _one_turn(ranges_m: FloatArray, increment_rad: float) -> FloatArray:
 def _check_ranges(scan: LaserScan) -> None:
     """Refuse ranges that cannot be metres."""
     beyond = scan.ranges_m[(scan.ranges_m > scan.range_max_m) & (scan.ranges_m < np.inf)]
-    within = int(np.count_nonzero(scan.measured & (scan.ranges_m > 0.0)))
+    within = int(np.count_nonzero(scan.measured))
     values = np.unique(beyond)
     if len(values) < _VALUES or len(beyond) <= within:
         return
@@ -208,6 +226,26 @@ def _check_ranges(scan: LaserScan) -> None:
         f"ranges must be in metres: {within or 'no'} rays measure anything within range_min "
         f"{scan.range_min_m:g} to range_max {scan.range_max_m:g} m, most are about {middle_m:g}"
     )
+
+
+def _check_limits(scan: LaserScan) -> None:
+    """Refuse limits that cannot be metres, and ranges whose limits do not vouch for the unit."""
+    if scan.range_min_m > _NEAREST_M:
+        raise NavError(f"range_min must be in metres, got {scan.range_min_m:g} m")
+    met_m = scan.ranges_m[(scan.ranges_m > 0.0) & (scan.ranges_m < np.inf)]
+    most_m = met_m.max(initial=0.0)
+    if np.count_nonzero(met_m == most_m) >= _VALUES:  # a code for no return
+        met_m = met_m[met_m < most_m]
+    near = int(np.count_nonzero(met_m <= _NEAR_M))
+    if (
+        scan.range_max_m >= _FARTHEST_M
+        and 2 * len(met_m) > len(scan)
+        and near < _NEAR_SHARE * len(met_m)
+    ):
+        raise NavError(
+            f"ranges must be in metres: {near or 'no'} of {len(met_m)} are below {_NEAR_M:g} m, "
+            f"most are about {float(np.median(met_m)):g}, and range_max sets no limit"
+        )
 
 
 def map_cells_of(message: OccupancyGrid) -> MapCells:

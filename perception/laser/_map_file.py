@@ -127,8 +127,10 @@ def _shades(path: Path) -> tuple[FloatArray, NDArray[np.bool_] | None]:
     head = _NETPBM_HEAD.match(data)
     if head is not None:
         return _netpbm_shades(path, data, head), None
-    if data.startswith(b"P7"):  # OpenCV takes its numbers for shares of 255 or 65535
-        raise PerceptionError(f"the map's image {path} is a PAM (P7); save it as PGM or PNG")
+    if data.startswith((b"P7", b"II*\0", b"MM\0*")):
+        # OpenCV takes the numbers of one for shares of 255 or 65535, and drops the other's alpha.
+        kind = "PAM (P7)" if data.startswith(b"P7") else "TIFF"
+        raise PerceptionError(f"the map's image {path} is a {kind}; save it as PGM or PNG")
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     except cv2.error:
@@ -148,11 +150,14 @@ def _shades(path: Path) -> tuple[FloatArray, NDArray[np.bool_] | None]:
 
 def _transparent_grey(data: bytes) -> float | None:
     """Return the brightness of the transparent pixels of a grey PNG, which OpenCV drops."""
-    bits, is_grey = data[24:25], data[25:26] == b"\x00"
-    at = data.find(b"tRNS", 0, data.find(b"IDAT"))
-    if not data.startswith(b"\x89PNG") or not is_grey or at < 0:
+    if not data.startswith(b"\x89PNG") or data[25:26] != b"\x00":
         return None
-    return int.from_bytes(data[at + 4 : at + 6], "big") / ((1 << bits[0]) - 1)
+    at = 8
+    while (kind := data[at + 4 : at + 8]) not in (b"tRNS", b"IDAT", b""):
+        at += 12 + int.from_bytes(data[at : at + 4], "big")
+    if kind != b"tRNS":
+        return None
+    return int.from_bytes(data[at + 8 : at + 10], "big") / ((1 << data[24]) - 1)
 
 
 def _netpbm_shades(path: Path, data: bytes, head: re.Match[bytes]) -> FloatArray:

@@ -122,6 +122,7 @@ class LaserScan:
         """(N,) True for rays that measured an object within the limits."""
         ranges = self.ranges_m
         within = (ranges >= self.range_min_m) & (ranges <= self.range_max_m)
+        within &= ranges > 0.0  # many drivers send 0 for no return, and some 0 for range_min too
         return np.asarray(within & (ranges != self._nothing_m))
 
     @property

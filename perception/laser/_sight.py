@@ -119,7 +119,7 @@ class ScannerSight:
             return "none of its rays lies in its field of view"
         if np.mean(self.scan.no_return[inside]) > 0.5:
             return "its rays meet nothing, which a scanner that measures nothing may publish too"
-        if np.mean((ranges >= self.scan.range_min_m) & (ranges < WRAPPED_M)) > 0.5:
+        if np.mean(self.scan.measured[inside] & (ranges < WRAPPED_M)) > 0.5:
             return f"its rays end within {WRAPPED_M:.2f} m, as under a cover"
         return "most of its rays have no answer"
 

@@ -120,6 +120,28 @@ def test_some_returns_in_millimetres_among_rays_without_one_are_refused(range_ma
         laser_scan_of(replace(SCAN, ranges=ranges, range_max=range_max))
 
 
+@pytest.mark.parametrize("range_max", [1200.0, math.inf])
+def test_ranges_in_centimetres_are_no_far_away_walls(range_max: float) -> None:
+    """Most of a small room is less than 250 "m" away in centimetres."""
+    ranges = tuple(min(100.0 * each, 200.0 + 0.05 * ray) for ray, each in enumerate(SCAN.ranges))
+    with pytest.raises(NavError, match="ranges must be in metres: no of 541 are below 20 m"):
+        laser_scan_of(replace(SCAN, ranges=ranges, range_min=2.0, range_max=range_max))
+
+
+def test_far_walls_are_read_where_the_limit_vouches_for_the_unit() -> None:
+    far = tuple(30.0 + 0.01 * ray for ray in range(541))
+    assert laser_scan_of(replace(SCAN, ranges=far, range_max=100.0)).measured.all()
+    some = (3.0,) * 60 + far[60:]
+    assert laser_scan_of(replace(SCAN, ranges=some, range_max=math.inf)).measured.all()
+    code = (3.0,) * 20 + (65.535,) * 521
+    assert laser_scan_of(replace(SCAN, ranges=code, range_max=math.inf)).measured.all()
+
+
+def test_a_range_min_in_another_unit_is_named() -> None:
+    with pytest.raises(NavError, match="range_min must be in metres, got 120 m"):
+        laser_scan_of(replace(SCAN, range_min=120.0, range_max=3500.0))
+
+
 def test_returns_beyond_a_low_range_max_are_no_other_unit() -> None:
     """Whoever comes within it is still to be found."""
     ranges = tuple(each if each < 6.0 else math.inf for each in SCAN.ranges)
@@ -179,6 +201,22 @@ def test_a_time_increment_that_scan_time_denies_is_named() -> None:
     assert not nav.bridge.on_scan(0, wrong, START_S)
     (warning,) = nav.warnings
     assert "time_increment × rays is 0.540 s, but scan_time 0.040 s" in warning
+
+
+@pytest.mark.parametrize("scan_time", [0.0, 1.0])
+def test_sweeps_that_go_on_while_others_begin_are_named(scan_time: float) -> None:
+    """Also where scan_time is not set, or is wrong by the same factor."""
+    nav = Listener(scanners=[FRONT], with_camera=False)
+    used = []
+    for tick in range(200):
+        now_s = START_S + 0.02 * tick
+        nav.bridge.on_odometry(odometry(now_s, speed=0.0), now_s)
+        if tick > 75 and tick % 5 == 0:
+            sent = scan_message(now_s, [PLACE], time_increment_s=1.0 / 541)
+            used.append(nav.bridge.on_scan(0, replace(sent, scan_time=scan_time), now_s))
+    assert not any(used[4:])
+    assert nav.bridge.tick(now_s).speed_limit_mps == 0.0
+    assert any("is 0.998 s, but scans come every 0.100 s" in each for each in nav.warnings)
 
 
 def test_corrections_are_said_once() -> None:

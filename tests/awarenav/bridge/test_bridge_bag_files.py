@@ -100,6 +100,8 @@ def test_a_folder_without_metadata_is_read_as_the_files_in_it(
     shutil.copy(folder / "bag.db3", lone)
     assert USED in replay(lone)[1]
     assert USED in replay(lone / "bag.db3")[1]
+    (lone / "metadata.yaml").write_bytes(bytes(300))  # the robot was switched off
+    assert USED in replay(lone)[1]
     shutil.copy(folder / "bag.db3", lone / "other.db3")
     status, said = replay(lone)
     assert status == 2
@@ -137,7 +139,7 @@ def test_recordings_that_cannot_be_read_say_why(tmp_path: Path, replay) -> None:
     for name, text in (
         ("cut.mcap", "its recorder was not ended: `mcap recover`"),
         ("cut.bag", "its recorder was not ended: try `rosbag reindex`"),
-        ("pictures", "no metadata.yaml, and no .db3 or .mcap file"),
+        ("pictures", "no metadata.yaml, and no .db3, .mcap or .bag"),
         ("none", "there is no such file or folder"),
     ):
         status, said = replay(tmp_path / name)
@@ -185,8 +187,16 @@ def test_transforms_may_have_a_topic_of_their_own(tmp_path: Path, replay) -> Non
     asked = ("--odom", "robot1/odom")
     _, said = replay(bag, *asked, scan="robot1/scan")
     assert "the recording has no /tf; it has /robot1/tf_static: --tf robot1/tf" in said
-    _, said = replay(bag, *asked, "--tf", "/robot1/tf", scan="robot1/scan")
-    assert USED in said
+    for given in ("/robot1/tf", "robot1/tf/", "robot1/tf_static"):
+        assert USED in replay(bag, *asked, "--tf", given, scan="robot1/scan")[1]
+
+
+def test_no_other_robots_transforms_are_advised(tmp_path: Path, replay) -> None:
+    found = [*messages("/robot1/"), *messages("/robot2/"), *messages("/")[1:]]
+    bag = recorded(tmp_path / "bag", sorted(found, key=lambda each: each[1]))
+    both = "the recording has no /tf; it has /robot1/tf_static, /robot2/tf_static"
+    assert f"{both}: --tf robot2/tf\n" in replay(bag, "--odom", "robot2/odom")[1]
+    assert f"{both}\n" in replay(bag)[1]
 
 
 def ros1_messages(prefix: str, store) -> Iterator[tuple[str, float, object]]:

@@ -49,6 +49,15 @@ def test_every_output_takes_every_letter(encoding: str, tmp_path: Path, monkeypa
     assert "cannot read" in gone
 
 
+def test_a_process_without_outputs_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A daemon may have none."""
+    monkeypatch.setattr(sys, "stdout", None)
+    monkeypatch.setattr(sys, "stderr", None)
+    assert main(["policy", "show", "balanced", "--out", str(tmp_path / "policy.png")]) == 0
+    assert main(["policy", "show", "none"]) == 2
+    assert (tmp_path / "policy.png").exists()
+
+
 def test_json_stays_the_same_document(tmp_path: Path, monkeypatch) -> None:
     path = tmp_path / "m→é𝛼.yaml"
     path.write_bytes(POLICY.read_bytes())

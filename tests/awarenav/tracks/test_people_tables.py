@@ -119,6 +119,10 @@ def test_both_commands_and_calibrate_refuse_other_units(text, message, tmp_path,
         (table().replace("y_m\n", "y_m,x_m\n"), "the header has twice x_m"),
         (table().replace(",", ";"), "columns are separated by commas, these by ';'"),
         (table().replace(",", "\t"), r"columns are separated by commas, these by '\\t'"),
+        (
+            table().replace(".", ","),
+            "line 2: more values than the header's 4; numbers have a decimal point",
+        ),
         (table().encode("utf-16"), "must be UTF-8"),
         ("t_s,id,x_m,y_m\n", "holds no rows"),
     ],
@@ -141,6 +145,17 @@ def test_people_who_stand_or_rest_are_no_error_of_units() -> None:
     jogger = times[:, None] * [2.8, 0.0]
     for places in (bench, bench + 0.02 * noise, noise, slow, slow + noise, jogger):
         refuse_other_units("recording", [(times, places)])
+
+
+def test_people_who_cross_a_narrow_view_are_judged_together() -> None:
+    """Each walks less than two metres; nobody stands."""
+    seconds = np.arange(0.0, 1.4, 0.1)
+    places = seconds[:, None] * [1.3, 0.0]
+    refuse_other_units("recording", [(seconds, places)] * 40)
+    with pytest.raises(TrackingError, match=r"0\.13 m/s.*look like numbers of frames"):
+        refuse_other_units("recording", [(10.0 * seconds, places)] * 40)
+    # A few people who shift slowly are no sample.
+    refuse_other_units("recording", [(10.0 * seconds, places)] * 9)
 
 
 @pytest.mark.parametrize("speed_mps", [0.1, 15.0])

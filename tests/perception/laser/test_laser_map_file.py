@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of
 from PIL import Image
+from PIL.PngImagePlugin import PngInfo
 
 from perception import PerceptionError
 from perception.laser import LegDetector, LegDetectorConfig, MapCells, StaticMap
@@ -106,6 +107,15 @@ def test_the_transparent_colour_of_a_png_is_unknown(mode: str, tmp_path: Path) -
     drawn.save(tmp_path / "drawn.png", **({} if mode == "LA" else {"transparency": None}))
     drawn = written(tmp_path, (tmp_path / "drawn.png").read_bytes(), "drawn.png")
     assert StaticMap.from_yaml(drawn, margin_m=0.0).occupied.any() == (mode != "LA")
+
+
+def test_a_comment_of_a_png_is_no_transparent_colour(tmp_path: Path) -> None:
+    about = PngInfo()
+    about.add_text("Comment", "no tRNS\0\0 here")
+    drawn = Image.fromarray(np.array([[0, 255]], np.uint8))
+    drawn.save(tmp_path / "about.png", pnginfo=about)
+    path = written(tmp_path, (tmp_path / "about.png").read_bytes(), "about.png")
+    assert StaticMap.from_yaml(path, margin_m=0.0).occupied.tolist() == [[True, False]]
 
 
 @pytest.mark.parametrize("white", [1, 15, 100, 255, 256, 1023, 4095, 65535])
@@ -261,6 +271,8 @@ def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog
         (b"P2 2 1 100\n0 -1\n", "damaged, or no PGM"),
         (b"P2 2 1 100\n0 white\n", "damaged, or no PGM"),
         (b"P2 9000 9000 100\n0 1\n", "damaged, or no PGM"),
+        (b"II*\0" + bytes(30), "a TIFF; save it as PGM or PNG"),
+        (b"MM\0*" + bytes(30), "a TIFF; save it as PGM or PNG"),
         (b"P7\nWIDTH 1\nHEIGHT 1\nDEPTH 1\nMAXVAL 15\nENDHDR\n\x0f", r"a PAM \(P7\); save it as"),
     ],
 )

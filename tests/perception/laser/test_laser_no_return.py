@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from laser_scenes import laser_scan, points_of, two_legs
 
-from perception.laser import LaserScan, LegDetector
+from perception.laser import LaserScan, LegDetector, Scanner, sight_of
 
 RANGE_MAX_M = 4.0
 
@@ -54,6 +54,14 @@ def test_rays_of_range_max_met_nothing() -> None:
     assert scan.no_return.tolist() == [True, True, False, True]
     assert scan.measured.tolist() == [False, False, True, False]
     assert scan.free_m.tolist() == [4.0, 4.0, 3.0, 4.0]
+
+
+def test_rays_of_0_measured_nothing_whatever_range_min_is() -> None:
+    scan = LaserScan(0.0, 0.0, 0.01, [0.0, 0.05, 2.0, 0.0], 0.0, RANGE_MAX_M)
+    assert scan.measured.tolist() == [False, True, True, False]
+    assert scan.free_m.tolist() == [0.0, 0.05, 2.0, 0.0]
+    dead = sight_of(LaserScan(0.0, 0.0, 0.01, [0.0] * 90, 0.0, 4.0), Scanner.mounted(0.0, 0.0, 0.2))
+    assert dead.blind_text == "blind (most of its rays have no answer)"
 
 
 def test_a_wall_at_range_max_is_still_a_wall() -> None:
