@@ -132,6 +132,8 @@ def _scanner_findings(
     messages = ScanMessages(topic, said.append)
     refused: Counter[str] = Counter()
     blind: Counter[str] = Counter()
+    frozen: Counter[str] = Counter()
+    before = None
     frame = scans[0][1].header.frame_id
     try:
         mounting, where = Scanner(mounts.lookup(base, frame, 0.0)), f"in {base!r}"
@@ -139,16 +141,21 @@ def _scanner_findings(
         mounting, where = Scanner(np.eye(4)), f"in its own frame {frame!r}, which is not in tf"
     for recorded_s, message in scans:
         try:
-            sight = sight_of(messages.read(message, recorded_s), mounting)
+            scan = messages.read(message, recorded_s)
         except NavError as problem:
             refused[str(problem)] += 1
             continue
+        if before is not None and scan.repeats(before):
+            frozen["all ranges are those of the scan before"] += 1
+        before = scan
+        sight = sight_of(scan, mounting)
         if sight.blind_text:
             blind[sight.blind_text] += 1
     found = [Finding("warning", "scanners", text) for text in said]
     for reasons, words, remedy in (
         (refused, "refused: {}", "look at its driver"),
         (blind, "the scanner is {} (0° is ahead, " + where + ")", _REMEDY_BLIND),
+        (frozen, "{}: it is frozen", "look at its driver; a simulated scanner needs noise"),
     ):
         share = reasons.total() / len(scans)
         if share > _SELDOM:
@@ -156,8 +163,10 @@ def _scanner_findings(
             text = f"{topic}: in {reasons.total()} of {counted(len(scans), 'scan')}, {why}"
             severity = "error" if share > _OFTEN else "warning"
             found.append(Finding(severity, "scanners", text, remedy))  # type: ignore[arg-type]
-    few = refused.total() + blind.total()
-    text = f"{topic}: {counted(len(scans), 'scan')}, {few or 'none'} of them blind or refused"
+    few = refused.total() + blind.total() + frozen.total()
+    text = (
+        f"{topic}: {counted(len(scans), 'scan')}, {few or 'none'} of them blind, frozen or refused"
+    )
     return found or [Finding("fine", "scanners", text)]
 
 

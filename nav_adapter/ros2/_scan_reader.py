@@ -7,9 +7,11 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
+import numpy as np
+
 from perception import PerceptionError
 from perception.arrays import FloatArray
-from perception.laser import MapCells
+from perception.laser import LaserScan, MapCells
 from tracking import TrackingError
 
 from .._errors import NavError
@@ -24,6 +26,9 @@ from .messages.sensor_msgs import LaserScan as LaserScanMessage
 
 # A scanner whose scans are refused is reported again after this time.
 _WARN_AGAIN_S: Final = 10.0
+# A robot that has moved so far sees other ranges than before.
+_MOVED_M: Final = 0.05
+_TURNED_RAD: Final = math.radians(2.0)
 
 
 class ScanReader:
@@ -61,6 +66,8 @@ class ScanReader:
         self._lock, self._warn, self._odom_frame = lock, warn, odom_frame
         self._last_s = [-math.inf] * len(inputs)
         self._warned_s = [-math.inf] * len(inputs)
+        # The first of the scans that are equal, and the robot's pose then.
+        self._repeated: list[tuple[LaserScan, FloatArray] | None] = [None] * len(inputs)
         self._messages = [ScanMessages(each.name, warn) for each in inputs]
         self._map: MapCells | None = None
         # None until the first scan after a new map; each change is reported once.
@@ -120,8 +127,9 @@ class ScanReader:
             self._map, self._map_used = cells, None
 
     def forget(self) -> None:
-        """Forget the stamps of earlier scans."""
+        """Forget the stamps of earlier scans, and the scans."""
         self._last_s = [-math.inf] * len(self._inputs)
+        self._repeated = [None] * len(self._inputs)
         self._warned_s = [-math.inf] * len(self._inputs)
 
     def _process(self, number: int, message: LaserScanMessage, now_s: float) -> bool:
@@ -144,6 +152,7 @@ class ScanReader:
                 T_base_scanner = mount.T_base_scanner()
             motion = self._poses.motion(scan.stamp_s, scan.end_s)
             static_map = self._map_in_odom(scan.stamp_s)
+            self._require_live(number, scan, motion.T_odom_base)
         seen = self._perception.process(number, scan, T_base_scanner, motion, static_map)
         if seen.sight.nothing:
             with self._lock:
@@ -166,6 +175,22 @@ class ScanReader:
             self._watch.saw_scan(number, seen.stamp_s, seen.sight)
             self._read += 1
         return True
+
+    def _require_live(self, number: int, scan: LaserScan, T_odom_base: FloatArray) -> None:
+        """Refuse a scan that repeats those before it although the robot has moved.
+
+        While it stands, a scanner without noise, as in a simulator, repeats itself as well.
+        """
+        since = self._repeated[number]
+        if since is None or not scan.repeats(since[0]):
+            self._repeated[number] = scan, T_odom_base
+            return
+        step = np.linalg.inv(since[1]) @ T_odom_base
+        moved_m, turned_rad = math.hypot(*step[:2, 3]), abs(math.atan2(step[1, 0], step[0, 0]))
+        if moved_m > _MOVED_M or turned_rad > _TURNED_RAD:
+            raise NavError(
+                "all ranges are those of scans before the robot moved, so the scanner is frozen"
+            )
 
     def _map_in_odom(self, stamp_s: float) -> tuple[MapCells, FloatArray] | None:
         """Return the map and its pose, or None without a map, or while its pose is unknown."""

@@ -50,9 +50,6 @@ _OCCUPIED: Final = (65, 100)
 class ScanMessages:
     """Reads the messages of one scanner, and says once what is put right in them.
 
-    A scan whose ranges are all those of the one before comes from a frozen driver: a live scanner
-    has noise.
-
     Args:
         name: of the scanner.
         warn: called with each correction, once.
@@ -61,7 +58,6 @@ class ScanMessages:
     def __init__(self, name: str, warn: Callable[[str], object]) -> None:
         self._name, self._warn = name, warn
         self._stamped_at_end = False
-        self._before_m: FloatArray | None = None
         self._stamps_s: deque[float] = deque(maxlen=_SCANS)
         self._said: set[str] = set()
 
@@ -72,22 +68,10 @@ class ScanMessages:
         From then on its scans are read so.
 
         Raises:
-            NavError: as :func:`laser_scan_of`, for a scan that repeats the one before, for sweeps
-                that would go on while others begin, and for a sweep that ends in the future
-                because time_increment and scan_time disagree.
+            NavError: as :func:`laser_scan_of`, for sweeps that would go on while others begin, and
+                for a sweep that ends in the future because time_increment and scan_time disagree.
         """
         scan = laser_scan_of(message)
-        before_m, self._before_m = self._before_m, scan.ranges_m
-        # A scan that measures nothing is that of a blind scanner.
-        if (
-            before_m is not None
-            and scan.measured.any()
-            and np.array_equal(scan.ranges_m, before_m, equal_nan=True)
-        ):
-            raise NavError(
-                "all ranges are those of the scan before, so the scanner is frozen; a simulated "
-                "one needs noise"
-            )
         given, count = len(message.intensities), len(message.ranges)
         if given not in (0, count):
             self._say("intensities", f"{count} ranges but {given} intensities, which are not used")

@@ -125,6 +125,14 @@ class LaserScan:
         within &= ranges > 0.0  # many drivers send 0 for no return, and some 0 for range_min too
         return np.asarray(within & (ranges != self._nothing_m))
 
+    def repeats(self, before: LaserScan) -> bool:
+        """Return whether all ranges are those of another scan, and some ray measured something.
+
+        A live scanner has noise. It is frozen if this holds while the robot moves.
+        """
+        same = np.array_equal(self.ranges_m, before.ranges_m, equal_nan=True)
+        return bool(same and self.measured.any())
+
     @property
     def no_return(self) -> NDArray[np.bool_]:
         """(N,) True for rays that met no object within ``range_max_m``."""

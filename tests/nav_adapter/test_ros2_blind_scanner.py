@@ -33,8 +33,12 @@ class Blinded(Robot):
 
     change: Change = staticmethod(lambda ranges: ranges)
 
+    speed_mps = 0.0
+    x_m = 0.0
+
     def step(self, now_s: float):
-        self.bridge.on_odometry(odometry(now_s, speed=0.0), now_s)
+        self.x_m += PERIOD_S * self.speed_mps
+        self.bridge.on_odometry(odometry(now_s, x=self.x_m, speed=self.speed_mps), now_s)
         if "camera" not in self.silent:
             self.bridge.on_image(image(now_s), now_s)
         for number, scanner in enumerate(self.scanners):
@@ -62,18 +66,19 @@ def sector(low_deg: float, high_deg: float, value: float) -> Change:
     return lambda ranges: np.where(inside, value, ranges)
 
 
-def test_a_scanner_that_repeats_its_last_scan_counts_as_silent() -> None:
+@pytest.mark.parametrize("moves", [False, True])
+def test_a_scanner_that_repeats_itself_while_the_robot_moves_counts_as_silent(moves) -> None:
     nav = alone(people=[])
     assert nav.drive(START_S, 2.0)[-1].speed_limit_mps > 1.0
     repeated: list[np.ndarray] = []
     nav.change = lambda ranges: repeated[0] if repeated else (repeated.append(ranges), ranges)[1]
     nav.people.append(NEAR)  # whom the frozen scan does not show
+    nav.speed_mps = 0.4 if moves else 0.0
     after = nav.drive(START_S + 2.0, 3.0)
-    for each in after:
-        if each.stamp_s - (START_S + 2.0) > TIMING.stop_after_s + 2.0 * PERIOD_S:
-            assert each.speed_limit_mps == 0.0
-    assert any("scanner is frozen" in each for each in nav.warnings)
-    assert any("silent" in each for each in nav.warnings)
+    # By 0.05 m, which take 0.125 s, it is known.
+    stopped = [each for each in after if each.stamp_s - START_S > 2.2 + TIMING.stop_after_s]
+    assert all((each.speed_limit_mps == 0.0) == moves for each in stopped)
+    assert any("scanner is frozen" in each for each in nav.warnings) == moves
 
 
 @pytest.mark.parametrize("value", NO_ANSWERS)

@@ -152,7 +152,7 @@ def test_few_blind_scans_are_counted(capsys, tmp_path, drive) -> None:
     scans = iter(range(COUNT))
     drive.ranges = lambda ranges: np.zeros_like(ranges) if next(scans) in (20, 21) else ranges
     ((severity, text),) = findings(capsys, drive.record(tmp_path / "bag"))["scanners"]
-    assert (severity, f"{COUNT} scans, 2 of them blind" in text) == ("fine", True)
+    assert (severity, f"{COUNT} scans, 2 blind" in text) == ("fine", True)
 
 
 def test_a_scanner_that_sees_nothing_or_repeats_itself(capsys, tmp_path, drive) -> None:
