@@ -164,9 +164,7 @@ def _scanner_findings(
             severity = "error" if share > _OFTEN else "warning"
             found.append(Finding(severity, "scanners", text, remedy))  # type: ignore[arg-type]
     few = refused.total() + blind.total() + frozen.total()
-    text = (
-        f"{topic}: {counted(len(scans), 'scan')}, {few or 'none'} of them blind, frozen or refused"
-    )
+    text = f"{topic}: {counted(len(scans), 'scan')}, {few or 'none'} blind, frozen or refused"
     return found or [Finding("fine", "scanners", text)]
 
 

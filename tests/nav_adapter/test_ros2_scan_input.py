@@ -114,7 +114,10 @@ GOOD = scan_message(NOW)
         (scan_message(NOW - 0.1), "0.060 s before that of the last one"),
         (scan_message(NOW - PERIOD_S), "0.000 s before that of the last one"),
         (scan_message(NOW - 900.0), "before that of the last one"),
-        (replace(GOOD, time_increment=1e-3), "time_increment × rays is 0.540 s, but scans come every 0.040 s"),
+        (
+            replace(GOOD, time_increment=1e-3),
+            "time_increment × rays is 0.540 s, but scans come every 0.040 s",
+        ),
         (scan_message(NOW, low_rad=math.radians(140.0), rays=9), "must hold rays"),
     ],
 )
