@@ -13,7 +13,7 @@ from .arrays import FloatArray
 _WIDEST_RAD: Final = math.radians(89.9)
 _SAMPLES: Final = 2048
 _ITERATIONS: Final = 6
-_EXACT_PX: Final = 1e-4
+_EXACT_PX: Final = 1e-6
 _CONVERGED_PX: Final = 1e-3
 # Rays at the very end of the model cannot be moved outwards to measure a scale.
 _INSIDE: Final = 0.99
