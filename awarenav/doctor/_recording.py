@@ -27,7 +27,7 @@ from perception.laser import Scanner, sight_of
 
 from ..errors import counted
 from ..estimate import BagMessages
-from ._findings import Finding
+from ._findings import Finding, Severity
 
 _KINDS: Final = {ros_type(each): each for each in (LaserScan, Odometry, TFMessage)}
 _IMAGES: Final = frozenset(ros_type(each) for each in (Image, CompressedImage))
@@ -44,10 +44,10 @@ _REMEDY_BLIND: Final = (
 
 
 class _Recording:
-    """The messages of a recording by topic, each with the time of its recording.
+    """The messages of a recording.
 
     Attributes:
-        scans: of every scanner.
+        scans: of every scanner, with the times of their recording.
         odometry: of every source.
         transforms: of /tf, whatever its namespace.
         static: of /tf_static.
@@ -62,15 +62,14 @@ class _Recording:
         self.static: list[TFMessage] = []
         self.whole = True
         with contextlib.closing(BagMessages(path, {}, {})) as recorded:
-            topics = {name: kind for name, kind in recorded.topics if kind in _KINDS}
             self.has_images = any(kind in _IMAGES for _, kind in recorded.topics)
-        with contextlib.closing(BagMessages(path, {}, topics)) as recorded:
+            kinds = {name: kind for name, kind in recorded.topics if kind in _KINDS}
             began_s = None
-            for topic, recorded_s, message in recorded:
+            for topic, recorded_s, message in recorded.of_kinds(_KINDS):
                 began_s = recorded_s if began_s is None else began_s
                 # A message of ROS 1 may have other fields: then nothing is known of it.
                 with contextlib.suppress(NavError, AttributeError, TypeError, ValueError):
-                    self._add(topic, recorded_s, from_ros(_KINDS[topics[topic]], message))
+                    self._add(topic, recorded_s, from_ros(_KINDS[kinds[topic]], message))
                 if recorded_s - began_s > _LONGEST_S:
                     self.whole = False
                     break
@@ -161,8 +160,8 @@ def _scanner_findings(
         if share > _SELDOM:
             why = words.format(reasons.most_common(1)[0][0])
             text = f"{topic}: in {reasons.total()} of {counted(len(scans), 'scan')}, {why}"
-            severity = "error" if share > _OFTEN else "warning"
-            found.append(Finding(severity, "scanners", text, remedy))  # type: ignore[arg-type]
+            severity: Severity = "error" if share > _OFTEN else "warning"
+            found.append(Finding(severity, "scanners", text, remedy))
     few = refused.total() + blind.total() + frozen.total()
     text = f"{topic}: {counted(len(scans), 'scan')}, {few or 'none'} blind, frozen or refused"
     return found or [Finding("fine", "scanners", text)]

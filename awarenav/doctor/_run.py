@@ -127,7 +127,6 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
 
 def _image_findings(options: DoctorOptions) -> list[Finding]:
     assert options.source is not None
-    findings: list[Finding] = []
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
         choice = NetworkChoice.of_options(options)
         networks = choose_networks(**choice.model_dump())
@@ -135,7 +134,7 @@ def _image_findings(options: DoctorOptions) -> list[Finding]:
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)
         estimator = PeopleEstimator(networks, cameras, unfit=unfit)
         seen = _examine(source, estimator, options.frames)
-        findings += [
+        findings = [
             _domain_finding(unfit, networks.training_domains, rendered=source.rendered),
             *(Finding("error", "images", note) for note in source.notes),
         ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -99,6 +99,27 @@ def _explained(cause: Exception) -> str:
     return next((f"{text} ({why})" for said, why in _CAUSES.items() if said in text), text)
 
 
+def read_messages(
+    path: Path, reader: Any, connections: Sequence[Any]
+) -> Iterator[tuple[str, float, Any]]:
+    """Yield topic, time of recording (s) and message of some connections of an open recording.
+
+    Raises:
+        AwarenavError: for a message that cannot be read.
+    """
+    # The library takes none for all.
+    messages = reader.messages(connections=connections) if connections else iter(())
+    while True:
+        try:
+            connection, recorded_ns, raw = next(messages)
+            message = reader.deserialize(raw, connection.msgtype)
+        except StopIteration:
+            return
+        except Exception as cause:
+            raise AwarenavError(f"{path}: the rest cannot be read: {_explained(cause)}") from cause
+        yield topic_name(connection.topic), recorded_ns * 1e-9, message
+
+
 class BagMessages:
     """Messages of some topics of a recording, in the order in which they were recorded.
 
@@ -139,7 +160,7 @@ class BagMessages:
         Raises:
             AwarenavError: for a message that cannot be read.
         """
-        return self._read(self._connections)
+        return read_messages(self._path, self._reader, self._connections)
 
     def of(self, topic: str) -> Iterator[tuple[str, float, Any]]:
         """Yield the messages of one topic, as iterating over all does.
@@ -147,22 +168,17 @@ class BagMessages:
         Raises:
             AwarenavError: for a message that cannot be read.
         """
-        return self._read([each for each in self._connections if topic_name(each.topic) == topic])
+        own = [each for each in self._connections if topic_name(each.topic) == topic]
+        return read_messages(self._path, self._reader, own)
 
-    def _read(self, connections: list[Any]) -> Iterator[tuple[str, float, Any]]:
-        # The library takes none for all.
-        messages = self._reader.messages(connections=connections) if connections else iter(())
-        while True:
-            try:
-                connection, recorded_ns, raw = next(messages)
-                message = self._reader.deserialize(raw, connection.msgtype)
-            except StopIteration:
-                return
-            except Exception as cause:
-                raise AwarenavError(
-                    f"{self._path}: the rest cannot be read: {_explained(cause)}"
-                ) from cause
-            yield topic_name(connection.topic), recorded_ns * 1e-9, message
+    def of_kinds(self, kinds: Collection[str]) -> Iterator[tuple[str, float, Any]]:
+        """Yield the messages of all topics of some types, whether they were asked for or not.
+
+        Raises:
+            AwarenavError: for a message that cannot be read.
+        """
+        found = [each for each in self._reader.connections if each.msgtype in kinds]
+        return read_messages(self._path, self._reader, found)
 
     def close(self) -> None:
         """Close the recording."""

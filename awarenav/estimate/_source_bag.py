@@ -25,7 +25,7 @@ from perception import Camera
 from perception.arrays import ImageRgb
 
 from ..errors import AwarenavError
-from ._bag import open_bag, topic_name
+from ._bag import open_bag, read_messages, topic_name
 from ._source import SourceFrame
 
 _IMAGE: Final = "sensor_msgs/msg/Image"
@@ -175,7 +175,8 @@ class BagSource:
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             frame = str(shown.header.frame_id).lstrip("/")
             for connections in (static, [each for each in known if each not in static]):
-                for message in islice(self._messages(connections), _MOST_TRANSFORMS):
+                sent = read_messages(self._path, self._reader, connections)
+                for _, _, message in islice(sent, _MOST_TRANSFORMS):
                     for each in from_ros(TFMessage, message).transforms:
                         transforms.add_message(each, static=True)
                 if (root := transforms.root(frame)) != frame:
@@ -190,19 +191,8 @@ class BagSource:
 
     def _first(self, connections: list[Any]) -> Any:
         """Return the first message of some connections; None if there is none."""
-        return next(self._messages(connections), None)
-
-    def _messages(self, connections: list[Any]) -> Iterator[Any]:
-        """Yield the messages of some connections.
-
-        Raises:
-            AwarenavError: for one that cannot be read.
-        """
-        try:
-            for connection, _, raw in self._reader.messages(connections) if connections else ():
-                yield self._reader.deserialize(raw, connection.msgtype)
-        except Exception as cause:  # the library raises many kinds
-            raise AwarenavError(f"{self._path}: a message cannot be read: {cause}") from cause
+        found = next(read_messages(self._path, self._reader, connections), None)
+        return None if found is None else found[2]
 
 
 def _is_zero(info: Any, names: str) -> bool:

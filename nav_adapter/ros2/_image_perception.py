@@ -6,7 +6,7 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
 from perception.errors import DepthImageError
-from perception.no_view import FROZEN, why_no_view
+from perception.no_view import FROZEN, NoView, why_no_view
 from tracking import PersonTrack
 
 from .._errors import NavError
@@ -26,7 +26,6 @@ from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 # Uncertainty of the height and the tilt of a camera on a driving robot.
 _HEIGHT_STD_M = 0.05
 _TILT_STD_RAD = math.radians(2.0)
-_NO_VIEW: Final = "the picture is no view: it is"
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +116,9 @@ class ImagePerception:
             image = picture_of(message)
             self._fit(image.shape[1], image.shape[0])
             no_view, self._before = why_no_view(image, self._before), image
-            if no_view == FROZEN:
-                raise NavError(f"{_NO_VIEW} {no_view} (frozen? a simulated camera needs noise)")
             if no_view and self._has_had_view:
-                raise NavError(f"{_NO_VIEW} {no_view}")
-            self._has_had_view |= no_view is None
+                raise _refusal(no_view)
+            self._has_had_view = no_view is None
             floor, problem = _floor(T_odom_camera), ""
             try:
                 given = {} if depth is None else _given(depth)
@@ -132,7 +129,7 @@ class ImagePerception:
             # Of a camera that has never had a view, such as a stand-in with blank pictures, people
             # who are found count; that nobody is found means nothing.
             if no_view and not observations:
-                raise NavError(f"{_NO_VIEW} {no_view}")
+                raise _refusal(no_view)
             tracks = self._tracker.update(observations, stamp_s, T_odom_camera, is_current)
         if tracks is None:
             return None
@@ -161,6 +158,11 @@ class ImagePerception:
         self._pipeline = self._make_pipeline(camera)
         self._tracker.use_camera(camera)
         self._camera = camera
+
+
+def _refusal(no_view: NoView) -> NavError:
+    hint = " (frozen? a simulated camera needs noise)" if no_view == FROZEN else ""
+    return NavError(f"the picture is no view: it is {no_view}{hint}")
 
 
 def _given(depth: StampedDepth) -> dict[str, Any]:

@@ -10,13 +10,11 @@ import numpy as np
 
 from perception import Camera
 from perception.arrays import FloatArray
-from perception.laser import ScannerSight, SeenDirections
+from perception.laser import AHEAD_RAD, ScannerSight, SeenDirections
 
 CAMERA: Final = "camera"
 #: The camera's depth images, without which it goes on.
 DEPTH: Final = "depth images"
-# Without a camera, scanners must see this far to either side of straight ahead.
-_AHEAD_RAD: Final = math.radians(60.0)
 # A camera whose axis is steeper than this looks everywhere.
 _STEEP: Final = 0.2
 
@@ -47,7 +45,7 @@ class SensorWatch:
         self._scanners, self._lost_after_s = tuple(scanners), lost_after_s
         self._names = (*([CAMERA] * with_camera), *([DEPTH] * with_depth), *scanners)
         self._with_camera = with_camera
-        self._needed_rad = (0.0, _AHEAD_RAD)
+        self._needed_rad = (0.0, AHEAD_RAD)
         self._stamps_s: dict[str, float] = {}
         self._seen = SeenDirections()
         # Since when a scanner has been blind, and its sectors in words.

@@ -28,10 +28,11 @@ from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
 from ._seated import SeatedPeople
-from ._sight import ScannerSight, SeenDirections, sight_of
+from ._sight import AHEAD_RAD, ScannerSight, SeenDirections, sight_of
 from ._static_map import MapCells, StaticMap
 
 __all__ = [
+    "AHEAD_RAD",
     "CUTOUT",
     "HYPOTHESIS_FEATURES",
     "CandidateKind",

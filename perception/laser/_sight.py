@@ -26,6 +26,8 @@ _WITHIN_RAD: Final = math.radians(15.0)
 _ALIVE_SHARE: Final = 0.01
 # So many rays with one range beyond the longest are a code of the driver, and no measurement.
 _CODED: Final = 3
+#: A robot without a camera must see this far to either side of straight ahead.
+AHEAD_RAD: Final = math.radians(60.0)
 # Directions in the base frame for which it is known when they were last seen.
 _BEARINGS_RAD: Final = np.radians(np.arange(360.0))
 _FULL_TURN_RAD: Final = 2.0 * math.pi

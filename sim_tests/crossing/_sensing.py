@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,7 +10,7 @@ import numpy as np
 from nav_adapter import AwarenessPolicy, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import FloatArray
-from perception.laser import RobotMotion, SeenDirections
+from perception.laser import AHEAD_RAD, RobotMotion, SeenDirections
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
 from ..world.camera import CameraTiming
@@ -37,8 +36,6 @@ from .faults import Fault, FaultInjection, FaultyEyes
 _NEVER_S: Final = 1.0e6
 # An image without a person is no evidence about people farther away than this.
 _DETECTION_RANGE_M: Final = 10.0
-# Without a camera, scanners must see this far to either side of straight ahead.
-_AHEAD_RAD: Final = math.radians(60.0)
 # Images and scans with stamps farther ahead are refused, as the bridge on a robot refuses them.
 _AHEAD_S: Final = 0.05
 
@@ -185,7 +182,7 @@ class Sensing:
 
     def _perceived_s(self) -> float:
         """Return the time from which camera or scanners know what is ahead, as on a robot."""
-        stamps_s = (self._newest_s.get("camera"), self._seen.stamp_s(0.0, _AHEAD_RAD))
+        stamps_s = (self._newest_s.get("camera"), self._seen.stamp_s(0.0, AHEAD_RAD))
         return max((each for each in stamps_s if each is not None), default=-_NEVER_S)
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:

@@ -177,7 +177,7 @@ def test_a_twist_is_moved_by_the_lever_arm(x, y, yaw, forward, left, yaw_rate) -
 
 @pytest.mark.parametrize("transforms", [(), ("odom",), ("map",)], ids=["none", "odom", "map"])
 def test_a_child_frame_that_tf_does_not_know_on_the_robot_stops_it(transforms) -> None:
-    """What tf knows by way of odom or a map is somebody else's odometry, and no place on it."""
+    """A frame known by way of odom or a map is somebody else's odometry, and no place on it."""
     robot = Robot()
     for parent in transforms:
         if parent == "map":

@@ -43,7 +43,7 @@ def test_a_key_that_stands_twice_in_yaml_is_refused_with_both_lines(text: str, w
 
 
 def test_keys_of_further_documents_do_not_count() -> None:
-    """What `ros2 topic echo` prints holds many messages, and the last may be cut off."""
+    """`ros2 topic echo` prints many messages, and the last may be cut off."""
     assert parse_yaml("a: 1\n---\na: 2\na: 3\n", "text", first_document=True) == {"a": 1}
     with pytest.raises(PerceptionError, match="twice"):
         parse_yaml("a: 1\na: 2\n---\na: 3\n", "text", first_document=True)

@@ -110,19 +110,20 @@ def test_rays_are_where_the_robot_was_when_they_were_measured(
     assert view.passed(places, np.array([0.3, 0.3]), T).tolist() == [False, True]
 
 
+def legs(stamp_s: float) -> PersonObservation:
+    return PersonObservation(
+        stamp_s=stamp_s,
+        position_camera_m=np.array([3.0, 0.0, 0.0]),
+        position_covariance_m2=0.0025 * np.eye(3),
+        gaze_camera=None,
+        awareness=None,
+        awareness_std=None,
+        score=0.9,
+    )
+
+
 def test_a_view_of_a_frame_holds_for_that_frame_also_when_frames_come_late() -> None:
     """The view of a scan is kept with it, and late frames are processed with their own."""
-
-    def legs(stamp_s: float) -> PersonObservation:
-        return PersonObservation(
-            stamp_s=stamp_s,
-            position_camera_m=np.array([3.0, 0.0, 0.0]),
-            position_covariance_m2=0.0025 * np.eye(3),
-            gaze_camera=None,
-            awareness=None,
-            awareness_std=None,
-            score=0.9,
-        )
 
     hidden, free = view_of(ahead(25.0, 1.0)), view_of(np.full(720, 6.0))
     frames = [
@@ -153,19 +154,7 @@ def test_whether_a_place_is_empty_is_saved() -> None:
     tracker = PersonTracker(sensors=sensors)
     for step in range(63):
         stamp_s = 0.05 * step
-        people = []
-        if step < 40:
-            people = [
-                PersonObservation(
-                    stamp_s=stamp_s,
-                    position_camera_m=np.array([3.0, 0.0, 0.0]),
-                    position_covariance_m2=0.0025 * np.eye(3),
-                    gaze_camera=None,
-                    awareness=None,
-                    awareness_std=None,
-                    score=0.9,
-                )
-            ]
+        people = [legs(stamp_s)] if step < 40 else []
         tracks = tracker.update(people, stamp_s, np.eye(4), sensor="laser", view=free)
     (track,) = tracks
     assert track.place_empty

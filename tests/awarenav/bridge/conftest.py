@@ -2,9 +2,12 @@ from __future__ import annotations
 
 import os
 import random
+from pathlib import Path
 
 import pytest
 from paths import ROOT
+
+from nav_adapter.ros2 import RobotFile
 
 
 @pytest.fixture
@@ -20,3 +23,12 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> int:
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
     monkeypatch.setenv("PYTHONPATH", path)
     return random.SystemRandom().randint(1, 200)
+
+
+@pytest.fixture
+def robot_file(tmp_path: Path) -> Path:
+    """The robot of the docs, whose scanners are in tf."""
+    path = tmp_path / "robot.yaml"
+    docs = RobotFile.from_yaml(ROOT / "docs" / "nav2" / "robot.yaml")
+    docs.model_copy(update={"scanners": None}).to_yaml(path)
+    return path

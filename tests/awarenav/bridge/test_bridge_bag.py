@@ -9,21 +9,18 @@ import cv2
 import numpy as np
 import pytest
 import shapely
-from paths import ROOT
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 pytest.importorskip("mcap", reason="the extra ros2 is not installed")
 pytest.importorskip("rosbags", reason="the extra rosbag is not installed")
 
+from recorded_messages import recorded
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
 from scan_scenes import scan_message
 
 from awarenav.cli import main
-from nav_adapter.ros2 import RobotFile, encode
+from nav_adapter.ros2 import RobotFile
 from nav_adapter.ros2.conversions import to_time
-from nav_adapter.ros2.messages import Message, ros_type
 from nav_adapter.ros2.messages.geometry_msgs import (
     Transform,
     TransformStamped,
@@ -37,7 +34,6 @@ from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from tracking.prediction import PredictionModel
 
-STORE = get_typestore(Stores.ROS2_HUMBLE)
 START_S, SECONDS, PERSON = 1000.0, 3.0, (2.5, 1.2)
 
 
@@ -63,27 +59,6 @@ def messages(*, camera: bool = False, depth: bool = False):
             step = 64 * far.itemsize
             sent = Image(Header(to_time(now), "camera"), 48, 64, encoding, 0, step, far.tobytes())
             yield "/camera/depth", now + 0.03, sent
-
-
-def recorded(path: Path, found) -> Path:
-    connections: dict[str, object] = {}
-    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        for topic, now_s, message in found:
-            assert isinstance(message, Message)
-            if topic not in connections:
-                kind = ros_type(type(message))
-                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
-            writer.write(connections[topic], round(1e9 * now_s), encode(message))
-    return path
-
-
-@pytest.fixture
-def robot_file(tmp_path: Path) -> Path:
-    """The robot of the docs, whose scanners are in tf."""
-    path = tmp_path / "robot.yaml"
-    docs = RobotFile.from_yaml(ROOT / "docs" / "nav2" / "robot.yaml")
-    docs.model_copy(update={"scanners": None}).to_yaml(path)
-    return path
 
 
 def published(path: Path) -> list[tuple[float, str, object]]:

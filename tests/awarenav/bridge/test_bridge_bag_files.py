@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from paths import ROOT
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 pytest.importorskip("mcap", reason="the extra ros2 is not installed")
 pytest.importorskip("rosbags", reason="the extra rosbag is not installed")
 
+from recorded_messages import recorded
 from rosbags import rosbag1
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionMode, StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scan_scenes import scan_message
 
 from awarenav.cli import main
-from nav_adapter.ros2 import RobotFile, encode
 from nav_adapter.ros2.conversions import to_time
-from nav_adapter.ros2.messages import ros_type
 from nav_adapter.ros2.messages.geometry_msgs import Transform, TransformStamped, Vector3
 from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 
-STORE = get_typestore(Stores.ROS2_HUMBLE)
 START_S, TICKS = 1000.0, 40
 MOUNTED = TFMessage(
     (TransformStamped(Header(frame_id="base_link"), "scanner", Transform(Vector3(0.3, 0.0, 0.2))),)
@@ -48,28 +45,6 @@ def messages(
         found.append((f"{prefix}odom", at_s, Odometry(header, "base_link")))
         found.append((f"{prefix}scan", at_s + 0.01, scan_message(stamp_s, [(2.5, 1.2)])))
     return sorted(found, key=lambda each: each[1])
-
-
-def recorded(path: Path, found: Iterable, compression=None, **how) -> Path:
-    connections: dict[str, object] = {}
-    writer = Writer(path, version=9, storage_plugin=how.pop("plugin", StoragePlugin.SQLITE3))
-    if compression is not None:
-        writer.set_compression(compression, CompressionFormat.ZSTD)
-    with writer:
-        for topic, at_s, message in found:
-            if topic not in connections:
-                kind = ros_type(type(message))
-                connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
-            writer.write(connections[topic], round(1e9 * at_s), encode(message))
-    return path
-
-
-@pytest.fixture
-def robot_file(tmp_path: Path) -> Path:
-    path = tmp_path / "robot.yaml"
-    docs = RobotFile.from_yaml(ROOT / "docs" / "nav2" / "robot.yaml")
-    docs.model_copy(update={"scanners": None}).to_yaml(path)
-    return path
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What ``awarenav doctor`` says of recordings with one thing wrong at a time."""
+"""Findings of ``awarenav doctor`` about recordings with one thing wrong at a time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ import pytest
 
 from awarenav.cli import main
 from nav_adapter.ros2.conversions import to_time, yaw_quaternion
-from nav_adapter.ros2.messages import ros_type
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
     Pose,
@@ -33,16 +32,13 @@ from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 pytest.importorskip("rosbags", reason="the extra 'rosbag' is not installed")
 pytest.importorskip("cyclonedds", reason="the extra 'ros2' is not installed")
 
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
-
-from nav_adapter.ros2 import encode
+from recorded_messages import recorded
+from rosbags.rosbag2 import StoragePlugin
 
 START_S, PERIOD_S, COUNT = 1000.0, 0.05, 60
 SPEED_MPS = 0.5
 STEP_RAD = math.radians(1.0)
 ANGLES_RAD = math.radians(-135.0) + STEP_RAD * np.arange(271)
-STORE = get_typestore(Stores.ROS2_HUMBLE)
 OPTICAL = Quaternion(-0.5, 0.5, -0.5, 0.5)
 K = (300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0)
 P = (250.0, 0.0, 150.0, 0.0, 0.0, 255.0, 110.0, 0.0, 0.0, 0.0, 1.0, 0.0)
@@ -100,15 +96,8 @@ class Drive:
                 )  # fmt: skip
 
     def record(self, path: Path) -> Path:
-        connections: dict[str, object] = {}
-        with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-            for topic, time_s, message in self.messages():
-                if topic not in connections:
-                    kind = ros_type(type(message))
-                    connections[topic] = writer.add_connection(topic, kind, typestore=STORE)
-                stamp_ns = round(1e9 * (START_S + time_s))
-                writer.write(connections[topic], stamp_ns, encode(message))
-        return path
+        found = ((topic, START_S + time_s, each) for topic, time_s, each in self.messages())
+        return recorded(path, found, StoragePlugin.MCAP)
 
 
 def findings(capsys, path: Path, *options: str) -> dict[str, list[tuple[str, str]]]:
