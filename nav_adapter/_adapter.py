@@ -15,13 +15,11 @@ from tracking.prediction import PredictionModel
 from ._alert import Alert
 from ._alerting import AlertHistory, alerts_due
 from ._checks import age_of_s, checked_tracks, goes_back, refuse_absurd, require_type
-from ._constraints import GovernedSpeed, NavConstraints
+from ._constraints import NavConstraints
 from ._errors import NavError
-from ._governor import SpeedGovernor
-from ._lost import LostPeople
-from ._memory import LostPerson, PersonMemory
-from ._obstacle_rules import ObstacleRules
+from ._governor import GovernedSpeed, SpeedGovernor
 from ._obstacles import obstacles_of
+from ._people import People, Person
 from ._policy import AwarenessPolicy
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 from ._speed_basis import SpeedBasis
@@ -29,6 +27,8 @@ from ._speed_basis import SpeedBasis
 _LOG = logging.getLogger("nav_adapter")
 # A stamp that is later than the last one by more than this may be wrong.
 _MAX_PAUSE_S: Final = 10.0
+# When stamps that jump go on for this time, the clock has been set.
+_NEW_CLOCK_AFTER_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +44,12 @@ class _Memory:
         lost: people who were dropped and still limit the speed, by id.
     """
 
-    people: Mapping[int, PersonMemory] = field(default_factory=dict)
+    people: Mapping[int, Person] = field(default_factory=dict)
     alert_history: AlertHistory = field(default_factory=AlertHistory)
     constraints: NavConstraints | None = None
     given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
     ceiling_mps: float | None = None
-    lost: Mapping[int, LostPerson] = field(default_factory=dict)
+    lost: Mapping[int, Person] = field(default_factory=dict)
 
     @property
     def stamp_s(self) -> float | None:
@@ -77,38 +77,34 @@ class _Clock:
 class NavAdapter:
     """Turns tracked people into obstacles and a speed limit.
 
-    A person's radius is that of the policy for the lower bound of α, plus ``uncertainty_sigmas``
-    standard deviations of the position, and never below the floor (body radius plus minimum
-    clearance). It grows at once. It shrinks at a bounded rate, to the largest radius that was
-    called for in the last ``shrink_after_s``, and only with *new sightings* of a confirmed person:
-    while no frame shows the person, neither repeated nor predicted tracks shrink the radius or
-    raise the awareness.
+    A person's radius is that of the policy for the lower bound of α, or the smallest beside which
+    the limit is usable (:func:`nav_adapter.limit.passing_radius_m`), plus ``uncertainty_sigmas``
+    standard deviations of the position. It grows at once. It shrinks at a bounded rate, and only
+    with *new sightings* of a confirmed person: while no frame shows the person, neither repeated
+    nor predicted tracks shrink the radius or raise the awareness.
 
-    The speed limit is the smallest of all people and all rules: v_max of speed-and-separation
-    monitoring with the human speed that the policy assumes, and the policy's other rules. The
-    separation runs from the robot to the person's body circle (radius 0.30 m), not to the inflated
-    obstacle. People whom the robot cannot reach while it stops limit it less (``docs/safety.md``),
-    and so do people who stand if the policy bounds how fast they set off (``rules.standing``).
+    The speed limit is the lowest of all people: the highest speed at which the robot stands before
+    it meets their reach (:mod:`nav_adapter.limit`), with the speed that the policy assumes for
+    their awareness, and never more than a protective field in the robot's straight path allows.
 
     When a person is dropped whom no sensor has shown to be gone, the limit that they set rises
     slowly (``lost_rise_mps2``).
 
     Tentative people, people unseen for longer than ``fresh_within_s`` and, with stale data, all
     people count as unaware. For the speed limit, so do people at first sight, until frames have
-    shown them for ``shrink_after_s``. An id at a place that the person could not have reached is
-    first sight too: a tracker may have exchanged ids. After stale data, or after a pause in the
-    updates of that length, the limit rises from its last value no faster than the robot
-    accelerates.
+    shown them for 0.2 s. An id at a place that the person could not have reached is first sight
+    too: a tracker may have exchanged ids. After stale data, or after a pause in the updates of that
+    length, the limit rises from its last value no faster than the robot accelerates.
 
     A stamp that goes back, or that runs 10 s ahead of the robot's state, is refused and counted.
-    When such stamps go on for ``new_clock_after_s``, the clock has been set: the adapter forgets
+    When such stamps go on for 1 s, the clock has been set: the adapter forgets
     all people, starts anew and logs a warning (logger ``nav_adapter``). If the clock returns after
     a single update far ahead, the adapter goes on from before that update.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
         robot: footprint, braking and reaction time.
-        prediction: of swept polygons, speed field and alerts; None: as certain as the present.
+        prediction: of speed field and alerts; None: as certain as the present.
 
     Raises:
         NavError: for an argument of the wrong type, or a custom policy object whose values are not
@@ -128,9 +124,8 @@ class NavAdapter:
         self._policy = policy
         self._robot = robot
         self._prediction = prediction
-        self._rules = ObstacleRules(policy)
-        self._governor = SpeedGovernor(policy, robot, self._rules)
-        self._lost = LostPeople(policy, robot, self._rules, self._governor)
+        self._people = People(policy, robot)
+        self._governor = SpeedGovernor(policy, robot, self._people)
         self._memory = _Memory()
         self._clock = _Clock()
         self._warned_of_drive = False
@@ -235,7 +230,7 @@ class NavAdapter:
         pause_s = now - last_s
         if 0.0 <= pause_s <= self._policy.timing.stale_after_s:
             if self._has_caught_up(now):
-                memory = replace(memory, people=self._rules.after_silence(memory.people))
+                memory = replace(memory, people=self._people.after_silence(memory.people))
             return memory, replace(clock, jumped=None, before_jump=None)
         if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
             # A pause of the caller, as it seems.
@@ -245,7 +240,7 @@ class NavAdapter:
             if earlier_s is not None and 0.0 <= now - earlier_s <= _MAX_PAUSE_S:
                 return clock.before_jump, _Clock(clock.refused + 1, clock.restarts)
         jumped = JumpedClock.following(clock.jumped, now, _MAX_PAUSE_S)
-        if jumped.has_lasted(self._policy.timing.new_clock_after_s):
+        if jumped.has_lasted(_NEW_CLOCK_AFTER_S):
             ceiling_mps = robot_state.travel_mps
             if memory.constraints is not None:
                 ceiling_mps = min(ceiling_mps, memory.constraints.speed_limit_mps)
@@ -294,12 +289,11 @@ class NavAdapter:
         pause_s = 0.0 if before.stamp_s is None else now - before.stamp_s
         if pause_s > timing.stale_after_s:
             # After a pause in the updates nobody counts as aware any more.
-            people = self._rules.after_silence(people)
-        people = self._rules.updated(people, current, now, stale)
+            people = self._people.after_silence(people)
+        people = self._people.updated(people, current, now, stale)
         refuse_absurd(people)
-        lost = self._lost.missing(before.lost, before.people, before.stamp_s, people, now)
-        limit = self._governor.limit(people, robot_state, now, robot_age_s)
-        limit, lost = self._lost.limited(limit, lost, robot_state, now, robot_age_s)
+        lost = self._people.lost(before.lost, before.people, before.stamp_s, people, now)
+        limit, lost = self._governor.limit(people, lost, robot_state, now, robot_age_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
                 reason = f"stale data: {name} is {age_s:.2f} s old"
@@ -324,7 +318,7 @@ class NavAdapter:
         braked_mps -= self._robot.max_deceleration_mps2 * pause_s
         constraints = NavConstraints(
             stamp_s=now,
-            obstacles=obstacles_of(people, now, self._policy, self._prediction),
+            obstacles=obstacles_of(people, now),
             speed_limit_mps=limit.limit_mps,
             limited_by=limit.limited_by,
             stale=stale,
@@ -334,7 +328,7 @@ class NavAdapter:
             fastest_point_limit_mps=limit.fastest_point_mps,
             robot=self._robot,
             speed_basis=SpeedBasis(
-                *(self._policy, people, lost, current),
+                *(self._policy, self._people, people, lost, current),
                 *(robot_age_s, perception_age_s, ceiling_mps, self._prediction),
             ),
         )

@@ -13,7 +13,7 @@ from perception.anthropometry import BODY_RADIUS_M
 from tracking.prediction import PredictionModel
 
 from ._alert import Alert, AlertKind
-from ._memory import PersonMemory, Vector2
+from ._people import Person, Vector2
 from ._predicted import predicted_sigmas_m
 from ._robot import RobotProfile, RobotState
 from .policies import AlertRules
@@ -26,6 +26,11 @@ _SAME_VELOCITY_MPS: Final = 1e-3
 _CLOSING_M2PS: Final = 1e-9
 # The prediction is known to hold so far ahead.
 _PREDICTED_S: Final = 2.0
+# The lower bound of α below which a person is warned.
+_UNAWARE_BELOW: Final = 0.3
+# Shortest time until the same person gets the same alert again, and between two sounds.
+_REPEAT_AFTER_S: Final = 3.0
+_QUIET_S: Final = 1.0
 _SOUNDS: Final[frozenset[AlertKind]] = frozenset(("horn", "voice"))
 
 
@@ -45,7 +50,7 @@ class AlertHistory:
 def alerts_due(
     rules: AlertRules,
     robot: RobotProfile,
-    people: Mapping[int, PersonMemory],
+    people: Mapping[int, Person],
     robot_state: RobotState,
     now: float,
     sigmas: float,
@@ -61,15 +66,16 @@ def alerts_due(
     """
     candidates = _candidates(rules, robot, people, robot_state, now, sigmas, prediction)
     candidates.sort(key=lambda alert: (alert.time_to_closest_s, alert.track_id))
-    kept_s = max(rules.repeat_after_s, rules.quiet_s)
-    latest = {key: stamp for key, stamp in history.alert_stamps_s.items() if now - stamp < kept_s}
+    latest = {
+        key: stamp for key, stamp in history.alert_stamps_s.items() if now - stamp < _REPEAT_AFTER_S
+    }
     sound_stamp_s, alerts = history.sound_stamp_s, []
     for alert in candidates:
         key = (alert.track_id, alert.kind)
-        if now - latest.get(key, -math.inf) < rules.repeat_after_s:
+        if now - latest.get(key, -math.inf) < _REPEAT_AFTER_S:
             continue
         if alert.kind in _SOUNDS:
-            if now - sound_stamp_s < rules.quiet_s:
+            if now - sound_stamp_s < _QUIET_S:
                 continue
             sound_stamp_s = now
         latest[key] = now
@@ -80,7 +86,7 @@ def alerts_due(
 def _candidates(
     rules: AlertRules,
     robot: RobotProfile,
-    people: Mapping[int, PersonMemory],
+    people: Mapping[int, Person],
     robot_state: RobotState,
     now: float,
     sigmas: float,
@@ -95,7 +101,7 @@ def _candidates(
     reach_m = robot.circumscribed_radius_m + BODY_RADIUS_M
     candidates = []
     for track_id, memory in people.items():
-        if memory.track.status == "tentative" or memory.awareness_lower >= rules.unaware_below:
+        if memory.track.status == "tentative" or memory.awareness_lower >= _UNAWARE_BELOW:
             continue
         time_s, gap_m = _closest_approach(
             memory, position, velocity, age_s, reach_m + sigmas * memory.sigma_m
@@ -124,7 +130,7 @@ def _kind(rules: AlertRules, time_s: float) -> AlertKind | None:
 
 
 def _closest_approach(
-    memory: PersonMemory, robot_m: Vector2, robot_mps: Vector2, age_s: float, reach_m: float
+    memory: Person, robot_m: Vector2, robot_mps: Vector2, age_s: float, reach_m: float
 ) -> tuple[float, float]:
     """Return time (s) and gap (m) of the closest approach; the time is infinite if they move apart.
 

@@ -9,7 +9,7 @@ from typing import Final, get_args
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._memory import PersonMemory, velocity_variance_m2ps2
+from ._people import Person, velocity_variance_m2ps2
 
 # Data older than this, over 30 000 years, have a stamp that was never a time.
 _MOST_S: Final = 1e12
@@ -73,7 +73,7 @@ def goes_back(now: float, last_s: float) -> str:
     return f"stamp_s must not go backward, got {now:.6f} s after {last_s:.6f} s"
 
 
-def refuse_absurd(people: Mapping[int, PersonMemory]) -> None:
+def refuse_absurd(people: Mapping[int, Person]) -> None:
     """Refuse people whose finite numbers are too large for any person."""
     for track_id, person in people.items():
         x_m, y_m = person.position_odom_m

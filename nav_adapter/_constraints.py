@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import Any, cast
 
 from shapely.geometry import Polygon
@@ -43,8 +43,7 @@ class PersonObstacle(_WithOutline):
         awareness_lower: the lower bound of α that was used, in [0, 1]; 0 for people whose α is not
             trusted. When it falls the radius grows at once; when it rises the radius shrinks at a
             bounded rate.
-        polygon: the obstacle as a shapely polygon in odom. It contains the circle, and reaches
-            farther if the policy's outline asks for it.
+        polygon: the obstacle as a shapely polygon in odom, which contains the circle.
         covariance_odom: (4, 4) covariance of the position (m) and the velocity (m/s) of the track,
             predicted to the stamp of the constraints with constant velocity; None if it is not
             known.
@@ -126,34 +125,6 @@ def trusted_obstacle(
     return obstacle
 
 
-@dataclass(frozen=True, slots=True)
-class GovernedSpeed:
-    """A speed limit and its reason, while the adapter works it out.
-
-    Attributes:
-        limit_mps: ≥ 0.
-        limited_by: person and rule, or the robot's maximum.
-        braking_suffices: whether a robot that brakes from now on stops in time.
-        fastest_point_mps: the limit without the robot's own maximum, ≥ ``limit_mps``; infinite if
-            nobody limits the robot.
-    """
-
-    limit_mps: float
-    limited_by: str
-    braking_suffices: bool
-    fastest_point_mps: float
-
-    def at_most(self, limit_mps: float, limited_by: str) -> GovernedSpeed:
-        """Return the lower of this limit and another one, which has a reason of its own."""
-        if limit_mps < self.limit_mps:
-            return GovernedSpeed(limit_mps, limited_by, self.braking_suffices, limit_mps)
-        return replace(self, fastest_point_mps=min(self.fastest_point_mps, limit_mps))
-
-    def stopped(self, limited_by: str) -> GovernedSpeed:
-        """Return a limit of 0 for this reason."""
-        return GovernedSpeed(0.0, limited_by, self.braking_suffices, 0.0)
-
-
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class NavConstraints:
     """Obstacles and a speed limit for one planning cycle.
@@ -161,9 +132,10 @@ class NavConstraints:
     Attributes:
         stamp_s: the time that they hold for.
         obstacles: one per person.
-        speed_limit_mps: ≥ 0, at most the limit of speed-and-separation monitoring; 0 means stop.
-        limited_by: the person and the rule that set the limit, e.g. ``"track 3: speed and
-            separation"``, or ``"robot maximum"``.
+        speed_limit_mps: ≥ 0; 0 means stop.
+        limited_by: the person and the rule that set the limit: ``"track 3: reach"``, ``"track 3: in
+            the path"`` (the protective field of a scanner) or ``"track 3: lost"``; what stops the
+            robot; or ``"robot maximum"``.
         stale: True if the data are too old to trust; everyone then counts as unaware.
         reachable_speed_limit_mps: the limit that the robot can follow from its present speed with
             its full deceleration. It equals ``speed_limit_mps`` (and is never below it) unless the
@@ -171,9 +143,9 @@ class NavConstraints:
             speeds must not be empty. It starts from the measured speed, so a drive with its own
             ramp should get ``speed_limit_mps``: following a late measurement brakes too softly.
         alerts: people to warn now. An alert is given once, not in every update.
-        braking_suffices: False if a robot that brakes from now on at full deceleration still comes
-            nearer to a person than the clearance before it stands, by the assumptions of speed and
-            separation. A limit is then not enough: warn, evade or stop harder.
+        braking_suffices: False if a robot that brakes from now on at full deceleration may still be
+            met before it stands, by the model of people. A limit is then not enough: warn, evade or
+            stop harder.
         fastest_point_limit_mps: the limit for the fastest point of a robot that turns, such as a
             corner of its footprint. It is ``speed_limit_mps`` where people set the limit. Where the
             robot's own maximum does, it is higher, and infinite if nobody is near. If it is not

@@ -6,9 +6,9 @@ import difflib
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, Any, ClassVar
 
-from pydantic import GetCoreSchemaHandler, model_validator
+from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from perception.documents import parse_yaml
@@ -21,79 +21,64 @@ from .policies import (
     InflationPolicy,
     InterpolatedHumanSpeed,
     InterpolatedInflation,
-    NoticedPeople,
-    ObstacleOutline,
+    ReachRules,
     SafetyMargins,
     SpeedPolicy,
-    SpeedRules,
-    StandingPeople,
-    StartReserve,
-    TableHumanSpeed,
-    TableInflation,
     TimeBehaviour,
-    WalkingPeople,
 )
 
 # Presets are read once per process: they are frozen, and reading takes longer than an episode.
 _PRESETS: dict[str, AwarenessPolicy] = {}
-_SHIPPED: dict[str, tuple[type[StrictConfig], ...]] = {
-    "inflation": (InterpolatedInflation, TableInflation),
-    "speed": (InterpolatedHumanSpeed, TableHumanSpeed),
+_SHIPPED: dict[str, type[StrictConfig]] = {
+    "inflation": InterpolatedInflation,
+    "speed": InterpolatedHumanSpeed,
 }
 
 
 class _ShippedOrCustom:
-    """Pydantic marker of a field that takes a shipped model, its YAML keys, or a custom object."""
+    """Pydantic marker of a field that takes the shipped model, its YAML keys or a custom object."""
 
     def __init__(self, field: str, method: str) -> None:
-        self._ramp, self._table = _SHIPPED[field]
-        self._method = method
+        self._shipped, self._method = _SHIPPED[field], method
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        ramp, table, method = self._ramp, self._table, self._method
+        shipped, method = self._shipped, self._method
 
-        def check(value: Any, validate_ramp: Callable[[Any], Any]) -> Any:
-            if isinstance(value, table):
-                return value
-            if isinstance(value, Mapping) and any(str(key).startswith("table") for key in value):
-                return table.model_validate(dict(value))
-            if isinstance(value, (ramp, Mapping)):
-                return validate_ramp(value)
+        def check(value: Any, validate: Callable[[Any], Any]) -> Any:
+            if isinstance(value, (shipped, Mapping)):
+                return validate(value)
             if callable(getattr(value, method, None)) and not isinstance(value, type):
                 return value
             raise ValueError(
-                f"must be a mapping with the keys of {ramp.__name__} or {table.__name__}, or an "
-                f"object with a method {method}(awareness_lower), got {type(value).__name__}"
+                f"must be a mapping with the keys of {shipped.__name__}, or an object with a "
+                f"method {method}(awareness_lower), got {type(value).__name__}"
             )
 
         def dump(value: Any) -> Any:
-            shipped = isinstance(value, (ramp, table))
-            return value.model_dump(mode="json") if shipped else value
+            return value.model_dump(mode="json") if isinstance(value, shipped) else value
 
         return core_schema.no_info_wrap_validator_function(
             check,
-            handler.generate_schema(ramp),
+            handler.generate_schema(shipped),
             serialization=core_schema.plain_serializer_function_ser_schema(dump),
         )
-
-
-# Long enough for a mean place, short enough to follow the drift of odom.
-_STANDING_WINDOW_S: Final = 1.0
 
 
 class AwarenessPolicy(StrictConfig):
     """All settings between a person's awareness and the planner's constraints.
 
     Attributes:
-        inflation: radius of a person over ``awareness_lower``: a ramp, a table or a custom object.
-        speed: assumed human speed over ``awareness_lower``: a ramp, a table or a custom object.
-        outline: the part of the obstacles' polygons beyond their circles; by default nothing.
-        rules: assumed turns, and speed limits besides speed and separation.
-        noticed: what it counts that a person noticed the robot some seconds ago, or None for
-            nothing. It needs ``filter.noticed_memory_s`` and a laser scanner: with a camera alone
-            it changes nothing.
+        inflation: radius of a person over ``awareness_lower``: a ramp or a custom object.
+        speed: U over ``awareness_lower``, the speed that a person may change to: a ramp or a custom
+            object.
+        reach: how people change their motion and the robot its course, or None for a robot that
+            knows no motion of people: the protective field of a safety laser scanner alone.
+        noticed_counts_as: while ``PersonTrack.noticed`` is at least 0.5, the belief that a person
+            who does not look now knows of the robot, the lower bound of α is at least this; None
+            for nothing. It needs ``filter.noticed_memory_s`` and a laser scanner: with a camera
+            alone it changes nothing.
         alerts: rules for alerts, or None.
         margins: distances that hold for every α.
         timing: how fast obstacles may shrink and how long data may be trusted.
@@ -110,43 +95,19 @@ class AwarenessPolicy(StrictConfig):
     speed: Annotated[SpeedPolicy, _ShippedOrCustom("speed", "human_speed_mps")] = (
         InterpolatedHumanSpeed()
     )
-    outline: ObstacleOutline = ObstacleOutline()
-    rules: SpeedRules = SpeedRules(
-        standing=StandingPeople(delay_from_tracks=True),
-        walking=WalkingPeople(),
-        start_reserve=StartReserve(),
-    )
-    noticed: NoticedPeople | None = NoticedPeople()
+    reach: ReachRules | None = ReachRules()
+    noticed_counts_as: float | None = Field(default=0.6, ge=0.0, le=1.0)
     alerts: AlertRules | None = AlertRules()
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
-    filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=5.0)
-
-    @model_validator(mode="after")
-    def _check_ceiling(self) -> AwarenessPolicy:
-        ceiling_m = self.margins.maximum_radius_m
-        if ceiling_m is not None and isinstance(self.inflation, _SHIPPED["inflation"]):
-            unaware_m = self.inflation.radius_m(0.0)
-            if unaware_m > ceiling_m:
-                raise ValueError(
-                    "margins.maximum_radius_m must be at least the unaware radius of "
-                    f"{unaware_m:g} m, got {ceiling_m:g} m"
-                )
-        return self
-
-    @property
-    def standing_window_s(self) -> float | None:
-        """The setting of this name that a tracker needs for ``rules.standing``; None for off."""
-        standing = self.rules.standing
-        return _STANDING_WINDOW_S if standing is not None and standing.delay_from_tracks else None
+    filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=3.0)
 
     @classmethod
     def preset(cls, name: str) -> AwarenessPolicy:
         """Load a shipped policy.
 
         ``"balanced"`` is the default and ``"blind"`` ignores α. ``"conservative"`` is more careful
-        than the default, ``"assertive"`` less. ``"scanner"`` is today's AMR with a safety laser
-        scanner, for comparisons only.
+        than the default, ``"assertive"`` less.
 
         Raises:
             NavError: for a name that is not a preset.
@@ -178,8 +139,8 @@ class AwarenessPolicy(StrictConfig):
         for field, shipped in _SHIPPED.items():
             value = getattr(self, field)
             if not isinstance(value, shipped):
-                names = " and ".join(model.__name__ for model in shipped)
                 raise NavError(
-                    f"{field} is a {type(value).__name__}; only {names} can be written to YAML"
+                    f"{field} is a {type(value).__name__}; only {shipped.__name__} can be written "
+                    "to YAML"
                 )
         super().to_yaml(path)

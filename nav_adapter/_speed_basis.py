@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tracking import PersonTrack
 from tracking.prediction import PredictionModel
 
-from ._memory import LostPerson, PersonMemory
+from ._people import People, Person
 from ._policy import AwarenessPolicy
 
 
@@ -17,10 +17,12 @@ class SpeedBasis:
     """The basis of one speed limit, for limits at other poses and times.
 
     It holds the adapter's own frozen objects, so that keeping it costs an update next to nothing.
-    :func:`nav_adapter.exporters.speed_limit_at` reads it, and the robot of the constraints.
+    :func:`nav_adapter.exporters.speed_limit_at` reads it, and the robot of the constraints. Its
+    attributes are private.
 
     Attributes:
         policy: the adapter's.
+        rules: the adapter's rules for people.
         people: who count in full, by track id.
         lost: people who were dropped and still limit the speed, by track id.
         tracks: the input of the update; people of other tracks are missing.
@@ -31,8 +33,9 @@ class SpeedBasis:
     """
 
     policy: AwarenessPolicy
-    people: Mapping[int, PersonMemory]
-    lost: Mapping[int, LostPerson]
+    rules: People
+    people: Mapping[int, Person]
+    lost: Mapping[int, Person]
     tracks: tuple[PersonTrack, ...]
     robot_age_s: float
     perception_age_s: float

@@ -258,7 +258,7 @@ class TrackerConfig(TrackingConfig):
             TrackingError: for an object that is no policy.
         """
         try:
-            return cls(awareness=policy.filter, standing_window_s=policy.standing_window_s)
+            return cls(awareness=policy.filter)
         except AttributeError as cause:
             raise TrackingError(
                 f"policy must be an AwarenessPolicy, got {type(policy).__name__}: {cause}"

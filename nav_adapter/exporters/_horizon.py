@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,13 +12,10 @@ from tracking.prediction import FITTED, PredictionModel, predict_states
 from .._constraints import NavConstraints
 from .._errors import NavError
 from .._predicted import largest_sigmas_m
-from ..policies import ObstacleOutline
 from ._shapes import circles
 
 # Distance of an empty slot from the robot: out of reach, but small enough for a solver's scaling.
 _FAR_M = 100.0
-# The outline that a policy may sweep ahead uses the same model of motion.
-_OUTLINE: Final = ObstacleOutline()
 
 
 class PredictedPeople(NamedTuple):
@@ -98,8 +95,6 @@ def predicted_people(
     times_s: Any,
     *,
     model: PredictionModel | None = None,
-    acceleration_density_m2ps3: float | None = None,
-    overconfidence_per_s: float | None = None,
 ) -> PredictedPeople:
     """Return the people at every time, with the uncertainty of their positions.
 
@@ -107,11 +102,6 @@ def predicted_people(
     present velocity. The covariance is that of :mod:`tracking.prediction`: on recorded and on
     simulated people its region of two standard deviations holds 84 to 90 % of them, 86.5 % being
     right, up to 2 s ahead.
-
-    With either of the last two arguments it is the earlier formula, whose defaults are those of
-    :class:`~nav_adapter.policies.ObstacleOutline`: the covariance of the track is predicted, white
-    acceleration of density q adds q t³/3 to the variance, and the sum is multiplied by
-    1 + ``overconfidence_per_s`` · t.
 
     The size of a person is not part of it: a body is a disc of 0.30 m around the position. The
     ``radius_m`` of an obstacle already holds the uncertainty of the present.
@@ -121,41 +111,15 @@ def predicted_people(
         times_s: (T,) seconds after ``constraints.stamp_s``, ≥ 0.
         model: of the prediction, such as that of ``awarenav tracks calibrate``; None for the fitted
             one.
-        acceleration_density_m2ps3: q ≥ 0, of the earlier formula.
-        overconfidence_per_s: ≥ 0, of the earlier formula.
 
     Raises:
-        NavError: for an argument that is not finite or out of bounds, a model together with the
-            earlier formula, or an obstacle without ``covariance_odom``.
+        NavError: for an argument that is not finite or out of bounds, or an obstacle without
+            ``covariance_odom``.
     """
     times = _checked_times(times_s)
     covariances = _covariances_of(constraints, "predicted_people")
     now = circles(constraints)
-    if acceleration_density_m2ps3 is None and overconfidence_per_s is None:
-        places = predict_states(now[:, :4], covariances, times, model or FITTED)
-        return PredictedPeople(*places)
-    if model is not None:
-        raise NavError(
-            "predicted_people takes a model, or acceleration_density_m2ps3 and "
-            "overconfidence_per_s, got both"
-        )
-    if acceleration_density_m2ps3 is None:
-        acceleration_density_m2ps3 = _OUTLINE.acceleration_density_m2ps3
-    if overconfidence_per_s is None:
-        overconfidence_per_s = _OUTLINE.overconfidence_per_s
-    density = finite_number(
-        "acceleration_density_m2ps3", acceleration_density_m2ps3, NavError, minimum=0.0
-    )
-    growth = finite_number("overconfidence_per_s", overconfidence_per_s, NavError, minimum=0.0)
-    means = now[:, None, :2] + times[:, None] * now[:, None, 2:4]
-    place, cross, motion = (
-        part[:, None]
-        for part in (covariances[:, :2, :2], covariances[:, :2, 2:], covariances[:, 2:, 2:])
-    )
-    t = times[:, None, None]
-    predicted = place + t * (cross + np.swapaxes(cross, -1, -2)) + t * t * motion
-    predicted = predicted + density * t**3 / 3.0 * np.eye(2)
-    return PredictedPeople(means, np.asarray(predicted * (1.0 + growth * t)))
+    return PredictedPeople(*predict_states(now[:, :4], covariances, times, model or FITTED))
 
 
 def _spread_m(

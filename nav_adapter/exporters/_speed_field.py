@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.arrays import finite_number
+from perception.arrays import FloatArray, finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._field import SpeedField
-from ._field_arrays import checked, is_tensor, library_of
+from ._reach_field import limits_at
 
 
 def speed_limit_at(
@@ -30,12 +29,9 @@ def speed_limit_at(
     """Return (K, T), the speed limit in m/s at K × T poses, people moving as predicted.
 
     It is a lower bound of the limit that ``NavAdapter.update`` will give at that time to a robot
-    that is there. All rules of the policy count, and so do lost people, the age of the data and the
-    recovery after stale data. Whatever is not given counts with its worst value:
-
-    * without headings the robot's circumscribed circle counts, and people in every direction;
-    * without speeds the robot may stand or drive in any direction, so people behind count in full;
-    * without yaw rates, a robot whose state has an age may have turned by any angle since.
+    that is there. All people count, and so do lost ones, the age of the data and the recovery after
+    stale data. Without headings the robot's circumscribed circle counts, and people in every
+    direction; without speeds it drives forwards, and without yaw rates straight on.
 
     The bound holds if
 
@@ -46,11 +42,7 @@ def speed_limit_at(
     * the tracker reports at least once per ``fresh_within_s``, and the adapter is updated as often;
     * the robot is no faster than its maximum.
 
-    For people who stand and are seen, it is the limit itself.
-
-    With torch tensors of positions the result is a tensor with gradients, computed without a copy
-    in their precision and on their device. Other arrays are computed in single precision, and the
-    rounding error is taken off the limit.
+    For people who stand and are seen, it is the limit itself but for steps of time.
 
     Args:
         constraints: of ``NavAdapter.update``.
@@ -68,17 +60,11 @@ def speed_limit_at(
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
             constraints that do not come from ``update`` unless they stop the robot.
     """
-    field = _placed(
-        constraints,
-        positions_odom_m,
-        headings_odom_rad,
-        dt_s,
-        first_s,
-        speeds_mps,
-        yaw_rates_radps,
-        aware_for_s,
+    limits, _ = _limits(
+        *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
+        *(speeds_mps, yaw_rates_radps, aware_for_s),
     )
-    return field.limits_mps()
+    return limits
 
 
 def limited_by_at(
@@ -94,21 +80,14 @@ def limited_by_at(
 ) -> NDArray[np.object_]:
     """Return (K, T), the person and the rule that set each limit of :func:`speed_limit_at`.
 
-    The texts are those of :attr:`~nav_adapter.NavConstraints.limited_by`, such as ``"track 3: speed
-    and separation"``. The arguments and errors are those of :func:`speed_limit_at`. It takes
-    several times as long, so ask for the few poses that matter.
+    The texts are those of :attr:`~nav_adapter.NavConstraints.limited_by`, such as ``"track 3:
+    reach"``. The arguments and errors are those of :func:`speed_limit_at`.
     """
-    field = _placed(
-        constraints,
-        np.asarray(positions_odom_m),
-        headings_odom_rad,
-        dt_s,
-        first_s,
-        speeds_mps,
-        yaw_rates_radps,
-        aware_for_s,
+    _, texts = _limits(
+        *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
+        *(speeds_mps, yaw_rates_radps, aware_for_s),
     )
-    return field.reasons()
+    return texts
 
 
 def time_cost(
@@ -156,12 +135,6 @@ def time_cost(
         yaw_rates_radps=yaw_rates_radps,
         aware_for_s=aware_for_s,
     )
-    if is_tensor(positions_odom_m):
-        library, positions = library_of(positions_odom_m), positions_odom_m
-        steps = positions[:, 1:] - positions[:, :-1]
-        lengths = library.sqrt((steps * steps).sum(-1))
-        slower = library.at_least(library.minimum(limits[:, 1:], limits[:, :-1]), slowest)
-        return (lengths / slower).sum(-1)
     steps = np.diff(np.asarray(positions_odom_m, dtype=np.float64), axis=1)
     lengths = np.hypot(steps[..., 0], steps[..., 1])
     slower = np.maximum(np.minimum(limits[:, 1:], limits[:, :-1]), slowest)
@@ -170,7 +143,7 @@ def time_cost(
     return np.where(lengths > 0.0, seconds, 0.0).sum(axis=1)
 
 
-def _placed(
+def _limits(
     constraints: NavConstraints,
     positions_odom_m: Any,
     headings_odom_rad: Any,
@@ -179,27 +152,28 @@ def _placed(
     speeds_mps: Any,
     yaw_rates_radps: Any,
     aware_for_s: float,
-) -> SpeedField:
-    """Return the field with the robot at the poses, after a check of all arguments."""
-    positions = checked("positions_odom_m", positions_odom_m, ("K", "T", 2), positions_odom_m)
-    shape: tuple[int, int] = (int(positions.shape[0]), int(positions.shape[1]))
+) -> tuple[FloatArray, NDArray[np.object_]]:
+    """Return the limits and their reasons after a check of all arguments."""
+    positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
+    shape = positions.shape[:2]
     dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
     first = finite_number("first_s", first_s, NavError, minimum=0.0)
     if not aware_for_s >= 0.0:
         raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
 
     def of_shape(name: str, values: Any, *more: int) -> Any:
-        return None if values is None else checked(name, values, (*shape, *more), positions)
+        return None if values is None else finite_array(name, values, (*shape, *more), NavError)
 
     headings = of_shape("headings_odom_rad", headings_odom_rad)
     rates = of_shape("yaw_rates_radps", yaw_rates_radps)
-    times_s = first + dt * np.arange(shape[1], dtype=np.float64)
-    field = SpeedField(constraints, library_of(positions), times_s, aware_for_s)
     velocities = None  # forward and to the left
-    if len(np.shape(speeds_mps)) == 3:
+    if np.ndim(speeds_mps) == 3:
         both = of_shape("speeds_mps", speeds_mps, 2)
         velocities = both[:, :, 0], both[:, :, 1]
     elif speeds_mps is not None:
-        velocities = of_shape("speeds_mps", speeds_mps), None
-    field.place(positions, headings, velocities, rates)
-    return field
+        velocities = of_shape("speeds_mps", speeds_mps), np.float64(0.0)
+    return limits_at(
+        *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
+        first + dt * np.arange(shape[1], dtype=np.float64),
+        aware_for_s,
+    )

@@ -15,9 +15,8 @@ from perception.short_repr import short_repr
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._field import SpeedField
-from ._field_arrays import library_of
 from ._person_costs import checked_grid
+from ._reach_field import limits_at
 
 _LARGEST_CELLS: Final = 4_000_000
 
@@ -120,15 +119,11 @@ class SpeedMap:
         positions = positions.reshape(-1, 1, 2)
         limits = np.full(side * side, robot.max_speed_mps)
         for time_s in times:
-            field = SpeedField(
-                constraints,
-                library_of(positions),
-                np.array([time_s]),
-                aware_for_s,
+            at_time, _ = limits_at(
+                *(constraints, positions, None, None, 0.0, np.array([time_s]), aware_for_s),
                 reach_m=math.sqrt(0.5) * cell,
             )
-            field.place(positions)
-            np.minimum(limits, field.limits_mps()[:, 0], out=limits)
+            np.minimum(limits, at_time[:, 0], out=limits)
         return cls(
             constraints.stamp_s,
             origin,

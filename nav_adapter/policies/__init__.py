@@ -2,38 +2,21 @@
 
 from __future__ import annotations
 
-from ._human_speed import InterpolatedHumanSpeed, SpeedPolicy
-from ._inflation import InflationPolicy, InterpolatedInflation, ObstacleOutline
-from ._margins import AlertRules, SafetyMargins, TimeBehaviour
-from ._speed_rules import (
-    DistanceZones,
-    NearCap,
-    NoticedPeople,
-    ProtectiveField,
-    SpeedRules,
-    StandingPeople,
-    StartReserve,
-    WalkingPeople,
+from ._awareness import (
+    InflationPolicy,
+    InterpolatedHumanSpeed,
+    InterpolatedInflation,
+    SpeedPolicy,
 )
-from ._tables import TableHumanSpeed, TableInflation
+from ._settings import AlertRules, ReachRules, SafetyMargins, TimeBehaviour
 
 __all__ = [
     "AlertRules",
-    "DistanceZones",
     "InflationPolicy",
     "InterpolatedHumanSpeed",
     "InterpolatedInflation",
-    "NearCap",
-    "NoticedPeople",
-    "ObstacleOutline",
-    "ProtectiveField",
+    "ReachRules",
     "SafetyMargins",
     "SpeedPolicy",
-    "SpeedRules",
-    "StandingPeople",
-    "StartReserve",
-    "TableHumanSpeed",
-    "TableInflation",
     "TimeBehaviour",
-    "WalkingPeople",
 ]

@@ -1,0 +1,396 @@
+"""The speed limit: the highest speed at which the robot stands before anybody can reach it.
+
+The robot keeps its course, turned by up to ``turn_deg`` either way, drives at v for the reaction
+time and brakes. The limit is the highest v such that, at v *and at every lower speed*, its
+footprint meets nobody's reach while it moves (:mod:`nav_adapter.reach`, ``docs/safety.md``).
+
+For a fixed time t the way of the robot, s = v t − a (t − T)₊²/2, is linear in v, and it moves if
+v > a (t − T)₊. A rectangle whose base goes straight is within a distance of a point for an interval
+of s, and so is the union over all courses of a fan. So each time gives an interval of speeds, and
+the limit is the lowest speed of them all: there is no grid of speeds or headings. Between two
+times the reach is that of the later one, about the middle of the way between, larger by half of it,
+and the robot may be anywhere between its places at the two. So nothing slips through, and time 0
+counts.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from heapq import heappop, heappush
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray
+
+from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
+from .policies import ReachRules
+from .reach import Reach
+
+#: Below this speed the robot counts as standing: it will start along its heading.
+STANDING_MPS: Final = 0.05
+#: Steps of time until the robot stands from its maximum.
+STEPS: Final = 16
+#: Share of such a step that the one that decides is refined to.
+FINEST: Final = 0.13
+#: The limit beside a circle that a planner keeps to.
+PASSING_MPS: Final = 0.3
+#: The room above the robot's maximum up to which limits are computed.
+ROOM: Final = 1.5
+# A person at the base origin has no direction.
+_SAME_PLACE_M: Final = 1e-9
+
+
+class Course(NamedTuple):
+    """The courses that a robot may take while it stops, as a fan of straight ways.
+
+    A robot on a curve is within the fan too: the chord of its arc lies between the courses, and the
+    rectangle is larger by what the turn about that chord swings out.
+
+    Attributes:
+        x_m: place of the base in odom.
+        y_m: the same.
+        cos: direction of the middle of the fan.
+        sin: the same.
+        fan_cos: half the opening of the fan.
+        fan_sin: the same.
+        front_m: farthest part of the footprint ahead of the base, along the course.
+        rear_m: the same behind it, mostly negative.
+        half_m: half the width.
+        circle_m: radius of a robot that may go anywhere at once, as a circle; 0 for a fan.
+        maximum_mps: highest speed of the robot.
+        deceleration_mps2: a > 0.
+        reaction_s: T ≥ 0.
+    """
+
+    x_m: float
+    y_m: float
+    cos: float
+    sin: float
+    fan_cos: float
+    fan_sin: float
+    front_m: float
+    rear_m: float
+    half_m: float
+    circle_m: float
+    maximum_mps: float
+    deceleration_mps2: float
+    reaction_s: float
+
+
+def course_of(
+    robot: RobotProfile, state: RobotState, turn_rad: float, age_s: float = 0.0
+) -> Course:
+    """Return the courses of a robot whose state is ``age_s`` old.
+
+    It turns by at most ``turn_rad`` off the curve that it drives. A robot that stands starts along
+    its heading, or in any direction if it can move sideways. The footprint is measured along the
+    course. The maximum is one and a half times the robot's own, so that a limit of the fastest
+    point of a robot that turns has room.
+    """
+    forward, left = state.speed_mps, state.lateral_mps
+    sideways = abs(left) > LATERAL_NOISE_MPS
+    speed = math.hypot(forward, left) if sideways else abs(forward)
+    if speed < STANDING_MPS and robot.moves_sideways is True:
+        return any_course_of(robot, state, age_s)
+    off_rad, fan_rad = _off_heading_rad(state), turn_rad
+    if not sideways and robot.moves_sideways is not False:
+        # What counts as noise may be motion.
+        fan_rad += math.atan2(abs(left), max(speed, STANDING_MPS))
+    # Half the angle that the robot turns on its curve until it stands, which the chord has.
+    stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
+    chord_rad = 0.5 * min(max(state.yaw_rate_radps * stopping_s, -math.pi), math.pi)
+    fan_rad = min(fan_rad + abs(chord_rad), math.pi)
+    extent = _extent_m(robot.footprint_m, off_rad, abs(chord_rad))
+    return _course(robot, state, age_s, off_rad + chord_rad, fan_rad, extent)
+
+
+def any_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.0) -> Course:
+    """Return all the courses of a robot that may be turned by any angle: its circle counts."""
+    course = _course(robot, state, age_s, 0.0, math.pi, (0.0, 0.0, 0.0))
+    return course._replace(circle_m=robot.circumscribed_radius_m)
+
+
+def straight_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.0) -> Course:
+    """Return the course of a robot that goes straight on, whatever it turns."""
+    off_rad = _off_heading_rad(state)
+    extent = _extent_m(robot.footprint_m, off_rad, 0.0)
+    return _course(robot, state, age_s, off_rad, 0.0, extent)
+
+
+def limit_mps(person: Reach, course: Course) -> float:
+    """Return the highest speed at which the robot meets the reach of one person at a stand only.
+
+    The same holds for every lower speed. A number that is not finite gives 0. The result lies below
+    the exact one by what the last, finest steps of time leave open.
+    """
+    maximum = course.maximum_mps
+    if _is_far(person, course):
+        return maximum
+    a, T = course.deceleration_mps2, course.reaction_s + person.elapsed_s
+    step_s = _step_s(course)
+    finest_s = FINEST * step_s
+    # Intervals of time whose reach is met, the one with the lowest speed first.
+    meetings: list[tuple[float, float, float]] = []
+    t = 0.0
+    limit = maximum
+    while True:
+        if a * (t - T) < limit:  # a robot at the limit so far still moves at t
+            later = t + step_s
+            lowest = _lowest_mps(person, course, T, t, later)
+            if lowest < maximum:
+                heappush(meetings, (lowest, t, later))
+            t = later
+        elif not meetings:
+            return maximum
+        else:
+            lowest, first, last = meetings[0]
+            if last - first <= finest_s:
+                return lowest
+            heappop(meetings)
+            middle = 0.5 * (first + last)
+            for start, end in ((first, middle), (middle, last)):
+                lowest = _lowest_mps(person, course, T, start, end)
+                if lowest < maximum:
+                    heappush(meetings, (lowest, start, end))
+        limit = meetings[0][0] if meetings else maximum
+
+
+def _lowest_mps(person: Reach, course: Course, T: float, t0: float, t1: float) -> float:
+    """Return the lowest speed at which the robot meets the reach from t0 to t1; ∞ if there is none.
+
+    The reach is that at t1 about the middle of the person's way between, larger by half of it.
+    """
+    a = course.deceleration_mps2
+    need0 = a * (t0 - T) if t0 > T else 0.0  # a faster robot still moves at t0
+    braked0_m = 0.5 * need0 * (t0 - T)
+    braked1_m = 0.5 * a * (t1 - T) * (t1 - T) if t1 > T else 0.0
+    near, past, past_behind = contact_m(person, course, t0, t1)
+    if need0 * t0 - braked0_m <= past_behind:
+        return need0
+    # Written so that NaN stops the robot.
+    lowest = (near + braked1_m) / t1
+    if not lowest > need0:
+        lowest = need0
+    return math.inf if lowest * t0 - braked0_m > past else lowest
+
+
+def stops_in_time(person: Reach, course: Course, speed_mps: float) -> bool:
+    """Return whether a robot that brakes at once from ``speed_mps`` meets a reach at a stand only.
+
+    No reaction time is left to it, but for the age of the data.
+    """
+    T, a, step_s = person.elapsed_s, course.deceleration_mps2, _step_s(course)
+    t0 = way0 = 0.0
+    while a * (t0 - T) < speed_mps:
+        t1 = t0 + step_s
+        late = max(t1 - T, 0.0)
+        way1 = speed_mps * t1 - 0.5 * a * late * late
+        near, past, past_behind = contact_m(person, course, t0, t1)
+        if way0 <= past_behind or not (way1 < near or way0 > past):
+            return False
+        t0, way0 = t1, way1
+    return True
+
+
+def contact_m(
+    person: Reach, course: Course, t0_s: float, t1_s: float
+) -> tuple[float, float, float]:
+    """Return the ways on which the robot meets somebody's reach from t0 to t1.
+
+    The first two numbers are the ends of an interval, with the person ahead; it is empty, (∞, −∞),
+    where there is none. The third is the end of one that begins before the robot, with the person
+    behind the base, or −∞. A body behind the rear edge does not count: the robot drives away.
+    """
+    m0, m1 = person.drift_s(t0_s), person.drift_s(t1_s)
+    vx, vy, middle_s = person.velocity_x_mps, person.velocity_y_mps, 0.5 * (m0 + m1)
+    dx = person.x_m + vx * middle_s - course.x_m
+    dy = person.y_m + vy * middle_s - course.y_m
+    # Along and across the middle of the fan.
+    x = course.cos * dx + course.sin * dy
+    y = abs(course.cos * dy - course.sin * dx)
+    reach = person.radius_m(t1_s) + 0.5 * (m1 - m0) * math.sqrt(vx * vx + vy * vy)
+    reach += person.uncertainty_m(m1)
+    front, rear, half = course.front_m, course.rear_m, course.half_m
+    cos, sin = course.fan_cos, course.fan_sin
+    rho, side = reach + person.margin_m, half + person.margin_m
+    distance2 = x * x + y * y
+    distance = math.sqrt(distance2)
+    if not distance > _SAME_PLACE_M:  # at the base, or NaN
+        return -math.inf, math.inf, math.inf
+    if course.circle_m > 0.0:  # straight to the person
+        return distance - course.circle_m - course.front_m - rho, math.inf, -math.inf
+    # Seen from the courses of the fan, the middle of the reach lies on an arc about the base, from
+    # the course nearest to it to the one farthest from it. The ends of the arc, and the point to
+    # which a corner of the footprint leads straight, hold the least and the largest way.
+    low_x, low_y = cos * x + sin * y, cos * y - sin * x
+    if low_y <= 0.0:
+        low_x, low_y = distance, 0.0
+    high_x, high_y = cos * x - sin * y, cos * y + sin * x
+    if high_y < 0.0:
+        high_x, high_y = -distance, 0.0
+    near, past, past_behind = math.inf, -math.inf, -math.inf
+    if low_x >= 0.0 and low_y < half + rho:
+        off = low_y - side
+        past = low_x - rear + (math.sqrt(reach * reach - off * off) if off > 0.0 else reach)
+        at, beyond = max(high_x, 0.0), distance - rho
+        if beyond > half:
+            share = half / beyond
+            at = max(at, distance * math.sqrt(1.0 - share * share))
+        at = min(at, low_x)
+        off = math.sqrt(max(distance2 - at * at, 0.0)) - half
+        near = at - front - (math.sqrt(max(rho * rho - off * off, 0.0)) if off > 0.0 else rho)
+    if high_x < 0.0 and high_y < half + rho:
+        at, beyond = min(low_x, 0.0), distance - reach
+        if beyond > side:
+            share = side / beyond
+            at = min(at, -distance * math.sqrt(1.0 - share * share))
+        at = max(at, high_x)
+        off = math.sqrt(max(distance2 - at * at, 0.0)) - side
+        past_behind = at - rear
+        past_behind += math.sqrt(max(reach * reach - off * off, 0.0)) if off > 0.0 else reach
+    if past < 0.0:
+        near, past = math.inf, -math.inf
+    return near, past, past_behind
+
+
+def in_the_path_mps(
+    place_m: tuple[float, float], margin_m: float, clearance_m: float, course: Course
+) -> float:
+    """Return the highest speed by the protective field of a safety laser scanner.
+
+    The field is a rectangle along the middle of the fan: the robot's width with ``clearance_m`` on
+    either side, and its stopping distance with the same. Scanners know neither people nor speeds,
+    so this is today's AMR. A body of radius ``margin_m`` at ``place_m`` (odom) may not be in it. A
+    person behind the rear edge is not, and a number that is not finite gives 0.
+    """
+    dx, dy = place_m[0] - course.x_m, place_m[1] - course.y_m
+    x = course.cos * dx + course.sin * dy
+    off = abs(course.cos * dy - course.sin * dx) - course.half_m - clearance_m
+    if x < course.rear_m - margin_m or off > margin_m:
+        return course.maximum_mps
+    ahead = math.sqrt(margin_m * margin_m - off * off) if off > 0.0 else margin_m
+    gap_m = x - course.front_m - ahead - clearance_m
+    if not gap_m > 0.0:
+        return 0.0
+    a, T = course.deceleration_mps2, course.reaction_s
+    # The root of v T + v²/2a = gap.
+    return min(2.0 * gap_m / (T + math.sqrt(T * T + 2.0 * gap_m / a)), course.maximum_mps)
+
+
+@lru_cache(maxsize=64)
+def passing_radius_m(
+    speed_mps: float, rules: ReachRules | None, clearance_m: float, robot: RobotProfile
+) -> float:
+    """Return the smallest radius of a circle beside which the limit is at least 0.3 m/s.
+
+    The robot passes straight along the circle's edge, with the person standing anywhere beside it.
+    A planner that reads circles and knows no limit would otherwise be led to where the robot hardly
+    moves. It is at least the body radius and the clearance.
+
+    Args:
+        speed_mps: U.
+        rules: of the policy; None for the protective field alone.
+        clearance_m: of the policy.
+        robot: footprint, braking and reaction time.
+    """
+    floor_m = BODY_RADIUS_M + clearance_m
+    if rules is None:
+        return floor_m
+    state = RobotState(0.0, np.zeros(2), 0.0, PASSING_MPS, 0.0)
+    course = course_of(robot, state, math.radians(rules.turn_deg))
+    person = Reach(
+        *(0.0, 0.0, 0.0, 0.0, speed_mps, rules.time_constant_s, rules.delay_s),
+        margin_m=floor_m,
+    )
+
+    def passes(radius_m: float) -> bool:
+        beside_m = radius_m + course.half_m
+        places = np.linspace(course.rear_m - radius_m, course.front_m + 3.0 * radius_m, 16)
+        return all(
+            limit_mps(person._replace(x_m=x, y_m=beside_m), course) >= PASSING_MPS
+            for x in places.tolist()
+        )
+
+    low_m, high_m = floor_m, floor_m + 0.25
+    while not passes(high_m):
+        low_m, high_m = high_m, high_m + 0.25
+    while high_m - low_m > 0.004:
+        middle_m = 0.5 * (low_m + high_m)
+        low_m, high_m = (low_m, middle_m) if passes(middle_m) else (middle_m, high_m)
+    return high_m
+
+
+def _is_far(person: Reach, course: Course) -> bool:
+    """Return whether a person cannot be met before a robot at its maximum has stopped."""
+    stop_s = course.reaction_s + person.elapsed_s + course.maximum_mps / course.deceleration_mps2
+    stop_s += _step_s(course)
+    way_m = course.maximum_mps * stop_s
+    drift_s = person.drift_s(stop_s)
+    walked_m = drift_s * math.hypot(person.velocity_x_mps, person.velocity_y_mps)
+    size_m = math.hypot(max(course.front_m, -course.rear_m), course.half_m) + course.circle_m
+    uncertainty_m = max(person.uncertainty_m(drift_s), person.uncertainty_m(0.0))
+    around_m = person.radius_m(stop_s) + walked_m + uncertainty_m + person.margin_m + size_m
+    distance_m = math.hypot(person.x_m - course.x_m, person.y_m - course.y_m)
+    return distance_m > way_m + around_m
+
+
+def _step_s(course: Course) -> float:
+    stop_s = course.reaction_s + course.maximum_mps / ROOM / course.deceleration_mps2
+    return stop_s / STEPS
+
+
+def _off_heading_rad(state: RobotState) -> float:
+    """Return the direction of travel off the heading; 0 at a stand."""
+    if abs(state.lateral_mps) > LATERAL_NOISE_MPS:
+        return math.atan2(state.lateral_mps, state.speed_mps)
+    return math.pi if state.speed_mps <= -STANDING_MPS else 0.0
+
+
+def _course(
+    robot: RobotProfile,
+    state: RobotState,
+    age_s: float,
+    middle_rad: float,
+    fan_rad: float,
+    extent_m: tuple[float, float, float],
+) -> Course:
+    """Return a fan about ``middle_rad`` off the heading, of a robot that may have driven since."""
+    x, y = state.position_odom_m.tolist()
+    travel_mps = state.travel_mps
+    fastest_mps = max(travel_mps, robot.max_speed_mps)
+    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
+    driven_m = min(travel_mps * age_s + faster_m, fastest_mps * age_s)
+    front_m, rear_m, half_m = extent_m
+    middle_rad += state.heading_odom_rad
+    return Course(
+        *(x, y, math.cos(middle_rad), math.sin(middle_rad)),
+        *(math.cos(fan_rad), math.sin(fan_rad), front_m + driven_m, rear_m, half_m, 0.0),
+        ROOM * robot.max_speed_mps,
+        robot.max_deceleration_mps2,
+        robot.reaction_time_s,
+    )
+
+
+def _extent_m(
+    footprint_m: FloatArray, off_rad: float, swing_rad: float
+) -> tuple[float, float, float]:
+    """Return front, rear and half the width along a course ``off_rad`` from the heading.
+
+    They hold the footprint turned by up to ``swing_rad`` about that course, either way.
+    """
+    cos, sin = math.cos(off_rad), math.sin(off_rad)
+    corners = [(cos * x + sin * y, cos * y - sin * x) for x, y in footprint_m.tolist()]
+    front, rear = max(x for x, _ in corners), min(x for x, _ in corners)
+    half = max(abs(y) for _, y in corners)
+    if swing_rad <= 0.0:
+        return front, rear, half
+    radius = max(math.hypot(x, y) for x, y in corners)
+    cos, sin = math.cos(min(swing_rad, 0.5 * math.pi)), math.sin(min(swing_rad, 0.5 * math.pi))
+    return (
+        min(front + half * sin, radius),
+        max(rear - half * sin, -radius),
+        min(half * cos + max(front, -rear) * sin, radius) if cos > 0.0 else radius,
+    )

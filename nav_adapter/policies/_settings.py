@@ -1,0 +1,113 @@
+"""Settings besides radius and speed: reach, margins, time behaviour and alerts."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from pydantic import Field, model_validator
+
+from perception.anthropometry import BODY_RADIUS_M
+from tracking.config import StrictConfig
+
+from .._errors import NavError
+
+
+class ReachRules(StrictConfig):
+    """How people change their motion, and how far the robot may turn while it stops.
+
+    Attributes:
+        time_constant_s: τ, in which a person changes to another velocity. 0.54 s is the fit to
+            recorded people who set off (docs/people.md).
+        delay_s: δ, how long a person may have begun to do so before the sensors show it.
+        turn_deg: the robot may turn by this much off its course, either way, while it stops.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    time_constant_s: float = Field(default=0.54, ge=0.05, le=5.0)
+    delay_s: float = Field(default=0.15, ge=0.0, le=2.0)
+    turn_deg: float = Field(default=30.0, ge=0.0, le=180.0)
+
+
+class SafetyMargins(StrictConfig):
+    """Margins that hold for every α.
+
+    Attributes:
+        clearance_m: from footprint to body, in every direction; at least 0.10 m. Body radius
+            (0.30 m) plus this is the floor of every obstacle radius.
+        uncertainty_sigmas: number of standard deviations of a person's place and velocity (along
+            the most uncertain direction) that enlarge obstacle and reach. 2 covers 98 % of a normal
+            error towards the robot.
+        unseen_sigmas: the number that enlarges the reach of a person unseen for longer than
+            ``fresh_within_s``; at least ``uncertainty_sigmas`` count. No measurement corrects the
+            prediction of an unseen person.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    clearance_m: float = Field(default=0.10, ge=0.10, le=2.0)
+    uncertainty_sigmas: float = Field(default=2.0, ge=0.0, le=5.0)
+    unseen_sigmas: float = Field(default=2.5, ge=0.0, le=5.0)
+
+    @property
+    def floor_m(self) -> float:
+        """Smallest radius of any obstacle: body radius plus clearance."""
+        return BODY_RADIUS_M + self.clearance_m
+
+
+class TimeBehaviour(StrictConfig):
+    """Time behaviour of the adapter. Growth needs no setting: obstacles grow at once.
+
+    Attributes:
+        shrink_rate_mps: largest rate at which an obstacle shrinks, while frames show the person.
+        fresh_within_s: a person unseen for longer counts as unaware. Must exceed the camera's
+            period plus the delay of perception.
+        hold_s: a confirmed person who disappears from the input is kept, as unaware and with
+            constant velocity, until this time after the last sighting.
+        lost_rise_mps2: when such a person is dropped, or one whom the tracker has given up out of
+            sight, the limit that they set rises no faster than this. None: it rises at once.
+        stale_after_s: if perception or the robot's state is older, everyone counts as unaware.
+        stop_after_s: if either is older than this, the speed limit is 0.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    shrink_rate_mps: float = Field(default=0.5, gt=0.0, le=5.0)
+    fresh_within_s: float = Field(default=0.25, gt=0.0, le=1.0)
+    hold_s: float = Field(default=1.0, ge=0.0, le=10.0)
+    lost_rise_mps2: float | None = Field(default=0.7, gt=0.0, le=10.0)
+    stale_after_s: float = Field(default=0.5, gt=0.0, le=5.0)
+    stop_after_s: float = Field(default=1.5, gt=0.0, le=10.0)
+
+    @model_validator(mode="after")
+    def _check_order(self) -> TimeBehaviour:
+        if not self.fresh_within_s <= self.stale_after_s <= self.stop_after_s:
+            raise ValueError(
+                "fresh_within_s <= stale_after_s <= stop_after_s must hold, got "
+                f"{self.fresh_within_s:g} s, {self.stale_after_s:g} s, {self.stop_after_s:g} s"
+            )
+        return self
+
+
+class AlertRules(StrictConfig):
+    """Rules for alerts: whom to warn, how, and how often at most.
+
+    A person is warned if the lower bound of α is below 0.3 and the moving robot passes within
+    ``miss_within_m``. Of the alerts whose time is reached, the loudest is given: horn before voice
+    before light. The same person gets the same alert again after 3 s at the earliest, and two
+    sounds are at least 1 s apart.
+
+    Attributes:
+        miss_within_m: a person is warned if the gap between robot and body at the closest approach,
+            at constant velocities, is at most this.
+        light_within_s: time to the closest approach below which light is given; 0 for never.
+        voice_within_s: the same for a spoken warning.
+        horn_within_s: the same for the horn.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    miss_within_m: float = Field(default=0.5, ge=0.0, le=5.0)
+    light_within_s: float = Field(default=5.0, ge=0.0, le=30.0)
+    voice_within_s: float = Field(default=3.5, ge=0.0, le=30.0)
+    horn_within_s: float = Field(default=2.0, ge=0.0, le=30.0)

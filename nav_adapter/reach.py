@@ -1,0 +1,86 @@
+"""How far a person can come: the one model of people's motion that limit and proof rest on.
+
+Somebody at p with velocity u may change, from now on, to any velocity up to U, with the time
+constant τ, after going unnoticed for δ. At time t they are within
+
+    r(t) = U (t + δ − τ (1 − e^{−(t + δ)/τ}))   of   p + u τ (1 − e^{−t/τ}),
+
+plus the body and the uncertainty of place and velocity. τ = 0.54 s and U = 1.34 m/s fit recorded
+people who set off (``docs/people.md``). Somebody who stands needs time to start, somebody who walks
+away time to turn, and a brisk walker time to swerve: all three are this one statement.
+``docs/safety.md`` derives it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from perception.anthropometry import BODY_RADIUS_M
+
+
+class Reach(NamedTuple):
+    """The reach of one person, in odom, as plain floats.
+
+    Attributes:
+        x_m: place p of the body's centre line, ``elapsed_s`` before the present.
+        y_m: the same.
+        velocity_x_mps: velocity u at the same time.
+        velocity_y_mps: the same.
+        speed_mps: U ≥ 0, the highest speed that they may change to.
+        time_constant_s: τ > 0.
+        delay_s: δ ≥ 0, how long a change of velocity may have gone unnoticed.
+        elapsed_s: ≥ 0, age of place and velocity.
+        margin_m: body radius and clearance.
+        variances: a₀, a₁, a₂ of the variance a₀ + a₁ m + a₂ m² (m²) of the place after a drift of
+            m = τ (1 − e^{−t/τ}) seconds, with the standard deviations that count already squared
+            in.
+    """
+
+    x_m: float
+    y_m: float
+    velocity_x_mps: float
+    velocity_y_mps: float
+    speed_mps: float
+    time_constant_s: float
+    delay_s: float
+    elapsed_s: float = 0.0
+    margin_m: float = BODY_RADIUS_M
+    variances: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def drift_s(self, ahead_s: float) -> float:
+        """Return m, by which u carries the middle of the reach until ``ahead_s`` from now."""
+        tau = self.time_constant_s
+        return tau * -math.expm1(-(ahead_s + self.elapsed_s) / tau)
+
+    def radius_m(self, ahead_s: float) -> float:
+        """Return r, how far from that middle the body's centre line may be ``ahead_s`` from now."""
+        tau, since_s = self.time_constant_s, ahead_s + self.elapsed_s + self.delay_s
+        return self.speed_mps * (since_s + tau * math.expm1(-since_s / tau))
+
+    def uncertainty_m(self, drift_s: float) -> float:
+        """Return by how much the middle may be wrong after a drift."""
+        a0, a1, a2 = self.variances
+        return math.sqrt(max(a0 + drift_s * (a1 + drift_s * a2), 0.0))
+
+
+def covariance_terms(
+    covariance_odom: list[list[float]], sigmas: float
+) -> tuple[float, float, float]:
+    """Return :attr:`Reach.variances` of a track's covariance (4, 4), x, y, vx, vy.
+
+    After a drift m the place has the covariance P + m (C + Cᵀ) + m² V by blocks. Its largest
+    eigenvalue is at most the sum of those of the three.
+    """
+    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = covariance_odom
+    factor = sigmas * sigmas
+    return (
+        factor * _largest(xx, yy, xy),
+        factor * _largest(2.0 * xu, 2.0 * yv, xv + yu),
+        factor * _largest(uu, vv, uv),
+    )
+
+
+def _largest(xx: float, yy: float, xy: float) -> float:
+    """Return the larger eigenvalue of a symmetric matrix."""
+    return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
