@@ -218,7 +218,7 @@ class ObstacleRules:
         if rules.standing is not None and rules.standing.is_standing(
             math.hypot(*person.velocity_odom_mps), variance_m2ps2
         ):
-            start_delay_s = rules.standing.delay_s(unseen_s, track.moved_m, track.moved_age_s)
+            start_delay_s = rules.standing.delay_s(unseen_s, math.inf, 0.0)
         if rules.walking is not None:
             turn_delay_s = rules.walking.turn_delay_s + unseen_s
             spread_mps = rules.walking.velocity_sigmas * math.sqrt(variance_m2ps2)

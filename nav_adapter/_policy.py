@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final
+from typing import Annotated, Any, ClassVar
 
 from pydantic import GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
@@ -79,10 +79,6 @@ class _ShippedOrCustom:
         )
 
 
-# Long enough for a mean place, short enough to follow the drift of odom.
-_STANDING_WINDOW_S: Final = 1.0
-
-
 class AwarenessPolicy(StrictConfig):
     """All settings between a person's awareness and the planner's constraints.
 
@@ -133,12 +129,6 @@ class AwarenessPolicy(StrictConfig):
                     f"{unaware_m:g} m, got {ceiling_m:g} m"
                 )
         return self
-
-    @property
-    def standing_window_s(self) -> float | None:
-        """The setting of this name that a tracker needs for ``rules.standing``; None for off."""
-        standing = self.rules.standing
-        return _STANDING_WINDOW_S if standing is not None and standing.delay_from_tracks else None
 
     @classmethod
     def preset(cls, name: str) -> AwarenessPolicy:

@@ -51,10 +51,7 @@ def from_adapter(
     policy: AwarenessPolicy, outline: FloatArray, ahead_m: FloatArray, alpha: float
 ) -> list[float]:
     robot = replace(ROBOT, footprint_m=outline)
-    people = [
-        replace(person(position=(x, 0.0), awareness_lower=alpha), moved_m=0.0)
-        for x in ahead_m.tolist()
-    ]
+    people = [person(position=(x, 0.0), awareness_lower=alpha) for x in ahead_m.tolist()]
     return [settled_update([each], policy=policy, robot=robot).speed_limit_mps for each in people]
 
 
