@@ -30,12 +30,7 @@ RULES: dict[str, dict[str, Any]] = {
         "walking": WalkingPeople(human_acceleration_mps2=1.0),
         "standing": StandingPeople(),
     },
-    "own delay": {"standing": StandingPeople(delay_from_tracks=True)},
-    "of the presets": {
-        "walking": WalkingPeople(),
-        "standing": StandingPeople(delay_from_tracks=True),
-        "start_reserve": StartReserve(),
-    },
+    "of the presets": {"walking": WalkingPeople(), "start_reserve": StartReserve()},
     "late reserve": {
         "walking": WalkingPeople(),
         "start_reserve": StartReserve(start_delay_s=0.4),
