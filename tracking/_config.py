@@ -118,11 +118,6 @@ class TrackedPolicy(Protocol):
         """Settings of the awareness filter."""
         ...
 
-    @property
-    def standing_window_s(self) -> float | None:
-        """The tracker's setting of this name."""
-        ...
-
 
 class TrackerConfig(TrackingConfig):
     """Settings of :class:`~tracking.PersonTracker`.
@@ -215,10 +210,6 @@ class TrackerConfig(TrackingConfig):
 
     standing_time_constant_s: float = Field(default=1.0, ge=_LEAST_S, le=_MOST_S)
     """Time constant with which the velocity of an unseen standing person decays."""
-
-    standing_window_s: float | None = Field(default=None, ge=0.5, le=5.0)
-    """``PersonTrack.moved_m`` compares where a person is with where they stood for this long; 1 s
-    is a good choice. None switches it off."""
 
     body_radius_m: float = Field(default=0.25, ge=1e-3, le=10.0)
     """Radius of a person as an occluder: a body hides the people behind it."""

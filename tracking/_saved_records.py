@@ -9,12 +9,11 @@ from pydantic import Field, ValidationError, model_validator
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._exits import MAX_EVENTS
-from ._places import SLOTS, PlainPlace
 from ._sensors import CAMERA, SensorConfig
 from .config import StrictConfig, complaints
 
 FORMAT: Final = "awarenav-tracker"
-VERSION: Final = 2
+VERSION: Final = 3
 
 _Two: TypeAlias = tuple[float, float]
 _Four: TypeAlias = tuple[float, float, float, float]
@@ -35,7 +34,7 @@ class TracksRecord(StrictConfig):
     standing: list[bool]
     seen_stamps_s: list[list[float | None]]
     missed_s: list[list[float]]
-    passed_stamps_s: list[list[float | None]] | None = None
+    passed_stamps_s: list[list[float | None]]
     existence_logits: list[float]
     birth_stamps_s: list[float]
     birth_places_camera_m: list[_Two]
@@ -51,15 +50,13 @@ class TracksRecord(StrictConfig):
     look_speeds_mps: list[float]
     look_standing: list[bool]
     averted_s: list[float]
-    lasting_stds: list[Annotated[float, Field(ge=0.0, le=1e3)]] | None = None
-    size_logs: list[float] | None = None
-    size_variances: list[Annotated[float, Field(gt=0.0)] | None] | None = None
-    places: list[Annotated[list[PlainPlace], Field(max_length=SLOTS)]] | None = None
+    lasting_stds: list[Annotated[float, Field(ge=0.0, le=1e3)]]
+    size_logs: list[float]
+    size_variances: list[Annotated[float, Field(gt=0.0)] | None]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> TracksRecord:
-        columns = {name: getattr(self, name) for name in type(self).model_fields}
-        lengths = {name: len(column) for name, column in columns.items() if column is not None}
+        lengths = {name: len(getattr(self, name)) for name in type(self).model_fields}
         if len(set(lengths.values())) > 1:
             raise ValueError(f"every column must have one entry per track, got {lengths}")
         if any(a >= b for a, b in zip([0, *self.ids], self.ids, strict=False)):
@@ -105,7 +102,7 @@ class StateRecord(StrictConfig):
     clocks: dict[str, FrameClockRecord]
     faces: FrameClockRecord
     origin_odom_m: _Two | None
-    origin_velocity_mps: _Two = (0.0, 0.0)
+    origin_velocity_mps: _Two
     exits: ExitsRecord
     next_id: int = Field(ge=1, lt=2**63)
     tracks: TracksRecord
@@ -126,11 +123,7 @@ class StateRecord(StrictConfig):
                     f"hit_stamps_s must end in a stamp of at most {self.stamp_s} s, got {row}"
                 )
         tracks = self.tracks
-        rows: list[Any] = [
-            *tracks.seen_stamps_s,
-            *tracks.missed_s,
-            *(tracks.passed_stamps_s or ()),
-        ]
+        rows: list[Any] = [*tracks.seen_stamps_s, *tracks.missed_s, *tracks.passed_stamps_s]
         if any(len(row) != len(self.clocks) for row in rows):
             raise ValueError(
                 "seen_stamps_s, missed_s and passed_stamps_s must hold one number per sensor, "
@@ -150,9 +143,9 @@ class FrameRecord(StrictConfig):
     evidence_means: list[float | None]
     evidence_variances: list[float | None]
     weak: list[bool]
-    lasting_stds: list[Annotated[float, Field(ge=0.0, le=1e3)]] | None = None
-    size_logs: list[float | None] | None = None
-    size_variances: list[float | None] | None = None
+    lasting_stds: list[Annotated[float, Field(ge=0.0, le=1e3)]]
+    size_logs: list[float | None]
+    size_variances: list[float | None]
 
     @model_validator(mode="after")
     def _check_consistency(self) -> FrameRecord:
@@ -162,11 +155,9 @@ class FrameRecord(StrictConfig):
             len(self.evidence_means),
             len(self.evidence_variances),
             len(self.weak),
-            *(
-                len(column)
-                for column in (self.lasting_stds, self.size_logs, self.size_variances)
-                if column is not None
-            ),
+            len(self.lasting_stds),
+            len(self.size_logs),
+            len(self.size_variances),
         }
         if len(lengths) > 1:
             raise ValueError("every column of a frame must have one entry per observation")
@@ -211,25 +202,25 @@ class LeapRecord(StrictConfig):
 
 
 class ClockRecord(StrictConfig):
-    """Jumps of the clock. A state of before there were leaps has none."""
+    """Jumps of the clock."""
 
     refused_early_frames: int = Field(ge=0)
     restarts: int = Field(ge=0)
     jumped: dict[str, JumpedClockRecord]
-    refused_frames: dict[str, int] = Field(default_factory=dict)
-    ahead: dict[str, JumpedClockRecord] = Field(default_factory=dict)
-    leap: LeapRecord | None = None
+    refused_frames: dict[str, int]
+    ahead: dict[str, JumpedClockRecord]
+    leap: LeapRecord | None
 
 
 class TrackerRecord(HistoryRecord):
     """A tracker without its views, but with the frames that may still be replayed."""
 
     format: Literal["awarenav-tracker"]
-    version: Literal[2]
+    version: Literal[3]
     config: TrackerConfig
     sensors: dict[str, SensorConfig]
-    sensor_order: list[str] = Field(default_factory=list)
-    """Names of the sensors in the order of the columns; those of ``sensors`` if it is empty."""
+    sensor_order: list[str]
+    """Names of all sensors in the order of the columns."""
 
     refused_late_frames: int = Field(ge=0)
     clock: ClockRecord
@@ -237,7 +228,7 @@ class TrackerRecord(HistoryRecord):
     @model_validator(mode="after")
     def _check_consistency(self) -> TrackerRecord:
         names = {CAMERA, *self.sensors}
-        if self.sensor_order and sorted(self.sensor_order) != sorted(names):
+        if sorted(self.sensor_order) != sorted(names):
             raise ValueError(
                 f"sensor_order must have each of {', '.join(sorted(names))} once, "
                 f"got {', '.join(self.sensor_order)}"
@@ -262,11 +253,6 @@ class TrackerRecord(HistoryRecord):
                     "track"
                 )
         return self
-
-    @property
-    def names(self) -> list[str]:
-        """Names of all sensors in the order of the columns."""
-        return self.sensor_order or [CAMERA, *self.sensors]
 
 
 def record_of(state: Any) -> TrackerRecord:

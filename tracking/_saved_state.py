@@ -18,7 +18,6 @@ from ._errors import TrackingError
 from ._exits import Exits
 from ._history import History
 from ._measurement import Frame, Measurements
-from ._places import places_of, plain_places
 from ._saved_records import (
     FORMAT,
     VERSION,
@@ -87,9 +86,9 @@ def sensors_in(
             f"sensors must be those of the saved tracker, {list(record.sensors)}, with their "
             f"settings; got {list(given)}, and these differ: {differing}"
         )
-    if record.names[0] != CAMERA:
-        raise TrackingError(f"sensor_order must begin with {CAMERA!r}, got {record.names}")
-    return {name: given[name] for name in record.names[1:]}
+    if record.sensor_order[0] != CAMERA:
+        raise TrackingError(f"sensor_order must begin with {CAMERA!r}, got {record.sensor_order}")
+    return {name: given[name] for name in record.sensor_order[1:]}
 
 
 def history_of(record: TrackerRecord, empty: History, sensors: Sensors) -> History:
@@ -135,8 +134,7 @@ def state_of(
     record: StateRecord, names: Sequence[str], config: TrackerConfig, name: str
 ) -> TrackerState:
     """Return the state that a record describes; ``name`` is for messages."""
-    confirm_hits, window_s = config.confirm_hits, config.standing_window_s
-    tracks = record.tracks
+    confirm_hits, tracks = config.confirm_hits, record.tracks
     for index, covariance in enumerate(tracks.covariances):
         covariance_matrix(f"{name}.tracks.covariances[{index}]", covariance, 4, TrackingError)
     count = len(tracks.ids)
@@ -158,8 +156,7 @@ def state_of(
         ).reshape(count, len(names)),
         missed_s=_array([one for row in tracks.missed_s for one in row]).reshape(count, len(names)),
         passed_stamps_s=_array(
-            [one for row in tracks.passed_stamps_s or [[None] * len(names)] * count for one in row],
-            -math.inf,
+            [one for row in tracks.passed_stamps_s for one in row], -math.inf
         ).reshape(count, len(names)),
         existence_logits=_array(tracks.existence_logits),
         birth_stamps_s=_array(tracks.birth_stamps_s),
@@ -176,10 +173,9 @@ def state_of(
         look_speeds_mps=_array(tracks.look_speeds_mps),
         look_standing=np.array(tracks.look_standing, dtype=np.bool_),
         averted_s=_array(tracks.averted_s),
-        lasting_stds=_array(tracks.lasting_stds or [0.0] * count),
-        size_logs=_array(tracks.size_logs or [0.0] * count),
-        size_variances=_array(tracks.size_variances or [None] * count, math.inf),
-        places=places_of(tracks.places or (), count, window_s),
+        lasting_stds=_array(tracks.lasting_stds),
+        size_logs=_array(tracks.size_logs),
+        size_variances=_array(tracks.size_variances, math.inf),
     )
     events = record.exits
     exits = Exits(
@@ -225,9 +221,9 @@ def frame_of(record: FrameRecord, names: Sequence[str], name: str) -> Frame:
             _array(record.evidence_means, math.nan),
             _array(record.evidence_variances, math.nan),
             np.array(record.weak, dtype=np.bool_),
-            _array(record.lasting_stds or [0.0] * count),
-            _array(record.size_logs or [None] * count),
-            _array(record.size_variances or [None] * count),
+            _array(record.lasting_stds),
+            _array(record.size_logs, math.nan),
+            _array(record.size_variances, math.nan),
         ),
         list(names).index(record.sensor),
     )
@@ -298,7 +294,6 @@ def _plain_state(state: TrackerState, sensors: Sensors) -> dict[str, Any]:
             "lasting_stds": tracks.lasting_stds.tolist(),
             "size_logs": tracks.size_logs.tolist(),
             "size_variances": _finite_or_none(tracks.size_variances),
-            "places": plain_places(tracks.places),
         },
     }
 

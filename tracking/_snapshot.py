@@ -13,7 +13,6 @@ from ._noticed import noticed
 from ._sensors import Sensors
 from ._sizes import with_lasting
 from ._step import TrackerState, predicted
-from ._stillness import moved
 from ._table import BoolArray, TrackTable
 from ._track import PersonTrack, TrackStatus, trusted_track
 from ._track_management import coasted_too_long, shown_empty
@@ -54,8 +53,6 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             config.awareness,
         )
     estimated = estimate(belief, config.awareness)
-    moved_m, moved_stamps_s = moved(tracks, config.standing_window_s)
-    moved_ages_s = np.where(np.isfinite(moved_m), stamp_s - moved_stamps_s, 0.0)
     covariances = with_lasting(tracks, state.origin_odom_m, state.origin_velocity_mps)
     # The snapshots share these arrays.
     tracks.states.setflags(write=False)
@@ -76,8 +73,6 @@ def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[Pe
             (stamp_s - tracks.last_seen_s).tolist(),
             _places_empty(state, tracks, sensors),
             noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
-            moved_m.tolist(),
-            moved_ages_s.tolist(),
         )
     )
 

@@ -20,10 +20,8 @@ from ._matching import Found, match_frame
 from ._measurement import Frame, Measurements
 from ._motion import predict
 from ._noticed import with_noticed
-from ._places import slots_of
 from ._sensors import Sensors, seen_lately
 from ._sizes import with_sizes, with_sizes_forgotten
-from ._stillness import with_places
 from ._table import BoolArray, TrackTable
 from ._track_management import (
     damped_time_s,
@@ -72,8 +70,7 @@ class TrackerState:
 
 def nobody(config: TrackerConfig, sensors: Sensors, next_id: int = 1) -> TrackerState:
     """Return the state before the first frame."""
-    slots = slots_of(config.standing_window_s)
-    table = TrackTable.empty(config.confirm_hits, len(sensors), slots)
+    table = TrackTable.empty(config.confirm_hits, len(sensors))
     return TrackerState(table, (FrameClock(),) * len(sensors), next_id)
 
 
@@ -112,7 +109,6 @@ def advance(state: TrackerState, frame: Frame, sensors: Sensors) -> TrackerState
     tracks = _with_sizes(tracks, frame, given, found, state, sensors)
     tracks = _with_awareness(tracks, frame, found, earlier, state, sensors)
     tracks = with_noticed(before, tracks, frame, found, earlier.faces, dt_s, state.clocks, sensors)
-    tracks = with_places(tracks, frame, found, sensors)
     view = sensor.view if frame.view is None else frame.view
     tracks = tracks.replaced(
         missed_s=missed_time_s(tracks, ~found.seen, dt_s, frame, config, view),

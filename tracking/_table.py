@@ -58,8 +58,6 @@ class TrackTable:
             is not in ``covariances`` (``_sizes``).
         size_logs: (N,) ln of the range at which an adult would look as large, over the range.
         size_variances: (N,) of it; ∞ where nothing is known of the person's size.
-        places: (N, K, 4) latest measured places (``_stillness``), oldest first; K is 0 if they
-            are not asked for.
     """
 
     ids: IntArray
@@ -93,11 +91,10 @@ class TrackTable:
     lasting_stds: FloatArray
     size_logs: FloatArray
     size_variances: FloatArray
-    places: FloatArray
 
     @staticmethod
-    def empty(confirm_hits: int, sensors: int = 1, places: int = 0) -> TrackTable:
-        """Return a table without tracks, for these numbers of sensors and of places."""
+    def empty(confirm_hits: int, sensors: int = 1) -> TrackTable:
+        """Return a table without tracks, for this number of sensors."""
         no_numbers = np.empty(0)
         no_flags = np.empty(0, dtype=np.bool_)
         return TrackTable(
@@ -132,7 +129,6 @@ class TrackTable:
             lasting_stds=no_numbers,
             size_logs=no_numbers,
             size_variances=no_numbers,
-            places=np.empty((0, places, 4)),
         )
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any, Final, Literal, cast, get_args
 
@@ -36,10 +35,6 @@ class PersonTrack:
             person was out of sight and may still be there.
         noticed: lower bound, in [0, 1], of the probability that this person has noticed the robot
             by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
-        moved_m: upper bound (99.9 %) of the distance between where this person stood in the last
-            second and where they were ``moved_age_s`` before the stamp; infinite for people who do
-            not stand or of whom too little is known, and unless ``standing_window_s`` is set.
-        moved_age_s: ≥ 0; 0 where ``moved_m`` is infinite.
     """
 
     id: int
@@ -55,8 +50,6 @@ class PersonTrack:
     time_since_seen_s: float
     place_empty: bool = False
     noticed: float = 0.0
-    moved_m: float = math.inf
-    moved_age_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.status not in get_args(TrackStatus):
@@ -93,8 +86,6 @@ class PersonTrack:
             time_since_seen_s=number("time_since_seen_s", 0.0),
             place_empty=bool(self.place_empty),
             noticed=number("noticed", 0.0, 1.0),
-            moved_m=math.inf if self.moved_m == math.inf else number("moved_m", 0.0),
-            moved_age_s=number("moved_age_s", 0.0),
         )
 
 

@@ -18,7 +18,6 @@ from ._existence import confirming_logit
 from ._exits import floor_places
 from ._kalman import inverse_2x2
 from ._measurement import Frame
-from ._places import no_places
 from ._table import BoolArray, IndexArray, TrackTable
 from ._views import RangedView, View
 from .awareness_filter import prior
@@ -85,7 +84,6 @@ def initiate(
         lasting_stds=measured.lasting_stds[unmatched],
         size_logs=np.zeros(count),
         size_variances=np.full(count, np.inf),
-        places=no_places(count, config.standing_window_s),
     )
 
 

@@ -36,25 +36,21 @@ from ._prediction import fit_table, prediction_table
 from ._prediction_sets import HORIZONS_S
 from ._rates import rate_table
 from ._stonesoup import StoneSoupGnn, StoneSoupJpda
-from ._two_sensors import MOVED, two_sensor_cost_ms
+from ._two_sensors import two_sensor_cost_ms
 
 BASELINE = Path(__file__).with_name("baseline.json")
 SETS = {"open": OPEN, "occluded": OCCLUDED}
 #: The baseline holds for runs of this size only.
 STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
 PARTS = ("scores", "rates", "cost", "sensors", "consistency", "prediction")
-#: These need minutes; the first and the last need the simulator.
-STARTS, FIT, GAZE = "starts", "fit", "gaze"
+#: These need minutes; the last needs the simulator.
+FIT, GAZE = "fit", "gaze"
 #: Recorded people lie beside the repository, if anywhere; see README.md.
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "data"
 COST_PEOPLE = (20, 100, 300)
 COST_FRAMES, COST_REPEATS = 150, 3
 #: Wanted: an update with two sensors takes at most this much longer than with the camera alone.
 MOST_FOR_TWO_SENSORS = 1.5
-#: The same with ``moved_m``, which is off by default.
-MOST_WITH_MOVED = 1.75
-#: Starts per seed, and the largest share of moving frames with a delay that is too short.
-STARTS_PER_SEED, MOST_SHORT = 6, 0.001
 STEPS_S = (0.03, 0.05, 0.1, 0.2, 0.4)
 CONSISTENCY_WALKERS, CONSISTENCY_FRAMES = 60, 60
 _NEEDS = {"norfair": "norfair", "stonesoup-gnn": "stonesoup", "stonesoup-jpda": "stonesoup"}
@@ -98,8 +94,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         fit_table(options.recordings)
     if GAZE in options.parts:
         _gaze()
-    if STARTS in options.parts:
-        _starts(options, missed)
     return finish(metrics, missed, baseline if _is_standard(options) else {}, options.out)
 
 
@@ -154,10 +148,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--parts",
-        type=_subset((*PARTS, STARTS, FIT, GAZE)),
+        type=_subset((*PARTS, FIT, GAZE)),
         default=list(PARTS),
         metavar="NAMES",
-        help=f"some of {', '.join(PARTS)} (default: these), {STARTS}, {FIT}, {GAZE}",
+        help=f"some of {', '.join(PARTS)} (default: these), {FIT}, {GAZE}",
     )
     parser.add_argument(
         "--stonesoup-up-to",
@@ -321,7 +315,7 @@ def _sensors(
     for name, value in cost.items():
         ratio = value / cost["camera"]
         print(f"{name:20s}{COST_PEOPLE[0]:6d}{value:12.3f}{ratio:14.3f}", flush=True)
-        if ratio > (MOST_WITH_MOVED if name == MOVED else MOST_FOR_TWO_SENSORS):
+        if ratio > MOST_FOR_TWO_SENSORS:
             missed.append(f"an update with {name} takes {ratio:.2f} times as long")
     both = cost["camera and scanner"] / cost["camera"]
     metrics.append(
@@ -365,27 +359,3 @@ def _gaze() -> None:
     print(f"\n{'error ahead, m':28s}" + "".join(f"{each:>8g} s" for each in HORIZONS_S))
     for name, errors_m in gaze_gains(range(100, 112), range(12)).items():
         print(f"{name:28s}" + "".join(f"{each:10.4f}" for each in errors_m), flush=True)
-
-
-def _starts(options: argparse.Namespace, missed: list[str]) -> None:
-    """Measure how soon starts are noticed, and print what that is worth."""
-    # Needs the simulator.
-    from ._starts import (  # noqa: PLC0415
-        RATES_HZ,
-        measure_starts,
-        start_lines,
-        worth_lines,
-    )
-
-    print(f"\n{'start delay, s':24s}{'10 %':>6s}{'50 %':>7s}{'75 %':>7s}{'90 %':>7s}", end="")
-    print("   known  too short, of frames in motion")
-    runs = [(rate, 0.015, False) for rate in RATES_HZ]
-    runs += [(RATES_HZ[0], 0.03, False), (RATES_HZ[0], 0.015, True)]
-    for rate_hz, noise_m, merged in runs:
-        name = f"{rate_hz:g} Hz, {1e3 * noise_m:g} mm{', merged' if merged else ''}"
-        count = STARTS_PER_SEED * options.seeds
-        found = measure_starts(count, rate_hz, options.seed, noise_m=noise_m, merged=merged)
-        print("\n".join(start_lines(name, found)), flush=True)
-        if found.short > MOST_SHORT * found.moving:
-            missed.append(f"starts, {name}: {found.short} of {found.moving} delays too short")
-    print("\n" + "\n".join(worth_lines()))

@@ -14,8 +14,6 @@ from tracking import AwarenessFilterConfig, PersonTracker, SensorConfig, Tracker
 from ._measurements import SimulatedRecording
 from ._ours import T_ODOM_CAMERA, observations
 
-#: The name of the costs with ``moved_m``.
-MOVED = "… and moved"
 _SCAN_STD_M = 0.05
 _FrameOf = tuple[float, tuple[PersonObservation, ...], str]
 
@@ -32,13 +30,11 @@ def two_sensor_cost_ms(
     alone = [frame for frame in both if frame[2] == "camera"]
     memory = AwarenessFilterConfig(**{**config.awareness.model_dump(), "noticed_memory_s": 5.0})
     noticing = config.model_copy(update={"awareness": memory})
-    standing = config.model_copy(update={"standing_window_s": 1.0})
     scanner = {"laser": SensorConfig()}
     makers: dict[str, tuple[Callable[[], PersonTracker], list[_FrameOf]]] = {
         "camera": (lambda: PersonTracker(config), alone),
         "camera and scanner": (lambda: PersonTracker(config, sensors=scanner), both),
         "… and noticed": (lambda: PersonTracker(noticing, sensors=scanner), both),
-        MOVED: (lambda: PersonTracker(standing, sensors=scanner), both),
     }
     least = {name: np.full(len(frames), np.inf) for name, (_, frames) in makers.items()}
     for _ in range(repeats):

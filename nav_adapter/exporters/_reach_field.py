@@ -393,7 +393,7 @@ def _contacts_m(
     off = np.maximum(np.sqrt(np.maximum(distance2 - at * at, 0.0)) - half, 0.0)
     near = at - front - np.sqrt(np.maximum(rho * rho - off * off, 0.0))
     ahead &= past >= 0.0
-    near, past = np.where(ahead, near, np.inf), np.where(ahead, past, -np.inf)
+    near, past = np.where(ahead, near, 1e9), np.where(ahead, past, -np.inf)
     behind = np.full(len(px), -np.inf)
     if backward.any():
         corner2 = np.square(np.maximum(distance - reach, 0.0))

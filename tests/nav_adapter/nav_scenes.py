@@ -167,8 +167,6 @@ def crowds(draw: st.DrawFn, stamp_s: float = 0.0, max_size: int = 4) -> tuple[Pe
             awareness_lower=draw(finite(0, 1)),
             height_m=1.7,
             time_since_seen_s=draw(st.sampled_from([0.0, 0.05, 0.4])),
-            moved_m=draw(st.sampled_from([np.inf, 0.0]) | finite(0.0, 0.1)),
-            moved_age_s=draw(finite(0.0, 0.2)),
         )
         for track_id, share in zip(ids, calm, strict=True)
     )

@@ -63,7 +63,7 @@ class Cycle:
 def after_vanishing(place_m: tuple[float, float], change: Change, seconds: float) -> list[Cycle]:
     """Show a standing person for 3 s, then scans that are changed and show nobody."""
     tracker = PersonTracker(
-        TrackerConfig(awareness=POLICY.filter, standing_window_s=POLICY.standing_window_s),
+        TrackerConfig(awareness=POLICY.filter),
         sensors={"laser": SensorConfig(view=ScannerView())},
     )
     adapter = NavAdapter(POLICY, ROBOT)

@@ -150,11 +150,7 @@ def _begun_s(policy: AwarenessPolicy, track: PersonTrack) -> float | None:
     least_s = rule.start_delay_s + track.time_since_seen_s
     if not rule.delay_from_tracks:
         return least_s
-    if math.isinf(track.moved_m):
-        return None
-    # The way of somebody who speeds up evenly is ½ a t².
-    speeding_up_s = (2.0 * track.moved_m / rule.human_acceleration_mps2) ** 0.5
-    return max(least_s, track.moved_age_s + speeding_up_s)
+    return None
 
 
 def _walked_m(

@@ -30,12 +30,7 @@ RULES: dict[str, dict[str, Any]] = {
         "walking": WalkingPeople(human_acceleration_mps2=1.0),
         "standing": StandingPeople(),
     },
-    "own delay": {"standing": StandingPeople(delay_from_tracks=True)},
-    "of the presets": {
-        "walking": WalkingPeople(),
-        "standing": StandingPeople(delay_from_tracks=True),
-        "start_reserve": StartReserve(),
-    },
+    "of the presets": {"walking": WalkingPeople(), "start_reserve": StartReserve()},
     "late reserve": {
         "walking": WalkingPeople(),
         "start_reserve": StartReserve(start_delay_s=0.4),
@@ -51,10 +46,7 @@ def from_adapter(
     policy: AwarenessPolicy, outline: FloatArray, ahead_m: FloatArray, alpha: float
 ) -> list[float]:
     robot = replace(ROBOT, footprint_m=outline)
-    people = [
-        replace(person(position=(x, 0.0), awareness_lower=alpha), moved_m=0.0)
-        for x in ahead_m.tolist()
-    ]
+    people = [person(position=(x, 0.0), awareness_lower=alpha) for x in ahead_m.tolist()]
     return [settled_update([each], policy=policy, robot=robot).speed_limit_mps for each in people]
 
 

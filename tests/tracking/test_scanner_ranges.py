@@ -160,11 +160,6 @@ def test_whether_a_place_is_empty_is_saved() -> None:
     assert track.place_empty
     restored = PersonTracker.from_state(tracker.state(), sensors=sensors)
     assert restored.predict(stamp_s)[0].place_empty
-    # A state of an earlier release does not say it.
-    state = tracker.state()
-    for part in ("base", "latest"):
-        del state[part]["tracks"]["passed_stamps_s"]
-    assert not PersonTracker.from_state(state, sensors=sensors).predict(stamp_s)[0].place_empty
 
 
 def test_wrong_views_are_refused() -> None:

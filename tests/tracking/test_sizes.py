@@ -168,18 +168,3 @@ def test_a_saved_tracker_goes_on_with_sizes_to_the_bit():
         (ours,), (theirs,) = (each.update([one], stamp, camera_at()) for each in (first, second))
     assert np.array_equal(ours.position_odom_m, theirs.position_odom_m)
     assert np.array_equal(ours.covariance_odom, theirs.covariance_odom)
-
-
-def test_a_saved_tracker_of_before_sizes_is_read():
-    tracker = PersonTracker()
-    after_images(tracker, np.arange(0.0, 0.5, 0.05), lasting=0.0)
-    saved = json.loads(json.dumps(tracker.state()))
-    for state in (saved["base"], saved["latest"]):
-        del state["origin_velocity_mps"]
-        for name in ("lasting_stds", "size_logs", "size_variances"):
-            del state["tracks"][name]
-    for frame in saved["frames"]:
-        for name in ("lasting_stds", "size_logs", "size_variances"):
-            del frame[name]
-    (track,) = PersonTracker.from_state(saved).predict(0.5)
-    assert np.array_equal(track.position_odom_m, tracker.predict(0.5)[0].position_odom_m)

@@ -196,19 +196,6 @@ def test_a_saved_tracker_goes_on_through_leaps(steps: Sequence[tuple[float, str]
         assert sum(tracker.refused_frames.values()) == total
 
 
-def test_a_state_without_leaps_is_read() -> None:
-    """As written before there were any."""
-    tracker = PersonTracker()
-    for step in range(10):
-        show(tracker, step * PERIOD_S)
-    state = json.loads(json.dumps(tracker.state()))
-    del state["sensor_order"]
-    for name in ("leap", "ahead", "refused_frames"):
-        del state["clock"][name]
-    restored = PersonTracker.from_state(state)
-    assert everything(show(restored, 1.0)) == everything(show(tracker, 1.0))
-
-
 @pytest.mark.parametrize(
     ("offset_s", "shut_out", "other"), [(0.8, "camera", LASER), (-0.8, LASER, "camera")]
 )

@@ -68,7 +68,7 @@ def tracks(state: dict[str, Any]) -> dict[str, Any]:
 
 WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "another format": (lambda s: s.update(format="pickle"), "must have format 'awarenav-tracker'"),
-    "another version": (lambda s: s.update(version=1), "must have version 2.*got 1"),
+    "another version": (lambda s: s.update(version=2), "must have version 3.*got 2"),
     "a missing part": (lambda s: s.pop("latest"), "latest"),
     "an unknown part": (lambda s: s.update(lates=1), "unknown key 'lates'"),
     "a column cut short": (lambda s: tracks(s)["states"].pop(), "one entry per track"),

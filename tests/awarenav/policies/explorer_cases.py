@@ -240,8 +240,8 @@ def random_state(draw: random.Random, timing: Any) -> dict[str, Any]:
         "track": draw.choice(TRACKS),
         "unseen_s": unseen_s,
         "data_age_s": old_s,
-        "moved_m": draw.choice([None, draw.uniform(0.0, 0.1)]),
-        "moved_age_s": draw.uniform(0.0, 0.2),
+        "moved_m": None,
+        "moved_age_s": 0.0,
         "speed_mps": draw.choice(
             [0.0, draw.uniform(-2, 2), draw.uniform(0, 2), draw.uniform(0, 2)]
         ),
@@ -294,7 +294,6 @@ def _track(state: dict[str, Any], stamp_s: float, awareness: float, seen_s: floa
     if status == "coasting" and stamp_s < seen_s:
         status = "confirmed"
     variances = [state["sigma_m"] ** 2] * 2 + [state["velocity_sigma_mps"] ** 2] * 2
-    moved_m = math.inf if state["moved_m"] is None else state["moved_m"]
     return PersonTrack(
         id=1,
         stamp_s=stamp_s,
@@ -308,8 +307,6 @@ def _track(state: dict[str, Any], stamp_s: float, awareness: float, seen_s: floa
         height_m=1.7,
         time_since_seen_s=unseen_s,
         noticed=state["noticed"],
-        moved_m=moved_m,
-        moved_age_s=state["moved_age_s"] if state["moved_m"] is not None else 0.0,
     )
 
 
