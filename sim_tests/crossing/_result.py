@@ -96,6 +96,7 @@ class CrossingResult:
             number ``scripted + i`` in lists of all people.
         scripted: number of scripted workers; they come first in lists of all people.
         robot: the robot.
+        obstacle_boxes_odom_m: (B, 4) x_min, y_min, x_max, y_max of racks, walls and props.
     """
 
     scenario: str
@@ -117,5 +118,6 @@ class CrossingResult:
     people: tuple[PersonOutcome, ...] = ()
     scripted: int = 0
     robot: RobotProfile = NOVA_CARTER
+    obstacle_boxes_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
     __repr__ = short_repr
