@@ -14,6 +14,9 @@ from ...world.errors import SimError
 #: there is one; empty if nobody came near.
 Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
+# That of sim_tests.crossing, whose import needs the simulator.
+_STANDING_SPEED_MPS: Final = 0.03
+
 
 @dataclass(frozen=True, slots=True, repr=False)
 class EpisodeRecord:
@@ -149,8 +152,16 @@ class EpisodeRecord:
 
     @property
     def moving_touched(self) -> bool:
-        """True if a moving robot and a person touched, whoever moved into whom."""
-        return self.moving_contacts > 0 or self.robot_touched
+        """True if a moving robot and a person touched, whoever moved into whom.
+
+        Tables of earlier versions tell it by the robot's highest speed at a contact.
+        """
+        speed_mps = self.speed_at_min_separation_mps or 0.0
+        return (
+            self.moving_contacts > 0
+            or self.robot_touched
+            or (self.contact and speed_mps > _STANDING_SPEED_MPS)
+        )
 
     @property
     def robot_touched(self) -> bool:
