@@ -81,7 +81,8 @@ class CrossingResult:
         perception: ``"truth"``, ``"keypoints"``, ``"pixels"``, ``"keypoints+scanner"``,
             ``"pixels+scanner"``, ``"scanner"`` or ``"oracle"``.
         success: the goal was reached, and the robot hit nobody by its own motion.
-        contact: robot and a person touched.
+        contact: robot and a person touched, whether the robot moved or stood: ``contacts`` has its
+            speed.
         contact_by: ``"robot"`` if the robot moved into a person in any contact, ``"person"`` if
             only people walked into the robot, else empty.
         contacts: all contacts.

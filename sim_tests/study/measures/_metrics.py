@@ -57,7 +57,7 @@ SHARES: Final = _by_name(
         "Contacts with a moving robot",
         "%",
         "lower",
-        "Share of episodes in which a moving robot and a person touched, whoever moved into whom.",
+        "Share of episodes in which a moving robot and a person touched, by any cause.",
         share=True,
     ),
     Metric(
@@ -257,7 +257,7 @@ METRICS: Final = _by_name(
         "Contacts with a moving robot",
         "",
         "lower",
-        "Contacts of a person and a moving robot, whoever moved into whom.",
+        "Contacts of a person and a moving robot, by any cause.",
         decimals=3,
     ),
     Metric(
@@ -265,7 +265,7 @@ METRICS: Final = _by_name(
         "Speed at contact, any cause",
         "m/s",
         "lower",
-        "The robot's highest speed at a contact with a person, whoever moved into whom.",
+        "The robot's highest speed at a contact with a person, by any cause.",
     ),
     Metric(
         "robot_contacts",

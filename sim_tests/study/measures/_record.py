@@ -72,7 +72,7 @@ class EpisodeRecord:
             people a second time, with the same seed; the row may differ in another run.
         attentive_share: smallest share of the time for which one of the people had a true α ≥ 0.5,
             while they could look at the robot within 5 m.
-        moving_contacts: contacts with a moving robot, whoever moved into whom.
+        moving_contacts: contacts with a moving robot, by any cause.
         moving_contact_mps: the robot's highest speed at one of them.
         step_out_unaware: expected impacts with unaware people who set off, per 1 000 crossings.
         step_out_unaware_fast: those of them at more than 0.25 m/s.
@@ -152,7 +152,7 @@ class EpisodeRecord:
 
     @property
     def moving_touched(self) -> bool:
-        """True if a moving robot and a person touched, whoever moved into whom.
+        """True if a moving robot and a person touched, by any cause.
 
         Tables of earlier versions tell it by the robot's highest speed at a contact.
         """

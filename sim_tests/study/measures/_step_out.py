@@ -1,4 +1,4 @@
-"""Step-out impacts: how often, and how fast, the robot would meet people who set off at any time.
+"""Step-out impacts: the share and speed of impacts with people who might set off at any time.
 
 An index of what a drive leaves to luck, computed from the log of an episode. docs/metrics.md says
 what it is not.
@@ -45,7 +45,7 @@ _PLACES_AT_ONCE: Final = 200_000
 
 @dataclass(frozen=True, slots=True)
 class StepOut:
-    """How people step out, and how often: the constants of the step-out impacts.
+    """A model of people who step out: the constants of the step-out impacts.
 
     Attributes:
         speed_mps: speed to which people set off, > 0. The default is the mean of walking people
@@ -136,7 +136,7 @@ def step_out_impacts(result: CrossingResult, model: StepOut = STEP_OUT) -> StepO
 
     Args:
         result: the crossing.
-        model: how people step out.
+        model: the people's constants.
 
     Raises:
         SimError: a result without frames, or with frames that do not hold all people.
@@ -185,7 +185,7 @@ class _Starts:
     Attributes:
         robot: the robot.
         outline: its outline.
-        model: how people step out.
+        model: the people's constants.
         row: (M,) row of the trace.
         person: (M,) index of the person.
         poses_odom: (M, 3) x, y and heading of the robot.

@@ -77,7 +77,7 @@ class SummaryRow:
         nondeterministic: number of episodes whose planner did not repeat itself.
         success: share of successes in all episodes.
         moving_contact: share of the episodes without an error in which a person and the moving
-            robot touched, whoever moved into whom.
+            robot touched, by any cause.
         robot_contact: share of them in which the robot moved into a person.
         person_contact: share of them in which a person walked into the robot.
         means: mean of each of :data:`METRICS` over the episodes to which it applies.

@@ -125,7 +125,6 @@ def _comparison_table(comparisons: Sequence[Comparison]) -> str:
             "violation %": lambda each: _signed(each.violation_excess, 0, 100.0),
             "% of time": lambda each: _signed(each.violation_excess_of_time, 2, 100.0),
             "longer violation": lambda each: _share_text(each.violates_more),
-            "step-out": lambda each: _signed(each.step_out_unaware, 1),
         },
         left=3,
     )
@@ -213,7 +212,7 @@ def _notes(summary: Summary) -> list[str]:
         "won back: share of the time that the other loses. violation: longer violation of the\n"
         "margin S − S_p, relative to that of the other, and to the time that it takes. least,\n"
         "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
-        "person and the moving robot touched, whoever moved into whom. step-out: step-out impacts\n"
+        "person and the moving robot touched, by any cause. step-out: step-out impacts\n"
         "with unaware people. (≤ x %): upper end of the exact interval. [?]: too few for an\n"
         "interval. docs/metrics.md defines all figures."
     ]

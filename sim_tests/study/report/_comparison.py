@@ -80,6 +80,13 @@ _PAIRED: Final = (
         share=True,
     ),
     Metric(
+        "step_out_unaware",
+        "Difference in step-out impacts, unaware",
+        "",
+        "lower",
+        "Mean over pairs: the policy's less the reference's, per 1 000 crossings.",
+    ),
+    Metric(
         "min_separation_m",
         "Difference in smallest separation",
         "m",
