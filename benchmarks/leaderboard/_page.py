@@ -25,8 +25,17 @@ _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
 _RANKED_DECIMALS: Final = 2
 
-_COLUMNS: Final = ("rank, row", "contacts by the robot", "violation (s)", "time lost (s)")
+_COLUMNS: Final = ("rank, row", "contacts, moving", "violation (s)", "time lost (s)")
 _MORE_COLUMNS: Final = ("row", "against today's AMR (s)", "goals; walked into", "measured")
+_STEP_OUT_COLUMNS: Final = (
+    "row",
+    "unaware",
+    "above 0.25 m/s",
+    "worst (m/s)",
+    "aware",
+    "faster starts: unaware",
+    "worst (m/s)",
+)
 _PARTS_COLUMNS: Final = ("row", *_ATTENTIONS)
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 
@@ -56,9 +65,9 @@ class Standing:
         return len(self.ran) == self.planned
 
     @property
-    def robot_contacts(self) -> Interval:
-        """Share of episodes in which the robot moved into a person."""
-        return proportion_interval(sum(each.robot_touched for each in self.ran), len(self.ran))
+    def contacts(self) -> Interval:
+        """Share of episodes in which a person and the moving robot touched."""
+        return proportion_interval(sum(each.moving_touched for each in self.ran), len(self.ran))
 
     def mean(self, field: str, attention: str = "") -> Interval:
         """Return the mean of a field with its interval, resampled within scenarios."""
@@ -77,7 +86,7 @@ class Standing:
     def rank_key(self) -> tuple[float, float, float, str]:
         """The key by which complete rows are ranked."""
         return (
-            self.robot_contacts.value,
+            self.contacts.value,
             round(self.mean("violation_time_s").value, _RANKED_DECIMALS),
             self.mean("time_lost_s").value,
             self.row.name,
@@ -119,6 +128,7 @@ def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
         seeds=f"the seeds 0 to {board.seeds - 1}" if board.seeds > 1 else "the seed 0",
         table=_table(_COLUMNS, [_cells(each, ranks, baseline) for each in shown]),
         more=_table(_MORE_COLUMNS, [_more_cells(each, baseline, about) for each in shown]),
+        step_out=_table(_STEP_OUT_COLUMNS, [_step_out_cells(each) for each in shown]),
         note=textwrap.fill(note, 100, break_long_words=False, break_on_hyphens=False),
         parts=_table(_PARTS_COLUMNS, [_parts_cells(each) for each in shown]),
         minutes=minutes,
@@ -133,8 +143,8 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _cells(standing: Standing, ranks: Mapping[str, int], baseline: Standing) -> list[str]:
     """Return the cells of the ranking; a row without a rank has a dash, today's AMR is marked."""
-    row, ran, contacts = standing.row, standing.ran, standing.robot_contacts
-    hits = sum(each.robot_touched for each in ran)
+    row, ran, contacts = standing.row, standing.ran, standing.contacts
+    hits = sum(each.moving_touched for each in ran)
     rank = f"{ranks[row.name]}. " if row.name in ranks else "– "
     policy = f"**`{row.policy_name}`, today's AMR**" if standing is baseline else _policy(row)
     return [
@@ -157,6 +167,22 @@ def _more_cells(
         "" if standing is baseline else _signed(change),
         f"{arrived} of {len(ran)}; {touched} of {len(ran)}",
         ", ".join(filter(None, (measured.get(name, "") for name in ("version", "commit", "date")))),
+    ]
+
+
+def _step_out_cells(standing: Standing) -> list[str]:
+    def worst(field: str) -> str:
+        values = [value for each in standing.ran if (value := getattr(each, field)) is not None]
+        return f"{max(values):.2f}" if values else "–"
+
+    return [
+        _label(standing.row),
+        standing.mean("step_out_unaware").text(1),
+        standing.mean("step_out_unaware_fast").text(1),
+        worst("step_out_worst_mps"),
+        standing.mean("step_out_aware").text(1),
+        standing.mean("step_out_stress_unaware").text(1),
+        worst("step_out_stress_worst_mps"),
     ]
 
 

@@ -380,4 +380,5 @@ def _result(
         people=people,
         scripted=len(scenario.workers),
         robot=scenario.robot_profile,
+        obstacle_boxes_odom_m=scenario.layout.obstacle_boxes_odom,
     )

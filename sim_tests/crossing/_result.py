@@ -81,7 +81,8 @@ class CrossingResult:
         perception: ``"truth"``, ``"keypoints"``, ``"pixels"``, ``"keypoints+scanner"``,
             ``"pixels+scanner"``, ``"scanner"`` or ``"oracle"``.
         success: the goal was reached, and the robot hit nobody by its own motion.
-        contact: robot and a person touched.
+        contact: robot and a person touched, whether the robot moved or stood: ``contacts`` has its
+            speed.
         contact_by: ``"robot"`` if the robot moved into a person in any contact, ``"person"`` if
             only people walked into the robot, else empty.
         contacts: all contacts.
@@ -96,6 +97,7 @@ class CrossingResult:
             number ``scripted + i`` in lists of all people.
         scripted: number of scripted workers; they come first in lists of all people.
         robot: the robot.
+        obstacle_boxes_odom_m: (B, 4) x_min, y_min, x_max, y_max of racks, walls and props.
     """
 
     scenario: str
@@ -117,5 +119,6 @@ class CrossingResult:
     people: tuple[PersonOutcome, ...] = ()
     scripted: int = 0
     robot: RobotProfile = NOVA_CARTER
+    obstacle_boxes_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
     __repr__ = short_repr

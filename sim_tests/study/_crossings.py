@@ -109,19 +109,30 @@ def crossings_command(options: CrossingsOptions) -> int:
 
 def _short_table(records: Iterable[EpisodeRecord]) -> str:
     """Return a table with one line per policy (and planner, perception, fault if several)."""
-    header = ("policy", "episodes", "success", "robot contacts", "time lost s", "least m", "failed")
+    header = (
+        "policy",
+        "episodes",
+        "success",
+        "contacts",
+        "time lost s",
+        "least m",
+        "step-out",
+        "failed",
+    )
     rows: list[Sequence[str]] = []
     for row in summarise(records).policies:
         ran = row.episodes - row.errors
         lost, least = row.means["time_lost_s"], row.worst.get("min_separation_m")
+        step_out = row.means["step_out_unaware"]
         rows.append(
             (
                 row.variant,
                 str(row.episodes),
                 f"{100.0 * row.success.value:.0f} %" if row.episodes else "–",
-                str(round(row.robot_contact.value * row.robot_contact.n)) if ran else "–",
+                str(round(row.moving_contact.value * row.moving_contact.n)) if ran else "–",
                 f"{lost.value:.2f}" if lost.n else "–",
                 "–" if least is None else f"{least:.2f}",
+                f"{step_out.value:.1f}" if step_out.n else "–",
                 str(row.errors),
             )
         )

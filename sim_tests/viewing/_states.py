@@ -14,7 +14,7 @@ from perception import AttentionCone
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ..crossing import CrossingFrame, CrossingResult, Stage
+from ..crossing import STANDING_SPEED_MPS, CrossingFrame, CrossingResult, Stage
 
 #: States per second of simulated time; fewer where the robot's control is slower.
 STATES_HZ: Final = 20.0
@@ -130,7 +130,9 @@ def outcome_text(result: CrossingResult) -> str:
     if math.isfinite(result.min_margin_m):
         parts.append(f"least margin {result.min_margin_m:.2f} m")
     if result.contact:
-        parts.append(f"contact, caused by the {result.contact_by}")
+        moving = any(each.robot_speed_mps > STANDING_SPEED_MPS for each in result.contacts)
+        robot = "moving" if moving else "standing"
+        parts.append(f"contact with the {robot} robot, caused by the {result.contact_by}")
     return ", ".join(parts)
 
 

@@ -36,6 +36,13 @@ if TYPE_CHECKING:
         salvage_record_file,
         write_records,
     )
+    from ._step_out import (
+        FASTER_STEP_OUT,
+        STEP_OUT,
+        StepOut,
+        StepOutImpacts,
+        step_out_impacts,
+    )
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
     from ._summary_text import nondeterminism_notes, summary_text, table_text
     from ._trace import Trace
@@ -45,11 +52,13 @@ __all__ = [
     "ATTENTION_WITHIN_M",
     "ATTENTIVE_FROM",
     "BASELINE",
+    "FASTER_STEP_OUT",
     "FEW_PAIRS",
     "METRICS",
     "OVERSHOOT_MPS",
     "RECORD_COLUMNS",
     "SHARES",
+    "STEP_OUT",
     "UNAWARE_UP_TO",
     "UNCONFIRMED",
     "Comparison",
@@ -58,6 +67,8 @@ __all__ = [
     "Interval",
     "MeasuredAttention",
     "Metric",
+    "StepOut",
+    "StepOutImpacts",
     "Summary",
     "SummaryRow",
     "Trace",
@@ -78,6 +89,7 @@ __all__ = [
     "read_records",
     "record_row",
     "salvage_record_file",
+    "step_out_impacts",
     "summarise",
     "summary_text",
     "table_text",
@@ -141,6 +153,13 @@ __getattr__ = lazy_names(
             "read_records",
             "salvage_record_file",
             "write_records",
+        ),
+        "._step_out": (
+            "FASTER_STEP_OUT",
+            "STEP_OUT",
+            "StepOut",
+            "StepOutImpacts",
+            "step_out_impacts",
         ),
         "._summary": (
             "BASELINE",

@@ -33,6 +33,7 @@ class Outline:
 
     Attributes:
         reach_m: distance of the farthest corner from the base origin.
+        bounds_m: (2, 2) least and largest x and y.
     """
 
     def __init__(self, footprint_m: FloatArray) -> None:
@@ -43,6 +44,7 @@ class Outline:
         self._lengths = np.hypot(edges[:, 0], edges[:, 1])
         self._along = edges / self._lengths[:, None]
         self._outward = np.stack([self._along[:, 1], -self._along[:, 0]], axis=1)
+        self.bounds_m = np.stack([footprint_m.min(axis=0), footprint_m.max(axis=0)])
         self.reach_m = float(np.hypot(footprint_m[:, 0], footprint_m[:, 1]).max())
 
     def gap(self, points_base_m: FloatArray) -> FloatArray:

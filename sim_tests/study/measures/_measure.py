@@ -21,6 +21,7 @@ from ._driving import (
     success_weighted_path_length,
 )
 from ._record import Awareness, EpisodeRecord, rounded
+from ._step_out import FASTER_STEP_OUT, step_out_impacts
 from ._trace import Trace
 
 if TYPE_CHECKING:
@@ -66,6 +67,9 @@ def measure(
     delay_s, detour_m = human_cost(result.people)
     awareness, reaction, error = _awareness_of_nearest(result, trace)
     by_robot = [contact for contact in result.contacts if contact.by == "robot"]
+    moving = [each for each in result.contacts if each.robot_speed_mps > STANDING_SPEED_MPS]
+    step_out = step_out_impacts(result)
+    stress = step_out_impacts(result, FASTER_STEP_OUT)
     separation_m, speed_then = _smallest_separation(result, trace, nearest_m)
     return _rounded(
         EpisodeRecord(
@@ -113,6 +117,15 @@ def measure(
             awareness=awareness,
             reaction=reaction,
             attentive_share=MeasuredAttention.of(trace).least_aware_share,
+            moving_contacts=len(moving),
+            moving_contact_mps=max((each.robot_speed_mps for each in moving), default=None),
+            step_out_unaware=step_out.unaware,
+            step_out_unaware_fast=step_out.unaware_fast,
+            step_out_aware=step_out.aware,
+            step_out_aware_fast=step_out.aware_fast,
+            step_out_worst_mps=step_out.worst_mps,
+            step_out_stress_unaware=stress.unaware,
+            step_out_stress_worst_mps=stress.worst_mps,
         )
     )
 

@@ -53,6 +53,14 @@ SHARES: Final = _by_name(
         from_zero=False,
     ),
     Metric(
+        "moving_contacts",
+        "Contacts with a moving robot",
+        "%",
+        "lower",
+        "Share of episodes in which a moving robot and a person touched, by any cause.",
+        share=True,
+    ),
+    Metric(
         "robot_contacts",
         "Contacts caused by the robot",
         "%",
@@ -189,6 +197,75 @@ METRICS: Final = _by_name(
         "s",
         "lower",
         "Seconds an episode with a person's surface in the personal zone.",
+    ),
+    Metric(
+        "step_out_unaware",
+        "Step-out impacts, unaware",
+        "",
+        "lower",
+        "Expected impacts per 1 000 crossings with people who have not looked for 1 s or never, "
+        "set off at any time and ignore the robot. An index, not a rate of accidents.",
+    ),
+    Metric(
+        "step_out_unaware_fast",
+        "Step-out impacts above 0.25 m/s, unaware",
+        "",
+        "lower",
+        "Those step-out impacts with unaware people in which the robot closes at more than "
+        "0.25 m/s.",
+    ),
+    Metric(
+        "step_out_worst_mps",
+        "Worst step-out impact, unaware",
+        "m/s",
+        "lower",
+        "The robot's highest closing speed in a step-out impact with an unaware person.",
+    ),
+    Metric(
+        "step_out_aware",
+        "Step-out impacts, aware",
+        "",
+        "lower",
+        "Expected impacts per 1 000 crossings with people who have looked within 1 s, if every "
+        "one who sets off ignores the robot. Few do: an upper bound.",
+    ),
+    Metric(
+        "step_out_aware_fast",
+        "Step-out impacts above 0.25 m/s, aware",
+        "",
+        "lower",
+        "Those step-out impacts with aware people in which the robot closes at more than 0.25 m/s.",
+    ),
+    Metric(
+        "step_out_stress_unaware",
+        "Step-out impacts of faster starts, unaware",
+        "",
+        "lower",
+        "Step-out impacts with unaware people who start faster than recorded: to 1.6 m/s with a "
+        "time constant of 0.35 s.",
+    ),
+    Metric(
+        "step_out_stress_worst_mps",
+        "Worst step-out impact of faster starts, unaware",
+        "m/s",
+        "lower",
+        "The robot's highest closing speed in a step-out impact with an unaware person who starts "
+        "faster than recorded.",
+    ),
+    Metric(
+        "moving_contacts",
+        "Contacts with a moving robot",
+        "",
+        "lower",
+        "Contacts of a person and a moving robot, by any cause.",
+        decimals=3,
+    ),
+    Metric(
+        "moving_contact_mps",
+        "Speed at contact, any cause",
+        "m/s",
+        "lower",
+        "The robot's highest speed at a contact with a person, by any cause.",
     ),
     Metric(
         "robot_contacts",

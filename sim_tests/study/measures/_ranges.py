@@ -25,6 +25,8 @@ _NOT_NEGATIVE: Final = (
     "personal_s",
     "awareness_error",
     "attentive_share",
+    "moving_contact_mps",
+    *(name for name in COLUMN_KINDS if name.startswith("step_out_")),
     *(name for name, kind in COLUMN_KINDS.items() if kind == "count" and name != "seed"),
 )
 _AT_MOST_ONE: Final = ("spl", "awareness_error", "attentive_share")

@@ -14,8 +14,11 @@ from ...world.errors import SimError
 #: there is one; empty if nobody came near.
 Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
+# That of sim_tests.crossing, whose import needs the simulator.
+_STANDING_SPEED_MPS: Final = 0.03
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, repr=False)
 class EpisodeRecord:
     """The metrics of one episode, as docs/metrics.md defines them.
 
@@ -29,8 +32,8 @@ class EpisodeRecord:
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are
             scanners too, or ``"scanner"``.
         success: the goal was reached and the robot touched nobody by its own motion.
-        contact: the robot and a person touched.
-        contact_by: ``"robot"``, ``"person"`` or empty.
+        contact: the robot, moving or not, and a person touched.
+        contact_by: ``"robot"`` if the robot moved into a person, else ``"person"``, or empty.
         min_separation_m: smallest distance between the surfaces of robot and person.
         time_to_goal_s: None when the goal was not reached.
         max_speed_within_2m_mps: the robot's highest speed with a person's surface within 2 m.
@@ -69,6 +72,15 @@ class EpisodeRecord:
             people a second time, with the same seed; the row may differ in another run.
         attentive_share: smallest share of the time for which one of the people had a true α ≥ 0.5,
             while they could look at the robot within 5 m.
+        moving_contacts: contacts with a moving robot, by any cause.
+        moving_contact_mps: the robot's highest speed at one of them.
+        step_out_unaware: expected impacts with unaware people who set off, per 1 000 crossings.
+        step_out_unaware_fast: those of them at more than 0.25 m/s.
+        step_out_aware: the same with aware people who ignore the robot.
+        step_out_aware_fast: those of them at more than 0.25 m/s.
+        step_out_worst_mps: the robot's highest closing speed in an impact with an unaware person.
+        step_out_stress_unaware: ``step_out_unaware`` with faster starts than recorded.
+        step_out_stress_worst_mps: ``step_out_worst_mps`` with faster starts than recorded.
     """
 
     scenario: str
@@ -113,12 +125,43 @@ class EpisodeRecord:
     error: str = ""
     nondeterministic: bool = False
     attentive_share: float | None = None
+    moving_contacts: int = 0
+    moving_contact_mps: float | None = None
+    step_out_unaware: float | None = None
+    step_out_unaware_fast: float | None = None
+    step_out_aware: float | None = None
+    step_out_aware_fast: float | None = None
+    step_out_worst_mps: float | None = None
+    step_out_stress_unaware: float | None = None
+    step_out_stress_worst_mps: float | None = None
+
+    def __repr__(self) -> str:
+        """Return the fields that do not have their default."""
+        cells = (
+            f"{field.name}={getattr(self, field.name)!r}"
+            for field in fields(self)
+            if getattr(self, field.name) != field.default
+        )
+        return f"EpisodeRecord({', '.join(cells)})"
 
     @property
     def versioned_scenario(self) -> str:
         """The scenario, followed by its version from 2 on."""
         version = "" if self.scenario_version == 1 else f" v{self.scenario_version}"
         return self.scenario + version
+
+    @property
+    def moving_touched(self) -> bool:
+        """True if a moving robot and a person touched, by any cause.
+
+        Tables of earlier versions tell it by the robot's highest speed at a contact.
+        """
+        speed_mps = self.speed_at_min_separation_mps or 0.0
+        return (
+            self.moving_contacts > 0
+            or self.robot_touched
+            or (self.contact and speed_mps > _STANDING_SPEED_MPS)
+        )
 
     @property
     def robot_touched(self) -> bool:

@@ -48,6 +48,7 @@ class Comparison:
         violation_excess_of_time: additional violation time, relative to the baseline's duration.
         violates_more: share of pairs in which the policy violates the margin longer.
         min_separation_m: mean difference in the smallest separation.
+        step_out_unaware: mean difference in the step-out impacts with unaware people.
     """
 
     variant: str
@@ -60,6 +61,7 @@ class Comparison:
     violation_excess_of_time: Interval
     violates_more: Interval
     min_separation_m: Interval
+    step_out_unaware: Interval
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -74,8 +76,9 @@ class SummaryRow:
             no other figure.
         nondeterministic: number of episodes whose planner did not repeat itself.
         success: share of successes in all episodes.
-        robot_contact: share of the episodes without an error in which the robot moved into a
-            person.
+        moving_contact: share of the episodes without an error in which a person and the moving
+            robot touched, by any cause.
+        robot_contact: share of them in which the robot moved into a person.
         person_contact: share of them in which a person walked into the robot.
         means: mean of each of :data:`METRICS` over the episodes to which it applies.
         worst: worst value of each metric, where it applies to an episode and has a better
@@ -88,6 +91,7 @@ class SummaryRow:
     errors: int
     nondeterministic: int
     success: Interval
+    moving_contact: Interval
     robot_contact: Interval
     person_contact: Interval
     means: Mapping[str, Interval]
@@ -264,6 +268,7 @@ def _summary_row(
         errors=len(records) - len(ran),
         nondeterministic=sum(record.nondeterministic for record in ran),
         success=proportion_interval(sum(r.success for r in ran), len(records), level),
+        moving_contact=proportion_interval(sum(r.moving_touched for r in ran), len(ran), level),
         robot_contact=proportion_interval(sum(r.robot_touched for r in ran), len(ran), level),
         person_contact=proportion_interval(sum(r.person_touched for r in ran), len(ran), level),
         means=dict(zip(METRICS, intervals, strict=True)),
@@ -290,4 +295,5 @@ def _comparison(
         violation_excess_of_time=violation_excess_of_time(base, group, rng, level),
         violates_more=violates_more(base, group, level),
         min_separation_m=paired_difference(base, group, "min_separation_m", rng, level),
+        step_out_unaware=paired_difference(base, group, "step_out_unaware", rng, level),
     )

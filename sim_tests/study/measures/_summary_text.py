@@ -25,6 +25,9 @@ def summary_text(summary: Summary) -> str:
         _titled(f"Policies: means with {percent} intervals", _policy_table(summary.policies)),
         _titled("Safety: the worst of all episodes", _safety_table(summary.policies)),
     ]
+    if any(row.means["step_out_unaware"].known for row in summary.policies):
+        title = "Step-out impacts per 1 000 crossings: an index, not a rate of accidents"
+        blocks.append(_titled(title, _step_out_table(summary.policies)))
     if summary.comparisons:
         blocks.append(
             _titled(
@@ -81,13 +84,30 @@ def _safety_table(rows: Sequence[SummaryRow]) -> str:
         rows,
         {
             "policy": lambda row: row.variant,
-            "contact by robot": lambda row: _share_text(row.robot_contact),
+            "contact, moving": lambda row: _share_text(row.moving_contact),
+            "by robot": lambda row: _share_text(row.robot_contact),
             "by person": lambda row: _share_text(row.person_contact),
             "least m": _worst("min_separation_m"),
             "margin m": _worst("min_margin_m"),
             "violated s": _worst("violation_time_s"),
             "TTC s": _worst("min_time_to_collision_s"),
             "PET s": _worst("post_encroachment_s"),
+        },
+    )
+
+
+def _step_out_table(rows: Sequence[SummaryRow]) -> str:
+    return _table(
+        rows,
+        {
+            "policy": lambda row: row.variant,
+            "unaware": _mean("step_out_unaware"),
+            "> 0.25 m/s": _mean("step_out_unaware_fast", bounds=False),
+            "worst m/s": _worst("step_out_worst_mps"),
+            "aware": _mean("step_out_aware"),
+            "aware > 0.25 m/s": _mean("step_out_aware_fast", bounds=False),
+            "faster starts": _mean("step_out_stress_unaware", bounds=False),
+            "their worst m/s": _worst("step_out_stress_worst_mps"),
         },
     )
 
@@ -117,7 +137,8 @@ def _part_table(rows: Sequence[SummaryRow]) -> str:
             "episodes": lambda row: row.part.replace("_", " "),
             "policy": lambda row: row.variant,
             "success": _successes,
-            "by robot": _robot_contacts,
+            "contacts": _moving_contacts,
+            "step-out": _mean("step_out_unaware", bounds=False),
             "time lost s": _mean("time_lost_s"),
             "least m": _worst("min_separation_m"),
             "margin m": _worst("min_margin_m"),
@@ -163,8 +184,8 @@ def _successes(row: SummaryRow) -> str:
     return f"{round(row.success.value * row.episodes)} of {row.episodes}"
 
 
-def _robot_contacts(row: SummaryRow) -> str:
-    share = row.robot_contact
+def _moving_contacts(row: SummaryRow) -> str:
+    share = row.moving_contact
     return str(round(share.value * share.n)) if share.n else "–"
 
 
@@ -190,8 +211,10 @@ def _notes(summary: Summary) -> list[str]:
     notes = [
         "won back: share of the time that the other loses. violation: longer violation of the\n"
         "margin S − S_p, relative to that of the other, and to the time that it takes. least,\n"
-        "margin, violated, TTC, PET under safety: the worst of all episodes. (≤ x %): upper end\n"
-        "of the exact interval. [?]: too few for an interval. docs/metrics.md defines all figures."
+        "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
+        "person and the moving robot touched, by any cause. step-out: step-out impacts\n"
+        "with unaware people. (≤ x %): upper end of the exact interval. [?]: too few for an\n"
+        "interval. docs/metrics.md defines all figures."
     ]
     if any(row.part == UNCONFIRMED for row in summary.attentions):
         notes.append(

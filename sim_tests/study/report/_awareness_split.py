@@ -34,7 +34,8 @@ class AwarenessGroup:
     Attributes:
         title: heading of the group.
         meaning: one sentence.
-        counts: look and name of each arm, its episodes and its robot contacts, as texts.
+        counts: look and name of each arm, its episodes and its contacts with the moving
+            robot, as texts.
         panels: metrics on axes that all groups share.
     """
 
@@ -60,9 +61,9 @@ def split_by_awareness(statistics: RunStatistics) -> tuple[AwarenessGroup, ...]:
             continue
         counts = []
         for arm, row in rows[kind]:
-            episodes = 0 if row is None else row.robot_contact.n
-            hits = 0 if row is None or not episodes else round(row.robot_contact.value * episodes)
-            contacts = plural(hits, "robot contact") if episodes else ""
+            episodes = 0 if row is None else row.moving_contact.n
+            hits = 0 if row is None or not episodes else round(row.moving_contact.value * episodes)
+            contacts = plural(hits, "contact") if episodes else ""
             counts.append((arm.look, arm.name, count(episodes), contacts))
         panels = tuple(
             panel(

@@ -12,7 +12,8 @@ from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 
 #: Metrics that are shown first.
 MAIN: Final = (
-    SHARES["robot_contacts"],
+    SHARES["moving_contacts"],
+    METRICS["step_out_unaware"],
     TIME_LOST,
     VIOLATION,
     SHARES["success"],
@@ -21,10 +22,18 @@ MAIN: Final = (
 )
 #: Metrics that are shown on demand.
 FURTHER: Final = (
+    SHARES["robot_contacts"],
     SHARES["person_contacts"],
     *(
         METRICS[name]
         for name in (
+            "step_out_unaware_fast",
+            "step_out_worst_mps",
+            "step_out_aware",
+            "step_out_aware_fast",
+            "step_out_stress_unaware",
+            "step_out_stress_worst_mps",
+            "moving_contact_mps",
             "min_separation_m",
             "min_time_to_collision_s",
             "post_encroachment_s",
@@ -69,6 +78,13 @@ _PAIRED: Final = (
         "Σ (time of violation of the policy − of the reference) / Σ that of the reference, over "
         "pairs.",
         share=True,
+    ),
+    Metric(
+        "step_out_unaware",
+        "Difference in step-out impacts, unaware",
+        "",
+        "lower",
+        "Mean over pairs: the policy's less the reference's, per 1 000 crossings.",
     ),
     Metric(
         "min_separation_m",

@@ -109,9 +109,9 @@ def list_episodes(run: RunData, arms: Sequence[Arm], folder: Path | None = None)
 
 
 def worst_first(episode: Episode) -> tuple[int, float, tuple[str, int, int]]:
-    """Return a sort key: robot contacts, then errors; among equals, the smallest margin first."""
+    """Return a sort key: contacts with the moving robot, then errors, then the smallest margins."""
     record = episode.record
-    severity = 0 if record.robot_touched else 1 if record.error else 2
+    severity = 0 if record.moving_touched else 1 if record.error else 2
     margin = float("inf") if record.min_margin_m is None else record.min_margin_m
     return severity, margin, episode.pair
 
@@ -123,6 +123,8 @@ def outcome_of(episode: Episode) -> str:
         return f"failed: {record.error}"
     if record.robot_touched:
         return "robot moved into a person"
+    if record.moving_touched:
+        return "a person walked into the moving robot"
     if record.person_contacts:
         return "a person walked into the robot"
     return "goal not reached" if record.time_to_goal_s is None else ""
@@ -151,7 +153,7 @@ def _line(run: RunData, episode: Episode, arm: Arm, folder: Path) -> EpisodeLine
         number(record.min_margin_m),
         number(record.min_separation_m),
         outcome_of(episode),
-        bool(record.error or record.robot_touched),
+        bool(record.error or record.moving_touched),
         run.replay(episode) and f"{run.replay(episode)} --view",
         _page(run, episode, folder),
     )

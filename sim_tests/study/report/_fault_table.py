@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ..measures import Metric, paired_difference
 from ._arm import Arm, Episode
-from ._statistics import TIME_LOST, VIOLATION, RunStatistics, robot_contacts
+from ._statistics import TIME_LOST, VIOLATION, RunStatistics, moving_contacts
 from ._text import NOTHING, count, number, percent
 
 
@@ -35,8 +35,8 @@ def fault_rows(statistics: RunStatistics) -> tuple[FaultRow, ...]:
     for arm in statistics.arms:
         for fault in sorted({each.record.fault for each in arm.others}):
             episodes = tuple(each for each in arm.others if each.record.fault == fault)
-            contacts = robot_contacts(episodes)
-            hits = sum(each.record.robot_touched for each in episodes)
+            contacts = moving_contacts(episodes)
+            hits = sum(each.record.moving_touched for each in episodes)
             margins = [
                 each.record.min_margin_m
                 for each in episodes

@@ -38,7 +38,7 @@ class Mark:
         look: number of the arm's colour and shape.
         x: place in per cent from the left.
         y: place in per cent from the top, moved off other marks.
-        touched: the robot moved into a person.
+        touched: a person and the moving robot touched.
     """
 
     line: int
@@ -106,19 +106,19 @@ def scatter(arms: Sequence[Arm], listed: Sequence[Episode], replay_prefix: str) 
     lines = {id(each): index for index, each in enumerate(listed)}
     x_zero = x_scale.place(0.0) if x_scale.low < 0.0 < x_scale.high else None
     # Contacts keep their places, and are drawn last, above all other marks.
-    shown = sorted(shown, key=lambda point: not point[1].record.robot_touched)
+    shown = sorted(shown, key=lambda point: not point[1].record.moving_touched)
     spots, covered = spread(
         [_place(each, x_scale, y_scale, x_zero, band) for _, each in shown],
         _APART if len(shown) <= FEW_MARKS else _APART_MANY,
     )
     drawn = sorted(
-        zip(shown, spots, strict=True), key=lambda point: point[0][1].record.robot_touched
+        zip(shown, spots, strict=True), key=lambda point: point[0][1].record.moving_touched
     )
     marks, rows = [], []
     for (arm, each), (x, y) in drawn:
         record = each.record
         key = -1 if each.number is None else each.number
-        hit = record.robot_touched
+        hit = record.moving_touched
         label = f"{arm.name}, {record.scenario}, seed {record.seed}"
         marks.append(Mark(lines.get(id(each), 0), label, numbers[arm.name], arm.look, x, y, hit))
         rows.append(
@@ -217,7 +217,7 @@ def _thinned(points: Sequence[tuple[Arm, Episode]]) -> list[tuple[Arm, Episode]]
         return list(points)
     order = sorted(
         range(len(points)),
-        key=lambda i: (not points[i][1].record.robot_touched, _margin(points[i][1])),
+        key=lambda i: (not points[i][1].record.moving_touched, _margin(points[i][1])),
     )
     worst, rest = order[: MOST_MARKS // 2], order[MOST_MARKS // 2 :]
     step = len(rest) / (MOST_MARKS - len(worst))

@@ -47,7 +47,7 @@ class ScenarioRow:
         name: name, with the version from 2 on.
         attention: the scenario's ``attention``, and in how many episodes its people were not so.
         episodes: number of episodes of all arms.
-        contacts: contacts caused by the robot, by arm.
+        contacts: contacts with the moving robot, by arm.
         cells: cells in the columns of all groups.
     """
 
@@ -135,11 +135,11 @@ def _group(title: str, meaning: str, arms: Sequence[Arm]) -> ColumnGroup:
 
 
 def _contacts_cell(rows: Sequence[tuple[str, SummaryRow | None]]) -> TableCell:
-    """Return the cell of the contacts caused by the robot, by arm."""
+    """Return the cell of the contacts with the moving robot, by arm."""
     hits = {
-        name: round(row.robot_contact.value * row.robot_contact.n)
+        name: round(row.moving_contact.value * row.moving_contact.n)
         for name, row in rows
-        if row is not None and row.robot_contact.n
+        if row is not None and row.moving_contact.n
     }
     total = sum(hits.values())
     if not total:

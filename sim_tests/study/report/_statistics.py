@@ -155,6 +155,7 @@ def estimate(row: SummaryRow | None, metric: Metric) -> Interval:
     if row is None:
         return Interval(np.nan, -np.inf, np.inf, 0)
     shares = {
+        "moving_contacts": row.moving_contact,
         "robot_contacts": row.robot_contact,
         "person_contacts": row.person_contact,
         "success": row.success,
@@ -162,6 +163,6 @@ def estimate(row: SummaryRow | None, metric: Metric) -> Interval:
     return shares[metric.name] if metric.share else row.means[metric.name]
 
 
-def robot_contacts(episodes: Sequence[Episode]) -> Interval:
-    """Return the share of episodes in which the robot moved into a person."""
-    return proportion_interval(sum(each.record.robot_touched for each in episodes), len(episodes))
+def moving_contacts(episodes: Sequence[Episode]) -> Interval:
+    """Return the share of episodes in which a person and the moving robot touched."""
+    return proportion_interval(sum(each.record.moving_touched for each in episodes), len(episodes))

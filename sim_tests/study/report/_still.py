@@ -40,16 +40,16 @@ class Still:
 
 
 def worst_of(arms: Sequence[Arm]) -> tuple[tuple[Arm, Episode], ...]:
-    """Return the worst episodes: robot contacts of any arm, then the smallest margins.
+    """Return the worst episodes: contacts with the moving robot, then the smallest margins.
 
-    Only the arms that verdicts are about count for the margins.
+    Contacts of any arm count. Only the arms that verdicts are about count for the margins.
     """
     points = [(arm, each) for arm in arms for each in (*arm.episodes, *arm.others)]
     judged = {arm.name for arm in judged_arms(arms)}
     known = [
         (arm, each)
         for arm, each in points
-        if each.record.robot_touched
+        if each.record.moving_touched
         or (arm.name in judged and each.record.min_margin_m is not None)
     ]
     found: dict[tuple[str, str], tuple[Arm, Episode]] = {}

@@ -8,7 +8,7 @@ from typing import Final, Literal
 
 from ..measures import ATTENTIVE_FROM, FEW_PAIRS, SHARES, Comparison, Interval
 from ._arm import Arm, judged_arms
-from ._statistics import RunStatistics, Unconfirmed, robot_contacts
+from ._statistics import RunStatistics, Unconfirmed, moving_contacts
 from ._text import NOTHING, count, percent, plural
 
 # Above this upper bound, "none seen" says too little.
@@ -54,14 +54,16 @@ def verdicts(statistics: RunStatistics) -> tuple[Verdict, ...]:
 
 def _verdict(statistics: RunStatistics, arm: Arm) -> Verdict:
     # Contacts count under every fault.
-    contacts = robot_contacts((*arm.episodes, *arm.others))
+    episodes = (*arm.episodes, *arm.others)
+    contacts = moving_contacts(episodes)
     if not contacts.n:
         card = Card(
-            "Contacts caused by the robot", NOTHING, "no episode finished", "no data", "open"
+            SHARES["moving_contacts"].title, NOTHING, "no episode finished", "no data", "open"
         )
         return Verdict(arm.name, arm.look, "No episode finished, so nothing can be said.", (card,))
-    cards = [_contact_card(arm, contacts)]
-    sentence = _contact_sentence(contacts)
+    by_robot = sum(each.record.robot_touched for each in episodes)
+    cards = [_contact_card(arm, contacts, by_robot)]
+    sentence = _contact_sentence(contacts, by_robot)
     note = ""
     whole = statistics.against(arm)
     if whole is not None:
@@ -122,13 +124,16 @@ def _hits(share: Interval) -> int:
     return round(share.value * share.n)
 
 
-def _contact_card(arm: Arm, share: Interval) -> Card:
-    title = SHARES["robot_contacts"].title
+def _contact_card(arm: Arm, share: Interval, by_robot: int) -> Card:
+    title = SHARES["moving_contacts"].title
     hits = _hits(share)
     figure = f"{count(hits)} of {count(share.n)}"
     under = f", {plural(len(arm.others), 'episode')} of them under faults" if arm.others else ""
     if hits:
-        detail = f"{percent(share.low)} to {percent(share.high)} with 95 % confidence{under}"
+        detail = (
+            f"{count(by_robot)} by the robot, {count(hits - by_robot)} by a person; "
+            f"{percent(share.low)} to {percent(share.high)} with 95 % confidence{under}"
+        )
         return Card(title, figure, detail, "contacts seen", "bad")
     detail = f"at most {percent(share.high)} with 95 % confidence{under}"
     if share.high > _LARGEST_SHARE:
@@ -136,15 +141,17 @@ def _contact_card(arm: Arm, share: Interval) -> Card:
     return Card(title, figure, detail, "none seen", "good")
 
 
-def _contact_sentence(share: Interval) -> str:
+def _contact_sentence(share: Interval, by_robot: int) -> str:
     hits = _hits(share)
     if hits:
         return (
-            f"The robot moved into a person in {count(hits)} of {plural(share.n, 'episode')} "
-            f"({percent(share.value)}): look at these before anything else."
+            f"A person and the moving robot touched in {count(hits)} of "
+            f"{plural(share.n, 'episode')} ({percent(share.value)}): look at these before anything "
+            f"else. The robot moved into the person in {count(by_robot)} of them, and a person "
+            f"walked into the moving robot in {count(hits - by_robot)}."
         )
     return (
-        f"The robot moved into nobody in {plural(share.n, 'episode')}; a true rate of up to "
+        f"The moving robot touched nobody in {plural(share.n, 'episode')}; a true rate of up to "
         f"{percent(share.high)} remains possible."
     )
 

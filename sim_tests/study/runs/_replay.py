@@ -277,5 +277,6 @@ def _description(record: EpisodeRecord) -> str:
     if record.min_margin_m is not None:
         parts.append(f"least margin {record.min_margin_m:.2f} m")
     if record.contact:
-        parts.append(f"contact, caused by the {record.contact_by}")
+        robot = "moving" if record.moving_touched else "standing"
+        parts.append(f"contact with the {robot} robot, caused by the {record.contact_by}")
     return ", ".join(parts)

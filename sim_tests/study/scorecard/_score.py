@@ -63,8 +63,11 @@ class Score:
         median_time_s: median time to goal of those.
         against_blind_s: mean difference of the time lost to that of the policy ``blind`` with the
             same planner, over pairs of episodes; negative is faster. By :data:`PARTS`.
+        moving_contacts: share of episodes in which a person and the moving robot touched.
         robot_contacts: share of episodes in which the robot moved into a person.
         person_contacts: share of episodes in which a person walked into the robot.
+        step_out_unaware: mean step-out impacts with unaware people, per 1 000 crossings.
+        step_out_worst_mps: the robot's highest closing speed in one of them; None if not measured.
         worst_margin_m: smallest separation margin of all episodes; None if nobody came near.
         negative_margin: share of episodes with a negative margin.
         limit: obedience to ``speed_limit_mps``.
@@ -79,8 +82,11 @@ class Score:
     goals: Interval
     median_time_s: float | None
     against_blind_s: Mapping[str, Interval]
+    moving_contacts: Interval
     robot_contacts: Interval
     person_contacts: Interval
+    step_out_unaware: Interval
+    step_out_worst_mps: float | None
     worst_margin_m: float | None
     negative_margin: Interval
     limit: Obedience

@@ -157,8 +157,14 @@ def _score(planner: str, policy: str, group: _Group, blind: _Group, reference: _
         proportion_interval(len(times), len(group)),
         median(times) if times else None,
         {part: _against(blind, group, part) for part in PARTS},
+        _share(records, lambda each: each.moving_touched),
         _share(records, lambda each: each.robot_touched),
         _share(records, lambda each: each.person_touched),
+        _step_out(records),
+        max(
+            (each.step_out_worst_mps for each in records if each.step_out_worst_mps is not None),
+            default=None,
+        ),
         min(margins, default=None),
         _share(records, lambda each: each.min_margin_m is not None and each.min_margin_m < 0.0),
         _obedience([each.limit_excess_mps for each in conducts]),
@@ -169,6 +175,16 @@ def _score(planner: str, policy: str, group: _Group, blind: _Group, reference: _
 
 def _share(records: Sequence[EpisodeRecord], is_so: Callable[[EpisodeRecord], bool]) -> Interval:
     return proportion_interval(sum(map(is_so, records)), len(records))
+
+
+def _step_out(records: Sequence[EpisodeRecord]) -> Interval:
+    """Return the mean step-out impacts with unaware people, over the episodes with people."""
+    known = [each for each in records if each.step_out_unaware is not None]
+    return bootstrap_interval(
+        [each.step_out_unaware for each in known],
+        np.random.default_rng(0),
+        strata=[each.scenario for each in known],
+    )
 
 
 def _against(blind: _Group, group: _Group, part: str) -> Interval:

@@ -23,7 +23,11 @@ COLUMNS: Final[dict[str, str]] = {
     "same planner, scenario and seed, with its 95 % interval; negative is faster",
     "Attentive, s": "the same for episodes in which everybody was attentive",
     "Unaware, s": "the same for scenarios in which people are unaware",
-    "Contacts": "episodes in which the robot moved into a person / a person walked into the robot",
+    "Contacts": "episodes in which a person and the moving robot touched / the robot moved into a "
+    "person / a person walked into the robot, moving or not",
+    "Step-out": "expected impacts with unaware people who set off, per 1 000 crossings, with the "
+    "95 % interval; an index, not a rate of accidents",
+    "Worst step-out, m/s": "the robot's highest closing speed in one of these impacts",
     "Worst margin, m": "smallest separation margin S − S_p of a moving robot",
     "Negative margin": "episodes with a negative margin, with the 95 % interval of the share",
     "Speed limit, m/s": f"largest excess over the speed limit; obeyed: {OBEYED}",
@@ -183,12 +187,15 @@ def _cells(score: Score) -> tuple[Cell, ...]:
         Cell(NOTHING) if score.policy == BASELINE else difference(each)
         for each in score.against_blind_s.values()
     ]
-    contacts = f"{hits(score.robot_contacts)} / {hits(score.person_contacts)}"
+    touched = (score.moving_contacts, score.robot_contacts, score.person_contacts)
+    contacts, step_out = " / ".join(str(hits(each)) for each in touched), score.step_out_unaware
     return (
         _share(goals, bad=hits(goals) < goals.n),
         Cell(number(score.median_time_s, 1)),
         *against,
-        Cell(contacts if score.robot_contacts.n else NOTHING, bad=hits(score.robot_contacts) > 0),
+        Cell(contacts if score.robot_contacts.n else NOTHING, bad=hits(score.moving_contacts) > 0),
+        Cell(step_out.text(1) if step_out.known else NOTHING),
+        Cell(number(score.step_out_worst_mps)),
         Cell(number(worst), bad=worst is not None and worst < 0.0),
         _share(negative, bad=hits(negative) > 0),
         Cell(exceeded(score.limit), bad=score.limit.obeyed is False),
@@ -233,13 +240,16 @@ def _record(planner: PlannerScore, score: Score) -> dict[str, str]:
             (f"against_blind{'_' + part if part else ''}_s", each)
             for part, each in score.against_blind_s.items()
         ),
+        ("moving_contacts", score.moving_contacts),
         ("robot_contacts", score.robot_contacts),
         ("person_contacts", score.person_contacts),
+        ("step_out_unaware", score.step_out_unaware),
         ("negative_margin", score.negative_margin),
     ):
         values |= {name: share.value, f"{name}_low": share.low, f"{name}_high": share.high}
     values |= {
         "median_time_s": score.median_time_s,
+        "step_out_worst_mps": score.step_out_worst_mps,
         "worst_margin_m": score.worst_margin_m,
         "limit_excess_mps": score.limit.excess_mps,
         "fastest_point_excess_mps": score.fastest_point.excess_mps,

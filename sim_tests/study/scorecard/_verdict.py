@@ -102,7 +102,11 @@ def _arrival(score: Score) -> tuple[str, list[Mark]]:
 
 
 def _contacts(score: Score) -> tuple[str, list[Mark]]:
-    by_robot, by_person = score.robot_contacts, score.person_contacts
+    moving, by_robot, by_person = (
+        score.moving_contacts,
+        score.robot_contacts,
+        score.person_contacts,
+    )
     walked = (
         f" People walked into the robot in {of(by_person)} episodes." if hits(by_person) else ""
     )
@@ -111,9 +115,15 @@ def _contacts(score: Score) -> tuple[str, list[Mark]]:
             f"The robot moved into a person in {of(by_robot)} episodes "
             f"({percent(by_robot.low)} to {percent(by_robot.high)})."
         )
-        return text + walked, [Mark(f"contact in {of(by_robot)}", "bad")]
+        return text + walked, [Mark(f"contact in {of(moving)}", "bad")]
+    if hits(moving):
+        text = (
+            f"People touched the moving robot in {of(moving)} episodes ({percent(moving.low)} to "
+            f"{percent(moving.high)}), and walked into it each time."
+        )
+        return text + walked, [Mark(f"contact in {of(moving)}", "bad")]
     text = f"The robot moved into nobody (a rate of up to {percent(by_robot.high)} is possible)."
-    return text + walked, [Mark("no contact by the robot", "good")]
+    return text + walked, [Mark("no contact with the moving robot", "good")]
 
 
 def _margin(score: Score) -> tuple[str, list[Mark]]:

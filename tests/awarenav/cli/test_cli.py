@@ -35,7 +35,7 @@ def test_crossings_write_one_row_per_episode_with_paired_seeds(tmp_path, capsys)
     arguments += ["--workers", "1", "--no-report", "--out", str(out)]
     assert main(arguments) == 0
     text = capsys.readouterr().out
-    assert "robot contacts" in text
+    assert "contacts" in text
     assert "episodes.csv with 4 episodes" in text
     header, *body = rows(out / "episodes.csv")
     assert tuple(header) == RECORD_COLUMNS

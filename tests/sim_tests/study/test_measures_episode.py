@@ -71,10 +71,17 @@ def test_contacts_are_split_and_a_contact_is_no_separation():
     record = measure(crossing(T_S, straight(1.0), [person], contacts=touches))
     assert (record.contacts, record.robot_contacts, record.person_contacts) == (3, 2, 1)
     assert record.contact_speed_mps == 0.4
+    assert (record.moving_contacts, record.moving_contact_mps) == (3, 0.9)
     assert (record.min_separation_m, record.speed_at_min_separation_mps) == (0.0, 0.9)
     assert not record.success
     by_person = measure(crossing(T_S, straight(1.0), [person], contacts=touches[:1]))
     assert by_person.contact_speed_mps is None
+    assert (by_person.moving_contacts, by_person.moving_contact_mps) == (1, 0.9)
+    assert by_person.success
+    standing = (ContactEvent(1.0, 0, "person", 0.02),)
+    walked_into = measure(crossing(T_S, straight(0.02), [person], contacts=standing))
+    assert (walked_into.contacts, walked_into.moving_contacts) == (1, 0)
+    assert walked_into.moving_contact_mps is None
 
 
 def test_warnings_are_counted_as_they_are_asked_for():

@@ -36,6 +36,13 @@ def episode(scenario, seed, policy, **values):
         "duration_s": 10.0 + lost,
         "attention": ATTENTION[scenario],
         "awareness": "aware" if ATTENTION[scenario] == "attentive" else "unaware",
+        "step_out_unaware": 10.0 * lost,
+        "step_out_unaware_fast": 5.0 * lost,
+        "step_out_aware": 100.0,
+        "step_out_aware_fast": 50.0,
+        "step_out_worst_mps": 0.1 * lost,
+        "step_out_stress_unaware": 20.0 * lost,
+        "step_out_stress_worst_mps": 0.2 * lost,
         "attentive_share": 0.9 if ATTENTION[scenario] == "attentive" else 0.0,
         **values,
     }
@@ -78,6 +85,7 @@ def test_every_policy_is_compared_with_the_baseline():
     assert (every.baseline, every.pairs) == ("blind", 10)
     assert every.won_back.value == pytest.approx(3.0 / 6.2)
     assert every.time_lost_s.value == pytest.approx(-3.0)
+    assert every.step_out_unaware.value == pytest.approx(-30.0)
     assert only(summary.comparisons, variant="oracle", part="attentive").pairs == 5
     assert only(summary.scenario_comparisons, variant="oracle", part="late_glance").pairs == 5
     other = summarise(RECORDS, baseline="balanced")
@@ -144,6 +152,35 @@ def test_contacts_show_in_every_table():
     text = summary_text(summarise(touched))
     assert "1 of 10 (≤ 45 %)" in text
     assert only(summarise(touched).policies, variant="balanced").robot_contact.value == 0.1
+
+
+def test_a_contact_with_a_moving_robot_counts_whoever_caused_it():
+    """Also in a table of an earlier version, which has the speed at the contact alone."""
+    walked_into = {"contact": True, "contact_by": "person", "contacts": 1, "person_contacts": 1}
+    changes = {
+        0: {"moving_contacts": 1, "moving_contact_mps": 0.4},
+        1: {"speed_at_min_separation_mps": 0.4},
+        2: {"speed_at_min_separation_mps": 0.01},  # the robot stood
+    }
+    touched = [
+        replace(r, **walked_into, **changes[r.seed])
+        if r.policy == "balanced" and r.scenario == "late_glance" and r.seed in changes
+        else r
+        for r in RECORDS
+    ]
+    row = only(summarise(touched).policies, variant="balanced")
+    shares = (row.moving_contact.value, row.robot_contact.value, row.person_contact.value)
+    assert shares == (0.2, 0.0, 0.3)
+    assert row.success.value == 1.0
+    safety = summary_text(summarise(touched)).partition("Safety")[2]
+    line = next(line for line in safety.splitlines() if line.startswith("balanced"))
+    assert line.split()[1:4] == ["2", "of", "10"]
+
+
+def test_step_out_impacts_have_a_table_unless_nobody_measured_them():
+    assert "Step-out impacts" in summary_text(summarise(RECORDS))
+    earlier = [replace(r, step_out_unaware=None) for r in RECORDS]
+    assert "Step-out impacts" not in summary_text(summarise(earlier))
 
 
 def test_no_episodes_are_no_tables():

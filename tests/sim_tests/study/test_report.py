@@ -126,9 +126,10 @@ def test_contact_is_never_played_down(run: MadeUpRun, tmp_path: Path) -> None:
         success=False,
     )
     page = report(replace(run, records=tuple(records)), tmp_path)
-    assert "The robot moved into a person in 1 of" in page.text
+    assert "A person and the moving robot touched in 1 of" in page.text
+    assert "The robot moved into the person in 1 of them" in page.text
     assert "contacts seen" in page.text
-    assert "The robot moved into nobody" not in page.text
+    assert "The moving robot touched nobody" not in page.text
 
 
 def test_few_episodes_prove_nothing(tmp_path: Path) -> None:
@@ -244,7 +245,7 @@ def test_missing_files_cost_only_what_was_in_them(
 @pytest.mark.parametrize("policies", [("balanced",), ("blind",), ("oracle",)])
 def test_one_policy_alone(policies: tuple[str, ...], tmp_path: Path) -> None:
     page = report(made_up_run(scenarios=3, seeds=3, policies=policies), tmp_path)
-    assert "The robot moved into nobody in 9 episodes" in page.text
+    assert "The moving robot touched nobody in 9 episodes" in page.text
     assert "It wins back" not in page.text
 
 

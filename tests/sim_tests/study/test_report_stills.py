@@ -65,4 +65,4 @@ def test_a_failing_still_costs_only_itself(folder: Path, tmp_path: Path, how: st
     page = PageReader(write_report(tmp_path).read_text("utf-8"))
     assert "No picture: " in page.text
     assert not pictures(page)
-    assert "The robot moved into nobody in 1 episode;" in page.text
+    assert "The moving robot touched nobody in 1 episode;" in page.text

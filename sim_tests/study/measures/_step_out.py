@@ -1,0 +1,360 @@
+"""Step-out impacts: the share and speed of impacts with people who might set off at any time.
+
+An index of what a drive leaves to luck, computed from the log of an episode. docs/metrics.md says
+what it is not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray, finite_number, set_fields
+
+from ...actors.behaviour import LOOK_WITHIN_S, START_SHARES
+from ...crossing import STANDING_SPEED_MPS
+from ...world.errors import SimError
+from ._awareness import AWARE_FROM
+from ._conflict import Outline
+from ._trace import Trace
+
+if TYPE_CHECKING:
+    from nav_adapter import RobotProfile
+
+    from ...crossing import CrossingResult
+
+#: A person who has looked within this time counts as aware.
+AWARE_WITHIN_S: Final = 1.0
+#: Faster impacts are counted apart.
+FAST_IMPACT_MPS: Final = 0.25
+_CROSSINGS: Final = 1000.0
+_EVERY_S: Final = 0.1
+_DIRECTIONS: Final = 16
+# Between two steps somebody at 1.34 m/s and a robot at 1.5 m/s come nearer by 0.14 m.
+_STEP_S: Final = 0.05
+# Halvings of the step in which an impact begins: to 1.6 ms.
+_HALVINGS: Final = 5
+# Places that are computed at once, to bound the memory.
+_PLACES_AT_ONCE: Final = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class StepOut:
+    """A model of people who step out: the constants of the step-out impacts.
+
+    Attributes:
+        speed_mps: speed to which people set off, > 0. The default is the mean of walking people
+            (Weidmann 1993).
+        time_constant_s: time constant of the approach to that speed, > 0 (0.54 s: Moussaïd et al.
+            2009).
+        noticed_after_s: time until a start is seen, before the robot's reaction time begins. The
+            default lies in the 0.14 to 0.30 s that docs/safety.md gives.
+        start_shares: share of people who start within a second, each in [0, 1), by the last look
+            at the robot: now, up to 1 s and up to 4 s ago, longer ago or never. The default was
+            recorded at the kerb, before vehicles that move (docs/people.md).
+
+    Raises:
+        SimError: for other values.
+    """
+
+    speed_mps: float = 1.34
+    time_constant_s: float = 0.54
+    noticed_after_s: float = 0.2
+    start_shares: tuple[float, ...] = START_SHARES["moving"]
+
+    def __post_init__(self) -> None:
+        for name, zero_is_valid in (
+            ("speed_mps", False),
+            ("time_constant_s", False),
+            ("noticed_after_s", True),
+        ):
+            value = finite_number(
+                name,
+                getattr(self, name),
+                SimError,
+                minimum=0.0,
+                exclusive_minimum=not zero_is_valid,
+            )
+            set_fields(self, **{name: value})
+        shares = tuple(finite_number("start_shares", each, SimError) for each in self.start_shares)
+        if len(shares) != len(LOOK_WITHIN_S) + 1 or not all(0.0 <= each < 1.0 for each in shares):
+            raise SimError(
+                f"start_shares must be {len(LOOK_WITHIN_S) + 1} shares in [0, 1), got {shares}"
+            )
+        set_fields(self, start_shares=shares)
+
+    def ways(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the time (s) for which the velocity at the start counts, and the way (m) ahead.
+
+        After ``t_s`` a person has moved by the velocity at the start times the first, and by the
+        second in the direction in which they set off.
+        """
+        lag_s = -self.time_constant_s * np.expm1(-t_s / self.time_constant_s)
+        return lag_s, self.speed_mps * (t_s - lag_s)
+
+
+#: People as recorded.
+STEP_OUT: Final = StepOut()
+#: Faster starts than recorded, to see how much a figure rests on the model.
+FASTER_STEP_OUT: Final = StepOut(speed_mps=1.6, time_constant_s=0.35)
+
+
+@dataclass(frozen=True, slots=True)
+class StepOutImpacts:
+    """The step-out impacts of one episode, as docs/metrics.md defines them.
+
+    Attributes:
+        unaware: expected impacts with unaware people, per 1 000 such crossings.
+        unaware_fast: those of them at more than 0.25 m/s.
+        aware: expected impacts with aware people who ignore the robot, per 1 000 such crossings.
+        aware_fast: those of them at more than 0.25 m/s.
+        worst_mps: the robot's highest closing speed in an impact with an unaware person, 0 without
+            any.
+    """
+
+    unaware: float
+    unaware_fast: float
+    aware: float
+    aware_fast: float
+    worst_mps: float
+
+
+def step_out_impacts(result: CrossingResult, model: StepOut = STEP_OUT) -> StepOutImpacts:
+    """Return the step-out impacts of a crossing; every figure is NaN without people.
+
+    Every 0.1 s at which the robot moves, each person sets off in each of 16 directions, evenly
+    spaced from the robot's heading on, and ignores the robot. The robot keeps its curve, holds its
+    speed for its reaction time and ``noticed_after_s``, and brakes. An impact is the first touch of
+    the convex hull of its footprint and the body circle of 0.30 m, if the base origin then closes
+    at more than 0.03 m/s with the person's centre. A path through a rack, a wall or a prop gives
+    none.
+
+    Args:
+        result: the crossing.
+        model: the people's constants.
+
+    Raises:
+        SimError: a result without frames, or with frames that do not hold all people.
+    """
+    trace = Trace.of(result)
+    if not trace.people:
+        return StepOutImpacts(*[math.nan] * 5)
+    t_s = trace.t_s
+    every = 1
+    if len(t_s) > 1:
+        every = max(round(_EVERY_S / float(np.median(np.diff(t_s)))), 1)
+    instants = np.arange(0, len(t_s), every)
+    lasts_s = np.diff(t_s[instants], append=t_s[-1])
+    yaw_rates = np.array([frame.robot_state.yaw_rate_radps for frame in result.frames])
+    starts = _Starts.of(trace, yaw_rates, instants, result.robot, model)
+    closing_mps = starts.impacts(result.obstacle_boxes_odom_m)  # (M, 16), 0 without an impact
+    since_look_s = _since_look_s(trace)[starts.row, starts.person]
+    rates_hz = -np.log1p(-np.array(model.start_shares))
+    by_look = np.searchsorted(np.array(LOOK_WITHIN_S) + 1e-9, since_look_s)
+    weights = _CROSSINGS / _DIRECTIONS * rates_hz[by_look] * lasts_s[starts.row // every]
+    unaware = since_look_s > AWARE_WITHIN_S + 1e-9
+
+    def expected(people: NDArray[np.bool_], above_mps: float) -> float:
+        return float((closing_mps > above_mps).sum(axis=1) @ (weights * people))
+
+    return StepOutImpacts(
+        unaware=expected(unaware, 0.0),
+        unaware_fast=expected(unaware, FAST_IMPACT_MPS),
+        aware=expected(~unaware, 0.0),
+        aware_fast=expected(~unaware, FAST_IMPACT_MPS),
+        worst_mps=float(closing_mps[unaware].max(initial=0.0)),
+    )
+
+
+def _since_look_s(trace: Trace) -> FloatArray:
+    """Return the (N, P) times since the last true look at the robot; infinite before the first."""
+    looked_s = np.where(trace.awareness >= AWARE_FROM, trace.t_s[:, None], -np.inf)
+    since: FloatArray = trace.t_s[:, None] - np.maximum.accumulate(looked_s, axis=0)
+    return since
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Starts:
+    """M instants and people who may set off; vectors are in the base frame of the instant.
+
+    Attributes:
+        robot: the robot.
+        outline: its outline.
+        model: the people's constants.
+        row: (M,) row of the trace.
+        person: (M,) index of the person.
+        poses_odom: (M, 3) x, y and heading of the robot.
+        place_m: (M, 2) the person's centre line.
+        velocity_mps: (M, 2) the person's velocity.
+        robot_mps: (M, 2) the robot's velocity.
+        yaw_rate_radps: (M,).
+    """
+
+    robot: RobotProfile
+    outline: Outline
+    model: StepOut
+    row: NDArray[np.intp]
+    person: NDArray[np.intp]
+    poses_odom: FloatArray
+    place_m: FloatArray
+    velocity_mps: FloatArray
+    robot_mps: FloatArray
+    yaw_rate_radps: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        trace: Trace,
+        yaw_rates_radps: FloatArray,
+        instants: NDArray[np.intp],
+        robot: RobotProfile,
+        model: StepOut,
+    ) -> _Starts:
+        """Return the starts that the robot, while it moves, can meet before it stands."""
+        outline = Outline(robot.footprint_m)
+        places = trace.to_base(trace.people_odom_m - trace.robot_odom_m[:, None])
+        velocities = trace.to_base(trace.people_odom_mps)
+        speed = trace.travel_mps[:, None]
+        brakes_s = speed / robot.max_deceleration_mps2
+        until_s = robot.reaction_time_s + model.noticed_after_s + brakes_s
+        reach_m = until_s * np.maximum(np.linalg.norm(velocities, axis=2), model.speed_mps)
+        reach_m += speed * (until_s - 0.5 * brakes_s) + outline.reach_m + BODY_RADIUS_M
+        near = (np.linalg.norm(places, axis=2) <= reach_m) & (speed > STANDING_SPEED_MPS)
+        chosen = np.zeros(len(near), dtype=np.bool_)
+        chosen[instants] = True
+        row, person = np.nonzero(near & chosen[:, None])
+        poses = np.column_stack((trace.robot_odom_m, trace.heading_odom_rad))
+        return cls(
+            robot,
+            outline,
+            model,
+            row,
+            person,
+            poses[row],
+            places[row, person],
+            velocities[row, person],
+            trace.velocity_base_mps[row],
+            yaw_rates_radps[row],
+        )
+
+    def impacts(self, boxes_odom_m: FloatArray) -> FloatArray:
+        """Return the (M, 16) closing speeds of the impacts; 0 for a start that ends in none."""
+        found = np.zeros((len(self.row), _DIRECTIONS))
+        speed = float(np.linalg.norm(self.robot_mps, axis=1).max(initial=0.0))
+        until_s = self._holds_s + speed / self.robot.max_deceleration_mps2
+        t_s = np.arange(math.ceil(until_s / _STEP_S) + 1, dtype=np.float64) * _STEP_S
+        at_once = max(_PLACES_AT_ONCE // (_DIRECTIONS * len(t_s)), 1)
+        for first in range(0, len(self.row), at_once):
+            which = np.arange(first, min(first + at_once, len(self.row)))
+            start, direction, touch_s = self._touches(which, t_s)
+            closing = self._closing_mps(start, direction, touch_s)
+            hits = closing > STANDING_SPEED_MPS
+            start, direction, touch_s = start[hits], direction[hits], touch_s[hits]
+            free = ~self._blocked(start, direction, touch_s, boxes_odom_m)
+            found[start[free], direction[free]] = closing[hits][free]
+        return found
+
+    def _touches(
+        self, which: NDArray[np.intp], t_s: FloatArray
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatArray]:
+        """Return start, direction and time (s) of every first touch, looked for at ``t_s``."""
+        everyone = np.arange(_DIRECTIONS)[:, None]
+        touch = self._touch(which[:, None, None], everyone, t_s)
+        start, direction = np.nonzero(touch.any(axis=2))
+        step = touch.argmax(axis=2)[start, direction]
+        start = which[start]
+        late_s, early_s = t_s[step], t_s[np.maximum(step - 1, 0)]
+        for _ in range(_HALVINGS):
+            middle_s = 0.5 * (early_s + late_s)
+            inside = self._touch(start, direction, middle_s)
+            late_s = np.where(inside, middle_s, late_s)
+            early_s = np.where(inside, early_s, middle_s)
+        return start, direction, late_s
+
+    @property
+    def _holds_s(self) -> float:
+        """Time for which the robot holds its speed."""
+        return self.robot.reaction_time_s + self.model.noticed_after_s
+
+    def _touch(self, start: Any, direction: Any, t_s: FloatArray) -> NDArray[np.bool_]:
+        """Return whether body circle and outline touch; the arguments are broadcast."""
+        x_m, y_m, _ = self._relative(start, direction, t_s)
+        low, high = self.outline.bounds_m
+        touch: NDArray[np.bool_] = (
+            (x_m >= low[0] - BODY_RADIUS_M)
+            & (x_m <= high[0] + BODY_RADIUS_M)
+            & (y_m >= low[1] - BODY_RADIUS_M)
+            & (y_m <= high[1] + BODY_RADIUS_M)
+        )
+        # Only beside a box about both can they touch.
+        points = np.stack([x_m[touch], y_m[touch]], axis=1)
+        touch[touch] = self.outline.distance(points) <= BODY_RADIUS_M
+        return touch
+
+    def _closing_mps(
+        self, start: NDArray[np.intp], direction: NDArray[np.intp], t_s: FloatArray
+    ) -> FloatArray:
+        """Return the speed of the base origin towards the person's centre."""
+        x_m, y_m, left = self._relative(start, direction, t_s)
+        ahead, aside = self.robot_mps[start].T
+        closing: FloatArray = left * (ahead * x_m + aside * y_m)
+        return closing / np.maximum(np.hypot(x_m, y_m), 1e-9)
+
+    def _relative(
+        self, start: Any, direction: Any, t_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return x and y of people in the base frame then, and the share of its speed left."""
+        ahead, aside = self.robot_mps[start, 0], self.robot_mps[start, 1]
+        speed = np.hypot(ahead, aside)
+        deceleration = self.robot.max_deceleration_mps2
+        braking_s = np.clip(t_s - self._holds_s, 0.0, speed / deceleration)
+        left = 1.0 - deceleration * braking_s / speed
+        # The way driven, as the time that it takes at the present velocity.
+        driven_s = np.minimum(t_s, self._holds_s) + 0.5 * (1.0 + left) * braking_s
+        turned = self.yaw_rate_radps[start] * driven_s
+        # The chord of the curve lies in the middle between both headings.
+        chord_s = driven_s * np.sinc(0.5 * turned / np.pi)
+        cos, sin = np.cos(0.5 * turned), np.sin(0.5 * turned)
+        robot_x_m = chord_s * (cos * ahead - sin * aside)
+        robot_y_m = chord_s * (sin * ahead + cos * aside)
+        x_m, y_m = self._person_m(start, direction, t_s)
+        x_m, y_m = x_m - robot_x_m, y_m - robot_y_m
+        cos, sin = np.cos(turned), np.sin(turned)
+        return cos * x_m + sin * y_m, cos * y_m - sin * x_m, left
+
+    def _person_m(
+        self, start: Any, direction: Any, t_s: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return x and y of people in the base frame of the start."""
+        lag_s, way_m = self.model.ways(t_s)
+        angle = 2.0 * np.pi / _DIRECTIONS * direction
+        return (
+            self.place_m[start, 0] + self.velocity_mps[start, 0] * lag_s + np.cos(angle) * way_m,
+            self.place_m[start, 1] + self.velocity_mps[start, 1] * lag_s + np.sin(angle) * way_m,
+        )
+
+    def _blocked(
+        self,
+        start: NDArray[np.intp],
+        direction: NDArray[np.intp],
+        touch_s: FloatArray,
+        boxes_odom_m: FloatArray,
+    ) -> NDArray[np.bool_]:
+        """Return whether a box lies on a person's path; one that they stand in does not count."""
+        blocked = np.zeros(len(start), dtype=np.bool_)
+        if not len(start):
+            return blocked
+        t_s = np.minimum(np.arange(0.0, touch_s.max() + _STEP_S, _STEP_S), touch_s[:, None])
+        x_m, y_m = self._person_m(start[:, None], direction[:, None], t_s)
+        robot_x_m, robot_y_m, heading = self.poses_odom[start].T[..., None]
+        cos, sin = np.cos(heading), np.sin(heading)
+        x_m, y_m = robot_x_m + cos * x_m - sin * y_m, robot_y_m + sin * x_m + cos * y_m
+        for x_min, y_min, x_max, y_max in boxes_odom_m:
+            inside = (x_m > x_min) & (x_m < x_max) & (y_m > y_min) & (y_m < y_max)
+            blocked |= inside.any(axis=1) & ~inside[:, 0]
+        return blocked

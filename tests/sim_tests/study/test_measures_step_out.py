@@ -1,0 +1,277 @@
+"""Step-out impacts: closed forms, what must not change them, and what must stop them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, crossing, straight, walking
+
+from nav_adapter import RobotProfile
+from sim_tests import NOVA_CARTER, ScenarioTemplate, SimError, run_crossing
+from sim_tests.study.measures import (
+    FASTER_STEP_OUT,
+    STEP_OUT,
+    StepOut,
+    measure,
+    step_out_impacts,
+)
+
+T_S = np.arange(0.0, 6.001, 0.05)
+BRIEF_S = np.array([0.0, 0.05, 0.1, 0.15])  # two instants of 0.1 s, of which the second lasts 0.05
+RATES_HZ = -np.log(1.0 - np.array([0.23, 0.26, 0.09, 0.10]))
+HOLDS_S = NOVA_CARTER.reaction_time_s + 0.2
+LASTS_S = float(BRIEF_S[-1])
+
+
+def standing(x_m, y_m):
+    return walking((x_m, y_m), (0.0, 0.0))
+
+
+def turned(function, angle, mirrored=False):
+    """The same robot or walk in a hall that is turned, and perhaps mirrored."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    sign = -1.0 if mirrored else 1.0
+
+    def place(x, y):
+        return cos * x - sin * sign * y, sin * x + cos * sign * y
+
+    def moved(t):
+        x, y, *rest = function(t)
+        if len(rest) == 2 and function.__name__ == "walk":
+            return (*place(x, y), *place(*rest))
+        heading, forward, *left = rest
+        return (*place(x, y), angle + sign * heading, forward, *(sign * each for each in left))
+
+    return moved
+
+
+def unaware(robot, *people, times=T_S, **values):
+    return step_out_impacts(crossing(times, robot, people, **values)).unaware
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "speed_mps"), [(0.4, 0.6), (0.8, 1.0), (1.2, 1.0), (2.0, 1.4), (2.6, 1.5)]
+)
+def test_somebody_ahead_is_hit_in_the_directions_of_a_closed_form(gap_m, speed_mps):
+    """A frozen person (time constant of an hour) is met in all directions, or in none."""
+    frozen = StepOut(time_constant_s=3600.0)
+    stops_m = speed_mps * HOLDS_S + speed_mps**2 / (2.0 * NOVA_CARTER.max_deceleration_mps2)
+    person = standing(gap_m + ALONG_M + BODY_RADIUS_M, 0.0)
+    # At an instant: the robot has not moved in the log.
+    result = crossing(BRIEF_S, lambda t: (0.0, 0.0, 0.0, speed_mps), [person])
+    found = step_out_impacts(result, frozen)
+    hit = stops_m > gap_m
+    assert found.unaware == pytest.approx(1000.0 * RATES_HZ[3] * LASTS_S * hit)
+    if hit:
+        a = NOVA_CARTER.max_deceleration_mps2
+        brakes_m = max(gap_m - speed_mps * HOLDS_S, 0.0)
+        impact_mps = math.sqrt(speed_mps**2 - 2.0 * a * brakes_m)
+        assert found.worst_mps == pytest.approx(impact_mps, abs=0.01)
+        assert (found.unaware_fast > 0.0) == (impact_mps > 0.25)
+
+
+@given(st.floats(0.3, 1.5), st.floats(0.3, 1.4), st.floats(0.5, 3.0))
+def test_directions_beside_a_straight_path_are_those_of_a_fine_simulation(v, aside_m, ahead_m):
+    """Written out anew: one direction and millisecond after the other, for a rectangle."""
+    person = standing(ahead_m, aside_m + ACROSS_M + BODY_RADIUS_M)
+    result = crossing(BRIEF_S, lambda t: (0.0, 0.0, 0.0, v), [person])
+    found = step_out_impacts(result)
+    share, worst, unclear = simulated_share(v, ahead_m, aside_m + ACROSS_M + BODY_RADIUS_M)
+    expected = 1000.0 * RATES_HZ[3] * LASTS_S
+    assert abs(found.unaware - expected * share) <= expected * unclear / 16 + 1e-6
+    if not unclear:
+        assert found.worst_mps == pytest.approx(worst, abs=0.02)
+
+
+def simulated_share(v, x_m, y_m):
+    a, tau, fastest = NOVA_CARTER.max_deceleration_mps2, 0.54, 1.34
+    t = np.arange(0.0, HOLDS_S + v / a + 0.1, 1e-3)
+    brakes = np.clip(t - HOLDS_S, 0.0, v / a)
+    driven = v * np.minimum(t, HOLDS_S) + v * brakes - 0.5 * a * brakes**2
+    speed = v - a * brakes
+    way = fastest * (t - tau * (1.0 - np.exp(-t / tau)))
+    hits, worst, unclear = 0, 0.0, 0
+    for phi in np.arange(16) * math.pi / 8.0:
+        dx, dy = x_m + math.cos(phi) * way - driven, y_m + math.sin(phi) * way
+        low_x, high_x = NOVA_CARTER.footprint_m[:, 0].min(), NOVA_CARTER.footprint_m[:, 0].max()
+        apart = np.hypot(
+            np.maximum(np.maximum(low_x - dx, dx - high_x), 0.0),
+            np.maximum(np.abs(dy) - ACROSS_M, 0.0),
+        )
+        unclear += abs(float(apart.min()) - BODY_RADIUS_M) < 0.02
+        if (apart <= BODY_RADIUS_M).any():
+            k = int(np.argmax(apart <= BODY_RADIUS_M))
+            closing = speed[k] * dx[k] / math.hypot(dx[k], dy[k])
+            unclear += abs(closing - 0.03) < 0.02
+            hits += closing > 0.03
+            worst = max(worst, closing if closing > 0.03 else 0.0)
+    return hits / 16, worst, unclear
+
+
+def test_a_robot_that_stands_meets_nobody():
+    near = standing(ALONG_M + BODY_RADIUS_M + 0.02, 0.0)
+    assert unaware(lambda t: (0.0, 0.0, 0.0, 0.0), near) == 0.0
+    assert unaware(lambda t: (0.0, 0.0, 0.0, 0.029), near) == 0.0
+    assert unaware(lambda t: (0.0, 0.0, 0.0, 0.04), near) > 0.0
+
+
+@given(st.floats(0.3, 3.0), st.floats(-2.0, 2.0), st.floats(0.1, 1.5), st.floats(0.05, 0.5))
+def test_a_faster_robot_meets_whomever_a_slower_one_meets(ahead_m, aside_m, v, faster):
+    """Somebody who does not move, so that the way alone counts."""
+    person = standing(ahead_m + ALONG_M + BODY_RADIUS_M, aside_m)
+    frozen = StepOut(time_constant_s=3600.0)
+
+    def found(speed):
+        robot = crossing(BRIEF_S, lambda t: (0.0, 0.0, 0.0, speed), [person])
+        return step_out_impacts(robot, frozen)
+
+    slow, fast = found(v), found(v + faster)
+    assert fast.unaware >= slow.unaware - 1e-9
+    assert fast.worst_mps >= slow.worst_mps - 0.01
+
+
+def curve(t):
+    """A robot on a curve of 2 m, which it leaves sideways as well."""
+    angle = 0.4 * t
+    return 2.0 * math.sin(angle), 2.0 * (1.0 - math.cos(angle)), angle, 0.8, 0.1
+
+
+@settings(max_examples=15)
+@given(st.floats(-math.pi, math.pi), st.booleans())
+def test_a_hall_that_is_turned_or_mirrored_changes_nothing(angle, mirrored):
+    def walk(t):
+        return 3.0 - 0.7 * t, 1.4 - 0.2 * t, -0.7, -0.2
+
+    plain = step_out_impacts(crossing(T_S, curve, [walk]))
+    other = step_out_impacts(
+        crossing(T_S, turned(curve, angle, mirrored), [turned(walk, angle, mirrored)])
+    )
+    assert plain.unaware > 0.0
+    for name in ("unaware", "unaware_fast", "worst_mps"):
+        assert getattr(other, name) == pytest.approx(getattr(plain, name), abs=1e-6)
+
+
+def with_yaw_rate(result, yaw_rate):
+    frames = tuple(
+        replace(frame, robot_state=replace(frame.robot_state, yaw_rate_radps=yaw_rate))
+        for frame in result.frames
+    )
+    return replace(result, frames=frames)
+
+
+def test_the_robot_keeps_its_curve_and_its_drift():
+    """Frozen people on the way of a curve to the left, or of a drift, are met there alone."""
+    frozen = StepOut(time_constant_s=3600.0)
+    left, right = standing(1.3, 0.9), standing(1.3, -0.9)
+
+    def impacts(person, yaw_rate=0.0, drift=0.0):
+        result = crossing(BRIEF_S, lambda t: (0.0, 0.0, 0.0, 1.2, drift), [person])
+        return step_out_impacts(with_yaw_rate(result, yaw_rate), frozen).unaware
+
+    assert impacts(left) == impacts(right) == 0.0
+    for change in ({"yaw_rate": 1.0}, {"drift": 0.7}):
+        opposite = {name: -value for name, value in change.items()}
+        assert impacts(left, **change) > 0.0 == impacts(right, **change)
+        assert impacts(right, **opposite) == pytest.approx(impacts(left, **change))
+
+
+def test_racks_block_and_the_box_that_somebody_stands_in_does_not():
+    person = standing(2.0, 1.1)
+    result = crossing(T_S, straight(1.0), [person])
+    free = step_out_impacts(result).unaware
+    assert free > 0.0
+
+    def behind(*box):
+        return step_out_impacts(replace(result, obstacle_boxes_odom_m=np.array([box]))).unaware
+
+    assert behind(-10.0, 0.6, 12.0, 0.7) == 0.0
+    assert 0.0 < behind(1.0, 0.6, 1.9, 0.7) < free
+    assert behind(-10.0, 1.5, 12.0, 3.0) == pytest.approx(free)  # behind their back
+    assert behind(1.5, 0.9, 2.5, 1.3) == pytest.approx(free)
+
+
+@pytest.mark.parametrize(
+    ("since_look_s", "share", "aware"),
+    [(0.0, 0.23, True), (0.9, 0.26, True), (1.2, 0.09, False), (3.9, 0.09, False),
+     (4.2, 0.10, False), (None, 0.10, False)],
+)  # fmt: skip
+def test_the_last_true_look_gives_the_rate_and_the_side(since_look_s, share, aware):
+    """The robot moves at one instant, towards somebody whom it meets in each direction."""
+    moves_s = 5.0
+    looked_s = -math.inf if since_look_s is None else moves_s - since_look_s
+
+    def robot(t):
+        return 0.0, 0.0, 0.0, 1.0 if t > moves_s - 1e-6 else 0.0
+
+    def look(t, person):
+        return 0.6 if t <= looked_s + 1e-6 else 0.4
+
+    frozen = StepOut(time_constant_s=3600.0)
+    person = standing(ALONG_M + BODY_RADIUS_M + 0.1, 0.0)
+    times = np.arange(0.0, moves_s + 0.051, 0.05)  # the last instant lasts 0.05 s
+    found = step_out_impacts(crossing(times, robot, [person], awareness=look), frozen)
+    expected = -1000.0 * math.log(1.0 - share) * 0.05
+    sides = (found.aware, found.unaware)
+    assert sides == pytest.approx((expected, 0.0) if aware else (0.0, expected))
+    assert (found.worst_mps > 0.0) == (not aware)
+
+
+def test_any_footprint_counts_by_its_hull_and_people_behind_are_not_met():
+    """A long vehicle whose base origin lies at the rear, with a notch in front."""
+    corners = np.array(
+        [(-0.3, -0.4), (1.6, -0.4), (1.6, -0.2), (1.0, 0.0), (1.6, 0.2), (1.6, 0.4), (-0.3, 0.4)]
+    )
+    truck = RobotProfile(corners, 2.0, 1.0, 0.5, 0.4)
+    frozen = StepOut(time_constant_s=3600.0)
+
+    def impacts(x_m, y_m=0.0):
+        result = crossing(BRIEF_S, lambda t: (0.0, 0.0, 0.0, 1.0), [standing(x_m, y_m)])
+        return step_out_impacts(replace(result, robot=truck), frozen).unaware
+
+    stops_m = 0.4 + 0.2 + 1.0
+    assert impacts(1.6 + BODY_RADIUS_M + stops_m - 0.03) > 0.0
+    assert impacts(1.6 + BODY_RADIUS_M + stops_m + 0.03) == 0.0
+    assert impacts(1.6 + BODY_RADIUS_M - 0.05) > 0.0  # time 0 counts, in the notch as well
+    assert impacts(-0.3 - BODY_RADIUS_M + 0.05) == 0.0
+    assert impacts(2.5, 0.4 + BODY_RADIUS_M + 0.03) == 0.0
+
+
+def test_the_row_has_both_models_and_nothing_without_people():
+    walk = walking((3.0, 1.2), (0.0, 0.0))
+    result = crossing(T_S, straight(1.2), [walk])
+    record, found = measure(result), step_out_impacts(result)
+    assert found == step_out_impacts(result, STEP_OUT)
+    assert record.step_out_unaware == pytest.approx(found.unaware, abs=1e-6)
+    assert record.step_out_unaware_fast == pytest.approx(found.unaware_fast, abs=1e-6)
+    assert record.step_out_worst_mps == pytest.approx(found.worst_mps, abs=1e-6)
+    assert record.step_out_aware == record.step_out_aware_fast == 0.0
+    stress = step_out_impacts(result, FASTER_STEP_OUT)
+    assert record.step_out_stress_unaware == pytest.approx(stress.unaware, abs=1e-6)
+    assert record.step_out_stress_worst_mps == pytest.approx(stress.worst_mps, abs=1e-6)
+    assert stress.unaware > found.unaware > found.unaware_fast > 0.0
+    alone = measure(crossing(T_S, straight(1.2)))
+    assert alone.step_out_unaware is alone.step_out_stress_worst_mps is None
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"speed_mps": 0.0}, "speed_mps"),
+        ({"time_constant_s": math.nan}, "time_constant_s"),
+        ({"noticed_after_s": -0.1}, "noticed_after_s"),
+        ({"start_shares": (0.1, 0.1, 0.1)}, "start_shares must be 4 shares"),
+        ({"start_shares": (0.1, 0.1, 0.1, 1.0)}, "start_shares must be 4 shares"),
+    ],
+)
+def test_constants_that_nobody_has_are_refused(values, message):
+    with pytest.raises(SimError, match=message):
+        StepOut(**values)
+
+
+def test_a_crossing_logs_the_racks_of_its_hall():
+    scenario = ScenarioTemplate.shipped("blind_corner").for_seed(0)
+    result = run_crossing(scenario, policy="scanner", seed=0)
+    np.testing.assert_array_equal(result.obstacle_boxes_odom_m, scenario.layout.obstacle_boxes_odom)
