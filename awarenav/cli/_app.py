@@ -107,6 +107,10 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "sim_tests.dataset.command:render",
             "Render images of people in warehouses, with the truth about them.",
         ),
+        "frontier": _Entry(
+            "sim_tests.study.frontier.command:frontier",
+            "Draw what awareness is worth: time lost over step-out impacts.",
+        ),
         "tune": _Entry(
             "sim_tests.search.tune.command:tune",
             "Search for policies that lose less time and keep the separation margin.",

@@ -15,7 +15,12 @@ if TYPE_CHECKING:
         MeasuredAttention,
         measured_part,
     )
-    from ._bootstrap import bootstrap_interval, ratio_interval
+    from ._bootstrap import (
+        bootstrap_interval,
+        ratio_interval,
+        resampled_interval,
+        resampled_means,
+    )
     from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
     from ._driving import path_length_m
     from ._interval import FEW_PAIRS, Interval, proportion_interval, zero_of_n_upper
@@ -88,6 +93,8 @@ __all__ = [
     "read_record_file",
     "read_records",
     "record_row",
+    "resampled_interval",
+    "resampled_means",
     "salvage_record_file",
     "step_out_impacts",
     "summarise",
@@ -115,6 +122,8 @@ __getattr__ = lazy_names(
         "._bootstrap": (
             "bootstrap_interval",
             "ratio_interval",
+            "resampled_interval",
+            "resampled_means",
         ),
         "._conduct": (
             "OVERSHOOT_MPS",
@@ -147,6 +156,8 @@ __getattr__ = lazy_names(
             "EpisodeRecord",
             "RECORD_COLUMNS",
             "record_row",
+            "resampled_interval",
+            "resampled_means",
         ),
         "._record_file": (
             "read_record_file",

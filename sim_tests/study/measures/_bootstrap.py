@@ -100,19 +100,71 @@ def ratio_intervals(
     level = finite_number("level", level, SimError, minimum=0.0, exclusive_minimum=True)
     if level >= 1.0:
         raise SimError(f"level must lie in (0, 1), got {level:g}")
-    if strata is not None and len(strata) != len(top):
-        raise SimError(f"strata must be {len(top)} labels, one per value, got {len(strata)}")
-    groups = _strata_rows(strata, len(top)) if len(top) > 1 else []
-    tops, bottoms = np.zeros((2, resamples, top.shape[1]))
-    for group in groups:
-        for rows, weights in _draws(len(group), resamples, rng):
-            tops[rows] += weights @ top[group]
-            bottoms[rows] += weights @ bottom[group]
+    tops, bottoms = _resampled_sums((top, bottom), rng, strata, resamples)
+    groups = _groups(strata, len(top))
     applies = ((top != 0.0) | (bottom != 0.0)).sum(axis=0).tolist()
     return tuple(
         _interval(top[:, m], bottom[:, m], tops[:, m], bottoms[:, m], applies[m], groups, level)
         for m in range(top.shape[1])
     )
+
+
+def resampled_means(
+    values: Any,
+    rng: np.random.Generator,
+    *,
+    strata: Sequence[Hashable] | None = None,
+    resamples: int = RESAMPLES,
+) -> FloatArray:
+    """Return the (B, M) means of (N, M) finite values in B resamples of the N episodes.
+
+    Resamples are drawn as for :func:`ratio_intervals`. All columns share them, so figures that are
+    computed from several columns are paired. With a single episode all means are 0.
+
+    Raises:
+        SimError: values that are not finite, or another number of labels than of episodes.
+    """
+    checked = finite_array("values", values, ("N", "M"), SimError)
+    (sums,) = _resampled_sums((checked,), rng, strata, resamples)
+    means: FloatArray = sums / max(len(checked), 1)
+    return means
+
+
+def resampled_interval(
+    value: float, resampled: FloatArray, n: int, level: float = 0.95
+) -> Interval:
+    """Return a figure of n episodes with the bias-corrected interval of its (B,) resamples.
+
+    The interval is unbounded for a single episode, or where more resamples have no figure (NaN)
+    than the interval may leave out.
+    """
+    usable = np.isfinite(resampled)
+    if not np.isfinite(value) or n < 2 or np.mean(~usable) > 0.5 * (1.0 - level):
+        return Interval(value, -np.inf, np.inf, n)
+    return Interval(value, *_bca(value, resampled[usable], 0.0, level), n)
+
+
+def _resampled_sums(
+    columns: Sequence[FloatArray],
+    rng: np.random.Generator,
+    strata: Sequence[Hashable] | None,
+    resamples: int,
+) -> list[FloatArray]:
+    """Return the (B, M) sums of each of the (N, M) columns in the same resamples."""
+    n = len(columns[0])
+    if strata is not None and len(strata) != n:
+        raise SimError(f"strata must be {n} labels, one per value, got {len(strata)}")
+    sums = [np.zeros((resamples, each.shape[1])) for each in columns]
+    for group in _groups(strata, n):
+        for rows, weights in _draws(len(group), resamples, rng):
+            for total, each in zip(sums, columns, strict=True):
+                total[rows] += weights @ each[group]
+    return sums
+
+
+def _groups(strata: Sequence[Hashable] | None, n: int) -> list[NDArray[np.intp]]:
+    """Return the rows of each stratum; none for a single episode."""
+    return _strata_rows(strata, n) if n > 1 else []
 
 
 def _interval(

@@ -16,7 +16,7 @@ GROUPS = {
     "On a robot": ["estimate", "judge", "tracks", "bridge", "models", "doctor", "policy"],
     "Simulation": [
         *("demo", "crossings", "watch", "replay", "compare", "measures", "export", "report"),
-        *("planners", "scenario", "render", "tune", "falsify"),
+        *("planners", "scenario", "render", "frontier", "tune", "falsify"),
     ],
     "Development": ["bench", "completion"],
 }

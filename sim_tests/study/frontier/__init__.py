@@ -1,0 +1,37 @@
+"""The frontier: time lost over step-out impacts, with and without awareness."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from awarenav.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from ._family import SPEEDS_MPS, TODAY, Member, family
+    from ._frontier import Frontier, Point, Worth, frontier_of
+    from ._plot import draw_frontier
+    from ._text import frontier_text, sentences
+
+__all__ = [
+    "SPEEDS_MPS",
+    "TODAY",
+    "Frontier",
+    "Member",
+    "Point",
+    "Worth",
+    "draw_frontier",
+    "family",
+    "frontier_of",
+    "frontier_text",
+    "sentences",
+]
+
+__getattr__ = lazy_names(
+    __name__,
+    {
+        "._family": ("SPEEDS_MPS", "TODAY", "Member", "family"),
+        "._frontier": ("Frontier", "Point", "Worth", "frontier_of"),
+        "._plot": ("draw_frontier",),
+        "._text": ("frontier_text", "sentences"),
+    },
+)

@@ -1,0 +1,129 @@
+"""The picture of the frontier: time lost over step-out impacts, today's AMR on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from awarenav.errors import counted
+from awarenav.figures import Axes, new_figure, save_figure
+from perception.arrays import FloatArray
+
+from ..measures import Interval
+from ._frontier import Frontier, Point
+from ._text import sentences
+
+_TODAY: Final = "#b3261e"
+_OTHER: Final = "#b8651b"
+_QUIET: Final = "#5c6069"
+_LINES: Final = {
+    "blind": ("#8a8f98", "s", "without awareness"),
+    "aware": ("#1f4e79", "o", "with awareness"),
+    "memory": ("#2e7d4f", "D", "with awareness, 3 s of memory"),
+}
+
+
+def draw_frontier(frontier: Frontier, path: Path) -> None:
+    """Draw the frontier into a file (PNG, SVG or PDF).
+
+    The axis of the impacts is that of their square roots, so that 0 and today's AMR both show.
+    """
+    figure = new_figure(8.2, 6.2, dpi=110.0)
+    axes = figure.subplots()
+    axes.set_yscale("function", functions=(lambda y: np.sqrt(np.maximum(y, 0.0)), np.square))
+    for kind, (colour, marker, label) in _LINES.items():
+        found = [p for p in frontier.points if p.member is not None and p.member.kind == kind]
+        if not found:
+            continue
+        _draw(axes, found, colour, marker, label)
+        line = [frontier.today, *found] if kind == "blind" else found
+        axes.plot(*_places(line).T, color=colour, lw=1.4, alpha=0.7, zorder=1)
+        for point in found:
+            if point.member is not None:
+                _name(axes, point, f"{point.member.speed_mps:g}", colour, below=kind != "blind")
+    _draw(axes, [frontier.today], _TODAY, "*", "today's AMR", size=13.0)
+    others = [p for p in frontier.points[1:] if p.member is None]
+    if others:
+        _draw(axes, others, _OTHER, "^", "other policies")
+    for point in others:
+        _name(axes, point, point.name, _OTHER, below=False)
+    axes.set_ylim(bottom=0.0)
+    free_s, today_s = frontier.free_s, frontier.today.time_lost_s.value
+    over = axes.secondary_xaxis(
+        "top",
+        functions=(
+            lambda lost_s: (free_s + lost_s) / (free_s + today_s),
+            lambda ratio: ratio * (free_s + today_s) - free_s,
+        ),
+    )
+    over.set_xlabel("time to the goal over that of today's AMR")
+    axes.set_xlabel("time lost to people (s a crossing)")
+    axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
+    axes.grid(alpha=0.25)
+    axes.spines[["right"]].set_visible(False)
+    axes.legend(frameon=False)
+    axes.annotate(
+        f"Numbers: U in m/s. {counted(frontier.episodes, 'episode')} of each policy in "
+        f"{counted(frontier.scenarios, 'scenario')}, 95 % intervals.",
+        (1.0, 0.01),
+        xycoords="axes fraction",
+        ha="right",
+        color=_QUIET,
+        fontsize=8,
+    )
+    said = sentences(frontier)
+    if said:
+        figure.suptitle("\n".join(said).replace("`", ""), fontsize=9, x=0.02, ha="left")
+    save_figure(figure, path)
+
+
+def _draw(
+    axes: Axes, points: Sequence[Point], colour: str, marker: str, label: str, size: float = 6.0
+) -> None:
+    """Draw points with the intervals of both figures, where they are bounded."""
+    x, y = _places(points).T
+    axes.errorbar(
+        x,
+        y,
+        xerr=_ends([point.time_lost_s for point in points]),
+        yerr=_ends([point.step_out_unaware for point in points]),
+        fmt=marker,
+        ms=size,
+        color=colour,
+        ecolor=colour,
+        elinewidth=0.8,
+        alpha=0.9,
+        label=label,
+        zorder=3,
+    )
+
+
+def _places(points: Sequence[Point]) -> FloatArray:
+    return np.array([[p.time_lost_s.value, p.step_out_unaware.value] for p in points])
+
+
+def _ends(intervals: Sequence[Interval]) -> FloatArray:
+    """Return the (2, N) lengths of error bars; 0 where an interval is unbounded."""
+    ends = [
+        (max(each.value - each.low, 0.0), max(each.high - each.value, 0.0))
+        if each.bounded
+        else (0.0, 0.0)
+        for each in intervals
+    ]
+    return np.array(ends).T
+
+
+def _name(axes: Axes, point: Point, text: str, colour: str, *, below: bool) -> None:
+    axes.annotate(
+        text,
+        (point.time_lost_s.value, point.step_out_unaware.value),
+        xytext=(-5, -5) if below else (5, 5),
+        textcoords="offset points",
+        ha="right" if below else "left",
+        va="top" if below else "bottom",
+        color=colour,
+        fontsize=8,
+    )
