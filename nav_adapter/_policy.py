@@ -145,8 +145,7 @@ class AwarenessPolicy(StrictConfig):
         """Load a shipped policy.
 
         ``"balanced"`` is the default and ``"blind"`` ignores α. ``"conservative"`` is more careful
-        than the default, ``"assertive"`` less. ``"scanner"`` is today's AMR with a safety laser
-        scanner, for comparisons only.
+        than the default, ``"assertive"`` less.
 
         Raises:
             NavError: for a name that is not a preset.

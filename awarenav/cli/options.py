@@ -19,6 +19,7 @@ from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole
 __all__ = [
     "COMPLETE_POLICIES",
     "COMPLETE_SCENARIOS",
+    "COMPLETE_SIMULATED_POLICIES",
     "PERCEPTIONS",
     "POPULATIONS",
     "REFERENCE_PLANNER",
@@ -93,8 +94,12 @@ _COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
 _COMPLETE_ROBOTS: Final = _shipped("sim_tests", "actors/robot/shipped", "nova_carter")
 #: Completion of policies.
 COMPLETE_POLICIES: Final = _shipped("nav_adapter", "policies")
-_COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "oracle")
+#: Completion of the policies of crossings, which have today's AMR besides.
+COMPLETE_SIMULATED_POLICIES: Final = _shipped("nav_adapter", "policies", "scanner")
+_COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "scanner", "oracle")
 _COMPLETE_FAULTS: Final = _shipped("sim_tests", "crossing/faults", "none")
+
+_TODAY: Final = "'scanner' (today's AMR), "
 
 
 def seed(note: str = "", *, default: int | None = 0) -> Decorator:
@@ -262,14 +267,14 @@ def population() -> Decorator:
     )
 
 
-def policy(default: str = "balanced") -> Decorator:
-    """Add ``--policy``: one policy."""
+def policy(*, simulated: bool = False) -> Decorator:
+    """Add ``--policy``: one policy; in the simulator it may be today's AMR."""
     return option(
         "--policy",
-        default=default,
+        default="balanced",
         metavar="NAME|FILE",
-        shell_complete=COMPLETE_POLICIES,
-        help="Policy: a preset, or a YAML file.",
+        shell_complete=COMPLETE_SIMULATED_POLICIES if simulated else COMPLETE_POLICIES,
+        help=f"Policy: a preset, {_TODAY if simulated else ''}or a YAML file.",
     )
 
 
@@ -285,7 +290,7 @@ def policies(default: Sequence[str], *, repeated: bool = False) -> Decorator:
         **_several(repeated),
         default=list(default),
         shell_complete=_COMPLETE_POLICIES_AND_ORACLE,
-        help="Policies: presets, YAML files, or 'oracle' (balanced with true awareness)."
+        help=f"Policies: presets, {_TODAY}YAML files, or 'oracle' (balanced with true awareness)."
         + _again(repeated),
     )
 

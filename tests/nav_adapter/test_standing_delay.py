@@ -157,6 +157,5 @@ def test_a_policy_says_what_its_tracker_needs() -> None:
     assert with_rule("balanced", None).standing_window_s is None
     assert with_rule("balanced", StandingPeople(start_delay_s=0.2)).standing_window_s is None
     assert with_rule("balanced", RULE).standing_window_s == 1.0
-    assert AwarenessPolicy.preset("scanner").standing_window_s is None
     for name in PRESETS:
         assert AwarenessPolicy.preset(name).standing_window_s == 1.0

@@ -14,6 +14,7 @@ from paths import ROOT
 
 from nav_adapter import AwarenessPolicy
 from perception import PersonObservation
+from sim_tests.crossing import named_policy
 from tracking import (
     AwarenessFilterConfig,
     PersonTracker,
@@ -51,7 +52,7 @@ def moved_m(config: TrackerConfig) -> float:
 
 @pytest.mark.parametrize("name", ["balanced", "assertive", "conservative", "blind", "scanner"])
 def test_a_rule_that_needs_the_tracker_has_what_it_needs(name: str) -> None:
-    policy = AwarenessPolicy.preset(name)
+    policy = named_policy(name)[1]
     config = TrackerConfig.for_policy(policy)
     assert config == TrackerConfig(
         awareness=policy.filter, standing_window_s=policy.standing_window_s

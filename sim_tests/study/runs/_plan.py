@@ -18,6 +18,7 @@ from perception.arrays import finite_number
 from perception.documents import parse_yaml, yaml_text
 from tracking.config import StrictConfig, complaints
 
+from ...crossing import named_policy
 from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault, shipped_faults
 from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
@@ -217,12 +218,7 @@ def _named_policy(
     """Return the name and the YAML of a policy with each perception; the oracle has its own."""
     if policy == ORACLE:
         return [(ORACLE, policy_text(AwarenessPolicy.preset("balanced")), ORACLE)]
-    if not isinstance(policy, str):
-        name, own_policy = policy
-    elif policy.endswith((".yaml", ".yml")):
-        name, own_policy = Path(policy).stem, AwarenessPolicy.from_yaml(policy)
-    else:
-        name, own_policy = policy, AwarenessPolicy.preset(policy)
+    name, own_policy = named_policy(policy) if isinstance(policy, str) else policy
     text = policy_text(own_policy)
     return [(name, text, perception) for perception in perceptions]
 
