@@ -88,7 +88,12 @@ def _shipped(
 
 #: Completion of scenarios, for ``shell_complete`` of an option or argument.
 COMPLETE_SCENARIOS: Final = _shipped(
-    "sim_tests", "scenario/shipped", "all", "guidelines", sets=["guidelines"]
+    "sim_tests",
+    "scenario/shipped",
+    "all",
+    "guidelines",
+    "step_out",
+    sets=["guidelines", "step_out"],
 )
 _COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
 _COMPLETE_ROBOTS: Final = _shipped("sim_tests", "actors/robot/shipped", "nova_carter")
@@ -295,20 +300,23 @@ def policies(default: Sequence[str], *, repeated: bool = False) -> Decorator:
     )
 
 
-def scenarios(which: str, *, repeated: bool = False) -> Decorator:
+def scenarios(
+    which: str, *, repeated: bool = False, default: Sequence[str] = ("all",)
+) -> Decorator:
     """Add ``--scenario``: shipped scenarios and files.
 
     Args:
         which: the shipped ones that the name of a set stands for.
         repeated: each scenario needs the option before it, as beside positional arguments.
+        default: names.
     """
     return option(
         "--scenario",
         **_several(repeated),
-        default=["all"],
+        default=list(default),
         shell_complete=COMPLETE_SCENARIOS,
-        help=f"Scenarios: shipped ones, YAML files, or a set of shipped ones {which}: 'all' or "
-        f"'guidelines'.{_again(repeated)}",
+        help=f"Scenarios: shipped ones, YAML files, or a set of shipped ones {which}: 'all', "
+        f"'guidelines' or 'step_out'.{_again(repeated)}",
     )
 
 
@@ -355,8 +363,8 @@ def _planner_settings(default: str | list[str]) -> dict[str, Any]:
     return {
         "default": default,
         "callback": _without_reference,
-        "help": "Local planner: 'reference', 'straight_on', or a class of yours, which gets the "
-        "robot's profile, and static_boxes_odom_m if it takes that.",
+        "help": "Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
+        "class of yours, which gets the robot's profile, and static_boxes_odom_m if it takes that.",
     }
 
 

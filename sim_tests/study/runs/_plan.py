@@ -62,8 +62,8 @@ def plan_jobs(
     They are nested in that order.
 
     Args:
-        scenarios: templates, shipped names, YAML files, or sets: ``"all"``, or ``"guidelines"``,
-            without the scenarios that need no planner.
+        scenarios: templates, shipped names, YAML files, or sets (``"all"``, ``"guidelines"``,
+            ``"step_out"``) without the scenarios that need no planner.
         policies: names of presets, YAML files, pairs of a name for the tables and a policy, or
             ``"oracle"``. The oracle is ``balanced`` with perception that knows the truth: the
             upper bound of what better perception could gain.
@@ -119,8 +119,8 @@ def named_templates(
     """Return the scenarios of names and YAML files, each once.
 
     Args:
-        names: shipped names, YAML files, or sets: ``"all"``, or ``"guidelines"``, without the
-            scenarios that need no planner.
+        names: shipped names, YAML files, or sets (``"all"``, ``"guidelines"``, ``"step_out"``)
+            without the scenarios that need no planner.
         camera: as for :meth:`ScenarioTemplate.with_camera`.
         population: as for :meth:`ScenarioTemplate.with_population`.
         robot: as for :meth:`ScenarioTemplate.with_robot`.
