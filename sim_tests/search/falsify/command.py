@@ -32,7 +32,7 @@ from awarenav.cli import POSITIVE, command, option, options
     shell_complete=options.COMPLETE_SIMULATED_POLICIES,
     help="Policy that the worst cases are run with too, for the verdict.",
 )
-@options.scenarios("that have a planner and people")
+@options.scenarios("that have a planner and people", default=("all", "step_out"))
 @option(
     "--episodes",
     type=POSITIVE,
