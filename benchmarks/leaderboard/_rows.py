@@ -33,9 +33,9 @@ class Row(StrictConfig):
 
     Attributes:
         name: name of the file of its results.
-        policy: a preset, or a YAML file by its path in the repository.
+        policy: a preset, ``"scanner"``, or a YAML file by its path in the repository.
         sensors: ``"truth"`` knows everybody in all directions; the others perceive.
-        planner: ``"reference"`` or ``"module:Class"``.
+        planner: ``"reference"``, ``"costmap"`` or ``"module:Class"``.
     """
 
     error: ClassVar[type[ValueError]] = SimError
