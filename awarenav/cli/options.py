@@ -104,8 +104,6 @@ COMPLETE_SIMULATED_POLICIES: Final = _shipped("nav_adapter", "policies", "scanne
 _COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "scanner", "oracle")
 _COMPLETE_FAULTS: Final = _shipped("sim_tests", "crossing/faults", "none")
 
-_TODAY: Final = "'scanner' (today's AMR), "
-
 
 def seed(note: str = "", *, default: int | None = 0) -> Decorator:
     """Add ``--seed``: the seed of all random numbers."""
@@ -279,7 +277,7 @@ def policy(*, simulated: bool = False) -> Decorator:
         default="balanced",
         metavar="NAME|FILE",
         shell_complete=COMPLETE_SIMULATED_POLICIES if simulated else COMPLETE_POLICIES,
-        help=f"Policy: a preset, {_TODAY if simulated else ''}or a YAML file.",
+        help="Policy: a preset, or a YAML file.",
     )
 
 
@@ -295,8 +293,8 @@ def policies(default: Sequence[str], *, repeated: bool = False) -> Decorator:
         **_several(repeated),
         default=list(default),
         shell_complete=_COMPLETE_POLICIES_AND_ORACLE,
-        help=f"Policies: presets, {_TODAY}YAML files, or 'oracle' (balanced with true awareness)."
-        + _again(repeated),
+        help="Policies: presets, 'scanner' (today's AMR), YAML files, or 'oracle' (balanced with "
+        "true awareness)." + _again(repeated),
     )
 
 
