@@ -171,6 +171,8 @@ def _lowest_mps(person: Reach, course: Course, T: float, t0: float, t1: float) -
     near, past, past_behind = contact_m(person, course, t0, t1)
     if need0 * t0 - braked0_m <= past_behind:
         return need0
+    if past == -math.inf:
+        return math.inf
     lowest = (near + braked1_m) / t1
     if lowest < a * (t1 - T):  # a robot that slow stands before t1
         lowest = math.sqrt(a * (a * T * T + 2.0 * max(near, 0.0))) - a * T
