@@ -19,7 +19,7 @@ from ..measures import (
     resampled_interval,
     resampled_means,
 )
-from ._family import TODAY, Member, member_named
+from ._family import TODAY, Member, family, member_named
 
 _ATTENTIVE: Final = "attentive"
 
@@ -155,12 +155,10 @@ def _by_policy(records: Iterable[EpisodeRecord]) -> dict[str, dict[_Task, Episod
     return groups
 
 
-def _order(name: str) -> tuple[int, str, float]:
-    """Return the order of policies: today's AMR, the family by kind and speed, then others."""
-    member = member_named(name)
-    if member is not None:
-        return 1, member.kind, member.speed_mps
-    return (0 if name == TODAY else 2), name, 0.0
+def _order(name: str) -> tuple[int, str]:
+    """Return the order of policies: today's AMR, the family in its order, then others by name."""
+    members = [TODAY, *(each.name for each in family(memory=True))]
+    return (members.index(name) if name in members else len(members)), name
 
 
 @dataclass(frozen=True, slots=True)

@@ -156,8 +156,6 @@ __getattr__ = lazy_names(
             "EpisodeRecord",
             "RECORD_COLUMNS",
             "record_row",
-            "resampled_interval",
-            "resampled_means",
         ),
         "._record_file": (
             "read_record_file",
