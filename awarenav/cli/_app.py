@@ -113,7 +113,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "tune": _Entry(
             "sim_tests.search.tune.command:tune",
-            "Search for policies that lose less time and keep the separation margin.",
+            "Search for the policy that loses the least time at a given risk.",
         ),
         "falsify": _Entry(
             "sim_tests.search.falsify.command:falsify",

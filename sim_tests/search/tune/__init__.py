@@ -1,4 +1,4 @@
-"""Policies tuned for little time lost and little margin violated: ``awarenav tune``."""
+"""Policies tuned for the least time lost at a given risk: ``awarenav tune``."""
 
 from __future__ import annotations
 
@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._evaluation import Evaluation, knee, pareto_front
+    from ._evaluation import Evaluation
     from ._policy_space import PolicySpace, read_ranges, shipped_ranges
     from ._results import importances
     from ._settings import TuneSettings
-    from ._tune import feasible_front
+    from ._tune import ranked_trials
 
 __all__ = [
     "Evaluation",
     "PolicySpace",
     "TuneSettings",
-    "feasible_front",
     "importances",
-    "knee",
-    "pareto_front",
+    "ranked_trials",
     "read_ranges",
     "shipped_ranges",
 ]
@@ -28,11 +26,7 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "._evaluation": (
-            "Evaluation",
-            "knee",
-            "pareto_front",
-        ),
+        "._evaluation": ("Evaluation",),
         "._policy_space": (
             "PolicySpace",
             "read_ranges",
@@ -40,6 +34,6 @@ __getattr__ = lazy_names(
         ),
         "._results": ("importances",),
         "._settings": ("TuneSettings",),
-        "._tune": ("feasible_front",),
+        "._tune": ("ranked_trials",),
     },
 )

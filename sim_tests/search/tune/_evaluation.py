@@ -1,4 +1,4 @@
-"""The evaluation of a policy over many episodes, and the Pareto front of several policies."""
+"""The evaluation of a policy over many episodes: its time lost and its risk."""
 
 from __future__ import annotations
 
@@ -10,39 +10,12 @@ import numpy as np
 
 from ...study.measures import EpisodeRecord, Interval, bootstrap_interval, paired_difference
 
-#: The objectives, which are minimised: fields of :class:`EpisodeRecord`.
-OBJECTIVES: Final = ("time_lost_s", "violation_time_s")
-
-Point = tuple[float, float]
-
-
-def pareto_front(points: Sequence[Point]) -> list[int]:
-    """Return the rows of the points that no other dominates, sorted by the first objective.
-
-    Of equal points, only the first is returned.
-    """
-    order = sorted(range(len(points)), key=lambda row: (points[row], row))
-    best, rows = float("inf"), []
-    for row in order:
-        if points[row][1] < best:
-            best = points[row][1]
-            rows.append(row)
-    return rows
-
-
-def knee(points: Sequence[Point]) -> int:
-    """Return the row of the point of a front that is farthest from the line between its ends.
-
-    Both objectives are scaled to [0, 1] over the front (Das 1999). A front of one or two points
-    has its knee at the first.
-    """
-    if len(points) < 3:
-        return 0
-    values = np.array(points)
-    span = np.ptp(values, axis=0)
-    scaled = (values - values.min(axis=0)) / np.where(span > 0.0, span, 1.0)
-    # Distance from the line between (0, 1) and (1, 0) towards (0, 0), times √2.
-    return int((1.0 - scaled.sum(axis=1)).argmax())
+#: What is minimised: a field of :class:`EpisodeRecord`.
+OBJECTIVE: Final = "time_lost_s"
+#: What is bounded: step-out impacts with unaware people, per 1 000 crossings.
+RISK: Final = "step_out_unaware"
+#: The figures of a policy, in the order of tables.
+FIGURES: Final = (OBJECTIVE, RISK)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,52 +61,51 @@ class Evaluation:
         )
         return mine == others
 
-    def estimate(self, base: Evaluation) -> Point:
-        """Return the objectives over all episodes of the base policy, from fewer episodes.
+    def estimate(self, base: Evaluation) -> tuple[float, float]:
+        """Return the figures over all episodes of the base policy, from fewer episodes.
 
         They are the base policy's means over all of its episodes, plus the mean paired differences
-        (a control variate). With all episodes they are :attr:`objectives`.
+        (a control variate). With all episodes they are :attr:`figures`.
         """
-        part = base.same_episodes(self).objectives
-        time_s, violation_s = (
+        part = base.same_episodes(self).figures
+        time_s, risk = (
             mine + (whole - same)
-            for mine, whole, same in zip(self.objectives, base.objectives, part, strict=True)
+            for mine, whole, same in zip(self.figures, base.figures, part, strict=True)
         )
-        return time_s, violation_s
+        return time_s, risk
 
     @property
-    def objectives(self) -> tuple[float, float]:
-        """Mean time lost and mean violation time, seconds per episode."""
-        time_s, violation_s = (float(np.mean(self._values(name))) for name in OBJECTIVES)
-        return time_s, violation_s
+    def figures(self) -> tuple[float, float]:
+        """Mean time lost, seconds, and mean step-out impacts per 1 000 crossings."""
+        time_s, risk = (float(np.mean(self._values(name))) for name in FIGURES)
+        return time_s, risk
 
     @property
-    def deficit_m(self) -> float:
-        """Mean over episodes of the deepest negative separation margin."""
-        margins = [record.min_margin_m for record in self.records]
-        return float(np.mean([0.0 if value is None else max(0.0, -value) for value in margins]))
+    def risk(self) -> float:
+        """Mean step-out impacts with unaware people, per 1 000 crossings."""
+        return self.figures[1]
 
     @property
-    def robot_contacts(self) -> int:
-        """Number of episodes in which the robot moved into a person."""
-        return sum(record.robot_contacts > 0 for record in self.records)
+    def moving_contacts(self) -> int:
+        """Number of episodes in which a moving robot and a person touched, by any cause."""
+        return sum(record.moving_touched for record in self.records)
 
     @property
     def reached(self) -> int:
         """Number of episodes that reached the goal."""
         return sum(record.time_to_goal_s is not None for record in self.records)
 
-    def interval(self, objective: str) -> Interval:
-        """Return the mean of an objective with its 95 % interval, resampled within scenarios."""
+    def interval(self, figure: str) -> Interval:
+        """Return the mean of a figure with its 95 % interval, resampled within scenarios."""
         return bootstrap_interval(
-            self._values(objective),
+            self._values(figure),
             np.random.default_rng(0),
             strata=[record.scenario for record in self.records],
         )
 
-    def minus(self, base: Evaluation, objective: str, level: float = 0.95) -> Interval:
+    def minus(self, base: Evaluation, figure: str, level: float = 0.95) -> Interval:
         """Return the mean difference to another policy on the same episodes, with its interval."""
-        return paired_difference(base.records, self.records, objective, level=level)
+        return paired_difference(base.records, self.records, figure, level=level)
 
     def _values(self, name: str) -> list[float]:
         values = [getattr(record, name) for record in self.records]

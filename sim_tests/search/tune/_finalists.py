@@ -1,4 +1,4 @@
-"""The finalists of a tuning: trials of the front, compared with the base policy on held-out."""
+"""The finalists of a tuning: the best trials, compared with the base policy on held-out."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ from typing import Final
 from nav_adapter import AwarenessPolicy
 
 from ...study.measures import FEW_PAIRS
-from .._optuna import optuna
-from ._evaluation import OBJECTIVES, Evaluation, knee
+from ._evaluation import OBJECTIVE, Evaluation
 
 #: The name of a finalist that is shown to be better than the base policy.
 BEATS_BASE: Final = "beats_base"
-#: The name of a trial that is no worse than the base policy in either objective on tuning seeds.
-NO_WORSE: Final = "no_worse_in_tuning"
+#: The names of the trials with the least time lost within the risk.
+PLACES: Final = ("least_time_lost", "second", "third")
 #: All names of finalists.
-REASONS: Final = (BEATS_BASE, "least_time_lost", "knee", "least_violation", NO_WORSE)
+REASONS: Final = (BEATS_BASE, *PLACES)
 _LEVEL: Final = 0.95
 
 
@@ -26,8 +25,8 @@ class Candidate:
     """A policy with its evaluation on both sets of seeds.
 
     Attributes:
-        names: presets and the base policy by name, trials by the reasons why they were chosen. A
-            policy may have several names.
+        names: presets and the base policy by name, trials by their place. A policy may have several
+            names.
         trial: number of the trial; None for presets and the base policy.
         policy: the policy.
         tuning: evaluation on the tuning seeds in the tuning scenarios.
@@ -52,33 +51,6 @@ class Candidate:
         )
 
 
-def chosen_trials(
-    front: Sequence[optuna.trial.FrozenTrial], base: Evaluation
-) -> dict[int, tuple[str, ...]]:
-    """Return the reasons for which trials of the front are chosen, by row of the front.
-
-    Args:
-        front: trials of the front, by time lost.
-        base: the base policy on the tuning seeds.
-    """
-    if not front:
-        return {}
-    points = [(trial.values[0], trial.values[1]) for trial in front]
-    rows = {"least_time_lost": 0, "knee": knee(points), "least_violation": len(points) - 1}
-    time_s, violation_s = base.objectives
-    better = [
-        row
-        for row, point in enumerate(points)
-        if point[0] <= time_s and point[1] <= violation_s and point != (time_s, violation_s)
-    ]
-    if better:
-        rows[NO_WORSE] = better[knee([points[row] for row in better])]
-    reasons: dict[int, tuple[str, ...]] = {}
-    for name, row in rows.items():
-        reasons[row] = (*reasons.get(row, ()), name)
-    return reasons
-
-
 def merged(candidates: Iterable[Candidate]) -> list[Candidate]:
     """Return the candidates with equal ones as one, which has all of their names."""
     rows: list[Candidate] = []
@@ -98,41 +70,43 @@ def level_of(finalists: int) -> float:
 
 
 def beats(
-    candidate: Candidate, base: Candidate, hold_out_scenarios: Container[str], level: float
+    candidate: Candidate,
+    base: Candidate,
+    risk: float,
+    hold_out_scenarios: Container[str],
+    level: float,
 ) -> bool:
     """Return whether the held-out episodes show that a policy is better than the base policy.
 
-    They show it if the paired interval of one objective lies below 0 and that of the other does not
-    lie above 0, over at least :data:`FEW_PAIRS` pairs; if neither mean is worse for that objective
-    in the held-out scenarios alone, nor either interval above 0 there; and if the robot moved into
-    nobody.
+    They show it if its step-out impacts are within the given risk, the moving robot touched nobody,
+    and over at least :data:`FEW_PAIRS` pairs the paired interval of the time lost lies below 0,
+    without a worse mean in the held-out scenarios alone. The time does not matter if the base
+    policy is above the risk.
     """
-    if candidate.held_out.robot_contacts or candidate.tuning.robot_contacts:
+    held_out = candidate.held_out
+    if held_out.moving_contacts or candidate.tuning.moving_contacts or held_out.risk > risk:
         return False
-    found = [candidate.held_out.minus(base.held_out, each, level) for each in OBJECTIVES]
-    if min(each.n for each in found) < FEW_PAIRS or any(each.low > 0.0 for each in found):
+    whole = held_out.minus(base.held_out, OBJECTIVE, level)
+    if whole.n < FEW_PAIRS:
         return False
-    elsewhere = [
-        candidate.held_out.within(hold_out_scenarios).minus(base.held_out, each, level)
-        for each in OBJECTIVES
-    ]
-    if any(each.n and each.low > 0.0 for each in elsewhere):
-        return False
-    return any(
-        whole.high < 0.0 and not (part.n and part.value > 0.0)
-        for whole, part in zip(found, elsewhere, strict=True)
-    )
+    if base.held_out.risk > risk:
+        return True
+    part = held_out.within(hold_out_scenarios).minus(base.held_out, OBJECTIVE, level)
+    return whole.high < 0.0 and not (part.n and part.value > 0.0)
 
 
 def named_winner(
-    candidates: Sequence[Candidate], base: Candidate, hold_out_scenarios: Container[str]
+    candidates: Sequence[Candidate],
+    base: Candidate,
+    risk: float,
+    hold_out_scenarios: Container[str],
 ) -> list[Candidate]:
     """Return the candidates; the best of those that beat the base policy has that name first."""
     level = level_of(len(candidates))
-    winners = [each for each in candidates if beats(each, base, hold_out_scenarios, level)]
+    winners = [each for each in candidates if beats(each, base, risk, hold_out_scenarios, level)]
     if not winners:
         return list(candidates)
-    best = min(winners, key=lambda each: each.held_out.objectives)
+    best = min(winners, key=lambda each: each.held_out.figures)
     return [
         replace(each, names=(BEATS_BASE, *each.names)) if each is best else each
         for each in candidates

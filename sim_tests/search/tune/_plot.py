@@ -1,4 +1,4 @@
-"""The plot of a tuning: trials, front, presets, and the importances of the parameters."""
+"""The plot of a tuning: trials, the risk, presets, and the importances of the parameters."""
 
 from __future__ import annotations
 
@@ -11,64 +11,59 @@ import numpy as np
 from awarenav.errors import counted
 from awarenav.figures import new_figure, save_figure
 
-from ._evaluation import OBJECTIVES
+from .._shared_study import NOTES
+from ._evaluation import FIGURES, RISK
 from ._tune import Tuning
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _TRIAL: Final = "#9aa3ad"
-_FRONT: Final = "#1f5fa8"
+_WITHIN: Final = "#1f5fa8"
 _CONTACT: Final = "#b3261e"
 _ANCHOR: Final = "#d9822b"
 _CHOSEN: Final = "#2e7d4f"
 _BARS: Final = 8
-_MARKERS: Final = ("D", "s", "^", "v", "P")
+_MARKERS: Final = ("D", "s", "^", "v", "P", "*")
+_WORDS: Final = {"time_lost_s": "the time lost", "step_out_unaware": "the step-out impacts"}
 
 
 def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], path: Path) -> None:
-    """Draw trials, front, presets and chosen policies, and the importances beside them."""
+    """Draw trials, the risk, presets and chosen policies, and the importances beside them."""
     figure = new_figure(12.0, 6.0)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1.0))
-    _draw_front(figure.add_subplot(grid[:, 0]), tuning)
-    for row, name in enumerate(OBJECTIVES):
+    _draw_trials(figure.add_subplot(grid[:, 0]), tuning)
+    for row, name in enumerate(FIGURES):
         _draw_importances(figure.add_subplot(grid[row, 1]), name, importance[name])
     save_figure(figure, path)
 
 
-def _draw_front(axes: Axes, tuning: Tuning) -> None:
-    evaluated = [trial for trial in tuning.trials if trial.values is not None]
-    for touched, colour, marker, label in (
-        (False, _TRIAL, "o", "trial"),
-        (True, _CONTACT, "x", "trial with a contact caused by the robot"),
-    ):
-        points = np.array(
-            [
-                trial.values
-                for trial in evaluated
-                if any(value > 0.0 for value in trial.constraints.values()) == touched
-            ]
-        )
-        if points.size:
-            axes.scatter(points[:, 0], points[:, 1], c=colour, marker=marker, s=26, label=label)
-    if tuning.front:
-        line = np.array([trial.values for trial in tuning.front])
-        axes.plot(
-            line[:, 0],
-            line[:, 1],
-            color=_FRONT,
-            drawstyle="steps-post",
-            marker="o",
-            ms=5,
-            label="front",
-        )
+def _draw_trials(axes: Axes, tuning: Tuning) -> None:
+    axes.set_yscale("function", functions=(lambda y: np.sqrt(np.maximum(y, 0.0)), np.square))
+    within = {trial.number for trial in tuning.ranked}
+    groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {
+        (_TRIAL, "o", "trial"): [],
+        (_WITHIN, "o", "trial within the risk"): [],
+        (_CONTACT, "x", "trial with a contact"): [],
+    }
+    other, fine, touched = groups.values()
+    for trial in tuning.trials:
+        if trial.values is None:
+            continue
+        notes = trial.user_attrs[NOTES]
+        rows = touched if notes["moving_contacts"] else fine if trial.number in within else other
+        rows.append((trial.values[0], max(notes[RISK], 0.0)))
+    for (colour, marker, label), points in groups.items():
+        if points:
+            axes.scatter(*np.array(points).T, c=colour, marker=marker, s=26, label=label)
+    axes.axhline(tuning.risk, color=_WITHIN, lw=1.0, ls="--", label="the given risk")
     for anchor, marker in zip(tuning.anchors, _MARKERS, strict=False):
-        x, y = anchor.tuning.objectives
-        colour = _CONTACT if anchor.tuning.robot_contacts else _ANCHOR
+        x, y = anchor.tuning.figures
+        colour = _CONTACT if anchor.tuning.moving_contacts else _ANCHOR
         axes.scatter([x], [y], marker=marker, s=60, c=colour, zorder=3, label=anchor.name)
     places: dict[tuple[float, float], list[str]] = {}
     for chosen in tuning.chosen:
-        places.setdefault(chosen.tuning.objectives, []).append(chosen.name.replace("_", " "))
+        places.setdefault(chosen.tuning.figures, []).append(chosen.name.replace("_", " "))
     for row, ((x, y), names) in enumerate(sorted(places.items())):
         below = row % 2 == 0  # so that the names of neighbours do not overlap
         axes.scatter([x], [y], marker="o", s=120, facecolors="none", edgecolors=_CHOSEN, lw=2)
@@ -89,17 +84,18 @@ def _draw_front(axes: Axes, tuning: Tuning) -> None:
         fontsize=10,
     )
     axes.set_xlabel("mean time lost (s an episode)")
-    axes.set_ylabel("mean time with a negative separation margin (s an episode)")
+    axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
     axes.grid(alpha=0.25)
     axes.margins(0.12)
+    axes.set_ylim(bottom=0.0)
     axes.legend(loc="upper right", fontsize=8)
 
 
-def _draw_importances(axes: Axes, objective: str, importance: Mapping[str, float]) -> None:
+def _draw_importances(axes: Axes, figure: str, importance: Mapping[str, float]) -> None:
     first = sorted(importance.items(), key=lambda each: -each[1])[:_BARS][::-1]
     names, values = [name for name, _ in first], [value for _, value in first]
-    axes.barh(names, values, color=_FRONT)
-    axes.set_title(f"what decided {objective.replace('_', ' ')[:-2]}", loc="left", fontsize=10)
+    axes.barh(names, values, color=_WITHIN)
+    axes.set_title(f"what decided {_WORDS[figure]}", loc="left", fontsize=10)
     axes.tick_params(labelsize=8)
     if not any(values):
         axes.set_axis_off()

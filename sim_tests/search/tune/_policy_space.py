@@ -19,15 +19,13 @@ from tracking.config import complaints
 from ...world.errors import SimError
 from .._optimizer import Range
 
-# Walking speed of ISO 13855: the least speed assumed for an unaware person.
-_WALKING_SPEED_MPS: Final = 1.6
 # Lower bounds of all ranges: the floor.
 _LOWER_BOUNDS: Final = {
     "inflation.aware_radius_m": BODY_RADIUS_M + 0.10,
     "inflation.unaware_radius_m": BODY_RADIUS_M + 0.10,
-    "speed.unaware_human_speed_mps": _WALKING_SPEED_MPS,
-    "margins.minimum_clearance_m": 0.10,
-    "margins.separation_clearance_m": 0.10,
+    # 99 % of the people recorded beside a robot set off no faster; the risk needs more.
+    "speed.unaware_human_speed_mps": 1.05,
+    "margins.clearance_m": 0.10,
     "margins.uncertainty_sigmas": 1.0,
     "filter.lower_bound_confidence": 0.5,
 }
@@ -35,10 +33,8 @@ _LOWER_BOUNDS: Final = {
 _AT_MOST: Final = (
     ("inflation.unaware_radius_m", "inflation.aware_radius_m"),
     ("speed.unaware_human_speed_mps", "speed.aware_human_speed_mps"),
-    ("speed.aware_human_speed_mps", "speed.watching_human_speed_mps"),
     ("filter.evidence_time_constant_s", "filter.unseen_time_constant_s"),
     ("filter.unseen_time_constant_s", "filter.no_face_time_constant_s"),
-    ("outline.unaware_ahead_s", "outline.aware_ahead_s"),
     ("timing.stop_after_s", "timing.stale_after_s"),
     ("timing.stale_after_s", "timing.fresh_within_s"),
 )
@@ -46,15 +42,7 @@ _AT_MOST: Final = (
 _ABOVE: Final = (
     ("inflation.unaware_below", "inflation.aware_above", 0.05),
     ("speed.unaware_below", "speed.aware_above", 0.05),
-    ("speed.aware_above", "speed.watching_above", 0.05),
-    ("outline.unaware_below", "outline.aware_above", 0.05),
-    ("rules.zones.stop_within_m", "rules.zones.full_speed_beyond_m", 0.1),
 )
-# Parts that a policy may lack; a range in one adds it with these values.
-_OPTIONAL: Final = {
-    "rules.near_cap": {"within_m": 1.5, "speed_mps": 1.5},
-    "rules.zones": {"stop_within_m": 0.0, "full_speed_beyond_m": 0.5},
-}
 
 
 class PolicyRange(Range):
@@ -73,8 +61,7 @@ class PolicySpace:
     """The policies that differ from a base policy in some numbers.
 
     Every point of the space is a valid policy: numbers that do not fit together are moved to the
-    nearest that do. No policy is below the floor, and none assumes that an unaware person is slower
-    than the walking speed of ISO 13855.
+    nearest that do. No policy is below the floor.
 
     Args:
         base: the policy that gives all other numbers.
@@ -96,9 +83,6 @@ class PolicySpace:
                     raise SimError(
                         f"{place}: must not be searched below {bound:g}, got {each.low:g}"
                     )
-                for part, values in _OPTIONAL.items():
-                    if place.startswith(part + ".") and _get(self._data, part) is None:
-                        _put(self._data, part, dict(values))
                 if not isinstance(_get(self._data, place), float | int):
                     near = difflib.get_close_matches(place, _number_keys(self._data), n=1)
                     hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -126,11 +110,6 @@ class PolicySpace:
         for below, above, gap in _ABOVE:
             if _has_both(data, below, above):
                 _put(data, above, max(_get(data, above), _get(data, below) + gap))
-        ceiling_m = data["margins"]["maximum_radius_m"]
-        if ceiling_m is not None:
-            data["margins"]["maximum_radius_m"] = max(
-                ceiling_m, _get(data, "inflation.unaware_radius_m") or 0.0
-            )
         try:
             return AwarenessPolicy.model_validate(data)
         except ValidationError as cause:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, Literal
 
-from ._evaluation import OBJECTIVES, Evaluation
+from ._evaluation import OBJECTIVE, RISK, Evaluation
 
 #: Why a trial ended before all of its episodes; empty if it did not.
-Dropped = Literal["", "contact", "loses"]
+Dropped = Literal["", "contact", "risk", "loses"]
 
 # With fewer pairs of episodes, the bootstrap interval is too narrow to end a trial.
 _LEAST_PAIRS: Final = 12
@@ -23,22 +23,23 @@ def stages(seeds: range) -> Iterator[range]:
         done += step
 
 
-def dropped(candidate: Evaluation, base: Evaluation) -> Dropped:
+def dropped(candidate: Evaluation, base: Evaluation, risk: float) -> Dropped:
     """Return why a trial need not run more episodes, or an empty text.
 
-    A contact that the robot caused ends it. So does an objective in which the paired 95 % interval
-    shows that it is worse than the base policy, unless it is shown to be better in the other one:
-    such a trial may still lie on the front.
+    A contact of a moving robot ends it. So does a 95 % interval of the step-out impacts above the
+    given risk, and a paired one that shows that it loses more time than a base policy within that
+    risk.
 
     Args:
         candidate: the episodes of the trial so far.
         base: the base policy on at least the same episodes.
+        risk: the given step-out impacts per 1 000 crossings.
     """
-    if candidate.robot_contacts:
+    if candidate.moving_contacts:
         return "contact"
-    differences = [candidate.minus(base, objective) for objective in OBJECTIVES]
-    if min(each.n for each in differences) < _LEAST_PAIRS:
+    slower = candidate.minus(base, OBJECTIVE)
+    if slower.n < _LEAST_PAIRS:
         return ""
-    is_worse = any(each.low > 0.0 for each in differences)
-    is_better = any(each.high < 0.0 for each in differences)
-    return "loses" if is_worse and not is_better else ""
+    if candidate.interval(RISK).low > risk:
+        return "risk"
+    return "loses" if slower.low > 0.0 and base.risk <= risk else ""

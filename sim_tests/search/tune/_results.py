@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,48 +19,55 @@ from ...world.errors import SimError
 from .._files import templates_of, write_csv
 from .._optuna import optuna
 from .._shared_study import NOTES
-from ._evaluation import OBJECTIVES
-from ._finalists import NO_WORSE, REASONS, Candidate
+from ._evaluation import FIGURES, OBJECTIVE, RISK
+from ._finalists import REASONS, Candidate
 from ._plot import draw_tuning
 from ._tune import Tuning
 from ._verdict import verdict_text
 
-_LABELS: Final = {"time_lost_s": "time lost", "violation_time_s": "time with a negative margin"}
+# Words and unit of each figure.
+_LABELS: Final = {
+    OBJECTIVE: ("time lost", " s"),
+    RISK: ("step-out impacts with unaware people per 1 000 crossings", ""),
+}
 
 
 def importances(study: optuna.Study) -> dict[str, dict[str, float]]:
-    """Return the importance of each parameter, by objective; the importances sum to 1.
+    """Return the importance of each parameter, by figure; the importances of a figure sum to 1.
 
     The importance is a parameter's share in being among the best tenth, by PED-ANOVA (Watanabe,
     Bansal and Hutter 2023). All are 0 for fewer than three trials, and where the trials do not
-    differ in the objective.
+    differ in the figure.
     """
     done = [t for t in study.get_trials(deepcopy=False) if t.values is not None]
     names = sorted({name for trial in done for name in trial.params})
-    return {
-        objective: _importance(study, row, names, done) for row, objective in enumerate(OBJECTIVES)
+    figures: dict[str, Callable[[optuna.trial.FrozenTrial], float]] = {
+        OBJECTIVE: lambda trial: trial.values[0],
+        RISK: lambda trial: float(trial.user_attrs[NOTES][RISK]),
     }
+    return {name: _importance(study, target, names, done) for name, target in figures.items()}
 
 
 def _importance(
-    study: optuna.Study, row: int, names: list[str], done: list[optuna.trial.FrozenTrial]
+    study: optuna.Study,
+    target: Callable[[optuna.trial.FrozenTrial], float],
+    names: list[str],
+    done: list[optuna.trial.FrozenTrial],
 ) -> dict[str, float]:
     nothing = dict.fromkeys(names, 0.0)
-    if len(done) < 3 or len({trial.values[row] for trial in done}) < 2:
+    if len(done) < 3 or len({target(trial) for trial in done}) < 2:
         return nothing
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = optuna.importance.get_param_importances(
-            study,
-            evaluator=optuna.importance.PedAnovaImportanceEvaluator(),
-            target=lambda trial: trial.values[row],
+            study, evaluator=optuna.importance.PedAnovaImportanceEvaluator(), target=target
         )
     known = {name: value for name, value in found.items() if math.isfinite(value)}
     return dict(sorted((nothing | known).items(), key=lambda each: -each[1]))
 
 
 def write_tuning(tuning: Tuning, folder: Path) -> None:
-    """Write trials.csv, importances.json, chosen.json, chosen/*.yaml and pareto.png."""
+    """Write trials.csv, importances.json, chosen.json, chosen/*.yaml and tuning.png."""
     importance = importances(tuning.study)
     _write_trials(tuning, folder / "trials.csv")
     _write_json(folder / "importances.json", importance)
@@ -73,7 +81,10 @@ def write_tuning(tuning: Tuning, folder: Path) -> None:
             "tuning_seeds": _ends(tuning.settings.tuning_seeds),
             "held_out_seeds": _ends(tuning.settings.held_out_seeds),
             "base": base.name,
-            "base_on_front": not any(NO_WORSE in each.names for each in rows),
+            "risk": {
+                "tuning": round(tuning.risk, 6),
+                "held_out": round(tuning.held_out_risk, 6),
+            },
             "beats_base": None if tuning.winner is None else tuning.winner.trial,
             "verdict": verdict_text(tuning),
             "policies": [_figures(tuning, each) for each in rows],
@@ -88,7 +99,7 @@ def write_tuning(tuning: Tuning, folder: Path) -> None:
                 _header(tuning, each, name) + policy_text(each.policy),
                 SimError,
             )
-    draw_tuning(tuning, importance, folder / "pareto.png")
+    draw_tuning(tuning, importance, folder / "tuning.png")
 
 
 def table_lines(tuning: Tuning) -> list[str]:
@@ -102,17 +113,19 @@ def table_lines(tuning: Tuning) -> list[str]:
     lines = [
         f"{'':{width + 5}s}{'tuning seeds':^52s}  {'held-out seeds':^52s}".rstrip(),
         f"{'policy':{width}s}{'trial':>5s}"
-        + (2 * f"{'time lost (s)':>21s}{'violation (s)':>21s}{'contacts':>10s}  ").rstrip(),
+        + (2 * f"{'time lost (s)':>21s}{'step-out':>21s}{'contacts':>10s}  ").rstrip(),
     ]
     for name, each in zip(names, rows, strict=True):
         trial = "" if each.trial is None else str(each.trial)
         cells = f"{name:{width}s}{trial:>5s}"
         for evaluation in (each.tuning, each.held_out):
-            time_s, violation_s = (evaluation.interval(name) for name in OBJECTIVES)
-            cells += (
-                f"{time_s.text(2):>21s}{violation_s.text(3):>21s}{evaluation.robot_contacts:10d}  "
-            )
+            time_s, risk = (evaluation.interval(name) for name in FIGURES)
+            cells += f"{time_s.text(2):>21s}{risk.text(2):>21s}{evaluation.moving_contacts:10d}  "
         lines.append(cells.rstrip())
+    lines.append(
+        f"At most {tuning.risk:.2f} step-out impacts with unaware people per 1 000 crossings on "
+        f"tuning seeds, {tuning.held_out_risk:.2f} on held-out seeds."
+    )
     trials = [trial.user_attrs.get(NOTES, {}) for trial in tuning.trials]
     early = [notes for notes in trials if notes.get("dropped")]
     if early:
@@ -125,19 +138,20 @@ def table_lines(tuning: Tuning) -> list[str]:
 
 
 def _write_trials(tuning: Tuning, path: Path) -> None:
-    front = {trial.number for trial in tuning.front}
+    rank = {trial.number: place for place, trial in enumerate(tuning.ranked, start=1)}
     names = list(tuning.space.ranges)
-    notes = ("deficit_m", "robot_contacts", "reached", "episodes", "dropped")
+    notes = ("moving_contacts", "reached", "episodes", "dropped")
     write_csv(
         path,
-        ["trial", "state", *OBJECTIVES, *notes, "on_front", *names],
+        ["trial", "state", *FIGURES, *notes, "rank", *names],
         (
             [
                 trial.number,
                 trial.state.name.lower(),
-                *map(csv_number, trial.values or [None, None]),
+                *map(csv_number, trial.values or [None]),
+                csv_number(trial.user_attrs.get(NOTES, {}).get(RISK)),
                 *(trial.user_attrs.get(NOTES, {}).get(note, "") for note in notes),
-                str(trial.number in front).lower(),
+                rank.get(trial.number, ""),
                 *(repr(trial.params[name]) for name in names),
             ]
             for trial in tuning.trials
@@ -160,11 +174,10 @@ def _figures(tuning: Tuning, candidate: Candidate) -> dict[str, Any]:
     for name, evaluation, other in parts:
         figures[name] = {
             "episodes": len(evaluation.records),
-            "robot_contacts": evaluation.robot_contacts,
+            "moving_contacts": evaluation.moving_contacts,
             "reached_goal": evaluation.reached,
-            "deficit_m": round(evaluation.deficit_m, 6),
-            **{key: _interval_data(evaluation.interval(key)) for key in OBJECTIVES},
-            "minus_base": {key: _interval_data(evaluation.minus(other, key)) for key in OBJECTIVES},
+            **{key: _interval_data(evaluation.interval(key)) for key in FIGURES},
+            "minus_base": {key: _interval_data(evaluation.minus(other, key)) for key in FIGURES},
         }
     return figures
 
@@ -190,15 +203,14 @@ def _header(tuning: Tuning, candidate: Candidate, name: str) -> str:
         f"{_ends(settings.held_out_seeds)} in {', '.join(_scenarios(tuning))}), means with 95 % "
         "intervals:",
     ]
-    for key in OBJECTIVES:
+    for key, (label, unit) in _LABELS.items():
         lines.append(
-            f"  {_LABELS[key]} {held_out.interval(key).text(3)} s; minus that of {base.name}, "
-            f"paired: {held_out.minus(base.held_out, key).text(3)} s"
+            f"  {label} {held_out.interval(key).text(3)}{unit}; minus that of {base.name}, "
+            f"paired: {held_out.minus(base.held_out, key).text(3)}{unit}"
         )
     lines.append(
-        f"  contacts caused by the robot: {held_out.robot_contacts}; goals reached: "
-        f"{held_out.reached}; "
-        f"deepest negative margin {held_out.deficit_m:.3f} m"
+        f"  contacts with the moving robot: {held_out.moving_contacts}; goals reached: "
+        f"{held_out.reached}"
     )
     return "".join(f"# {line}\n" for line in lines)
 

@@ -30,6 +30,7 @@ class TuneOptions:
     hold_out_scenarios: tuple[str, ...]
     generation: int
     sampler: SamplerName
+    risk: float | None
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
@@ -73,6 +74,7 @@ def tune_command(options: TuneOptions) -> int:
         hold_out_scenarios=held_out_scenarios(
             options.hold_out_scenarios, templates_of(common["scenarios"])
         ),
+        risk=options.risk,
     )
 
     def report(tuning: Tuning) -> None:
@@ -117,11 +119,13 @@ def _verdict(tuning: Tuning, options: TuneOptions) -> Verdict:
 def _continued(options: TuneOptions, trials: int, held_out: int) -> str:
     """Return the command that goes on with the tuning."""
     ranges = () if options.ranges is None else ("--ranges", options.ranges)
+    risk = () if options.risk is None else ("--risk", options.risk)
     return command_text(
         "tune",
         *("--policy", options.policy),
         *episode_words(options),
         *ranges,
+        *risk,
         *("--trials", trials, "--episodes", options.episodes, "--held-out", held_out),
         *("--hold-out-scenarios", *options.hold_out_scenarios),
         *("--generation", options.generation, "--sampler", options.sampler),

@@ -11,6 +11,7 @@ from nav_adapter import AwarenessPolicy
 
 from ...crossing.eyes import Perception
 from ...scenario import ScenarioTemplate
+from ...study.frontier import TODAY, sensors_of_today
 from ...study.runs import Job, plan_jobs
 from ...world.errors import SimError
 from .._files import templates_of
@@ -40,6 +41,8 @@ class TuneSettings:
         sampler: ``"tpe"`` or ``"nsga2"``.
         generation: trials per generation.
         hold_out_scenarios: names of the scenarios that no trial runs.
+        risk: step-out impacts per 1 000 crossings that a policy may have; None for a twentieth of
+            those of today's AMR in the same episodes.
     """
 
     policy_name: str
@@ -55,6 +58,7 @@ class TuneSettings:
     sampler: str
     generation: int
     hold_out_scenarios: tuple[str, ...] = ()
+    risk: float | None = None
 
     @property
     def templates(self) -> tuple[ScenarioTemplate, ...]:
@@ -86,17 +90,20 @@ class TuneSettings:
     ) -> tuple[Job, ...]:
         """Return the episodes of a policy: every seed in every one of some scenarios.
 
+        Today's AMR has its laser scanners alone, where the robot has any.
+
         Raises:
             SimError: an episode that cannot be run.
         """
         perception = Perception.named(self.perception)
+        sensors = perception.sensors
         return plan_jobs(
             templates,
             [(name, policy)],
             seeds,
             planners=[self.planner],
             perception=perception.kind or "keypoints",  # without a camera it does not matter
-            sensors=[perception.sensors],
+            sensors=[sensors_of_today(sensors) if name == TODAY else sensors],
         )
 
 

@@ -1,4 +1,4 @@
-"""A tuning: the search for policies with little time lost and little margin violated."""
+"""A tuning: the search for policies that lose the least time at a given risk."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from typing import Final, cast
 from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
+from ...crossing import named_policy
+from ...study.frontier import TODAY
 from ...study.measures import Interval
 from ...study.runs import ProcessLock, policy_of
 from ...world.errors import SimError
@@ -19,9 +21,9 @@ from .._files import write_or_check_settings
 from .._optimizer import Optimizer, Outcome, SamplerName
 from .._optuna import optuna
 from .._shared_study import NOTES, Claim, SharedStudy
-from ._evaluation import Evaluation, pareto_front
+from ._evaluation import OBJECTIVE, RISK, Evaluation
 from ._evaluator import PolicyEvaluator
-from ._finalists import BEATS_BASE, Candidate, chosen_trials, level_of, merged, named_winner
+from ._finalists import BEATS_BASE, PLACES, Candidate, level_of, merged, named_winner
 from ._policy_space import PolicyRange, PolicySpace
 from ._race import Dropped, dropped, stages
 from ._settings import TuneSettings
@@ -34,14 +36,16 @@ _RESULTS: Final = (
     "importances.json",
     "chosen.json",
     "chosen/*.yaml",
-    "pareto.png",
+    "tuning.png",
 )
 # Evaluated beside the trials.
-_PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
-# A trial in which the robot moved into a person is not chosen.
-_CONSTRAINT: Final = "robot_contacts"
+_PRESETS: Final = ("blind", "conservative", "balanced", "assertive", TODAY)
+# Constraints of a trial: the moving robot touches nobody, and the risk is at most the given one.
+_CONTACTS: Final = "moving_contacts"
+_OVER_RISK: Final = "over_risk"
 _POLL_S: Final = 0.5
-_MOST_CHOSEN: Final = 4
+# Without a number of their own, policies may have this share of the risk of today's AMR.
+_SHARE_OF_TODAY: Final = 1.0 / 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,18 +57,22 @@ class Tuning:
         space: its search space.
         study: Optuna's study.
         trials: all finished trials, by number.
-        front: trials on the Pareto front that ran every episode, by time lost.
-        anchors: the base policy and the presets.
-        chosen: trials chosen from the front; none equals one of ``anchors``.
+        ranked: trials within the constraints that ran every episode, by time lost.
+        anchors: the base policy, the presets and today's AMR.
+        chosen: the first of ``ranked``; none equals one of ``anchors``.
+        risk: step-out impacts per 1 000 crossings that a policy may have on the tuning seeds.
+        held_out_risk: the same on the held-out seeds.
     """
 
     settings: TuneSettings
     space: PolicySpace
     study: optuna.Study
     trials: tuple[optuna.trial.FrozenTrial, ...]
-    front: tuple[optuna.trial.FrozenTrial, ...]
+    ranked: tuple[optuna.trial.FrozenTrial, ...]
     anchors: tuple[Candidate, ...]
     chosen: tuple[Candidate, ...]
+    risk: float
+    held_out_risk: float
 
     @property
     def base(self) -> Candidate:
@@ -76,13 +84,13 @@ class Tuning:
         """The chosen policy that is shown to be better than the base policy, if there is one."""
         return next((each for each in self.chosen if each.name == BEATS_BASE), None)
 
-    def minus_base(self, candidate: Candidate, objective: str) -> Interval:
-        """Return the paired difference to the base policy on the held-out episodes.
+    def minus_base(self, candidate: Candidate) -> Interval:
+        """Return the paired difference in time lost to the base policy on the held-out episodes.
 
         Its level is that of the decision: all chosen policies together have 95 %.
         """
         level = level_of(len(self.chosen))
-        return candidate.held_out.minus(self.base.held_out, objective, level)
+        return candidate.held_out.minus(self.base.held_out, OBJECTIVE, level)
 
 
 def tune(
@@ -115,7 +123,6 @@ def tune(
         space.ranges,
         generation=settings.generation,
         seed=settings.seed,
-        objectives=2,
         initial=[space.base_parameters()],
     )
     # Refuses what cannot be run.
@@ -144,7 +151,7 @@ def tune(
             )
             for name, policy in anchors.items()
         }
-        race = _Race(space, evaluator, settings, anchors, tuned)
+        race = _Race(space, evaluator, settings, anchors, tuned, _risk(settings, tuned[TODAY]))
         _run_trials(study, settings, race, runner)
         runner.bar.set_postfix_str("held-out seeds")
         tuning = _tuning(study, race)
@@ -158,33 +165,41 @@ def tune(
 def _tuning(study: SharedStudy, race: _Race) -> Tuning:
     """Return the result of a finished study; runs the held-out seeds."""
     settings, trials = race.settings, study.finished_trials()
-    front = feasible_front(trials)
-    reasons = chosen_trials(front, race.tuned[settings.policy_name])
+    ranked = ranked_trials(trials)
     rows = merged(
         [
             *(race.anchor(name) for name in race.anchors),
-            *(race.finalist(front[row], names) for row, names in reasons.items()),
+            *(race.finalist(trial, (name,)) for name, trial in zip(PLACES, ranked, strict=False)),
         ]
     )
     anchors = tuple(each for each in rows if each.trial is None)
     new = [each for each in rows if each.trial is not None]
+    today = next(each for each in anchors if TODAY in each.names)
+    held_out_risk = _risk(settings, today.held_out)
     return Tuning(
         settings=settings,
         space=race.space,
         study=study.study,
         trials=tuple(trials),
-        front=tuple(front),
+        ranked=tuple(ranked),
         anchors=anchors,
-        chosen=tuple(named_winner(new, anchors[0], settings.hold_out_scenarios)),
+        chosen=tuple(named_winner(new, anchors[0], held_out_risk, settings.hold_out_scenarios)),
+        risk=race.risk,
+        held_out_risk=held_out_risk,
     )
 
 
-def feasible_front(
+def _risk(settings: TuneSettings, today: Evaluation) -> float:
+    """Return the impacts that a policy may have: the given ones, or a share of today's."""
+    return _SHARE_OF_TODAY * today.risk if settings.risk is None else settings.risk
+
+
+def ranked_trials(
     trials: Sequence[optuna.trial.FrozenTrial],
 ) -> list[optuna.trial.FrozenTrial]:
-    """Return the Pareto front of the trials that satisfy every constraint, by time lost.
+    """Return the trials that satisfy every constraint, by time lost.
 
-    A trial that was dropped before it ran every episode is not on it.
+    A trial that was dropped before it ran every episode is not among them.
     """
     feasible = [
         trial
@@ -193,8 +208,7 @@ def feasible_front(
         and all(value <= 0.0 for value in trial.constraints.values())
         and not trial.user_attrs.get(NOTES, {}).get("dropped")
     ]
-    rows = pareto_front([(trial.values[0], trial.values[1]) for trial in feasible])
-    return [feasible[row] for row in rows]
+    return sorted(feasible, key=lambda trial: (trial.values[0], trial.number))
 
 
 def require_trials(tuning: Tuning) -> None:
@@ -208,7 +222,7 @@ def _anchors(policy_name: str, base: AwarenessPolicy) -> dict[str, AwarenessPoli
     """Return the base policy and the presets by name; refuse a base with the name of a preset."""
     anchors = {policy_name: base}
     for name in _PRESETS:
-        preset = AwarenessPolicy.preset(name)
+        _, preset = named_policy(name)
         if name in anchors and anchors[name] != preset:
             raise SimError(f"a policy of your own needs a name of its own, got {name!r}")
         anchors[name] = preset
@@ -220,7 +234,7 @@ def _planned_episodes(settings: TuneSettings, finished_trials: int, anchors: int
     per_trial = settings.episodes * len(settings.tuning_templates)
     per_held_out = settings.held_out * len(settings.scenarios)
     left = settings.trials - finished_trials
-    return per_trial * (left + anchors) + per_held_out * (anchors + _MOST_CHOSEN)
+    return per_trial * (left + anchors) + per_held_out * (anchors + len(PLACES))
 
 
 def _run_trials(
@@ -244,6 +258,7 @@ class _Race:
         settings: settings of the tuning.
         anchors: the base policy and the presets, by name.
         tuned: their evaluations on the tuning seeds.
+        risk: step-out impacts per 1 000 crossings that a policy may have on the tuning seeds.
     """
 
     space: PolicySpace
@@ -251,6 +266,7 @@ class _Race:
     settings: TuneSettings
     anchors: dict[str, AwarenessPolicy]
     tuned: dict[str, Evaluation]
+    risk: float
 
     def outcomes(self, claims: Sequence[Claim]) -> list[Outcome]:
         """Return the outcomes of trials."""
@@ -297,15 +313,17 @@ class _Race:
                 evaluation = Evaluation.joined([evaluation, part])
                 if len(evaluation.records) == len(base.records):
                     break
-                reason = dropped(evaluation, base)
+                reason = dropped(evaluation, base, self.risk)
                 if reason:
                     break
+        time_s, risk = evaluation.estimate(base)
+        contacts = evaluation.moving_contacts
         return Outcome(
-            evaluation.estimate(base),
-            {_CONSTRAINT: float(evaluation.robot_contacts)},
+            (time_s,),
+            {_CONTACTS: float(contacts), _OVER_RISK: risk - self.risk},
             {
-                "deficit_m": evaluation.deficit_m,
-                "robot_contacts": evaluation.robot_contacts,
+                RISK: risk,
+                _CONTACTS: contacts,
                 "reached": evaluation.reached,
                 "episodes": len(evaluation.records),
                 "dropped": reason,

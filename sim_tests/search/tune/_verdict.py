@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
-from typing import Final
-
 from awarenav.errors import counted
 
 from ...study.measures import FEW_PAIRS, zero_of_n_upper
-from .._verdict import change_text, is_shown, listed
-from ._evaluation import OBJECTIVES
-from ._finalists import BEATS_BASE, NO_WORSE, Candidate, beats, level_of
+from .._verdict import change_text, is_shown
+from ._evaluation import OBJECTIVE
+from ._finalists import BEATS_BASE, Candidate, level_of
 from ._tune import Tuning
-
-_WORDS: Final = {
-    "time_lost_s": (2, "loses"),
-    "violation_time_s": (3, "violates the margin"),
-}
 
 
 def verdict_text(tuning: Tuning) -> str:
     """Return whether a chosen policy is better than the base policy, in sentences."""
     base, winner = tuning.base, tuning.winner
-    if not tuning.front:
+    if not tuning.ranked:
         return (
-            f"keep {base.name}. No trial ran all of its episodes without a contact that the robot "
-            "caused, or without losing to it."
+            f"keep {base.name}. No trial ran all of its episodes within the risk and without a "
+            "contact with the moving robot."
         )
     if winner is not None:
         return (
@@ -35,7 +27,7 @@ def verdict_text(tuning: Tuning) -> str:
         )
     nearest = nearest_candidate(tuning)
     if nearest is None:
-        return f"keep {base.name}. The front has no policy that differs from it and the presets."
+        return f"keep {base.name}. No trial within the risk differs from it and the presets."
     reason = _reason(tuning, nearest)
     return (
         f"keep {base.name}. The nearest is {nearest.name} ({_also(nearest)}): {reason}. "
@@ -44,10 +36,17 @@ def verdict_text(tuning: Tuning) -> str:
 
 
 def nearest_candidate(tuning: Tuning) -> Candidate | None:
-    """Return the chosen policy with the fewest contacts and the least time lost on held-out."""
+    """Return the chosen policy with the fewest contacts and the least time lost on held-out.
+
+    One above the risk comes after those within it.
+    """
     return min(
         tuning.chosen,
-        key=lambda each: (each.held_out.robot_contacts, *each.held_out.objectives),
+        key=lambda each: (
+            each.held_out.moving_contacts,
+            each.held_out.risk > tuning.held_out_risk,
+            each.held_out.figures,
+        ),
         default=None,
     )
 
@@ -55,36 +54,31 @@ def nearest_candidate(tuning: Tuning) -> Candidate | None:
 def is_undecided(tuning: Tuning) -> bool:
     """Return whether more held-out episodes could show that a chosen policy is better."""
     return tuning.winner is None and any(
-        not each.held_out.robot_contacts
-        and any(tuning.minus_base(each, name).value < 0.0 for name in OBJECTIVES)
-        and not any(
-            is_shown(change) and change.low > 0.0
-            for change in (tuning.minus_base(each, name) for name in OBJECTIVES)
-        )
+        not each.held_out.moving_contacts
+        and each.held_out.risk <= tuning.held_out_risk
+        and tuning.minus_base(each).value < 0.0
         for each in tuning.chosen
     )
 
 
 def _also(candidate: Candidate) -> str:
-    names = [name for name in candidate.names[1:] if name != NO_WORSE]
-    return ", ".join([f"trial {candidate.trial}", *names])
+    return ", ".join([f"trial {candidate.trial}", *candidate.names[1:]])
 
 
 def _reason(tuning: Tuning, candidate: Candidate) -> str:
     """Return why a policy does not beat the base policy."""
-    if candidate.held_out.robot_contacts:
-        return "the robot moved into a person in held-out episodes"
-    changes = {name: tuning.minus_base(candidate, name) for name in OBJECTIVES}
-    if min(each.n for each in changes.values()) < FEW_PAIRS:
+    if candidate.held_out.moving_contacts:
+        return "the moving robot and a person touched in held-out episodes"
+    if candidate.held_out.risk > tuning.held_out_risk:
+        return "it is above the risk on held-out episodes"
+    change = tuning.minus_base(candidate)
+    if change.n < FEW_PAIRS:
         return f"fewer than {FEW_PAIRS} pairs of held-out episodes show nothing"
-    if any(each.low > 0.0 for each in changes.values()):
-        return "it is shown to be worse in one of the two"
-    if not any(each.high < 0.0 for each in changes.values()):
+    if not is_shown(change):
         return "a difference is not shown"
-    none: Container[str] = ()
-    if beats(candidate, tuning.base, none, level_of(len(tuning.chosen))):
-        return "it does not hold in the held-out scenarios alone"
-    return "it is not shown to be better"
+    if change.low > 0.0:
+        return "it is shown to lose more time"
+    return "it does not hold in the held-out scenarios alone"
 
 
 def _comparison(tuning: Tuning, candidate: Candidate) -> str:
@@ -92,25 +86,26 @@ def _comparison(tuning: Tuning, candidate: Candidate) -> str:
     settings, base = tuning.settings, tuning.base
     level = level_of(len(tuning.chosen))
     held_out = candidate.held_out
-    text = f"On {counted(len(held_out.records), 'held-out episode')} it " + listed(
-        [change_text(tuning.minus_base(candidate, name), *_WORDS[name]) for name in OBJECTIVES]
+    text = f"On {counted(len(held_out.records), 'held-out episode')} it " + change_text(
+        tuning.minus_base(candidate), 2, "loses"
     )
     if settings.hold_out_scenarios:
         alone = held_out.within(settings.hold_out_scenarios)
         where = counted(len(settings.hold_out_scenarios), "held-out scenario")
-        text += f"; in the {where} alone it " + listed(
-            [
-                change_text(alone.minus(base.held_out, name, level), *_WORDS[name])
-                for name in OBJECTIVES
-            ]
+        text += f"; in the {where} alone it " + change_text(
+            alone.minus(base.held_out, OBJECTIVE, level), 2, "loses"
         )
     else:
         text += "; no scenario was held out"
-    n, contacts = len(held_out.records), held_out.robot_contacts
+    n, contacts = len(held_out.records), held_out.moving_contacts
     touched = (
-        f"The robot moved into nobody (at most {100.0 * zero_of_n_upper(n):.1f} % with 95 % "
+        f"The moving robot touched nobody (at most {100.0 * zero_of_n_upper(n):.1f} % with 95 % "
         "confidence)."
         if not contacts
-        else f"The robot moved into a person in {contacts} of them."
+        else f"The moving robot and a person touched in {contacts} of them."
     )
-    return f"{text} ({100.0 * level:.4g} % intervals). {touched}"
+    risk = (
+        f"It has {held_out.risk:.2f} step-out impacts per 1 000 crossings, {base.name} "
+        f"{base.held_out.risk:.2f}; {tuning.held_out_risk:.2f} are allowed."
+    )
+    return f"{text} ({100.0 * level:.4g} % intervals). {risk} {touched}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
+from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, options
 
 
 @command(
@@ -70,6 +70,13 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
     help="Search method: tpe for up to a few hundred trials, nsga2 for more (with a --generation "
     "of about 20).",
 )
+@option(
+    "--risk",
+    type=Number(0.0),
+    show_default="a twentieth of that of today's AMR in the same episodes",
+    metavar="N",
+    help="Step-out impacts with unaware people that a policy may have, per 1 000 crossings.",
+)
 @options.perception()
 @options.sensors()
 @options.camera()
@@ -83,13 +90,14 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
 @options.overwrite()
 @options.as_json()
 def tune(**values: Any) -> int:
-    """Search for policies that lose less time and keep the separation margin.
+    """Search for the policy that loses the least time at a given risk.
 
-    Varies the numbers of --policy. Trials run few episodes first, and end when the paired interval
-    shows that they lose to --policy. A policy with which the robot caused a contact is not chosen.
-    Ends with a verdict against --policy on held-out seeds and scenarios, and the next command.
-    Writes study.db, trials.csv, pareto.png, importances.json, chosen.json, and chosen/*.yaml with
-    their results on the held-out seeds.
+    Varies the numbers of --policy. The risk is that of step-outs: impacts with unaware people who
+    set off at any time. Trials run few episodes first, and end when an interval shows that they
+    are above the risk or lose to --policy. A policy with which a moving robot and a person touched
+    is not chosen. Ends with a verdict against --policy on held-out seeds and scenarios, and the
+    next command. Writes study.db, trials.csv, tuning.png, importances.json, chosen.json, and
+    chosen/*.yaml with their results on the held-out seeds.
     """
     from ._run import TuneOptions, tune_command  # noqa: PLC0415 - help needs no simulator
 

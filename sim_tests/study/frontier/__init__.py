@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._family import SPEEDS_MPS, TODAY, Member, family
+    from ._family import SPEEDS_MPS, TODAY, Member, family, sensors_of_today
     from ._frontier import Frontier, Point, Worth, frontier_of
     from ._plot import draw_frontier
     from ._text import frontier_text, sentences
@@ -23,13 +23,14 @@ __all__ = [
     "family",
     "frontier_of",
     "frontier_text",
+    "sensors_of_today",
     "sentences",
 ]
 
 __getattr__ = lazy_names(
     __name__,
     {
-        "._family": ("SPEEDS_MPS", "TODAY", "Member", "family"),
+        "._family": ("SPEEDS_MPS", "TODAY", "Member", "family", "sensors_of_today"),
         "._frontier": ("Frontier", "Point", "Worth", "frontier_of"),
         "._plot": ("draw_frontier",),
         "._text": ("frontier_text", "sentences"),

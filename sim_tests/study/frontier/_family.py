@@ -7,6 +7,8 @@ from typing import Final, Literal
 
 from nav_adapter import AwarenessPolicy
 
+from ...crossing.eyes import SensorSet
+
 #: The policy of today's AMR, which is one end of the frontier without awareness.
 TODAY: Final = "scanner"
 #: U, the speed that people who have not noticed the robot may change to.
@@ -14,6 +16,11 @@ SPEEDS_MPS: Final = (0.6, 0.9, 1.2, 1.5, 1.6)
 #: What a policy knows: nothing of awareness, who looks, or who has looked as well.
 Kind = Literal["blind", "aware", "memory"]
 _MEMORY_S: Final = 3.0
+
+
+def sensors_of_today(sensors: SensorSet) -> SensorSet:
+    """Return the sensors of today's AMR: its laser scanners alone, where the robot has any."""
+    return "camera" if sensors == "camera" else "scanner"
 
 
 @dataclass(frozen=True, slots=True)

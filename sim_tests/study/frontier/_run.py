@@ -15,7 +15,7 @@ from ...crossing.eyes import PerceptionKind, SensorSet
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, read_records
 from ..runs import Job, RunFiles, plan_jobs, run_jobs
-from ._family import TODAY, family
+from ._family import TODAY, family, sensors_of_today
 from ._frontier import frontier_of
 from ._plot import draw_frontier
 from ._text import frontier_text
@@ -75,8 +75,7 @@ def _run(options: FrontierOptions) -> Iterable[EpisodeRecord]:
     """Run the family and today's AMR, and write the policies beside the episodes."""
     members = [(each.name, each.policy()) for each in family(memory="scanner" in options.sensors)]
     jobs = _jobs(options, members, options.sensors)
-    # Today's AMR has its laser scanners alone, where the robot has any.
-    jobs += _jobs(options, [TODAY], "camera" if options.sensors == "camera" else "scanner")
+    jobs += _jobs(options, [TODAY], sensors_of_today(options.sensors))
     records = run_jobs(
         jobs,
         options.out,

@@ -20,10 +20,8 @@ from sim_tests import SimError
 from sim_tests.search.tune import (
     Evaluation,
     PolicySpace,
-    feasible_front,
     importances,
-    knee,
-    pareto_front,
+    ranked_trials,
     read_ranges,
     shipped_ranges,
 )
@@ -34,9 +32,6 @@ _SPACES = {name: PolicySpace(AwarenessPolicy.preset(name)) for name in _PRESETS}
 _NAMES = list(shipped_ranges())
 
 shares = st.fixed_dictionaries({name: st.floats(0.0, 1.0) for name in _NAMES})
-points = st.lists(
-    st.tuples(st.integers(0, 6).map(float), st.integers(0, 6).map(float)), min_size=1, max_size=20
-)
 
 
 def _at(space: PolicySpace, share: dict[str, float]) -> dict[str, float]:
@@ -48,9 +43,10 @@ def test_every_point_of_the_space_is_a_policy_that_keeps_the_floor(name, share):
     space = _SPACES[name]
     policy = space.policy(_at(space, share))
     for alpha in (0.0, 0.3, 0.6, 1.0):
-        assert policy.margins.bounded_m(policy.inflation.radius_m(alpha)) >= 0.40
-    assert policy.speed.human_speed_mps(0.0) >= 1.6
-    assert policy.margins.separation_clearance_m >= 0.10
+        assert policy.inflation.radius_m(alpha) >= 0.40
+        assert policy.speed.human_speed_mps(alpha) >= policy.speed.human_speed_mps(1.0)
+    assert policy.speed.human_speed_mps(0.0) >= 1.05
+    assert policy.margins.clearance_m >= 0.10
     assert AwarenessPolicy.model_validate(policy.model_dump(mode="json")) == policy
 
 
@@ -72,7 +68,7 @@ def _number(data: dict, path: str) -> float | None:
 
 def test_one_parameter_may_set_several_keys():
     space = _SPACES["balanced"]
-    policy = space.policy({**space.base_parameters(), "inflation.aware_above": 0.77})
+    policy = space.policy({**space.base_parameters(), "speed.aware_above": 0.77})
     assert policy.inflation.aware_above == policy.speed.aware_above == 0.77
 
 
@@ -80,14 +76,14 @@ def test_one_parameter_may_set_several_keys():
     ("text", "message"),
     [
         ("inflation.aware_radius_m: {low: 0.2, high: 0.8}", "not be searched below 0.4"),
-        ("speed.unaware_human_speed_mps: {low: 1.0, high: 1.8}", "not be searched below 1.6"),
-        ("margins.minimum_clearance_m: {low: 0.05, high: 0.8}", "not be searched below 0.1"),
+        ("speed.unaware_human_speed_mps: {low: 1.0, high: 1.8}", "not be searched below 1.05"),
+        ("margins.clearance_m: {low: 0.05, high: 0.8}", "not be searched below 0.1"),
         (
             "inflation.unaware_radius_m: {low: 0.5, high: 1.0, also: [inflation.aware_radius_m]}\n"
             "inflation.aware_radius: {low: 0.4, high: 0.8}",
             "no number 'inflation.aware_radius'; did you mean 'inflation.aware_radius_m'",
         ),
-        ("inflation.shape: {low: 0.4, high: 0.8}", "no number 'inflation.shape'"),
+        ("alerts: {low: 0.4, high: 0.8}", "no number 'alerts'"),
         ("timing.hold_s: {low: 5.0, high: 50.0}", "policy that cannot be"),
     ],
 )
@@ -114,49 +110,35 @@ def test_unusable_files_of_ranges_are_refused_with_a_reason(tmp_path, text, mess
         read_ranges(path)
 
 
-@given(points)
-def test_the_front_holds_the_points_that_no_other_dominates(given_points):
-    rows = pareto_front(given_points)
-    for row, point in enumerate(given_points):
-        beaten = any(
-            other != point and other[0] <= point[0] and other[1] <= point[1]
-            for other in given_points
-        )
-        assert beaten == (point not in [given_points[each] for each in rows]), row
-    on_front = [given_points[row] for row in rows]
-    assert all(a[0] < b[0] and a[1] > b[1] for a, b in itertools.pairwise(on_front))
-
-
-def test_the_knee_is_where_the_front_bends():
-    bent = [(0.0, 10.0), (1.0, 2.0), (5.0, 1.0), (10.0, 0.0)]
-    assert knee(bent) == 1
-    # Units do not matter.
-    assert knee([(1000.0 * x, 0.01 * y) for x, y in bent]) == 1
-    assert knee(bent[:2]) == knee(bent[:1]) == 0
-
-
-def _trial(number: int, values: tuple[float, float], contacts: float):
-    trial = optuna.trial.create_trial(values=values, constraints={"robot_contacts": contacts})
+def _trial(number: int, time_s: float, contacts: float = 0.0, over_risk: float = -0.1, **notes):
+    trial = optuna.trial.create_trial(
+        values=[time_s],
+        constraints={"moving_contacts": contacts, "over_risk": over_risk},
+        user_attrs={"notes": notes},
+    )
     trial.number = number
     return trial
 
 
-def test_a_trial_with_a_contact_caused_by_the_robot_is_on_no_front():
-    trials = [_trial(0, (3.0, 3.0), 0.0), _trial(1, (1.0, 1.0), 1.0), _trial(2, (2.0, 4.0), 0.0)]
-    assert [trial.number for trial in feasible_front(trials)] == [2, 0]
-    assert feasible_front(trials[1:2]) == []
+def test_trials_with_a_contact_above_the_risk_or_dropped_have_no_rank():
+    trials = [_trial(0, 3.0), _trial(1, 1.0, 1.0), _trial(2, 2.0), _trial(3, 1.0, over_risk=0.1)]
+    trials += [_trial(4, 1.0, dropped="loses"), _trial(5, 2.5, over_risk=0.0)]
+    assert [trial.number for trial in ranked_trials(trials)] == [2, 5, 0]
+    assert ranked_trials(trials[1:2]) == []
 
 
 def _study(values) -> optuna.Study:
-    study = optuna.create_study(directions=["minimize"] * 2)
+    study = optuna.create_study()
     for x, y in itertools.product(range(6), repeat=2):
         a, b = x / 5.0, y / 5.0
+        time_s, risk = values(a, b)
         distribution = optuna.distributions.FloatDistribution(0.0, 1.0)
         study.add_trial(
             optuna.trial.create_trial(
                 params={"matters": a, "idle": b},
                 distributions={"matters": distribution, "idle": distribution},
-                values=values(a, b),
+                values=[time_s],
+                user_attrs={"notes": {"step_out_unaware": risk}},
             )
         )
     return study
@@ -167,9 +149,12 @@ def test_importances_are_finite_sum_to_one_and_find_the_parameter_that_matters()
     first = found["time_lost_s"]
     assert sum(first.values()) == pytest.approx(1.0)
     assert first["matters"] > 0.8
-    # No parameter matters for an objective in which no trial differs.
-    assert found["violation_time_s"] == {"matters": 0.0, "idle": 0.0}
+    # No parameter matters for a figure in which no trial differs.
+    assert found["step_out_unaware"] == {"matters": 0.0, "idle": 0.0}
     assert all(math.isfinite(v) for each in found.values() for v in each.values())
+
+
+_WALKED_INTO = {"contact": True, "contact_by": "person", "moving_contacts": 1}
 
 
 def _record(seed: int, **values) -> EpisodeRecord:
@@ -179,14 +164,15 @@ def _record(seed: int, **values) -> EpisodeRecord:
 def test_an_evaluation_counts_contacts_and_errors_and_means():
     found = Evaluation.of(
         [
-            _record(2, time_lost_s=3.0, violation_time_s=0.5, min_margin_m=-0.2, robot_contacts=2),
+            _record(2, time_lost_s=3.0, step_out_unaware=0.5, person_contacts=1, **_WALKED_INTO),
             _record(0, error="no"),
-            _record(1, time_lost_s=1.0, violation_time_s=0.0, min_margin_m=0.7, time_to_goal_s=9.0),
+            _record(1, time_lost_s=1.0, step_out_unaware=0.0, time_to_goal_s=9.0),
         ]
     )
-    assert found.objectives == (2.0, 0.25)
-    assert found.deficit_m == pytest.approx(0.1)
-    assert (found.robot_contacts, found.reached, found.errors) == (1, 1, ("no",))
+    assert found.figures == (2.0, 0.25)
+    assert found.risk == 0.25
+    # A person who walked into the moving robot counts, too.
+    assert (found.moving_contacts, found.reached, found.errors) == (1, 1, ("no",))
     assert found.minus(found, "time_lost_s").value == 0.0
 
 
@@ -202,7 +188,7 @@ workers:
   - path: [{t_s: 0.0, x_m: {uniform: {low: 1.5, high: 2.0}}, y_m: 1.8}]
 """
 _TUNE = ["tune", "--trials", "4", "--generation", "3", "--episodes", "1", "--held-out", "1"]
-_TUNE += ["--perception", "truth"]
+_TUNE += ["--perception", "truth", "--risk", "0.5"]
 
 
 @pytest.mark.slow
@@ -214,8 +200,9 @@ def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_
     one, two = tmp_path / "one", tmp_path / "two"
     assert main([*arguments, "--out", str(one)]) == 0
     printed = capsys.readouterr().out
-    for name in (*_PRESETS, "least_time_lost", "knee", "least_violation"):
+    for name in (*_PRESETS, "scanner", "least_time_lost", "step-out"):
         assert name in printed
+    assert "At most 0.50 step-out impacts with unaware people per 1 000 crossings" in printed
     assert "\nVerdict: keep balanced. " in printed
     assert "\nNext: awarenav tune --policy balanced " in printed
     with (one / "trials.csv").open(newline="") as file:
@@ -230,8 +217,9 @@ def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_
     capsys.readouterr()
     for name in ("trials.csv", "chosen.json", "importances.json"):
         assert (one / name).read_bytes() == (two / name).read_bytes()
-    assert (one / "pareto.png").read_bytes()[:4] == b"\x89PNG"
+    assert (one / "tuning.png").read_bytes()[:4] == b"\x89PNG"
     chosen = json.loads((one / "chosen.json").read_text())
+    assert chosen["risk"] == {"tuning": 0.5, "held_out": 0.5}
     assert chosen["tuning_seeds"] == "0 to 0"
     assert chosen["held_out_seeds"] == "1000000 to 1000000"
     for path in (one / "chosen").iterdir():
@@ -252,6 +240,7 @@ def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_
         (["--hold-out-scenarios", "crossing_atentive"], "did you mean 'crossing_attentive'"),
         (["--hold-out-scenarios", "crossing_attentive"], "must leave a scenario to tune on"),
         (["--resume"], "there is no tuning"),
+        (["--risk", "-1"], "must be"),
         (["--generation", "1"], "at least 2 trials"),
         (["--planner", "nowhere"], "module:Class"),
     ],

@@ -33,7 +33,7 @@ from sim_tests.study.measures import EpisodeRecord
 _TASKS = [(scenario, seed) for scenario in "abcdef" for seed in range(5)]
 
 
-def _evaluation(time_s=5.0, violation_s=0.0, *, tasks=_TASKS, contacts=0, spread=0.3, name="p"):
+def _evaluation(time_s=5.0, risk=0.0, *, tasks=_TASKS, contacts=0, spread=0.3, name="p"):
     """Episodes of which each scenario and seed has the same chance part in every policy."""
     records = []
     for row, (scenario, seed) in enumerate(tasks):
@@ -43,8 +43,8 @@ def _evaluation(time_s=5.0, violation_s=0.0, *, tasks=_TASKS, contacts=0, spread
             EpisodeRecord(
                 *(scenario, seed, name, "q", "truth"),
                 time_lost_s=time_s + 2.0 * chance + spread * own,
-                violation_time_s=violation_s,
-                robot_contacts=int(row < contacts),
+                step_out_unaware=risk,
+                moving_contacts=int(row < contacts),
             )
         )
     return Evaluation.of(records)
@@ -63,32 +63,34 @@ def test_stages_are_the_seeds_in_order_and_double_what_has_run(count, first):
 
 def test_a_trial_that_is_shown_to_lose_is_dropped_and_an_open_one_goes_on():
     base = _evaluation()
-    assert dropped(_evaluation(6.5), base) == "loses"
-    assert dropped(_evaluation(3.5), base) == ""
-    assert dropped(_evaluation(5.01), base) == ""
+    assert dropped(_evaluation(6.5), base, 0.5) == "loses"
+    assert dropped(_evaluation(3.5), base, 0.5) == ""
+    assert dropped(_evaluation(5.01), base, 0.5) == ""
     # Too few pairs show nothing, a contact is enough.
     few = _TASKS[:6]
-    assert dropped(_evaluation(6.5, tasks=few), base) == ""
-    assert dropped(_evaluation(3.5, tasks=few, contacts=1), base) == "contact"
+    assert dropped(_evaluation(6.5, tasks=few), base, 0.5) == ""
+    assert dropped(_evaluation(3.5, 0.7, tasks=few), base, 0.5) == ""
+    assert dropped(_evaluation(3.5, tasks=few, contacts=1), base, 0.5) == "contact"
 
 
-def test_a_trial_that_trades_one_objective_for_the_other_may_be_on_the_front():
-    base = _evaluation(violation_s=0.2)
-    assert dropped(_evaluation(6.5, violation_s=0.0), base) == ""
-    assert dropped(_evaluation(3.5, violation_s=0.3), base) == ""
-    assert dropped(_evaluation(6.5, violation_s=0.2), base) == "loses"
+def test_a_trial_above_the_risk_is_dropped_however_fast_it_is():
+    base = _evaluation()
+    assert dropped(_evaluation(3.5, 0.6), base, 0.5) == "risk"
+    assert dropped(_evaluation(3.5, 0.5), base, 0.5) == ""
+    # The base policy is above the risk itself: a slower policy within it is what is looked for.
+    assert dropped(_evaluation(6.5, 0.4), _evaluation(risk=0.6), 0.5) == ""
 
 
 def test_the_estimate_from_few_episodes_uses_the_base_policy_on_the_same():
     base, whole = _evaluation(), _evaluation(6.0)
-    assert whole.estimate(base) == whole.objectives
+    assert whole.estimate(base) == whole.figures
     rng = np.random.default_rng(0)
     errors_s = []
     for _ in range(50):
         rows = rng.choice(len(_TASKS), 8, replace=False)
         part = _evaluation(6.0, tasks=[_TASKS[row] for row in rows])
-        errors_s.append([part.estimate(base)[0], part.objectives[0]])
-    paired_s, plain_s = np.std(np.array(errors_s) - whole.objectives[0], axis=0)
+        errors_s.append([part.estimate(base)[0], part.figures[0]])
+    paired_s, plain_s = np.std(np.array(errors_s) - whole.figures[0], axis=0)
     assert paired_s < 0.3 * plain_s
 
 
@@ -127,12 +129,18 @@ def _candidate(name: str, number: int | None = 1, **values) -> Candidate:
 
 def test_a_policy_beats_another_only_when_the_interval_says_so():
     base = _candidate("base", None)
-    assert beats(_candidate("better", time_s=4.0), base, (), 0.95)
-    assert not beats(_candidate("equal", time_s=4.99), base, (), 0.95)
-    assert not beats(_candidate("worse", time_s=6.0), base, (), 0.95)
-    assert not beats(_candidate("few", time_s=4.0, tasks=_TASKS[:15]), base, (), 0.95)
-    assert not beats(_candidate("touches", time_s=4.0, contacts=1), base, (), 0.95)
-    assert not beats(_candidate("violates", time_s=4.0, violation_s=0.1), base, (), 0.95)
+    assert beats(_candidate("better", time_s=4.0), base, 0.5, (), 0.95)
+    assert not beats(_candidate("equal", time_s=4.99), base, 0.5, (), 0.95)
+    assert not beats(_candidate("worse", time_s=6.0), base, 0.5, (), 0.95)
+    assert not beats(_candidate("few", time_s=4.0, tasks=_TASKS[:15]), base, 0.5, (), 0.95)
+    assert not beats(_candidate("touches", time_s=4.0, contacts=1), base, 0.5, (), 0.95)
+    assert not beats(_candidate("risky", time_s=4.0, risk=0.6), base, 0.5, (), 0.95)
+
+
+def test_a_policy_within_the_risk_beats_one_above_it_though_it_is_slower():
+    base = _candidate("base", None, risk=0.6)
+    assert beats(_candidate("careful", time_s=6.0, risk=0.4), base, 0.5, (), 0.95)
+    assert not beats(_candidate("risky", time_s=4.0, risk=0.55), base, 0.5, (), 0.95)
 
 
 def test_a_gain_must_hold_in_the_held_out_scenarios():
@@ -140,29 +148,31 @@ def test_a_gain_must_hold_in_the_held_out_scenarios():
     gains = _evaluation(3.0, tasks=_TASKS[:20])
     loses = _evaluation(6.0, tasks=_TASKS[20:])
     mixed = _candidate("mixed", held_out=Evaluation.joined([gains, loses]))
-    assert beats(mixed, base, (), 0.95)
-    assert beats(mixed, base, "ab", 0.95)
-    assert not beats(mixed, base, "ef", 0.95)
+    assert beats(mixed, base, 0.5, (), 0.95)
+    assert beats(mixed, base, 0.5, "ab", 0.95)
+    assert not beats(mixed, base, 0.5, "ef", 0.95)
 
 
 def test_the_winner_gets_the_name_and_more_finalists_need_a_wider_interval():
     base = _candidate("base", None)
-    rows = [_candidate("knee", 1, time_s=4.2), _candidate("other", 2, time_s=4.0)]
-    names = [each.names for each in named_winner(rows, base, ())]
-    assert names == [("knee",), (BEATS_BASE, "other")]
-    assert [each.names for each in named_winner(rows[:0], base, ())] == []
-    assert named_winner([_candidate("knee", 1, time_s=5.5)], base, ())[0].names == ("knee",)
+    rows = [_candidate("second", 1, time_s=4.2), _candidate("other", 2, time_s=4.0)]
+    names = [each.names for each in named_winner(rows, base, 0.5, ())]
+    assert names == [("second",), (BEATS_BASE, "other")]
+    assert [each.names for each in named_winner(rows[:0], base, 0.5, ())] == []
+    assert named_winner([_candidate("second", 1, time_s=5.5)], base, 0.5, ())[0].names == (
+        "second",
+    )
     assert level_of(1) == 0.95
     assert level_of(4) == pytest.approx(0.9875)
 
 
 def test_equal_policies_and_equal_episodes_are_one_row():
-    base, same_policy = _candidate("base", None), _candidate("knee", None)
-    same_episodes = _candidate("least_violation", 3)
+    base, same_policy = _candidate("base", None), _candidate("second", None)
+    same_episodes = _candidate("third", 3)
     other = _candidate("least_time_lost", 4, time_s=4.0)
     rows = merged([base, other, same_policy, same_episodes])
     assert [each.names for each in rows] == [
-        ("base", "knee", "least_violation"),
+        ("base", "second", "third"),
         ("least_time_lost",),
     ]
     assert rows[0].trial is None
@@ -174,18 +184,20 @@ def _tuning(*chosen: Candidate, hold_out=("e", "f")) -> Tuning:
         hold_out_scenarios=hold_out,
     )
     base = _candidate("balanced", None)
-    rows = tuple(named_winner(chosen, base, hold_out))
-    return Tuning(settings, None, None, (), ("a trial",), (base,), rows)
+    rows = tuple(named_winner(chosen, base, 0.5, hold_out))
+    return Tuning(settings, None, None, (), ("a trial",), (base,), rows, 0.5, 0.5)
 
 
 def test_the_verdict_names_a_winner_with_its_intervals_and_says_that_it_was_not_falsified():
-    tuning = _tuning(_candidate("knee", 7, time_s=4.0))
+    tuning = _tuning(_candidate("second", 7, time_s=4.0))
     text = verdict_text(tuning)
-    assert text.startswith("beats_base (trial 7, knee) is better than balanced. On 30 held-out ")
+    assert text.startswith("beats_base (trial 7, second) is better than balanced. On 30 held-out ")
     alone = tuning.winner.held_out.within("ef").minus(tuning.base.held_out, "time_lost_s")
     assert f"in the 2 held-out scenarios alone it loses {-alone.value:.2f} s less" in text
     assert "(95 % intervals)" in text
-    assert "The robot moved into nobody (at most 9.5 % with 95 % confidence)." in text
+    allowed = "It has 0.00 step-out impacts per 1 000 crossings, balanced 0.00; 0.50 are allowed."
+    assert allowed in text
+    assert "The moving robot touched nobody (at most 9.5 % with 95 % confidence)." in text
     assert text.endswith("It has not been falsified yet.")
 
 
@@ -193,20 +205,21 @@ def test_the_verdict_names_a_winner_with_its_intervals_and_says_that_it_was_not_
     ("values", "reason", "undecided"),
     [
         ({"time_s": 4.88}, "a difference is not shown", True),
-        ({"time_s": 6.0}, "it is shown to be worse in one of the two", False),
-        ({"time_s": 4.0, "contacts": 2}, "the robot moved into a person", False),
+        ({"time_s": 6.0}, "it is shown to lose more time", False),
+        ({"time_s": 4.0, "contacts": 2}, "the moving robot and a person touched", False),
+        ({"time_s": 4.0, "risk": 0.7}, "it is above the risk", False),
         ({"time_s": 4.0, "tasks": _TASKS[:15]}, "fewer than 20 pairs", True),
     ],
 )
 def test_the_verdict_keeps_the_base_policy_and_says_why(values, reason, undecided):
-    tuning = _tuning(_candidate("knee", 7, **values))
+    tuning = _tuning(_candidate("second", 7, **values))
     text = verdict_text(tuning)
-    assert text.startswith(f"keep balanced. The nearest is knee (trial 7): {reason}")
+    assert text.startswith(f"keep balanced. The nearest is second (trial 7): {reason}")
     assert is_undecided(tuning) == undecided
 
 
 def test_the_verdict_says_that_no_scenario_was_held_out():
-    text = verdict_text(_tuning(_candidate("knee", 7, time_s=4.0), hold_out=()))
+    text = verdict_text(_tuning(_candidate("second", 7, time_s=4.0), hold_out=()))
     assert "no scenario was held out" in text
 
 
@@ -219,9 +232,9 @@ def test_the_verdict_says_that_no_scenario_was_held_out():
     ],
 )
 def test_a_chosen_policy_says_for_which_robot_and_people_it_was_tuned(robot, population, words):
-    knee = _candidate("knee", 7, time_s=4.0)
-    tuning = _tuning(knee)
+    second = _candidate("second", 7, time_s=4.0)
+    tuning = _tuning(second)
     common = common_settings("balanced", ["runs_out"], "", population, robot)
     settings = dataclasses.replace(tuning.settings, scenarios=common["scenarios"])
-    header = _header(dataclasses.replace(tuning, settings=settings), knee, "knee")
+    header = _header(dataclasses.replace(tuning, settings=settings), second, "second")
     assert words in header.splitlines()[0]
