@@ -74,8 +74,34 @@ class Falsification:
 
     @property
     def contacts(self) -> int:
-        """Number of episodes in which the robot moved into a person."""
+        """Number of episodes in which the moving robot touched a person who had not looked.
+
+        Without the floor, people who had looked count, too.
+        """
         return sum(trial.score <= CONTACT_SCORE for trial in self.trials)
+
+    @property
+    def contact_mps(self) -> float:
+        """The robot's highest speed at one of these contacts; 0 without any."""
+        return max(CONTACT_SCORE - min((t.score for t in self.trials), default=0.0), 0.0)
+
+    @property
+    def aware_contacts(self) -> int:
+        """Number of episodes in which the moving robot touched a person who had looked."""
+        return len(self._aware_speeds_mps)
+
+    @property
+    def aware_contact_mps(self) -> float:
+        """The robot's highest speed in one of these episodes at a contact; 0 without any."""
+        return max(self._aware_speeds_mps, default=0.0)
+
+    @property
+    def _aware_speeds_mps(self) -> list[float]:
+        return [
+            float(trial.notes.get("moving_contact_mps") or 0.0)
+            for trial in self.trials
+            if trial.notes.get("moving_contacts", 0) > trial.notes.get("moving_contacts_unaware", 0)
+        ]
 
     @property
     def errors(self) -> int:
@@ -228,21 +254,22 @@ def _evaluator(
     def evaluate(batch: Sequence[ParameterValues]) -> list[Outcome]:
         runner.bar.set_postfix_str(space.template.name)
         jobs = [job_of(settings, space.scenario(values)) for values in batch]
-        return [_outcome(record) for record in runner.run(jobs)]
+        return [_outcome(each, settings.unsafe_no_floor) for each in runner.run(jobs)]
 
     return evaluate
 
 
-def _outcome(record: EpisodeRecord) -> Outcome:
+def _outcome(record: EpisodeRecord, everybody: bool) -> Outcome:
     notes: dict[str, object] = {
         "min_margin_m": record.min_margin_m,
         "min_separation_m": record.min_separation_m,
         "contact_by": record.contact_by,
-        "robot_contacts": record.robot_contacts,
-        "contact_speed_mps": record.contact_speed_mps,
+        "moving_contacts": record.moving_contacts,
+        "moving_contacts_unaware": record.moving_contacts_unaware,
+        "moving_contact_mps": record.moving_contact_mps,
         "speed_at_min_separation_mps": record.speed_at_min_separation_mps,
         "awareness": record.awareness,
         "reaction": record.reaction,
         "error": record.error,
     }
-    return Outcome((score(record),), notes=notes)
+    return Outcome((score(record, everybody=everybody),), notes=notes)

@@ -15,7 +15,7 @@ from .._optimizer import Optimizer, Outcome, ParameterValues, Range
 from .._optuna import optuna
 from .._shared_study import NOTES, Claim, SharedStudy
 
-#: Score of a contact that the robot caused, below every margin.
+#: Score of a contact with the moving robot that counts, below every margin.
 CONTACT_SCORE: Final = -10.0
 #: Score without a margin: the robot never moved near a person, or the episode has no result.
 NO_MARGIN_SCORE: Final = 10.0
@@ -33,16 +33,23 @@ _LATER_SPREAD: Final = 0.3
 Evaluate = Callable[[Sequence[ParameterValues]], Sequence[Outcome]]
 
 
-def score(record: EpisodeRecord) -> float:
+def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
     """Return the score of an episode: the smallest separation margin at a moving robot, in metres.
 
-    A margin lies within (−10, 10]. A contact caused by the robot gives −10 less the robot's speed
-    in m/s, so that a faster contact scores lower. An episode without a result gives 10.
+    A margin lies within (−10, 10]. A contact of the moving robot and a person who has not looked at
+    it for 1 s, or never, gives −10 less the robot's speed in m/s, so that a faster contact scores
+    lower. Whoever walks into whom does not matter. An episode without a result gives 10.
+
+    Args:
+        record: the episode.
+        everybody: contacts with people who have looked count, too.
     """
     if record.error:
         return NO_MARGIN_SCORE
-    if record.robot_contacts > 0:
-        return CONTACT_SCORE - (record.contact_speed_mps or 0.0)
+    if record.moving_contacts_unaware > 0:
+        return CONTACT_SCORE - (record.moving_contact_unaware_mps or 0.0)
+    if everybody and record.moving_contacts > 0:
+        return CONTACT_SCORE - (record.moving_contact_mps or 0.0)
     if record.min_margin_m is None:
         return NO_MARGIN_SCORE
     return min(max(record.min_margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE)

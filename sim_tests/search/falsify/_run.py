@@ -113,7 +113,8 @@ def _table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> li
         )
     contacts, episodes = falsification.contacts, len(falsification.trials)
     lines.append(
-        f"{contacts} of {counted(episodes, 'episode')} with a contact that the robot caused."
+        f"{contacts} of {counted(episodes, 'episode')} with a contact of the moving robot and a "
+        f"person who had not looked for 1 s; {falsification.aware_contacts} with a person who had."
     )
     if falsification.errors:
         broken = counted(falsification.errors, "episode has", "episodes have")

@@ -67,14 +67,28 @@ def verdict_text(
         )
     if contacts:
         text = (
-            f"{name} is not safe enough: the robot moved into a person in {contacts} of {searched}."
+            f"{name} is not safe enough: the moving robot and a person who had not looked touched "
+            f"in {contacts} of {searched}, at up to {falsification.contact_mps:.2f} m/s."
         )
     else:
         text = (
-            f"no contact that the robot caused with {name} in {searched}. A search is not a "
-            "sample, so this gives no rate."
+            f"no contact of the moving robot and a person who had not looked with {name} in "
+            f"{searched}. A search is not a sample, so this gives no rate."
         )
-    return " ".join([text, *_comparison(name, cases, others)])
+    return " ".join([text, _aware(falsification), *_comparison(name, cases, others)])
+
+
+def _aware(falsification: Falsification) -> str:
+    """Return the sentence about people who had looked, whom today's AMR does not spare either."""
+    touched, episodes = falsification.aware_contacts, len(falsification.trials)
+    if not touched:
+        return "Nobody who had looked was touched by the moving robot either."
+    share, speed_mps = 100.0 * touched / episodes, falsification.aware_contact_mps
+    return (
+        f"It touched people who had looked within 1 s in {touched} ({share:.1f} %), at up to "
+        f"{speed_mps:.2f} m/s; the same search with --policy scanner gives these figures of "
+        "today's AMR."
+    )
 
 
 def _comparison(
@@ -87,7 +101,7 @@ def _comparison(
         return []
     other = pairs[0][1].policy
     touched = [
-        sum(record.robot_contacts > 0 for record in side) for side in zip(*pairs, strict=True)
+        sum(record.moving_contacts > 0 for record in side) for side in zip(*pairs, strict=True)
     ]
     margins = [
         (mine.min_margin_m, theirs.min_margin_m)
@@ -96,7 +110,7 @@ def _comparison(
     ]
     better = sum(theirs > mine for mine, theirs in margins)
     worse = sum(theirs < mine for mine, theirs in margins)
-    parts = [f"touches a person in {touched[1]} ({name} in {touched[0]})"]
+    parts = [f"touches a person while it moves in {touched[1]} ({name} in {touched[0]})"]
     if margins:
         deepest = [min(side) for side in zip(*margins, strict=True)]
         parts += [

@@ -52,9 +52,9 @@ class WorstCase:
     def replays(self) -> bool:
         """True if the file gives the margin and the contacts of the trial."""
         notes = self.trial.notes
-        return (self.record.min_margin_m, self.record.robot_contacts) == (
+        return (self.record.min_margin_m, self.record.moving_contacts) == (
             notes["min_margin_m"],
-            notes["robot_contacts"],
+            notes["moving_contacts"],
         )
 
 
@@ -106,7 +106,10 @@ def write_worst(falsification: Falsification, folder: Path, most: int) -> list[W
 
 def write_episodes(falsification: Falsification, path: Path) -> None:
     """Write every episode of the search as CSV; the last column has the parameters as JSON."""
-    notes = ("min_margin_m", "min_separation_m", "contact_by", "robot_contacts", "error")
+    notes = (
+        *("min_margin_m", "min_separation_m", "contact_by"),
+        *("moving_contacts", "moving_contacts_unaware", "moving_contact_mps", "error"),
+    )
     write_csv(
         path,
         ["scenario", "round", "trial", "score", *notes, "levers"],
@@ -147,7 +150,7 @@ def write_summary(
         contacts = [row for row, each in enumerate(scores) if each <= CONTACT_SCORE]
         scenarios[name] = {
             "episodes": len(scores),
-            "robot_contacts": len(contacts),
+            "contacts": len(contacts),
             "first_contact_at": contacts[0] + 1 if contacts else None,
             "lowest_score": round(min(scores), 6),
         }
@@ -155,7 +158,10 @@ def write_summary(
         "policy": falsification.settings.policy_name,
         "unsafe_no_floor": falsification.settings.unsafe_no_floor,
         "episodes": len(falsification.trials),
-        "robot_contacts": falsification.contacts,
+        "contacts": falsification.contacts,
+        "contact_mps": round(falsification.contact_mps, 6),
+        "aware_contacts": falsification.aware_contacts,
+        "aware_contact_mps": round(falsification.aware_contact_mps, 6),
         "without_result": falsification.errors,
         "verdict": verdict,
         "scenarios": scenarios,
@@ -166,7 +172,8 @@ def write_summary(
                 "min_margin_m": case.record.min_margin_m,
                 "min_separation_m": case.record.min_separation_m,
                 "contact_by": case.record.contact_by,
-                "robot_contacts": case.record.robot_contacts,
+                "moving_contacts": case.record.moving_contacts,
+                "moving_contacts_unaware": case.record.moving_contacts_unaware,
                 "speed_at_min_separation_mps": case.record.speed_at_min_separation_mps,
                 "awareness": case.record.awareness,
                 "replays": case.replays,
@@ -183,7 +190,7 @@ def _figures_against(record: EpisodeRecord | None) -> dict[str, Any] | None:
     """Return the figures of a worst case with another policy; None without one."""
     if record is None:
         return None
-    names = ("policy", "min_margin_m", "min_separation_m", "robot_contacts", "error")
+    names = ("policy", "min_margin_m", "min_separation_m", "moving_contacts", "error")
     return {name: getattr(record, name) for name in names}
 
 
@@ -211,7 +218,7 @@ def _header(trial: EvaluatedTrial, settings: FalsifySettings, file: str) -> str:
         f"Found by falsification of {settings.policy_name} in {trial.scenario}, "
         f"round {trial.round}, trial {trial.trial}.",
         f"Smallest separation margin at a moving robot {_metres(margin)}, smallest separation "
-        f"{_metres(separation)}, contacts caused by the robot {trial.notes['robot_contacts']}.",
+        f"{_metres(separation)}, contacts with the moving robot {trial.notes['moving_contacts']}.",
         f"awarenav crossings --scenario {file} --policy {POLICY_FILE} "
         f"{Perception.named(settings.perception).options}"
         + (f" --planner {planner}" if planner else "")

@@ -14,8 +14,8 @@ from awarenav.cli import POSITIVE, command, option, options
         "awarenav crossings --scenario worst/worst_001.yaml --policy mine.yaml",
     ],
     exit_status={
-        0: "The robot caused no contact.",
-        1: "The robot caused a contact.",
+        0: "The moving robot touched nobody who had not looked.",
+        1: "It touched somebody who had not looked for 1 s, or never.",
         2: "Bad input.",
         130: "Interrupted; the episodes so far are kept.",
     },
@@ -79,9 +79,10 @@ def falsify(**values: Any) -> int:
     """Search for the situations in which a policy does worst.
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
-    limits, and looks for the smallest separation margin while the robot moves. People of
-    --population recorded do not draw the speed and glances that are varied; --seed draws their
-    pace, sway and starts by chance. Ends with a verdict against another policy in the same
+    limits. Looks for contacts of the moving robot with people who have not looked at it for 1 s,
+    and for the smallest separation margin. Contacts with people who have looked are counted apart.
+    People of --population recorded do not draw the speed and glances that are varied; --seed draws
+    their pace, sway and starts by chance. Ends with a verdict against another policy in the same
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings
     --scenario` runs them again), episodes.csv, falsify.png, summary.json and the studies.
     """

@@ -11,8 +11,9 @@ from ...crossing.eyes import SensorSet
 
 #: The policy of today's AMR, which is one end of the frontier without awareness.
 TODAY: Final = "scanner"
-#: U, the speed that people who have not noticed the robot may change to.
-SPEEDS_MPS: Final = (0.6, 0.9, 1.2, 1.5, 1.6)
+#: U, the speed that people who have not noticed the robot may change to. At 0 everybody is expected
+#: to keep to their motion, as people who have noticed the robot are.
+SPEEDS_MPS: Final = (0.0, 0.3, 0.6, 1.0, 1.5)
 #: What a policy knows: nothing of awareness, who looks, or who has looked as well.
 Kind = Literal["blind", "aware", "memory"]
 _MEMORY_S: Final = 3.0
@@ -26,6 +27,9 @@ def sensors_of_today(sensors: SensorSet) -> SensorSet:
 @dataclass(frozen=True, slots=True)
 class Member:
     """A policy of the family.
+
+    The radius of unaware people goes with U: at 1.5 m/s it is that of ``balanced``, at 0 that of
+    aware people.
 
     Attributes:
         kind: ``"blind"`` treats everybody as unaware. ``"aware"`` expects people who look to keep
@@ -45,6 +49,9 @@ class Member:
         """Return the policy: ``balanced`` with these settings."""
         data = AwarenessPolicy.preset("balanced").model_dump(mode="json")
         inflation, speed = data["inflation"], data["speed"]
+        share = self.speed_mps / speed["unaware_human_speed_mps"]
+        aware_m, unaware_m = inflation["aware_radius_m"], inflation["unaware_radius_m"]
+        inflation["unaware_radius_m"] = aware_m + share * (unaware_m - aware_m)
         speed["unaware_human_speed_mps"] = self.speed_mps
         speed["aware_human_speed_mps"] = self.speed_mps if self.kind == "blind" else 0.0
         if self.kind == "blind":
@@ -58,7 +65,12 @@ class Member:
 def family(*, memory: bool) -> tuple[Member, ...]:
     """Return the family; ``memory`` adds the policies that need laser scanners."""
     kinds: tuple[Kind, ...] = ("blind", "aware", "memory") if memory else ("blind", "aware")
-    return tuple(Member(kind, speed_mps) for kind in kinds for speed_mps in SPEEDS_MPS)
+    return tuple(
+        Member(kind, speed_mps)
+        for kind in kinds
+        for speed_mps in SPEEDS_MPS
+        if kind == "blind" or speed_mps > 0.0  # at 0, awareness changes nothing
+    )
 
 
 def member_named(name: str) -> Member | None:

@@ -14,7 +14,7 @@ from awarenav.files import json_text, write_text
 from ...crossing.eyes import PerceptionKind, SensorSet
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, read_records
-from ..runs import Job, RunFiles, plan_jobs, run_jobs
+from ..runs import Job, RunFiles, plan_jobs, policy_text, run_jobs
 from ._family import TODAY, family, sensors_of_today
 from ._frontier import frontier_of
 from ._plot import draw_frontier
@@ -86,7 +86,8 @@ def _run(options: FrontierOptions) -> Iterable[EpisodeRecord]:
         about=_about(options),
     )
     for name, policy in members:
-        policy.to_yaml(options.out / "policies" / f"{name}.yaml")
+        path = options.out / "policies" / f"{name}.yaml"
+        write_text(path, policy_text(policy), SimError)
     return records
 
 

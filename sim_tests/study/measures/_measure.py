@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Final
 
@@ -21,12 +21,12 @@ from ._driving import (
     success_weighted_path_length,
 )
 from ._record import Awareness, EpisodeRecord, rounded
-from ._step_out import FASTER_STEP_OUT, step_out_impacts
+from ._step_out import FASTER_STEP_OUT, is_unaware, since_look_of, step_out_impacts
 from ._trace import Trace
 
 if TYPE_CHECKING:
     from ...actors.behaviour import PersonOutcome
-    from ...crossing import CrossingResult
+    from ...crossing import ContactEvent, CrossingResult
 
 #: Far edges of the intimate and the personal zone (E. T. Hall, The Hidden Dimension, 1966).
 INTIMATE_M: Final = 0.45
@@ -68,6 +68,7 @@ def measure(
     awareness, reaction, error = _awareness_of_nearest(result, trace)
     by_robot = [contact for contact in result.contacts if contact.by == "robot"]
     moving = [each for each in result.contacts if each.robot_speed_mps > STANDING_SPEED_MPS]
+    unaware = _with_unaware(moving, trace)
     step_out = step_out_impacts(result)
     stress = step_out_impacts(result, FASTER_STEP_OUT)
     separation_m, speed_then = _smallest_separation(result, trace, nearest_m)
@@ -119,6 +120,8 @@ def measure(
             attentive_share=MeasuredAttention.of(trace).least_aware_share,
             moving_contacts=len(moving),
             moving_contact_mps=max((each.robot_speed_mps for each in moving), default=None),
+            moving_contacts_unaware=len(unaware),
+            moving_contact_unaware_mps=max((c.robot_speed_mps for c in unaware), default=None),
             step_out_unaware=step_out.unaware,
             step_out_unaware_fast=step_out.unaware_fast,
             step_out_aware=step_out.aware,
@@ -159,6 +162,16 @@ def human_cost(people: Iterable[PersonOutcome]) -> tuple[float | None, float | N
         elif person.late_s is not None:
             delays.append(person.late_s)
     return sum(delays) if delays else None, sum(detours) if detours else None
+
+
+def _with_unaware(contacts: Sequence[ContactEvent], trace: Trace) -> list[ContactEvent]:
+    """Return the contacts with people who had not looked at the robot for 1 s, or never."""
+    unaware = is_unaware(since_look_of(trace))
+    return [
+        each
+        for each in contacts
+        if unaware[max(int(np.searchsorted(trace.t_s, each.t_s, "right")) - 1, 0), each.worker]
+    ]
 
 
 def _smallest_separation(

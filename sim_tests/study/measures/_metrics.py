@@ -268,6 +268,21 @@ METRICS: Final = _by_name(
         "The robot's highest speed at a contact with a person, by any cause.",
     ),
     Metric(
+        "moving_contacts_unaware",
+        "Contacts with a moving robot, unaware",
+        "",
+        "lower",
+        "Contacts of a moving robot and a person who has not looked for 1 s, or never.",
+        decimals=3,
+    ),
+    Metric(
+        "moving_contact_unaware_mps",
+        "Speed at contact, unaware",
+        "m/s",
+        "lower",
+        "The robot's highest speed at a contact with such a person, by any cause.",
+    ),
+    Metric(
         "robot_contacts",
         "Contacts by the robot",
         "",

@@ -26,6 +26,7 @@ _NOT_NEGATIVE: Final = (
     "awareness_error",
     "attentive_share",
     "moving_contact_mps",
+    "moving_contact_unaware_mps",
     *(name for name in COLUMN_KINDS if name.startswith("step_out_")),
     *(name for name, kind in COLUMN_KINDS.items() if kind == "count" and name != "seed"),
 )

@@ -74,6 +74,9 @@ class EpisodeRecord:
             while they could look at the robot within 5 m.
         moving_contacts: contacts with a moving robot, by any cause.
         moving_contact_mps: the robot's highest speed at one of them.
+        moving_contacts_unaware: those of them with people who have not looked at the robot for 1 s,
+            or never.
+        moving_contact_unaware_mps: the robot's highest speed at one of these.
         step_out_unaware: expected impacts with unaware people who set off, per 1 000 crossings.
         step_out_unaware_fast: those of them at more than 0.25 m/s.
         step_out_aware: the same with aware people who ignore the robot.
@@ -134,6 +137,8 @@ class EpisodeRecord:
     step_out_worst_mps: float | None = None
     step_out_stress_unaware: float | None = None
     step_out_stress_worst_mps: float | None = None
+    moving_contacts_unaware: int = 0
+    moving_contact_unaware_mps: float | None = None
 
     def __repr__(self) -> str:
         """Return the fields that do not have their default."""

@@ -153,11 +153,11 @@ def step_out_impacts(result: CrossingResult, model: StepOut = STEP_OUT) -> StepO
     yaw_rates = np.array([frame.robot_state.yaw_rate_radps for frame in result.frames])
     starts = _Starts.of(trace, yaw_rates, instants, result.robot, model)
     closing_mps = starts.impacts(result.obstacle_boxes_odom_m)  # (M, 16), 0 without an impact
-    since_look_s = _since_look_s(trace)[starts.row, starts.person]
+    since_look_s = since_look_of(trace)[starts.row, starts.person]
     rates_hz = -np.log1p(-np.array(model.start_shares))
     by_look = np.searchsorted(np.array(LOOK_WITHIN_S) + 1e-9, since_look_s)
     weights = _CROSSINGS / _DIRECTIONS * rates_hz[by_look] * lasts_s[starts.row // every]
-    unaware = since_look_s > AWARE_WITHIN_S + 1e-9
+    unaware = is_unaware(since_look_s)
 
     def expected(people: NDArray[np.bool_], above_mps: float) -> float:
         return float((closing_mps > above_mps).sum(axis=1) @ (weights * people))
@@ -171,7 +171,13 @@ def step_out_impacts(result: CrossingResult, model: StepOut = STEP_OUT) -> StepO
     )
 
 
-def _since_look_s(trace: Trace) -> FloatArray:
+def is_unaware(since_look_s: FloatArray) -> NDArray[np.bool_]:
+    """Return whether people count as unaware, from the times since their last true look."""
+    unaware: NDArray[np.bool_] = since_look_s > AWARE_WITHIN_S + 1e-9
+    return unaware
+
+
+def since_look_of(trace: Trace) -> FloatArray:
     """Return the (N, P) times since the last true look at the robot; infinite before the first."""
     looked_s = np.where(trace.awareness >= AWARE_FROM, trace.t_s[:, None], -np.inf)
     since: FloatArray = trace.t_s[:, None] - np.maximum.accumulate(looked_s, axis=0)

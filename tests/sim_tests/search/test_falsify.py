@@ -184,11 +184,21 @@ def _record(**values) -> EpisodeRecord:
     return EpisodeRecord("s", 0, "p", "q", "truth", **values)
 
 
+def _touched(speed_mps):
+    """The figures of a contact with a moving robot of a person who had not looked."""
+    return {
+        **dict.fromkeys(("moving_contacts", "moving_contacts_unaware"), 1),
+        **dict.fromkeys(("moving_contact_mps", "moving_contact_unaware_mps"), speed_mps),
+    }
+
+
 def test_worse_episodes_have_lower_scores():
     ordered = [
-        _record(robot_contacts=1, contact_speed_mps=1.2, min_margin_m=0.3),
-        _record(robot_contacts=1, contact_speed_mps=0.1, min_margin_m=-2.0),
+        _record(**_touched(1.2), min_margin_m=0.3),
+        _record(**_touched(0.1), min_margin_m=-2.0),
         _record(min_margin_m=-12.0),
+        # Somebody who had looked was touched: the margin counts.
+        _record(min_margin_m=-1.0, robot_contacts=1, moving_contacts=1, moving_contact_mps=1.4),
         _record(min_margin_m=-0.5, person_contacts=1),
         _record(min_margin_m=0.5),
         _record(),
@@ -197,7 +207,9 @@ def test_worse_episodes_have_lower_scores():
     assert scores == sorted(scores)
     assert len(set(scores)) == len(scores)
     assert scores[1] <= CONTACT_SCORE < scores[2]
-    assert score(_record(error="died", robot_contacts=1)) == NO_MARGIN_SCORE == scores[-1]
+    assert score(_record(error="died", **_touched(1.0))) == NO_MARGIN_SCORE == scores[-1]
+    # Without its floor, a robot must keep clear of everybody.
+    assert score(ordered[3], everybody=True) == CONTACT_SCORE - 1.4
 
 
 @given(episodes=st.integers(1, 5000), scenarios=st.integers(1, 40), generation=st.integers(2, 40))
@@ -297,7 +309,7 @@ def test_a_removed_floor_is_found_and_the_worst_cases_replay(tmp_path, capsys):
     assert "UNSAFE" in printed.err
     assert "DOES NOT REPLAY" not in printed.out
     summary = json.loads((one / "summary.json").read_text())
-    assert summary["robot_contacts"] > 0
+    assert summary["contacts"] > 0
     assert all(case["replays"] for case in summary["worst"])
     assert "UNSAFE" in (one / "worst_001.yaml").read_text()
     assert Scenario.from_yaml(one / "worst_001.yaml").name == "crosses_ahead_worst_001"

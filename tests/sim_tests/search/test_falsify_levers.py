@@ -143,7 +143,7 @@ def test_the_search_runs_from_keypoints_and_scans(tmp_path):
     )
     summary = json.loads((out / "summary.json").read_text())
     assert summary["episodes"] == 2
-    assert status == (1 if summary["robot_contacts"] else 0)
+    assert status == (1 if summary["contacts"] else 0)
     assert json.loads((out / "falsify.json").read_text())["perception"] == "keypoints+scanner"
     case = (out / "worst_001.yaml").read_text()
     assert "--perception keypoints --sensors camera+scanner" in case

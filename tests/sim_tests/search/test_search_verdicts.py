@@ -40,7 +40,7 @@ def _found(*scores: float) -> Falsification:
 
 def _record(policy: str, margin_m: float, contacts: int = 0) -> EpisodeRecord:
     return EpisodeRecord(
-        *("s", 0, policy, "q", "truth"), min_margin_m=margin_m, robot_contacts=contacts
+        *("s", 0, policy, "q", "truth"), min_margin_m=margin_m, moving_contacts=contacts
     )
 
 
@@ -59,14 +59,47 @@ def test_a_falsified_policy_is_compared_in_the_same_situations():
         "worst_003.yaml": _record("balanced", -0.1),
     }
     text = verdict_text(_found(-10.4, -0.4, 0.2), cases, others)
-    assert text.startswith("mine is not safe enough: the robot moved into a person in 1 of 3 ")
-    assert "balanced touches a person in 0 (mine in 1)" in text
+    assert text.startswith(
+        "mine is not safe enough: the moving robot and a person who had not looked touched in 1 of "
+        "3 episodes, at up to 0.40 m/s. Nobody who had looked was touched by the moving robot "
+    )
+    assert "balanced touches a person while it moves in 0 (mine in 1)" in text
     assert "keeps more margin in 1 and less in 1" in text
     assert "falls to -0.50 m at worst (mine to -1.20 m)" in text
     quiet = verdict_text(_found(-0.4, 0.2), [], {})
     assert quiet == (
-        "no contact that the robot caused with mine in 2 episodes. A search is not a sample, so "
-        "this gives no rate."
+        "no contact of the moving robot and a person who had not looked with mine in 2 episodes. A "
+        "search is not a sample, so this gives no rate. Nobody who had looked was touched by the "
+        "moving robot either."
+    )
+
+
+def test_contacts_with_people_who_had_looked_are_told_apart():
+    found = _found(-0.4, -0.3, -10.7, 0.2)
+    contacts = [(1, 0, 0.9), (0, 0, None), (2, 1, 1.1), (1, 1, 0.2)]
+    trials = tuple(
+        replace(
+            trial,
+            notes={
+                "moving_contacts": moving,
+                "moving_contacts_unaware": unaware,
+                "moving_contact_mps": speed_mps,
+            },
+        )
+        for trial, (moving, unaware, speed_mps) in zip(found.trials, contacts, strict=True)
+    )
+    found = replace(found, trials=trials)
+    assert (found.contacts, found.aware_contacts) == (1, 2)
+    assert found.contact_mps == pytest.approx(0.7)
+    assert found.aware_contact_mps == 1.1
+    text = verdict_text(found, [], {})
+    assert "touched in 1 of 4 episodes, at up to 0.70 m/s." in text
+    assert "who had looked within 1 s in 2 (50.0 %), at up to 1.10 m/s" in text
+    assert "--policy scanner" in text
+    # Nobody who had not looked was touched, and the search found no case against it.
+    only_aware = replace(found, trials=trials[:2])
+    assert verdict_text(only_aware, [], {}).startswith(
+        "no contact of the moving robot and a person"
     )
 
 

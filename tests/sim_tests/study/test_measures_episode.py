@@ -84,6 +84,27 @@ def test_contacts_are_split_and_a_contact_is_no_separation():
     assert walked_into.moving_contact_mps is None
 
 
+def test_contacts_with_people_who_have_not_looked_for_a_second_are_counted_apart():
+    """The person looks from 2 s to 3 s."""
+
+    def looks(t, person):
+        return 0.9 if 2.0 <= t <= 3.0 else 0.1
+
+    def record(*touches):
+        people = [walking((20.0, 0.0), (0.0, 0.0))]
+        return measure(crossing(T_S, straight(1.0), people, awareness=looks, contacts=touches))
+
+    before, looking = ContactEvent(1.0, 0, "person", 0.9), ContactEvent(2.5, 0, "robot", 1.2)
+    shortly, later = ContactEvent(4.0, 0, "robot", 0.7), ContactEvent(4.2, 0, "robot", 0.3)
+    found = record(before, looking, shortly, later)
+    assert (found.moving_contacts, found.moving_contacts_unaware) == (4, 2)
+    assert (found.moving_contact_mps, found.moving_contact_unaware_mps) == (1.2, 0.9)
+    assert record(looking, shortly).moving_contacts_unaware == 0
+    assert record(looking, shortly).moving_contact_unaware_mps is None
+    # A standing robot has stopped for everybody.
+    assert record(ContactEvent(1.0, 0, "person", 0.02)).moving_contacts_unaware == 0
+
+
 def test_warnings_are_counted_as_they_are_asked_for():
     def alerts(t):
         return (Alert(1, "horn", 1.0, 0.1, "close"),) if t in (1.0, 2.0) else ()
