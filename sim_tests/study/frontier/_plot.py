@@ -18,7 +18,6 @@ from ._text import sentences
 
 _TODAY: Final = "#b3261e"
 _OTHER: Final = "#b8651b"
-_QUIET: Final = "#5c6069"
 _LINES: Final = {
     "blind": ("#8a8f98", "s", "without awareness"),
     "aware": ("#1f4e79", "o", "with awareness"),
@@ -33,7 +32,10 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
     """
     figure = new_figure(8.2, 6.2, dpi=110.0)
     axes = figure.subplots()
-    axes.set_yscale("function", functions=(lambda y: np.sqrt(np.maximum(y, 0.0)), np.square))
+    axes.set_yscale(
+        "function",
+        functions=(lambda y: np.sign(y) * np.sqrt(np.abs(y)), lambda y: np.sign(y) * np.square(y)),
+    )
     for kind, (colour, marker, label) in _LINES.items():
         found = [p for p in frontier.points if p.member is not None and p.member.kind == kind]
         if not found:
@@ -43,14 +45,15 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
         axes.plot(*_places(line).T, color=colour, lw=1.4, alpha=0.7, zorder=1)
         for point in found:
             if point.member is not None:
-                _name(axes, point, f"{point.member.speed_mps:g}", colour, below=kind != "blind")
+                _name(axes, point, f"{point.member.speed_mps:g}", colour)
     _draw(axes, [frontier.today], _TODAY, "*", "today's AMR", size=13.0)
     others = [p for p in frontier.points[1:] if p.member is None]
     if others:
         _draw(axes, others, _OTHER, "^", "other policies")
     for point in others:
-        _name(axes, point, point.name, _OTHER, below=False)
-    axes.set_ylim(bottom=0.0)
+        _name(axes, point, point.name, _OTHER)
+    highest = max(point.step_out_unaware.value for point in frontier.points)
+    axes.set_ylim(bottom=-0.004 * max(highest, 1.0))  # points at 0 lie free of the axis
     free_s, today_s = frontier.free_s, frontier.today.time_lost_s.value
     over = axes.secondary_xaxis(
         "top",
@@ -60,20 +63,15 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
         ),
     )
     over.set_xlabel("time to the goal over that of today's AMR")
-    axes.set_xlabel("time lost to people (s a crossing)")
+    axes.set_xlabel(
+        "time lost to people (s a crossing)\n"
+        f"numbers: U in m/s; {counted(frontier.episodes, 'episode')} of each policy in "
+        f"{counted(frontier.scenarios, 'scenario')}; 95 % intervals"
+    )
     axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
     axes.grid(alpha=0.25)
     axes.spines[["right"]].set_visible(False)
     axes.legend(frameon=False)
-    axes.annotate(
-        f"Numbers: U in m/s. {counted(frontier.episodes, 'episode')} of each policy in "
-        f"{counted(frontier.scenarios, 'scenario')}, 95 % intervals.",
-        (1.0, 0.01),
-        xycoords="axes fraction",
-        ha="right",
-        color=_QUIET,
-        fontsize=8,
-    )
     said = sentences(frontier)
     if said:
         figure.suptitle("\n".join(said).replace("`", ""), fontsize=9, x=0.02, ha="left")
@@ -116,14 +114,12 @@ def _ends(intervals: Sequence[Interval]) -> FloatArray:
     return np.array(ends).T
 
 
-def _name(axes: Axes, point: Point, text: str, colour: str, *, below: bool) -> None:
+def _name(axes: Axes, point: Point, text: str, colour: str) -> None:
     axes.annotate(
         text,
         (point.time_lost_s.value, point.step_out_unaware.value),
-        xytext=(-5, -5) if below else (5, 5),
+        xytext=(4, 4),
         textcoords="offset points",
-        ha="right" if below else "left",
-        va="top" if below else "bottom",
         color=colour,
-        fontsize=8,
+        fontsize=9,
     )
