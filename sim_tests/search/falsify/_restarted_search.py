@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class EvaluatedTrial:
     trial: int
     parameters: ParameterValues
     score: float
-    notes: dict[str, object]
+    notes: dict[str, Any]
 
 
 class RestartedSearch:

@@ -55,7 +55,8 @@ def _draw_trials(axes: Axes, tuning: Tuning) -> None:
         rows.append((trial.values[0], max(notes[RISK], 0.0)))
     for (colour, marker, label), points in groups.items():
         if points:
-            axes.scatter(*np.array(points).T, c=colour, marker=marker, s=26, label=label)
+            times_s, risks = zip(*points, strict=True)
+            axes.scatter(times_s, risks, c=colour, marker=marker, s=26, label=label)
     axes.axhline(tuning.risk, color=_WITHIN, lw=1.0, ls="--", label="the given risk")
     for anchor, marker in zip(tuning.anchors, _MARKERS, strict=False):
         x, y = anchor.tuning.figures

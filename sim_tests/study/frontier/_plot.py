@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -54,14 +55,15 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
         _name(axes, point, point.name, _OTHER)
     highest = max(point.step_out_unaware.value for point in frontier.points)
     axes.set_ylim(bottom=-0.004 * max(highest, 1.0))  # points at 0 lie free of the axis
-    free_s, today_s = frontier.free_s, frontier.today.time_lost_s.value
-    over = axes.secondary_xaxis(
-        "top",
-        functions=(
-            lambda lost_s: (free_s + lost_s) / (free_s + today_s),
-            lambda ratio: ratio * (free_s + today_s) - free_s,
-        ),
-    )
+    free_s, today_s = frontier.free_s, frontier.free_s + frontier.today.time_lost_s.value
+
+    def over_today(lost_s: Any) -> Any:
+        return (free_s + lost_s) / today_s
+
+    def lost_at(ratio: Any) -> Any:
+        return ratio * today_s - free_s
+
+    over = axes.secondary_xaxis("top", functions=(over_today, lost_at))
     over.set_xlabel("time to the goal over that of today's AMR")
     axes.set_xlabel(
         "time lost to people (s a crossing)\n"
@@ -100,18 +102,18 @@ def _draw(
 
 
 def _places(points: Sequence[Point]) -> FloatArray:
-    return np.array([[p.time_lost_s.value, p.step_out_unaware.value] for p in points])
+    places = [[p.time_lost_s.value, p.step_out_unaware.value] for p in points]
+    return np.array(places, dtype=np.float64)
 
 
 def _ends(intervals: Sequence[Interval]) -> FloatArray:
     """Return the (2, N) lengths of error bars; 0 where an interval is unbounded."""
-    ends = [
-        (max(each.value - each.low, 0.0), max(each.high - each.value, 0.0))
-        if each.bounded
-        else (0.0, 0.0)
+    known = [
+        each if each.bounded else replace(each, low=each.value, high=each.value)
         for each in intervals
     ]
-    return np.array(ends).T
+    below = [max(each.value - each.low, 0.0) for each in known]
+    return np.array([below, [max(each.high - each.value, 0.0) for each in known]], dtype=np.float64)
 
 
 def _name(axes: Axes, point: Point, text: str, colour: str) -> None:
