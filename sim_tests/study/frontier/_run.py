@@ -119,5 +119,6 @@ def _about(options: FrontierOptions) -> dict[str, Any]:
             settings[name] = value
     words = ["awarenav", "frontier"]
     for name, value in settings.items():
-        words += [f"--{name}", *map(str, value if isinstance(value, list) else [value])]
+        for each in value if isinstance(value, list) else [value]:
+            words += [f"--{name}", str(each)]
     return {"command": shlex.join([*words, "--out", str(options.out)]), "settings": settings}

@@ -12,7 +12,7 @@ from awarenav.cli import POSITIVE, FolderPath, argument, command, option, option
     examples=[
         "awarenav frontier --episodes 4 --sensors camera+scanner --out frontier",
         "awarenav frontier frontier",
-        "awarenav frontier --scenario blind_corner head_on_in_aisle --perception truth",
+        "awarenav frontier --scenario blind_corner --scenario runs_out --perception truth",
     ],
     exit_status={
         0: "Success.",
@@ -24,7 +24,7 @@ from awarenav.cli import POSITIVE, FolderPath, argument, command, option, option
     "docs/frontier.md explains the picture. Needs the extra 'plot'.",
 )
 @argument("folder", type=FolderPath(), required=False, metavar="[DIR]")
-@options.scenarios("that have a planner")
+@options.scenarios("that have a planner", repeated=True)
 @options.planner()
 @options.perception()
 @options.sensors()

@@ -94,7 +94,7 @@ def test_exclusions_are_those_that_are_known():
     assert {(path[0], name, other) for path, name, other in EXCLUSIVE} == {
         *(
             (name, "--overwrite", "--resume")
-            for name in ("crossings", "estimate", "falsify", "planners", "render", "tune")
+            for name in "crossings estimate falsify frontier planners render tune".split()
         ),
         *((name, "--fov-deg", "--camera") for name in ("doctor", "estimate")),
         *(

@@ -26,7 +26,7 @@ FRAMES = [
     for k in range(4)
 ]
 # These take minutes, or need a study of many episodes; their own tests read their JSON.
-SLOW = {("bench",), ("demo",), ("falsify",), ("planners", "compare"), ("tune",)}
+SLOW = {("bench",), ("demo",), ("falsify",), ("frontier",), ("planners", "compare"), ("tune",)}
 
 
 def printed(capfd, *words, status=0):

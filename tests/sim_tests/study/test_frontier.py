@@ -237,11 +237,10 @@ workers:
 @pytest.mark.slow
 def test_the_family_runs_in_two_scenarios_and_a_resumed_run_only_draws(tmp_path, capsys):
     words = ["frontier", "--perception", "truth", "--workers", "1", "--out", str(tmp_path / "out")]
-    words.append("--scenario")
     for name, y_m in (("near", 1.2), ("far", 1.8)):
         path = tmp_path / f"{name}.yaml"
         path.write_text(_SCENARIO.format(name=name, y_m=y_m))
-        words.append(str(path))
+        words += ["--scenario", str(path)]
     assert main(words) == 0
     printed = capsys.readouterr().out
     assert "2 episodes of each policy in 2 scenarios" in printed
