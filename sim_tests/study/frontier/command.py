@@ -23,7 +23,13 @@ from awarenav.cli import POSITIVE, FolderPath, argument, command, option, option
     epilog="A killed or interrupted run continues with the same command and --resume. "
     "docs/frontier.md explains the picture. Needs the extra 'plot'.",
 )
-@argument("folder", type=FolderPath(), required=False, metavar="[DIR]")
+@argument(
+    "folder",
+    type=FolderPath(),
+    required=False,
+    metavar="[DIR]",
+    help="Folder of finished episodes, to draw them again; nothing is run.",
+)
 @options.scenarios("that have a planner", repeated=True)
 @options.planner()
 @options.perception()

@@ -67,6 +67,7 @@ def test_no_command_takes_positional_arguments_beside_an_option_of_several_value
         assert not (many and arguments), path
 
 
+RUNS = ("crossings", "estimate", "falsify", "frontier", "planners", "render", "tune")
 EXCLUSIVE = [
     (path, name, each.excludes)
     for path, one in COMMANDS.items()
@@ -94,7 +95,7 @@ def test_exclusions_are_those_that_are_known():
     assert {(path[0], name, other) for path, name, other in EXCLUSIVE} == {
         *(
             (name, "--overwrite", "--resume")
-            for name in "crossings estimate falsify frontier planners render tune".split()
+            for name in RUNS
         ),
         *((name, "--fov-deg", "--camera") for name in ("doctor", "estimate")),
         *(
