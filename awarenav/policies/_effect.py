@@ -19,6 +19,8 @@ _FAR_M: Final = 1000.0
 # Long enough for every policy.
 _FIRST_SIGHT_S: Final = 0.5
 
+_Row = tuple[float, float, list[float], list[float]]
+
 
 @dataclass(frozen=True, slots=True)
 class Effect:
@@ -51,14 +53,19 @@ def effect_of(
         distance_m: (D,), from the robot's front to the person's body, along the way.
     """
     ahead_m = robot.footprint_m[:, 0].max() + BODY_RADIUS_M + distance_m
-    rows = [_row(policy, robot, alpha, ahead_m.tolist()) for alpha in awareness.tolist()]
-    radius, human, ahead, beside = (np.array(column) for column in zip(*rows, strict=True))
+    rows: dict[tuple[float, float], _Row] = {}
+    pairs = []
+    for alpha in awareness.tolist():
+        # Of two α with the same radius and U the adapter makes the same.
+        pairs.append((policy.inflation.radius_m(alpha), policy.speed.human_speed_mps(alpha)))
+        if pairs[-1] not in rows:
+            rows[pairs[-1]] = _row(policy, robot, alpha, ahead_m.tolist())
+    columns = zip(*(rows[pair] for pair in pairs), strict=True)
+    radius, human, ahead, beside = (np.array(column) for column in columns)
     return Effect(radius, human, ahead, beside)
 
 
-def _row(
-    policy: AwarenessPolicy, robot: RobotProfile, alpha: float, ahead_m: list[float]
-) -> tuple[float, float, list[float], list[float]]:
+def _row(policy: AwarenessPolicy, robot: RobotProfile, alpha: float, ahead_m: list[float]) -> _Row:
     """Return radius, U and both rows of limits for one bound of α."""
     adapter, step_s = NavAdapter(policy, robot), policy.timing.fresh_within_s
     now = 0.0

@@ -41,8 +41,8 @@ from ._version_0_2 import (
 # The smallest time constant that a policy can have.
 _AT_ONCE_S: Final = 0.05
 _SMALLEST_CLEARANCE_M, _LARGEST_CLEARANCE_M = 0.1, 2.0
-# A blend over so little of α is a step.
-_STEP: Final = 0.01
+# A blend over so little of α is a step. At its end a person is aware, as a belief may count.
+_STEP: Final = 1e-6
 
 
 def upgrade_command(old: Path, out: Path | None) -> int:
@@ -173,7 +173,7 @@ class Upgrade:
 
     def _step(self, section: str, above: float) -> None:
         self.policy.setdefault(section, {}).update(
-            unaware_below=max(above - _STEP, 0.0), aware_above=above
+            unaware_below=round(max(above - _STEP, 0.0), 6), aware_above=above
         )
 
     def _rules(self) -> tuple[Mapping[str, Any], Mapping[str, Any] | None]:
@@ -208,7 +208,8 @@ class Upgrade:
         if "people_turn_deg" in rules:
             self._say("replaced", "rules.people_turn_deg", "reach: people may turn anywhere")
         accelerations, delays = [ACCELERATION_MPS2], [0.0]
-        sigmas = self.policy.get("margins", {}).get("uncertainty_sigmas", 2.0)
+        margins = self.policy.get("margins", {})
+        sigmas = number(margins, "uncertainty_sigmas", 2.0, "margins")
         for key, known in PEOPLE.items():
             if (given := rules.get(key)) is None:
                 continue
