@@ -24,7 +24,7 @@ _Row = tuple[float, float, list[float], list[float]]
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What a policy makes of lower bounds of α (A,) and distances (D,).
+    """Effect of a policy, over lower bounds of α (A,) and distances (D,).
 
     Attributes:
         radius_m: (A,), of the obstacle.

@@ -111,7 +111,7 @@ def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list
     width = len(distances)
     lines = [
         name,
-        f"{'':27}  {'limit (m/s), ahead at':{width}}  {f'{BESIDE_M:g} m beside, at':{width}}",
+        f"{'':27}  {'limit (m/s), ahead at':{width}}  {BESIDE_M:g} m beside, at",
         f"awareness  radius         U  {distances}  {distances}",
     ]
     for row, alpha in enumerate(_AWARENESS):
@@ -130,7 +130,7 @@ def _robot(options: ShowOptions) -> RobotProfile:
         "max_deceleration_mps2": ("--deceleration (m/s²)", options.deceleration),
         "reaction_time_s": ("--reaction-time (s)", options.reaction_time),
     }
-    numbers = {
+    numbers: dict[str, Any] = {
         name: finite_number(
             option,
             value,
