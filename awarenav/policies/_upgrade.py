@@ -245,21 +245,26 @@ class Upgrade:
             self.policy["reach"] = reach
 
     def _lowering_rules(self, rules: Mapping[str, Any]) -> None:
-        """Say what is lost of the rules that only lowered the limit."""
+        """Say what is lost of the rules that only lowered the limit, and of the closing speed."""
         speed = self.policy["speed"]
         unaware, aware = (number(speed, key, 0.0, "speed") for key in HUMAN_SPEEDS)
+        moving = self.policy.get("reach", {}) is not None
+        if moving and aware < unaware:
+            self._say(
+                "check",
+                f"aware people, {aware:g} m/s",
+                "in 0.2 those who set off counted with the speed of unaware people, those who walk "
+                "on with that of their track. Now both are expected to change to "
+                "speed.aware_human_speed_mps at most. Raise it where they do not",
+            )
         if rules.get("start_reserve") is not None:
-            moving = self.policy.get("reach", {}) is not None
-            covered = moving and aware >= unaware
-            text = "people who set off are within U"
-            if not moving:
-                text = "dropped: with reach: null no motion of people counts"
-            elif not covered:
-                text = (
-                    "dropped: of aware people aware_human_speed_mps alone counts, "
-                    f"{aware:g} m/s. Raise it where they may set off beside the robot"
-                )
-            self._say("dropped" if covered else "check", "rules.start_reserve", text)
+            self._say(
+                "dropped" if moving else "check",
+                "rules.start_reserve",
+                "people who set off are within U"
+                if moving
+                else "dropped: with reach: null no motion of people counts",
+            )
         for key in ("zones", "near_cap"):
             if rules.get(key) is not None:
                 self._say(
