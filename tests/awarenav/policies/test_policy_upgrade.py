@@ -258,7 +258,7 @@ def test_a_quicker_person_and_a_longer_delay_are_kept(upgrade):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("margings: {}", "no key 'margings'"),
+        ("nothings: {}", "no key 'nothings'"),
         ("rules: {walkng: {}}", "no key 'walkng'"),
         ("speed: {table_mps: [[0.5, 1.0], [0.4, 0.5]]}", "awareness must rise"),
         ("speed: {table_mps: []}", "must hold [awareness, value] pairs"),
