@@ -1,7 +1,7 @@
 """The limit of :mod:`nav_adapter.limit` at many poses at once: the same steps, on arrays.
 
 It is a lower bound of :func:`~nav_adapter.limit.limit_mps`, since its steps of time are not
-refined. Values are floats, or arrays of one number per time or per pose.
+refined; fine ones give it itself. Values are floats, or arrays of one number per time or per pose.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from .._people import Person, position_sigma_m
+from .._people import OLDEST_S, Person, position_sigma_m
 from .._predicted import predicted_sigmas_m
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
@@ -31,6 +31,8 @@ Value = Any
 _SAME_AGE_S: Final = 1e-9
 # A limit is lowered by this share of itself, for rounding.
 _ROUNDING: Final = 1e-9
+# Fine steps are as short as the shortest of ``limit_mps``.
+_FINER: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +113,7 @@ def courses_of(
     off: Value = 0.0
     speed: Value = travel
     fan_rad: Value = turn_rad
+    noise_rad: Value = 0.0
     if velocities_mps is not None:
         sideways = np.abs(left) > LATERAL_NOISE_MPS
         speed = np.where(sideways, travel, np.abs(forward))
@@ -118,16 +121,20 @@ def courses_of(
         off = np.where(sideways, np.arctan2(left, forward), off)
         if robot.moves_sideways is not False:
             noise_rad = np.arctan2(np.abs(left), np.maximum(speed, STANDING_MPS))
-            fan_rad = fan_rad + np.where(sideways, 0.0, noise_rad)
+            noise_rad = np.where(sideways, 0.0, noise_rad)
+        # A robot that stands may start either way, or any way.
+        fan_rad = np.where(speed < STANDING_MPS, math.pi, fan_rad)
+        if robot.moves_sideways is not False:
+            noise_rad = np.where(speed < STANDING_MPS, math.pi, noise_rad)
     stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
     half_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
-    fan_rad = np.minimum(fan_rad + 0.5 * np.abs(half_rad), math.pi)
+    fan_rad = np.minimum(fan_rad + noise_rad + 0.5 * np.abs(half_rad), math.pi)
     middle_rad = headings_rad + off + 0.5 * half_rad
     straight = _extents_m(robot, off, 0.0)
     return Courses(
         *(x, y, driven_m, np.cos(middle_rad), np.sin(middle_rad)),
         *(np.cos(fan_rad), np.sin(fan_rad)),
-        *_extents_m(robot, off, np.abs(half_rad)),
+        *_extents_m(robot, off, np.abs(half_rad) + noise_rad),
         straight=(np.cos(headings_rad + off), np.sin(headings_rad + off), *straight),
     )
 
@@ -251,7 +258,7 @@ def _ahead(
     a0, a1, a2 = (sigmas * sigmas * each for each in variances)
     return PersonAhead(
         *(track_id, x + vx * moves_s, y + vy * moves_s, vx, vy, speed_mps, delay_s),
-        age_s if is_shown else age_s + times_s,
+        min(age_s, OLDEST_S) if is_shown else np.minimum(age_s + times_s, OLDEST_S),
         (a0, a1, a2),
         BODY_RADIUS_M + sigmas * sigma_m,
     )
@@ -272,6 +279,7 @@ def person_limits_mps(
     basis: SpeedBasis,
     robot: RobotProfile,
     reach_m: float = 0.0,
+    fine: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limits (N,) that one person sets by the path and by their reach; ∞ for none.
 
@@ -282,6 +290,7 @@ def person_limits_mps(
         basis: of the constraints.
         robot: of the constraints.
         reach_m: the limits hold within this distance of the poses, which have no heading then.
+        fine: the steps of time are fine, for a few poses.
     """
 
     def gathered(value: Value) -> Value:
@@ -306,15 +315,18 @@ def person_limits_mps(
     U, delay = gathered(person.speed_mps), gathered(person.delay_s)
     variances = tuple(gathered(each) for each in person.variances)
     walking, tau = math.hypot(vx, vy), rules.time_constant_s
-    step_s = robot.max_speed_mps / a / STEPS
+    step_s = robot.max_speed_mps / a / STEPS / (_FINER if fine else 1)
+    steps = math.ceil((float(np.max(T)) + maximum / a) / step_s)
+    at_once = steps if fine else 1  # a few poses are faster so
     limit = np.full(len(dx), maximum)
-    m0 = tau * -np.expm1(-elapsed / tau)
-    t0, need0, braked0 = 0.0, 0.0 * T, 0.0 * T
-    while np.min(need0) < maximum:
+    for first in range(0, steps, at_once):
+        t0 = step_s * np.arange(first, first + at_once)[:, None]
         t1 = t0 + step_s
+        early = np.maximum(t0 - T, 0.0)
+        need0, braked0 = a * early, 0.5 * a * early * early
         late = np.maximum(t1 - T, 0.0)
         need1, braked1 = a * late, 0.5 * a * late * late
-        m1 = tau * -np.expm1(-(t1 + elapsed) / tau)
+        m0, m1 = (tau * -np.expm1(-(t + elapsed) / tau) for t in (t0, t1))
         since = t1 + elapsed + delay
         reach = U * (since + tau * np.expm1(-since / tau)) + 0.5 * walking * (m1 - m0)
         variance = variances[0] + m1 * (variances[1] + m1 * variances[2])
@@ -329,15 +341,14 @@ def person_limits_mps(
             lowest = np.maximum(_least_mps(near, t1, braked1, need1, a, T), need0)
             lowest = np.where(lowest * t0 - braked0 <= past, lowest, maximum)
             lowest = np.where(need0 * t0 - braked0 <= behind, need0, lowest)
-        np.minimum(limit, lowest, out=limit)
-        t0, need0, braked0, m0 = t1, need1, braked1, m1
-        if np.min(need0) >= limit.max():
+        np.minimum(limit, lowest.min(axis=0), out=limit)
+        if np.min(need1) >= limit.max():
             break
     return path, np.where(limit < maximum, limit, np.inf)
 
 
 def _least_mps(
-    near: FloatArray, t1: float, braked1: Value, need1: Value, a: float, T: Value
+    near: FloatArray, t1: Value, braked1: Value, need1: Value, a: float, T: Value
 ) -> FloatArray:
     """Return the lowest speed at which the robot comes as far as ``near`` until t1."""
     least = (near + braked1) / t1
@@ -404,7 +415,7 @@ def _contacts_m(
     near = at - front - np.sqrt(np.maximum(rho * rho - off * off, 0.0))
     ahead &= past >= 0.0
     near, past = np.where(ahead, near, 1e9), np.where(ahead, past, -np.inf)
-    behind = np.full(len(px), -np.inf)
+    behind = np.full_like(near, -np.inf)
     if backward.any():
         corner2 = np.square(np.maximum(distance - reach, 0.0))
         share = np.maximum(corner2 - side * side, 0.0) / np.maximum(corner2, 1e-12)
@@ -425,6 +436,7 @@ def limits_at(
     times_s: FloatArray,
     aware_for_s: float,
     reach_m: float = 0.0,
+    fine: bool = False,
 ) -> tuple[FloatArray, NDArray[np.object_]]:
     """Return the limits (K, T) at poses (K, T, …), and who sets them, as texts.
 
@@ -437,6 +449,7 @@ def limits_at(
         times_s: (T,) after the stamp.
         aware_for_s: how long awareness counts.
         reach_m: the limits hold within this distance of the poses; they have no heading then.
+        fine: the steps of time are fine, for a few poses.
 
     Raises:
         NavError: for constraints that do not come from ``update`` unless they stop the robot.
@@ -476,7 +489,7 @@ def limits_at(
         if not len(near):
             continue
         path, reach = person_limits_mps(
-            person, courses.at(near), times[near], basis, robot, reach_m
+            person, courses.at(near), times[near], basis, robot, reach_m, fine
         )
         own = np.minimum(path, reach)
         if person.least_mps is not None:
