@@ -261,7 +261,7 @@ def _evaluator(
 
 def _outcome(record: EpisodeRecord, everybody: bool) -> Outcome:
     notes: dict[str, object] = {
-        "min_margin_m": record.min_margin_m,
+        "min_margin_unaware_m": record.min_margin_unaware_m,
         "min_separation_m": record.min_separation_m,
         "contact_by": record.contact_by,
         "moving_contacts": record.moving_contacts,

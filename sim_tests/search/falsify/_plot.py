@@ -86,13 +86,13 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
     label = " with its floor taken away (UNSAFE)" if settings.unsafe_no_floor else ""
     axes.set_title(
         f"{counted(len(falsification.trials), 'episode')} against {settings.policy_name}{label}: "
-        f"{falsification.contacts} with a contact that the robot caused (crosses)",
+        f"{falsification.contacts} with a contact with people who had not looked (crosses)",
         loc="left",
         fontsize=10,
     )
     axes.set_xlabel("episode, by scenario in the order of the search")
-    axes.set_ylabel("smallest separation margin (m)")
-    axes.margins(x=0.01)
+    axes.set_ylabel("smallest margin of unaware people (m)")
+    axes.set_xlim(-0.5, max(next_place, 1) - 0.5)  # the names lie at places without a margin, too
     axes.grid(alpha=0.25)
 
 
@@ -137,7 +137,9 @@ def _draw_plan(axes: Axes, case: WorstCase) -> None:
     axes.set_aspect("equal")
     record = case.record
     touched = f", {record.contact_by} touched" if record.contact_by else ""
-    margin = "none" if record.min_margin_m is None else f"{record.min_margin_m:.2f} m"
+    margin = (
+        "none" if record.min_margin_unaware_m is None else f"{record.min_margin_unaware_m:.2f} m"
+    )
     speed_mps = frame.robot_state.travel_mps
     if case.result.contacts:
         speed_mps = case.result.contacts[0].robot_speed_mps

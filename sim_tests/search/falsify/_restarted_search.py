@@ -36,13 +36,14 @@ Evaluate = Callable[[Sequence[ParameterValues]], Sequence[Outcome]]
 def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
     """Return the score of an episode: the smallest separation margin at a moving robot, in metres.
 
-    A margin lies within (−10, 10]. A contact of the moving robot and a person who has not looked at
-    it for 1 s, or never, gives −10 less the robot's speed in m/s, so that a faster contact scores
-    lower. Whoever walks into whom does not matter. An episode without a result gives 10.
+    The margin is that to people who have not looked at the robot for 1 s, or never. It lies within
+    (−10, 10]. A contact of the moving robot with them gives −10 less the robot's speed in m/s, so
+    that a faster contact scores lower. Who walks into whom does not matter. An episode without a
+    result gives 10.
 
     Args:
         record: the episode.
-        everybody: contacts with people who have looked count, too.
+        everybody: people who have looked count, too.
     """
     if record.error:
         return NO_MARGIN_SCORE
@@ -50,9 +51,10 @@ def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
         return CONTACT_SCORE - (record.moving_contact_unaware_mps or 0.0)
     if everybody and record.moving_contacts > 0:
         return CONTACT_SCORE - (record.moving_contact_mps or 0.0)
-    if record.min_margin_m is None:
+    margin_m = record.min_margin_m if everybody else record.min_margin_unaware_m
+    if margin_m is None:
         return NO_MARGIN_SCORE
-    return min(max(record.min_margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE)
+    return min(max(margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE)
 
 
 @dataclass(frozen=True, slots=True)

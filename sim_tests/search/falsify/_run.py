@@ -105,7 +105,7 @@ def _table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> li
         record = case.record
         lines.append(
             f"{case.path.name:16s}{case.trial.scenario:24s}"
-            f"{_two_decimals(record.min_margin_m):>7s} m"
+            f"{_two_decimals(record.min_margin_unaware_m):>7s} m"
             f"{_two_decimals(record.min_separation_m):>10s} m"
             f"{_two_decimals(record.speed_at_min_separation_mps):>6s} m/s"
             f"  {record.contact_by or '-':12s}{record.awareness or '-':16s}"

@@ -104,9 +104,9 @@ def _comparison(
         sum(record.moving_contacts > 0 for record in side) for side in zip(*pairs, strict=True)
     ]
     margins = [
-        (mine.min_margin_m, theirs.min_margin_m)
+        (mine.min_margin_unaware_m, theirs.min_margin_unaware_m)
         for mine, theirs in pairs
-        if mine.min_margin_m is not None and theirs.min_margin_m is not None
+        if mine.min_margin_unaware_m is not None and theirs.min_margin_unaware_m is not None
     ]
     better = sum(theirs > mine for mine, theirs in margins)
     worse = sum(theirs < mine for mine, theirs in margins)

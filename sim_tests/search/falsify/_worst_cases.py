@@ -52,8 +52,8 @@ class WorstCase:
     def replays(self) -> bool:
         """True if the file gives the margin and the contacts of the trial."""
         notes = self.trial.notes
-        return (self.record.min_margin_m, self.record.moving_contacts) == (
-            notes["min_margin_m"],
+        return (self.record.min_margin_unaware_m, self.record.moving_contacts) == (
+            notes["min_margin_unaware_m"],
             notes["moving_contacts"],
         )
 
@@ -107,7 +107,7 @@ def write_worst(falsification: Falsification, folder: Path, most: int) -> list[W
 def write_episodes(falsification: Falsification, path: Path) -> None:
     """Write every episode of the search as CSV; the last column has the parameters as JSON."""
     notes = (
-        *("min_margin_m", "min_separation_m", "contact_by"),
+        *("min_margin_unaware_m", "min_separation_m", "contact_by"),
         *("moving_contacts", "moving_contacts_unaware", "moving_contact_mps", "error"),
     )
     write_csv(
@@ -169,7 +169,7 @@ def write_summary(
             {
                 "file": case.path.name,
                 "scenario": case.trial.scenario,
-                "min_margin_m": case.record.min_margin_m,
+                "min_margin_unaware_m": case.record.min_margin_unaware_m,
                 "min_separation_m": case.record.min_separation_m,
                 "contact_by": case.record.contact_by,
                 "moving_contacts": case.record.moving_contacts,
@@ -190,7 +190,7 @@ def _figures_against(record: EpisodeRecord | None) -> dict[str, Any] | None:
     """Return the figures of a worst case with another policy; None without one."""
     if record is None:
         return None
-    names = ("policy", "min_margin_m", "min_separation_m", "moving_contacts", "error")
+    names = ("policy", "min_margin_unaware_m", "min_separation_m", "moving_contacts", "error")
     return {name: getattr(record, name) for name in names}
 
 
@@ -211,13 +211,13 @@ def _description(scenario: Scenario, settings: FalsifySettings) -> str:
 
 
 def _header(trial: EvaluatedTrial, settings: FalsifySettings, file: str) -> str:
-    margin = trial.notes["min_margin_m"]
+    margin = trial.notes["min_margin_unaware_m"]
     separation = trial.notes["min_separation_m"]
     planner = PLANNER if settings.unsafe_no_floor else settings.planner
     lines = [
         f"Found by falsification of {settings.policy_name} in {trial.scenario}, "
         f"round {trial.round}, trial {trial.trial}.",
-        f"Smallest separation margin at a moving robot {_metres(margin)}, smallest separation "
+        f"Smallest margin of unaware people {_metres(margin)}, smallest separation "
         f"{_metres(separation)}, contacts with the moving robot {trial.notes['moving_contacts']}.",
         f"awarenav crossings --scenario {file} --policy {POLICY_FILE} "
         f"{Perception.named(settings.perception).options}"

@@ -80,7 +80,7 @@ def falsify(**values: Any) -> int:
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
     limits. Looks for contacts of the moving robot with people who have not looked at it for 1 s,
-    and for the smallest separation margin. Contacts with people who have looked are counted apart.
+    and for the smallest margin to them. Contacts with people who have looked are counted apart.
     People of --population recorded do not draw the speed and glances that are varied; --seed draws
     their pace, sway and starts by chance. Ends with a verdict against another policy in the same
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings

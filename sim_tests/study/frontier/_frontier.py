@@ -47,7 +47,7 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Worth:
-    """What awareness wins with one policy, against the line of the policies without awareness.
+    """The gain from awareness with one policy, against the line of the policies without awareness.
 
     The line goes through today's AMR and the policies without awareness, from one to the next. A
     policy that is slower than another and has no fewer impacts is not on it. The line is not

@@ -120,6 +120,7 @@ def measure(
             attentive_share=MeasuredAttention.of(trace).least_aware_share,
             moving_contacts=len(moving),
             moving_contact_mps=max((each.robot_speed_mps for each in moving), default=None),
+            min_margin_unaware_m=_least_margin_to_unaware(result, trace),
             moving_contacts_unaware=len(unaware),
             moving_contact_unaware_mps=max((c.robot_speed_mps for c in unaware), default=None),
             step_out_unaware=step_out.unaware,
@@ -172,6 +173,14 @@ def _with_unaware(contacts: Sequence[ContactEvent], trace: Trace) -> list[Contac
         for each in contacts
         if unaware[max(int(np.searchsorted(trace.t_s, each.t_s, "right")) - 1, 0), each.worker]
     ]
+
+
+def _least_margin_to_unaware(result: CrossingResult, trace: Trace) -> float | None:
+    """Return the smallest margin of the frames at a moving robot to people who had not looked."""
+    margins_m = np.array([frame.margins_m for frame in result.frames], dtype=np.float64)
+    counts = is_unaware(since_look_of(trace))
+    counts = counts & (trace.travel_mps > STANDING_SPEED_MPS)[:, None]
+    return float(margins_m.reshape(counts.shape)[counts].min()) if counts.any() else None
 
 
 def _smallest_separation(

@@ -163,6 +163,14 @@ METRICS: Final = _by_name(
         "protective separation of ISO 13855 and ISO/TS 15066.",
     ),
     Metric(
+        "min_margin_unaware_m",
+        "Smallest margin, unaware",
+        "m",
+        "higher",
+        "Smallest separation margin at a moving robot to people who have not looked for 1 s, or "
+        "never.",
+    ),
+    Metric(
         "violation_time_s",
         "Margin violated",
         "s",

@@ -77,6 +77,7 @@ class EpisodeRecord:
         moving_contacts_unaware: those of them with people who have not looked at the robot for 1 s,
             or never.
         moving_contact_unaware_mps: the robot's highest speed at one of these.
+        min_margin_unaware_m: smallest separation margin at a moving robot to such people.
         step_out_unaware: expected impacts with unaware people who set off, per 1 000 crossings.
         step_out_unaware_fast: those of them at more than 0.25 m/s.
         step_out_aware: the same with aware people who ignore the robot.
@@ -139,6 +140,7 @@ class EpisodeRecord:
     step_out_stress_worst_mps: float | None = None
     moving_contacts_unaware: int = 0
     moving_contact_unaware_mps: float | None = None
+    min_margin_unaware_m: float | None = None
 
     def __repr__(self) -> str:
         """Return the fields that do not have their default."""

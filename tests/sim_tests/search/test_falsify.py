@@ -194,13 +194,15 @@ def _touched(speed_mps):
 
 def test_worse_episodes_have_lower_scores():
     ordered = [
-        _record(**_touched(1.2), min_margin_m=0.3),
-        _record(**_touched(0.1), min_margin_m=-2.0),
-        _record(min_margin_m=-12.0),
+        _record(**_touched(1.2), min_margin_unaware_m=0.3),
+        _record(**_touched(0.1), min_margin_unaware_m=-2.0),
+        _record(min_margin_unaware_m=-12.0),
         # Somebody who had looked was touched: the margin counts.
-        _record(min_margin_m=-1.0, robot_contacts=1, moving_contacts=1, moving_contact_mps=1.4),
-        _record(min_margin_m=-0.5, person_contacts=1),
-        _record(min_margin_m=0.5),
+        _record(
+            min_margin_unaware_m=-1.0, robot_contacts=1, moving_contacts=1, moving_contact_mps=1.4
+        ),
+        _record(min_margin_unaware_m=-0.5, person_contacts=1),
+        _record(min_margin_unaware_m=0.5),
         _record(),
     ]
     scores = [score(record) for record in ordered]

@@ -40,7 +40,7 @@ def _found(*scores: float) -> Falsification:
 
 def _record(policy: str, margin_m: float, contacts: int = 0) -> EpisodeRecord:
     return EpisodeRecord(
-        *("s", 0, policy, "q", "truth"), min_margin_m=margin_m, moving_contacts=contacts
+        *("s", 0, policy, "q", "truth"), min_margin_unaware_m=margin_m, moving_contacts=contacts
     )
 
 

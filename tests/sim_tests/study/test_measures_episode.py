@@ -90,6 +90,9 @@ def test_contacts_with_people_who_have_not_looked_for_a_second_are_counted_apart
     def looks(t, person):
         return 0.9 if 2.0 <= t <= 3.0 else 0.1
 
+    def always(t, person):
+        return 0.9
+
     def record(*touches):
         people = [walking((20.0, 0.0), (0.0, 0.0))]
         return measure(crossing(T_S, straight(1.0), people, awareness=looks, contacts=touches))
@@ -101,6 +104,10 @@ def test_contacts_with_people_who_have_not_looked_for_a_second_are_counted_apart
     assert (found.moving_contact_mps, found.moving_contact_unaware_mps) == (1.2, 0.9)
     assert record(looking, shortly).moving_contacts_unaware == 0
     assert record(looking, shortly).moving_contact_unaware_mps is None
+    # The robot comes nearer all the time, to somebody who is unaware again at the end.
+    assert found.min_margin_unaware_m == pytest.approx(record().min_separation_m)
+    aware = crossing(T_S, straight(1.0), [walking((20.0, 0.0), (0.0, 0.0))], awareness=always)
+    assert measure(aware).min_margin_unaware_m is None
     # A standing robot has stopped for everybody.
     assert record(ContactEvent(1.0, 0, "person", 0.02)).moving_contacts_unaware == 0
 
