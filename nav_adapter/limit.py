@@ -150,6 +150,8 @@ def limit_mps(person: Reach, course: Course) -> float:
     the exact one by what the last, finest steps of time leave open.
     """
     maximum = course.maximum_mps
+    if not person.elapsed_s >= 0.0:
+        return 0.0
     if _is_far(person, course):
         return maximum
     a, T = course.deceleration_mps2, course.reaction_s + person.elapsed_s
@@ -245,7 +247,7 @@ def contact_m(
     rho, side = reach + person.margin_m, half + person.margin_m
     distance2 = x * x + y * y
     distance = math.sqrt(distance2)
-    if not distance > _SAME_PLACE_M:  # at the base, or NaN
+    if not (distance > _SAME_PLACE_M and reach >= 0.0):  # at the base, or NaN
         return -math.inf, math.inf, math.inf
     if course.circle_m > 0.0:  # straight to the person
         return distance - course.circle_m - course.front_m - rho, math.inf, -math.inf

@@ -226,7 +226,7 @@ def test_a_robot_that_stands_counts_people_ahead_and_behind() -> None:
 
 
 def test_a_curve_leads_to_people_beside_the_way() -> None:
-    beside = person((2.0, 0.9), top=0.0)
+    beside = person((1.9, 0.6), top=0.0)
     straight, left, right = (course(10.0, yaw_rate=rate) for rate in (0.0, 0.8, -0.8))
     assert limit_mps(beside, left) < limit_mps(beside, straight)
     assert limit_mps(beside, right) <= limit_mps(beside, straight)
