@@ -72,7 +72,8 @@ def test_the_smallest_circles_are_those_of_the_presets() -> None:
                 ROBOT,
             )
             shown_m = row(PLANNERS, f"{title}: smallest circle")[index]
-            assert shown_m == pytest.approx(smallest_m, abs=0.0051)
+            # It is found to within 0.4 %.
+            assert shown_m == pytest.approx(smallest_m, abs=0.0101)
 
 
 def test_the_limits_beside_somebody_are_those_of_the_page() -> None:
