@@ -16,9 +16,8 @@ from nav_adapter.reach import Reach
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 SAFETY = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
 PLANNERS = (ROOT / "docs" / "planners.md").read_text(encoding="utf-8")
-ROBOT = RobotProfile(
-    [[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]], 1.5, 1.0, 1.0, 0.3
-)
+FOOTPRINT_M = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
+ROBOT = RobotProfile(FOOTPRINT_M, 1.5, 1.0, 1.0, 0.3)
 
 
 def reach(

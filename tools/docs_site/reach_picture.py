@@ -19,7 +19,7 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 FILE: Final = Path(__file__).parents[2] / "docs" / "images" / "reach.png"
-FOOTPRINT_M: Final = [[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]]
+FOOTPRINT_M: Final = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
 TIMES_S: Final = (0.0, 0.5, 1.0, 1.5)
 PLACE_M: Final = (2.2, 1.6)
 _ROWS: Final = (("has not noticed", 0.0), ("has noticed", 1.0))
