@@ -52,10 +52,12 @@ def test_the_table_of_reaches_is_that_of_the_presets(name: str) -> None:
     assert ways == [round(person.radius_m(t), 2) for t in (0.5, 1.0, 1.5, 2.0)]
 
 
-def test_an_aware_person_who_walks_is_counted_to_stop() -> None:
-    drift_m = 1.2 * reach("balanced", 1.0, walks=1.2).drift_s(100.0)
-    assert f"{drift_m:.2f} m at 1.2 m/s" in " ".join(SAFETY.split())
-    assert reach("balanced", 1.0).radius_m(2.0) == 0.0
+def test_an_aware_person_who_walks_may_stop_or_walk_on() -> None:
+    walker = reach("balanced", 1.0, walks=1.2)
+    assert f"{1.2 * walker.drift_s(100.0):.2f} m from 1.2 m/s" in " ".join(SAFETY.split())
+    assert walker.radius_m(2.0) == 0.0
+    assert walker.walks_faster
+    assert 1.2 * walker.walking_on().drift_s(2.0) == pytest.approx(2.4, abs=0.01)
 
 
 def test_the_smallest_circles_are_those_of_the_presets() -> None:
