@@ -18,8 +18,8 @@ from typing import Final, NamedTuple
 
 from perception.anthropometry import BODY_RADIUS_M
 
-# A time constant with which a velocity does not change within seconds.
-_WALKING_ON_S: Final = 1e4
+#: A time constant with which a velocity does not change within seconds.
+WALKING_ON_S: Final = 1e4
 
 
 class Reach(NamedTuple):
@@ -58,7 +58,7 @@ class Reach(NamedTuple):
 
     def walking_on(self) -> Reach:
         """Return the reach of this person if they walk straight on."""
-        return self._replace(speed_mps=0.0, delay_s=0.0, time_constant_s=_WALKING_ON_S)
+        return self._replace(speed_mps=0.0, delay_s=0.0, time_constant_s=WALKING_ON_S)
 
     def drift_s(self, ahead_s: float) -> float:
         """Return m, by which u carries the middle of the reach until ``ahead_s`` from now."""

@@ -24,7 +24,7 @@ from .._predicted import predicted_sigmas_m
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
 from ..limit import ROOM, STANDING_MPS, STEPS
-from ..reach import covariance_terms
+from ..reach import WALKING_ON_S, covariance_terms
 
 Value = Any
 # Ages closer than this are equal.
@@ -314,7 +314,45 @@ def person_limits_mps(
         return path, np.full(len(dx), np.inf)
     U, delay = gathered(person.speed_mps), gathered(person.delay_s)
     variances = tuple(gathered(each) for each in person.variances)
-    walking, tau = math.hypot(vx, vy), rules.time_constant_s
+    walking = math.hypot(vx, vy)
+    given = (dx, dy, vx, vy, elapsed, variances, margins.floor_m)
+    room = (robot, T, circle, fine)
+    limit = _reach_mps(*given, U, delay, rules.time_constant_s, courses, *room)
+    if np.any(walking > U):
+        # As in the adapter: whoever walks on is not met by a robot that goes straight on.
+        ahead = courses
+        if courses.cos is not None:
+            cos, sin, front, rear, half = courses.straight
+            ahead = replace(
+                courses,
+                **{"cos": cos, "sin": sin, "fan_cos": 1.0, "fan_sin": 0.0},
+                **{"front_m": front, "rear_m": rear, "half_m": half},
+            )
+        on = _reach_mps(*given, 0.0, 0.0, WALKING_ON_S, ahead, *room)
+        limit = np.where(walking > U, np.minimum(limit, on), limit)
+    return path, limit
+
+
+def _reach_mps(
+    dx: FloatArray,
+    dy: FloatArray,
+    vx: float,
+    vy: float,
+    elapsed: Value,
+    variances: tuple[Value, ...],
+    margin: float,
+    U: Value,
+    delay: Value,
+    tau: float,
+    courses: Courses,
+    robot: RobotProfile,
+    T: Value,
+    circle: float,
+    fine: bool,
+) -> FloatArray:
+    """Return the limits (N,) of :func:`~nav_adapter.limit.limit_mps`; ∞ for none."""
+    a, maximum = robot.max_deceleration_mps2, ROOM * robot.max_speed_mps
+    walking = math.hypot(vx, vy)
     step_s = robot.max_speed_mps / a / STEPS / (_FINER if fine else 1)
     steps = math.ceil((float(np.max(T)) + maximum / a) / step_s)
     at_once = steps if fine else 1  # a few poses are faster so
@@ -334,17 +372,17 @@ def person_limits_mps(
         middle = 0.5 * (m0 + m1)
         px, py = (dx + vx * middle, dy + vy * middle) if walking else (dx, dy)
         if courses.cos is None:
-            near = np.hypot(px, py) - (circle + courses.driven_m + margins.floor_m + reach)
+            near = np.hypot(px, py) - (circle + courses.driven_m + margin + reach)
             lowest = np.maximum(_least_mps(near, t1, braked1, need1, a, T), need0)
         else:
-            near, past, behind = _contacts_m(px, py, courses, reach, margins.floor_m)
+            near, past, behind = _contacts_m(px, py, courses, reach, margin)
             lowest = np.maximum(_least_mps(near, t1, braked1, need1, a, T), need0)
             lowest = np.where(lowest * t0 - braked0 <= past, lowest, maximum)
             lowest = np.where(need0 * t0 - braked0 <= behind, need0, lowest)
         np.minimum(limit, lowest.min(axis=0), out=limit)
         if np.min(need1) >= limit.max():
             break
-    return path, np.where(limit < maximum, limit, np.inf)
+    return np.where(limit < maximum, limit, np.inf)
 
 
 def _least_mps(
@@ -354,7 +392,7 @@ def _least_mps(
     least = (near + braked1) / t1
     # A robot that is slow stands before t1.
     stops = np.sqrt(a * (a * T * T + 2.0 * np.maximum(near, 0.0))) - a * T
-    return np.where(least < need1, stops, least)
+    return np.asarray(np.where(least < need1, stops, least))
 
 
 def _path_mps(
