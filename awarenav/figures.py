@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from perception.installation import install_command
 
@@ -43,6 +46,7 @@ __all__ = [
     "Wedge",
     "new_figure",
     "save_figure",
+    "scale_by_roots",
 ]
 
 
@@ -65,6 +69,24 @@ def new_figure(
     )
     FigureCanvasAgg(figure)
     return figure
+
+
+def scale_by_roots(axes: Axes, highest: float) -> None:
+    """Scale the y axis, which begins at 0, by square roots, so that small values show.
+
+    Args:
+        axes: the axes.
+        highest: the highest value. Points at 0 lie free of the axis.
+    """
+
+    def root(y: Any) -> Any:
+        return np.sign(y) * np.sqrt(np.abs(y))
+
+    def square(y: Any) -> Any:
+        return np.sign(y) * np.square(y)
+
+    axes.set_yscale("function", functions=(root, square))
+    axes.set_ylim(bottom=-0.004 * max(highest, 1.0))
 
 
 def save_figure(figure: Figure, path: Path) -> None:

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from awarenav.errors import counted
-from awarenav.figures import new_figure, save_figure
+from awarenav.figures import new_figure, save_figure, scale_by_roots
 
 from .._shared_study import NOTES
 from ._evaluation import FIGURES, RISK
@@ -39,7 +37,6 @@ def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], p
 
 
 def _draw_trials(axes: Axes, tuning: Tuning) -> None:
-    axes.set_yscale("function", functions=(lambda y: np.sqrt(np.maximum(y, 0.0)), np.square))
     within = {trial.number for trial in tuning.ranked}
     groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {
         (_TRIAL, "o", "trial"): [],
@@ -88,7 +85,7 @@ def _draw_trials(axes: Axes, tuning: Tuning) -> None:
     axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
     axes.grid(alpha=0.25)
     axes.margins(0.12)
-    axes.set_ylim(bottom=0.0)
+    scale_by_roots(axes, max(anchor.tuning.risk for anchor in tuning.anchors))
     axes.legend(loc="upper right", fontsize=8)
 
 

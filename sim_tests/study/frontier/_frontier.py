@@ -92,6 +92,14 @@ class Frontier:
         """Today's AMR."""
         return self.points[0]
 
+    @property
+    def line(self) -> tuple[Point, ...]:
+        """The policies on the line without awareness, by time lost."""
+        lost_s = np.array([point.time_lost_s.value for point in self.points])
+        impacts = np.array([point.step_out_unaware.value for point in self.points])
+        on_line = _efficient(_without_awareness(self.points), lost_s, impacts)
+        return tuple(self.points[column] for column in on_line)
+
 
 def frontier_of(records: Iterable[EpisodeRecord], level: float = 0.95) -> Frontier:
     """Return the frontier of episodes; it does not depend on their order.
@@ -197,12 +205,7 @@ class _Means:
 
 
 def _worth(points: Sequence[Point], means: _Means, n: int, level: float) -> tuple[Worth, ...]:
-    line = [
-        column
-        for column, point in enumerate(points)
-        if column == 0 or (point.member is not None and point.member.kind == "blind")
-    ]
-    found = []
+    line, found = _without_awareness(points), []
     for column, point in enumerate(points):
         if point.member is None or point.member.kind == "blind":
             continue
@@ -214,6 +217,15 @@ def _worth(points: Sequence[Point], means: _Means, n: int, level: float) -> tupl
             )
         )
     return tuple(found)
+
+
+def _without_awareness(points: Sequence[Point]) -> list[int]:
+    """Return the places of today's AMR and of the family without awareness."""
+    return [
+        column
+        for column, point in enumerate(points)
+        if column == 0 or (point.member is not None and point.member.kind == "blind")
+    ]
 
 
 def _won(means: _Means, row: int, line: Sequence[int], column: int) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from awarenav.errors import counted
-from awarenav.figures import Axes, new_figure, save_figure
+from awarenav.figures import Axes, new_figure, save_figure, scale_by_roots
 from perception.arrays import FloatArray
 
 from ..measures import Interval
@@ -33,17 +33,16 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
     """
     figure = new_figure(8.2, 6.2, dpi=110.0)
     axes = figure.subplots()
-    axes.set_yscale(
-        "function",
-        functions=(lambda y: np.sign(y) * np.sqrt(np.abs(y)), lambda y: np.sign(y) * np.square(y)),
-    )
     for kind, (colour, marker, label) in _LINES.items():
         found = [p for p in frontier.points if p.member is not None and p.member.kind == kind]
         if not found:
             continue
         _draw(axes, found, colour, marker, label)
-        line = [frontier.today, *found] if kind == "blind" else found
-        axes.plot(*_places(line).T, color=colour, lw=1.4, alpha=0.7, zorder=1)
+        x, y = _places(frontier.line if kind == "blind" else found).T
+        if kind == "blind":  # straight between two policies, which a scale by roots bends
+            between = np.linspace(x[0], x[-1], 400)
+            x, y = between, np.interp(between, x, y)
+        axes.plot(x, y, color=colour, lw=1.4, alpha=0.7, zorder=1)
         for point in found:
             if point.member is not None:
                 _name(axes, point, f"{point.member.speed_mps:g}", colour)
@@ -53,8 +52,7 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
         _draw(axes, others, _OTHER, "^", "other policies")
     for point in others:
         _name(axes, point, point.name, _OTHER)
-    highest = max(point.step_out_unaware.value for point in frontier.points)
-    axes.set_ylim(bottom=-0.004 * max(highest, 1.0))  # points at 0 lie free of the axis
+    scale_by_roots(axes, max(point.step_out_unaware.value for point in frontier.points))
     free_s, today_s = frontier.free_s, frontier.free_s + frontier.today.time_lost_s.value
 
     def over_today(lost_s: Any) -> Any:

@@ -93,10 +93,7 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
 
 def test_exclusions_are_those_that_are_known():
     assert {(path[0], name, other) for path, name, other in EXCLUSIVE} == {
-        *(
-            (name, "--overwrite", "--resume")
-            for name in RUNS
-        ),
+        *((name, "--overwrite", "--resume") for name in RUNS),
         *((name, "--fov-deg", "--camera") for name in ("doctor", "estimate")),
         *(
             (name, option, "--networks")

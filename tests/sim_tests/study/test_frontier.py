@@ -106,6 +106,7 @@ def test_the_line_is_not_prolonged():
 def test_a_policy_without_awareness_that_is_slower_and_riskier_is_not_on_the_line():
     with_it = worth_of("aware_u1.5", 2.0, 2.25)
     alone = frontier_of(rows({**LINE, "aware_u1.5": (2.0, 2.25)})).worth[0]
+    assert [each.name for each in frontier_of(rows({**LINE, **ASIDE})).line] == list(LINE)
     assert with_it.at_equal_risk_s.value == pytest.approx(alone.at_equal_risk_s.value)
 
 
