@@ -19,11 +19,12 @@ from nav_scenes import (
     moved_robot,
     numbers,
     person,
+    policy_radius_m,
     robot_at,
+    settled_update,
 )
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, max_speed_mps
-from nav_adapter.policies import SpeedRules
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -36,19 +37,15 @@ def at(tracks: tuple[PersonTrack, ...], stamp_s: float) -> tuple[PersonTrack, ..
     return tuple(replace(track, stamp_s=track.stamp_s + stamp_s) for track in tracks)
 
 
-# Without the reserve for people who set off, which test_start_reserve.py tests.
-NO_RESERVE = AwarenessPolicy(rules=SpeedRules())
-
-
 def settled(
     alpha: float,
     *,
     position: tuple[float, float],
     seconds: float = 2.0,
-    policy: AwarenessPolicy = NO_RESERVE,
+    policy: AwarenessPolicy | None = None,
 ) -> NavConstraints:
     """Return the constraints after a person with this α has stood in view for a while."""
-    adapter = NavAdapter(policy, ROBOT)
+    adapter = NavAdapter(AwarenessPolicy() if policy is None else policy, ROBOT)
     for step in range(round(seconds / 0.05) + 1):
         now = 0.05 * step
         result = adapter.update(
@@ -57,24 +54,48 @@ def settled(
     return result
 
 
-def test_one_person_in_closed_form() -> None:
-    result = settled(1.0, position=(2.0, 0.0))
-    (obstacle,) = result.obstacles
-    assert obstacle.radius_m == pytest.approx(0.45)
+def path_mps(gap_m: float) -> float:
+    """Return the root of v T + v²/2a = gap, with which a robot stops within a gap."""
+    a, T = ROBOT.max_deceleration_mps2, ROBOT.reaction_time_s
+    return min(-a * T + math.sqrt((a * T) ** 2 + 2.0 * a * gap_m), ROBOT.max_speed_mps)
+
+
+def straight_mps(distance_m: float, human_mps: float) -> float:
+    """Return the limit for somebody who stands straight ahead, from a fine grid of speeds.
+
+    They come straight at the robot, whose nearest point goes straight at them. The way of both is
+    that of nav_adapter/reach.py and of a robot that brakes after its reaction time.
+    """
+    a, T, rules = ROBOT.max_deceleration_mps2, ROBOT.reaction_time_s, AwarenessPolicy().reach
+    assert rules is not None
+    gap_m = distance_m - 0.3625 - FLOOR_M
+    lowest = ROBOT.max_speed_mps
+    for t in np.linspace(0.0, T + ROBOT.max_speed_mps / a, 2000).tolist():
+        late, since = max(t - T, 0.0), t + rules.delay_s
+        reach = human_mps * (since + rules.time_constant_s * math.expm1(-since / 0.54))
+        # v t − a late²/2 ≥ gap − reach, and the robot still moves: v > a late.
+        touches = (gap_m - reach + 0.5 * a * late**2) / max(t, 1e-9)
+        lowest = min(lowest, max(touches, a * late))
+    return lowest
+
+
+@pytest.mark.parametrize("distance_m", [1.2, 1.6, 2.0, 2.4])
+def test_one_person_straight_ahead(distance_m: float) -> None:
+    aware = settled(1.0, position=(distance_m, 0.0))
+    (obstacle,) = aware.obstacles
+    assert obstacle.radius_m == pytest.approx(policy_radius_m(AwarenessPolicy(), 1.0))
     assert obstacle.awareness_lower == 1.0
     assert obstacle.height_m == 1.75
-    separation_m = 2.0 - 0.3625 - BODY_RADIUS_M
-    braking = {"deceleration_mps2": 1.0, "reaction_time_s": 0.3, "clearance_m": 0.1}
-    limit = float(max_speed_mps(separation_m, 0.7, **braking))
-    assert result.speed_limit_mps == pytest.approx(limit, abs=1e-12)
-    assert result.limited_by == "track 1: speed and separation"
-    assert not result.stale
+    assert not aware.stale
+    # Somebody who keeps to their place is what a scanner stops for.
+    assert aware.speed_limit_mps == pytest.approx(path_mps(distance_m - 0.3625 - FLOOR_M), rel=0.03)
 
-    result = settled(0.0, position=(2.0, 0.0))
-    assert result.obstacles[0].radius_m == pytest.approx(1.0)
-    unaware = float(max_speed_mps(separation_m, 1.6, **braking))
-    assert result.speed_limit_mps == pytest.approx(unaware, abs=1e-12)
-    assert unaware < 0.5 * limit
+    unaware = settled(0.0, position=(distance_m, 0.0))
+    assert unaware.obstacles[0].radius_m == pytest.approx(policy_radius_m(AwarenessPolicy(), 0.0))
+    expected = straight_mps(distance_m, 1.5)
+    assert 0.93 * expected - 0.01 <= unaware.speed_limit_mps <= expected + 1e-9
+    assert unaware.limited_by == "track 1: reach"
+    assert unaware.speed_limit_mps < 0.9 * aware.speed_limit_mps
 
 
 def test_without_people_the_limit_is_the_robots_maximum() -> None:
@@ -166,12 +187,18 @@ class Own:
         return self._speed
 
 
-@pytest.mark.parametrize("radius", [0.0, -3.0, 0.39, 0.41])
+@pytest.mark.parametrize("radius", [0.0, -3.0, 0.39, 0.41, 5.0])
 def test_the_floor_holds_for_any_policy_object(radius: float) -> None:
-    adapter = NavAdapter(AwarenessPolicy(inflation=Own(lambda _: radius)), ROBOT)
-    for now in (0.0, 0.5, 1.0, 5.0):
-        result = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
-        assert result.obstacles[0].radius_m == max(FLOOR_M, radius)
+    """The floor of the field alone is body and clearance; of reach, the way past the person."""
+    for reach in (AwarenessPolicy().reach, None):
+        policy = AwarenessPolicy(inflation=Own(lambda _: radius), reach=reach)
+        adapter = NavAdapter(policy, ROBOT)
+        for now in (0.0, 0.5, 1.0, 5.0):
+            result = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
+            found = result.obstacles[0].radius_m
+            assert found >= max(FLOOR_M, radius)
+            if reach is None or radius == 5.0:
+                assert found == max(FLOOR_M, radius)
 
 
 @pytest.mark.parametrize(
@@ -203,41 +230,36 @@ def test_a_policy_that_fails_later_leaves_the_adapter_as_it_was() -> None:
     assert numbers(adapter.update(*later)) == numbers(twin.update(*later))
 
 
-def test_a_runner_counts_with_the_speed_of_the_track() -> None:
+def test_a_runner_is_assumed_to_run_on() -> None:
     def limit(velocity: tuple[float, float], alpha: float) -> float:
-        track = person(position=(5.0, 0.0), velocity=velocity, awareness_lower=alpha)
-        return (
-            NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0).speed_limit_mps
-        )
+        return settled_update(
+            [person(position=(4.5, 0.0), velocity=velocity, awareness_lower=alpha)]
+        ).speed_limit_mps
 
     for alpha in (0.0, 1.0):
-        assert limit((0.0, 1.2), alpha) == limit((0.0, 0.0), alpha)
-        running = max_speed_mps(
-            5.0 - 0.3625 - BODY_RADIUS_M,
-            3.0,
-            deceleration_mps2=1.0,
-            reaction_time_s=0.3,
-            clearance_m=0.1,
+        assert limit((-3.0, 0.0), alpha) < limit((-1.2, 0.0), alpha) < limit((0.0, 0.0), alpha)
+        # The body is 4.5 − 0.3625 − 0.4 m away and 1.4 m nearer when the robot has stopped.
+        assert limit((-3.0, 0.0), alpha) < path_mps(4.5 - 0.3625 - FLOOR_M - 1.0)
+
+
+@settings(max_examples=40)
+@given(sigma=finite(0.0, 1.0), x=finite(0.5, 6.0), alpha=st.sampled_from([0.0, 1.0]))
+def test_uncertainty_enlarges_the_obstacle_and_lowers_the_limit(
+    sigma: float, x: float, alpha: float
+) -> None:
+    def constraints(sigma_m: float, x_m: float) -> NavConstraints:
+        return settled_update(
+            [person(position=(x_m, 0.0), sigma_m=sigma_m, awareness_lower=alpha)]
         )
-        assert limit((0.0, 3.0), alpha) == pytest.approx(min(1.5, float(running)), abs=1e-12)
 
-
-@given(sigma=finite(0.0, 1.0), x=finite(0.5, 6.0))
-def test_uncertainty_enlarges_the_obstacle_and_lowers_the_limit(sigma: float, x: float) -> None:
-    def constraints(sigma_m: float) -> NavConstraints:
-        track = person(position=(x, 0.0), sigma_m=sigma_m)
-        return NavAdapter(AwarenessPolicy(), ROBOT).update((track,), robot_at(), 0.0)
-
-    exact, uncertain = constraints(0.0), constraints(sigma)
-    assert uncertain.obstacles[0].radius_m == pytest.approx(exact.obstacles[0].radius_m + 2 * sigma)
-    limit = max_speed_mps(
-        max(x - 0.3625, 0.0) - BODY_RADIUS_M - 2.0 * sigma,
-        1.6,
-        deceleration_mps2=1.0,
-        reaction_time_s=0.3,
-        clearance_m=0.1,
-    )
-    assert uncertain.speed_limit_mps == pytest.approx(min(1.5, float(limit)), abs=1e-9)
+    exact, uncertain = constraints(0.0, x), constraints(sigma, x)
+    wider_m = uncertain.obstacles[0].radius_m - exact.obstacles[0].radius_m
+    assert wider_m == pytest.approx(2.0 * sigma)
+    # Two standard deviations count as much as a body that is nearer by as much.
+    nearer = constraints(0.0, max(x - 2.0 * sigma, 0.3))
+    assert uncertain.speed_limit_mps <= exact.speed_limit_mps + 1e-9
+    if x - 2.0 * sigma > 0.3:
+        assert uncertain.speed_limit_mps == pytest.approx(nearer.speed_limit_mps, abs=0.04)
 
 
 def test_the_most_uncertain_direction_counts() -> None:
@@ -249,11 +271,12 @@ def test_the_most_uncertain_direction_counts() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     result = adapter.update((track,), robot_at(0.3), 0.3, perception_stamp_s=0.3)
     sigma = math.sqrt(0.25 + 0.3**2 * 0.16)
-    assert result.obstacles[0].radius_m == pytest.approx(1.0 + 2.0 * sigma)
+    unaware_m = policy_radius_m(AwarenessPolicy(), 0.0)
+    assert result.obstacles[0].radius_m == pytest.approx(unaware_m + 2.0 * sigma)
 
 
-def test_people_are_predicted_but_never_farther_away() -> None:
-    """A person last seen walking away may have turned round, so the limit does not rise."""
+def test_people_are_predicted_with_the_age_of_their_track() -> None:
+    """An old track tells less of where somebody is: the limit falls with its age."""
 
     def constraints(vx: float, now: float) -> NavConstraints:
         adapter = NavAdapter(AwarenessPolicy(), ROBOT)
@@ -263,9 +286,20 @@ def test_people_are_predicted_but_never_farther_away() -> None:
 
     leaving, standing, coming = (constraints(vx, 0.2) for vx in (1.0, 0.0, -1.0))
     np.testing.assert_allclose(leaving.obstacles[0].center_odom_m, [3.2, 0.0])
-    assert leaving.speed_limit_mps == standing.speed_limit_mps
-    assert coming.speed_limit_mps < standing.speed_limit_mps
-    assert standing.speed_limit_mps < constraints(0.0, 0.0).speed_limit_mps
+    assert coming.speed_limit_mps < standing.speed_limit_mps < leaving.speed_limit_mps
+    for vx, now in ((1.0, leaving), (0.0, standing), (-1.0, coming)):
+        assert now.speed_limit_mps < constraints(vx, 0.0).speed_limit_mps
+
+
+def test_the_protective_field_counts_the_nearer_of_old_and_predicted_place() -> None:
+    """A person last seen walking away may have stopped."""
+    field = AwarenessPolicy(reach=None)
+
+    def limit(vx: float) -> float:
+        track = person(position=(2.0, 0.0), velocity=(vx, 0.0))
+        return NavAdapter(field, ROBOT).update((track,), robot_at(0.2), 0.2).speed_limit_mps
+
+    assert limit(1.0) == limit(0.0) > limit(-1.0) > 0.0
 
 
 def test_the_distance_driven_since_the_robot_state_counts() -> None:
