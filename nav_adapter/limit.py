@@ -31,8 +31,8 @@ from .reach import Reach
 
 #: Below this speed the robot counts as standing: it will start along its heading.
 STANDING_MPS: Final = 0.05
-#: Steps of time until the robot stands from its maximum.
-STEPS: Final = 16
+#: Steps of time while the robot brakes from its maximum.
+STEPS: Final = 12
 #: Share of such a step that the one that decides is refined to.
 FINEST: Final = 0.13
 #: The limit beside a circle that a planner keeps to.
@@ -99,12 +99,13 @@ def course_of(
     if not sideways and robot.moves_sideways is not False:
         # What counts as noise may be motion.
         fan_rad += math.atan2(abs(left), max(speed, STANDING_MPS))
-    # Half the angle that the robot turns on its curve until it stands, which the chord has.
+    # On its curve the robot turns by an angle until it stands. The chord has up to half of it, and
+    # the heading up to half of it more than the chord.
     stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
-    chord_rad = 0.5 * min(max(state.yaw_rate_radps * stopping_s, -math.pi), math.pi)
-    fan_rad = min(fan_rad + abs(chord_rad), math.pi)
-    extent = _extent_m(robot.footprint_m, off_rad, abs(chord_rad))
-    return _course(robot, state, age_s, off_rad + chord_rad, fan_rad, extent)
+    half_rad = 0.5 * min(max(state.yaw_rate_radps * stopping_s, -math.pi), math.pi)
+    fan_rad = min(fan_rad + 0.5 * abs(half_rad), math.pi)
+    extent = _extent_m(robot.footprint_m, off_rad, abs(half_rad))
+    return _course(robot, state, age_s, off_rad + 0.5 * half_rad, fan_rad, extent)
 
 
 def any_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.0) -> Course:
@@ -170,8 +171,12 @@ def _lowest_mps(person: Reach, course: Course, T: float, t0: float, t1: float) -
     near, past, past_behind = contact_m(person, course, t0, t1)
     if need0 * t0 - braked0_m <= past_behind:
         return need0
-    # Written so that NaN stops the robot.
+    if past == -math.inf:
+        return math.inf
     lowest = (near + braked1_m) / t1
+    if lowest < a * (t1 - T):  # a robot that slow stands before t1
+        lowest = math.sqrt(a * (a * T * T + 2.0 * max(near, 0.0))) - a * T
+    # Written so that NaN stops the robot.
     if not lowest > need0:
         lowest = need0
     return math.inf if lowest * t0 - braked0_m > past else lowest
@@ -338,8 +343,8 @@ def _is_far(person: Reach, course: Course) -> bool:
 
 
 def _step_s(course: Course) -> float:
-    stop_s = course.reaction_s + course.maximum_mps / ROOM / course.deceleration_mps2
-    return stop_s / STEPS
+    """Return the step of time, which depends on neither reaction time nor age."""
+    return course.maximum_mps / ROOM / course.deceleration_mps2 / STEPS
 
 
 def _off_heading_rad(state: RobotState) -> float:

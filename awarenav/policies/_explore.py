@@ -18,8 +18,8 @@ from ._settings import policy_settings, robot_settings
 from ._show import FOOTPRINT_M, read_policy
 from ._situation import OVER_TIME, SITUATION
 
-#: In the order from the baseline of today to the least careful policy.
-PRESETS: Final = ("scanner", "blind", "conservative", "balanced", "assertive")
+#: From the most to the least careful policy.
+PRESETS: Final = ("blind", "conservative", "balanced", "assertive")
 #: The scripts of the page in their order; the arithmetic comes first.
 ARITHMETIC: Final = ("values", "separation", "adapter", "outline")
 _SCRIPTS: Final = (*ARITHMETIC, "check", "yaml", "draw", "plan", "words", "controls", "page")

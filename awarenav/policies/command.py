@@ -20,7 +20,7 @@ def policy() -> None:
         "awarenav policy show blind balanced mine.yaml --max-speed 1.2 --out mine.svg",
     ],
     exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="The presets are scanner, blind, conservative, balanced and assertive.",
+    epilog="The presets are blind, conservative, balanced and assertive.",
 )
 @argument(
     "policies",
@@ -58,7 +58,7 @@ def show(**values: Any) -> int:
         "awarenav policy explore mine.yaml --robot robot.yaml --out mine.html",
     ],
     exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="The presets are scanner, blind, conservative, balanced and assertive.",
+    epilog="The presets are blind, conservative, balanced and assertive.",
 )
 @argument(
     "policy",

@@ -120,14 +120,14 @@ def courses_of(
             noise_rad = np.arctan2(np.abs(left), np.maximum(speed, STANDING_MPS))
             fan_rad = fan_rad + np.where(sideways, 0.0, noise_rad)
     stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
-    chord_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
-    fan_rad = np.minimum(fan_rad + np.abs(chord_rad), math.pi)
-    middle_rad = headings_rad + off + chord_rad
+    half_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
+    fan_rad = np.minimum(fan_rad + 0.5 * np.abs(half_rad), math.pi)
+    middle_rad = headings_rad + off + 0.5 * half_rad
     straight = _extents_m(robot, off, 0.0)
     return Courses(
         *(x, y, driven_m, np.cos(middle_rad), np.sin(middle_rad)),
         *(np.cos(fan_rad), np.sin(fan_rad)),
-        *_extents_m(robot, off, np.abs(chord_rad)),
+        *_extents_m(robot, off, np.abs(half_rad)),
         straight=(np.cos(headings_rad + off), np.sin(headings_rad + off), *straight),
     )
 
@@ -306,7 +306,7 @@ def person_limits_mps(
     U, delay = gathered(person.speed_mps), gathered(person.delay_s)
     variances = tuple(gathered(each) for each in person.variances)
     walking, tau = math.hypot(vx, vy), rules.time_constant_s
-    step_s = (robot.reaction_time_s + robot.max_speed_mps / a) / STEPS
+    step_s = robot.max_speed_mps / a / STEPS
     limit = np.full(len(dx), maximum)
     m0 = tau * -np.expm1(-elapsed / tau)
     t0, need0, braked0 = 0.0, 0.0 * T, 0.0 * T
@@ -323,10 +323,10 @@ def person_limits_mps(
         px, py = (dx + vx * middle, dy + vy * middle) if walking else (dx, dy)
         if courses.cos is None:
             near = np.hypot(px, py) - (circle + courses.driven_m + margins.floor_m + reach)
-            lowest = np.maximum((near + braked1) / t1, need0)
+            lowest = np.maximum(_least_mps(near, t1, braked1, need1, a, T), need0)
         else:
             near, past, behind = _contacts_m(px, py, courses, reach, margins.floor_m)
-            lowest = np.maximum((near + braked1) / t1, need0)
+            lowest = np.maximum(_least_mps(near, t1, braked1, need1, a, T), need0)
             lowest = np.where(lowest * t0 - braked0 <= past, lowest, maximum)
             lowest = np.where(need0 * t0 - braked0 <= behind, need0, lowest)
         np.minimum(limit, lowest, out=limit)
@@ -334,6 +334,16 @@ def person_limits_mps(
         if np.min(need0) >= limit.max():
             break
     return path, np.where(limit < maximum, limit, np.inf)
+
+
+def _least_mps(
+    near: FloatArray, t1: float, braked1: Value, need1: Value, a: float, T: Value
+) -> FloatArray:
+    """Return the lowest speed at which the robot comes as far as ``near`` until t1."""
+    least = (near + braked1) / t1
+    # A robot that is slow stands before t1.
+    stops = np.sqrt(a * (a * T * T + 2.0 * np.maximum(near, 0.0))) - a * T
+    return np.where(least < need1, stops, least)
 
 
 def _path_mps(

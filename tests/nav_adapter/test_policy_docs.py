@@ -37,7 +37,7 @@ def limits(policy: AwarenessPolicy, distance_m: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize(
     ("column", "name"),
-    list(enumerate(["scanner", "blind", "conservative", "balanced", "assertive"])),
+    list(enumerate(["blind", "conservative", "balanced", "assertive"])),
 )
 def test_the_table_of_presets_shows_their_figures(column: int, name: str) -> None:
     policy = AwarenessPolicy.preset(name)
@@ -81,7 +81,7 @@ def test_the_page_says_what_is_left_without_moved_m(variance: float, text: str) 
 
 def test_no_preset_has_a_maximum_radius() -> None:
     """The page, claim C2 and the presets agree."""
-    for name in ("scanner", "blind", "conservative", "balanced", "assertive"):
+    for name in ("blind", "conservative", "balanced", "assertive"):
         assert AwarenessPolicy.preset(name).margins.maximum_radius_m is None
     assert "No preset sets a maximum" in TEXT
     safety = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ from paths import ROOT
 from nav_adapter import AwarenessPolicy, NavError
 from tracking.config import StrictConfig
 
-PRESETS = ("scanner", "blind", "conservative", "balanced", "assertive")
+PRESETS = ("blind", "conservative", "balanced", "assertive")
 RANDOM = [random_policy(random.Random(seed)) for seed in range(40)]
 
 
