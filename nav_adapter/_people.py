@@ -19,6 +19,8 @@ from .reach import Reach, covariance_terms
 
 Vector2 = tuple[float, float]
 
+#: Ages count up to this one, with which a person may be anywhere near.
+OLDEST_S: Final = 10.0
 # Awareness raises no speed before frames have shown a person for this long.
 _FIRST_SIGHT_S: Final = 0.2
 # The belief in having noticed the robot from which it counts.
@@ -224,7 +226,7 @@ class People:
             aware_mps + faster_mps,
             rules.time_constant_s,
             rules.delay_s + unseen_s,
-            max(now - track.stamp_s, 0.0),
+            min(max(now - track.stamp_s, 0.0), OLDEST_S),
             self._margins.floor_m,
             covariance_terms(track.covariance_odom.tolist(), self.sigmas(person, now)),
         )
@@ -290,7 +292,8 @@ class People:
             return person
         # A late frame is no evidence of awareness, but it does show the position. Without it, the
         # uncertainty of the first sighting would never shrink with a slow camera.
-        shrunk_m = self._timing.shrink_rate_mps * shown_s if track.status == "confirmed" else 0.0
+        shrinks = track.status == "confirmed" and before.known_s >= 0.0
+        shrunk_m = self._timing.shrink_rate_mps * shown_s if shrinks else 0.0
         return person._replace(
             seen_stamp_s=max(person.seen_stamp_s, before.seen_stamp_s),
             radius_m=max(person.radius_m, before.radius_m - shrunk_m),

@@ -29,7 +29,7 @@ from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 from .policies import ReachRules
 from .reach import Reach
 
-#: Below this speed the robot counts as standing: it will start along its heading.
+#: Below this speed the robot counts as standing: it may start either way.
 STANDING_MPS: Final = 0.05
 #: Steps of time while the robot brakes from its maximum.
 STEPS: Final = 12
@@ -80,31 +80,53 @@ class Course(NamedTuple):
     reaction_s: float
 
 
+def courses_of(
+    robot: RobotProfile, state: RobotState, turn_rad: float, age_s: float = 0.0
+) -> tuple[Course, ...]:
+    """Return the fans of courses of a robot whose state is ``age_s`` old: the lowest limit counts.
+
+    There is one, along the direction of travel. A robot that stands has a second one backwards, or
+    one in all directions if it may be able to move sideways.
+    """
+    sideways = abs(state.lateral_mps) > LATERAL_NOISE_MPS
+    if sideways or abs(state.speed_mps) >= STANDING_MPS:
+        return (course_of(robot, state, turn_rad, age_s),)
+    if robot.moves_sideways is not False:
+        return (any_course_of(robot, state, age_s),)
+    forward = course_of(robot, state, turn_rad, age_s)
+    front_m, rear_m = forward.front_m, forward.rear_m
+    driven_m = _driven_m(robot, state.travel_mps, age_s)
+    backward = forward._replace(
+        cos=-forward.cos,
+        sin=-forward.sin,
+        front_m=driven_m - rear_m,
+        rear_m=driven_m - front_m,
+    )
+    return forward, backward
+
+
 def course_of(
     robot: RobotProfile, state: RobotState, turn_rad: float, age_s: float = 0.0
 ) -> Course:
-    """Return the courses of a robot whose state is ``age_s`` old.
+    """Return the courses along the direction of travel of a robot whose state is ``age_s`` old.
 
-    It turns by at most ``turn_rad`` off the curve that it drives. A robot that stands starts along
-    its heading, or in any direction if it can move sideways. The footprint is measured along the
-    course. The maximum is one and a half times the robot's own, so that a limit of the fastest
+    It turns by at most ``turn_rad`` off the curve that it drives. The footprint is measured along
+    the course. The maximum is one and a half times the robot's own, so that a limit of the fastest
     point of a robot that turns has room.
     """
     forward, left = state.speed_mps, state.lateral_mps
     sideways = abs(left) > LATERAL_NOISE_MPS
     speed = math.hypot(forward, left) if sideways else abs(forward)
-    if speed < STANDING_MPS and robot.moves_sideways is True:
-        return any_course_of(robot, state, age_s)
-    off_rad, fan_rad = _off_heading_rad(state), turn_rad
+    off_rad, fan_rad, noise_rad = _off_heading_rad(state), turn_rad, 0.0
     if not sideways and robot.moves_sideways is not False:
         # What counts as noise may be motion.
-        fan_rad += math.atan2(abs(left), max(speed, STANDING_MPS))
+        noise_rad = math.atan2(abs(left), max(speed, STANDING_MPS))
     # On its curve the robot turns by an angle until it stands. The chord has up to half of it, and
     # the heading up to half of it more than the chord.
     stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
     half_rad = 0.5 * min(max(state.yaw_rate_radps * stopping_s, -math.pi), math.pi)
-    fan_rad = min(fan_rad + 0.5 * abs(half_rad), math.pi)
-    extent = _extent_m(robot.footprint_m, off_rad, abs(half_rad))
+    fan_rad = min(fan_rad + noise_rad + 0.5 * abs(half_rad), math.pi)
+    extent = _extent_m(robot.footprint_m, off_rad, abs(half_rad) + noise_rad)
     return _course(robot, state, age_s, off_rad + 0.5 * half_rad, fan_rad, extent)
 
 
@@ -128,6 +150,8 @@ def limit_mps(person: Reach, course: Course) -> float:
     the exact one by what the last, finest steps of time leave open.
     """
     maximum = course.maximum_mps
+    if not person.elapsed_s >= 0.0:
+        return 0.0
     if _is_far(person, course):
         return maximum
     a, T = course.deceleration_mps2, course.reaction_s + person.elapsed_s
@@ -223,7 +247,7 @@ def contact_m(
     rho, side = reach + person.margin_m, half + person.margin_m
     distance2 = x * x + y * y
     distance = math.sqrt(distance2)
-    if not distance > _SAME_PLACE_M:  # at the base, or NaN
+    if not (distance > _SAME_PLACE_M and reach >= 0.0):  # at the base, or NaN
         return -math.inf, math.inf, math.inf
     if course.circle_m > 0.0:  # straight to the person
         return distance - course.circle_m - course.front_m - rho, math.inf, -math.inf
@@ -321,8 +345,8 @@ def passing_radius_m(
 
     low_m, high_m = floor_m, floor_m + 0.25
     while not passes(high_m):
-        low_m, high_m = high_m, high_m + 0.25
-    while high_m - low_m > 0.004:
+        low_m, high_m = high_m, 2.0 * high_m
+    while high_m - low_m > 0.004 * high_m:
         middle_m = 0.5 * (low_m + high_m)
         low_m, high_m = (low_m, middle_m) if passes(middle_m) else (middle_m, high_m)
     return high_m
@@ -364,10 +388,7 @@ def _course(
 ) -> Course:
     """Return a fan about ``middle_rad`` off the heading, of a robot that may have driven since."""
     x, y = state.position_odom_m.tolist()
-    travel_mps = state.travel_mps
-    fastest_mps = max(travel_mps, robot.max_speed_mps)
-    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
-    driven_m = min(travel_mps * age_s + faster_m, fastest_mps * age_s)
+    driven_m = _driven_m(robot, state.travel_mps, age_s)
     front_m, rear_m, half_m = extent_m
     middle_rad += state.heading_odom_rad
     return Course(
@@ -377,6 +398,13 @@ def _course(
         robot.max_deceleration_mps2,
         robot.reaction_time_s,
     )
+
+
+def _driven_m(robot: RobotProfile, travel_mps: float, age_s: float) -> float:
+    """Return how far a robot may have driven since its state, speeding up to its maximum."""
+    fastest_mps = max(travel_mps, robot.max_speed_mps)
+    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
+    return min(travel_mps * age_s + faster_m, fastest_mps * age_s)
 
 
 def _extent_m(

@@ -19,7 +19,7 @@ from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from .._people import Person, position_sigma_m
+from .._people import OLDEST_S, Person, position_sigma_m
 from .._predicted import predicted_sigmas_m
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
@@ -111,6 +111,7 @@ def courses_of(
     off: Value = 0.0
     speed: Value = travel
     fan_rad: Value = turn_rad
+    noise_rad: Value = 0.0
     if velocities_mps is not None:
         sideways = np.abs(left) > LATERAL_NOISE_MPS
         speed = np.where(sideways, travel, np.abs(forward))
@@ -118,16 +119,20 @@ def courses_of(
         off = np.where(sideways, np.arctan2(left, forward), off)
         if robot.moves_sideways is not False:
             noise_rad = np.arctan2(np.abs(left), np.maximum(speed, STANDING_MPS))
-            fan_rad = fan_rad + np.where(sideways, 0.0, noise_rad)
+            noise_rad = np.where(sideways, 0.0, noise_rad)
+        # A robot that stands may start either way, or any way.
+        fan_rad = np.where(speed < STANDING_MPS, math.pi, fan_rad)
+        if robot.moves_sideways is not False:
+            noise_rad = np.where(speed < STANDING_MPS, math.pi, noise_rad)
     stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
     half_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
-    fan_rad = np.minimum(fan_rad + 0.5 * np.abs(half_rad), math.pi)
+    fan_rad = np.minimum(fan_rad + noise_rad + 0.5 * np.abs(half_rad), math.pi)
     middle_rad = headings_rad + off + 0.5 * half_rad
     straight = _extents_m(robot, off, 0.0)
     return Courses(
         *(x, y, driven_m, np.cos(middle_rad), np.sin(middle_rad)),
         *(np.cos(fan_rad), np.sin(fan_rad)),
-        *_extents_m(robot, off, np.abs(half_rad)),
+        *_extents_m(robot, off, np.abs(half_rad) + noise_rad),
         straight=(np.cos(headings_rad + off), np.sin(headings_rad + off), *straight),
     )
 
@@ -251,7 +256,7 @@ def _ahead(
     a0, a1, a2 = (sigmas * sigmas * each for each in variances)
     return PersonAhead(
         *(track_id, x + vx * moves_s, y + vy * moves_s, vx, vy, speed_mps, delay_s),
-        age_s if is_shown else age_s + times_s,
+        min(age_s, OLDEST_S) if is_shown else np.minimum(age_s + times_s, OLDEST_S),
         (a0, a1, a2),
         BODY_RADIUS_M + sigmas * sigma_m,
     )

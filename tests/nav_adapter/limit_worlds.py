@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nav_adapter import RobotProfile, RobotState
-from nav_adapter.limit import Course, course_of, limit_mps
+from nav_adapter.limit import Course, courses_of, limit_mps
 from nav_adapter.reach import Reach
 from perception.arrays import FloatArray
 
@@ -40,6 +41,53 @@ def drawn_robot(rng: np.random.Generator) -> RobotProfile:
     )
 
 
+@dataclass(frozen=True)
+class _Worlds:
+    """Robots that obey the limit, or drive ``v0`` at least, each beside one person."""
+
+    robot: RobotProfile
+    turn_rad: float
+    tau: float
+    delay: float
+    age: float
+    v0: FloatArray
+    curvature: FloatArray
+    place: FloatArray
+    velocity: FloatArray
+    top: FloatArray
+
+
+def _drawn(rng: np.random.Generator, worlds: int) -> _Worlds:
+    robot = drawn_robot(rng)
+    turn_rad = math.radians(rng.uniform(0.0, 45.0))
+    tau, delay, age = rng.uniform(0.3, 0.8), rng.uniform(0.0, 0.3), float(rng.choice([0.0, 0.1]))
+    rows = []
+    for _ in range(worlds):
+        top = float(rng.choice([0.0, 0.5, 1.5]))
+        distance, walk = rng.uniform(0.3, 5.0), rng.uniform(0.0, max(top, 1.0))
+        bearing, direction = rng.uniform(-math.pi, math.pi, 2).tolist()
+        where = (distance * math.cos(bearing), distance * math.sin(bearing))
+        motion = (walk * math.cos(direction), walk * math.sin(direction))
+        person = Reach(
+            *(*where, *motion, top, tau, delay), elapsed_s=age, margin_m=BODY_M + CLEARANCE_M
+        )
+        rate = float(rng.choice([0.0, rng.uniform(-1.0, 1.0)]))
+        speed = robot.max_speed_mps
+        for _ in range(4):  # the limit depends on how fast the robot drives along its curve
+            state = RobotState(0.0, np.zeros(2), 0.0, speed, rate)
+            courses = courses_of(robot, state, turn_rad)
+            limit = min(limit_mps(person, each) for each in courses)
+            if speed <= limit:
+                break
+            speed = limit
+        rows.append((speed, rate / max(speed, 0.01) if speed > 0.01 else 0.0, *where, *motion, top))
+    v0, curvature, *people, top = np.array(rows).T
+    return _Worlds(
+        *(robot, turn_rad, tau, delay, age, v0, curvature),
+        *(np.stack(people[:2], axis=1), np.stack(people[2:], axis=1), top),
+    )
+
+
 def run_worlds(
     rng: np.random.Generator, worlds: int, *, speed_factor: float = 1.0, faster: float = 1.0
 ) -> Outcome:
@@ -55,78 +103,54 @@ def run_worlds(
         speed_factor: the robot drives at the limit times this.
         faster: people reach the speed U times this.
     """
-    robot = drawn_robot(rng)
-    turn_rad = math.radians(rng.uniform(0.0, 45.0))
-    tau, delay = rng.uniform(0.3, 0.8), rng.uniform(0.0, 0.3)
-    age = rng.choice([0.0, 0.1])
-    T, a = robot.reaction_time_s, robot.max_deceleration_mps2
-    speeds, yaw, places, velocities, tops = [], [], [], [], []
-    while len(speeds) < worlds:
-        top = float(rng.choice([0.0, 0.5, 1.5]))
-        angle, distance = rng.uniform(-math.pi, math.pi), rng.uniform(0.3, 5.0)
-        place = distance * math.cos(angle), distance * math.sin(angle)
-        heading, walk = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, max(top, 1.0))
-        velocity = walk * math.cos(heading), walk * math.sin(heading)
-        person = Reach(
-            *(*place, *velocity, top, tau, delay), elapsed_s=age, margin_m=BODY_M + CLEARANCE_M
-        )
-        rate = float(rng.choice([0.0, rng.uniform(-1.0, 1.0)]))
-        speed = robot.max_speed_mps
-        for _ in range(4):
-            state = RobotState(0.0, np.zeros(2), 0.0, speed, rate)
-            limit = min(limit_mps(person, course_of(robot, state, turn_rad)), robot.max_speed_mps)
-            if speed <= limit:
-                break
-            speed = limit
-        speeds.append(speed * speed_factor)
-        yaw.append(rate)
-        places.append(place)
-        velocities.append(velocity)
-        tops.append(top)
-    v0, w0 = np.array(speeds), np.array(yaw)
-    place, velocity = np.array(places), np.array(velocities)
-    top = np.array(tops) * faster
-    heading = rng.uniform(-turn_rad, turn_rad, worlds)
-    curvature = np.where(v0 > 0.01, w0 / np.maximum(v0, 0.01), 0.0)
+    drawn = _drawn(rng, worlds)
+    T, a = drawn.robot.reaction_time_s, drawn.robot.max_deceleration_mps2
+    v0, tau = drawn.v0 * speed_factor, drawn.tau
+    heading = rng.uniform(-drawn.turn_rad, drawn.turn_rad, worlds)
     brakes_s = rng.uniform(0.0, 1.0, worlds) ** 0.3 * T
     # Where somebody aims who wants to meet the robot.
     meets_s = rng.uniform(0.2, T + 0.2 + v0 / a)
-    at = _way_m(v0, brakes_s, meets_s, a)
-    aim, _ = _pose(at, curvature, heading)
+    aim, _ = _pose(_way_m(v0, brakes_s, meets_s, a), drawn.curvature, heading)
     aim += rng.normal(0.0, 0.3, aim.shape)
+    aims = rng.uniform(0.0, 1.0, (worlds, 1)) < 0.7
     angle = rng.uniform(-math.pi, math.pi, (3, worlds))
-    drawn = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * rng.uniform(0.0, 1.0, (3, worlds, 1))
-    aims = rng.uniform(0.0, 1.0, worlds) < 0.7
-    corners = robot.footprint_m
-    front, rear, half = corners[:, 0].max(), corners[:, 0].min(), corners[:, 1].max()
+    ways = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    ways *= rng.uniform(0.0, 1.0, (3, worlds, 1))
+    top = drawn.top[:, None] * faster
     # The motion that the track showed dies away; what people drive at is added to it, since before
     # anybody could notice.
     added_m, added_mps = np.zeros((worlds, 2)), np.zeros((worlds, 2))
     touched, fastest = np.zeros(worlds, dtype=bool), 0.0
-    start_s, end_s = -(age + delay), T + robot.max_speed_mps / a
+    start_s, end_s = -(drawn.age + drawn.delay), T + drawn.robot.max_speed_mps / a
     decay = math.exp(-_STEP_S / tau)
     for step in range(math.ceil((end_s - start_s) / _STEP_S)):
         t = start_s + step * _STEP_S
-        seen_m = place + velocity * (tau * -math.expm1(-max(t + age, 0.0) / tau))
+        drift_s = tau * -math.expm1(-max(t + drawn.age, 0.0) / tau)
+        people = drawn.place + drift_s * drawn.velocity + added_m
         if t >= 0.0:
             speed = np.where(t < brakes_s, v0, np.maximum(v0 - a * (t - brakes_s), 0.0))
-            base, h = _pose(_way_m(v0, brakes_s, np.full(worlds, t), a), curvature, heading)
-            off = seen_m + added_m - base
-            fx = np.cos(h) * off[:, 0] + np.sin(h) * off[:, 1]
-            fy = np.abs(np.cos(h) * off[:, 1] - np.sin(h) * off[:, 0])
-            ahead = np.maximum(np.maximum(rear - fx, fx - front), 0.0)
-            gap = np.hypot(ahead, np.maximum(fy - half, 0.0))
-            touches = (gap < BODY_M) & (speed > 1e-3) & (fx >= rear) & ~touched
-            fastest = max(fastest, float(speed[touches].max(initial=0.0)))
-            touched |= touches
-        towards = aim - (seen_m + added_m)
+            base, h = _pose(_way_m(v0, brakes_s, np.full(worlds, t), a), drawn.curvature, heading)
+            meets = _touching(drawn.robot, people - base, h) & (speed > 1e-3) & ~touched
+            fastest = max(fastest, float(speed[meets].max(initial=0.0)))
+            touched |= meets
+        towards = aim - people
         towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
-        piece = drawn[min(int(3.0 * (t - start_s) / (end_s - start_s)), 2)]
-        target = np.where(aims[:, None], towards, piece) * top[:, None]
+        piece = ways[min(int(3.0 * (t - start_s) / (end_s - start_s)), 2)]
+        target = top * np.where(aims, towards, piece)
         # Exact for a target that is held for the step.
         added_m += target * _STEP_S + (added_mps - target) * (tau * (1.0 - decay))
         added_mps = target + (added_mps - target) * decay
     return Outcome(worlds, int((v0 > 0.05).sum()), int(touched.sum()), fastest)
+
+
+def _touching(robot: RobotProfile, off: FloatArray, heading: FloatArray) -> NDArray[np.bool_]:
+    """Return who touches the robot and is not behind its rear edge."""
+    front, half = robot.footprint_m.max(axis=0)
+    rear = robot.footprint_m[:, 0].min()
+    fx = np.cos(heading) * off[:, 0] + np.sin(heading) * off[:, 1]
+    fy = np.abs(np.cos(heading) * off[:, 1] - np.sin(heading) * off[:, 0])
+    ahead = np.maximum(np.maximum(rear - fx, fx - front), 0.0)
+    return np.asarray((np.hypot(ahead, np.maximum(fy - half, 0.0)) < BODY_M) & (fx >= rear))
 
 
 def _way_m(v0: FloatArray, brakes_s: FloatArray, t: FloatArray, a: float) -> FloatArray:
