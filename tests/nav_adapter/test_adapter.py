@@ -49,7 +49,9 @@ def settled(
     for step in range(round(seconds / 0.05) + 1):
         now = 0.05 * step
         result = adapter.update(
-            (person(now, position=position, awareness_lower=alpha),), robot_at(now), now
+            (person(now, position=position, awareness_lower=alpha),),
+            robot_at(now, speed_mps=0.1),
+            now,
         )
     return result
 
@@ -368,23 +370,24 @@ def test_wrong_constructor_arguments_are_refused() -> None:
         NavAdapter(AwarenessPolicy(), ())
 
 
-@pytest.mark.parametrize("alpha", [0.0, 1.0])
-def test_a_robot_that_obeys_stands_before_an_approaching_person_arrives(alpha: float) -> None:
+@pytest.mark.parametrize(("alpha", "human_mps"), [(0.0, 1.5), (0.0, 0.0), (1.0, 0.0)])
+def test_a_robot_that_obeys_stands_before_an_approaching_person_arrives(
+    alpha: float, human_mps: float
+) -> None:
     """Closed loop: the person walks at the assumed speed, and the drive follows the limit.
 
     The drive uses constraints that are one period old for one more period, and brakes no harder
     than the profile says. Both delays together are within the reaction time.
     """
     period, policy = 0.05, AwarenessPolicy()
-    human = policy.speed.human_speed_mps(alpha)
     for start_m in (1.5, 2.0, 4.0, 7.0, 11.0):
         adapter, now, x, worker = NavAdapter(policy, ROBOT), 0.0, 0.0, start_m
         speed = command = math.inf
-        while speed > 0.0:
+        while speed > 1e-3 and now < 20.0:
             separation = worker - x - 0.3625 - BODY_RADIUS_M
             assert separation > 0.0
             track = person(
-                now, position=(worker, 0.0), velocity=(-human, 0.0), awareness_lower=alpha
+                now, position=(worker, 0.0), velocity=(-human_mps, 0.0), awareness_lower=alpha
             )
             state = robot_at(now, position=(x, 0.0), speed_mps=min(speed, 1.5))
             limit = adapter.update((track,), state, now).speed_limit_mps
@@ -392,5 +395,7 @@ def test_a_robot_that_obeys_stands_before_an_approaching_person_arrives(alpha: f
                 speed = command = limit
             after = max(command, speed - ROBOT.max_deceleration_mps2 * period)
             x += 0.5 * (speed + after) * period
-            worker -= human * period
+            worker -= human_mps * period
             speed, command, now = after, limit, now + period
+        # It may drive up to somebody who stands, to within what it cannot do in time.
+        assert human_mps > 0.0 or alpha == 0.0 or separation < 0.2

@@ -144,6 +144,10 @@ def may_be_told_less(scene: Scene, known: int) -> bool:
     return known in (0, 3) or (straight and (known == 2 or forwards))
 
 
+def moves(state: RobotState) -> bool:
+    return abs(state.speed_mps) >= 0.05 or abs(state.lateral_mps) > 0.1
+
+
 @settings(max_examples=250)
 @given(scene=scenes())
 def test_the_field_is_never_above_the_limit_of_a_robot_that_gets_there(scene: Scene) -> None:
@@ -153,8 +157,9 @@ def test_the_field_is_never_above_the_limit_of_a_robot_that_gets_there(scene: Sc
     }
     for limit_mps in limits.values():
         assert 0.0 <= limit_mps <= then.speed_limit_mps + 1e-9
-    # Without a heading it holds for every one.
-    assert limits[0] <= min(limits.values()) + 1e-9
+    # Without a heading it holds for every one. At a stand the field is coarser.
+    if moves(scene.state):
+        assert limits[0] <= min(limits.values()) + 1e-9
 
 
 @st.composite
@@ -180,6 +185,8 @@ def standing_scenes(draw: st.DrawFn) -> Scene:
 @given(scene=standing_scenes())
 def test_for_people_who_stand_the_field_is_within_a_tenth_of_the_limit(scene: Scene) -> None:
     now, then = drive(scene)
+    if not moves(scene.state):
+        return
     # After silence people count as unaware at first, and fewer do so later.
     if scene.policy.timing.stale_after_s <= 0.1 or scene.policy.timing.fresh_within_s <= 0.1:
         return
@@ -217,26 +224,25 @@ def test_the_reasons_are_those_of_the_adapter() -> None:
         person(position=(6.0, 0.0), awareness_lower=1.0),
         person(track_id=2, position=(9.0, 0.0)),
     ]
-    now = settled_update(people, policy=policy)
     places = np.array([[0.0, 0.0], [4.5, 0.0], [4.5, 2.0], [7.5, 0.0], [-9.0, 0.0]])
     told = {
         "headings_odom_rad": np.zeros((5, 1)),
         "speeds_mps": np.full((5, 1), 0.5),
         "dt_s": 0.1,
     }
-    limits = speed_limit_at(now, places[:, None], **told)
-    reasons = limited_by_at(now, places[:, None], **told)
-    for place, limit, reason in zip(places, limits[:, 0], reasons[:, 0], strict=True):
-        there = settled_update(
-            people, policy=policy, state=robot_at(position=place.tolist(), speed_mps=0.5)
-        )
-        assert limit == pytest.approx(there.speed_limit_mps, rel=1e-3)
-        assert reason == there.limited_by
-    assert {reason.partition(": ")[2] for reason in reasons[:, 0]} == {
-        "speed and separation",
-        "start reserve",
-        "",
-    }
+    for rules in (policy.reach, None):
+        chosen = policy.model_copy(update={"reach": rules})
+        now = settled_update(people, policy=chosen)
+        limits = speed_limit_at(now, places[:, None], **told)
+        reasons = limited_by_at(now, places[:, None], **told)
+        for place, limit, reason in zip(places, limits[:, 0], reasons[:, 0], strict=True):
+            there = settled_update(
+                people, policy=chosen, state=robot_at(position=place.tolist(), speed_mps=0.5)
+            )
+            assert 0.9 * there.speed_limit_mps <= limit <= there.speed_limit_mps
+            assert reason == there.limited_by
+        rule = "in the path" if rules is None else "reach"
+        assert {reason.partition(": ")[2] for reason in reasons[:, 0]} == {rule, ""}
 
 
 def test_lost_and_stale_people_count_as_in_the_adapter() -> None:
