@@ -51,9 +51,7 @@ def person(
     )
 
 
-def policy_radius_m(
-    policy: AwarenessPolicy, alpha: float, robot: RobotProfile = ROBOT
-) -> float:
+def policy_radius_m(policy: AwarenessPolicy, alpha: float, robot: RobotProfile = ROBOT) -> float:
     """Return the radius of somebody whose place is certain, without the history of shrinking.
 
     It is that of the policy, or the one beside which a robot may pass at 0.3 m/s.

@@ -260,9 +260,7 @@ def test_uncertainty_enlarges_the_obstacle_and_lowers_the_limit(
     sigma: float, x: float, alpha: float
 ) -> None:
     def constraints(sigma_m: float, x_m: float) -> NavConstraints:
-        return settled_update(
-            [person(position=(x_m, 0.0), sigma_m=sigma_m, awareness_lower=alpha)]
-        )
+        return settled_update([person(position=(x_m, 0.0), sigma_m=sigma_m, awareness_lower=alpha)])
 
     exact, uncertain = constraints(0.0, x), constraints(sigma, x)
     wider_m = uncertain.obstacles[0].radius_m - exact.obstacles[0].radius_m

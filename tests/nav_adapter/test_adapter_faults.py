@@ -120,9 +120,9 @@ def test_a_stamp_a_few_seconds_ahead_costs_one_update(ahead_s: float, by: str) -
 
 
 def test_after_a_silence_an_id_is_first_sight_for_the_speed() -> None:
-    unaware = adapter().update(
-        [person(position=(2.2, 0))], robot_at(speed_mps=1.2), 0.0
-    ).speed_limit_mps
+    unaware = (
+        adapter().update([person(position=(2.2, 0))], robot_at(speed_mps=1.2), 0.0).speed_limit_mps
+    )
     limits = []
     for track_id in (1, 5):
         nav = adapter()

@@ -24,7 +24,6 @@ from nav_scenes import (
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
 from nav_adapter.policies import SafetyMargins
-from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
 PERIOD_S = 0.05
@@ -67,9 +66,7 @@ def test_short_looks_shrink_no_more_than_the_time_they_last() -> None:
 
 def test_awareness_raises_no_speed_at_first_sight() -> None:
     """Frames must have shown somebody for 0.2 s."""
-    limits = [
-        result.speed_limit_mps for result in watch(NavAdapter(AwarenessPolicy(), ROBOT), 0.5)
-    ]
+    limits = [result.speed_limit_mps for result in watch(NavAdapter(AwarenessPolicy(), ROBOT), 0.5)]
     unaware_mps = settled_update((person(),)).speed_limit_mps
     aware_mps = settled_update((person(awareness_lower=1.0),)).speed_limit_mps
     assert limits[:4] == [unaware_mps] * 4

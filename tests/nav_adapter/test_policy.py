@@ -58,9 +58,7 @@ def test_the_ramp_in_closed_form() -> None:
     assert radius.radius_m(0.3) == pytest.approx(1.0 - 0.8 * 5 / 32)
     assert radius.radius_m(0.4) == pytest.approx(0.6)
     assert radius.radius_m(0.5) == pytest.approx(0.2 + 0.8 * 5 / 32)
-    speed = InterpolatedHumanSpeed(
-        unaware_human_speed_mps=1.6, aware_human_speed_mps=0.0, **ramp
-    )
+    speed = InterpolatedHumanSpeed(unaware_human_speed_mps=1.6, aware_human_speed_mps=0.0, **ramp)
     assert speed.human_speed_mps(0.3) == pytest.approx(1.6 * 27 / 32)
 
 

@@ -137,9 +137,8 @@ def field_at(scene: Scene, now: NavConstraints, known: int) -> float:
 def may_be_told_less(scene: Scene, known: int) -> bool:
     """Return whether what the field is not told is what it assumes: forwards, and straight on."""
     state = scene.state
-    forwards = state.speed_mps >= 0.0 and state.lateral_mps == 0.0
-    # A robot that stands and moves in any direction does not drive forwards.
-    forwards &= scene.robot.moves_sideways is not True or state.speed_mps >= 0.05
+    # A robot that stands may start either way.
+    forwards = state.speed_mps >= 0.05 and state.lateral_mps == 0.0
     straight = state.yaw_rate_radps == 0.0
     return known in (0, 3) or (straight and (known == 2 or forwards))
 
