@@ -134,8 +134,11 @@ class SpeedGovernor:
             path_mps = in_the_path_mps(place_m, body_m, self._clearance_m, aged)
             lowest_mps = min(lowest_mps, path_mps)
         reach = self._people.reach(person, now)
-        for course in courses if reach is not None else ():
-            reach_mps = limit_mps(reach, course)
+        if reach is not None:
+            reach_mps = min(limit_mps(reach, course) for course in courses)
+            if reach.walks_faster:
+                # Whoever keeps to their motion is not met by a robot that keeps to its own.
+                reach_mps = min(reach_mps, limit_mps(reach.walking_on(), straight))
             if reach_mps <= lowest_mps:
                 lowest_mps, rule = reach_mps, "reach"
         return (math.inf if lowest_mps >= straight.maximum_mps else lowest_mps), rule

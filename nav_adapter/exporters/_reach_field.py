@@ -1,7 +1,7 @@
 """The limit of :mod:`nav_adapter.limit` at many poses at once: the same steps, on arrays.
 
 It is a lower bound of :func:`~nav_adapter.limit.limit_mps`, since its steps of time are not
-refined. Values are floats, or arrays of one number per time or per pose.
+refined; fine ones give it itself. Values are floats, or arrays of one number per time or per pose.
 """
 
 from __future__ import annotations
@@ -24,13 +24,15 @@ from .._predicted import predicted_sigmas_m
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
 from ..limit import ROOM, STANDING_MPS, STEPS
-from ..reach import covariance_terms
+from ..reach import WALKING_ON_S, covariance_terms
 
 Value = Any
 # Ages closer than this are equal.
 _SAME_AGE_S: Final = 1e-9
 # A limit is lowered by this share of itself, for rounding.
 _ROUNDING: Final = 1e-9
+# Fine steps are as short as the shortest of ``limit_mps``.
+_FINER: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,6 +279,7 @@ def person_limits_mps(
     basis: SpeedBasis,
     robot: RobotProfile,
     reach_m: float = 0.0,
+    fine: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the limits (N,) that one person sets by the path and by their reach; ∞ for none.
 
@@ -287,6 +290,7 @@ def person_limits_mps(
         basis: of the constraints.
         robot: of the constraints.
         reach_m: the limits hold within this distance of the poses, which have no heading then.
+        fine: the steps of time are fine, for a few poses.
     """
 
     def gathered(value: Value) -> Value:
@@ -310,16 +314,57 @@ def person_limits_mps(
         return path, np.full(len(dx), np.inf)
     U, delay = gathered(person.speed_mps), gathered(person.delay_s)
     variances = tuple(gathered(each) for each in person.variances)
-    walking, tau = math.hypot(vx, vy), rules.time_constant_s
-    step_s = robot.max_speed_mps / a / STEPS
+    walking = math.hypot(vx, vy)
+    given = (dx, dy, vx, vy, elapsed, variances, margins.floor_m)
+    room = (robot, T, circle, fine)
+    limit = _reach_mps(*given, U, delay, rules.time_constant_s, courses, *room)
+    if np.any(walking > U):
+        # As in the adapter: whoever walks on is not met by a robot that goes straight on.
+        ahead = courses
+        if courses.cos is not None:
+            cos, sin, front, rear, half = courses.straight
+            ahead = replace(
+                courses,
+                **{"cos": cos, "sin": sin, "fan_cos": 1.0, "fan_sin": 0.0},
+                **{"front_m": front, "rear_m": rear, "half_m": half},
+            )
+        on = _reach_mps(*given, 0.0, 0.0, WALKING_ON_S, ahead, *room)
+        limit = np.where(walking > U, np.minimum(limit, on), limit)
+    return path, limit
+
+
+def _reach_mps(
+    dx: FloatArray,
+    dy: FloatArray,
+    vx: float,
+    vy: float,
+    elapsed: Value,
+    variances: tuple[Value, ...],
+    margin: float,
+    U: Value,
+    delay: Value,
+    tau: float,
+    courses: Courses,
+    robot: RobotProfile,
+    T: Value,
+    circle: float,
+    fine: bool,
+) -> FloatArray:
+    """Return the limits (N,) of :func:`~nav_adapter.limit.limit_mps`; ∞ for none."""
+    a, maximum = robot.max_deceleration_mps2, ROOM * robot.max_speed_mps
+    walking = math.hypot(vx, vy)
+    step_s = robot.max_speed_mps / a / STEPS / (_FINER if fine else 1)
+    steps = math.ceil((float(np.max(T)) + maximum / a) / step_s)
+    at_once = steps if fine else 1  # a few poses are faster so
     limit = np.full(len(dx), maximum)
-    m0 = tau * -np.expm1(-elapsed / tau)
-    t0, need0, braked0 = 0.0, 0.0 * T, 0.0 * T
-    while np.min(need0) < maximum:
+    for first in range(0, steps, at_once):
+        t0 = step_s * np.arange(first, first + at_once)[:, None]
         t1 = t0 + step_s
+        early = np.maximum(t0 - T, 0.0)
+        need0, braked0 = a * early, 0.5 * a * early * early
         late = np.maximum(t1 - T, 0.0)
         need1, braked1 = a * late, 0.5 * a * late * late
-        m1 = tau * -np.expm1(-(t1 + elapsed) / tau)
+        m0, m1 = (tau * -np.expm1(-(t + elapsed) / tau) for t in (t0, t1))
         since = t1 + elapsed + delay
         reach = U * (since + tau * np.expm1(-since / tau)) + 0.5 * walking * (m1 - m0)
         variance = variances[0] + m1 * (variances[1] + m1 * variances[2])
@@ -327,28 +372,27 @@ def person_limits_mps(
         middle = 0.5 * (m0 + m1)
         px, py = (dx + vx * middle, dy + vy * middle) if walking else (dx, dy)
         if courses.cos is None:
-            near = np.hypot(px, py) - (circle + courses.driven_m + margins.floor_m + reach)
+            near = np.hypot(px, py) - (circle + courses.driven_m + margin + reach)
             lowest = np.maximum(_least_mps(near, t1, braked1, need1, a, T), need0)
         else:
-            near, past, behind = _contacts_m(px, py, courses, reach, margins.floor_m)
+            near, past, behind = _contacts_m(px, py, courses, reach, margin)
             lowest = np.maximum(_least_mps(near, t1, braked1, need1, a, T), need0)
             lowest = np.where(lowest * t0 - braked0 <= past, lowest, maximum)
             lowest = np.where(need0 * t0 - braked0 <= behind, need0, lowest)
-        np.minimum(limit, lowest, out=limit)
-        t0, need0, braked0, m0 = t1, need1, braked1, m1
-        if np.min(need0) >= limit.max():
+        np.minimum(limit, lowest.min(axis=0), out=limit)
+        if np.min(need1) >= limit.max():
             break
-    return path, np.where(limit < maximum, limit, np.inf)
+    return np.where(limit < maximum, limit, np.inf)
 
 
 def _least_mps(
-    near: FloatArray, t1: float, braked1: Value, need1: Value, a: float, T: Value
+    near: FloatArray, t1: Value, braked1: Value, need1: Value, a: float, T: Value
 ) -> FloatArray:
     """Return the lowest speed at which the robot comes as far as ``near`` until t1."""
     least = (near + braked1) / t1
     # A robot that is slow stands before t1.
     stops = np.sqrt(a * (a * T * T + 2.0 * np.maximum(near, 0.0))) - a * T
-    return np.where(least < need1, stops, least)
+    return np.asarray(np.where(least < need1, stops, least))
 
 
 def _path_mps(
@@ -409,7 +453,7 @@ def _contacts_m(
     near = at - front - np.sqrt(np.maximum(rho * rho - off * off, 0.0))
     ahead &= past >= 0.0
     near, past = np.where(ahead, near, 1e9), np.where(ahead, past, -np.inf)
-    behind = np.full(len(px), -np.inf)
+    behind = np.full_like(near, -np.inf)
     if backward.any():
         corner2 = np.square(np.maximum(distance - reach, 0.0))
         share = np.maximum(corner2 - side * side, 0.0) / np.maximum(corner2, 1e-12)
@@ -430,6 +474,7 @@ def limits_at(
     times_s: FloatArray,
     aware_for_s: float,
     reach_m: float = 0.0,
+    fine: bool = False,
 ) -> tuple[FloatArray, NDArray[np.object_]]:
     """Return the limits (K, T) at poses (K, T, …), and who sets them, as texts.
 
@@ -442,6 +487,7 @@ def limits_at(
         times_s: (T,) after the stamp.
         aware_for_s: how long awareness counts.
         reach_m: the limits hold within this distance of the poses; they have no heading then.
+        fine: the steps of time are fine, for a few poses.
 
     Raises:
         NavError: for constraints that do not come from ``update`` unless they stop the robot.
@@ -481,7 +527,7 @@ def limits_at(
         if not len(near):
             continue
         path, reach = person_limits_mps(
-            person, courses.at(near), times[near], basis, robot, reach_m
+            person, courses.at(near), times[near], basis, robot, reach_m, fine
         )
         own = np.minimum(path, reach)
         if person.least_mps is not None:

@@ -25,6 +25,7 @@ def speed_limit_at(
     speeds_mps: Any = None,
     yaw_rates_radps: Any = None,
     aware_for_s: float = math.inf,
+    fine: bool = False,
 ) -> Any:
     """Return (K, T), the speed limit in m/s at K × T poses, people moving as predicted.
 
@@ -55,6 +56,7 @@ def speed_limit_at(
         yaw_rates_radps: (K, T), or None.
         aware_for_s: ≥ 0, how long after the stamp awareness counts. People are unaware from then
             on, as they may have looked away.
+        fine: steps of time as short as those of ``update``, for a higher limit at a few poses.
 
     Raises:
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
@@ -62,7 +64,7 @@ def speed_limit_at(
     """
     limits, _ = _limits(
         *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
-        *(speeds_mps, yaw_rates_radps, aware_for_s),
+        *(speeds_mps, yaw_rates_radps, aware_for_s, fine),
     )
     return limits
 
@@ -152,6 +154,7 @@ def _limits(
     speeds_mps: Any,
     yaw_rates_radps: Any,
     aware_for_s: float,
+    fine: bool = False,
 ) -> tuple[FloatArray, NDArray[np.object_]]:
     """Return the limits and their reasons after a check of all arguments."""
     positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
@@ -176,4 +179,5 @@ def _limits(
         *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
         first + dt * np.arange(shape[1], dtype=np.float64),
         aware_for_s,
+        fine=fine,
     )
