@@ -80,9 +80,14 @@ def robots(draw: st.DrawFn) -> RobotProfile:
     count = draw(st.integers(3, 6))
     angles = np.arange(count) * (2.0 * math.pi / count)
     long, wide = draw(finite(0.2, 0.8)), draw(finite(0.2, 0.8))
+    corners = np.stack([long * np.cos(angles), wide * np.sin(angles)], axis=1)
+    corners += draw(finite(-0.15, 0.15))
+    if draw(st.booleans()):
+        ahead_m = draw(finite(-0.15, 0.15))
+        corners = np.array([[long, wide], [-long, wide], [-long, -wide], [long, -wide]])
+        corners[:, 0] += ahead_m
     return RobotProfile(
-        footprint_m=np.stack([long * np.cos(angles), wide * np.sin(angles)], axis=1)
-        + draw(finite(-0.15, 0.15)),
+        footprint_m=corners,
         max_speed_mps=draw(finite(0.3, 2.5)),
         max_acceleration_mps2=draw(finite(0.3, 2.0)),
         max_deceleration_mps2=draw(finite(0.3, 3.0)),

@@ -94,7 +94,7 @@ def _walk_at_a_turning_robot(bearing: float, distance: float, turn: float, when:
     while speed > 0.0:
         # A body behind the rear edge does not count: the robot drives away from it.
         along = np.array([math.cos(heading), math.sin(heading)])
-        if (worker - base) @ along > -0.3625 + 0.03:
+        if (worker - base) @ along > -0.3625 + 0.05:
             assert _gap_m(base, heading, worker) > POLICY.margins.clearance_m - 0.03
         yaw_rate = 0.0
         if start_s <= t < start_s + turning_s:

@@ -134,13 +134,21 @@ def field_at(scene: Scene, now: NavConstraints, known: int) -> float:
     return float(limits[0, 0])
 
 
+def is_a_box(robot: RobotProfile) -> bool:
+    """Return whether the circle holds the rectangle about the footprint, which ``update`` takes."""
+    x, y = np.abs(robot.footprint_m).max(axis=0)
+    return bool(np.hypot(x, y) <= robot.circumscribed_radius_m + 1e-9)
+
+
 def may_be_told_less(scene: Scene, known: int) -> bool:
     """Return whether what the field is not told is what it assumes: forwards, and straight on."""
+    if known == 0:
+        return is_a_box(scene.robot)
     state = scene.state
     # A robot that stands may start either way.
     forwards = state.speed_mps >= 0.05 and state.lateral_mps == 0.0
     straight = state.yaw_rate_radps == 0.0
-    return known in (0, 3) or (straight and (known == 2 or forwards))
+    return known == 3 or (straight and (known == 2 or forwards))
 
 
 def moves(state: RobotState) -> bool:
@@ -157,7 +165,7 @@ def test_the_field_is_never_above_the_limit_of_a_robot_that_gets_there(scene: Sc
     for limit_mps in limits.values():
         assert 0.0 <= limit_mps <= then.speed_limit_mps + 1e-9
     # Without a heading it holds for every one. At a stand the field is coarser.
-    if moves(scene.state):
+    if moves(scene.state) and 0 in limits:
         assert limits[0] <= min(limits.values()) + 1e-9
 
 
@@ -198,6 +206,8 @@ def test_for_people_who_stand_the_field_is_within_a_tenth_of_the_limit(scene: Sc
 def test_a_cell_of_the_map_holds_for_a_robot_anywhere_in_it(
     scene: Scene, shift: tuple[float, float]
 ) -> None:
+    if not is_a_box(scene.robot):
+        return
     cell_m = 0.3
     now, then = drive(scene)
     chart = SpeedMap.around(
