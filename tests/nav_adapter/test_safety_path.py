@@ -86,15 +86,16 @@ def _walk_at_a_turning_robot(bearing: float, distance: float, turn: float, when:
     assert rules is not None
     dt, t, heading = 0.005, 0.0, 0.0
     base, worker = np.zeros(2), distance * np.array([math.cos(bearing), math.sin(bearing)])
-    walking_mps = 0.0
+    walking_mps, behind = 0.0, False
     for _ in range(round(rules.delay_s / dt)):
         worker, walking_mps = _step(worker, base, walking_mps, dt, rules)
     stop_s = ROBOT.reaction_time_s + speed / ROBOT.max_deceleration_mps2
     start_s, turning_s = when * 0.5 * stop_s, 0.5 * stop_s
     while speed > 0.0:
-        # A body behind the rear edge does not count: the robot drives away from it.
+        # Whoever walks into the back of a robot that turning slows down is faster than it.
         along = np.array([math.cos(heading), math.sin(heading)])
-        if (worker - base) @ along > -0.3625 + 0.05:
+        behind |= bool((worker - base) @ along <= -0.3625)
+        if not behind:
             assert _gap_m(base, heading, worker) > POLICY.margins.clearance_m - 0.03
         yaw_rate = 0.0
         if start_s <= t < start_s + turning_s:
