@@ -121,7 +121,7 @@ def on_base(T_base_child: np.ndarray, child: str, linear=(0.3, 0.0, 0.0), angula
 @lru_cache
 def reference_limit() -> float:
     (*_, last) = Robot().drive(2.0, standing_at(HERE))
-    assert last.limited_by == "track 1: speed and separation"
+    assert last.limited_by == "track 1: reach"
     return last.speed_limit_mps
 
 
