@@ -46,8 +46,8 @@ def test_every_key_of_a_file_has_a_row_with_its_meaning(name: str) -> None:
 
 def test_rows_give_unit_range_default_and_choices() -> None:
     policy = rows_of("reference/policy-keys.md")
-    assert policy["minimum_clearance_m"][:2] == ["number in [0.1, 2]; m", "`0.1`"]
-    assert policy["maximum_radius_m"][:2] == ["number or null in (0, 20]; m", "`null`"]
+    assert policy["clearance_m"][:2] == ["number in [0.1, 2]; m", "`0.1`"]
+    assert policy["lost_rise_mps2"][:2] == ["number or null in (0, 10]; m/s²", "`0.7`"]
     assert "[InterpolatedInflation](#interpolatedinflation)" in policy["inflation"][0]
     scenario = rows_of("reference/scenario-keys.md")
     assert scenario["attention"][:2] == ["`attentive` or `unaware` or `mixed`", "`mixed`"]

@@ -10,6 +10,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
+from nav_adapter.limit import passing_radius_m
 from perception.arrays import FloatArray
 from tracking import PersonTrack
 
@@ -48,6 +49,17 @@ def person(
         height_m=1.75,
         time_since_seen_s=unseen_s,
     )
+
+
+def policy_radius_m(policy: AwarenessPolicy, alpha: float, robot: RobotProfile = ROBOT) -> float:
+    """Return the radius of somebody whose place is certain, without the history of shrinking.
+
+    It is that of the policy, or the one beside which a robot may pass at 0.3 m/s.
+    """
+    passing_m = passing_radius_m(
+        policy.speed.human_speed_mps(alpha), policy.reach, policy.margins.clearance_m, robot
+    )
+    return max(policy.inflation.radius_m(alpha), passing_m)
 
 
 def robot_at(

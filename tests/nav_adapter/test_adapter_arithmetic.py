@@ -14,8 +14,6 @@ from nav_scenes import ROBOT, crowds, finite, numbers, person, robot_at
 from shapely import Point
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavError, PersonObstacle, RobotProfile
-from nav_adapter.policies import SpeedRules, StandingPeople
-from sim_tests.crossing import named_policy
 from tracking import PersonTrack
 
 FEW = settings(max_examples=30)
@@ -84,9 +82,7 @@ def test_numbers_that_overflow_are_refused_and_change_nothing(huge: PersonTrack)
     )
 
 
-@pytest.mark.parametrize(
-    "preset", ["scanner", "blind", "conservative", "balanced", "assertive", "standing"]
-)
+@pytest.mark.parametrize("preset", ["field", "blind", "conservative", "balanced", "assertive"])
 @given(
     exponents=st.tuples(*[st.floats(-8.0, 308.0)] * 4),
     age_s=st.sampled_from([0.0, 0.3, 30.0]),
@@ -99,9 +95,9 @@ def test_finite_tracks_give_constraints_or_an_error_of_the_package(
         person(0.0, position=(position_m, 1.0), velocity=(0.0, -speed_mps)),
         covariance_odom=np.diag([variance_m2, variance_m2, variance_m2ps2, variance_m2ps2]),
     )
-    policy = AwarenessPolicy(rules=SpeedRules(standing=StandingPeople()))
-    if preset != "standing":
-        policy = named_policy(preset)[1]
+    policy = AwarenessPolicy(reach=None)
+    if preset != "field":
+        policy = AwarenessPolicy.preset(preset)
     adapter = NavAdapter(policy, ROBOT)
     try:
         constraints = adapter.update([track], robot_at(age_s, speed_mps=1.0), age_s)

@@ -6,12 +6,12 @@ import logging
 from itertools import pairwise
 
 import pytest
-from nav_scenes import ROBOT, numbers, person, robot_at
+from nav_scenes import ROBOT, numbers, person, policy_radius_m, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
-from nav_adapter.policies import TimeBehaviour
 
 PERIOD_S = 0.1
+UNAWARE_M, AWARE_M = (policy_radius_m(AwarenessPolicy(), alpha) for alpha in (0.0, 0.9))
 
 
 def step(adapter: NavAdapter, now: float, *, robot_s: float | None = None) -> NavConstraints:
@@ -50,7 +50,7 @@ def test_an_update_far_ahead_is_forgotten_if_the_clock_returns() -> None:
     play(adapter, 100.0, 20), play(twin, 100.0, 20)
     jumped = step(adapter, 3700.0)
     assert jumped.obstacles[0].awareness_lower == 0.9
-    assert jumped.obstacles[0].radius_m == 1.0
+    assert jumped.obstacles[0].radius_m == pytest.approx(UNAWARE_M)
     for k in range(20, 40):
         now = 100.0 + k * PERIOD_S
         assert numbers(step(adapter, now)) == numbers(step(twin, now))
@@ -62,8 +62,8 @@ def test_a_pause_of_the_caller_is_no_jump() -> None:
     play(adapter, 0.0, 20)
     refused, results = play(adapter, 600.0, 40)
     assert (refused, adapter.refused_stamps, adapter.clock_restarts) == (0, 0, 0)
-    assert results[0].obstacles[0].radius_m == 1.0
-    assert results[-1].obstacles[0].radius_m < 0.5
+    assert results[0].obstacles[0].radius_m == pytest.approx(UNAWARE_M)
+    assert results[-1].obstacles[0].radius_m == pytest.approx(AWARE_M)
 
 
 @pytest.mark.parametrize("back_s", [1.5, 3600.0, 1e9])
@@ -79,19 +79,11 @@ def test_a_clock_that_was_set_back_costs_a_second(
     assert adapter.clock_restarts == 1
     assert "the clock has been set" in caplog.text
     # First sight again: the largest obstacle, and the limit rises no faster than the robot.
-    assert after[0].obstacles[0].radius_m == 1.0
+    assert after[0].obstacles[0].radius_m == pytest.approx(UNAWARE_M)
     assert after[0].speed_limit_mps <= min(before[-1].speed_limit_mps, 0.5)
     for one, other in pairwise(after):
         assert other.speed_limit_mps - one.speed_limit_mps <= PERIOD_S + 1e-6
-    assert after[-1].obstacles[0].radius_m < 0.5
-
-
-def test_the_time_until_a_new_clock_is_believed_is_a_setting() -> None:
-    policy = AwarenessPolicy(timing=TimeBehaviour(new_clock_after_s=3.0))
-    adapter = NavAdapter(policy, ROBOT)
-    play(adapter, 5000.0, 5)
-    refused, _ = play(adapter, 10.0, 60)
-    assert refused == 30
+    assert after[-1].obstacles[0].radius_m == pytest.approx(AWARE_M)
 
 
 def test_refused_stamps_that_do_not_follow_one_another_start_nothing_anew() -> None:

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from nav_scenes import ROBOT, finite, person, robot_at
+from nav_scenes import ROBOT, finite, person, policy_radius_m, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
-from nav_adapter.policies import TimeBehaviour
 from nav_adapter.ros2 import STOP_POLYGON_ID
 from tracking import PersonTrack
 
 PERIOD_S = 0.05
 FAR, NEAR = (6.0, 0.0), (1.5, 0.6)
+UNAWARE_M = policy_radius_m(AwarenessPolicy(), 0.0)
 
 
 def frame(adapter: NavAdapter, now: float, *tracks: PersonTrack) -> NavConstraints:
@@ -43,11 +43,11 @@ def test_exchanged_ids_never_raise_the_limit_at_once() -> None:
     after = frame(adapter, 40 * PERIOD_S, *swapped)
     assert after.speed_limit_mps <= before.speed_limit_mps + 1e-9
     assert [each.track_id for each in after.obstacles] == [1, 2]
-    assert [each.radius_m for each in after.obstacles] == [1.1, 1.1]
+    assert [each.radius_m for each in after.obstacles] == pytest.approx([UNAWARE_M + 0.1] * 2)
     assert [each.awareness_lower for each in after.obstacles] == [0.0, 0.0]
     held = seen(adapter, 3, *swapped, start=41)
     assert held.speed_limit_mps <= before.speed_limit_mps + 1e-9
-    # A tracker that goes on to call this person aware is believed after shrink_after_s.
+    # A tracker that goes on to call this person aware is believed after 0.2 s.
     assert seen(adapter, 3, *swapped, start=44).speed_limit_mps > before.speed_limit_mps
 
 
@@ -131,7 +131,7 @@ def test_nobody_who_walks_counts_as_new(
     speed: float, course: float, turn: float, sigma: float, period: float
 ) -> None:
     """Not even somebody who stops or turns on the spot between two frames."""
-    adapter = NavAdapter(AwarenessPolicy(timing=TimeBehaviour(shrink_after_s=0.0)), ROBOT)
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     place, shown = np.array([5.0, 0.0]), []
     for k in range(8):
         heading = course + (turn if k >= 4 else 0.0)
@@ -164,6 +164,6 @@ def test_a_jump_beyond_covariance_and_human_speed_is_first_sight(
     reach_m = 1.6 * PERIOD_S + 4.0 * math.sqrt(2.0) * sigma
     if distance > reach_m + 0.06:
         assert obstacle.awareness_lower == 0.0
-        assert obstacle.radius_m == pytest.approx(1.0 + 2.0 * sigma)
+        assert obstacle.radius_m == pytest.approx(UNAWARE_M + 2.0 * sigma)
     elif distance < reach_m:
         assert obstacle.awareness_lower == 0.9

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from nav_scenes import ROBOT, finite, numbers, person, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
-from nav_adapter.policies import SpeedRules, StartReserve, TimeBehaviour
+from nav_adapter.policies import TimeBehaviour
 from perception import Camera, PersonObservation
 from perception.laser import LaserScan, RobotMotion, Scanner, scan_points
 from tracking import (
@@ -93,9 +93,7 @@ def test_somebody_whose_place_is_shown_empty_is_gone_at_once() -> None:
 
 def test_a_foreign_tracker_that_drops_people_at_once_has_them_held_and_then_lost() -> None:
     results = lose(NavAdapter(POLICY, ROBOT), 4.0, coasting_s=0.0)
-    # Beyond first sight: from then on somebody who stands gets time to set off.
-    first_s = POLICY.timing.shrink_after_s
-    limits = [each.speed_limit_mps for each in results if each.stamp_s > first_s + 1e-6]
+    limits = [each.speed_limit_mps for each in results]
     assert {each.obstacles == () for each in results if 1.0 < each.stamp_s < 1.95} == {False}
     assert max(b - a for a, b in pairwise(limits)) <= RISE_MPS2 * PERIOD_S + 1e-6
     assert results[-1].limited_by == "robot maximum"
@@ -170,17 +168,9 @@ def test_every_preset_remembers_people_it_lost() -> None:
 def test_losing_people_is_between_holding_and_forgetting_them(
     walk: list[tuple[float, set[int], bool]], places: list[tuple[float, float]]
 ) -> None:
-    """Whoever comes and goes, where nobody moves: unaware people who stand before the robot.
-
-    Without bounds on human acceleration, which do not count at first sight: whoever was held is
-    known, and gets more speed than somebody who comes back.
-    """
+    """Whoever comes and goes, where nobody moves: unaware people who stand before the robot."""
     policies = {"lost": POLICY, "forgotten": with_rise(None), "held": with_rise(0.7, hold_s=10.0)}
-    rules = {"rules": SpeedRules(start_reserve=StartReserve())}
-    adapters = {
-        name: NavAdapter(policy.model_copy(update=rules), ROBOT)
-        for name, policy in policies.items()
-    }
+    adapters = {name: NavAdapter(policy, ROBOT) for name, policy in policies.items()}
     now, before_mps = 0.0, MAXIMUM_MPS
     for dt, there, seen_late in walk:
         now += dt

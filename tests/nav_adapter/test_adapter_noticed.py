@@ -11,19 +11,14 @@ from nav_policies import policies, robots
 from nav_scenes import ROBOT, crowds, numbers, person, robot_at, settled_update
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
-from nav_adapter.policies import NoticedPeople, SpeedRules
 from tracking import PersonTrack
 
-# Without the reserve for people who set off, which would hide the differences.
-BALANCED = AwarenessPolicy(noticed=None, rules=SpeedRules())
-RULE = NoticedPeople(at_least=0.5, counts_as_awareness=0.6)
+
+def with_rule(policy: AwarenessPolicy, counts_as: float | None = 0.6) -> AwarenessPolicy:
+    return policy.model_copy(update={"noticed_counts_as": counts_as})
 
 
-def with_rule(policy: AwarenessPolicy, rule: NoticedPeople | None = RULE) -> AwarenessPolicy:
-    return policy.model_copy(update={"noticed": rule})
-
-
-NOTICED = with_rule(BALANCED)
+NOTICED = with_rule(AwarenessPolicy())
 
 
 def noticing(track: PersonTrack, noticed: float = 0.9) -> PersonTrack:
@@ -38,18 +33,19 @@ def constraints(*tracks: PersonTrack, policy: AwarenessPolicy = NOTICED) -> NavC
 UNAWARE = constraints(person())
 
 
-def test_it_counts_as_aware_and_not_as_watching() -> None:
+def test_it_counts_as_that_awareness_and_never_lowers_it() -> None:
     near = person(position=(2.0, 0.0))
     aware = constraints(replace(near, awareness_lower=0.6))
     assert numbers(constraints(noticing(near))) == numbers(aware)
     assert aware.speed_limit_mps > constraints(near).speed_limit_mps + 0.2
-    watches = replace(near, awareness_lower=0.9)
-    speed = AwarenessPolicy.preset("assertive").speed  # has a level for people who watch
-    two_levels = NOTICED.model_copy(update={"speed": speed})
-    aware = constraints(noticing(near), policy=two_levels)
-    watching = constraints(watches, policy=two_levels)
-    assert watching.speed_limit_mps > aware.speed_limit_mps + 0.05
-    assert numbers(constraints(noticing(watches), policy=two_levels)) == numbers(watching)
+    half = with_rule(AwarenessPolicy(), 0.4)
+    assert numbers(constraints(noticing(near), policy=half)) == numbers(
+        constraints(replace(near, awareness_lower=0.4), policy=half)
+    )
+    looks = replace(near, awareness_lower=0.9)
+    assert numbers(constraints(noticing(looks), policy=half)) == numbers(
+        constraints(looks, policy=half)
+    )
 
 
 def test_the_obstacle_says_which_bound_was_used() -> None:
@@ -63,7 +59,7 @@ def test_a_weak_belief_counts_nothing(noticed: float) -> None:
 
 
 @pytest.mark.parametrize("policy", ["conservative", "assertive", "blind"])
-def test_presets_without_the_rule_ignore_it(policy: str) -> None:
+def test_policies_without_the_rule_ignore_it(policy: str) -> None:
     preset = with_rule(AwarenessPolicy.preset(policy), None)
     with_belief = constraints(noticing(person()), policy=preset)
     assert numbers(with_belief) == numbers(constraints(person(), policy=preset))
@@ -72,7 +68,7 @@ def test_presets_without_the_rule_ignore_it(policy: str) -> None:
 @pytest.mark.parametrize("name", ["conservative", "blind"])
 def test_cautious_presets_have_no_memory(name: str) -> None:
     policy = AwarenessPolicy.preset(name)
-    assert policy.noticed is None
+    assert policy.noticed_counts_as is None
     assert policy.filter.noticed_memory_s == 0.0
 
 
@@ -112,28 +108,10 @@ def test_at_first_sight_and_after_a_jump_the_speed_is_that_for_the_unaware() -> 
     assert jumped.speed_limit_mps <= stranger.speed_limit_mps
 
 
-def test_it_holds_no_hysteresis() -> None:
-    """Hysteresis is held by looks: what one remembers must not prolong itself."""
-    speed = BALANCED.speed.model_copy(update={"shape": "hysteresis"})
-    inflation = BALANCED.inflation.model_copy(update={"shape": "hysteresis"})
-    policy = with_rule(BALANCED.model_copy(update={"speed": speed, "inflation": inflation}))
-    adapter = NavAdapter(policy, ROBOT)
-    for tick in range(8):
-        now = 0.1 * tick
-        adapter.update([noticing(person(now))], robot_at(now), now)
-    # A little awareness above unaware_below would hold somebody who was held before.
-    left = adapter.update([person(0.8, awareness_lower=0.2)], robot_at(0.8), 0.8)
-    never = constraints(person(awareness_lower=0.2), policy=policy)
-    assert left.speed_limit_mps == never.speed_limit_mps
-
-
-@pytest.mark.parametrize(
-    ("settings_", "message"),
-    [({"at_least": 0.0}, "at_least"), ({"counts_as_awareness": 1.1}, "counts_as_awareness")],
-)
-def test_settings_out_of_range_are_refused(settings_: dict[str, float], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        NoticedPeople(**settings_)
+@pytest.mark.parametrize("counts_as", [-0.1, 1.1, float("nan")])
+def test_settings_out_of_range_are_refused(counts_as: float) -> None:
+    with pytest.raises(ValueError, match="noticed_counts_as"):
+        AwarenessPolicy(noticed_counts_as=counts_as)
 
 
 @settings(max_examples=60, deadline=None)
@@ -151,8 +129,7 @@ def test_it_never_allows_more_than_that_awareness_itself(
     belief: float,
     level: float,
 ) -> None:
-    rule = NoticedPeople(at_least=0.5, counts_as_awareness=level)
-    ruled = with_rule(policy, rule)
+    ruled = with_rule(policy, level)
     remembered = [noticing(track, belief) for track in tracks]
     raised = [replace(track, awareness_lower=max(track.awareness_lower, level)) for track in tracks]
     without = settled_update(tracks, policy=ruled, robot=robot)

@@ -9,18 +9,27 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_scenes import FLOOR_M, ROBOT, crowds, finite, person, robot_at, settled_update
+from nav_scenes import (
+    FLOOR_M,
+    ROBOT,
+    crowds,
+    finite,
+    person,
+    policy_radius_m,
+    robot_at,
+    settled_update,
+)
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, max_speed_mps
-from nav_adapter.policies import SafetyMargins, SpeedRules
-from perception.anthropometry import BODY_RADIUS_M
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter.policies import SafetyMargins
 from tracking import PersonTrack
 
 PERIOD_S = 0.05
 RATE_MPS = AwarenessPolicy().timing.shrink_rate_mps
-HELD_S = AwarenessPolicy().timing.shrink_after_s
+FRESH_S = AwarenessPolicy().timing.fresh_within_s
+UNAWARE_M, AWARE_M = (policy_radius_m(AwarenessPolicy(), alpha) for alpha in (0.0, 1.0))
 
 
 def watch(adapter: NavAdapter, seconds: float, *, start_s: float = 0.0) -> list[NavConstraints]:
@@ -39,23 +48,30 @@ def radius(constraints: NavConstraints) -> float:
 
 def test_a_person_starts_large_and_shrinks_at_the_bounded_rate() -> None:
     radii = [radius(result) for result in watch(NavAdapter(AwarenessPolicy(), ROBOT), 2.0)]
-    assert radii[0] == 1.0
-    steps = [before - after for before, after in pairwise(radii)]
-    assert max(steps) <= RATE_MPS * PERIOD_S + 1e-9
-    # Not before awareness has held for four frames, from the second on: the first is unaware.
-    assert radii[4] == 1.0
-    assert radii[5] == pytest.approx(1.0 - RATE_MPS * PERIOD_S)
-    assert radii[10] == pytest.approx(1.0 - RATE_MPS * (0.5 - HELD_S))
-    assert radii[-1] == pytest.approx(0.45)
+    assert radii[0] == UNAWARE_M
+    for step, found in enumerate(radii):
+        expected_m = max(UNAWARE_M - RATE_MPS * PERIOD_S * step, AWARE_M)
+        assert found == pytest.approx(expected_m)
+    assert radii[-1] == AWARE_M < UNAWARE_M - 0.2
 
 
-def test_a_look_shorter_than_shrink_after_s_shrinks_nothing() -> None:
+def test_short_looks_shrink_no_more_than_the_time_they_last() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     for step in range(60):
         now = step * PERIOD_S
         alpha = 1.0 if step % 5 else 0.0
         result = adapter.update((person(now, awareness_lower=alpha),), robot_at(now), now)
-        assert radius(result) == 1.0
+        assert radius(result) == pytest.approx(UNAWARE_M - RATE_MPS * PERIOD_S * (step % 5))
+
+
+def test_awareness_raises_no_speed_at_first_sight() -> None:
+    """Frames must have shown somebody for 0.2 s."""
+    limits = [result.speed_limit_mps for result in watch(NavAdapter(AwarenessPolicy(), ROBOT), 0.5)]
+    unaware_mps = settled_update((person(),)).speed_limit_mps
+    aware_mps = settled_update((person(awareness_lower=1.0),)).speed_limit_mps
+    assert limits[:4] == [unaware_mps] * 4
+    assert limits[4:] == [aware_mps] * 6
+    assert aware_mps > unaware_mps
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.2, 0.3, 0.45])
@@ -68,8 +84,8 @@ def test_late_frames_reduce_the_uncertainty_of_the_first_sighting(late_s: float)
         sigma_m = 0.4 if step == 0 else 0.05
         track = person(now, sigma_m=sigma_m, unseen_s=late_s, awareness_lower=0.0)
         radii.append(radius(adapter.update((track,), robot_at(now), now)))
-    assert radii[0] == pytest.approx(1.0 + 2.0 * 0.4)
-    assert radii[-1] == pytest.approx(1.0 + 2.0 * 0.05)
+    assert radii[0] == pytest.approx(UNAWARE_M + 2.0 * 0.4)
+    assert radii[-1] == pytest.approx(UNAWARE_M + 2.0 * 0.05)
     assert max(before - after for before, after in pairwise(radii)) <= RATE_MPS * PERIOD_S + 1e-9
 
 
@@ -79,7 +95,7 @@ def test_late_frames_are_no_evidence_of_awareness() -> None:
         now = step * PERIOD_S
         track = person(now, unseen_s=0.3, awareness_lower=1.0)
         result = adapter.update((track,), robot_at(now), now)
-        assert radius(result) == 1.0
+        assert radius(result) == UNAWARE_M
         assert result.obstacles[0].awareness_lower == 0.0
 
 
@@ -87,7 +103,7 @@ def test_obstacles_grow_at_once() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     watch(adapter, 2.0)
     result = adapter.update((person(2.0, awareness_lower=0.0),), robot_at(2.0), 2.0)
-    assert radius(result) == 1.0
+    assert radius(result) == UNAWARE_M
 
 
 @pytest.mark.parametrize("control_period_s", [0.01, 0.03, 0.1, 0.2])
@@ -102,7 +118,7 @@ def test_shrinking_depends_on_time_and_not_on_the_number_of_updates(
         result = adapter.update((person(frame, awareness_lower=1.0),), robot_at(now), now)
     # The first frame counts as aware only if there are two updates with it.
     late_s = max(control_period_s, PERIOD_S)
-    expected = 1.0 - RATE_MPS * (0.6 - HELD_S)
+    expected = UNAWARE_M - RATE_MPS * 0.6
     assert radius(result) == pytest.approx(expected, abs=RATE_MPS * late_s + 1e-9)
 
 
@@ -136,7 +152,7 @@ def test_losing_the_camera_never_shrinks_a_radius(
         assert radius(after) >= radius(before)
         assert after.speed_limit_mps <= before.speed_limit_mps + 1e-12
         before = after
-    assert radius(before) == 1.0
+    assert radius(before) == UNAWARE_M
     assert before.obstacles[0].awareness_lower == 0.0
 
 
@@ -209,16 +225,16 @@ def test_a_confirmed_person_who_disappears_is_held_as_unaware_and_moving() -> No
         now = step * PERIOD_S
         track = person(now, position=(3.0, now), velocity=(0.0, 1.0), awareness_lower=1.0)
         seen = adapter.update((track,), robot_at(now), now)
-    assert seen.obstacles[0].radius_m == pytest.approx(0.45)
+    assert seen.obstacles[0].radius_m == pytest.approx(AWARE_M)
     for gone_s in (0.1, 0.5, 0.99):
         now = 2.0 + gone_s
         held = adapter.update((), robot_at(now), now)
         (obstacle,) = held.obstacles
         assert obstacle.center_odom_m == pytest.approx([3.0, now])
-        assert obstacle.radius_m == 1.0
+        assert obstacle.radius_m == UNAWARE_M
         assert obstacle.awareness_lower == 0.0
         assert held.speed_limit_mps < seen.speed_limit_mps
-        assert held.limited_by == "track 1: speed and separation"
+        assert held.limited_by == "track 1: reach"
     assert adapter.update((), robot_at(3.01), 3.01).obstacles == ()
 
 
@@ -227,61 +243,37 @@ def test_a_person_who_returns_continues_with_the_held_radius() -> None:
     watch(adapter, 2.0)
     adapter.update((), robot_at(2.3), 2.3)
     back = adapter.update((person(2.6, awareness_lower=1.0),), robot_at(2.6), 2.6)
-    # One sighting is no evidence for the time of the absence.
-    assert radius(back) == 1.0
+    # One sighting is no evidence for the whole time of the absence.
+    assert radius(back) == pytest.approx(UNAWARE_M - RATE_MPS * FRESH_S)
     for step in range(1, 6):
         now = 2.6 + step * PERIOD_S
         back = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
-    assert radius(back) == pytest.approx(1.0 - RATE_MPS * 2 * PERIOD_S)
+    assert radius(back) == pytest.approx(UNAWARE_M - RATE_MPS * (FRESH_S + 5 * PERIOD_S))
 
 
-def test_two_levels_over_time() -> None:
-    """Between the thresholds the level stays the same; without evidence it is unaware."""
-    levels = {"shape": "two_level", "unaware_below": 0.2, "aware_above": 0.6}
-    # Without the bounds on human acceleration, which do not hold at first sight.
-    policy = AwarenessPolicy(inflation=levels, speed=levels, rules=SpeedRules())
-    adapter, limits, radii = NavAdapter(policy, ROBOT), [], []
-    phases = [0.5] * 40 + [0.7] * 40 + [0.4] * 40 + [0.1] + [0.4] * 20
-    for step, alpha in enumerate(phases):
-        now = step * PERIOD_S
-        result = adapter.update((person(now, awareness_lower=alpha),), robot_at(now), now)
-        radii.append(radius(result))
-        limits.append(result.speed_limit_mps)
-    assert radii[39] == 1.0
-    assert radii[79] == radii[119] == pytest.approx(0.45)
-    assert set(radii[120:]) == {1.0}
-    assert limits[39] < limits[40] == limits[119]
-    assert set(limits[120:]) == {limits[0]}
-    for _ in range(2):  # lost while held
-        adapter.update((person(now, awareness_lower=0.7),), robot_at(now), now)
-    gone = adapter.update((person(now, awareness_lower=0.7),), robot_at(now + 0.3), now + 0.3)
-    assert gone.speed_limit_mps <= limits[0]
-    assert radius(gone) == 1.0
-
-
-@given(seen_sigmas=finite(0.0, 3.0), unseen_sigmas=finite(0.0, 4.0), sigma_m=finite(0.0, 0.4))
+@given(
+    seen_sigmas=finite(0.0, 3.0),
+    unseen_sigmas=finite(0.0, 4.0),
+    sigma_m=finite(0.0, 0.4),
+    reach=st.booleans(),
+)
+@settings(max_examples=40)
 def test_unseen_people_count_with_more_standard_deviations(
-    seen_sigmas: float, unseen_sigmas: float, sigma_m: float
+    seen_sigmas: float, unseen_sigmas: float, sigma_m: float, reach: bool
 ) -> None:
-    margins = SafetyMargins(uncertainty_sigmas=seen_sigmas, unseen_sigmas=unseen_sigmas)
-    policy = AwarenessPolicy(margins=margins)
-    gap_m = 3.0 - float(ROBOT.footprint_m[:, 0].max()) - BODY_RADIUS_M
+    """As many of a tracked place as if the place were certain and the clearance as much larger."""
+    policy = AwarenessPolicy() if reach else AwarenessPolicy(reach=None)
 
-    def limit_mps(unseen_s: float) -> float:
-        adapter = NavAdapter(policy, ROBOT)
-        track = person(position=(3.0, 0.0), sigma_m=sigma_m, unseen_s=unseen_s)
+    def limit_mps(margins: SafetyMargins, sigma_m: float, unseen_s: float) -> float:
+        adapter = NavAdapter(policy.model_copy(update={"margins": margins}), ROBOT)
+        track = person(position=(2.5, 0.0), sigma_m=sigma_m, unseen_s=unseen_s)
         return adapter.update((track,), robot_at(), 0.0).speed_limit_mps
 
+    margins = SafetyMargins(uncertainty_sigmas=seen_sigmas, unseen_sigmas=unseen_sigmas)
     for unseen_s, sigmas in ((0.24, seen_sigmas), (0.26, max(seen_sigmas, unseen_sigmas))):
-        separation_mps = max_speed_mps(
-            gap_m - sigmas * sigma_m,
-            policy.speed.human_speed_mps(0.0),
-            deceleration_mps2=ROBOT.max_deceleration_mps2,
-            reaction_time_s=ROBOT.reaction_time_s,
-            clearance_m=margins.separation_clearance_m,
-        )
-        expected_mps = min(ROBOT.max_speed_mps, float(separation_mps))
-        assert limit_mps(unseen_s) == pytest.approx(expected_mps, abs=1e-9)
+        wider = SafetyMargins(clearance_m=0.10 + sigmas * sigma_m)
+        expected_mps = limit_mps(wider, 0.0, unseen_s)
+        assert limit_mps(margins, sigma_m, unseen_s) == pytest.approx(expected_mps, abs=0.03)
 
 
 def test_obstacles_stop_growing_during_a_long_silence() -> None:
@@ -294,11 +286,11 @@ def test_obstacles_stop_growing_during_a_long_silence() -> None:
         result = adapter.watchdog(float(step))
     assert result.speed_limit_mps == 0.0
     sigma_m = math.sqrt(0.01 + 1.5**2 * 0.09)
-    assert radius(result) == pytest.approx(1.0 + 2.0 * sigma_m)
+    assert radius(result) == pytest.approx(UNAWARE_M + 2.0 * sigma_m)
     silent = NavAdapter(AwarenessPolicy(), ROBOT)
     silent.update((replace(walker, covariance_odom=covariance),), robot_at(), 0.0)
     back = silent.update((person(30.0, awareness_lower=1.0),), robot_at(30.0), 30.0)
-    assert radius(back) == pytest.approx(1.2)
+    assert radius(back) == pytest.approx(UNAWARE_M + 0.2)
 
 
 def test_a_tentative_or_long_unseen_person_is_not_held() -> None:

@@ -17,7 +17,8 @@ from tracking import PersonTrack
 
 
 def constraints_for(*tracks: PersonTrack) -> NavConstraints:
-    return NavAdapter(AwarenessPolicy(), ROBOT).update(tracks, robot_at(), 0.0)
+    # Without reach the unaware radius is that of the policy, 1 m.
+    return NavAdapter(AwarenessPolicy(reach=None), ROBOT).update(tracks, robot_at(), 0.0)
 
 
 def brute_force(

@@ -10,9 +10,10 @@ from hypothesis import given
 from nav_scenes import ROBOT, crowds, finite, person, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, PersonObstacle
-from nav_adapter._memory import position_sigma_m
+from nav_adapter._people import position_sigma_m
 from nav_adapter.exporters import predicted_circles, predicted_people
 from tracking import PersonTrack
+from tracking.prediction import PredictionModel
 
 TIMES_S = np.array([0.0, 0.4, 1.0, 3.0])
 
@@ -36,22 +37,31 @@ def test_means_are_those_of_the_circles_and_covariances_are_valid(
     assert (np.linalg.eigvalsh(people.covariances_odom_m2) > -1e-9).all()
 
 
-@given(tracks=crowds(), density=finite(0.0, 1.0), growth=finite(0.0, 1.0), t_s=finite(0.0, 3.0))
+def with_white_acceleration(density_m2ps3: float) -> PredictionModel:
+    """Return constant velocity with white acceleration and nothing else."""
+    return PredictionModel(
+        lag_per_s2=0.0,
+        acceleration_density_m2ps3=density_m2ps3,
+        change_mps=0.0,
+        slow_change_mps=0.0,
+        sway_s=0.0,
+        max_speed_mps=15.0,
+        max_acceleration_mps2=50.0,
+    )
+
+
+@given(tracks=crowds(), t_s=finite(0.0, 3.0))
 def test_the_largest_deviation_is_that_of_the_adapter(
-    tracks: tuple[PersonTrack, ...], density: float, growth: float, t_s: float
+    tracks: tuple[PersonTrack, ...], t_s: float
 ) -> None:
     """The adapter predicts the track from its own stamp, in plain Python."""
-    people = predicted_people(
-        constraints_for(tracks),
-        [t_s],
-        acceleration_density_m2ps3=density,
-        overconfidence_per_s=growth,
-    )
+    now = constraints_for(tracks)
+    people = predicted_people(now, [t_s], model=with_white_acceleration(0.0))
     by_id = sorted(tracks, key=lambda track: track.id)
     for track, covariances in zip(by_id, people.covariances_odom_m2, strict=True):
-        variance = position_sigma_m(track, t_s) ** 2 + density * t_s**3 / 3.0
+        variance = position_sigma_m(track, t_s - track.stamp_s) ** 2
         largest = float(np.linalg.eigvalsh(covariances[0])[-1])
-        assert largest == pytest.approx(variance * (1.0 + growth * t_s), abs=1e-9)
+        assert largest == pytest.approx(variance, abs=1e-9)
 
 
 def test_the_covariance_is_that_of_sampled_walks() -> None:
@@ -78,12 +88,8 @@ def test_the_covariance_is_that_of_sampled_walks() -> None:
         kick = rng.normal(0.0, math.sqrt(density * step_s), (count, 2))
         state[:, :2] += step_s * (state[:, 2:] + 0.5 * kick)
         state[:, 2:] += kick
-    people = predicted_people(
-        constraints_for((track,)),
-        [horizon_s],
-        acceleration_density_m2ps3=density,
-        overconfidence_per_s=0.0,
-    )
+    model = with_white_acceleration(density)
+    people = predicted_people(constraints_for((track,)), [horizon_s], model=model)
     np.testing.assert_allclose(people.means_odom_m[0, 0], state[:, :2].mean(axis=0), atol=0.02)
     np.testing.assert_allclose(
         people.covariances_odom_m2[0, 0], np.cov(state[:, :2].T), rtol=0.04, atol=0.01
@@ -116,9 +122,6 @@ def test_what_is_not_known_is_refused() -> None:
     nobody = predicted_people(NavConstraints(0.0, (), 1.0, "a test", False), TIMES_S)
     assert nobody.means_odom_m.shape == (0, 4, 2)
     assert nobody.covariances_odom_m2.shape == (0, 4, 2, 2)
-    for arguments in ({"acceleration_density_m2ps3": -1.0}, {"overconfidence_per_s": math.nan}):
-        with pytest.raises(NavError, match=next(iter(arguments))):
-            predicted_people(constraints_for(()), TIMES_S, **arguments)
     with pytest.raises(NavError, match="times_s"):
         predicted_people(constraints_for(()), [-0.1])
     with pytest.raises(NavError, match="covariance_odom"):

@@ -6,18 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given, settings
 from nav_scenes import ROBOT, crowds, person, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
 from nav_adapter.exporters import predicted_circles, predicted_people, speed_limit_at
-from nav_adapter.policies import ObstacleOutline
 from tracking import PersonTrack
 from tracking.prediction import FITTED, PredictionModel, predict_ahead
 
 TIMES_S = np.array([0.0, 0.2, 0.5, 1.0, 2.0])
-SWEEPING = AwarenessPolicy().model_copy(update={"outline": ObstacleOutline(sweep_s=2.0)})
 
 
 def walker(**arguments: object) -> PersonTrack:
@@ -32,9 +29,8 @@ def constraints_for(
     prediction: PredictionModel | None = None,
     *,
     speed_mps: float = 0.0,
-    policy: AwarenessPolicy = SWEEPING,
 ) -> NavConstraints:
-    adapter = NavAdapter(policy, ROBOT, prediction=prediction)
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT, prediction=prediction)
     return adapter.update(tracks, robot_at(0.0, speed_mps=speed_mps), 0.0)
 
 
@@ -47,29 +43,7 @@ def test_circles_and_limits_are_those_without_a_prediction(tracks: tuple[PersonT
     for one, other in zip(plain.obstacles, wide.obstacles, strict=True):
         assert one.radius_m == other.radius_m
         np.testing.assert_array_equal(one.center_odom_m, other.center_odom_m)
-        # Rings of the same disc may differ in the last digit after the hull.
-        assert other.polygon.buffer(1e-9).contains(shapely.Point(*other.center_odom_m))
-
-
-def test_swept_polygons_hold_the_predicted_region_and_no_more() -> None:
-    track = walker(position=(4.0, 1.0))
-    obstacle = constraints_for((track,), FITTED).obstacles[0]
-    ahead = predict_ahead(track, [2.0])
-    sigma_m = float(np.sqrt(np.linalg.eigvalsh(ahead.covariances_odom_m2[0, 0])[-1]))
-    rim_m = obstacle.radius_m + 2.0 * (sigma_m - 0.1)
-    inner = shapely.Point(4.0, 1.0).buffer(rim_m - 1e-6, quad_segs=64)
-    outer = shapely.Point(4.0, 1.0).buffer(1.01 * rim_m, quad_segs=64)
-    assert obstacle.polygon.contains(inner)
-    assert outer.contains(obstacle.polygon)
-
-
-def test_people_who_walk_on_are_swept_less_widely_than_those_who_may_set_off() -> None:
-    """The policy's outline makes no difference between the two."""
-    walking, standing = walker(velocity=(1.4, 0.0)), walker(track_id=2, position=(3.0, 9.0))
-    for model, narrower in ((None, False), (FITTED, True)):
-        one, other = constraints_for((walking, standing), model).obstacles
-        across = [each.polygon.bounds[3] - each.polygon.bounds[1] for each in (one, other)]
-        assert (across[0] < 0.9 * across[1]) is narrower
+        assert one.polygon.equals(other.polygon)
 
 
 def test_the_speed_field_is_more_cautious_the_further_ahead() -> None:
@@ -78,7 +52,7 @@ def test_the_speed_field_is_more_cautious_the_further_ahead() -> None:
     poses = np.zeros((1, 20, 2))
     before, after = (speed_limit_at(each, poses, dt_s=0.1)[0] for each in (plain, wide))
     assert after[0] == pytest.approx(before[0], abs=0.02)
-    assert (np.diff(after) < 0.0).all()
+    assert (np.diff(after) <= 0.0).all()
     assert np.ptp(before) < 1e-6
     assert after[-1] < before[-1] - 0.1
 
@@ -132,7 +106,5 @@ def test_arguments_that_do_not_fit_are_refused() -> None:
     constraints = constraints_for((walker(),))
     with pytest.raises(NavError, match="prediction must be a PredictionModel or None, got str"):
         NavAdapter(AwarenessPolicy(), ROBOT, prediction="prediction.yaml")  # type: ignore[arg-type]
-    with pytest.raises(NavError, match="got both"):
-        predicted_people(constraints, TIMES_S, model=FITTED, overconfidence_per_s=0.5)
     with pytest.raises(NavError, match="sigmas"):
         predicted_circles(constraints, TIMES_S, model=FITTED, sigmas=-1.0)

@@ -121,7 +121,7 @@ def on_base(T_base_child: np.ndarray, child: str, linear=(0.3, 0.0, 0.0), angula
 @lru_cache
 def reference_limit() -> float:
     (*_, last) = Robot().drive(2.0, standing_at(HERE))
-    assert last.limited_by == "track 1: speed and separation"
+    assert last.limited_by == "track 1: reach"
     return last.speed_limit_mps
 
 
@@ -280,7 +280,7 @@ def test_a_contradiction_that_ends_is_forgotten_and_the_limit_rises_slowly() -> 
     stand = standing_at(HERE, linear=(0.0, 0.0, 0.0))
     constraints = robot.drive(6.0, stand, apart, START_S + 3.0)
     limits = [each.speed_limit_mps for each in constraints]
-    assert limits[-1] == pytest.approx(reference_limit())
+    assert limits[-1] == pytest.approx(reference_limit(), abs=0.03)
     # From the speed of the robot, by its acceleration over at most the time that counts as fresh.
     assert max(np.diff(limits)) <= 0.25 + 1e-9
 

@@ -5,12 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from nav_adapter import AwarenessPolicy, InflationPolicy, SpeedPolicy
-from nav_adapter.policies import (
-    InterpolatedHumanSpeed,
-    InterpolatedInflation,
-    TableHumanSpeed,
-    TableInflation,
-)
+from nav_adapter.policies import InterpolatedHumanSpeed, InterpolatedInflation
 from nav_adapter.ros2 import RobotFile
 from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
@@ -49,8 +44,8 @@ CONFIG_PAGES: Final = {
         f"The keys of a policy's file, for [policies](../policies.md). {_KEYS}",
         AwarenessPolicy,
         alternatives={
-            InflationPolicy: (InterpolatedInflation, TableInflation),
-            SpeedPolicy: (InterpolatedHumanSpeed, TableHumanSpeed),
+            InflationPolicy: (InterpolatedInflation,),
+            SpeedPolicy: (InterpolatedHumanSpeed,),
         },
     ),
     "scenario-keys": ConfigPage(

@@ -1,0 +1,133 @@
+"""The presets: their order at every instant, and what tells them apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_policies import robots
+from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
+
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
+from tracking import PersonTrack
+
+PRESETS = ("blind", "conservative", "balanced", "assertive")
+#: The first of each pair is at least as careful at every instant.
+ORDERED = (
+    ("conservative", "balanced"),
+    ("balanced", "assertive"),
+    ("conservative", "assertive"),
+    ("blind", "balanced"),
+    ("blind", "assertive"),
+)
+ROUNDING = 1e-9
+
+#: Time step, speed and yaw rate of the robot, and its people relative to the stamp.
+Walk = list[tuple[float, float, float, tuple[PersonTrack, ...]]]
+
+
+@st.composite
+def walks(draw: st.DrawFn) -> Walk:
+    """The same people in every update, who come, look, notice, coast, jump and disappear."""
+    people = draw(crowds(max_size=2))
+    steps = draw(st.lists(st.sampled_from([0.05, 0.1, 0.25, 0.7]), min_size=2, max_size=12))
+    walk = []
+    for dt in steps:
+        present = tuple(
+            replace(
+                track,
+                stamp_s=-draw(st.sampled_from([0.0, 0.0, 0.03])),
+                status=draw(st.sampled_from(["confirmed", "confirmed", "coasting"])),
+                time_since_seen_s=draw(st.sampled_from([0.0, 0.0, 0.0, 0.4])),
+                awareness_lower=draw(st.sampled_from([0.0, 0.15, 0.55, 0.9]) | finite(0.0, 1.0)),
+                noticed=draw(st.sampled_from([0.0, 0.9])),
+            )
+            for track in people
+            if draw(st.integers(0, 9))
+        )
+        yaw_radps = draw(st.just(0.0) | finite(-1.0, 1.0))
+        walk.append((dt, draw(finite(-1.5, 1.5)), yaw_radps, present))
+    return walk
+
+
+def run(policy: AwarenessPolicy, robot: RobotProfile, walk: Walk) -> list[NavConstraints]:
+    adapter, now, results = NavAdapter(policy, robot), 0.0, []
+    for dt, speed_mps, yaw_radps, people in walk:
+        now += dt
+        tracks = tuple(replace(track, stamp_s=track.stamp_s + now) for track in people)
+        state = replace(robot_at(now, heading_rad=0.3, speed_mps=speed_mps))
+        state = replace(state, yaw_rate_radps=yaw_radps)
+        results.append(adapter.update(tracks, state, now, perception_stamp_s=now))
+    return results
+
+
+@settings(max_examples=60)
+@given(robot=st.just(ROBOT) | robots(), walk=walks())
+def test_presets_are_ordered_at_every_instant(robot: RobotProfile, walk: Walk) -> None:
+    results = {name: run(AwarenessPolicy.preset(name), robot, walk) for name in PRESETS}
+    for careful, bold in ORDERED:
+        for a, b in zip(results[careful], results[bold], strict=True):
+            assert a.speed_limit_mps <= b.speed_limit_mps + ROUNDING, (careful, bold)
+            radii = zip(a.obstacles, b.obstacles, strict=True)
+            assert all(wide.radius_m >= narrow.radius_m - ROUNDING for wide, narrow in radii), (
+                careful,
+                bold,
+            )
+
+
+@settings(max_examples=40)
+@given(robot=st.just(ROBOT) | robots(), walk=walks())
+def test_no_preset_is_looser_than_the_protective_field_of_todays_robots(
+    robot: RobotProfile, walk: Walk
+) -> None:
+    """Nobody is treated worse: claim of docs/safety.md."""
+    for name in PRESETS:
+        policy = AwarenessPolicy.preset(name)
+        field = policy.model_copy(update={"reach": None})
+        for a, b in zip(run(policy, robot, walk), run(field, robot, walk), strict=True):
+            assert a.speed_limit_mps <= b.speed_limit_mps + ROUNDING, name
+
+
+def limits(name: str) -> dict[str, float]:
+    """Return the limits of a robot at 0.8 m/s where presets matter: near people ahead or beside."""
+    places = {"ahead": (2.0, 0.0), "beside": (1.2, 0.9)}
+    people = {
+        "unaware": {"awareness_lower": 0.0},
+        "half aware": {"awareness_lower": 0.4},
+        "aware": {"awareness_lower": 1.0},
+    }
+    policy, found = AwarenessPolicy.preset(name), {}
+    for place, position in places.items():
+        for who, alpha in people.items():
+            track = person(position=position, **alpha)
+            state = robot_at(speed_mps=0.8)
+            limit = settled_update((track,), policy=policy, state=state).speed_limit_mps
+            found[f"{who} {place}"] = limit
+        noticed = replace(person(position=position), noticed=0.9)
+        result = settled_update((noticed,), policy=policy, state=robot_at(speed_mps=0.8))
+        found[f"noticed {place}"] = result.speed_limit_mps
+    return found
+
+
+@pytest.mark.parametrize(("one", "other"), list(combinations(PRESETS, 2)))
+def test_each_pair_of_presets_differs_where_it_matters(one: str, other: str) -> None:
+    """By at least 5 % of the limit, for somebody near the robot's way."""
+    a, b = limits(one), limits(other)
+    apart = {key: abs(a[key] - b[key]) / max(a[key], b[key]) for key in a}
+    assert max(apart.values()) >= 0.05, apart
+
+
+def test_awareness_is_worth_more_than_a_choice_of_preset() -> None:
+    """Beside somebody who has noticed the robot ``balanced`` drives as fast as ``blind`` alone."""
+    blind, balanced = limits("blind"), limits("balanced")
+    for who in ("aware", "noticed"):
+        assert balanced[f"{who} beside"] > 1.3 * blind[f"{who} beside"]
+    for place in ("ahead", "beside"):
+        assert balanced[f"unaware {place}"] == pytest.approx(blind[f"unaware {place}"])
+    assert np.isclose(
+        limits("conservative")["noticed beside"], limits("conservative")["unaware beside"]
+    )
