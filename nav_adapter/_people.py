@@ -211,19 +211,21 @@ class People:
         if rules is None:
             return None
         track = person.track
-        aware_mps = self._unaware_mps
+        speed_mps = self._unaware_mps
         if not person.is_at_first_sight:
-            aware_mps = self._policy_speed_mps(person.awareness_lower)
-        # Whoever is faster than that may stay so.
+            speed_mps = self._policy_speed_mps(person.awareness_lower)
         velocity = person.velocity_odom_mps
-        faster_mps = max(math.hypot(*velocity) - self._unaware_mps, 0.0)
+        walking_mps = math.hypot(*velocity)
+        if walking_mps > self._unaware_mps > 0.0:
+            # Faster people may stay so. In proportion, so that presets stay ordered.
+            speed_mps *= walking_mps / self._unaware_mps
         # Between the frame that showed the person and the track's stamp nobody looked. The
         # covariance grows with it; what they began in the last moments it does not know.
         unseen_s = min(max(track.stamp_s - person.seen_stamp_s, 0.0), self._timing.fresh_within_s)
         return Reach(
             *person.track_position_odom_m,
             *velocity,
-            aware_mps + faster_mps,
+            speed_mps,
             rules.time_constant_s,
             rules.delay_s + unseen_s,
             min(max(now - track.stamp_s, 0.0), OLDEST_S),
