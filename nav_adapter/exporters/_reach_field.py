@@ -1,36 +1,37 @@
-"""The limit of :mod:`nav_adapter.limit` at many poses at once: the same steps, on arrays.
+"""The limit of :mod:`nav_adapter.limit` at many poses at once, a lower bound of it.
 
-It is a lower bound of :func:`~nav_adapter.limit.limit_mps`, since its steps of time are not
-refined. Values are floats, or arrays of one number per time or per pose.
+The steps of time are those of :func:`~nav_adapter.limit.limit_mps`. The one in which the robot
+stops is halved where it decides, as there. Each person is computed only at poses where they may
+lower the limit that others set, the nearest first.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
-from typing import Any, Final, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from .._people import Person, position_sigma_m
-from .._predicted import predicted_sigmas_m
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
-from ..limit import ROOM, STANDING_MPS, STEPS
-from ..reach import covariance_terms
+from ..limit import STANDING_MPS
+from ._people_ahead import PARTS, Reaches, people_ahead
 
 Value = Any
-# Ages closer than this are equal.
-_SAME_AGE_S: Final = 1e-9
-# A limit is lowered by this share of itself, for rounding.
-_ROUNDING: Final = 1e-9
+# Pairs of pose and person that are computed together, so that their numbers stay in the cache.
+_TOGETHER: Final = 16384
+# A limit is lowered by this share of itself, for rounding in single precision.
+_ROUNDING: Final = 1e-5
+# What is less than this far on the other side counts as on this side, for the same reason.
+_NEAR_M: Final = np.float32(1e-5)
+# Instead of an infinite way.
+_NOWHERE_M: Final = np.float32(1e9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +65,6 @@ class Courses:
     half_m: Value = 0.0
     straight: tuple[Value, ...] = ()
 
-    def at(self, rows: Any) -> Courses:
-        """Return the courses of some poses."""
-
-        def chosen(value: Value) -> Value:
-            if isinstance(value, tuple):
-                return tuple(chosen(each) for each in value)
-            return value[rows] if isinstance(value, np.ndarray) else value
-
-        return replace(
-            self, **{each.name: chosen(getattr(self, each.name)) for each in fields(self)}
-        )
-
 
 def courses_of(
     robot: RobotProfile,
@@ -84,6 +73,7 @@ def courses_of(
     headings_rad: FloatArray | None,
     velocities_mps: tuple[FloatArray, Value] | None,
     yaw_rates_radps: Value,
+    anywhere: bool = False,
 ) -> Courses:
     """Return the courses at poses (N, 2), as :func:`~nav_adapter.limit.course_of` has them.
 
@@ -94,6 +84,7 @@ def courses_of(
         headings_rad: (N,), or None for any.
         velocities_mps: forward and left, (N,), or None for a robot that drives forwards.
         yaw_rates_radps: (N,), or 0.
+        anywhere: whether the robot starts in any direction.
     """
     x, y = positions_m.T
     age_s = basis.robot_age_s
@@ -106,14 +97,13 @@ def courses_of(
     faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
     driven_m = np.minimum(travel * age_s + faster_m, fastest * age_s)
     if headings_rad is None or (basis.policy.reach is None and velocities_mps is None):
-        return Courses(x, y, driven_m)
+        return Courses(x, y, _single(driven_m))
     turn_rad = 0.0 if basis.policy.reach is None else math.radians(basis.policy.reach.turn_deg)
     off: Value = 0.0
     speed: Value = travel
     fan_rad: Value = turn_rad
     if velocities_mps is not None:
-        sideways = np.abs(left) > LATERAL_NOISE_MPS
-        speed = np.where(sideways, travel, np.abs(forward))
+        sideways, speed = np.abs(left) > LATERAL_NOISE_MPS, _speed_mps(forward, left)
         off = np.where(forward <= -STANDING_MPS, math.pi, 0.0)
         off = np.where(sideways, np.arctan2(left, forward), off)
         if robot.moves_sideways is not False:
@@ -122,288 +112,422 @@ def courses_of(
     stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
     chord_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
     fan_rad = np.minimum(fan_rad + np.abs(chord_rad), math.pi)
-    middle_rad = headings_rad + off + chord_rad
-    straight = _extents_m(robot, off, 0.0)
-    return Courses(
-        *(x, y, driven_m, np.cos(middle_rad), np.sin(middle_rad)),
-        *(np.cos(fan_rad), np.sin(fan_rad)),
-        *_extents_m(robot, off, np.abs(chord_rad)),
-        straight=(np.cos(headings_rad + off), np.sin(headings_rad + off), *straight),
-    )
+    straight_rad = headings_rad + off
+    extent = _extents_m(robot, off)
+    straight = middle = (*_directions(straight_rad), *extent)
+    if np.any(chord_rad):
+        swung = _swung(robot, extent, np.abs(chord_rad))
+        middle = (*_directions(straight_rad + chord_rad), *swung)
+    if anywhere:
+        return Courses(x, y, _single(driven_m), straight=straight)
+    fan = _directions(fan_rad)
+    cos, sin, *extents = middle
+    return Courses(x, y, _single(driven_m), cos, sin, *fan, *extents, straight=straight)
 
 
-def _extents_m(robot: RobotProfile, off_rad: Value, swing_rad: Value) -> tuple[Value, Value, Value]:
-    """Return what :func:`~nav_adapter.limit._extent_m` does, for arrays of angles."""
-    corners = robot.footprint_m
-    cos, sin = np.cos(off_rad)[..., None], np.sin(off_rad)[..., None]
-    along = cos * corners[:, 0] + sin * corners[:, 1]
-    across = cos * corners[:, 1] - sin * corners[:, 0]
-    front, rear, half = along.max(-1), along.min(-1), np.abs(across).max(-1)
-    if np.ndim(swing_rad) == 0 and swing_rad == 0.0:
-        return front, rear, half
-    radius, swing_rad = robot.circumscribed_radius_m, np.minimum(swing_rad, 0.5 * math.pi)
-    cos, sin = np.cos(swing_rad), np.sin(swing_rad)
-    swung = half * cos + np.maximum(front, -rear) * sin
+def _speed_mps(forward: Value, left: Value) -> Value:
+    """Return the speed on the course: lateral noise does not count."""
+    return np.where(np.abs(left) > LATERAL_NOISE_MPS, np.hypot(forward, left), np.abs(forward))
+
+
+def _single(value: Value) -> Value:
+    return np.asarray(value, dtype=np.float32)
+
+
+def _directions(angle_rad: Value) -> tuple[Value, Value]:
+    """Return cosine and sine in single precision."""
+    return _single(np.cos(angle_rad)), _single(np.sin(angle_rad))
+
+
+def _extents_m(robot: RobotProfile, off_rad: Value) -> tuple[Value, Value, Value]:
+    """Return front, rear and half the width along a course ``off_rad`` from the heading."""
+    if not np.any(off_rad):
+        off_rad = 0.0
+    cos, sin = _directions(off_rad)
+    front, rear, half = -np.inf, np.inf, 0.0
+    for x, y in robot.footprint_m.astype(np.float32):
+        along, across = cos * x + sin * y, cos * y - sin * x
+        front, rear = np.maximum(front, along), np.minimum(rear, along)
+        half = np.maximum(half, np.abs(across))
+    return front + _NEAR_M, rear - _NEAR_M, half + _NEAR_M
+
+
+def _swung(
+    robot: RobotProfile, extent_m: tuple[Value, Value, Value], swing_rad: Value
+) -> tuple[Value, Value, Value]:
+    """Return what they are for a footprint turned by up to ``swing_rad`` either way."""
+    (front, rear, half), radius = extent_m, np.float32(robot.circumscribed_radius_m + _NEAR_M)
+    cos, sin = _directions(np.minimum(swing_rad, 0.5 * math.pi))
     return (
-        np.where(swing_rad > 0.0, np.minimum(front + half * sin, radius), front),
-        np.where(swing_rad > 0.0, np.maximum(rear - half * sin, -radius), rear),
-        np.where(swing_rad > 0.0, np.minimum(swung, radius), half),
+        np.where(sin > 0.0, np.minimum(front + half * sin, radius), front),
+        np.where(sin > 0.0, np.maximum(rear - half * sin, -radius), rear),
+        np.where(sin > 0.0, np.minimum(half * cos + np.maximum(front, -rear) * sin, radius), half),
     )
 
 
-class PersonAhead(NamedTuple):
-    """One person at T times, as the adapter will know them if they go straight on.
+@dataclass(slots=True)
+class _Pairs:
+    """Pairs of a pose and a person in a time, as arrays (n,) or numbers that all have.
 
     Attributes:
-        track_id: of the person.
-        x_m: place ``elapsed_s`` before each time, a float or (T,) like all of them.
-        y_m: the same.
-        velocity_x_mps: a float.
-        velocity_y_mps: a float.
-        speed_mps: U.
-        delay_s: δ.
-        elapsed_s: age of the place.
-        variances: a₀, a₁ and a₂ of :class:`~nav_adapter.reach.Reach`.
-        body_m: body radius and uncertainty of the present place.
-        least_mps: what a lost person allows at least, or None.
+        row: of the tables.
+        x_m: place along the middle of the fan, from the base.
+        y_m: the same across it.
+        velocity_x_mps: along it.
+        velocity_y_mps: across it.
+        fan_cos: of the course; None for a robot that may go anywhere at once.
+        fan_sin: the same.
+        front_m: the same, or the radius of that robot.
+        rear_m: the same.
+        half_m: the same.
     """
 
-    track_id: int
+    row: Any
     x_m: Value
     y_m: Value
-    velocity_x_mps: float
-    velocity_y_mps: float
-    speed_mps: Value
-    delay_s: Value
-    elapsed_s: Value
-    variances: tuple[Value, Value, Value]
-    body_m: Value
-    least_mps: Value = None
+    velocity_x_mps: Value
+    velocity_y_mps: Value
+    fan_cos: Value
+    fan_sin: Value
+    front_m: Value
+    rear_m: Value
+    half_m: Value
+
+    def at(self, chosen: Any) -> _Pairs:
+        """Return some of the pairs."""
+        return _Pairs(*(_of(getattr(self, name), chosen) for name in self.__slots__))
 
 
-def people_ahead(
-    constraints: NavConstraints, times_s: FloatArray, aware_for_s: float
-) -> Iterator[PersonAhead]:
-    """Yield the people at times (T,) after the stamp of the constraints."""
-    basis = constraints.speed_basis
-    assert basis is not None
-    now, shown = constraints.stamp_s, {track.id: track for track in basis.tracks}
-    for track_id, person in basis.people.items():
-        is_shown = shown.get(track_id) is person.track
-        yield _ahead(basis, now, times_s, aware_for_s, track_id, person, is_shown)
-    for track_id, person in basis.lost.items():
-        rise_mps2, since_s = basis.policy.timing.lost_rise_mps2 or 0.0, person.lost_since_s or now
-        least_mps = (person.lost_limit_mps or 0.0) + rise_mps2 * (now + times_s - since_s)
-        ahead = _ahead(basis, now, times_s, aware_for_s, track_id, person, False)
-        yield ahead._replace(least_mps=least_mps)
+def _of(value: Value, chosen: Any) -> Value:
+    return value[chosen] if isinstance(value, np.ndarray) and value.ndim else value
 
 
-def _ahead(
-    basis: SpeedBasis,
-    now: float,
-    times_s: FloatArray,
-    aware_for_s: float,
-    track_id: int,
-    person: Person,
-    is_shown: bool,
-) -> PersonAhead:
-    """Return a person at times ahead. Those whom the latest frame shows are seen as now."""
-    track, policy = person.track, basis.policy
-    fresh_s, margins = policy.timing.fresh_within_s, policy.margins
-    age_s = max(now - track.stamp_s, 0.0)
-    seen_s = min(person.seen_stamp_s, track.stamp_s - track.time_since_seen_s)
-    is_seen = is_shown and track.status != "coasting" and now - seen_s <= fresh_s - _SAME_AGE_S
-    speed_mps: Value = 0.0
-    delay_s: Value = 0.0
-    unaware_mps = policy.speed.human_speed_mps(0.0)
-    reach = basis.rules.reach(person, now)
-    if reach is not None:
-        speed_mps, delay_s = reach.speed_mps, reach.delay_s
-    unaware_mps = max(unaware_mps, math.hypot(*person.velocity_odom_mps))
-    sigmas: Value = basis.rules.sigmas(person, now)
-    covariance = track.covariance_odom.tolist()
-    variances: tuple[Value, ...] = covariance_terms(covariance, 1.0)
-    sigma_m: Value = person.sigma_m
-    if not is_seen:
-        # No later frame shows them: unaware, and less and less certain.
-        unseen = now + times_s - seen_s > fresh_s - _SAME_AGE_S
-        speed_mps = np.where(unseen, max(unaware_mps, speed_mps), speed_mps)
-        sigmas = np.where(unseen, max(sigmas, margins.unseen_sigmas), sigmas)
-        if is_shown:
-            if policy.reach is not None:
-                later_s = np.minimum(track.stamp_s + times_s - seen_s, fresh_s)
-                delay_s = np.maximum(delay_s, policy.reach.delay_s + later_s)
-            ahead = [_terms_ahead(covariance, each) for each in times_s.tolist()]
-            variances = tuple(np.array(ahead).T)
-        until_s = np.minimum(
-            age_s + times_s, max(age_s, policy.timing.stop_after_s) + (times_s if is_shown else 0.0)
-        )
-        sigma_m = np.array([position_sigma_m(track, each) for each in until_s.tolist()])
-    if basis.prediction is not None:
-        ahead_m = predicted_sigmas_m(track, age_s + times_s, basis.prediction)
-        sigma_m = np.maximum(sigma_m, ahead_m)
-        variances = (np.maximum(variances[0], ahead_m**2), *variances[1:])
-    if aware_for_s < times_s[-1]:
-        speed_mps = np.where(times_s > aware_for_s, np.maximum(unaware_mps, speed_mps), speed_mps)
-    x, y = person.track_position_odom_m
-    vx, vy = person.velocity_odom_mps
-    moves_s: Value = times_s if is_shown and (vx or vy) else 0.0
-    a0, a1, a2 = (sigmas * sigmas * each for each in variances)
-    return PersonAhead(
-        *(track_id, x + vx * moves_s, y + vy * moves_s, vx, vy, speed_mps, delay_s),
-        age_s if is_shown else age_s + times_s,
-        (a0, a1, a2),
-        BODY_RADIUS_M + sigmas * sigma_m,
-    )
+def _in(table: Any, part: Any, row: Any) -> Value:
+    """Return the values of a table (J, rows), or of one with one column."""
+    if table.shape[1] == 1:
+        return table[part, 0]
+    return table[part].take(row) if np.ndim(part) == 0 else table[part, row]
 
 
-def _terms_ahead(covariance: list[list[float]], ahead_s: float) -> tuple[float, float, float]:
-    """Return the terms of a covariance that is predicted at constant velocity."""
-    P = np.array(covariance)
-    P[:2] += ahead_s * P[2:]
-    P[:, :2] += ahead_s * P[:, 2:]
-    return covariance_terms(P.tolist(), 1.0)
-
-
-def person_limits_mps(
-    person: PersonAhead,
-    courses: Courses,
-    times: Any,
-    basis: SpeedBasis,
-    robot: RobotProfile,
-    reach_m: float = 0.0,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the limits (N,) that one person sets by the path and by their reach; ∞ for none.
+class _Field:
+    """Limits of people at many poses.
 
     Args:
-        person: at T times.
-        courses: at N poses.
+        reaches: of the people.
+        courses: (N,) of the robot.
         times: (N,) index of the time of each pose.
         basis: of the constraints.
         robot: of the constraints.
-        reach_m: the limits hold within this distance of the poses, which have no heading then.
+        reach_m: the limits hold within this distance of the poses.
     """
 
-    def gathered(value: Value) -> Value:
-        return value[times] if isinstance(value, np.ndarray) and value.ndim else value
+    def __init__(
+        self,
+        reaches: Reaches,
+        courses: Courses,
+        times: Any,
+        basis: SpeedBasis,
+        robot: RobotProfile,
+        reach_m: float,
+    ) -> None:
+        self._reaches, self._courses, self._times = reaches, courses, times
+        self._margin_m = np.float32(basis.policy.margins.floor_m)
+        self._clearance_m = np.float32(basis.policy.margins.clearance_m)
+        self._has_reach = basis.policy.reach is not None
+        self._a = np.float32(robot.max_deceleration_mps2)
+        front, rear, half = _extents_m(robot, 0.0)
+        self._circle_m = np.float32(math.hypot(max(front, -rear), half) + reach_m)
+        length = np.maximum(courses.front_m, -courses.rear_m) + courses.driven_m
+        size_m = np.sqrt(np.square(length) + np.square(courses.half_m))
+        # Of a circle that holds footprint and course, wherever they point.
+        self._size_m = np.float32(np.max(size_m)) + (self._circle_m if courses.cos is None else 0)
+        self._step_s = float(reaches.ahead_s[PARTS])
 
-    margins, rules = basis.policy.margins, basis.policy.reach
-    a, maximum = robot.max_deceleration_mps2, ROOM * robot.max_speed_mps
-    elapsed = gathered(person.elapsed_s)
-    T = robot.reaction_time_s + elapsed
-    dx, dy = gathered(person.x_m) - courses.x_m, gathered(person.y_m) - courses.y_m
-    circle = robot.circumscribed_radius_m + reach_m
-    body = gathered(person.body_m)
-    vx, vy = person.velocity_x_mps, person.velocity_y_mps
-    path = _path_mps(dx, dy, courses, body, margins.clearance_m, circle, a, T, maximum)
-    if np.any(elapsed) and (vx or vy):
-        later = dx + vx * elapsed, dy + vy * elapsed
-        path = np.minimum(
-            path, _path_mps(*later, courses, body, margins.clearance_m, circle, a, T, maximum)
-        )
-    if rules is None:
-        return path, np.full(len(dx), np.inf)
-    U, delay = gathered(person.speed_mps), gathered(person.delay_s)
-    variances = tuple(gathered(each) for each in person.variances)
-    walking, tau = math.hypot(vx, vy), rules.time_constant_s
-    step_s = (robot.reaction_time_s + robot.max_speed_mps / a) / STEPS
-    limit = np.full(len(dx), maximum)
-    m0 = tau * -np.expm1(-elapsed / tau)
-    t0, need0, braked0 = 0.0, 0.0 * T, 0.0 * T
-    while np.min(need0) < maximum:
-        t1 = t0 + step_s
-        late = np.maximum(t1 - T, 0.0)
-        need1, braked1 = a * late, 0.5 * a * late * late
-        m1 = tau * -np.expm1(-(t1 + elapsed) / tau)
-        since = t1 + elapsed + delay
-        reach = U * (since + tau * np.expm1(-since / tau)) + 0.5 * walking * (m1 - m0)
-        variance = variances[0] + m1 * (variances[1] + m1 * variances[2])
-        reach = reach + np.sqrt(np.maximum(variance, 0.0))
-        middle = 0.5 * (m0 + m1)
-        px, py = (dx + vx * middle, dy + vy * middle) if walking else (dx, dy)
+    def lower(self, limits: FloatArray) -> Any:
+        """Lower limits (N,) in place to those that people set, and return by whom.
+
+        The result (N,) is twice the index of a person, one more for the path, or −1 for nobody.
+        """
+        reaches, courses = self._reaches, self._courses
+        by = np.full(len(limits), -1)
+        nearest, least = np.zeros(len(limits), dtype=np.intp), np.full(len(limits), np.inf)
+        away = []
+        for index in range(len(reaches.people)):
+            row = reaches.first[index] + reaches.follows[index] * self._times
+            dx, dy = reaches.x_m[row] - courses.x_m, reaches.y_m[row] - courses.y_m
+            distance = np.sqrt(dx * dx + dy * dy)
+            away.append((row, distance))
+            middle = reaches.around_m.shape[0] // 2
+            free = distance - _in(reaches.around_m, middle, row)
+            nearer = free < least
+            np.copyto(least, free, where=nearer)
+            nearest[nearer] = index
+        rows = reaches.first[nearest] + reaches.follows[nearest] * self._times
+        everywhere = np.arange(len(limits))
+        self._lower_by([(everywhere, nearest, rows)], limits, by)
+        others = []
+        for index, (row, distance) in enumerate(away):
+            poses = np.flatnonzero((distance < self._near_m(row, limits)) & (nearest != index))
+            others.append((poses, np.full(len(poses), index), row[poses]))
+        self._lower_by(others, limits, by)
+        return by
+
+    def _near_m(self, row: Any, limits: Any) -> Any:
+        """Return the distances (n,) from which on a person sets no lower limit."""
+        react = self._reacts_s(row)
+        stop_s = limits / self._a + react
+        return self._around_m(row, stop_s) + 0.5 * limits * (stop_s + react) + self._size_m
+
+    def _around_m(self, row: Any, until_s: Any) -> Any:
+        """Return how far people (n,) come from their place until some times."""
+        around = self._reaches.around_m
+        part = (until_s * (1.0 / self._step_s) + 1.0).astype(np.intp) * PARTS
+        np.minimum(part, len(around) - 1, out=part)
+        return around.ravel().take(part * around.shape[1] + row)
+
+    def _reacts_s(self, row: Any) -> Value:
+        react = self._reaches.react_s
+        return react[row] if len(react) > 1 else react[0]
+
+    def _lower_by(self, pairs: list[Any], limits: FloatArray, by: Any) -> None:
+        """Lower the limits by pairs (poses, people, rows); each pose is in each of them once."""
+        poses, people, rows = (np.concatenate(each) for each in zip(*pairs, strict=True))
+        before, own = limits[poses].astype(np.float32), np.empty(len(poses), dtype=np.float32)
+        in_the_path = np.empty(len(poses), dtype=bool)
+        for start in range(0, len(poses), _TOGETHER):
+            some = slice(start, start + _TOGETHER)
+            path, reach = self._limits(poses[some], rows[some], before[some])
+            own[some], in_the_path[some] = np.minimum(path, reach), path < reach
+        lowest = np.maximum(own * (1.0 - _ROUNDING), self._reaches.least_mps[rows])
+        end = 0
+        for each in pairs:
+            begin, end = end, end + len(each[0])
+            lower = begin + np.flatnonzero(lowest[begin:end] < limits[each[0]])
+            limits[poses[lower]] = lowest[lower]
+            by[poses[lower]] = 2 * people[lower] + in_the_path[lower]
+
+    def _limits(self, pose: Any, row: Any, before: Any) -> tuple[Any, Any]:
+        """Return the limits (n,) by the path and by the reach, ∞ where not below ``before``."""
+        reaches, courses = self._reaches, self._courses
+        dx = (reaches.x_m[row] - courses.x_m[pose]).astype(np.float32)
+        dy = (reaches.y_m[row] - courses.y_m[pose]).astype(np.float32)
+        vx, vy = reaches.velocity_x_mps[row], reaches.velocity_y_mps[row]
+        driven, react = _of(courses.driven_m, pose), self._reacts_s(row)
+        body, elapsed = reaches.body_m[row], reaches.elapsed_s[row]
+        straight = tuple(_of(each, pose) for each in courses.straight)
+        path = self._path_mps(dx, dy, straight, body, driven, react)
+        if np.any(elapsed):
+            x, y = dx + vx * elapsed, dy + vy * elapsed
+            np.minimum(path, self._path_mps(x, y, straight, body, driven, react), out=path)
+        if not self._has_reach:
+            return path, np.full(len(pose), _NOWHERE_M)
         if courses.cos is None:
-            near = np.hypot(px, py) - (circle + courses.driven_m + margins.floor_m + reach)
-            lowest = np.maximum((near + braked1) / t1, need0)
+            pairs = _Pairs(
+                row, dx, dy, vx, vy, None, None, self._circle_m + driven, 0.0, 0.0
+            )
         else:
-            near, past, behind = _contacts_m(px, py, courses, reach, margins.floor_m)
-            lowest = np.maximum((near + braked1) / t1, need0)
-            lowest = np.where(lowest * t0 - braked0 <= past, lowest, maximum)
-            lowest = np.where(need0 * t0 - braked0 <= behind, need0, lowest)
-        np.minimum(limit, lowest, out=limit)
-        t0, need0, braked0, m0 = t1, need1, braked1, m1
-        if np.min(need0) >= limit.max():
-            break
-    return path, np.where(limit < maximum, limit, np.inf)
+            cos, sin = _of(courses.cos, pose), _of(courses.sin, pose)
+            fan = (_of(each, pose) for each in (courses.fan_cos, courses.fan_sin))
+            extent = (_of(courses.front_m, pose) + driven, _of(courses.rear_m, pose))
+            pairs = _Pairs(
+                *(row, cos * dx + sin * dy, cos * dy - sin * dx),
+                *(cos * vx + sin * vy, cos * vy - sin * vx),
+                *(*fan, *extent, _of(courses.half_m, pose)),
+            )
+        np.minimum(before, path, out=before)
+        reach = np.full(len(pose), _NOWHERE_M)
+        near = self._near(pairs, before)
+        reach[near] = self._reach_mps(pairs.at(near), before[near])
+        return path, reach
+
+    def _near(self, pairs: _Pairs, before: Any) -> Any:
+        """Return the indices of pairs whose person may come to where the robot may be."""
+        if pairs.fan_cos is None:
+            return np.arange(len(before))
+        around = self._around_m(pairs.row, before / self._a + self._reacts_s(pairs.row))
+        x, y, cos, sin = pairs.x_m, np.abs(pairs.y_m), pairs.fan_cos, pairs.fan_sin
+        low_y = cos * y - sin * x
+        low_x = np.where(low_y <= 0.0, 1.0, cos * x + sin * y)
+        close = around + self._size_m
+        return np.flatnonzero(
+            (low_y < around + pairs.half_m) & (low_x > -around) | (x * x + y * y < close * close)
+        )
+
+    def _first_step(self, pairs: _Pairs, before: Any) -> Any:
+        """Return the number (n,) of the first step in which robot and person may meet."""
+        free = np.sqrt(pairs.x_m * pairs.x_m + pairs.y_m * pairs.y_m) - self._size_m
+        around = self._reaches.around_m
+        steps = (len(around) - 1) // PARTS
+        low, high = np.zeros(len(free), dtype=np.int16), np.full(len(free), steps, dtype=np.int16)
+        for _ in range(steps.bit_length()):
+            middle = (low + high) >> 1
+            part = np.minimum(middle + 1, steps).astype(np.intp) * PARTS
+            way = self._reaches.ahead_s[part] * before
+            apart = free > around.ravel().take(part * around.shape[1] + pairs.row) + way
+            low, high = np.where(apart, middle + 1, low), np.where(apart, high, middle)
+        return np.minimum(low, steps)
+
+    def _path_mps(
+        self, dx: Any, dy: Any, straight: tuple[Value, ...], body: Any, driven: Value, react: Value
+    ) -> Any:
+        """Return the limits (n,) of the protective field; ∞ for none."""
+        if not straight:
+            gap = np.sqrt(dx * dx + dy * dy) - body - (driven + self._circle_m + self._clearance_m)
+        else:
+            cos, sin, front, rear, half = straight
+            x = cos * dx + sin * dy
+            off = np.abs(cos * dy - sin * dx) - (half + self._clearance_m)
+            inside = (x >= rear - body) & (off <= body)
+            np.maximum(off, 0.0, out=off)
+            ahead = np.sqrt(np.maximum(body * body - off * off, 0.0))
+            gap = np.where(inside, x - ahead - (front + driven + self._clearance_m), _NOWHERE_M)
+        return _stopping_mps(gap, react, self._a)
+
+    def _reach_mps(self, pairs: _Pairs, before: Any, first: Any = None, again: int = 3) -> Any:
+        """Return the limits (n,) by the reach; they are ∞ where they are not below ``before``.
+
+        The first steps that count are given, or computed. The step in which a robot stops is looked
+        at in parts. Where none of them sets a limit, later steps count, ``again`` times at most.
+        """
+        if first is None:
+            first = self._first_step(pairs, before)
+        limits, lowest = np.full(len(before), _NOWHERE_M), before.copy()
+        order = np.argsort(first, kind="stable")
+        begins = np.searchsorted(first[order], np.arange(len(self._reaches.ahead_s) // PARTS + 1))
+        left = order[:0]
+        stopping: list[tuple[Any, Any, Any]] = []
+        for step in range(len(begins) - 1):
+            left = np.concatenate((left, order[begins[step] : begins[step + 1]]))
+            if not len(left):
+                continue
+            later = (step + 1) * PARTS
+            now = pairs.at(left)
+            own = self._lowest_mps(now, step * PARTS, later)
+            need = _in(self._reaches.need_mps, later, now.row)
+            lower = np.flatnonzero(own < lowest[left])
+            lowest[left[lower]] = own[lower]
+            is_stop = own[lower] < _of(need, lower)
+            ends, passes = lower[is_stop], lower[~is_stop]
+            limits[left[passes]] = own[passes]
+            stopping.append((left[ends], own[ends], np.full(len(ends), step)))
+            left = left[lowest[left] > need]
+        if not stopping:
+            return limits
+        chosen, own, steps = (np.concatenate(each) for each in zip(*stopping, strict=True))
+        halved, is_met = self._halved_mps(pairs.at(chosen), steps * PARTS, own)
+        limits[chosen] = np.minimum(limits[chosen], halved)
+        free = np.flatnonzero(~is_met)
+        if len(free) and again:
+            chosen, steps = chosen[free], steps[free] + 1
+            before = np.minimum(before[chosen], limits[chosen])
+            later_on = self._reach_mps(pairs.at(chosen), before, steps, again - 1)
+            limits[chosen] = np.minimum(limits[chosen], later_on)
+        elif len(free):
+            limits[chosen[free]] = np.minimum(limits[chosen[free]], own[free])
+        return limits
+
+    def _halved_mps(self, pairs: _Pairs, first: Any, limits: Any) -> tuple[Any, Any]:
+        """Return limits (n,) that a whole step from ``first`` on set, in steps of one part.
+
+        The second array tells where one of them lets the robot stop in it, so later ones are of no
+        matter.
+        """
+        last = ends = first + PARTS
+        others = np.full(len(limits), _NOWHERE_M)
+        for _ in range(PARTS.bit_length() - 1):
+            middle = (first + last) // 2
+            need = _in(self._reaches.need_mps, middle, pairs.row)
+            own = self._lowest_mps(pairs, first, middle)
+            sooner = own < need
+            np.minimum(others, own, out=others, where=~sooner)
+            limits = np.where(sooner, own, np.maximum(limits, need))
+            first, last = np.where(sooner, first, middle), np.where(sooner, middle, last)
+        own = self._lowest_mps(pairs, first, last)
+        is_met = own < _in(self._reaches.need_mps, last, pairs.row)
+        limits = np.minimum(np.maximum(limits, own), others)
+        free = np.flatnonzero(~is_met)
+        if len(free):
+            # The rest of the step, which an earlier part that seemed to be met has hidden.
+            rest = pairs.at(free)
+            own = self._lowest_mps(rest, last[free], ends[free])
+            limits[free] = np.minimum(limits[free], own)
+            is_met[free] = own < _in(self._reaches.need_mps, ends[free], rest.row)
+        return limits, is_met
+
+    def _lowest_mps(self, pairs: _Pairs, part: Any, later: Any) -> Any:
+        """Return what :func:`~nav_adapter.limit._lowest_mps` does; a robot may stop in between."""
+        reaches, row = self._reaches, pairs.row
+        t0, t1 = reaches.ahead_s[part], reaches.ahead_s[later]
+        m0, m1 = _in(reaches.drift_s, part, row), _in(reaches.drift_s, later, row)
+        need0, need1 = _in(reaches.need_mps, part, row), _in(reaches.need_mps, later, row)
+        braked0, braked1 = _in(reaches.braked_m, part, row), _in(reaches.braked_m, later, row)
+        middle, half = 0.5 * (m0 + m1), 0.5 * (m1 - m0)
+        vx, vy = pairs.velocity_x_mps, pairs.velocity_y_mps
+        x, y = pairs.x_m + vx * middle, pairs.y_m + vy * middle
+        reach = _in(reaches.reach_m, later, row) + half * np.sqrt(vx * vx + vy * vy)
+        if pairs.fan_cos is None:
+            past = behind = None
+            near = np.sqrt(x * x + y * y) - (pairs.front_m + self._margin_m) - reach
+        else:
+            near, past, behind = _contacts_m(x, y, pairs, reach, self._margin_m)
+        own = np.maximum((near + braked1) / t1, need0)
+        stops = np.flatnonzero(own < need1)
+        if len(stops):
+            stopped = _stopping_mps(near[stops], self._reacts_s(row[stops]), self._a)
+            own[stops] = np.maximum(stopped, _of(need0, stops))
+        if past is not None:
+            own[own * t0 - braked0 > past] = _NOWHERE_M
+        if behind is not None:
+            own = np.where(need0 * t0 - braked0 <= behind, need0, own)
+        return own
 
 
-def _path_mps(
-    dx: FloatArray,
-    dy: FloatArray,
-    courses: Courses,
-    body: Value,
-    clearance: float,
-    circle: float,
-    a: float,
-    T: Value,
-    maximum: float,
-) -> FloatArray:
-    """Return the limits (N,) of the protective field; ∞ for none."""
-    if courses.cos is None:
-        gap = np.hypot(dx, dy) - circle - courses.driven_m - body - clearance
-        inside = np.ones(len(dx), dtype=bool)
-    else:
-        cos, sin, front, rear, half = courses.straight
-        x = cos * dx + sin * dy
-        off = np.abs(cos * dy - sin * dx) - half - clearance
-        inside = (x >= rear - body) & (off <= body)
-        beyond = np.maximum(off, 0.0)
-        ahead = np.sqrt(np.maximum(body * body - beyond * beyond, 0.0))
-        gap = x - front - courses.driven_m - ahead - clearance
-    gap = np.maximum(gap, 0.0)
-    limit = 2.0 * gap / (T + np.sqrt(T * T + 2.0 * gap / a) + 1e-300)
-    return np.where(inside & (limit < maximum), limit, np.inf)
+def _stopping_mps(gap_m: Any, react_s: Value, deceleration_mps2: Any) -> Any:
+    """Return the speeds at which the robot stops within ``gap_m``."""
+    twice_m = 2.0 * np.maximum(gap_m, 0.0)
+    slower = np.sqrt(react_s * react_s + twice_m / deceleration_mps2) + react_s
+    return twice_m / (slower + np.float32(1e-30))
 
 
 def _contacts_m(
-    px: FloatArray, py: FloatArray, courses: Courses, reach: Value, margin: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what :func:`~nav_adapter.limit.contact_m` does, for people at (px, py)."""
-    cos, sin = courses.fan_cos, courses.fan_sin
-    front, rear, half = courses.front_m + courses.driven_m, courses.rear_m, courses.half_m
-    x = courses.cos * px + courses.sin * py
-    y = np.abs(courses.cos * py - courses.sin * px)
+    along: Any, across: Any, pairs: _Pairs, reach: Any, margin: Any
+) -> tuple[Any, Any, Any]:
+    """Return what :func:`~nav_adapter.limit.contact_m` does; the third is None if all are −∞."""
+    cos, sin, half = pairs.fan_cos, pairs.fan_sin, pairs.half_m
+    x, y = along, np.abs(across)
     rho, side = reach + margin, half + margin
     distance2 = x * x + y * y
     distance = np.sqrt(distance2)
-    low_y = cos * y - sin * x
-    in_fan = low_y <= 0.0
-    low_x = np.where(in_fan, distance, cos * x + sin * y)
-    low_y = np.maximum(low_y, 0.0)
-    high_y = cos * y + sin * x
-    high_x = np.where(high_y < 0.0, -distance, cos * x - sin * y)
-    high_y = np.maximum(high_y, 0.0)
-    wide = half + rho
-    ahead = (low_x >= 0.0) & (low_y < wide)
-    backward = (high_x < 0.0) & (high_y < wide)
-    off = np.maximum(low_y - side, 0.0)
-    past = low_x - rear + np.sqrt(np.maximum(reach * reach - off * off, 0.0))
-    corner2 = np.square(np.maximum(distance - rho, 0.0))
-    share = np.maximum(corner2 - half * half, 0.0) / np.maximum(corner2, 1e-12)
-    at = np.minimum(np.maximum(distance * np.sqrt(share), high_x), low_x)
-    off = np.maximum(np.sqrt(np.maximum(distance2 - at * at, 0.0)) - half, 0.0)
-    near = at - front - np.sqrt(np.maximum(rho * rho - off * off, 0.0))
-    ahead &= past >= 0.0
-    near, past = np.where(ahead, near, 1e9), np.where(ahead, past, -np.inf)
-    behind = np.full(len(px), -np.inf)
-    if backward.any():
-        corner2 = np.square(np.maximum(distance - reach, 0.0))
-        share = np.maximum(corner2 - side * side, 0.0) / np.maximum(corner2, 1e-12)
-        at = np.minimum(-distance * np.sqrt(share), np.minimum(low_x, 0.0))
-        at = np.maximum(at, high_x)
-        off = np.maximum(np.sqrt(np.maximum(distance2 - at * at, 0.0)) - side, 0.0)
-        end = at - rear + np.sqrt(np.maximum(reach * reach - off * off, 0.0))
-        behind = np.where(backward, end, -np.inf)
-    return near, past, behind
+    cos_x, sin_x, cos_y, sin_y = cos * x, sin * x, cos * y, sin * y
+    low_y = cos_y - sin_x
+    low_x = np.where(low_y <= 0.0, distance, cos_x + sin_y)
+    np.maximum(low_y, 0.0, out=low_y)
+    high_y = cos_y + sin_x
+    high_x = np.where(high_y < 0.0, -distance, cos_x - sin_y)
+    wide = rho + half
+    ahead = (low_x >= -_NEAR_M) & (low_y < wide)
+    low_y -= side
+    np.maximum(low_y, 0.0, out=low_y)
+    reach2 = reach * reach
+    past = np.sqrt(np.maximum(reach2 - low_y * low_y, 0.0)) + (low_x - pairs.rear_m)
+    ahead &= past >= -_NEAR_M
+    share = half / np.maximum(distance - rho, half)
+    at = np.maximum(distance * np.sqrt(1.0 - share * share), high_x)
+    np.minimum(at, low_x, out=at)
+    off = np.sqrt(np.maximum(distance2 - at * at, 0.0))
+    off -= half
+    np.maximum(off, 0.0, out=off)
+    near = at - np.sqrt(np.maximum(rho * rho - off * off, 0.0)) - pairs.front_m
+    near = np.where(ahead, near, _NOWHERE_M)
+    backward = (high_x < _NEAR_M) & (high_y < wide)
+    if not backward.any():
+        return near, past, None
+    share = side / np.maximum(distance - reach, side)
+    at = np.minimum(-distance * np.sqrt(1.0 - share * share), low_x)
+    at = np.maximum(np.minimum(at, 0.0), high_x)
+    off = np.maximum(np.sqrt(np.maximum(distance2 - at * at, 0.0)) - side, 0.0)
+    end = at - pairs.rear_m + np.sqrt(np.maximum(reach2 - off * off, 0.0))
+    return near, past, np.where(backward, end, -np.inf)
 
 
 def limits_at(
@@ -415,8 +539,8 @@ def limits_at(
     times_s: FloatArray,
     aware_for_s: float,
     reach_m: float = 0.0,
-) -> tuple[FloatArray, NDArray[np.object_]]:
-    """Return the limits (K, T) at poses (K, T, …), and who sets them, as texts.
+) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
+    """Return the limits (K, T) at poses (K, T, …), and who sets them: indices of texts.
 
     Args:
         constraints: of ``NavAdapter.update``, or some that stop the robot.
@@ -435,82 +559,60 @@ def limits_at(
         raise NavError(f"constraints must be NavConstraints, got {type(constraints).__name__}")
     basis, robot = constraints.speed_basis, constraints.robot
     shape = positions_m.shape[:2]
-    limits, texts = np.zeros(shape), np.full(shape, constraints.limited_by, dtype=object)
+    by = np.zeros(shape, dtype=np.intp)
     if basis is None or robot is None:
         if constraints.speed_limit_mps > 0.0:
             raise NavError(
                 "constraints must come from NavAdapter.update, got some without speed_basis"
             )
-        return limits, texts
-    limits[:], texts[:] = robot.max_speed_mps, "robot maximum"
+        return np.zeros(shape), by, [constraints.limited_by]
+    if basis.stopped:
+        return np.zeros(shape), by, ["stale data"]
+    texts = [
+        "recovery after stale data",
+        "robot: moves sideways, but its profile says otherwise",
+        "robot maximum",
+    ]
+    limits, by = np.full(shape, robot.max_speed_mps), by + 2
+    if basis.ceiling_mps is not None:
+        rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
+        ceilings = np.broadcast_to(basis.ceiling_mps + rise_mps2 * times_s, shape)
+        by[ceilings < limits] = 0
+        limits = np.minimum(limits, ceilings)
+    if velocities_mps is not None and robot.moves_sideways is False:
+        sideways = np.broadcast_to(np.abs(velocities_mps[1]) > LATERAL_NOISE_MPS, shape)
+        limits[sideways], by[sideways] = 0.0, 1
+    people = tuple(people_ahead(constraints, times_s, aware_for_s))
+    if not people or not limits.size:
+        return limits, by, texts
 
     def flat(value: Value) -> Value:
         return value.reshape(-1) if isinstance(value, np.ndarray) and value.ndim else value
 
-    velocities = (
-        None if velocities_mps is None else (flat(velocities_mps[0]), flat(velocities_mps[1]))
-    )
-    courses = courses_of(
-        robot,
-        basis,
-        positions_m.reshape(-1, 2),
-        flat(headings_rad),
-        velocities,
-        flat(yaw_rates_radps),
-    )
+    velocities = None
+    if velocities_mps is not None:
+        velocities = flat(velocities_mps[0]), flat(velocities_mps[1])
     times = np.tile(np.arange(shape[1]), shape[0])
-    flat_limits, flat_texts = limits.reshape(-1), texts.reshape(-1)
-    for person in people_ahead(constraints, times_s, aware_for_s):
-        off = np.hypot(_of(person.x_m, times) - courses.x_m, _of(person.y_m, times) - courses.y_m)
-        near = np.flatnonzero(off < _free_m(person, courses, basis, robot) + reach_m)
-        if not len(near):
+    reaches = Reaches.of(people, shape[1], basis, robot)
+    lowest, who = limits.reshape(-1), np.empty(limits.size, dtype=np.intp)
+    standing = np.zeros(limits.size, dtype=bool)
+    if velocities is not None and headings_rad is not None and robot.moves_sideways is True:
+        standing = _speed_mps(*velocities) < STANDING_MPS
+    for anywhere in (False, True):
+        poses = np.flatnonzero(standing == anywhere)
+        if not len(poses):
             continue
-        path, reach = person_limits_mps(
-            person, courses.at(near), times[near], basis, robot, reach_m
+        courses = courses_of(
+            *(robot, basis, positions_m.reshape(-1, 2)[poses], _of(flat(headings_rad), poses)),
+            velocities and tuple(_of(each, poses) for each in velocities),
+            *(_of(flat(yaw_rates_radps), poses), anywhere),
         )
-        own = np.minimum(path, reach)
-        if person.least_mps is not None:
-            own = np.maximum(own, _of(person.least_mps, times[near]))
-        own = (1.0 - _ROUNDING) * own
-        lower = own < flat_limits[near]
-        flat_limits[near[lower]] = own[lower]
-        for rule, holds in (
-            ("reach", lower & (reach <= path)),
-            ("in the path", lower & (path < reach)),
-        ):
-            name = rule if person.least_mps is None else "lost"
-            flat_texts[near[holds]] = f"track {person.track_id}: {name}"
-    if basis.ceiling_mps is not None:
-        rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
-        ceilings = np.broadcast_to(basis.ceiling_mps + rise_mps2 * times_s, shape)
-        texts[ceilings < limits] = "recovery after stale data"
-        limits = np.minimum(limits, ceilings)
-    if velocities_mps is not None and robot.moves_sideways is False:
-        sideways = np.broadcast_to(np.abs(velocities_mps[1]) > LATERAL_NOISE_MPS, shape)
-        limits[sideways] = 0.0
-        texts[sideways] = "robot: moves sideways, but its profile says otherwise"
-    if basis.stopped:
-        limits[:], texts[:] = 0.0, "stale data"
-    return limits, texts
-
-
-def _of(value: Value, times: Any) -> Value:
-    return value[times] if isinstance(value, np.ndarray) and value.ndim else value
-
-
-def _free_m(person: PersonAhead, courses: Courses, basis: SpeedBasis, robot: RobotProfile) -> float:
-    """Return a distance of person and base from which on the person sets no limit."""
-    a, maximum = robot.max_deceleration_mps2, ROOM * robot.max_speed_mps
-    elapsed_s, delay_s = float(np.max(person.elapsed_s)), float(np.max(person.delay_s))
-    stop_s = robot.reaction_time_s + elapsed_s + maximum / a
-    way_m = maximum * (robot.reaction_time_s + elapsed_s) + 0.5 * maximum**2 / a
-    rules = basis.policy.reach
-    tau = 1.0 if rules is None else rules.time_constant_s
-    since_s = stop_s + maximum / a / STEPS + elapsed_s + delay_s
-    walked_m = float(np.max(person.speed_mps)) * (since_s + tau * math.expm1(-since_s / tau))
-    drift_m = max(tau, elapsed_s) * math.hypot(person.velocity_x_mps, person.velocity_y_mps)
-    a0, a1, a2 = (max(float(np.max(each)), 0.0) for each in person.variances)
-    uncertain_m = max(math.sqrt(a0 + tau * (a1 + tau * a2)), float(np.max(person.body_m)))
-    driven_m = float(np.max(courses.driven_m)) + robot.circumscribed_radius_m
-    # The drift between two steps, and that until the end.
-    return way_m + walked_m + 2.0 * drift_m + uncertain_m + basis.policy.margins.floor_m + driven_m
+        field = _Field(reaches, courses, times[poses], basis, robot, reach_m)
+        some = lowest[poses]
+        who[poses] = field.lower(some)
+        lowest[poses] = some
+    by = np.where(who.reshape(shape) < 0, by, who.reshape(shape) + len(texts))
+    for person in people:
+        rules = ("reach", "in the path") if person.least_mps is None else ("lost", "lost")
+        texts += [f"track {person.track_id}: {rule}" for rule in rules]
+    return lowest.reshape(shape), by, texts

@@ -60,7 +60,7 @@ def speed_limit_at(
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
             constraints that do not come from ``update`` unless they stop the robot.
     """
-    limits, _ = _limits(
+    limits, _, _ = _limits(
         *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
         *(speeds_mps, yaw_rates_radps, aware_for_s),
     )
@@ -83,11 +83,11 @@ def limited_by_at(
     The texts are those of :attr:`~nav_adapter.NavConstraints.limited_by`, such as ``"track 3:
     reach"``. The arguments and errors are those of :func:`speed_limit_at`.
     """
-    _, texts = _limits(
+    _, by, texts = _limits(
         *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
         *(speeds_mps, yaw_rates_radps, aware_for_s),
     )
-    return texts
+    return np.array(texts, dtype=object)[by]
 
 
 def time_cost(
@@ -152,7 +152,7 @@ def _limits(
     speeds_mps: Any,
     yaw_rates_radps: Any,
     aware_for_s: float,
-) -> tuple[FloatArray, NDArray[np.object_]]:
+) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
     """Return the limits and their reasons after a check of all arguments."""
     positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
     shape = positions.shape[:2]
