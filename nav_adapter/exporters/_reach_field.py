@@ -25,7 +25,7 @@ from ._people_ahead import PARTS, Reaches, people_ahead
 
 Value = Any
 # Pairs of pose and person that are computed together, so that their numbers stay in the cache.
-_TOGETHER: Final = 16384
+_TOGETHER: Final = 32768
 # A limit is lowered by this share of itself, for rounding in single precision.
 _ROUNDING: Final = 1e-5
 # What is less than this far on the other side counts as on this side, for the same reason.
@@ -206,7 +206,7 @@ def _in(table: Any, part: Any, row: Any) -> Value:
     """Return the values of a table (J, rows), or of one with one column."""
     if table.shape[1] == 1:
         return table[part, 0]
-    return table[part].take(row) if np.ndim(part) == 0 else table[part, row]
+    return table[part].take(row) if isinstance(part, int) else table[part, row]
 
 
 class _Field:
@@ -322,9 +322,7 @@ class _Field:
         if not self._has_reach:
             return path, np.full(len(pose), _NOWHERE_M)
         if courses.cos is None:
-            pairs = _Pairs(
-                row, dx, dy, vx, vy, None, None, self._circle_m + driven, 0.0, 0.0
-            )
+            pairs = _Pairs(row, dx, dy, vx, vy, None, None, self._circle_m + driven, 0.0, 0.0)
         else:
             cos, sin = _of(courses.cos, pose), _of(courses.sin, pose)
             fan = (_of(each, pose) for each in (courses.fan_cos, courses.fan_sin))
