@@ -8,7 +8,6 @@ lower the limit that others set, the nearest first.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -21,192 +20,25 @@ from .._errors import NavError
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
 from ..limit import STANDING_MPS
+from ._courses import (
+    NOWHERE_M,
+    Courses,
+    Pairs,
+    Value,
+    chosen_of,
+    contacts_m,
+    course_speed_mps,
+    courses_of,
+    extents_m,
+    in_table,
+    stopping_mps,
+)
 from ._people_ahead import PARTS, Reaches, people_ahead
 
-Value = Any
 # Pairs of pose and person that are computed together, so that their numbers stay in the cache.
 _TOGETHER: Final = 32768
 # A limit is lowered by this share of itself, for rounding in single precision.
 _ROUNDING: Final = 1e-5
-# What is less than this far on the other side counts as on this side, for the same reason.
-_NEAR_M: Final = np.float32(1e-5)
-# Instead of an infinite way.
-_NOWHERE_M: Final = np.float32(1e9)
-
-
-@dataclass(frozen=True, slots=True)
-class Courses:
-    """Courses of the robot at N poses; see :class:`~nav_adapter.limit.Course`.
-
-    Attributes:
-        x_m: (N,) place of the base.
-        y_m: (N,).
-        driven_m: how far the robot may have driven since its state.
-        cos: direction of the middle of the fan, or None for a robot that may go anywhere at once.
-        sin: the same.
-        fan_cos: half the opening of the fan.
-        fan_sin: the same.
-        front_m: of the footprint.
-        rear_m: the same.
-        half_m: the same.
-        straight: cosine and sine of the straight course, and front, rear and half the width along
-            it.
-    """
-
-    x_m: FloatArray
-    y_m: FloatArray
-    driven_m: Value
-    cos: Value = None
-    sin: Value = None
-    fan_cos: Value = -1.0
-    fan_sin: Value = 0.0
-    front_m: Value = 0.0
-    rear_m: Value = 0.0
-    half_m: Value = 0.0
-    straight: tuple[Value, ...] = ()
-
-
-def courses_of(
-    robot: RobotProfile,
-    basis: SpeedBasis,
-    positions_m: FloatArray,
-    headings_rad: FloatArray | None,
-    velocities_mps: tuple[FloatArray, Value] | None,
-    yaw_rates_radps: Value,
-    anywhere: bool = False,
-) -> Courses:
-    """Return the courses at poses (N, 2), as :func:`~nav_adapter.limit.course_of` has them.
-
-    Args:
-        robot: of the constraints.
-        basis: of the constraints.
-        positions_m: (N, 2).
-        headings_rad: (N,), or None for any.
-        velocities_mps: forward and left, (N,), or None for a robot that drives forwards.
-        yaw_rates_radps: (N,), or 0.
-        anywhere: whether the robot starts in any direction.
-    """
-    x, y = positions_m.T
-    age_s = basis.robot_age_s
-    if velocities_mps is None:
-        travel: Value = robot.max_speed_mps
-    else:
-        forward, left = velocities_mps
-        travel = np.hypot(forward, left)
-    fastest = np.maximum(travel, robot.max_speed_mps)
-    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
-    driven_m = np.minimum(travel * age_s + faster_m, fastest * age_s)
-    if headings_rad is None or (basis.policy.reach is None and velocities_mps is None):
-        return Courses(x, y, _single(driven_m))
-    turn_rad = 0.0 if basis.policy.reach is None else math.radians(basis.policy.reach.turn_deg)
-    off: Value = 0.0
-    speed: Value = travel
-    fan_rad: Value = turn_rad
-    if velocities_mps is not None:
-        sideways, speed = np.abs(left) > LATERAL_NOISE_MPS, _speed_mps(forward, left)
-        off = np.where(forward <= -STANDING_MPS, math.pi, 0.0)
-        off = np.where(sideways, np.arctan2(left, forward), off)
-        if robot.moves_sideways is not False:
-            noise_rad = np.arctan2(np.abs(left), np.maximum(speed, STANDING_MPS))
-            fan_rad = fan_rad + np.where(sideways, 0.0, noise_rad)
-    stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
-    chord_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
-    fan_rad = np.minimum(fan_rad + np.abs(chord_rad), math.pi)
-    straight_rad = headings_rad + off
-    extent = _extents_m(robot, off)
-    straight = middle = (*_directions(straight_rad), *extent)
-    if np.any(chord_rad):
-        swung = _swung(robot, extent, np.abs(chord_rad))
-        middle = (*_directions(straight_rad + chord_rad), *swung)
-    if anywhere:
-        return Courses(x, y, _single(driven_m), straight=straight)
-    fan = _directions(fan_rad)
-    cos, sin, *extents = middle
-    return Courses(x, y, _single(driven_m), cos, sin, *fan, *extents, straight=straight)
-
-
-def _speed_mps(forward: Value, left: Value) -> Value:
-    """Return the speed on the course: lateral noise does not count."""
-    return np.where(np.abs(left) > LATERAL_NOISE_MPS, np.hypot(forward, left), np.abs(forward))
-
-
-def _single(value: Value) -> Value:
-    return np.asarray(value, dtype=np.float32)
-
-
-def _directions(angle_rad: Value) -> tuple[Value, Value]:
-    """Return cosine and sine in single precision."""
-    return _single(np.cos(angle_rad)), _single(np.sin(angle_rad))
-
-
-def _extents_m(robot: RobotProfile, off_rad: Value) -> tuple[Value, Value, Value]:
-    """Return front, rear and half the width along a course ``off_rad`` from the heading."""
-    if not np.any(off_rad):
-        off_rad = 0.0
-    cos, sin = _directions(off_rad)
-    front, rear, half = -np.inf, np.inf, 0.0
-    for x, y in robot.footprint_m.astype(np.float32):
-        along, across = cos * x + sin * y, cos * y - sin * x
-        front, rear = np.maximum(front, along), np.minimum(rear, along)
-        half = np.maximum(half, np.abs(across))
-    return front + _NEAR_M, rear - _NEAR_M, half + _NEAR_M
-
-
-def _swung(
-    robot: RobotProfile, extent_m: tuple[Value, Value, Value], swing_rad: Value
-) -> tuple[Value, Value, Value]:
-    """Return what they are for a footprint turned by up to ``swing_rad`` either way."""
-    (front, rear, half), radius = extent_m, np.float32(robot.circumscribed_radius_m + _NEAR_M)
-    cos, sin = _directions(np.minimum(swing_rad, 0.5 * math.pi))
-    return (
-        np.where(sin > 0.0, np.minimum(front + half * sin, radius), front),
-        np.where(sin > 0.0, np.maximum(rear - half * sin, -radius), rear),
-        np.where(sin > 0.0, np.minimum(half * cos + np.maximum(front, -rear) * sin, radius), half),
-    )
-
-
-@dataclass(slots=True)
-class _Pairs:
-    """Pairs of a pose and a person in a time, as arrays (n,) or numbers that all have.
-
-    Attributes:
-        row: of the tables.
-        x_m: place along the middle of the fan, from the base.
-        y_m: the same across it.
-        velocity_x_mps: along it.
-        velocity_y_mps: across it.
-        fan_cos: of the course; None for a robot that may go anywhere at once.
-        fan_sin: the same.
-        front_m: the same, or the radius of that robot.
-        rear_m: the same.
-        half_m: the same.
-    """
-
-    row: Any
-    x_m: Value
-    y_m: Value
-    velocity_x_mps: Value
-    velocity_y_mps: Value
-    fan_cos: Value
-    fan_sin: Value
-    front_m: Value
-    rear_m: Value
-    half_m: Value
-
-    def at(self, chosen: Any) -> _Pairs:
-        """Return some of the pairs."""
-        return _Pairs(*(_of(getattr(self, name), chosen) for name in self.__slots__))
-
-
-def _of(value: Value, chosen: Any) -> Value:
-    return value[chosen] if isinstance(value, np.ndarray) and value.ndim else value
-
-
-def _in(table: Any, part: Any, row: Any) -> Value:
-    """Return the values of a table (J, rows), or of one with one column."""
-    if table.shape[1] == 1:
-        return table[part, 0]
-    return table[part].take(row) if isinstance(part, int) else table[part, row]
 
 
 class _Field:
@@ -235,7 +67,7 @@ class _Field:
         self._clearance_m = np.float32(basis.policy.margins.clearance_m)
         self._has_reach = basis.policy.reach is not None
         self._a = np.float32(robot.max_deceleration_mps2)
-        front, rear, half = _extents_m(robot, 0.0)
+        front, rear, half = extents_m(robot, 0.0)
         self._circle_m = np.float32(math.hypot(max(front, -rear), half) + reach_m)
         length = np.maximum(courses.front_m, -courses.rear_m) + courses.driven_m
         size_m = np.sqrt(np.square(length) + np.square(courses.half_m))
@@ -257,11 +89,9 @@ class _Field:
             dx, dy = reaches.x_m[row] - courses.x_m, reaches.y_m[row] - courses.y_m
             distance = np.sqrt(dx * dx + dy * dy)
             away.append((row, distance))
-            middle = reaches.around_m.shape[0] // 2
-            free = distance - _in(reaches.around_m, middle, row)
-            nearer = free < least
-            np.copyto(least, free, where=nearer)
-            nearest[nearer] = index
+            free = distance - in_table(reaches.around_m, len(reaches.ahead_s) // 2, row)
+            nearest[free < least] = index
+            np.minimum(least, free, out=least)
         rows = reaches.first[nearest] + reaches.follows[nearest] * self._times
         everywhere = np.arange(len(limits))
         self._lower_by([(everywhere, nearest, rows)], limits, by)
@@ -286,8 +116,7 @@ class _Field:
         return around.ravel().take(part * around.shape[1] + row)
 
     def _reacts_s(self, row: Any) -> Value:
-        react = self._reaches.react_s
-        return react[row] if len(react) > 1 else react[0]
+        return in_table(self._reaches.react_s[None], 0, row)
 
     def _lower_by(self, pairs: list[Any], limits: FloatArray, by: Any) -> None:
         """Lower the limits by pairs (poses, people, rows); each pose is in each of them once."""
@@ -312,33 +141,33 @@ class _Field:
         dx = (reaches.x_m[row] - courses.x_m[pose]).astype(np.float32)
         dy = (reaches.y_m[row] - courses.y_m[pose]).astype(np.float32)
         vx, vy = reaches.velocity_x_mps[row], reaches.velocity_y_mps[row]
-        driven, react = _of(courses.driven_m, pose), self._reacts_s(row)
+        driven, react = chosen_of(courses.driven_m, pose), self._reacts_s(row)
         body, elapsed = reaches.body_m[row], reaches.elapsed_s[row]
-        straight = tuple(_of(each, pose) for each in courses.straight)
+        straight = tuple(chosen_of(each, pose) for each in courses.straight)
         path = self._path_mps(dx, dy, straight, body, driven, react)
         if np.any(elapsed):
             x, y = dx + vx * elapsed, dy + vy * elapsed
             np.minimum(path, self._path_mps(x, y, straight, body, driven, react), out=path)
         if not self._has_reach:
-            return path, np.full(len(pose), _NOWHERE_M)
+            return path, np.full(len(pose), NOWHERE_M)
         if courses.cos is None:
-            pairs = _Pairs(row, dx, dy, vx, vy, None, None, self._circle_m + driven, 0.0, 0.0)
+            pairs = Pairs(row, dx, dy, vx, vy, None, None, self._circle_m + driven, 0.0, 0.0)
         else:
-            cos, sin = _of(courses.cos, pose), _of(courses.sin, pose)
-            fan = (_of(each, pose) for each in (courses.fan_cos, courses.fan_sin))
-            extent = (_of(courses.front_m, pose) + driven, _of(courses.rear_m, pose))
-            pairs = _Pairs(
+            cos, sin = chosen_of(courses.cos, pose), chosen_of(courses.sin, pose)
+            fan = (chosen_of(each, pose) for each in (courses.fan_cos, courses.fan_sin))
+            extent = (chosen_of(courses.front_m, pose) + driven, chosen_of(courses.rear_m, pose))
+            pairs = Pairs(
                 *(row, cos * dx + sin * dy, cos * dy - sin * dx),
                 *(cos * vx + sin * vy, cos * vy - sin * vx),
-                *(*fan, *extent, _of(courses.half_m, pose)),
+                *(*fan, *extent, chosen_of(courses.half_m, pose)),
             )
         np.minimum(before, path, out=before)
-        reach = np.full(len(pose), _NOWHERE_M)
+        reach = np.full(len(pose), NOWHERE_M)
         near = self._near(pairs, before)
         reach[near] = self._reach_mps(pairs.at(near), before[near])
         return path, reach
 
-    def _near(self, pairs: _Pairs, before: Any) -> Any:
+    def _near(self, pairs: Pairs, before: Any) -> Any:
         """Return the indices of pairs whose person may come to where the robot may be."""
         if pairs.fan_cos is None:
             return np.arange(len(before))
@@ -351,7 +180,7 @@ class _Field:
             (low_y < around + pairs.half_m) & (low_x > -around) | (x * x + y * y < close * close)
         )
 
-    def _first_step(self, pairs: _Pairs, before: Any) -> Any:
+    def _first_step(self, pairs: Pairs, before: Any) -> Any:
         """Return the number (n,) of the first step in which robot and person may meet."""
         free = np.sqrt(pairs.x_m * pairs.x_m + pairs.y_m * pairs.y_m) - self._size_m
         around = self._reaches.around_m
@@ -378,10 +207,10 @@ class _Field:
             inside = (x >= rear - body) & (off <= body)
             np.maximum(off, 0.0, out=off)
             ahead = np.sqrt(np.maximum(body * body - off * off, 0.0))
-            gap = np.where(inside, x - ahead - (front + driven + self._clearance_m), _NOWHERE_M)
-        return _stopping_mps(gap, react, self._a)
+            gap = np.where(inside, x - ahead - (front + driven + self._clearance_m), NOWHERE_M)
+        return stopping_mps(gap, react, self._a)
 
-    def _reach_mps(self, pairs: _Pairs, before: Any, first: Any = None, again: int = 3) -> Any:
+    def _reach_mps(self, pairs: Pairs, before: Any, first: Any = None, again: int = 3) -> Any:
         """Return the limits (n,) by the reach; they are ∞ where they are not below ``before``.
 
         The first steps that count are given, or computed. The step in which a robot stops is looked
@@ -389,7 +218,7 @@ class _Field:
         """
         if first is None:
             first = self._first_step(pairs, before)
-        limits, lowest = np.full(len(before), _NOWHERE_M), before.copy()
+        limits, lowest = np.full(len(before), NOWHERE_M), before.copy()
         order = np.argsort(first, kind="stable")
         begins = np.searchsorted(first[order], np.arange(len(self._reaches.ahead_s) // PARTS + 1))
         left = order[:0]
@@ -401,10 +230,10 @@ class _Field:
             later = (step + 1) * PARTS
             now = pairs.at(left)
             own = self._lowest_mps(now, step * PARTS, later)
-            need = _in(self._reaches.need_mps, later, now.row)
+            need = in_table(self._reaches.need_mps, later, now.row)
             lower = np.flatnonzero(own < lowest[left])
             lowest[left[lower]] = own[lower]
-            is_stop = own[lower] < _of(need, lower)
+            is_stop = own[lower] < chosen_of(need, lower)
             ends, passes = lower[is_stop], lower[~is_stop]
             limits[left[passes]] = own[passes]
             stopping.append((left[ends], own[ends], np.full(len(ends), step)))
@@ -424,24 +253,24 @@ class _Field:
             limits[chosen[free]] = np.minimum(limits[chosen[free]], own[free])
         return limits
 
-    def _halved_mps(self, pairs: _Pairs, first: Any, limits: Any) -> tuple[Any, Any]:
+    def _halved_mps(self, pairs: Pairs, first: Any, limits: Any) -> tuple[Any, Any]:
         """Return limits (n,) that a whole step from ``first`` on set, in steps of one part.
 
         The second array tells where one of them lets the robot stop in it, so later ones are of no
         matter.
         """
         last = ends = first + PARTS
-        others = np.full(len(limits), _NOWHERE_M)
+        others = np.full(len(limits), NOWHERE_M)
         for _ in range(PARTS.bit_length() - 1):
             middle = (first + last) // 2
-            need = _in(self._reaches.need_mps, middle, pairs.row)
+            need = in_table(self._reaches.need_mps, middle, pairs.row)
             own = self._lowest_mps(pairs, first, middle)
             sooner = own < need
             np.minimum(others, own, out=others, where=~sooner)
             limits = np.where(sooner, own, np.maximum(limits, need))
             first, last = np.where(sooner, first, middle), np.where(sooner, middle, last)
         own = self._lowest_mps(pairs, first, last)
-        is_met = own < _in(self._reaches.need_mps, last, pairs.row)
+        is_met = own < in_table(self._reaches.need_mps, last, pairs.row)
         limits = np.minimum(np.maximum(limits, own), others)
         free = np.flatnonzero(~is_met)
         if len(free):
@@ -449,83 +278,35 @@ class _Field:
             rest = pairs.at(free)
             own = self._lowest_mps(rest, last[free], ends[free])
             limits[free] = np.minimum(limits[free], own)
-            is_met[free] = own < _in(self._reaches.need_mps, ends[free], rest.row)
+            is_met[free] = own < in_table(self._reaches.need_mps, ends[free], rest.row)
         return limits, is_met
 
-    def _lowest_mps(self, pairs: _Pairs, part: Any, later: Any) -> Any:
+    def _lowest_mps(self, pairs: Pairs, part: Any, later: Any) -> Any:
         """Return what :func:`~nav_adapter.limit._lowest_mps` does; a robot may stop in between."""
         reaches, row = self._reaches, pairs.row
         t0, t1 = reaches.ahead_s[part], reaches.ahead_s[later]
-        m0, m1 = _in(reaches.drift_s, part, row), _in(reaches.drift_s, later, row)
-        need0, need1 = _in(reaches.need_mps, part, row), _in(reaches.need_mps, later, row)
-        braked0, braked1 = _in(reaches.braked_m, part, row), _in(reaches.braked_m, later, row)
+        tables = reaches.drift_s, reaches.need_mps, reaches.braked_m
+        m0, need0, braked0 = (in_table(each, part, row) for each in tables)
+        m1, need1, braked1 = (in_table(each, later, row) for each in tables)
         middle, half = 0.5 * (m0 + m1), 0.5 * (m1 - m0)
         vx, vy = pairs.velocity_x_mps, pairs.velocity_y_mps
         x, y = pairs.x_m + vx * middle, pairs.y_m + vy * middle
-        reach = _in(reaches.reach_m, later, row) + half * np.sqrt(vx * vx + vy * vy)
+        reach = in_table(reaches.reach_m, later, row) + half * np.sqrt(vx * vx + vy * vy)
         if pairs.fan_cos is None:
             past = behind = None
             near = np.sqrt(x * x + y * y) - (pairs.front_m + self._margin_m) - reach
         else:
-            near, past, behind = _contacts_m(x, y, pairs, reach, self._margin_m)
+            near, past, behind = contacts_m(x, y, pairs, reach, self._margin_m)
         own = np.maximum((near + braked1) / t1, need0)
         stops = np.flatnonzero(own < need1)
         if len(stops):
-            stopped = _stopping_mps(near[stops], self._reacts_s(row[stops]), self._a)
-            own[stops] = np.maximum(stopped, _of(need0, stops))
+            stopped = stopping_mps(near[stops], self._reacts_s(row[stops]), self._a)
+            own[stops] = np.maximum(stopped, chosen_of(need0, stops))
         if past is not None:
-            own[own * t0 - braked0 > past] = _NOWHERE_M
+            own[own * t0 - braked0 > past] = NOWHERE_M
         if behind is not None:
             own = np.where(need0 * t0 - braked0 <= behind, need0, own)
         return own
-
-
-def _stopping_mps(gap_m: Any, react_s: Value, deceleration_mps2: Any) -> Any:
-    """Return the speeds at which the robot stops within ``gap_m``."""
-    twice_m = 2.0 * np.maximum(gap_m, 0.0)
-    slower = np.sqrt(react_s * react_s + twice_m / deceleration_mps2) + react_s
-    return twice_m / (slower + np.float32(1e-30))
-
-
-def _contacts_m(
-    along: Any, across: Any, pairs: _Pairs, reach: Any, margin: Any
-) -> tuple[Any, Any, Any]:
-    """Return what :func:`~nav_adapter.limit.contact_m` does; the third is None if all are −∞."""
-    cos, sin, half = pairs.fan_cos, pairs.fan_sin, pairs.half_m
-    x, y = along, np.abs(across)
-    rho, side = reach + margin, half + margin
-    distance2 = x * x + y * y
-    distance = np.sqrt(distance2)
-    cos_x, sin_x, cos_y, sin_y = cos * x, sin * x, cos * y, sin * y
-    low_y = cos_y - sin_x
-    low_x = np.where(low_y <= 0.0, distance, cos_x + sin_y)
-    np.maximum(low_y, 0.0, out=low_y)
-    high_y = cos_y + sin_x
-    high_x = np.where(high_y < 0.0, -distance, cos_x - sin_y)
-    wide = rho + half
-    ahead = (low_x >= -_NEAR_M) & (low_y < wide)
-    low_y -= side
-    np.maximum(low_y, 0.0, out=low_y)
-    reach2 = reach * reach
-    past = np.sqrt(np.maximum(reach2 - low_y * low_y, 0.0)) + (low_x - pairs.rear_m)
-    ahead &= past >= -_NEAR_M
-    share = half / np.maximum(distance - rho, half)
-    at = np.maximum(distance * np.sqrt(1.0 - share * share), high_x)
-    np.minimum(at, low_x, out=at)
-    off = np.sqrt(np.maximum(distance2 - at * at, 0.0))
-    off -= half
-    np.maximum(off, 0.0, out=off)
-    near = at - np.sqrt(np.maximum(rho * rho - off * off, 0.0)) - pairs.front_m
-    near = np.where(ahead, near, _NOWHERE_M)
-    backward = (high_x < _NEAR_M) & (high_y < wide)
-    if not backward.any():
-        return near, past, None
-    share = side / np.maximum(distance - reach, side)
-    at = np.minimum(-distance * np.sqrt(1.0 - share * share), low_x)
-    at = np.maximum(np.minimum(at, 0.0), high_x)
-    off = np.maximum(np.sqrt(np.maximum(distance2 - at * at, 0.0)) - side, 0.0)
-    end = at - pairs.rear_m + np.sqrt(np.maximum(reach2 - off * off, 0.0))
-    return near, past, np.where(backward, end, -np.inf)
 
 
 def limits_at(
@@ -585,26 +366,24 @@ def limits_at(
         return limits, by, texts
 
     def flat(value: Value) -> Value:
-        return value.reshape(-1) if isinstance(value, np.ndarray) and value.ndim else value
+        is_array = isinstance(value, np.ndarray) and value.ndim
+        return value.reshape(-1, *value.shape[2:]) if is_array else value
 
-    velocities = None
-    if velocities_mps is not None:
-        velocities = flat(velocities_mps[0]), flat(velocities_mps[1])
+    places, headings, rates = map(flat, (positions_m, headings_rad, yaw_rates_radps))
+    velocities = velocities_mps and tuple(map(flat, velocities_mps))
     times = np.tile(np.arange(shape[1]), shape[0])
     reaches = Reaches.of(people, shape[1], basis, robot)
     lowest, who = limits.reshape(-1), np.empty(limits.size, dtype=np.intp)
     standing = np.zeros(limits.size, dtype=bool)
-    if velocities is not None and headings_rad is not None and robot.moves_sideways is True:
-        standing = _speed_mps(*velocities) < STANDING_MPS
+    if velocities and headings_rad is not None and robot.moves_sideways is True:
+        standing = course_speed_mps(*velocities) < STANDING_MPS
     for anywhere in (False, True):
         poses = np.flatnonzero(standing == anywhere)
         if not len(poses):
             continue
-        courses = courses_of(
-            *(robot, basis, positions_m.reshape(-1, 2)[poses], _of(flat(headings_rad), poses)),
-            velocities and tuple(_of(each, poses) for each in velocities),
-            *(_of(flat(yaw_rates_radps), poses), anywhere),
-        )
+        here, heading, rate = (chosen_of(each, poses) for each in (places, headings, rates))
+        velocity = velocities and tuple(chosen_of(each, poses) for each in velocities)
+        courses = courses_of(robot, basis, here, heading, velocity, rate, anywhere)
         field = _Field(reaches, courses, times[poses], basis, robot, reach_m)
         some = lowest[poses]
         who[poses] = field.lower(some)

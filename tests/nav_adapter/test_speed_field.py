@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import policies, robots
 from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
 
 from nav_adapter import (
@@ -21,7 +20,7 @@ from nav_adapter import (
     RobotState,
 )
 from nav_adapter.exporters import SpeedMap, limited_by_at, speed_limit_at, time_cost
-from nav_adapter.policies import ProtectiveField, StartReserve
+from nav_adapter.policies import ReachRules
 from nav_adapter.ros2 import speed_mask
 from tracking import PersonTrack
 
@@ -44,6 +43,7 @@ class Scene:
     after_s: float
     state: RobotState
     coasts: bool
+    told: int
 
 
 def at(track: PersonTrack, time_s: float, *, coasts: bool = False) -> PersonTrack:
@@ -83,117 +83,144 @@ def drive(scene: Scene) -> tuple[NavConstraints, NavConstraints]:
 
 
 @st.composite
-def scenes(draw: st.DrawFn) -> Scene:
-    policy = draw(policies())
-    rules = policy.rules.model_copy(
-        update={
-            "start_reserve": draw(
-                st.none()
-                | st.builds(
-                    StartReserve,
-                    human_acceleration_mps2=finite(0.5, 4.0),
-                    start_delay_s=finite(0.0, 0.5),
-                )
-            ),
-            "protective_field": draw(
-                st.sampled_from([None, None, None, ProtectiveField(beside_m=0.2)])
-            ),
-        }
+def policies(draw: st.DrawFn) -> AwarenessPolicy:
+    policy = AwarenessPolicy.preset(
+        draw(st.sampled_from(["balanced", "conservative", "assertive", "blind"]))
     )
-    policy = policy.model_copy(update={"rules": rules})
-    drive = draw(st.sampled_from([None, "differential", "ackermann", "holonomic"]))
-    radius_m = 1.5 if drive == "ackermann" else None
-    robot = replace(draw(robots()), drive=drive, min_turning_radius_m=radius_m)
-    people = draw(crowds())
+    reach = ReachRules(
+        time_constant_s=draw(finite(0.1, 1.0)),
+        delay_s=draw(finite(0.0, 0.5)),
+        turn_deg=draw(st.sampled_from([0.0, 30.0, 120.0]) | finite(0.0, 180.0)),
+    )
+    fresh_s = draw(finite(0.12, 0.3))
+    changes = {
+        "reach": draw(st.sampled_from([reach, reach, reach, None])),
+        "timing": policy.timing.model_copy(update={"fresh_within_s": fresh_s}),
+    }
+    return policy.model_copy(update=changes)
+
+
+@st.composite
+def robots(draw: st.DrawFn) -> RobotProfile:
+    angles = np.sort(draw(st.permutations(range(12)))[: draw(st.integers(4, 7))]) * (np.pi / 6.0)
+    long, wide = draw(finite(0.2, 0.8)), draw(finite(0.2, 0.8))
+    corners = np.stack([long * np.cos(angles), wide * np.sin(angles)], axis=1)
+    return RobotProfile(
+        footprint_m=corners + draw(finite(-0.15, 0.15)),
+        max_speed_mps=draw(finite(0.3, 2.5)),
+        max_acceleration_mps2=draw(finite(0.3, 2.0)),
+        max_deceleration_mps2=draw(finite(0.3, 3.0)),
+        reaction_time_s=draw(finite(0.0, 0.8)),
+        drive=draw(st.sampled_from([None, "differential", "holonomic"])),
+    )
+
+
+@st.composite
+def scenes(draw: st.DrawFn, known: int | None = None) -> Scene:
+    """Scenes with a robot that drives straight on, or as it likes if the field is told so."""
+    robot = draw(robots())
     after_s = draw(st.just(0.0) | finite(0.0, 2.0))
     top = robot.max_speed_mps
-    speed = draw(st.sampled_from([0.0, 0.03]) | finite(-0.7 * top, 0.7 * top))
-    # A robot that cannot move sideways but does is a fault, with a test of its own.
-    lateral = draw(st.sampled_from([0.0, 0.0, 0.05]))
-    if robot.moves_sideways is not False:
-        lateral = draw(st.just(lateral) | finite(-0.7 * top, 0.7 * top))
+    told = draw(st.integers(0, 3)) if known is None else known
+    speed, lateral = draw(finite(0.05, top)), 0.0
+    if told >= 2:
+        speed = draw(st.sampled_from([0.0, 0.03, -0.04]) | finite(-0.7 * top, 0.7 * top))
+        # A robot that cannot move sideways but does is a fault, with a test of its own.
+        lateral = draw(st.sampled_from([0.0, 0.0, 0.02]))
+        if robot.moves_sideways is not False:
+            lateral = draw(st.just(lateral) | finite(-0.7 * top, 0.7 * top))
     state = RobotState(
         after_s - draw(st.just(0.0) | finite(0.0, 0.4)),
         np.array(draw(st.tuples(finite(-3, 3), finite(-3, 3)))),
         draw(finite(-4.0, 4.0)),
         speed,
-        draw(finite(-1.5, 1.5)),
+        draw(finite(-1.5, 1.5)) if told >= 3 else 0.0,
         np.array([speed, lateral]),
     )
+    people = draw(crowds())
     missing = draw(st.integers(0, min(1, len(people))))
-    return Scene(policy, robot, people, missing, after_s, state, draw(st.booleans()))
+    return Scene(
+        draw(policies()), robot, people, missing, after_s, state, draw(st.booleans()), told
+    )
 
 
-def known_of(state: RobotState, known: int) -> dict[str, Any]:
-    """Return what the field is told of the robot: nothing, or more and more."""
+def field_at(scene: Scene, now: NavConstraints) -> float:
+    """Return the field at the robot's pose, told as much of the robot as the scene says."""
+    state = scene.state
     assert state.velocity_base_mps is not None
     forward, left = state.velocity_base_mps.tolist()
-    speeds = [[[forward, left]]] if left else [[forward]]
-    everything = {
+    told: dict[str, Any] = {
         "headings_odom_rad": [[state.heading_odom_rad]],
-        "speeds_mps": speeds,
+        "speeds_mps": [[[forward, left]]] if left else [[forward]],
         "yaw_rates_radps": [[state.yaw_rate_radps]],
     }
-    return dict(list(everything.items())[:known])
-
-
-def field_at(scene: Scene, now: NavConstraints, known: int) -> float:
     limits = speed_limit_at(
         now,
-        scene.state.position_odom_m[None, None],
+        state.position_odom_m[None, None],
         dt_s=1.0,
         first_s=scene.after_s,
-        **known_of(scene.state, known),
+        **dict(list(told.items())[: scene.told]),
     )
     assert limits.shape == (1, 1)
     return float(limits[0, 0])
 
 
-@settings(max_examples=250)
+@settings(max_examples=300)
 @given(scene=scenes())
 def test_the_field_is_never_above_the_limit_of_a_robot_that_gets_there(scene: Scene) -> None:
     now, then = drive(scene)
-    limits = [field_at(scene, now, known) for known in range(4)]
-    for limit_mps in limits:
-        assert 0.0 <= limit_mps <= then.speed_limit_mps + 1e-9
-    # Telling more never lowers the field.
-    assert (np.diff(limits) >= -1e-5).all()
+    assert 0.0 <= field_at(scene, now) <= then.speed_limit_mps + 1e-9
 
 
-@st.composite
-def standing_scenes(draw: st.DrawFn) -> Scene:
-    """Scenes with people who stand and are seen in every frame."""
-    scene = draw(scenes())
-    people = tuple(
-        replace(
-            track,
-            status="confirmed",
-            velocity_odom_mps=np.zeros(2),
-            time_since_seen_s=0.0,
-            stamp_s=draw(st.sampled_from([0.0, 0.0, -0.04])),
-            awareness_lower=draw(st.sampled_from([0.0, 0.5, 1.0])),
+def test_for_people_who_stand_and_are_seen_the_field_is_the_limit() -> None:
+    rng, shares = np.random.default_rng(4), []
+    for _ in range(40):
+        policy = AwarenessPolicy.preset(str(rng.choice(["balanced", "conservative", "blind"])))
+        people = [
+            person(
+                track_id=index,
+                position=rng.uniform(-5.0, 5.0, 2).tolist(),
+                awareness_lower=float(rng.choice([0.0, 0.5, 1.0])),
+                sigma_m=float(rng.choice([0.0, 0.1])),
+            )
+            for index in range(rng.integers(1, 4))
+        ]
+        places, headings = rng.uniform(-4.0, 4.0, (12, 1, 2)), rng.uniform(-4.0, 4.0, (12, 1))
+        speeds = rng.uniform(-1.2, 1.2, (12, 1))
+        now = settled_update(people, policy=policy)
+        field = speed_limit_at(now, places, headings, dt_s=1.0, speeds_mps=speeds)
+        for place, heading, speed, limit in zip(places, headings, speeds, field, strict=True):
+            state = robot_at(
+                position=place[0].tolist(), heading_rad=float(heading[0]), speed_mps=float(speed[0])
+            )
+            there = settled_update(people, policy=policy, state=state).speed_limit_mps
+            if there >= 0.2:
+                shares.append(limit[0] / there)
+    assert len(shares) > 150
+    assert max(shares) <= 1.0
+    # But for a few poses at which a person just comes to the edge of the robot's way, or just not.
+    assert np.quantile(shares, 0.02) > 0.9
+    assert np.median(shares) > 0.999
+
+
+def test_straight_ahead_of_a_person_who_stands_the_field_is_the_limit_at_every_distance() -> None:
+    for alpha in (0.0, 1.0):
+        now = settled_update([person(position=(0.0, 0.0), awareness_lower=alpha)])
+        places = np.stack([np.linspace(-4.5, -0.9, 60), np.zeros(60)], axis=1)
+        field = speed_limit_at(
+            now, places[:, None], np.zeros((60, 1)), dt_s=1.0, speeds_mps=np.full((60, 1), 0.5)
         )
-        for track in scene.people
-    )
-    state = replace(scene.state, stamp_s=scene.after_s - draw(st.sampled_from([0.0, 0.0, 0.03])))
-    return replace(scene, people=people, missing=0, state=state)
-
-
-@settings(max_examples=150)
-@given(scene=standing_scenes())
-def test_for_people_who_stand_the_field_is_the_limit(scene: Scene) -> None:
-    now, then = drive(scene)
-    # At first sight people count as unaware, and fewer do so later.
-    timing = scene.policy.timing
-    known_s = 4 * min(0.1, timing.fresh_within_s) if timing.stale_after_s > 0.1 else 0.0
-    if known_s < timing.shrink_after_s + 1e-6 or scene.after_s == 0.0:
-        return
-    limit_mps = field_at(scene, now, 3)
-    assert limit_mps == pytest.approx(then.speed_limit_mps, rel=0.01, abs=2e-3)
+        assert field[0, 0] == ROBOT.max_speed_mps
+        for place, limit in zip(places.tolist(), field[:, 0].tolist(), strict=True):
+            there = settled_update(
+                [person(position=(0.0, 0.0), awareness_lower=alpha)],
+                state=robot_at(position=place, speed_mps=0.5),
+            ).speed_limit_mps
+            assert 0.95 * there - 5e-3 <= limit <= there
 
 
 @settings(max_examples=60)
-@given(scene=scenes(), shift=st.tuples(finite(-0.5, 0.5), finite(-0.5, 0.5)))
+@given(scene=scenes(known=0), shift=st.tuples(finite(-0.5, 0.5), finite(-0.5, 0.5)))
 def test_a_cell_of_the_map_holds_for_a_robot_anywhere_in_it(
     scene: Scene, shift: tuple[float, float]
 ) -> None:
@@ -223,7 +250,7 @@ def test_the_reasons_are_those_of_the_adapter() -> None:
         person(track_id=2, position=(9.0, 0.0)),
     ]
     now = settled_update(people, policy=policy)
-    places = np.array([[0.0, 0.0], [4.5, 0.0], [4.5, 2.0], [7.5, 0.0], [-9.0, 0.0]])
+    places = np.array([[0.0, 0.0], [4.5, 0.0], [4.5, 0.7], [7.5, 0.0], [-9.0, 0.0]])
     told = {
         "headings_odom_rad": np.zeros((5, 1)),
         "speeds_mps": np.full((5, 1), 0.5),
@@ -235,13 +262,12 @@ def test_the_reasons_are_those_of_the_adapter() -> None:
         there = settled_update(
             people, policy=policy, state=robot_at(position=place.tolist(), speed_mps=0.5)
         )
-        assert limit == pytest.approx(there.speed_limit_mps, rel=1e-3)
+        assert limit == pytest.approx(there.speed_limit_mps, rel=5e-3)
         assert reason == there.limited_by
-    assert {reason.partition(": ")[2] for reason in reasons[:, 0]} == {
-        "speed and separation",
-        "start reserve",
-        "",
-    }
+    assert set(reasons[:, 0]) == {"track 1: reach", "track 2: reach", "robot maximum"}
+    scanner = settled_update(people, policy=policy.model_copy(update={"reach": None}))
+    reasons = limited_by_at(scanner, places[:, None], **told)
+    assert set(reasons[:, 0]) == {"track 1: in the path", "track 2: in the path", "robot maximum"}
 
 
 def test_lost_and_stale_people_count_as_in_the_adapter() -> None:
@@ -372,66 +398,3 @@ def test_the_mask_is_what_nav2_reads() -> None:
     row, column = 60, 70
     assert mask.info.origin.position.x + 0.1 * column == pytest.approx(1.0)
     assert values[row, column] == 1
-
-
-def test_tensors_give_the_same_limits_with_gradients() -> None:
-    torch: Any = pytest.importorskip("torch")
-    rng = np.random.default_rng(2)
-    now = settled_update(random_people(rng, 6), policy=AwarenessPolicy.preset("balanced"))
-    places, headings = rng.uniform(-5, 5, (20, 12, 2)), rng.uniform(-3, 3, (20, 12))
-    speeds = rng.uniform(0.2, 1, (20, 12))
-    expected = speed_limit_at(now, places, headings, dt_s=0.1, speeds_mps=speeds)
-    tensor = torch.tensor(places, requires_grad=True)
-    told = {"dt_s": 0.1, "speeds_mps": torch.tensor(speeds)}
-    limits = speed_limit_at(now, tensor, torch.tensor(headings), **told)
-    assert limits.detach().numpy() == pytest.approx(expected, rel=1e-4, abs=1e-4)
-    limits.sum().backward()
-    gradient = tensor.grad.numpy()
-    assert np.isfinite(gradient).all()
-    step = 1e-5
-    for axis in (0, 1):
-        moved = [places.copy(), places.copy()]
-        moved[0][:, :, axis] -= step
-        moved[1][:, :, axis] += step
-        low, high = (
-            speed_limit_at(now, torch.tensor(each), torch.tensor(headings), **told).numpy()
-            for each in moved
-        )
-        slope = (high - low) / (2.0 * step)
-        close = np.isclose(gradient[:, :, axis], slope, rtol=1e-3, atol=1e-3)
-        assert close.mean() > 0.98  # but for kinks between two people or rules
-    cost = time_cost(now, tensor, dt_s=0.1)
-    expected_s = time_cost(now, places, dt_s=0.1)
-    assert cost.detach().numpy() == pytest.approx(expected_s, rel=1e-3)
-    with pytest.raises(NavError, match="finite"):
-        speed_limit_at(now, torch.full((1, 1, 2), float("nan")), dt_s=0.1)
-
-
-@settings(max_examples=25)
-@given(scene=scenes(), seed=st.integers(0, 2**32 - 1), known=st.integers(0, 3))
-def test_many_poses_give_the_limits_of_few_to_the_last_bit(
-    scene: Scene, seed: int, known: int
-) -> None:
-    # With many poses, each person is computed only where they may allow less than others do.
-    now, _ = drive(scene)
-    rng, shape = np.random.default_rng(seed), (50, 82)
-    places = rng.normal(0.0, 4.0, (*shape, 2))
-    # The same extent of all parts gives the same rounding.
-    places[:, 0], places[:, 1] = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    top = scene.robot.max_speed_mps
-    everything = {
-        "headings_odom_rad": rng.uniform(-3.0, 3.0, shape),
-        "speeds_mps": rng.uniform(-top, top, shape),
-        "yaw_rates_radps": rng.uniform(-1.0, 1.0, shape),
-    }
-    told = dict(list(everything.items())[:known])
-    times = {"dt_s": 0.05, "aware_for_s": 2.0}
-    at_once = speed_limit_at(now, places, **told, **times)
-    for start in range(0, 50, 25):
-        part = slice(start, start + 25)
-        some = {name: values[part] for name, values in told.items()}
-        expected = speed_limit_at(now, places[part], **some, **times)
-        if known == 0:
-            assert (at_once[part] == expected).all()
-        else:
-            assert at_once[part] == pytest.approx(expected, rel=1e-6, abs=1e-6)
