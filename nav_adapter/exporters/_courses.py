@@ -110,9 +110,11 @@ def courses_of(
         middle = (*_directions(straight_rad + chord_rad), *swung)
     if anywhere:
         return Courses(x, y, _single(driven_m), straight=straight)
-    fan = _directions(fan_rad)
-    cos, sin, *extents = middle
-    return Courses(x, y, _single(driven_m), cos, sin, *fan, *extents, straight=straight)
+    fan_cos, fan_sin = _directions(fan_rad)
+    cos, sin, front, rear, half = middle
+    return Courses(
+        *(x, y, _single(driven_m), cos, sin, fan_cos, fan_sin, front, rear, half), straight
+    )
 
 
 def course_speed_mps(forward: Value, left: Value) -> Value:

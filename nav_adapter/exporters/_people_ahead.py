@@ -108,8 +108,8 @@ class Reaches:
         """Return the tables of one or more people."""
         counts, columns = [], []
         for each in people:
-            values = (*each[1:8], *each.variances, each.body_m)
-            values += (-np.inf if each.least_mps is None else each.least_mps,)
+            least_mps = -np.inf if each.least_mps is None else each.least_mps
+            values = (*each[1:8], *each.variances, each.body_m, least_mps)
             count = times if any(np.ndim(value) for value in values) else 1
             counts.append(count)
             columns.append(np.stack([np.broadcast_to(value, count) for value in values]))
