@@ -121,15 +121,16 @@ def straight_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.
     return _course(robot, state, age_s, off_rad, 0.0, extent)
 
 
-def limit_mps(person: Reach, course: Course) -> float:
+def limit_mps(person: Reach, course: Course, at_most_mps: float = math.inf) -> float:
     """Return the highest speed at which the robot meets the reach of one person at a stand only.
 
     The same holds for every lower speed. A number that is not finite gives 0. The result lies below
-    the exact one by what the last, finest steps of time leave open.
+    the exact one by what the last, finest steps of time leave open. It is ``at_most_mps``, which
+    takes less time, or the maximum where the limit is not lower.
     """
-    maximum = course.maximum_mps
+    maximum = min(course.maximum_mps, at_most_mps)
     size_m = _size_m(course)
-    if _is_far(person, course, size_m):
+    if _is_far(person, course, size_m, maximum):
         return maximum
     a, T = course.deceleration_mps2, course.reaction_s + person.elapsed_s
     step_s = _step_s(course)
@@ -141,7 +142,7 @@ def limit_mps(person: Reach, course: Course) -> float:
     while True:
         if a * (t - T) < limit:  # a robot at the limit so far still moves at t
             later = t + step_s
-            lowest = _lowest_mps(person, course, size_m, T, t, later)
+            lowest = _lowest_mps(person, course, size_m, maximum, T, t, later)
             if lowest < maximum:
                 heappush(meetings, (lowest, t, later))
             t = later
@@ -154,19 +155,19 @@ def limit_mps(person: Reach, course: Course) -> float:
             heappop(meetings)
             middle = 0.5 * (first + last)
             for start, end in ((first, middle), (middle, last)):
-                lowest = _lowest_mps(person, course, size_m, T, start, end)
+                lowest = _lowest_mps(person, course, size_m, maximum, T, start, end)
                 if lowest < maximum:
                     heappush(meetings, (lowest, start, end))
         limit = meetings[0][0] if meetings else maximum
 
 
 def _lowest_mps(
-    person: Reach, course: Course, size_m: float, T: float, t0: float, t1: float
+    person: Reach, course: Course, size_m: float, maximum: float, T: float, t0: float, t1: float
 ) -> float:
     """Return the lowest speed at which the robot meets the reach from t0 to t1; ∞ if there is none.
 
     The reach is that at t1 about the middle of the person's way between, larger by half of it.
-    Speeds from the maximum on may count as none.
+    Speeds from ``maximum`` on may count as none.
     """
     a = course.deceleration_mps2
     need0 = a * (t0 - T) if t0 > T else 0.0  # a faster robot still moves at t0
@@ -174,7 +175,7 @@ def _lowest_mps(
     braked1_m = 0.5 * a * (t1 - T) * (t1 - T) if t1 > T else 0.0
     x, y, distance2, reach = reach_at(person, course, t0, t1)
     apart_m = math.sqrt(distance2) - reach - person.margin_m - size_m - _ROUNDING_M
-    if apart_m > 0.0 and apart_m + braked1_m >= course.maximum_mps * t1:
+    if apart_m > 0.0 and apart_m + braked1_m >= maximum * t1:
         return math.inf
     near, past, past_behind = contact_m(course, person.margin_m, x, y, distance2, reach)
     if need0 * t0 - braked0_m <= past_behind:
@@ -273,11 +274,11 @@ def passing_radius_m(
     return high_m
 
 
-def _is_far(person: Reach, course: Course, size_m: float) -> bool:
-    """Return whether a person cannot be met before a robot at its maximum has stopped."""
-    stop_s = course.reaction_s + person.elapsed_s + course.maximum_mps / course.deceleration_mps2
+def _is_far(person: Reach, course: Course, size_m: float, maximum_mps: float) -> bool:
+    """Return whether a person cannot be met before a robot at that speed has stopped."""
+    stop_s = course.reaction_s + person.elapsed_s + maximum_mps / course.deceleration_mps2
     stop_s += _step_s(course)
-    way_m = course.maximum_mps * stop_s
+    way_m = maximum_mps * stop_s
     drift_s = person.drift_s(stop_s)
     walked_m = drift_s * math.hypot(person.velocity_x_mps, person.velocity_y_mps)
     uncertainty_m = max(person.uncertainty_m(drift_s), person.uncertainty_m(0.0))
