@@ -35,8 +35,8 @@ from ._courses import (
 )
 from ._people_ahead import PARTS, Reaches, people_ahead
 
-# Pairs of pose and person that are computed together, so that their numbers stay in the cache.
-_TOGETHER: Final = 32768
+# Pairs of pose and person that are computed together: few calls, and numbers that fit the cache.
+_TOGETHER: Final = 65536
 # A limit is lowered by this share of itself, for rounding in single precision.
 _ROUNDING: Final = 1e-5
 
@@ -210,7 +210,7 @@ class _Field:
             gap = np.where(inside, x - ahead - (front + driven + self._clearance_m), NOWHERE_M)
         return stopping_mps(gap, react, self._a)
 
-    def _reach_mps(self, pairs: Pairs, before: Any, first: Any = None, again: int = 3) -> Any:
+    def _reach_mps(self, pairs: Pairs, before: Any, first: Any = None, again: int = 2) -> Any:
         """Return the limits (n,) by the reach; they are ∞ where they are not below ``before``.
 
         The first steps that count are given, or computed. The step in which a robot stops is looked

@@ -30,8 +30,8 @@ def speed_limit_at(
 
     It is a lower bound of the limit that ``NavAdapter.update`` will give at that time to a robot
     that is there. All people count, and so do lost ones, the age of the data and the recovery after
-    stale data. Without headings the robot's circumscribed circle counts, and people in every
-    direction; without speeds it drives forwards, and without yaw rates straight on.
+    stale data. Without headings a circle about the robot counts, and people in every direction;
+    without speeds it drives forwards, and without yaw rates straight on.
 
     The bound holds if
 
@@ -42,7 +42,8 @@ def speed_limit_at(
     * the tracker reports at least once per ``fresh_within_s``, and the adapter is updated as often;
     * the robot is no faster than its maximum.
 
-    For people who stand and are seen, it is the limit itself but for steps of time.
+    For people who stand and are seen, it is the limit itself within some millimetres per second,
+    but for a few poses where a person just comes to the edge of the robot's way, or just not.
 
     Args:
         constraints: of ``NavAdapter.update``.

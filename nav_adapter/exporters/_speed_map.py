@@ -79,8 +79,8 @@ class SpeedMap:
     ) -> SpeedMap:
         """Return the map of a square around a point, people moving as predicted.
 
-        A cell has the limit of :func:`speed_limit_at` for a robot anywhere in it, with any heading
-        and direction of travel. The corner of the map is rounded to whole cells.
+        A cell has the limit of :func:`speed_limit_at` for a robot anywhere in it that drives
+        straight on, with any heading. The corner of the map is rounded to whole cells.
 
         Args:
             constraints: of ``NavAdapter.update``.
