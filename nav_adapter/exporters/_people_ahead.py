@@ -113,12 +113,14 @@ class Reaches:
             count = times if any(np.ndim(value) for value in values) else 1
             counts.append(count)
             columns.append(np.stack([np.broadcast_to(value, count) for value in values]))
-        x, y, vx, vy, U, delay, elapsed, a0, a1, a2, body, least = np.concatenate(columns, axis=1)
+        x, y, *others, least = np.concatenate(columns, axis=1)
+        # Most rows of a person differ in place alone.
+        different, each_row = np.unique(np.stack(others), axis=1, return_inverse=True)
+        each_row = each_row.reshape(-1)
+        vx, vy, U, delay, elapsed, a0, a1, a2, body = different
         follows = np.array(counts) > 1
         first = np.cumsum([0, *counts[:-1]])
         a, react = robot.max_deceleration_mps2, robot.reaction_time_s + elapsed
-        if np.ptp(react) == 0.0:
-            react = react[:1]
         step_s = (robot.reaction_time_s + robot.max_speed_mps / a) / STEPS * 2
         steps = math.ceil((react.max() + robot.max_speed_mps / a) / step_s + 1e-6)
         t = (step_s / PARTS) * np.arange(PARTS * steps + 1)[:, None]
@@ -138,13 +140,20 @@ class Reaches:
         largest_m = float(around.max()) + robot.max_speed_mps * float(t[-1, 0])
         largest_m += 2.0 * robot.circumscribed_radius_m
         slack = 2e-6 * (2.0 + largest_m) ** 2
-        single = np.float32
+
+        def table(values: FloatArray) -> Any:
+            """Return values (…, rows), or (…, 1) where all rows are equal."""
+            values = values.astype(np.float32)
+            return values[..., :1] if values.shape[-1] == 1 else values[..., each_row]
+
+        if np.ptp(react) == 0.0:
+            react, late = react[:1], late[:, :1]
         return cls(
-            *(people, first, follows.astype(np.intp), x, y, vx.astype(single), vy.astype(single)),
-            *((body + slack).astype(single), least, elapsed.astype(single), react.astype(single)),
-            *(t[:, 0].astype(single), m.astype(single), (r + slack).astype(single)),
-            *((around + 2.0 * slack).astype(single), (a * late).astype(single)),
-            (0.5 * a * late * late).astype(single),
+            *(people, first, follows.astype(np.intp), x, y, vx[each_row].astype(np.float32)),
+            *(vy[each_row].astype(np.float32), (body + slack)[each_row].astype(np.float32), least),
+            *(elapsed[each_row].astype(np.float32), table(react), t[:, 0].astype(np.float32)),
+            *(table(m), table(r + slack), table(around + 2.0 * slack), table(a * late)),
+            table(0.5 * a * late * late),
         )
 
 

@@ -113,7 +113,7 @@ class _Field:
         around = self._reaches.around_m
         part = (until_s * (1.0 / self._step_s) + 1.0).astype(np.intp) * PARTS
         np.minimum(part, len(around) - 1, out=part)
-        return around.ravel().take(part * around.shape[1] + row)
+        return in_table(around, part, row)
 
     def _reacts_s(self, row: Any) -> Value:
         return in_table(self._reaches.react_s[None], 0, row)
@@ -190,7 +190,7 @@ class _Field:
             middle = (low + high) >> 1
             part = np.minimum(middle + 1, steps).astype(np.intp) * PARTS
             way = self._reaches.ahead_s[part] * before
-            apart = free > around.ravel().take(part * around.shape[1] + pairs.row) + way
+            apart = free > in_table(around, part, pairs.row) + way
             low, high = np.where(apart, middle + 1, low), np.where(apart, high, middle)
         return np.minimum(low, steps)
 
