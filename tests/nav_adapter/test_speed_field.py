@@ -199,7 +199,7 @@ def test_for_people_who_stand_and_are_seen_the_field_is_the_limit() -> None:
     assert len(shares) > 150
     assert max(shares) <= 1.0
     # But for a few poses at which a person just comes to the edge of the robot's way, or just not.
-    assert np.quantile(shares, 0.02) > 0.9
+    assert np.quantile(shares, 0.04) > 0.9
     assert np.median(shares) > 0.999
 
 
