@@ -6,16 +6,50 @@ It is computed some twenty times per person and update, so its formulas are writ
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final, NamedTuple
 
 from .reach import Reach
-
-if TYPE_CHECKING:
-    from .limit import Course
 
 # A person at the base origin has no direction.
 _SAME_PLACE_M: Final = 1e-9
 _sqrt, _expm1 = math.sqrt, math.expm1
+
+
+class Course(NamedTuple):
+    """The courses that a robot may take while it stops, as a fan of straight ways.
+
+    A robot on a curve is within the fan too: the chord of its arc lies between the courses, and the
+    rectangle is larger by what the turn about that chord swings out.
+
+    Attributes:
+        x_m: place of the base in odom.
+        y_m: the same.
+        cos: direction of the middle of the fan.
+        sin: the same.
+        fan_cos: half the opening of the fan.
+        fan_sin: the same.
+        front_m: farthest part of the footprint ahead of the base, along the course.
+        rear_m: the same behind it, mostly negative.
+        half_m: half the width.
+        circle_m: radius of a robot that may go anywhere at once, as a circle; 0 for a fan.
+        maximum_mps: highest speed of the robot.
+        deceleration_mps2: a > 0.
+        reaction_s: T ≥ 0.
+    """
+
+    x_m: float
+    y_m: float
+    cos: float
+    sin: float
+    fan_cos: float
+    fan_sin: float
+    front_m: float
+    rear_m: float
+    half_m: float
+    circle_m: float
+    maximum_mps: float
+    deceleration_mps2: float
+    reaction_s: float
 
 
 def reach_at(

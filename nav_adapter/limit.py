@@ -18,17 +18,33 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from heapq import heappop, heappush
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ._contact import contact_m, reach_at
+from ._contact import Course, contact_m, reach_at
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 from .policies import ReachRules
 from .reach import Reach
+
+__all__ = [
+    "FINEST",
+    "PASSING_MPS",
+    "ROOM",
+    "STANDING_MPS",
+    "STEPS",
+    "Course",
+    "any_course_of",
+    "course_of",
+    "in_the_path_mps",
+    "limit_mps",
+    "passing_radius_m",
+    "stops_in_time",
+    "straight_course_of",
+]
 
 #: Below this speed the robot counts as standing: it will start along its heading.
 STANDING_MPS: Final = 0.05
@@ -42,43 +58,6 @@ PASSING_MPS: Final = 0.3
 ROOM: Final = 1.5
 # More than the rounding of any distance that matters.
 _ROUNDING_M: Final = 1e-9
-
-
-class Course(NamedTuple):
-    """The courses that a robot may take while it stops, as a fan of straight ways.
-
-    A robot on a curve is within the fan too: the chord of its arc lies between the courses, and the
-    rectangle is larger by what the turn about that chord swings out.
-
-    Attributes:
-        x_m: place of the base in odom.
-        y_m: the same.
-        cos: direction of the middle of the fan.
-        sin: the same.
-        fan_cos: half the opening of the fan.
-        fan_sin: the same.
-        front_m: farthest part of the footprint ahead of the base, along the course.
-        rear_m: the same behind it, mostly negative.
-        half_m: half the width.
-        circle_m: radius of a robot that may go anywhere at once, as a circle; 0 for a fan.
-        maximum_mps: highest speed of the robot.
-        deceleration_mps2: a > 0.
-        reaction_s: T ≥ 0.
-    """
-
-    x_m: float
-    y_m: float
-    cos: float
-    sin: float
-    fan_cos: float
-    fan_sin: float
-    front_m: float
-    rear_m: float
-    half_m: float
-    circle_m: float
-    maximum_mps: float
-    deceleration_mps2: float
-    reaction_s: float
 
 
 def course_of(
