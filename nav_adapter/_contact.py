@@ -1,4 +1,4 @@
-"""Where the robot meets the reach of a person: geometry on plain floats, for the limit alone.
+"""Contact of the robot with the reach of a person: geometry on plain floats, for the limit alone.
 
 It is computed some twenty times per person and update, so its formulas are written out.
 """
