@@ -31,6 +31,7 @@ class Course(NamedTuple):
         front_m: farthest part of the footprint ahead of the base, along the course.
         rear_m: the same behind it, mostly negative.
         half_m: half the width.
+        radius_m: no part of the robot is farther from the base of its course, wherever it points.
         circle_m: radius of a robot that may go anywhere at once, as a circle; 0 for a fan.
         maximum_mps: highest speed of the robot.
         deceleration_mps2: a > 0.
@@ -46,6 +47,7 @@ class Course(NamedTuple):
     front_m: float
     rear_m: float
     half_m: float
+    radius_m: float
     circle_m: float
     maximum_mps: float
     deceleration_mps2: float
@@ -71,7 +73,8 @@ def reach_at(
     x, y = cos * dx + sin * dy, abs(cos * dy - sin * dx)
     reach = U * (since_s + tau * _expm1(-since_s / tau))
     reach += 0.5 * (m1 - m0) * _sqrt(vx * vx + vy * vy)
-    variance = a0 + m1 * (a1 + m1 * a2)
+    # With a negative a1 it shrinks.
+    variance = max(a0 + m1 * (a1 + m1 * a2), a0 + m0 * (a1 + m0 * a2))
     if not variance <= 0.0:
         reach += _sqrt(variance)
     return x, y, x * x + y * y, reach
@@ -86,10 +89,10 @@ def contact_m(
     where there is none. The third is the end of one that begins before the robot, with the person
     behind the base, or −∞. A body behind the rear edge does not count: the robot drives away.
     """
-    _, _, _, _, cos, sin, front, rear, half, circle = course[:10]
+    _, _, _, _, cos, sin, front, rear, half, radius, circle = course[:11]
     rho, side = reach + margin, half + margin
     distance = _sqrt(distance2)
-    if not distance > _SAME_PLACE_M:  # at the base, or NaN
+    if not (distance > _SAME_PLACE_M and reach >= 0.0):  # at the base, or NaN
         return -math.inf, math.inf, math.inf
     if circle > 0.0:  # straight to the person
         return distance - circle - front - rho, math.inf, -math.inf
@@ -113,7 +116,8 @@ def contact_m(
         at = min(at, low_x)
         off = _sqrt(max(distance2 - at * at, 0.0)) - half
         near = at - front - (_sqrt(max(rho * rho - off * off, 0.0)) if off > 0.0 else rho)
-    if high_x < 0.0 and high_y < half + rho:
+        near = max(near, distance - radius - rho)
+    if high_x < 0.0 and high_y < half + rho and distance <= radius + rho:
         at, beyond = min(low_x, 0.0), distance - reach
         if beyond > side:
             share = side / beyond

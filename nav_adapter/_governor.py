@@ -14,7 +14,7 @@ from ._robot import RobotProfile, RobotState
 from .limit import (
     STANDING_MPS,
     Course,
-    course_of,
+    courses_of,
     in_the_path_mps,
     limit_mps,
     stops_in_time,
@@ -87,19 +87,19 @@ class SpeedGovernor:
         lowest_mps, reason, suffices = math.inf, "robot maximum", True
         kept: dict[int, Person] = {}
         if people or lost:
-            straight, course = self.courses(robot_state, robot_age_s)
+            straight, courses = self.courses(robot_state, robot_age_s)
             speed_mps = robot_state.travel_mps
             for track_id, person in people.items():
                 # A limit that is not the lowest counts only where it is below the speed.
                 counts_mps = max(lowest_mps, speed_mps)
-                own_mps, rule = self.person_mps(person, straight, course, now, counts_mps)
+                own_mps, rule = self.person_mps(person, straight, courses, now, counts_mps)
                 if own_mps < lowest_mps:
                     lowest_mps, reason = own_mps, f"track {track_id}: {rule}"
                 # A robot within its limit has the whole reaction time left.
                 if own_mps < speed_mps and suffices and speed_mps >= STANDING_MPS:
-                    suffices = self._stops_in_time(person, straight, course, speed_mps, now)
+                    suffices = self._stops_in_time(person, straight, courses, speed_mps, now)
             for track_id, person in lost.items():
-                own_mps, _ = self.person_mps(person, straight, course, now)
+                own_mps, _ = self.person_mps(person, straight, courses, now)
                 first_mps = own_mps if person.lost_limit_mps is None else person.lost_limit_mps
                 lost_s = now - (person.lost_since_s or now)
                 ceiling_mps = first_mps + (self._rise_mps2 or 0.0) * lost_s
@@ -113,18 +113,20 @@ class SpeedGovernor:
             return GovernedSpeed(maximum_mps, "robot maximum", suffices, lowest_mps), kept
         return GovernedSpeed(lowest_mps, reason, suffices, lowest_mps), kept
 
-    def courses(self, robot_state: RobotState, robot_age_s: float) -> tuple[Course, Course | None]:
+    def courses(
+        self, robot_state: RobotState, robot_age_s: float
+    ) -> tuple[Course, tuple[Course, ...]]:
         """Return the straight course, and those that count for the reach."""
         straight = straight_course_of(self._robot, robot_state, robot_age_s)
         if self._turn_rad is None:
-            return straight, None
-        return straight, course_of(self._robot, robot_state, self._turn_rad, robot_age_s)
+            return straight, ()
+        return straight, courses_of(self._robot, robot_state, self._turn_rad, robot_age_s)
 
     def person_mps(
         self,
         person: Person,
         straight: Course,
-        course: Course | None,
+        courses: tuple[Course, ...],
         now: float,
         counts_mps: float = math.inf,
     ) -> tuple[float, str]:
@@ -142,18 +144,28 @@ class SpeedGovernor:
             path_mps = in_the_path_mps(place_m, body_m, self._clearance_m, aged)
             lowest_mps = min(lowest_mps, path_mps)
         reach = self._people.reach(person, now)
-        if reach is not None and course is not None:
-            reach_mps = limit_mps(reach, course, counts_mps)
+        if reach is not None:
+            reach_mps = counts_mps
+            for course in courses:
+                reach_mps = limit_mps(reach, course, reach_mps)
+            if reach.walks_faster:
+                # Whoever keeps to their motion is not met by a robot that keeps to its own.
+                reach_mps = limit_mps(reach.walking_on(), straight, reach_mps)
             if reach_mps <= lowest_mps:
                 lowest_mps, rule = reach_mps, "reach"
         return (math.inf if lowest_mps >= straight.maximum_mps else lowest_mps), rule
 
     def _stops_in_time(
-        self, person: Person, straight: Course, course: Course | None, speed_mps: float, now: float
+        self,
+        person: Person,
+        straight: Course,
+        courses: tuple[Course, ...],
+        speed_mps: float,
+        now: float,
     ) -> bool:
         """Return whether a robot that brakes fully from now on stops before it meets a person."""
         reach = self._people.reach(person, now)
-        if reach is not None and course is not None:
-            return stops_in_time(reach, course, speed_mps)
-        own_mps, _ = self.person_mps(person, straight._replace(reaction_s=0.0), None, now)
+        if reach is not None:
+            return all(stops_in_time(reach, course, speed_mps) for course in courses)
+        own_mps, _ = self.person_mps(person, straight._replace(reaction_s=0.0), (), now)
         return speed_mps <= own_mps

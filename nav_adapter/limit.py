@@ -39,6 +39,7 @@ __all__ = [
     "Course",
     "any_course_of",
     "course_of",
+    "courses_of",
     "in_the_path_mps",
     "limit_mps",
     "passing_radius_m",
@@ -46,10 +47,10 @@ __all__ = [
     "straight_course_of",
 ]
 
-#: Below this speed the robot counts as standing: it will start along its heading.
+#: Below this speed the robot counts as standing: it may start either way.
 STANDING_MPS: Final = 0.05
-#: Steps of time until the robot stands from its maximum.
-STEPS: Final = 16
+#: Steps of time while the robot brakes from its maximum.
+STEPS: Final = 12
 #: Share of such a step that the one that decides is refined to.
 FINEST: Final = 0.13
 #: The limit beside a circle that a planner keeps to.
@@ -60,31 +61,54 @@ ROOM: Final = 1.5
 _ROUNDING_M: Final = 1e-9
 
 
+def courses_of(
+    robot: RobotProfile, state: RobotState, turn_rad: float, age_s: float = 0.0
+) -> tuple[Course, ...]:
+    """Return the fans of courses of a robot whose state is ``age_s`` old: the lowest limit counts.
+
+    There is one, along the direction of travel. A robot that stands has a second one backwards, or
+    one in all directions if it may be able to move sideways.
+    """
+    sideways = abs(state.lateral_mps) > LATERAL_NOISE_MPS
+    if sideways or abs(state.speed_mps) >= STANDING_MPS:
+        return (course_of(robot, state, turn_rad, age_s),)
+    if robot.moves_sideways is not False:
+        return (any_course_of(robot, state, age_s),)
+    forward = course_of(robot, state, turn_rad, age_s)
+    front_m, rear_m = forward.front_m, forward.rear_m
+    driven_m = _driven_m(robot, state.travel_mps, age_s)
+    backward = forward._replace(
+        cos=-forward.cos,
+        sin=-forward.sin,
+        front_m=driven_m - rear_m,
+        rear_m=driven_m - front_m,
+    )
+    return forward, backward
+
+
 def course_of(
     robot: RobotProfile, state: RobotState, turn_rad: float, age_s: float = 0.0
 ) -> Course:
-    """Return the courses of a robot whose state is ``age_s`` old.
+    """Return the courses along the direction of travel of a robot whose state is ``age_s`` old.
 
-    It turns by at most ``turn_rad`` off the curve that it drives. A robot that stands starts along
-    its heading, or in any direction if it can move sideways. The footprint is measured along the
-    course. The maximum is one and a half times the robot's own, so that a limit of the fastest
+    It turns by at most ``turn_rad`` off the curve that it drives. The footprint is measured along
+    the course. The maximum is one and a half times the robot's own, so that a limit of the fastest
     point of a robot that turns has room.
     """
     forward, left = state.speed_mps, state.lateral_mps
     sideways = abs(left) > LATERAL_NOISE_MPS
     speed = math.hypot(forward, left) if sideways else abs(forward)
-    if speed < STANDING_MPS and robot.moves_sideways is True:
-        return any_course_of(robot, state, age_s)
-    off_rad, fan_rad = _off_heading_rad(state), turn_rad
+    off_rad, fan_rad, noise_rad = _off_heading_rad(state), turn_rad, 0.0
     if not sideways and robot.moves_sideways is not False:
         # What counts as noise may be motion.
-        fan_rad += math.atan2(abs(left), max(speed, STANDING_MPS))
-    # Half the angle that the robot turns on its curve until it stands, which the chord has.
+        noise_rad = math.atan2(abs(left), max(speed, STANDING_MPS))
+    # On its curve the robot turns by an angle until it stands. The chord has up to half of it, and
+    # the heading up to half of it more than the chord.
     stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
-    chord_rad = 0.5 * min(max(state.yaw_rate_radps * stopping_s, -math.pi), math.pi)
-    fan_rad = min(fan_rad + abs(chord_rad), math.pi)
-    extent = _extent_m(robot.footprint_m, off_rad, abs(chord_rad))
-    return _course(robot, state, age_s, off_rad + chord_rad, fan_rad, extent)
+    half_rad = 0.5 * min(max(state.yaw_rate_radps * stopping_s, -math.pi), math.pi)
+    fan_rad = min(fan_rad + noise_rad + 0.5 * abs(half_rad), math.pi)
+    extent = _extent_m(robot.footprint_m, off_rad, abs(half_rad) + noise_rad)
+    return _course(robot, state, age_s, off_rad + 0.5 * half_rad, fan_rad, extent)
 
 
 def any_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.0) -> Course:
@@ -108,6 +132,8 @@ def limit_mps(person: Reach, course: Course, at_most_mps: float = math.inf) -> f
     takes less time, or the maximum where the limit is not lower.
     """
     maximum = min(course.maximum_mps, at_most_mps)
+    if not person.elapsed_s >= 0.0:
+        return 0.0
     size_m = _size_m(course)
     if _is_far(person, course, size_m, maximum):
         return maximum
@@ -154,13 +180,17 @@ def _lowest_mps(
     braked1_m = 0.5 * a * (t1 - T) * (t1 - T) if t1 > T else 0.0
     x, y, distance2, reach = reach_at(person, course, t0, t1)
     apart_m = math.sqrt(distance2) - reach - person.margin_m - size_m - _ROUNDING_M
-    if apart_m > 0.0 and apart_m + braked1_m >= maximum * t1:
+    if apart_m > 0.0 and apart_m >= _way_m(maximum, a, T, t1):
         return math.inf
     near, past, past_behind = contact_m(course, person.margin_m, x, y, distance2, reach)
     if need0 * t0 - braked0_m <= past_behind:
         return need0
-    # Written so that NaN stops the robot.
+    if past == -math.inf:
+        return math.inf
     lowest = (near + braked1_m) / t1
+    if lowest < a * (t1 - T):  # a robot that slow stands before t1
+        lowest = math.sqrt(a * (a * T * T + 2.0 * max(near, 0.0))) - a * T
+    # Written so that NaN stops the robot.
     if not lowest > need0:
         lowest = need0
     return math.inf if lowest * t0 - braked0_m > past else lowest
@@ -175,8 +205,7 @@ def stops_in_time(person: Reach, course: Course, speed_mps: float) -> bool:
     t0 = way0 = 0.0
     while a * (t0 - T) < speed_mps:
         t1 = t0 + step_s
-        late = max(t1 - T, 0.0)
-        way1 = speed_mps * t1 - 0.5 * a * late * late
+        way1 = _way_m(speed_mps, a, T, t1)
         near, past, past_behind = contact_m(
             course, person.margin_m, *reach_at(person, course, t0, t1)
         )
@@ -184,6 +213,14 @@ def stops_in_time(person: Reach, course: Course, speed_mps: float) -> bool:
             return False
         t0, way0 = t1, way1
     return True
+
+
+def _way_m(speed_mps: float, a: float, T: float, t: float) -> float:
+    """Return the way until t of a robot that brakes from T on, and then stands."""
+    braked_s = min(t - T, speed_mps / a)
+    if braked_s <= 0.0:
+        return speed_mps * t
+    return speed_mps * (T + braked_s) - 0.5 * a * braked_s * braked_s
 
 
 def in_the_path_mps(
@@ -246,8 +283,8 @@ def passing_radius_m(
 
     low_m, high_m = floor_m, floor_m + 0.25
     while not passes(high_m):
-        low_m, high_m = high_m, high_m + 0.25
-    while high_m - low_m > 0.004:
+        low_m, high_m = high_m, 2.0 * high_m
+    while high_m - low_m > 0.004 * high_m:
         middle_m = 0.5 * (low_m + high_m)
         low_m, high_m = (low_m, middle_m) if passes(middle_m) else (middle_m, high_m)
     return high_m
@@ -273,8 +310,8 @@ def _size_m(course: Course) -> float:
 
 
 def _step_s(course: Course) -> float:
-    stop_s = course.reaction_s + course.maximum_mps / ROOM / course.deceleration_mps2
-    return stop_s / STEPS
+    """Return the step of time, which depends on neither reaction time nor age."""
+    return course.maximum_mps / ROOM / course.deceleration_mps2 / STEPS
 
 
 def _off_heading_rad(state: RobotState) -> float:
@@ -294,19 +331,24 @@ def _course(
 ) -> Course:
     """Return a fan about ``middle_rad`` off the heading, of a robot that may have driven since."""
     x, y = state.position_odom_m.tolist()
-    travel_mps = state.travel_mps
-    fastest_mps = max(travel_mps, robot.max_speed_mps)
-    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
-    driven_m = min(travel_mps * age_s + faster_m, fastest_mps * age_s)
+    driven_m = _driven_m(robot, state.travel_mps, age_s)
     front_m, rear_m, half_m = extent_m
     middle_rad += state.heading_odom_rad
     return Course(
         *(x, y, math.cos(middle_rad), math.sin(middle_rad)),
-        *(math.cos(fan_rad), math.sin(fan_rad), front_m + driven_m, rear_m, half_m, 0.0),
+        *(math.cos(fan_rad), math.sin(fan_rad), front_m + driven_m, rear_m, half_m),
+        *(robot.circumscribed_radius_m + driven_m, 0.0),
         ROOM * robot.max_speed_mps,
         robot.max_deceleration_mps2,
         robot.reaction_time_s,
     )
+
+
+def _driven_m(robot: RobotProfile, travel_mps: float, age_s: float) -> float:
+    """Return how far a robot may have driven since its state, speeding up to its maximum."""
+    fastest_mps = max(travel_mps, robot.max_speed_mps)
+    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
+    return min(travel_mps * age_s + faster_m, fastest_mps * age_s)
 
 
 def _extent_m(
@@ -324,8 +366,10 @@ def _extent_m(
         return front, rear, half
     radius = max(math.hypot(x, y) for x, y in corners)
     cos, sin = math.cos(min(swing_rad, 0.5 * math.pi)), math.sin(min(swing_rad, 0.5 * math.pi))
+    long = max(front, -rear)
     return (
         min(front + half * sin, radius),
         max(rear - half * sin, -radius),
-        min(half * cos + max(front, -rear) * sin, radius) if cos > 0.0 else radius,
+        # A corner that has swung past the side was out at the radius.
+        min(half * cos + long * sin, radius) if half * sin < long * cos else radius,
     )

@@ -154,6 +154,7 @@ def clip_twists_ahead(
         first_s=period_s,
         speeds_mps=every_time[..., :2],
         yaw_rates_radps=every_time[..., 2],
+        fine=True,
     )
     lowest = limits.min(axis=1)
     lowest = np.minimum(lowest[:-1], lowest[-1]).reshape(now.shape[:-1])

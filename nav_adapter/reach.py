@@ -1,4 +1,4 @@
-"""How far a person can come: the one model of people's motion that limit and proof rest on.
+"""The reach of people: the one model of their motion that limit and proof rest on.
 
 Somebody at p with velocity u may change, from now on, to any velocity up to U, with the time
 constant τ, after going unnoticed for δ. At time t they are within
@@ -14,9 +14,12 @@ away time to turn, and a brisk walker time to swerve: all three are this one sta
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from perception.anthropometry import BODY_RADIUS_M
+
+#: A time constant with which a velocity does not change within seconds.
+WALKING_ON_S: Final = 1e4
 
 
 class Reach(NamedTuple):
@@ -47,6 +50,15 @@ class Reach(NamedTuple):
     elapsed_s: float = 0.0
     margin_m: float = BODY_RADIUS_M
     variances: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def walks_faster(self) -> bool:
+        """True if this person walks faster than U: walking on is not within the reach then."""
+        return math.hypot(self.velocity_x_mps, self.velocity_y_mps) > self.speed_mps
+
+    def walking_on(self) -> Reach:
+        """Return the reach of this person if they walk straight on."""
+        return self._replace(speed_mps=0.0, delay_s=0.0, time_constant_s=WALKING_ON_S)
 
     def drift_s(self, ahead_s: float) -> float:
         """Return m, by which u carries the middle of the reach until ``ahead_s`` from now."""

@@ -24,7 +24,7 @@ _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
 
 # Keys by which files that are given in the wrong place are known.
 _KINDS: Final = {
-    "a policy": {"inflation", "speed", "outline", "rules", "margins", "timing", "filter"},
+    "a policy": {"inflation", "speed", "reach", "margins", "timing", "filter", "alerts"},
     "a scenario": {"layout", "people", "workers", "population", "attention", "replay_csv"},
     "the file of a robot": {"footprint_m", "max_speed_mps", "max_deceleration_mps2", "drive"},
     "a camera_info file": {"image_width", "image_height", "camera_matrix", "distortion_model"},

@@ -19,6 +19,7 @@ from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole
 __all__ = [
     "COMPLETE_POLICIES",
     "COMPLETE_SCENARIOS",
+    "COMPLETE_SIMULATED_POLICIES",
     "PERCEPTIONS",
     "POPULATIONS",
     "REFERENCE_PLANNER",
@@ -87,13 +88,20 @@ def _shipped(
 
 #: Completion of scenarios, for ``shell_complete`` of an option or argument.
 COMPLETE_SCENARIOS: Final = _shipped(
-    "sim_tests", "scenario/shipped", "all", "guidelines", sets=["guidelines"]
+    "sim_tests",
+    "scenario/shipped",
+    "all",
+    "guidelines",
+    "step_out",
+    sets=["guidelines", "step_out"],
 )
 _COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
 _COMPLETE_ROBOTS: Final = _shipped("sim_tests", "actors/robot/shipped", "nova_carter")
 #: Completion of policies.
 COMPLETE_POLICIES: Final = _shipped("nav_adapter", "policies")
-_COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "oracle")
+#: Completion of the policies of crossings, which have today's AMR besides.
+COMPLETE_SIMULATED_POLICIES: Final = _shipped("nav_adapter", "policies", "scanner")
+_COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "scanner", "oracle")
 _COMPLETE_FAULTS: Final = _shipped("sim_tests", "crossing/faults", "none")
 
 
@@ -262,13 +270,13 @@ def population() -> Decorator:
     )
 
 
-def policy(default: str = "balanced") -> Decorator:
-    """Add ``--policy``: one policy."""
+def policy(*, simulated: bool = False) -> Decorator:
+    """Add ``--policy``: one policy; in the simulator it may be today's AMR."""
     return option(
         "--policy",
-        default=default,
+        default="balanced",
         metavar="NAME|FILE",
-        shell_complete=COMPLETE_POLICIES,
+        shell_complete=COMPLETE_SIMULATED_POLICIES if simulated else COMPLETE_POLICIES,
         help="Policy: a preset, or a YAML file.",
     )
 
@@ -285,25 +293,28 @@ def policies(default: Sequence[str], *, repeated: bool = False) -> Decorator:
         **_several(repeated),
         default=list(default),
         shell_complete=_COMPLETE_POLICIES_AND_ORACLE,
-        help="Policies: presets, YAML files, or 'oracle' (balanced with true awareness)."
-        + _again(repeated),
+        help="Policies: presets, 'scanner' (today's AMR), YAML files, or 'oracle' (balanced with "
+        "true awareness)." + _again(repeated),
     )
 
 
-def scenarios(which: str, *, repeated: bool = False) -> Decorator:
+def scenarios(
+    which: str, *, repeated: bool = False, default: Sequence[str] = ("all",)
+) -> Decorator:
     """Add ``--scenario``: shipped scenarios and files.
 
     Args:
         which: the shipped ones that the name of a set stands for.
         repeated: each scenario needs the option before it, as beside positional arguments.
+        default: names.
     """
     return option(
         "--scenario",
         **_several(repeated),
-        default=["all"],
+        default=list(default),
         shell_complete=COMPLETE_SCENARIOS,
-        help=f"Scenarios: shipped ones, YAML files, or a set of shipped ones {which}: 'all' or "
-        f"'guidelines'.{_again(repeated)}",
+        help=f"Scenarios: shipped ones, YAML files, or a set of shipped ones {which}: 'all', "
+        f"'guidelines' or 'step_out'.{_again(repeated)}",
     )
 
 
@@ -350,8 +361,8 @@ def _planner_settings(default: str | list[str]) -> dict[str, Any]:
     return {
         "default": default,
         "callback": _without_reference,
-        "help": "Local planner: 'reference', 'straight_on', or a class of yours, which gets the "
-        "robot's profile, and static_boxes_odom_m if it takes that.",
+        "help": "Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
+        "class of yours, which gets the robot's profile, and static_boxes_odom_m if it takes that.",
     }
 
 

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from nav_adapter import AwarenessPolicy, RobotProfile
-from nav_adapter.settled import settled_human_speed_mps, settled_radius_m, settled_speed_limit_mps
+from nav_adapter.ros2 import RobotFile
 from perception.arrays import finite_number
 
 from ..errors import AwarenavError
 from ..files import json_text
+from ._effect import BESIDE_M, effect_of
 
 _FORMATS: Final = (".png", ".svg", ".pdf")
 _AWARENESS: Final = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 _DISTANCES_M: Final = (1.0, 2.0, 3.0, 5.0)
-#: The robot of the tables in docs/policies.md. Distances are measured from its outline, so this
-#: matters for rules.walking alone, which counts from the circle around it.
-FOOTPRINT_M: Final = ((0.35, 0.25), (-0.35, 0.25), (-0.35, -0.25), (0.35, -0.25))
+#: The robot of the tables in docs/policies.md.
+ROBOT: Final = RobotProfile(
+    footprint_m=np.array(((0.35, 0.25), (-0.35, 0.25), (-0.35, -0.25), (0.35, -0.25))),
+    max_speed_mps=1.5,
+    max_acceleration_mps2=1.0,
+    max_deceleration_mps2=1.0,
+    reaction_time_s=0.3,
+    drive="differential",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,9 +37,10 @@ class ShowOptions:
     policies: tuple[str, ...]
     out: Path
     as_json: bool
-    max_speed: float
-    deceleration: float
-    reaction_time: float
+    robot: Path | None
+    max_speed: float | None
+    deceleration: float | None
+    reaction_time: float | None
     farthest: float
 
 
@@ -84,49 +92,53 @@ def read_policy(name: str) -> AwarenessPolicy:
 
 def _table(policy: AwarenessPolicy, robot: RobotProfile) -> dict[str, Any]:
     """Return the contents of the table as plain data."""
-    awareness = np.array(_AWARENESS)
-    limits = settled_speed_limit_mps(policy, robot, np.array(_DISTANCES_M), awareness[:, None])
+    effect = effect_of(policy, robot, np.array(_AWARENESS), np.array(_DISTANCES_M))
     return {
         "awareness": list(_AWARENESS),
-        "radius_m": settled_radius_m(policy, awareness).tolist(),
-        "human_speed_mps": settled_human_speed_mps(policy, awareness).tolist(),
+        "radius_m": effect.radius_m.tolist(),
+        "human_speed_mps": effect.human_speed_mps.tolist(),
         "distance_m": list(_DISTANCES_M),
-        "speed_limit_mps": limits.tolist(),
+        "limit_ahead_mps": effect.ahead_mps.tolist(),
+        "beside_m": BESIDE_M,
+        "limit_beside_mps": effect.beside_mps.tolist(),
     }
 
 
 def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list[str]:
-    """Return the table of radius, human speed and speed limits as lines of text."""
-    awareness = np.array(_AWARENESS)
-    radius = settled_radius_m(policy, awareness)
-    human = settled_human_speed_mps(policy, awareness)
-    limit = settled_speed_limit_mps(policy, robot, np.array(_DISTANCES_M), awareness[:, None])
-    heads = [f"limit at {distance:g} m" for distance in _DISTANCES_M]
-    lines = [name, "  ".join(["awareness", "radius", "human speed", *heads])]
+    """Return the table of radius, U and speed limits as lines of text."""
+    table = _table(policy, robot)
+    distances = "  ".join(f"{distance:3g} m" for distance in _DISTANCES_M)
+    width = len(distances)
+    lines = [
+        name,
+        f"{'':27}  {'limit (m/s), ahead at':{width}}  {BESIDE_M:g} m beside, at",
+        f"awareness  radius         U  {distances}  {distances}",
+    ]
     for row, alpha in enumerate(_AWARENESS):
-        cells = [f"{alpha:9.1f}", f"{radius[row]:4.2f} m", f"{human[row]:7.2f} m/s"]
-        cells += [f"{value:8.2f} m/s" for value in limit[row]]
-        lines.append("  ".join(cells))
+        cells = [f"{alpha:9.1f}", f"{table['radius_m'][row]:4.2f} m"]
+        cells.append(f"{table['human_speed_mps'][row]:4.2f} m/s")
+        limits = table["limit_ahead_mps"][row] + table["limit_beside_mps"][row]
+        lines.append("  ".join(cells + [f"{limit:5.2f}" for limit in limits]))
     return [*lines, ""]
 
 
 def _robot(options: ShowOptions) -> RobotProfile:
-    """Return a robot with the speeds, braking and reaction time of the options."""
-
-    def number(option: str, value: float, least: float) -> float:
-        return finite_number(
+    """Return the robot of the file, or that of the page, with the numbers of the options."""
+    robot = ROBOT if options.robot is None else RobotFile.from_yaml(options.robot).profile()
+    given = {
+        "max_speed_mps": ("--max-speed (m/s)", options.max_speed),
+        "max_deceleration_mps2": ("--deceleration (m/s²)", options.deceleration),
+        "reaction_time_s": ("--reaction-time (s)", options.reaction_time),
+    }
+    numbers: dict[str, Any] = {
+        name: finite_number(
             option,
             value,
             AwarenavError,
-            minimum=least,
-            exclusive_minimum=option != "--reaction-time (s)",
+            minimum=0.0,
+            exclusive_minimum=name != "reaction_time_s",
         )
-
-    deceleration_mps2 = number("--deceleration (m/s²)", options.deceleration, 0.0)
-    return RobotProfile(
-        footprint_m=np.array(FOOTPRINT_M),
-        max_speed_mps=number("--max-speed (m/s)", options.max_speed, 0.0),
-        max_acceleration_mps2=deceleration_mps2,
-        max_deceleration_mps2=deceleration_mps2,
-        reaction_time_s=number("--reaction-time (s)", options.reaction_time, 0.0),
-    )
+        for name, (option, value) in given.items()
+        if value is not None
+    }
+    return replace(robot, **numbers)

@@ -9,18 +9,18 @@ from ..cli import NUMBER, FilePath, argument, command, group, option, options
 
 @group("policy")
 def policy() -> None:
-    """Show awareness policies: presets, or YAML files of yours."""
+    """Show awareness policies, or translate a policy file of version 0.2."""
 
 
 @command(
     "show",
-    short_help="Print and draw radius, assumed human speed and speed limit.",
+    short_help="Print and draw radius, human speed and speed limit.",
     examples=[
         "awarenav policy show balanced",
-        "awarenav policy show blind balanced mine.yaml --max-speed 1.2 --out mine.svg",
+        "awarenav policy show blind balanced mine.yaml --robot robot.yaml --out mine.svg",
     ],
     exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="The presets are scanner, blind, conservative, balanced and assertive.",
+    epilog="The presets are blind, conservative, balanced and assertive.",
 )
 @argument(
     "policies",
@@ -32,18 +32,42 @@ def policy() -> None:
 )
 @options.plot_file("policy.png", "The drawing; replaces the file.")
 @options.as_json()
-@option("--max-speed", type=NUMBER, default=1.5, metavar="M/S", help="The robot's maximum speed.")
-@option("--deceleration", type=NUMBER, default=1.0, metavar="M/S²", help="The robot's braking.")
 @option(
-    "--reaction-time", type=NUMBER, default=0.3, metavar="S", help="Time until the robot brakes."
+    "--robot",
+    type=FilePath(),
+    show_default="0.70 m × 0.50 m",
+    metavar="FILE",
+    help="A robot file, as `awarenav bridge` reads it.",
+)
+@option(
+    "--max-speed",
+    type=NUMBER,
+    show_default="1.5, or the file's",
+    metavar="M/S",
+    help="Maximum speed.",
+)
+@option(
+    "--deceleration",
+    type=NUMBER,
+    show_default="1.0, or the file's",
+    metavar="M/S²",
+    help="Braking.",
+)
+@option(
+    "--reaction-time",
+    type=NUMBER,
+    show_default="0.3, or the file's",
+    metavar="S",
+    help="Time until the robot brakes.",
 )
 @option("--farthest", type=NUMBER, default=6.0, metavar="M", help="End of the distance axis.")
 def show(**values: Any) -> int:
-    """Show a policy's effect for one person who stands straight ahead.
+    """Show a policy's effect for one person who stands, ahead of the robot or beside its way.
 
-    Position and velocity are known exactly. Prints and draws obstacle radius and assumed human
-    speed over awareness, and the speed limit over awareness and distance. Distances are from the
-    robot's footprint (0.70 m × 0.50 m) to the person's body.
+    Prints and draws the obstacle radius and U, the speed that the person may change to, over
+    awareness, and the speed limit over awareness and distance. The robot drives straight on. The
+    person beside the way stands 1.2 m from its middle. Distances run along the way, from the
+    robot's front to the body. Frames have shown the person for a while, at an exactly known place.
     """
     from ._show import ShowOptions, show_command  # noqa: PLC0415 - help needs no policies
 
@@ -51,40 +75,31 @@ def show(**values: Any) -> int:
 
 
 @command(
-    "explore",
-    short_help="Write a page with sliders for every setting.",
+    "upgrade",
+    short_help="Translate a policy file of version 0.2.",
     examples=[
-        "awarenav policy explore",
-        "awarenav policy explore mine.yaml --robot robot.yaml --out mine.html",
+        "awarenav policy upgrade old.yaml",
+        "awarenav policy upgrade old.yaml --out new.yaml",
     ],
-    exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="The presets are scanner, blind, conservative, balanced and assertive.",
+    exit_status={
+        0: "Every setting was translated, or could be dropped safely.",
+        1: "Lines that begin with 'check' need a decision; the new file is written all the same.",
+        2: "Bad input; nothing was written.",
+    },
 )
-@argument(
-    "policy",
-    default="balanced",
-    metavar="[NAME|FILE]",
-    shell_complete=options.COMPLETE_POLICIES,
-    help="The policy that is shown first: a preset, or a YAML file.",
-)
-@option(
-    "--robot",
-    type=FilePath(),
-    metavar="FILE",
-    help="The robot that is shown first: a robot file, as `awarenav bridge` reads it.",
-)
-@options.out_file("explorer.html", "The page; replaces the file.", "FILE.html")
-def explore(**values: Any) -> int:
-    """Write one HTML page that shows what a policy does, with a slider for every setting.
+@argument("old", type=FilePath(), metavar="OLD.yaml", help="A policy file of version 0.2.")
+@options.out_file(None, "The new file; replaces it.", "NEW.yaml", show_default="none")
+def upgrade(**values: Any) -> int:
+    """Say what becomes of each setting of a policy file of 0.2, and write the new file.
 
-    The page draws obstacle radius, speed limit, stopping distance and the reason of the limit for
-    one person, and loads and saves policies as YAML. It gives what the adapter gives. It needs no
-    network and no other file.
+    A line begins with kept, renamed, replaced, dropped or check. What the old file left out and has
+    another default now is written with its old value. 'check' means that the new file may be less
+    careful than the old one in this point, and says what to do.
     """
-    from ._explore import ExploreOptions, explore_command  # noqa: PLC0415 - help needs no policies
+    from ._upgrade import upgrade_command  # noqa: PLC0415 - help needs no policies
 
-    return explore_command(ExploreOptions(**values))
+    return upgrade_command(**values)
 
 
 policy.add_command(show)
-policy.add_command(explore)
+policy.add_command(upgrade)

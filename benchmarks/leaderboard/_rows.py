@@ -10,9 +10,9 @@ from typing import ClassVar, Final, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from awarenav.errors import not_one_of
-from awarenav.policies import read_policy
 from perception.documents import read_yaml
 from sim_tests import SimError
+from sim_tests.crossing import named_policy
 from sim_tests.crossing.eyes import Perception
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.runs import Job, named_templates, plan_jobs, policy_text
@@ -33,9 +33,9 @@ class Row(StrictConfig):
 
     Attributes:
         name: name of the file of its results.
-        policy: a preset, or a YAML file by its path in the repository.
+        policy: a preset, ``"scanner"``, or a YAML file by its path in the repository.
         sensors: ``"truth"`` knows everybody in all directions; the others perceive.
-        planner: ``"reference"`` or ``"module:Class"``.
+        planner: ``"reference"``, ``"costmap"`` or ``"module:Class"``.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -61,7 +61,7 @@ class Row(StrictConfig):
     def policy_yaml(self) -> str:
         """The whole policy as YAML."""
         path = _ROOT / self.policy
-        return policy_text(read_policy(str(path) if path.suffix else self.policy))
+        return policy_text(named_policy(path if path.suffix else self.policy)[1])
 
     @property
     def digest(self) -> str:

@@ -6,7 +6,7 @@ Values are numbers, or arrays of one number per pose.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -39,6 +39,7 @@ class Courses:
         front_m: of the footprint.
         rear_m: the same.
         half_m: the same.
+        radius_m: no part of the robot is farther from the base of its course.
         straight: cosine and sine of the straight course, and front, rear and half the width along
             it.
     """
@@ -53,7 +54,19 @@ class Courses:
     front_m: Value = 0.0
     rear_m: Value = 0.0
     half_m: Value = 0.0
+    radius_m: Value = 0.0
     straight: tuple[Value, ...] = ()
+
+    def straight_on(self) -> Courses:
+        """Return the courses of a robot that goes straight on, without a fan."""
+        if not self.straight:
+            return self
+        cos, sin, front, rear, half = self.straight
+        return replace(
+            self,
+            **{"cos": cos, "sin": sin, "fan_cos": np.float32(1.0), "fan_sin": np.float32(0.0)},
+            **{"front_m": front, "rear_m": rear, "half_m": half},
+        )
 
 
 def courses_of(
@@ -65,7 +78,9 @@ def courses_of(
     yaw_rates_radps: Value,
     anywhere: bool = False,
 ) -> Courses:
-    """Return the courses at poses (N, 2), as :func:`~nav_adapter.limit.course_of` has them.
+    """Return the courses at poses (N, 2), as :func:`~nav_adapter.limit.courses_of` has them.
+
+    A robot that stands has one fan of all directions, whichever end leads.
 
     Args:
         robot: of the constraints.
@@ -74,7 +89,7 @@ def courses_of(
         headings_rad: (N,), or None for any.
         velocities_mps: forward and left, (N,), or None for a robot that drives forwards.
         yaw_rates_radps: (N,), or 0.
-        anywhere: whether the robot starts in any direction.
+        anywhere: the robots stand, and may start in any direction.
     """
     x, y = positions_m.T
     age_s = basis.robot_age_s
@@ -86,40 +101,57 @@ def courses_of(
     fastest = np.maximum(travel, robot.max_speed_mps)
     faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
     driven_m = np.minimum(travel * age_s + faster_m, fastest * age_s)
-    if headings_rad is None or (basis.policy.reach is None and velocities_mps is None):
-        return Courses(x, y, _single(driven_m))
+    radius_m = robot.circumscribed_radius_m + driven_m + _NEAR_M
+    if headings_rad is None:
+        return Courses(x, y, _single(driven_m), radius_m=_single(radius_m))
     turn_rad = 0.0 if basis.policy.reach is None else math.radians(basis.policy.reach.turn_deg)
     off: Value = 0.0
     speed: Value = travel
-    fan_rad: Value = turn_rad
+    noise_rad: Value = 0.0
+    stands: Value = False
     if velocities_mps is not None:
         sideways, speed = np.abs(left) > LATERAL_NOISE_MPS, course_speed_mps(forward, left)
         off = np.where(forward <= -STANDING_MPS, math.pi, 0.0)
         off = np.where(sideways, np.arctan2(left, forward), off)
         if robot.moves_sideways is not False:
             noise_rad = np.arctan2(np.abs(left), np.maximum(speed, STANDING_MPS))
-            fan_rad = fan_rad + np.where(sideways, 0.0, noise_rad)
-    stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
-    chord_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
-    fan_rad = np.minimum(fan_rad + np.abs(chord_rad), math.pi)
+            noise_rad = np.where(sideways, 0.0, noise_rad)
+        stands = stands_at(forward, left)
     straight_rad = headings_rad + off
     extent = extents_m(robot, off)
-    straight = middle = (*_directions(straight_rad), *extent)
-    if np.any(chord_rad):
-        swung = _swung(robot, extent, np.abs(chord_rad))
-        middle = (*_directions(straight_rad + chord_rad), *swung)
+    straight = (*_directions(straight_rad), *extent)
     if anywhere:
-        return Courses(x, y, _single(driven_m), straight=straight)
-    fan_cos, fan_sin = _directions(fan_rad)
+        return Courses(x, y, _single(driven_m), radius_m=_single(radius_m), straight=straight)
+    # The chord of a curve, as in course_of.
+    stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
+    half_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
+    fan_rad = np.minimum(turn_rad + noise_rad + 0.5 * np.abs(half_rad), math.pi)
+    swing_rad = np.abs(half_rad) + noise_rad
+    middle = straight
+    if np.any(swing_rad):
+        swung = _swung(robot, extent, swing_rad)
+        middle = (*_directions(straight_rad + 0.5 * half_rad), *swung)
     cos, sin, front, rear, half = middle
+    if np.any(stands):
+        fan_rad = np.where(stands, math.pi, fan_rad)
+        long = np.maximum(front, -rear)
+        front, rear = np.where(stands, long, front), np.where(stands, -long, rear)
+    fan_cos, fan_sin = _directions(fan_rad)
     return Courses(
-        *(x, y, _single(driven_m), cos, sin, fan_cos, fan_sin, front, rear, half), straight
+        *(x, y, _single(driven_m), cos, sin, fan_cos, fan_sin, front, rear, half),
+        _single(radius_m),
+        straight,
     )
 
 
 def course_speed_mps(forward: Value, left: Value) -> Value:
     """Return the speed on the course: lateral noise does not count."""
     return np.where(np.abs(left) > LATERAL_NOISE_MPS, np.hypot(forward, left), np.abs(forward))
+
+
+def stands_at(forward: Value, left: Value) -> Value:
+    """Return whether a robot stands, so that it may start either way."""
+    return (np.abs(left) <= LATERAL_NOISE_MPS) & (np.abs(forward) < STANDING_MPS)
 
 
 def _single(value: Value) -> Value:
@@ -150,10 +182,13 @@ def _swung(
     """Return what they are for a footprint turned by up to ``swing_rad`` either way."""
     (front, rear, half), radius = extent_m, np.float32(robot.circumscribed_radius_m + _NEAR_M)
     cos, sin = _directions(np.minimum(swing_rad, 0.5 * math.pi))
+    long = np.maximum(front, -rear)
+    wide = np.minimum(half * cos + long * sin, radius)
+    wide = np.where(half * sin < long * cos - _NEAR_M, wide, radius)
     return (
         np.where(sin > 0.0, np.minimum(front + half * sin, radius), front),
         np.where(sin > 0.0, np.maximum(rear - half * sin, -radius), rear),
-        np.where(sin > 0.0, np.minimum(half * cos + np.maximum(front, -rear) * sin, radius), half),
+        np.where(sin > 0.0, wide, half),
     )
 
 
@@ -169,9 +204,10 @@ class Pairs:
         velocity_y_mps: across it.
         fan_cos: of the course; None for a robot that may go anywhere at once.
         fan_sin: the same.
-        front_m: the same, or the radius of that robot.
+        front_m: the same.
         rear_m: the same.
         half_m: the same.
+        radius_m: the same.
     """
 
     row: Any
@@ -184,6 +220,7 @@ class Pairs:
     front_m: Value
     rear_m: Value
     half_m: Value
+    radius_m: Value
 
     def at(self, chosen: Any) -> Pairs:
         """Return some of the pairs."""
@@ -237,8 +274,10 @@ def contacts_m(
     off -= half
     np.maximum(off, 0.0, out=off)
     near = at - np.sqrt(np.maximum(rho * rho - off * off, 0.0)) - pairs.front_m
+    beyond = distance - (rho + pairs.radius_m)  # what touches it is farther ahead
+    np.maximum(near, beyond, out=near)
     near = np.where(ahead, near, NOWHERE_M)
-    backward = (high_x < _NEAR_M) & (high_y < wide)
+    backward = (high_x < _NEAR_M) & (high_y < wide) & (beyond <= _NEAR_M)
     if not backward.any():
         return near, past, None
     share = side / np.maximum(distance - reach, side)

@@ -13,12 +13,13 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
-from .._people import Person, position_sigma_m
+from .._people import OLDEST_S, Person
+from .._places import position_sigma_m
 from .._predicted import predicted_sigmas_m
 from .._robot import RobotProfile
 from .._speed_basis import SpeedBasis
 from ..limit import STEPS
-from ..reach import covariance_terms
+from ..reach import WALKING_ON_S, covariance_terms
 
 Value = Any
 #: Parts of a step of time: the step that decides is divided into these.
@@ -37,6 +38,7 @@ class PersonAhead(NamedTuple):
         velocity_x_mps: a float.
         velocity_y_mps: a float.
         speed_mps: U.
+        time_constant_s: τ; 0 under a policy that knows no motion.
         delay_s: δ.
         elapsed_s: age of the place.
         variances: a₀, a₁ and a₂ of :class:`~nav_adapter.reach.Reach`.
@@ -50,11 +52,22 @@ class PersonAhead(NamedTuple):
     velocity_x_mps: float
     velocity_y_mps: float
     speed_mps: Value
+    time_constant_s: float
     delay_s: Value
     elapsed_s: Value
     variances: tuple[Value, Value, Value]
     body_m: Value
     least_mps: Value = None
+
+    @property
+    def walks_faster(self) -> bool:
+        """True if this person walks faster than U at any of the times."""
+        walking_mps = math.hypot(self.velocity_x_mps, self.velocity_y_mps)
+        return self.time_constant_s > 0.0 and walking_mps > float(np.min(self.speed_mps))
+
+    def walking_on(self) -> PersonAhead:
+        """Return the person if they walk straight on, as :meth:`Reach.walking_on` does."""
+        return self._replace(speed_mps=0.0, delay_s=0.0, time_constant_s=WALKING_ON_S)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +122,7 @@ class Reaches:
         counts, columns = [], []
         for each in people:
             least_mps = -np.inf if each.least_mps is None else each.least_mps
-            values = (*each[1:8], *each.variances, each.body_m, least_mps)
+            values = (*each[1:9], *each.variances, each.body_m, least_mps)
             count = times if any(np.ndim(value) for value in values) else 1
             counts.append(count)
             columns.append(np.stack([np.broadcast_to(value, count) for value in values]))
@@ -117,22 +130,22 @@ class Reaches:
         # Most rows of a person differ in place alone.
         different, each_row = np.unique(np.stack(others), axis=1, return_inverse=True)
         each_row = each_row.reshape(-1)
-        vx, vy, U, delay, elapsed, a0, a1, a2, body = different
+        vx, vy, U, tau, delay, elapsed, a0, a1, a2, body = different
         follows = np.array(counts) > 1
         first = np.cumsum([0, *counts[:-1]])
         a, react = robot.max_deceleration_mps2, robot.reaction_time_s + elapsed
-        step_s = (robot.reaction_time_s + robot.max_speed_mps / a) / STEPS * 2
+        step_s = robot.max_speed_mps / a / STEPS * 2  # twice that of the limit
         steps = math.ceil((react.max() + robot.max_speed_mps / a) / step_s + 1e-6)
         t = (step_s / PARTS) * np.arange(PARTS * steps + 1)[:, None]
         late = np.maximum(t - react, 0.0)
-        walking, rules = np.hypot(vx, vy), basis.policy.reach
+        walking = np.hypot(vx, vy)
         m, r = np.zeros((len(t), 1)), np.zeros((len(t), 1))
-        if rules is not None:
-            tau = rules.time_constant_s
+        if basis.policy.reach is not None:
             m = tau * -np.expm1(-(t + elapsed) / tau)
             since = t + elapsed + delay
             r = U * (since + tau * np.expm1(-since / tau))
-            r = r + np.sqrt(np.maximum(a0 + m * (a1 + m * a2), 0.0))
+            variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
+            r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))
         around = np.maximum.accumulate(r + (m + 0.5 * step_s) * walking, axis=0)
         margin = np.maximum(basis.policy.margins.floor_m, body + basis.policy.margins.clearance_m)
         around = around + margin + elapsed * walking
@@ -226,8 +239,10 @@ def _ahead(
     moves_s: Value = times_s if is_shown and (vx or vy) else 0.0
     a0, a1, a2 = (sigmas * sigmas * each for each in variances)
     return PersonAhead(
-        *(track_id, x + vx * moves_s, y + vy * moves_s, vx, vy, speed_mps, delay_s),
-        age_s if is_shown else age_s + times_s,
+        *(track_id, x + vx * moves_s, y + vy * moves_s, vx, vy, speed_mps),
+        0.0 if policy.reach is None else policy.reach.time_constant_s,
+        delay_s,
+        min(age_s, OLDEST_S) if is_shown else np.minimum(age_s + times_s, OLDEST_S),
         (a0, a1, a2),
         BODY_RADIUS_M + sigmas * sigma_m,
     )

@@ -11,15 +11,11 @@ import math
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
-from .._constraints import NavConstraints
-from .._errors import NavError
-from .._robot import LATERAL_NOISE_MPS, RobotProfile
+from .._robot import RobotProfile
 from .._speed_basis import SpeedBasis
-from ..limit import STANDING_MPS
 from ._courses import (
     NOWHERE_M,
     Courses,
@@ -27,13 +23,11 @@ from ._courses import (
     Value,
     chosen_of,
     contacts_m,
-    course_speed_mps,
-    courses_of,
     extents_m,
     in_table,
     stopping_mps,
 )
-from ._people_ahead import PARTS, Reaches, people_ahead
+from ._people_ahead import PARTS, Reaches
 
 # Pairs of pose and person that are computed together: few calls, and numbers that fit the cache.
 _TOGETHER: Final = 65536
@@ -41,7 +35,7 @@ _TOGETHER: Final = 65536
 _ROUNDING: Final = 1e-5
 
 
-class _Field:
+class Field:
     """Limits of people at many poses.
 
     Args:
@@ -51,6 +45,7 @@ class _Field:
         basis: of the constraints.
         robot: of the constraints.
         reach_m: the limits hold within this distance of the poses.
+        fine: all steps of time are as short as the shortest of ``limit_mps``, for a few poses.
     """
 
     def __init__(
@@ -61,18 +56,26 @@ class _Field:
         basis: SpeedBasis,
         robot: RobotProfile,
         reach_m: float,
+        fine: bool = False,
     ) -> None:
         self._reaches, self._courses, self._times = reaches, courses, times
         self._margin_m = np.float32(basis.policy.margins.floor_m)
         self._clearance_m = np.float32(basis.policy.margins.clearance_m)
         self._has_reach = basis.policy.reach is not None
         self._a = np.float32(robot.max_deceleration_mps2)
+        self._fine, self._reach_m = fine, np.float32(reach_m)
+        # The field is a rectangle, so its corners are farther away than the robot's.
+        clearance = basis.policy.margins.clearance_m
         front, rear, half = extents_m(robot, 0.0)
-        self._circle_m = np.float32(math.hypot(max(front, -rear), half) + reach_m)
-        length = np.maximum(courses.front_m, -courses.rear_m) + courses.driven_m
-        size_m = np.sqrt(np.square(length) + np.square(courses.half_m))
-        # Of a circle that holds footprint and course, wherever they point.
-        self._size_m = np.float32(np.max(size_m)) + (self._circle_m if courses.cos is None else 0)
+        long = max(front, -rear)
+        corner = math.hypot(long + clearance, half + clearance)
+        if robot.moves_sideways is not False and not courses.straight:
+            corner = math.sqrt(2.0) * (robot.circumscribed_radius_m + clearance)
+        self._corner_m = np.float32(corner + reach_m)
+        # No farther from the base is any part of robot or field, wherever they point.
+        sizes = np.hypot(np.maximum(courses.front_m, -courses.rear_m), courses.half_m) + clearance
+        size = max(float(np.max(sizes)), corner + reach_m)
+        self._size_m = np.float32(size + float(np.max(courses.driven_m)))
         self._step_s = float(reaches.ahead_s[PARTS])
 
     def lower(self, limits: FloatArray) -> Any:
@@ -123,8 +126,9 @@ class _Field:
         poses, people, rows = (np.concatenate(each) for each in zip(*pairs, strict=True))
         before, own = limits[poses].astype(np.float32), np.empty(len(poses), dtype=np.float32)
         in_the_path = np.empty(len(poses), dtype=bool)
-        for start in range(0, len(poses), _TOGETHER):
-            some = slice(start, start + _TOGETHER)
+        together = _TOGETHER if not self._fine else 1 + _TOGETHER // len(self._reaches.ahead_s)
+        for start in range(0, len(poses), together):
+            some = slice(start, start + together)
             path, reach = self._limits(poses[some], rows[some], before[some])
             own[some], in_the_path[some] = np.minimum(path, reach), path < reach
         lowest = np.maximum(own * (1.0 - _ROUNDING), self._reaches.least_mps[rows])
@@ -151,7 +155,8 @@ class _Field:
         if not self._has_reach:
             return path, np.full(len(pose), NOWHERE_M)
         if courses.cos is None:
-            pairs = Pairs(row, dx, dy, vx, vy, None, None, self._circle_m + driven, 0.0, 0.0)
+            radius = chosen_of(courses.radius_m, pose) + self._reach_m
+            pairs = Pairs(row, dx, dy, vx, vy, None, None, 0.0, 0.0, 0.0, radius)
         else:
             cos, sin = chosen_of(courses.cos, pose), chosen_of(courses.sin, pose)
             fan = (chosen_of(each, pose) for each in (courses.fan_cos, courses.fan_sin))
@@ -159,12 +164,14 @@ class _Field:
             pairs = Pairs(
                 *(row, cos * dx + sin * dy, cos * dy - sin * dx),
                 *(cos * vx + sin * vy, cos * vy - sin * vx),
-                *(*fan, *extent, chosen_of(courses.half_m, pose)),
+                *(*fan, *extent),
+                *(chosen_of(each, pose) for each in (courses.half_m, courses.radius_m)),
             )
         np.minimum(before, path, out=before)
         reach = np.full(len(pose), NOWHERE_M)
         near = self._near(pairs, before)
-        reach[near] = self._reach_mps(pairs.at(near), before[near])
+        reach_mps = self._finely_mps if self._fine else self._reach_mps
+        reach[near] = reach_mps(pairs.at(near), before[near])
         return path, reach
 
     def _near(self, pairs: Pairs, before: Any) -> Any:
@@ -199,7 +206,7 @@ class _Field:
     ) -> Any:
         """Return the limits (n,) of the protective field; ∞ for none."""
         if not straight:
-            gap = np.sqrt(dx * dx + dy * dy) - body - (driven + self._circle_m + self._clearance_m)
+            gap = np.sqrt(dx * dx + dy * dy) - body - (driven + self._corner_m)
         else:
             cos, sin, front, rear, half = straight
             x = cos * dx + sin * dy
@@ -209,6 +216,15 @@ class _Field:
             ahead = np.sqrt(np.maximum(body * body - off * off, 0.0))
             gap = np.where(inside, x - ahead - (front + driven + self._clearance_m), NOWHERE_M)
         return stopping_mps(gap, react, self._a)
+
+    def _finely_mps(self, pairs: Pairs, before: Any) -> Any:
+        """Return what :meth:`_reach_mps` does, with all the shortest steps of time at once."""
+        parts = np.arange(len(self._reaches.ahead_s) - 1)
+        each = np.repeat(np.arange(len(before)), len(parts))
+        part = np.tile(parts, len(before))
+        own = self._lowest_mps(pairs.at(each), part, part + 1)
+        limits = own.reshape(len(before), len(parts)).min(axis=1)
+        return np.where(limits < before, limits, NOWHERE_M)
 
     def _reach_mps(self, pairs: Pairs, before: Any, first: Any = None, again: int = 2) -> Any:
         """Return the limits (n,) by the reach; they are ∞ where they are not below ``before``.
@@ -294,7 +310,7 @@ class _Field:
         reach = in_table(reaches.reach_m, later, row) + half * np.sqrt(vx * vx + vy * vy)
         if pairs.fan_cos is None:
             past = behind = None
-            near = np.sqrt(x * x + y * y) - (pairs.front_m + self._margin_m) - reach
+            near = np.sqrt(x * x + y * y) - (pairs.radius_m + self._margin_m) - reach
         else:
             near, past, behind = contacts_m(x, y, pairs, reach, self._margin_m)
         own = np.maximum((near + braked1) / t1, need0)
@@ -307,89 +323,3 @@ class _Field:
         if behind is not None:
             own = np.where(need0 * t0 - braked0 <= behind, need0, own)
         return own
-
-
-def limits_at(
-    constraints: NavConstraints,
-    positions_m: FloatArray,
-    headings_rad: FloatArray | None,
-    velocities_mps: tuple[FloatArray, Value] | None,
-    yaw_rates_radps: Value,
-    times_s: FloatArray,
-    aware_for_s: float,
-    reach_m: float = 0.0,
-) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
-    """Return the limits (K, T) at poses (K, T, …), and who sets them: indices of texts.
-
-    Args:
-        constraints: of ``NavAdapter.update``, or some that stop the robot.
-        positions_m: (K, T, 2).
-        headings_rad: (K, T), or None for any.
-        velocities_mps: forward and left, (K, T), or None for a robot that drives forwards.
-        yaw_rates_radps: (K, T), or 0.
-        times_s: (T,) after the stamp.
-        aware_for_s: how long awareness counts.
-        reach_m: the limits hold within this distance of the poses; they have no heading then.
-
-    Raises:
-        NavError: for constraints that do not come from ``update`` unless they stop the robot.
-    """
-    if not isinstance(constraints, NavConstraints):
-        raise NavError(f"constraints must be NavConstraints, got {type(constraints).__name__}")
-    basis, robot = constraints.speed_basis, constraints.robot
-    shape = positions_m.shape[:2]
-    by = np.zeros(shape, dtype=np.intp)
-    if basis is None or robot is None:
-        if constraints.speed_limit_mps > 0.0:
-            raise NavError(
-                "constraints must come from NavAdapter.update, got some without speed_basis"
-            )
-        return np.zeros(shape), by, [constraints.limited_by]
-    if basis.stopped:
-        return np.zeros(shape), by, ["stale data"]
-    texts = [
-        "recovery after stale data",
-        "robot: moves sideways, but its profile says otherwise",
-        "robot maximum",
-    ]
-    limits, by = np.full(shape, robot.max_speed_mps), by + 2
-    if basis.ceiling_mps is not None:
-        rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
-        ceilings = np.broadcast_to(basis.ceiling_mps + rise_mps2 * times_s, shape)
-        by[ceilings < limits] = 0
-        limits = np.minimum(limits, ceilings)
-    if velocities_mps is not None and robot.moves_sideways is False:
-        sideways = np.broadcast_to(np.abs(velocities_mps[1]) > LATERAL_NOISE_MPS, shape)
-        limits[sideways], by[sideways] = 0.0, 1
-    people = tuple(people_ahead(constraints, times_s, aware_for_s))
-    if not people or not limits.size:
-        return limits, by, texts
-
-    def flat(value: Value) -> Value:
-        is_array = isinstance(value, np.ndarray) and value.ndim
-        return value.reshape(-1, *value.shape[2:]) if is_array else value
-
-    places, headings, rates = map(flat, (positions_m, headings_rad, yaw_rates_radps))
-    velocities = velocities_mps and tuple(map(flat, velocities_mps))
-    times = np.tile(np.arange(shape[1]), shape[0])
-    reaches = Reaches.of(people, shape[1], basis, robot)
-    lowest, who = limits.reshape(-1), np.empty(limits.size, dtype=np.intp)
-    standing = np.zeros(limits.size, dtype=bool)
-    if velocities and headings_rad is not None and robot.moves_sideways is True:
-        standing = course_speed_mps(*velocities) < STANDING_MPS
-    for anywhere in (False, True):
-        poses = np.flatnonzero(standing == anywhere)
-        if not len(poses):
-            continue
-        here, heading, rate = (chosen_of(each, poses) for each in (places, headings, rates))
-        velocity = velocities and tuple(chosen_of(each, poses) for each in velocities)
-        courses = courses_of(robot, basis, here, heading, velocity, rate, anywhere)
-        field = _Field(reaches, courses, times[poses], basis, robot, reach_m)
-        some = lowest[poses]
-        who[poses] = field.lower(some)
-        lowest[poses] = some
-    by = np.where(who.reshape(shape) < 0, by, who.reshape(shape) + len(texts))
-    for person in people:
-        rules = ("reach", "in the path") if person.least_mps is None else ("lost", "lost")
-        texts += [f"track {person.track_id}: {rule}" for rule in rules]
-    return lowest.reshape(shape), by, texts

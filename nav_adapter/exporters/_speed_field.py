@@ -12,7 +12,7 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._reach_field import limits_at
+from ._limits_at import limits_at
 
 
 def speed_limit_at(
@@ -25,18 +25,20 @@ def speed_limit_at(
     speeds_mps: Any = None,
     yaw_rates_radps: Any = None,
     aware_for_s: float = math.inf,
+    fine: bool = False,
 ) -> Any:
     """Return (K, T), the speed limit in m/s at K × T poses, people moving as predicted.
 
     It is a lower bound of the limit that ``NavAdapter.update`` will give at that time to a robot
     that is there. All people count, and so do lost ones, the age of the data and the recovery after
-    stale data. Without headings a circle about the robot counts, and people in every direction;
-    without speeds it drives forwards, and without yaw rates straight on.
+    stale data. Without headings a circle about the robot counts, and people in every direction, so
+    it may drive straight on, turn or stand. With headings but without speeds it drives forwards,
+    and without yaw rates straight on.
 
     The bound holds if
 
     * people keep the velocity of their track, and those whom the latest frames show are seen as
-      now: with the same covariance, the same age of the data and at least the same awareness;
+      now: with the same covariance, the same age of the data and the same awareness;
     * people out of sight, and missing ones, are not seen again; the uncertainty of a track that
       coasts grows with its velocity's;
     * the tracker reports at least once per ``fresh_within_s``, and the adapter is updated as often;
@@ -56,6 +58,7 @@ def speed_limit_at(
         yaw_rates_radps: (K, T), or None.
         aware_for_s: ≥ 0, how long after the stamp awareness counts. People are unaware from then
             on, as they may have looked away.
+        fine: steps of time as short as those of ``update``, for a higher limit at a few poses.
 
     Raises:
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
@@ -63,7 +66,7 @@ def speed_limit_at(
     """
     limits, _, _ = _limits(
         *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
-        *(speeds_mps, yaw_rates_radps, aware_for_s),
+        *(speeds_mps, yaw_rates_radps, aware_for_s, fine),
     )
     return limits
 
@@ -153,6 +156,7 @@ def _limits(
     speeds_mps: Any,
     yaw_rates_radps: Any,
     aware_for_s: float,
+    fine: bool = False,
 ) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
     """Return the limits and their reasons after a check of all arguments."""
     positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
@@ -177,4 +181,5 @@ def _limits(
         *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
         first + dt * np.arange(shape[1], dtype=np.float64),
         aware_for_s,
+        fine=fine,
     )

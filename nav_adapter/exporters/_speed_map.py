@@ -15,8 +15,8 @@ from perception.short_repr import short_repr
 
 from .._constraints import NavConstraints
 from .._errors import NavError
+from ._limits_at import limits_at
 from ._person_costs import checked_grid
-from ._reach_field import limits_at
 
 _LARGEST_CELLS: Final = 4_000_000
 
@@ -80,7 +80,8 @@ class SpeedMap:
         """Return the map of a square around a point, people moving as predicted.
 
         A cell has the limit of :func:`speed_limit_at` for a robot anywhere in it that drives
-        straight on, with any heading. The corner of the map is rounded to whole cells.
+        straight on, turns or stands, with any heading. The corner of the map is rounded to whole
+        cells.
 
         Args:
             constraints: of ``NavAdapter.update``.

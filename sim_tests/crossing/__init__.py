@@ -6,11 +6,11 @@ from ._crossing import (
     Crossing,
     Observer,
     Situation,
-    named_policy,
     run_crossing,
 )
 from ._drawing import TopView, draw_camera_view
 from ._metrics import CLEARANCE_M, STANDING_SPEED_MPS, ContactEvent, SafetyMeter
+from ._policies import named_policy
 from ._result import CrossingFrame, CrossingResult
 from ._stage import Stage, TrueView
 from .planner import StraightOn

@@ -18,10 +18,10 @@ from perception.arrays import FloatArray
 from ..actors.behaviour import PersonOutcome
 from ..actors.robot import RobotModel
 from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
-from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner, checked_command
 from ._metrics import SafetyMeter
+from ._policies import named_policy
 from ._result import CrossingFrame, CrossingResult
 from ._sensing import Sensed, Sensing
 from ._stage import Stage, TrueView
@@ -241,7 +241,7 @@ def run_crossing(
 
     Args:
         scenario: a scenario, or the name of a shipped one, drawn by the seed.
-        policy: a policy, the name of a preset, or a YAML file.
+        policy: a policy, the name of a preset, or a YAML file; see :func:`named_policy`.
         planner: the local planner; None for the reference :class:`SamplingPlanner`, or for
             :class:`StraightOn` where the scenario drives straight ahead.
         perception: ``"truth"``; ``"keypoints"``: true keypoints with noise through the pipeline;
@@ -325,18 +325,6 @@ def _default_planner(scenario: Scenario) -> LocalPlanner:
     if straight is not None:
         return StraightOn(straight)
     return SamplingPlanner(scenario.robot_profile, scenario.planner_boxes_odom_m)
-
-
-def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
-    """Return name and policy, from a policy, a preset's name or a file."""
-    if isinstance(policy, AwarenessPolicy):
-        return "custom", policy
-    path = Path(policy)
-    if path.suffix in (".yaml", ".yml"):
-        return path.stem, AwarenessPolicy.from_yaml(path)
-    if not isinstance(policy, str):
-        raise SimError(f"policy must be a preset's name or a .yaml file, got {policy}")
-    return policy, AwarenessPolicy.preset(policy)
 
 
 def _at_goal(scenario: Scenario, state: RobotState, goal: FloatArray) -> bool:

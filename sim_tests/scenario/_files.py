@@ -16,9 +16,14 @@ from ..world.errors import SimError
 
 _FOLDER: Final = resources.files("sim_tests.scenario") / "shipped"
 # The folder of each set of shipped scenarios.
-_SETS: Final = {"all": _FOLDER, "guidelines": _FOLDER / "guidelines"}
+_SETS: Final = {
+    "all": _FOLDER,
+    "guidelines": _FOLDER / "guidelines",
+    "step_out": _FOLDER / "step_out",
+}
 #: Names of the sets of shipped scenarios. ``"all"`` is the set that published figures are over.
-#: ``"guidelines"`` adds the situations of Francis et al. that it lacks.
+#: ``"guidelines"`` adds the situations of Francis et al. that it lacks, ``"step_out"`` people who
+#: stand beside the robot's way and set off across it as it comes.
 SCENARIO_SETS: Final = tuple(_SETS)
 _DEFAULTS: Final = _FOLDER / "defaults"
 _CAMERAS: Final = _FOLDER / "cameras"

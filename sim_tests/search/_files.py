@@ -11,9 +11,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from awarenav.policies import read_policy
 from perception.documents import parse_json, read_json
 
+from ..crossing import named_policy
 from ..scenario import ScenarioTemplate
 from ..study.runs import ProcessLock, named_templates, policy_text
 from ..world.errors import SimError
@@ -45,9 +45,10 @@ def common_settings(
         SimError: an unknown scenario, camera or robot.
         NavError: an unusable policy.
     """
+    name, own_policy = named_policy(policy)
     return {
-        "policy_name": Path(policy).stem,
-        "policy": policy_text(read_policy(policy)),
+        "policy_name": name,
+        "policy": policy_text(own_policy),
         "scenarios": tuple(
             each.to_text() for each in named_templates(scenarios, camera, population, robot)
         ),

@@ -15,6 +15,7 @@ from shapely import Point
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavError, PersonObstacle, RobotProfile
 from nav_adapter.policies import SpeedRules, StandingPeople
+from sim_tests.crossing import named_policy
 from tracking import PersonTrack
 
 FEW = settings(max_examples=30)
@@ -100,7 +101,7 @@ def test_finite_tracks_give_constraints_or_an_error_of_the_package(
     )
     policy = AwarenessPolicy(rules=SpeedRules(standing=StandingPeople()))
     if preset != "standing":
-        policy = AwarenessPolicy.preset(preset)
+        policy = named_policy(preset)[1]
     adapter = NavAdapter(policy, ROBOT)
     try:
         constraints = adapter.update([track], robot_at(age_s, speed_mps=1.0), age_s)

@@ -154,8 +154,7 @@ def test_the_lost_are_not_kept_for_longer_than_the_limit_rises() -> None:
     assert adapter._memory.lost == {}
 
 
-def test_the_scanner_of_today_forgets_at_once() -> None:
-    assert AwarenessPolicy.preset("scanner").timing.lost_rise_mps2 is None
+def test_every_preset_remembers_people_it_lost() -> None:
     for name in ("blind", "conservative", "balanced", "assertive"):
         assert AwarenessPolicy.preset(name).timing.lost_rise_mps2 == RISE_MPS2
 

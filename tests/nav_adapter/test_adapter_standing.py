@@ -234,7 +234,6 @@ def test_the_presets_have_the_rule_with_own_delays_and_it_survives_a_file(tmp_pa
     for name in ("blind", "conservative", "balanced", "assertive"):
         standing = AwarenessPolicy.preset(name).rules.standing
         assert standing == StandingPeople(delay_from_tracks=True)
-    assert AwarenessPolicy.preset("scanner").rules.standing is None
     STANDING.to_yaml(tmp_path / "mine.yaml")
     assert AwarenessPolicy.from_yaml(tmp_path / "mine.yaml") == STANDING
 

@@ -50,7 +50,6 @@ def test_somebody_who_walks_away_must_first_turn_round() -> None:
 @pytest.mark.parametrize("name", ["blind", "conservative", "balanced", "assertive"])
 def test_the_presets_have_the_rule(name: str) -> None:
     assert AwarenessPolicy.preset(name).rules.walking == WalkingPeople()
-    assert AwarenessPolicy.preset("scanner").rules.walking is None
 
 
 @pytest.mark.parametrize(

@@ -153,9 +153,7 @@ def test_presets_are_loaded_by_name() -> None:
     for alpha in (0.0, 0.3, 0.7, 1.0):
         assert blind.inflation.radius_m(alpha) == AwarenessPolicy().inflation.radius_m(0.0)
         assert blind.speed.human_speed_mps(alpha) == AwarenessPolicy().speed.human_speed_mps(0.0)
-    with pytest.raises(
-        NavError, match=r"'conservative', 'scanner', got 'blinded'; did you mean 'blind'"
-    ):
+    with pytest.raises(NavError, match=r"'conservative', got 'blinded'; did you mean 'blind'"):
         AwarenessPolicy.preset("blinded")
 
 

@@ -1,4 +1,4 @@
-"""The preset ``scanner``: a field sized by the robot's own speed, the same for everybody."""
+"""The simulator's preset ``scanner``: a field sized by the robot's speed, the same for all."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from nav_adapter import AwarenessPolicy, NavAdapter, RobotState
 from nav_adapter.policies import ProtectiveField, SpeedRules
 from nav_adapter.proof import check_robot
 from perception.anthropometry import BODY_RADIUS_M
+from sim_tests.crossing import named_policy
 
-SCANNER = AwarenessPolicy.preset("scanner")
+SCANNER = named_policy("scanner")[1]
 FRONT_M, HALF_WIDTH_M = 0.3625, 0.25
 EDGE_M = HALF_WIDTH_M + BODY_RADIUS_M + 0.10
 
@@ -136,6 +137,16 @@ def test_the_field_holds_for_people_who_stand_and_for_nobody_else() -> None:
     assert way_m > 2.0 - FRONT_M - BODY_RADIUS_M
 
 
+def test_the_scanner_has_none_of_the_rules_about_people() -> None:
+    rules = SCANNER.rules
+    assert (rules.standing, rules.walking, rules.start_reserve) == (None, None, None)
+    assert SCANNER.standing_window_s is None
+    assert SCANNER.timing.lost_rise_mps2 is None
+    assert SCANNER.noticed is None
+    assert SCANNER.filter.noticed_memory_s == 0.0
+    assert SCANNER.margins.maximum_radius_m is None
+
+
 def test_other_policies_know_no_field() -> None:
     for name in ("blind", "conservative", "balanced", "assertive"):
         assert AwarenessPolicy.preset(name).rules.protective_field is None
@@ -144,6 +155,6 @@ def test_other_policies_know_no_field() -> None:
 
 
 def test_help_names_every_preset() -> None:
-    for name in ("scanner", "blind", "conservative", "balanced", "assertive"):
+    for name in ("blind", "conservative", "balanced", "assertive"):
         assert name in (show.epilog or "")
         AwarenessPolicy.preset(name)

@@ -45,6 +45,12 @@ These scenarios are a set of their own, `--scenario guidelines`.
 [Scenarios](scenarios.md#the-guidelines-situations) says where they come from.
 
 <div class="gallery" markdown>"""
+_STEP_OUT: Final = """## People who step out
+
+These scenarios are a set of their own too, `--scenario step_out`.
+[Scenarios](scenarios.md#people-who-step-out) says when the people set off.
+
+<div class="gallery" markdown>"""
 _FILM: Final = """<picture>
 <source media="(prefers-reduced-motion: reduce)" srcset="images/scenarios/{name}.png">
 <img src="images/films/{name}.webp" alt="Film of {name} from above" loading="lazy">
@@ -65,7 +71,7 @@ speed limit and the largest radius over time. [Planners](planners.md) explains t
 def gallery_page() -> str:
     """Return the Markdown of the gallery."""
     parts = [_HEAD, *_films("all"), "</div>\n", _GUIDELINES, *_films("guidelines")]
-    parts += ["</div>\n", _EXAMPLES]
+    parts += ["</div>\n", _STEP_OUT, *_films("step_out"), "</div>\n", _EXAMPLES]
     for name in example_names():
         folder = "examples/planners" if name in PLANNERS else "examples"
         path = f"{folder}/{name}.py"

@@ -17,15 +17,11 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from awarenav import __version__  # noqa: E402
-from awarenav.policies import explorer_page  # noqa: E402
-from nav_adapter import AwarenessPolicy  # noqa: E402
 from tools.docs_site import notebook, reference  # noqa: E402
 from tools.docs_site.outside_files import FOLDER, OutsideFiles  # noqa: E402
 
 #: Pages whose films and code get the full width.
 _WIDE: Final = ("index.md", "gallery.md")
-#: The policy explorer, a page of its own; the navigation leads to it.
-_EXPLORER: Final = "policy_explorer.html"
 _outside: OutsideFiles | None = None
 
 
@@ -52,8 +48,6 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         add(name, abs_src_path=str(ROOT / path))
     for name, text in reference.pages().items():
         add(name, content=text)
-    preset = "balanced"
-    add(_EXPLORER, content=explorer_page(AwarenessPolicy.preset(preset), name=preset))
     stem = notebook.NOTEBOOK.stem
     text, pictures = notebook.page(notebook.read(), stem)
     add(f"{stem}.md", content=text)

@@ -1,6 +1,8 @@
-"""A person's attention to the robot after the first look at it: it may lapse."""
+"""A person's attention to the robot after the first look at it: it may lapse or end."""
 
 from __future__ import annotations
+
+import math
 
 from ._person import RobotBody
 from ._route import DesiredVelocity, RouteFollower
@@ -12,14 +14,20 @@ class AttentionSpan:
 
     Args:
         lapse: when and how the attention ends; None never.
+        sets_off_within_m: as for :class:`PersonSpec`.
+        start_s: time of the start, or the earliest one of somebody who waits for the robot.
 
     Attributes:
+        starts_s: time of the start by the clock; infinite for somebody who waits for the robot.
         halted: the person stands because of the robot, until the lapse.
         lapsed: the person walks as if no robot were there.
     """
 
-    def __init__(self, lapse: Lapse | None) -> None:
-        self._lapse = lapse
+    def __init__(
+        self, lapse: Lapse | None, sets_off_within_m: float | None = None, start_s: float = 0.0
+    ) -> None:
+        self._lapse, self._within_m, self._earliest_s = lapse, sets_off_within_m, start_s
+        self.starts_s = start_s if sets_off_within_m is None else math.inf
         self.halted = self.lapsed = False
 
     def sees(self, t_s: float, noticed_s: float | None, touched: bool, visible: bool) -> bool:
@@ -37,6 +45,15 @@ class AttentionSpan:
         self.halted = self._lapse.halts and not over and not touched
         self.lapsed = over and not touched
         return visible and not (self.lapsed and self._lapse.looks_away)
+
+    def maybe_set_off(self, follower: RouteFollower, t_s: float, robot: RobotBody | None) -> None:
+        """Let a person who stands until the robot is near their way set off, and forget it."""
+        if self._within_m is None or robot is None or t_s < self._earliest_s - 1e-9:
+            return
+        route = follower.route
+        if robot.gap_to_line_m(route.start, route.direction(0.0)) <= self._within_m:
+            follower.go(t_s)
+            self._within_m, self._lapse = None, Lapse(after_look_s=0.0)
 
     def end_halt(self) -> None:
         """Let a person who halted set off now, and still know of the robot."""

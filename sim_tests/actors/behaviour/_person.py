@@ -66,6 +66,14 @@ class RobotBody:
         aside = min(max(cos * dy - sin * dx, -self.half_width_m), self.half_width_m)
         return self.x_m + cos * ahead - sin * aside, self.y_m + sin * ahead + cos * aside
 
+    def gap_to_line_m(self, point_m: tuple[float, float], direction: tuple[float, float]) -> float:
+        """Return the distance of the rectangle from a line through a point; 0 where it is on it."""
+        (x, y), (ux, uy) = point_m, direction
+        cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        half_m = self.half_length_m * abs(ux * sin - uy * cos)
+        half_m += self.half_width_m * abs(ux * cos + uy * sin)
+        return max(abs(ux * (self.y_m - y) - uy * (self.x_m - x)) - half_m, 0.0)
+
     def extrapolated(self, dt_s: float) -> RobotBody:
         """Return the robot after ``dt_s`` of constant velocity."""
         dx, dy = self.vx_mps * dt_s, self.vy_mps * dt_s

@@ -154,6 +154,10 @@ class PersonSpec(StrictConfig):
         route: at least one point. With one point the person stands there.
         speed_mps: free walking speed.
         start_s: time of the start.
+        sets_off_within_m: the person stands until the robot's nearest edge is this near to the line
+            of the first piece of the route, before or after them, whether or not they see it. Then
+            (not before ``start_s``) they set off, look away and walk as if no robot were there,
+            until it touches them. None: at ``start_s``.
         heading_deg: heading while standing; default along the route.
         backwards: walk backwards.
         pauses: stops on the way.
@@ -177,6 +181,7 @@ class PersonSpec(StrictConfig):
     route: tuple[RoutePoint, ...] = Field(min_length=1)
     speed_mps: float = Field(default=1.34, gt=0.0, le=3.0)
     start_s: float = Field(default=0.0, ge=0.0)
+    sets_off_within_m: float | None = Field(default=None, ge=0.0)
     heading_deg: float | None = None
     backwards: bool = False
     pauses: tuple[Pause, ...] = ()
@@ -196,6 +201,12 @@ class PersonSpec(StrictConfig):
                 f"a person with activity {self.activity!r} stays at one place: route must have one "
                 f"point, got {len(self.route)}"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _who_sets_off_has_a_way(self) -> PersonSpec:
+        if self.sets_off_within_m is not None and len(self.route) < 2:
+            raise ValueError("sets_off_within_m needs a route of at least two points, got one")
         return self
 
     @property

@@ -87,14 +87,14 @@ class Walker:
         self._obstacles = Obstacles(boxes_odom_m)
         route = Route.from_spec(spec)
         start_s = max(spec.start_s + offset_s, 0.0)
-        self._follower = self._task = RouteFollower(route, spec.speed_mps, start_s)
+        self._span = AttentionSpan(spec.lapse, spec.sets_off_within_m, start_s)
+        self._follower = self._task = RouteFollower(route, spec.speed_mps, self._span.starts_s)
         for number, point in enumerate(spec.route):
             self._obstacles.check_free(
                 f"route point {number} of {spec.name!r}", point.x_m, point.y_m
             )
         gaze_rng, reaction_rng = rng.spawn(2)
         self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, activity=spec.activity)
-        self._span = AttentionSpan(spec.lapse)
         self._reactions = ReactionModel(spec.reactions, reaction_rng)
         self._detour = SlowRobotDetour()
         self._activity = Activity(spec.activity, spec.activity)
@@ -262,6 +262,7 @@ class Walker:
         if not first:
             self._walked_m += math.dist((x, y), self._trajectory.start)
             self._heading += self._turning * DECISION_PERIOD_S
+        self._span.maybe_set_off(self._task, t_s, around.robot)
         robot = self._span.known(self._look_at_robot(t_s, (x, y, self._heading), around))
         if self.spec.stays:
             self._trajectory.start_segment(t_s, (x, y, 0.0, 0.0), (0.0, 0.0), DECISION_PERIOD_S)
@@ -385,7 +386,7 @@ class Walker:
         """The walk without robot and people; None without a route or without an end of it."""
         if self._task.route.length_m == 0.0:
             return None
-        spec = self.spec.model_copy(update={"start_s": 0.0})
+        spec = self.spec.model_copy(update={"start_s": 0.0, "sets_off_within_m": None})
         alone = Walker(spec, np.random.default_rng(0), self._boxes_odom_m)
         route = self._task.route
         pauses = sum(stop.for_s for stop in route.stops[:-1])

@@ -1,12 +1,14 @@
-"""Local planners: the interface, the reference planner, and one that drives straight ahead."""
+"""Local planners: the interface, the reference planner, one with a costmap, one straight ahead."""
 
 from __future__ import annotations
 
 from ._config import PlannerConfig
+from ._costmap import CostmapPlanner
 from ._local_planner import LocalPlanner, StraightOn
 from ._sampling_planner import SamplingPlanner
 
 __all__ = [
+    "CostmapPlanner",
     "LocalPlanner",
     "PlannerConfig",
     "SamplingPlanner",

@@ -255,10 +255,11 @@ class SamplingPlanner:
             return bearing_rad
 
         c, s = math.cos(bearing_rad), math.sin(bearing_rad)
+        around = scene.among(self._boxes_odom_m)  # the way past may lie beyond a roll-out
 
         def is_free(x_m: float, y_m: float) -> bool:
             pose = Poses(*(np.asarray(value) for value in (x_m, y_m, c, s)))
-            return bool(scene.box_gap_m(self._footprint.at(pose)) >= config.clearance_m)
+            return bool(around.box_gap_m(self._footprint.at(pose)) >= config.clearance_m)
 
         return detour_bearing_rad(bearing_rad, goal.distance_m, discs, is_free)
 

@@ -217,6 +217,12 @@ class Scene:
         """Return x, y, vx, vy of each person."""
         return self._people
 
+    def among(self, boxes_odom_m: FloatArray) -> Scene:
+        """Return the same people among other boxes (N, 4)."""
+        other = copy.copy(self)
+        other._boxes_odom_m, other.has_boxes = boxes_odom_m, bool(len(boxes_odom_m))
+        return other
+
     def without_people(self) -> Scene:
         """Return the same boxes around the robot, and nobody."""
         alone = copy.copy(self)

@@ -28,7 +28,7 @@ from ...actors.behaviour import PersonSpec, RecordedPath, WorkerScript, read_rec
 from ...world.errors import SimError
 from .._scenario import Scenario
 from .._template import ScenarioTemplate
-from ._plans import closest_approaches, person_plan, robot_plan
+from ._plans import closest_approaches, person_plan, planned_people, robot_plan
 
 _WIDTH_IN: Final = 6.8
 _DPI: Final = 100
@@ -81,7 +81,7 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
     _draw_robot(axes, scenario, now_s)
     robot_m = robot_plan(scenario.robot, np.array([now_s]), scenario.robot_profile)[0]
     others = [template.for_seed(seed).people for seed in range(_DRAWS)]
-    for number, spec in enumerate(scenario.people):
+    for number, spec in enumerate(planned_people(scenario)):
         for people in others:
             _draw_route(axes, people[number], faint=True)
         _draw_person(axes, spec, now_s, robot_m)

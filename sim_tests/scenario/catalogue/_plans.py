@@ -65,6 +65,25 @@ def person_plan(spec: PersonSpec, t_s: FloatArray) -> tuple[FloatArray, FloatArr
     return np.column_stack(columns), np.asarray(walked)
 
 
+def planned_people(scenario: Scenario) -> tuple[PersonSpec, ...]:
+    """Return the people, with a planned start for those who set off as the robot comes."""
+    t_s = np.arange(0.0, scenario.duration_s, _STEP_S)
+    robot = robot_plan(scenario.robot, t_s, scenario.robot_profile)
+    reach_m = float(scenario.robot_profile.footprint_m[:, 0].max())
+    planned = []
+    for spec in scenario.people:
+        if spec.sets_off_within_m is not None:
+            first, second = (np.array([point.x_m, point.y_m]) for point in spec.route[:2])
+            ux, uy = (second - first) / max(float(np.linalg.norm(second - first)), 1e-9)
+            gaps_m = np.abs((robot - first) @ np.array([-uy, ux])) - reach_m
+            near = np.flatnonzero((gaps_m <= spec.sets_off_within_m) & (t_s >= spec.start_s))
+            start_s = float(t_s[near[0]]) if len(near) else scenario.duration_s
+            planned.append(spec.model_copy(update={"start_s": start_s, "sets_off_within_m": None}))
+        else:
+            planned.append(spec)
+    return tuple(planned)
+
+
 def closest_approaches(scenario: Scenario) -> dict[str, tuple[float, float]]:
     """Return how close the robot would come to each person if nobody reacted, and when.
 
@@ -78,7 +97,7 @@ def closest_approaches(scenario: Scenario) -> dict[str, tuple[float, float]]:
     robot = robot_plan(scenario.robot, t_s, scenario.robot_profile)
     arrived = np.flatnonzero((robot == robot[-1]).all(axis=1))[0] + 1
     t_s, robot = t_s[:arrived], robot[:arrived]
-    paths = {spec.name: person_plan(spec, t_s)[0] for spec in scenario.people}
+    paths = {spec.name: person_plan(spec, t_s)[0] for spec in planned_people(scenario)}
     for number, script in enumerate(scenario.workers):
         positions = [script.motion(float(t)).position_odom_m for t in t_s]
         paths[f"worker {number}"] = np.array(positions)

@@ -144,13 +144,19 @@ def names_of_sets(names: Sequence[str]) -> list[str]:
     ]
 
 
+def _start_text(spec: PersonSpec) -> str:
+    if spec.sets_off_within_m is None:
+        return f"{spec.start_s:.1f} s"
+    return f"when the robot is {spec.sets_off_within_m:.1f} m from that line"
+
+
 def _person_text(spec: PersonSpec) -> str:
     first, last = spec.route[0], spec.route[-1]
     walks = (
         f"stands at ({first.x_m:.3g}, {first.y_m:.3g}) m"
         if len(spec.route) == 1
         else f"walks from ({first.x_m:.3g}, {first.y_m:.3g}) to ({last.x_m:.3g}, {last.y_m:.3g}) m "
-        f"at {spec.speed_mps:.2f} m/s from {spec.start_s:.1f} s"
+        f"at {spec.speed_mps:.2f} m/s from {_start_text(spec)}"
     )
     glances = spec.glances
     if glances.notices_within_m <= 0.0:

@@ -48,8 +48,12 @@ def person_parameters(
     }
     if walks:
         fastest = FASTEST_BACKWARDS_MPS if person["backwards"] else fastest_mps
+        if (
+            person.get("sets_off_within_m") is None
+        ):  # else the robot's place decides, a distribution
+            earliest_s = max(start_s - _EARLIER_S, 0.0)
+            parameters["start_s"] = Parameter.of(earliest_s, start_s + _EARLIER_S, start_s)
         parameters |= {
-            "start_s": Parameter.of(max(start_s - _EARLIER_S, 0.0), start_s + _EARLIER_S, start_s),
             "speed_mps": Parameter.of(_SLOWEST_MPS, fastest, speed_mps),
             "aside_middle_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
             "pause_at": Parameter.of(0.05, 0.95, 0.5),

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 from awarenav.errors import counted
-from awarenav.policies import read_policy
 
+from ...crossing import named_policy
 from ...study.measures import EpisodeRecord
 from ...study.runs import policy_of, policy_text, run_episode
 from .._verdict import listed
@@ -37,7 +36,7 @@ def policy_against(given: str, settings: FalsifySettings) -> tuple[str, str] | N
     if settings.unsafe_no_floor:
         return None
     names = (given,) if given else (_BASE, _BASE_OF_BASE)
-    policies = [(Path(name).stem, policy_text(read_policy(name))) for name in names]
+    policies = [(name, policy_text(policy)) for name, policy in map(named_policy, names)]
     own = policy_of(settings.policy)
     return next((each for each in policies if policy_of(each[1]) != own), policies[-1])
 

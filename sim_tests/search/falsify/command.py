@@ -23,16 +23,16 @@ from awarenav.cli import POSITIVE, command, option, options
     "with the same result, whatever --workers is. --episodes may be raised then. Needs the extra "
     "'bench'.",
 )
-@options.policy()
+@options.policy(simulated=True)
 @option(
     "--against",
     default="",
     show_default="balanced; blind for balanced itself",
     metavar="NAME|FILE",
-    shell_complete=options.COMPLETE_POLICIES,
+    shell_complete=options.COMPLETE_SIMULATED_POLICIES,
     help="Policy that the worst cases are run with too, for the verdict.",
 )
-@options.scenarios("that have a planner and people")
+@options.scenarios("that have a planner and people", default=("all", "step_out"))
 @option(
     "--episodes",
     type=POSITIVE,

@@ -22,7 +22,7 @@ from awarenav.cli import POSITIVE, FilePath, OneOf, command, option, options
     "with the same result; --trials and --held-out may be raised then. Several processes that run "
     "the command with the same --out share the trials. Needs the extra 'bench'.",
 )
-@options.policy()
+@options.policy(simulated=True)
 @options.scenarios("that have a planner")
 @option(
     "--ranges",

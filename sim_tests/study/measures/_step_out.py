@@ -53,7 +53,7 @@ class StepOut:
         time_constant_s: time constant of the approach to that speed, > 0 (0.54 s: Moussaïd et al.
             2009).
         noticed_after_s: time until a start is seen, before the robot's reaction time begins. The
-            default lies in the 0.14 to 0.30 s that docs/safety.md gives.
+            default lies in the 0.14 to 0.30 s that docs/tracking.md gives.
         start_shares: share of people who start within a second, each in [0, 1), by the last look
             at the robot: now, up to 1 s and up to 4 s ago, longer ago or never. The default was
             recorded at the kerb, before vehicles that move (docs/people.md).

@@ -18,6 +18,7 @@ from perception.arrays import finite_number
 from perception.documents import parse_yaml, yaml_text
 from tracking.config import StrictConfig, complaints
 
+from ...crossing import named_policy
 from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault, shipped_faults
 from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
@@ -61,8 +62,8 @@ def plan_jobs(
     They are nested in that order.
 
     Args:
-        scenarios: templates, shipped names, YAML files, or sets: ``"all"``, or ``"guidelines"``,
-            without the scenarios that need no planner.
+        scenarios: templates, shipped names, YAML files, or sets (``"all"``, ``"guidelines"``,
+            ``"step_out"``) without the scenarios that need no planner.
         policies: names of presets, YAML files, pairs of a name for the tables and a policy, or
             ``"oracle"``. The oracle is ``balanced`` with perception that knows the truth: the
             upper bound of what better perception could gain.
@@ -118,8 +119,8 @@ def named_templates(
     """Return the scenarios of names and YAML files, each once.
 
     Args:
-        names: shipped names, YAML files, or sets: ``"all"``, or ``"guidelines"``, without the
-            scenarios that need no planner.
+        names: shipped names, YAML files, or sets (``"all"``, ``"guidelines"``, ``"step_out"``)
+            without the scenarios that need no planner.
         camera: as for :meth:`ScenarioTemplate.with_camera`.
         population: as for :meth:`ScenarioTemplate.with_population`.
         robot: as for :meth:`ScenarioTemplate.with_robot`.
@@ -217,12 +218,7 @@ def _named_policy(
     """Return the name and the YAML of a policy with each perception; the oracle has its own."""
     if policy == ORACLE:
         return [(ORACLE, policy_text(AwarenessPolicy.preset("balanced")), ORACLE)]
-    if not isinstance(policy, str):
-        name, own_policy = policy
-    elif policy.endswith((".yaml", ".yml")):
-        name, own_policy = Path(policy).stem, AwarenessPolicy.from_yaml(policy)
-    else:
-        name, own_policy = policy, AwarenessPolicy.preset(policy)
+    name, own_policy = named_policy(policy) if isinstance(policy, str) else policy
     text = policy_text(own_policy)
     return [(name, text, perception) for perception in perceptions]
 

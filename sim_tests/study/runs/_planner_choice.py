@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from nav_adapter import RobotProfile
 
-from ...crossing.planner import LocalPlanner, SamplingPlanner, StraightOn
+from ...crossing.planner import CostmapPlanner, LocalPlanner, SamplingPlanner, StraightOn
 from ...scenario import Scenario
 from ...world.errors import SimError
 from ._seeding import FRESH_TORCH_SEED, seeded_generators
@@ -55,7 +55,7 @@ def straight_to_goal(robot: RobotProfile) -> StraightOn:
 
 #: Planners that have a name without a module, beside the reference planner.
 KNOWN_PLANNERS: Final[Mapping[str, Callable[..., LocalPlanner]]] = MappingProxyType(
-    {"straight_on": straight_to_goal}
+    {"costmap": CostmapPlanner, "straight_on": straight_to_goal}
 )
 
 

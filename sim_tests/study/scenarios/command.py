@@ -74,7 +74,8 @@ def show(scenario: str, *, yaml: bool, seed: int | None) -> int:
     required=True,
     metavar="NAME|FILE...",
     shell_complete=options.COMPLETE_SCENARIOS,
-    help="Shipped scenarios, YAML files, or a set of shipped ones: 'all' or 'guidelines'.",
+    help="Shipped scenarios, YAML files, or a set of shipped ones: 'all', 'guidelines' or "
+    "'step_out'.",
 )
 @options.out_file(
     "scenario.png",
@@ -109,7 +110,7 @@ def draw(scenarios: tuple[str, ...], out: Path) -> int:
     required=True,
     metavar="NAME|FILE...",
     shell_complete=options.COMPLETE_SCENARIOS,
-    help="YAML files, shipped scenarios, or a set of these: 'all' or 'guidelines'.",
+    help="YAML files, shipped scenarios, or a set of these: 'all', 'guidelines' or 'step_out'.",
 )
 @option(
     "--episodes",

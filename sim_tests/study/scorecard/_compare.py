@@ -54,8 +54,8 @@ def compare_planners(
 
     Args:
         planners: ``"module:NAME"`` (a class, a function that returns a planner, or a planner, with
-            arguments as ``"module:NAME(gain=2.0)"``), ``"reference"``, ``"straight_on"``, or a
-            class or function that can be imported by its name.
+            arguments as ``"module:NAME(gain=2.0)"``), ``"reference"``, ``"costmap"``,
+            ``"straight_on"``, or a class or function that can be imported by its name.
         scenarios: templates, shipped names, YAML files, or ``"all"``.
         out_dir: folder of the results, which :func:`write_scorecard` and
             :class:`~sim_tests.study.runs.RunFiles` list.

@@ -49,7 +49,8 @@ def list_planners(*, as_json: bool) -> int:
     nargs=-1,
     required=True,
     metavar="MODULE:NAME...",
-    help="Classes, functions that return a planner, planners, or 'reference' and 'straight_on'.",
+    help="Classes, functions that return a planner, planners, or 'reference', 'costmap' and "
+    "'straight_on'.",
 )
 @options.scenarios("that have a planner", repeated=True)
 @options.policies(["balanced"], repeated=True)

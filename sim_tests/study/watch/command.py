@@ -29,7 +29,7 @@ from awarenav.cli import FilePath, Number, Whole, argument, command, option, opt
     shell_complete=options.COMPLETE_SCENARIOS,
     help="A shipped scenario, or a YAML file.",
 )
-@options.policy()
+@options.policy(simulated=True)
 @options.planner()
 @options.perception()
 @options.sensors()

@@ -64,6 +64,8 @@ def test_nested_commands_and_options_are_completed():
         (["crossings", "--scenario", "blind_corner", "crowd"], ["crowd_of_eight"]),
         (["crossings", "--policy", "b"], ["balanced", "blind"]),
         (["crossings", "--policy", "blind", "o"], ["oracle"]),
+        (["crossings", "--policy", "blind", "sc"], ["scanner"]),
+        (["falsify", "--policy", "s"], ["scanner"]),
         (["crossings", "--policy", "blind", "--fault", "gh"], ["ghosts"]),
         (["crossings", "--camera", "su"], ["surround"]),
         (["crossings", "--perception", "k"], ["keypoints"]),

@@ -76,7 +76,7 @@ def test_models_print_json(capfd, tmp_path):
 
 def test_planners_list_prints_json(capfd):
     listed = printed(capfd, "planners", "list")
-    assert [each["name"] for each in listed] == ["reference", "straight_on"]
+    assert [each["name"] for each in listed] == ["reference", "costmap", "straight_on"]
     assert all(each["about"].endswith((".", "(Fox, Burgard and Thrun 1997).")) for each in listed)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -11,18 +12,24 @@ from paths import ROOT
 
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy, NavAdapter, RobotProfile, RobotState
-from nav_adapter.settled import settled_radius_m, settled_speed_limit_mps
+from nav_adapter.ros2 import RobotFile
 from perception.anthropometry import BODY_RADIUS_M
 from perception.installation import install_command
 from tracking import PersonTrack
 
 HEADS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 OWN = """
-inflation: {table_m: [[0.0, 1.2], [0.5, 0.6], [1.0, 0.5]]}
-speed: {shape: two_level, unaware_below: 0.2, aware_above: 0.7}
-rules:
-  zones: {stop_within_m: 0.5, full_speed_beyond_m: 4.0}
-  near_cap: {within_m: 2.0, speed_mps: 0.6}
+inflation: {unaware_radius_m: 1.4, aware_radius_m: 0.5}
+speed: {unaware_below: 0.2, aware_above: 0.7, aware_human_speed_mps: 0.4}
+reach: {turn_deg: 40.0}
+margins: {clearance_m: 0.2}
+"""
+ROBOT_FILE = """
+footprint_m: [[0.6, 0.4], [-0.6, 0.4], [-0.6, -0.4], [0.6, -0.4]]
+max_speed_mps: 1.2
+max_acceleration_mps2: 0.8
+max_deceleration_mps2: 0.8
+reaction_time_s: 0.5
 """
 
 
@@ -36,7 +43,14 @@ def own(tmp_path):
 def test_help_says_what_it_does(capsys):
     assert main(["policy", "show", "--help"]) == 0
     text = capsys.readouterr().out
-    for option in ("--out", "--max-speed", "--deceleration", "--reaction-time", "balanced"):
+    for option in (
+        "--out",
+        "--max-speed",
+        "--deceleration",
+        "--reaction-time",
+        "--robot",
+        "balanced",
+    ):
         assert option in text
 
 
@@ -50,31 +64,62 @@ def test_a_drawing_is_a_whole_file_and_the_same_every_time(own, tmp_path, ending
     assert not list(tmp_path.rglob("*.part"))
 
 
-def test_the_table_is_what_the_adapter_gives(own, capsys):
-    assert main(["policy", "show", str(own), "--out", "none"]) == 0
+def limit_and_radius(policy, robot, alpha, ahead_m, beside_m):
+    """Return what a new adapter gives once it has seen the person for 3.2 s."""
+    adapter = NavAdapter(policy, robot)
+    place = [robot.footprint_m[:, 0].max() + BODY_RADIUS_M + ahead_m, beside_m]
+    for step in range(17):
+        now = 0.2 * step
+        track = PersonTrack(
+            1, now, "confirmed", place, [0.0, 0.0], np.zeros((4, 4)), alpha, 0.0, alpha, 1.75, 0.0
+        )
+        result = adapter.update((track,), RobotState(now, [0.0, 0.0], 0.0, 0.5, 0.0), now)
+    return result.speed_limit_mps, result.obstacles[0].radius_m
+
+
+@pytest.mark.parametrize("with_file", [False, True])
+def test_the_table_is_what_the_adapter_gives(own, tmp_path, with_file, capsys):
+    """Ahead and 1.2 m beside, for the robot of the page and for one from a file."""
+    robot = RobotProfile(
+        [[0.35, 0.25], [-0.35, 0.25], [-0.35, -0.25], [0.35, -0.25]], 1.5, 1.0, 1.0, 0.3
+    )
+    more = []
+    if with_file:
+        path = tmp_path / "robot.yaml"
+        path.write_text(ROBOT_FILE, encoding="utf-8")
+        robot, more = RobotFile.from_yaml(path).profile(), ["--robot", str(path)]
+    assert main(["policy", "show", str(own), "--out", "none", "--json", *more]) == 0
+    (table,) = json.loads(capsys.readouterr().out).values()
+    assert main(["policy", "show", str(own), "--out", "none", *more]) == 0
     lines = capsys.readouterr().out.splitlines()
-    rows = {float(line.split()[0]): line.split() for line in lines[2:-1]}
     assert lines[0] == str(own)
-    assert rows[0.0][1:3] == ["1.20", "m"]
-    assert rows[1.0][1:3] == ["0.50", "m"]
+    rows = [line.split() for line in lines[3:-1]]
     policy = AwarenessPolicy.from_yaml(own)
-    robot = RobotProfile([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]], 1.5, 1.0, 1.0, 0.3)
-    for alpha, row in rows.items():
-        for distance, shown in zip((1.0, 2.0, 3.0, 5.0), row[5::2], strict=True):
-            adapter = NavAdapter(policy, robot)
-            for step in range(60):
-                now = 0.05 * step
-                x = 0.3 + BODY_RADIUS_M + distance
-                track = PersonTrack(
-                    1, now, "confirmed", [x, 0.0], [0.0, 0.0], np.zeros((4, 4)), alpha, 0.0, alpha,
-                    1.75, 0.0,
-                )  # fmt: skip
-                result = adapter.update((track,), RobotState(now, [0.0, 0.0], 0.0, 0.0, 0.0), now)
-            assert float(shown) == pytest.approx(result.speed_limit_mps, abs=0.006)
-            settled = settled_speed_limit_mps(policy, robot, distance, alpha)
-            assert float(settled) == pytest.approx(result.speed_limit_mps, abs=1e-9)
-        radius = result.obstacles[0].radius_m
-        assert radius == pytest.approx(float(settled_radius_m(policy, alpha)))
+    beside_m = table["beside_m"]
+    assert beside_m == 1.2
+    for row, alpha in enumerate(table["awareness"]):
+        shown = [float(text) for text in rows[row] if text[0].isdigit()]
+        assert shown[0] == alpha
+        assert table["human_speed_mps"][row] == policy.speed.human_speed_mps(alpha)
+        both = table["limit_ahead_mps"][row], table["limit_beside_mps"][row]
+        assert shown[3:] == pytest.approx(both[0] + both[1], abs=0.0051)
+        if alpha not in (0.0, 0.4, 1.0):
+            continue
+        for at_m, limits in zip((0.0, beside_m), both, strict=True):
+            for ahead_m, limit_mps in zip(table["distance_m"], limits, strict=True):
+                expected, radius_m = limit_and_radius(policy, robot, alpha, ahead_m, at_m)
+                assert limit_mps == pytest.approx(expected, abs=1e-6)
+        assert table["radius_m"][row] == pytest.approx(radius_m)
+        assert shown[1] == pytest.approx(radius_m, abs=0.0051)
+
+
+def test_a_number_replaces_that_of_the_robot_file(own, tmp_path, capsys):
+    path = tmp_path / "robot.yaml"
+    path.write_text(ROBOT_FILE, encoding="utf-8")
+    arguments = ["policy", "show", str(own), "--out", "none", "--json", "--robot", str(path)]
+    assert main([*arguments, "--max-speed", "0.9"]) == 0
+    (table,) = json.loads(capsys.readouterr().out).values()
+    assert np.max(table["limit_ahead_mps"]) == 0.9
 
 
 @pytest.mark.parametrize(
@@ -86,6 +131,7 @@ def test_the_table_is_what_the_adapter_gives(own, capsys):
         (["balanced", "--max-speed", "0"], "--max-speed (m/s) must lie in (0, inf)"),
         (["balanced", "--deceleration", "nan"], "--deceleration (m/s²) must be finite"),
         (["balanced", "--reaction-time", "-1"], "--reaction-time (s) must lie in [0, inf)"),
+        (["balanced", "--robot", "nowhere.yaml"], "cannot read nowhere.yaml"),
         (["balanced", "--farthest", "0"], "--farthest (m) must lie in [0.5, 100]"),
     ],
 )

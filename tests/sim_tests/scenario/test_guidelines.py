@@ -1,4 +1,4 @@
-"""The second set of shipped scenarios: its place beside the first, its promises, its crossings."""
+"""The further sets of shipped scenarios: their place beside the first, promises, crossings."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import pytest
 from paths import ROOT
 
 from awarenav.cli import main
+from awarenav.errors import counted
 from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
 from sim_tests.actors.behaviour import PersonSpec
 from sim_tests.crossing.eyes._make_eyes import unusual_size_probability
@@ -20,27 +21,34 @@ QUICK = ("narrow_doorway",)
 
 
 def test_the_sets_share_no_scenario_and_all_stays_as_it_was_measured() -> None:
-    assert SCENARIO_SETS == ("all", "guidelines")
+    assert SCENARIO_SETS == ("all", "guidelines", "step_out")
     assert shipped_scenarios() == shipped_scenarios("all")
     assert not set(NAMES) & set(shipped_scenarios())
     assert len(named_templates(["all"])) == 23
     assert [each.name for each in named_templates(["guidelines"])] == list(NAMES)
     assert len(named_templates(["all", "guidelines", NAMES[0]])) == 23 + len(NAMES)
-    with pytest.raises(SimError, match="must be one of 'all', 'guidelines', got 'guideline'"):
+    sets = "'all', 'guidelines', 'step_out'"
+    with pytest.raises(SimError, match=f"must be one of {sets}, got 'guideline'"):
         shipped_scenarios("guideline")
     for name in NAMES:
         assert ScenarioTemplate.shipped(f"{name}@1").name == Scenario.shipped(name).name == name
 
 
-def test_the_list_shows_both_sets(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_shows_all_sets(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scenario", "list"]) == 0
-    first, second = capsys.readouterr().out.split("--scenario guidelines\n")
+    first, rest = capsys.readouterr().out.split("--scenario guidelines\n")
+    second, third = rest.split("--scenario step_out\n")
     assert first.startswith("--scenario all\n")
     assert all(f"{name}@" in second and f"{name}@" not in first for name in NAMES)
     assert all(f"{name}@" in first for name in shipped_scenarios())
+    assert all(f"{name}@" in third for name in shipped_scenarios("step_out"))
 
 
-@pytest.mark.parametrize("template", shipped_templates("guidelines"), ids=lambda each: each.name)
+@pytest.mark.parametrize(
+    "template",
+    [*shipped_templates("guidelines"), *shipped_templates("step_out")],
+    ids=lambda each: each.name,
+)
 def test_they_can_be_run_and_are_as_their_page_says(template: ScenarioTemplate) -> None:
     assert template_problems(template) == ()
     assert template.parameters()
@@ -55,10 +63,11 @@ def test_they_can_be_run_and_are_as_their_page_says(template: ScenarioTemplate) 
         assert max(notices_m) > 8.0
     page = (ROOT / "docs" / "scenarios.md").read_text("utf-8")
     _, _, section = page.partition(f"### {template.name}\n")
+    varies = counted(len(template.parameters()), "number varies", "numbers vary")
     text = " ".join(section.partition("\n### ")[0].split())
     assert text.startswith(template.description)
     assert (
-        f"({template.attention}; {len(template.parameters())} numbers vary; nearer than 1 m in "
+        f"({template.attention}; {varies}; nearer than 1 m in "
         f"{statistics.conflict_share:.0%} of 200 draws)"
     ) in text
     assert (ROOT / "docs" / "images" / "scenarios" / f"{template.name}.png").is_file()

@@ -185,7 +185,7 @@ def test_a_finished_comparison_is_not_run_over(folder):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["scorecard_planners"], "module:Class, e.g. .* or as one of reference, straight_on"),
+        (["scorecard_planners"], "module:Class, e.g. .* or as one of reference, costmap"),
         (["scorecard_planners:Absent"], "has no attribute 'Absent'"),
         (
             ["scorecard_planners:Straight(gain=2)"],

@@ -1,0 +1,243 @@
+"""The limit against brute force, in random worlds, and what it may never do."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from limit_worlds import brute_force_mps, run_worlds
+
+from nav_adapter import RobotProfile, RobotState
+from nav_adapter.limit import (
+    Course,
+    course_of,
+    courses_of,
+    in_the_path_mps,
+    limit_mps,
+    stops_in_time,
+    straight_course_of,
+)
+from nav_adapter.reach import Reach
+
+ROBOT = RobotProfile(
+    footprint_m=[(0.36, 0.25), (0.36, -0.25), (-0.36, -0.25), (-0.36, 0.25)],
+    max_speed_mps=1.5,
+    max_acceleration_mps2=1.0,
+    max_deceleration_mps2=1.0,
+    reaction_time_s=0.3,
+    drive="differential",
+)
+MARGIN_M = 0.40
+ANGLES = st.floats(-math.pi, math.pi)
+PLACES = st.tuples(st.floats(0.05, 6.0), ANGLES)
+WALKS = st.tuples(st.floats(0.0, 1.8), ANGLES)
+TURNS = st.floats(0.0, 60.0)
+
+
+def person(
+    place: tuple[float, float], walk: tuple[float, float] = (0.0, 0.0), top: float = 1.5
+) -> Reach:
+    """Return somebody at a distance and bearing, with a speed and direction."""
+    (distance, bearing), (speed, direction) = place, walk
+    return Reach(
+        *(distance * math.cos(bearing), distance * math.sin(bearing)),
+        *(speed * math.cos(direction), speed * math.sin(direction), top, 0.54, 0.15),
+        margin_m=MARGIN_M,
+    )
+
+
+def state(
+    speed: float = 0.8,
+    yaw_rate: float = 0.0,
+    *,
+    heading: float = 0.0,
+    left: float | None = None,
+    place: tuple[float, float] = (0.0, 0.0),
+) -> RobotState:
+    velocity = None if left is None else np.array([speed, left])
+    return RobotState(0.0, np.array(place), heading, speed, yaw_rate, velocity)
+
+
+def course(turn_deg: float = 30.0, age_s: float = 0.0, **motion: float) -> Course:
+    return course_of(ROBOT, state(**motion), math.radians(turn_deg), age_s)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_never_above_brute_force(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    fan = rng.choice([0.0, 0.5, 1.0, 2.0, math.pi])
+    at = course(math.degrees(fan))
+    reach = person(
+        (rng.uniform(0.1, 5.0), rng.uniform(-math.pi, math.pi)),
+        (rng.choice([0.0, rng.uniform(0.0, 1.6)]), rng.uniform(-math.pi, math.pi)),
+        float(rng.choice([0.0, 0.5, 1.5])),
+    )._replace(elapsed_s=float(rng.choice([0.0, 0.1])), variances=(0.01, 0.0, 0.02))
+    exact = brute_force_mps(reach, at)
+    speeds_mps = at.maximum_mps / 150  # between the speeds that were tried
+    assert exact - 0.1 <= limit_mps(reach, at) <= exact + speeds_mps + 1e-9
+
+
+@pytest.mark.parametrize(
+    "worlds", [20_000, pytest.param(1_000_000, marks=pytest.mark.slow)], ids=str
+)
+def test_a_robot_that_obeys_touches_nobody_in_random_worlds(worlds: int) -> None:
+    rng = np.random.default_rng(46)
+    outcomes = [run_worlds(rng, 500) for _ in range(worlds // 500)]
+    assert sum(each.contacts for each in outcomes) == 0
+    assert sum(each.moving for each in outcomes) > worlds // 3
+
+
+@pytest.mark.parametrize("change", [{"speed_factor": 1.3}, {"faster": 1.5}])
+def test_worlds_beyond_the_model_have_contacts(change: dict[str, float]) -> None:
+    rng = np.random.default_rng(47)
+    outcomes = [run_worlds(rng, 500, **change) for _ in range(12)]
+    assert sum(each.contacts for each in outcomes) > 0
+
+
+@given(place=PLACES, walk=WALKS, turn=TURNS, yaw_rate=st.floats(-1.0, 1.0))
+def test_whatever_makes_people_or_the_robot_worse_lowers_the_limit(
+    place: tuple[float, float], walk: tuple[float, float], turn: float, yaw_rate: float
+) -> None:
+    reach, at = person(place, walk), course(turn, yaw_rate=yaw_rate)
+    limit = limit_mps(reach, at)
+    a0, a1, a2 = reach.variances
+    worse = [
+        reach._replace(speed_mps=1.8),
+        reach._replace(delay_s=0.3),
+        reach._replace(variances=(a0 + 0.02, a1, a2)),
+        reach._replace(variances=(a0, a1, a2 + 0.05)),
+        reach._replace(margin_m=MARGIN_M + 0.1),
+    ]
+    assert all(limit_mps(each, at) <= limit + 1e-9 for each in worse)
+    assert limit_mps(reach, at._replace(reaction_s=at.reaction_s + 0.2)) <= limit + 1e-9
+    assert limit_mps(reach, course(turn + 10.0, yaw_rate=yaw_rate)) <= limit + 1e-9
+    assert limit_mps(reach, course(turn, age_s=0.2, yaw_rate=yaw_rate)) <= limit + 1e-9
+
+
+@given(place=PLACES, turn=TURNS, age=st.floats(0.0, 1.0))
+def test_an_older_place_of_somebody_who_stands_lowers_the_limit(
+    place: tuple[float, float], turn: float, age: float
+) -> None:
+    reach, at = person(place), course(turn)
+    assert limit_mps(reach._replace(elapsed_s=age), at) <= limit_mps(reach, at) + 1e-9
+
+
+@given(distance=st.floats(0.5, 5.0), top=st.floats(0.0, 1.5), away=st.floats(0.0, 2.0))
+def test_farther_ahead_is_never_slower(distance: float, top: float, away: float) -> None:
+    near, far = (person((each, 0.0), top=top) for each in (distance, distance + away))
+    assert limit_mps(near, course()) <= limit_mps(far, course()) + 1e-9
+
+
+@given(place=PLACES, walk=WALKS, turned=ANGLES, yaw_rate=st.floats(-1.0, 1.0))
+def test_a_turned_or_mirrored_world_has_the_same_limit(
+    place: tuple[float, float], walk: tuple[float, float], turned: float, yaw_rate: float
+) -> None:
+    limit = limit_mps(person(place, walk), course(yaw_rate=yaw_rate))
+    mirrored = person((place[0], -place[1]), (walk[0], -walk[1]))
+    assert limit_mps(mirrored, course(yaw_rate=-yaw_rate)) == pytest.approx(limit, abs=1e-6)
+    rotated = person((place[0], place[1] + turned), (walk[0], walk[1] + turned))
+    rotated = rotated._replace(x_m=rotated.x_m + 3.0, y_m=rotated.y_m - 2.0)
+    at = state(yaw_rate=yaw_rate, heading=turned, place=(3.0, -2.0))
+    assert limit_mps(rotated, course_of(ROBOT, at, math.radians(30.0))) == pytest.approx(
+        limit, abs=1e-6
+    )
+
+
+def test_time_0_counts_and_a_robot_may_leave_whoever_is_behind_it() -> None:
+    inside, touching = person((0.1, 0.3)), person((0.5, 0.0))
+    assert limit_mps(inside, course()) == limit_mps(touching, course()) == 0.0
+    assert limit_mps(person((0.0, 0.0)), course()) == 0.0
+    assert limit_mps(person((0.9, math.pi), top=0.0), course()) == course().maximum_mps
+    assert 0.0 < limit_mps(person((0.9, math.pi)), course()) < 1.0  # who may overtake it
+    assert limit_mps(person((0.9, 0.0), top=0.0), course(speed=-0.5)) == course().maximum_mps
+    assert limit_mps(person((0.9, math.pi), top=0.0), course(speed=-0.5)) < 0.5
+
+
+@pytest.mark.parametrize("field", ["x_m", "velocity_y_mps", "speed_mps", "elapsed_s", "delay_s"])
+def test_numbers_that_are_not_finite_stop_the_robot(field: str) -> None:
+    broken = person((2.0, 0.3))._replace(**{field: math.nan})
+    assert limit_mps(broken, course()) == 0.0
+
+
+@given(place=PLACES, walk=WALKS, speed=st.floats(0.05, 1.5))
+def test_a_robot_within_its_limit_stops_in_time(
+    place: tuple[float, float], walk: tuple[float, float], speed: float
+) -> None:
+    reach, at = person(place, walk), course()
+    if speed <= limit_mps(reach, at):
+        assert stops_in_time(reach, at, speed)
+
+
+def test_braking_suffices_between_the_limit_and_the_stop() -> None:
+    reach = person((2.5, 0.0))
+    limit = limit_mps(reach, course())
+    assert stops_in_time(reach, course(), limit + 0.05)
+    assert not stops_in_time(reach, course(), limit + 0.6)
+
+
+@given(place=PLACES, left=st.floats(0.15, 1.0), top=st.sampled_from([0.0, 1.5]))
+def test_a_robot_that_moves_sideways_looks_where_it_goes(
+    place: tuple[float, float], left: float, top: float
+) -> None:
+    sideways = state(0.0, left=left)
+    limit = limit_mps(person(place, top=top), course_of(ROBOT, sideways, 0.5))
+    # The same with the robot turned to its course, and its footprint turned back.
+    turned = RobotProfile(
+        footprint_m=[(0.25, 0.36), (0.25, -0.36), (-0.25, -0.36), (-0.25, 0.36)],
+        **{
+            name: getattr(ROBOT, name)
+            for name in (
+                *("max_speed_mps", "max_acceleration_mps2", "max_deceleration_mps2"),
+                *("reaction_time_s", "drive"),
+            )
+        },
+    )
+    ahead = state(left, heading=math.pi / 2)
+    assert limit == pytest.approx(
+        limit_mps(person(place, top=top), course_of(turned, ahead, 0.5)), abs=1e-6
+    )
+
+
+def test_a_robot_that_may_start_in_any_direction_counts_people_in_all() -> None:
+    omni = RobotProfile(
+        footprint_m=ROBOT.footprint_m,
+        max_speed_mps=1.5,
+        max_acceleration_mps2=1.0,
+        max_deceleration_mps2=1.0,
+        reaction_time_s=0.3,
+        drive="holonomic",
+    )
+    (at,) = courses_of(omni, state(0.0), 0.5)
+    limits = [limit_mps(person((2.0, bearing)), at) for bearing in (0.0, 1.0, 2.5, math.pi)]
+    assert limits == pytest.approx([limits[0]] * 4, abs=1e-6)
+
+
+def test_a_robot_that_stands_counts_people_ahead_and_behind() -> None:
+    forward, backward = courses_of(ROBOT, state(0.0), 0.5)
+    for bearing in (0.0, math.pi):
+        close, far = person((1.2, bearing), top=0.0), person((4.0, bearing), top=0.0)
+        assert min(limit_mps(close, each) for each in (forward, backward)) < 0.8
+        assert min(limit_mps(far, each) for each in (forward, backward)) > 1.5
+    (moving,) = courses_of(ROBOT, state(0.1), 0.5)
+    assert limit_mps(person((1.2, math.pi), top=0.0), moving) == moving.maximum_mps
+
+
+def test_a_curve_leads_to_people_beside_the_way() -> None:
+    beside = person((1.9, 0.6), top=0.0)
+    straight, left, right = (course(10.0, yaw_rate=rate) for rate in (0.0, 0.8, -0.8))
+    assert limit_mps(beside, left) < limit_mps(beside, straight)
+    assert limit_mps(beside, right) <= limit_mps(beside, straight)
+
+
+def test_the_protective_field_is_a_rectangle_ahead() -> None:
+    at = straight_course_of(ROBOT, state(1.0))
+    gap = 2.0 - 0.36 - 0.30 - 0.10
+    v = in_the_path_mps((2.0, 0.0), 0.30, 0.10, at)
+    assert v * 0.3 + v * v / 2.0 == pytest.approx(gap)
+    assert in_the_path_mps((2.0, 0.66), 0.30, 0.10, at) == at.maximum_mps
+    assert in_the_path_mps((-0.7, 0.0), 0.30, 0.10, at) == at.maximum_mps
+    assert in_the_path_mps((0.6, 0.0), 0.30, 0.10, at) == 0.0
+    assert in_the_path_mps((math.nan, 0.0), 0.30, 0.10, at) == 0.0
