@@ -126,6 +126,6 @@ def _lower(
         some = lowest[poses]
         first = Field(reaches, courses, *given).lower(some)
         if walking is not None:
-            second = Field(walking, courses.straight_on(), *given).lower(some)
-            first = np.where(second < 0, first, 2 * np.array(walkers)[second // 2] + second % 2)
+            second = Field(walking, courses.straight_on(), *given, walking_on=True).lower(some)
+            first = np.where(second < 0, first, 2 * np.array(walkers)[second // 2])
         who[poses], lowest[poses] = first, some

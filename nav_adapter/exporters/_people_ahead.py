@@ -19,7 +19,7 @@ from .._predicted import predicted_sigmas_m
 from .._robot import RobotProfile
 from .._speed_basis import SpeedBasis
 from ..limit import STEPS
-from ..reach import WALKING_ON_S, covariance_terms
+from ..reach import SAME_MPS, WALKING_ON_S, covariance_terms
 
 Value = Any
 #: Parts of a step of time: the step that decides is divided into these.
@@ -63,7 +63,8 @@ class PersonAhead(NamedTuple):
     def walks_faster(self) -> bool:
         """True if this person walks faster than U at any of the times."""
         walking_mps = math.hypot(self.velocity_x_mps, self.velocity_y_mps)
-        return self.time_constant_s > 0.0 and walking_mps > float(np.min(self.speed_mps))
+        slowest_mps = float(np.min(self.speed_mps))
+        return self.time_constant_s > 0.0 and walking_mps > slowest_mps + SAME_MPS
 
     def walking_on(self) -> PersonAhead:
         """Return the person if they walk straight on, as :meth:`Reach.walking_on` does."""

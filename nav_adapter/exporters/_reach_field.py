@@ -46,6 +46,8 @@ class Field:
         robot: of the constraints.
         reach_m: the limits hold within this distance of the poses.
         fine: all steps of time are as short as the shortest of ``limit_mps``, for a few poses.
+        walking_on: the limits are lowered already to those of people as they are; here they walk
+            straight on, and no protective field counts.
     """
 
     def __init__(
@@ -57,13 +59,14 @@ class Field:
         robot: RobotProfile,
         reach_m: float,
         fine: bool = False,
+        walking_on: bool = False,
     ) -> None:
         self._reaches, self._courses, self._times = reaches, courses, times
         self._margin_m = np.float32(basis.policy.margins.floor_m)
         self._clearance_m = np.float32(basis.policy.margins.clearance_m)
         self._has_reach = basis.policy.reach is not None
         self._a = np.float32(robot.max_deceleration_mps2)
-        self._fine, self._reach_m = fine, np.float32(reach_m)
+        self._fine, self._walking_on, self._reach_m = fine, walking_on, np.float32(reach_m)
         # The field is a rectangle, so its corners are farther away than the robot's.
         clearance = basis.policy.margins.clearance_m
         front, rear, half = extents_m(robot, 0.0)
@@ -85,19 +88,21 @@ class Field:
         """
         reaches, courses = self._reaches, self._courses
         by = np.full(len(limits), -1)
-        nearest, least = np.zeros(len(limits), dtype=np.intp), np.full(len(limits), np.inf)
+        nearest, least = np.full(len(limits), -1), np.full(len(limits), np.inf)
         away = []
         for index in range(len(reaches.people)):
             row = reaches.first[index] + reaches.follows[index] * self._times
             dx, dy = reaches.x_m[row] - courses.x_m, reaches.y_m[row] - courses.y_m
             distance = np.sqrt(dx * dx + dy * dy)
             away.append((row, distance))
+            if self._walking_on:
+                continue
             free = distance - in_table(reaches.around_m, len(reaches.ahead_s) // 2, row)
             nearest[free < least] = index
             np.minimum(least, free, out=least)
-        rows = reaches.first[nearest] + reaches.follows[nearest] * self._times
-        everywhere = np.arange(len(limits))
-        self._lower_by([(everywhere, nearest, rows)], limits, by)
+        if not self._walking_on:
+            rows = reaches.first[nearest] + reaches.follows[nearest] * self._times
+            self._lower_by([(np.arange(len(limits)), nearest, rows)], limits, by)
         others = []
         for index, (row, distance) in enumerate(away):
             poses = np.flatnonzero((distance < self._near_m(row, limits)) & (nearest != index))
@@ -148,8 +153,10 @@ class Field:
         driven, react = chosen_of(courses.driven_m, pose), self._reacts_s(row)
         body, elapsed = reaches.body_m[row], reaches.elapsed_s[row]
         straight = tuple(chosen_of(each, pose) for each in courses.straight)
-        path = self._path_mps(dx, dy, straight, body, driven, react)
-        if np.any(elapsed):
+        path = np.full(len(pose), NOWHERE_M)
+        if not self._walking_on:
+            path = self._path_mps(dx, dy, straight, body, driven, react)
+        if not self._walking_on and np.any(elapsed):
             x, y = dx + vx * elapsed, dy + vy * elapsed
             np.minimum(path, self._path_mps(x, y, straight, body, driven, react), out=path)
         if not self._has_reach:
