@@ -2,7 +2,7 @@
 
 The robot keeps its course, turned by up to ``turn_deg`` either way, drives at v for the reaction
 time and brakes. The limit is the highest v such that, at v *and at every lower speed*, its
-footprint meets nobody's reach while it moves (:mod:`nav_adapter.reach`, ``docs/safety.md``).
+footprint stays out of all reaches while it moves (:mod:`nav_adapter.reach`, ``docs/safety.md``).
 
 For a fixed time t the way of the robot, s = v t − a (t − T)₊²/2, is linear in v, and it moves if
 v > a (t − T)₊. A rectangle whose base goes straight is within a distance of a point for an interval
