@@ -224,11 +224,13 @@ def _ahead(
                 later_s = np.minimum(track.stamp_s + times_s - seen_s, fresh_s)
                 delay_s = np.maximum(delay_s, policy.reach.delay_s + later_s)
             ahead = [_terms_ahead(covariance, each) for each in times_s.tolist()]
-            variances = tuple(np.array(ahead).T)
+            # A covariance may shrink at first; nobody says that this one does.
+            variances = tuple(np.maximum(np.array(variances), np.array(ahead)).T)
         until_s = np.minimum(
             age_s + times_s, max(age_s, policy.timing.stop_after_s) + (times_s if is_shown else 0.0)
         )
-        sigma_m = np.array([position_sigma_m(track, each) for each in until_s.tolist()])
+        ahead_m = np.array([position_sigma_m(track, each) for each in until_s.tolist()])
+        sigma_m = np.maximum(sigma_m, ahead_m)
     if basis.prediction is not None:
         ahead_m = predicted_sigmas_m(track, age_s + times_s, basis.prediction)
         sigma_m = np.maximum(sigma_m, ahead_m)
