@@ -9,7 +9,8 @@ from typing import Final, get_args
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._people import Person, velocity_variance_m2ps2
+from ._people import Person
+from ._places import velocity_variance_m2ps2
 
 # Data older than this, over 30 000 years, have a stamp that was never a time.
 _MOST_S: Final = 1e12

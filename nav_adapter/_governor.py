@@ -90,7 +90,9 @@ class SpeedGovernor:
             straight, courses = self.courses(robot_state, robot_age_s)
             speed_mps = robot_state.travel_mps
             for track_id, person in people.items():
-                own_mps, rule = self.person_mps(person, straight, courses, now)
+                # A limit that is not the lowest counts only where it is below the speed.
+                counts_mps = max(lowest_mps, speed_mps)
+                own_mps, rule = self.person_mps(person, straight, courses, now, counts_mps)
                 if own_mps < lowest_mps:
                     lowest_mps, reason = own_mps, f"track {track_id}: {rule}"
                 # A robot within its limit has the whole reaction time left.
@@ -121,9 +123,17 @@ class SpeedGovernor:
         return straight, courses_of(self._robot, robot_state, self._turn_rad, robot_age_s)
 
     def person_mps(
-        self, person: Person, straight: Course, courses: tuple[Course, ...], now: float
+        self,
+        person: Person,
+        straight: Course,
+        courses: tuple[Course, ...],
+        now: float,
+        counts_mps: float = math.inf,
     ) -> tuple[float, str]:
-        """Return the limit that one person sets, infinite for none, and the rule."""
+        """Return the limit that one person sets, infinite for none, and the rule.
+
+        A limit of ``counts_mps`` or more may be any other such one.
+        """
         lowest_mps, rule = straight.maximum_mps, "in the path"
         body_m = BODY_RADIUS_M + self._people.sigmas(person, now) * person.sigma_m
         aged = straight._replace(
@@ -135,10 +145,12 @@ class SpeedGovernor:
             lowest_mps = min(lowest_mps, path_mps)
         reach = self._people.reach(person, now)
         if reach is not None:
-            reach_mps = min(limit_mps(reach, course) for course in courses)
+            reach_mps = counts_mps
+            for course in courses:
+                reach_mps = limit_mps(reach, course, reach_mps)
             if reach.walks_faster:
                 # Whoever keeps to their motion is not met by a robot that keeps to its own.
-                reach_mps = min(reach_mps, limit_mps(reach.walking_on(), straight))
+                reach_mps = limit_mps(reach.walking_on(), straight, reach_mps)
             if reach_mps <= lowest_mps:
                 lowest_mps, rule = reach_mps, "reach"
         return (math.inf if lowest_mps >= straight.maximum_mps else lowest_mps), rule

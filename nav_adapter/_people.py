@@ -12,6 +12,7 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
+from ._places import has_jumped, position_sigma_m
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile
 from .limit import passing_radius_m
@@ -25,11 +26,6 @@ OLDEST_S: Final = 10.0
 _FIRST_SIGHT_S: Final = 0.2
 # The belief in having noticed the robot from which it counts.
 _NOTICED: Final = 0.5
-# Standard deviations by which two positions of one person may differ. 4 are exceeded once in
-# 3000 frames, which costs a moment of speed.
-_EXPLAINED_SIGMAS: Final = 4.0
-# Places closer than this are the same, also for a tracker that reports no uncertainty.
-_SAME_PLACE_M: Final = 0.05
 # Walking speed of ISO 13855: the way that explains a new place, at least.
 _WALKER_MPS: Final = 1.6
 # Stamps closer than this are equal: the stamp of a sighting is a difference of floats, computed
@@ -78,7 +74,7 @@ class Person(NamedTuple):
 
     @property
     def is_at_first_sight(self) -> bool:
-        """Whether frames have shown this person too briefly for awareness to raise a speed."""
+        """True until frames have shown this person long enough for awareness to raise a speed."""
         return self.known_s < _FIRST_SIGHT_S - _ROUNDING_S
 
     def is_kept(self, stamp_s: float, hold_s: float) -> bool:
@@ -146,7 +142,7 @@ class People:
         jumped = {
             track.id
             for track in tracks
-            if track.id in people and _has_jumped(people[track.id], track, self._jump_mps)
+            if track.id in people and has_jumped(people[track.id].track, track, self._jump_mps)
         }
         current = {
             track.id: self._at(track, None, 0.0, now)
@@ -329,7 +325,7 @@ class People:
         ]
         for track_id in sorted(jumped):
             person = people[track_id]
-            near = [each for each in takers if not _has_jumped(person, each, self._jump_mps)]
+            near = [each for each in takers if not has_jumped(person.track, each, self._jump_mps)]
             if near:
                 takers.remove(near[0])
             else:
@@ -363,47 +359,6 @@ class People:
             return speed_mps
         name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
         return finite_number(name, speed_mps, NavError, minimum=0.0)
-
-
-def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
-    """Return the standard deviation of the position after ``ahead_s`` ≥ 0 at constant velocity.
-
-    It is that of the most uncertain direction: the root of the larger eigenvalue of the position's
-    part of F P Fᵀ.
-    """
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = (
-        track.covariance_odom.tolist()
-    )
-    xx += ahead_s * (2.0 * xu + ahead_s * uu)
-    yy += ahead_s * (2.0 * yv + ahead_s * vv)
-    xy += ahead_s * (xv + yu + ahead_s * uv)
-    return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))
-
-
-def velocity_variance_m2ps2(track: PersonTrack) -> float:
-    """Return the variance of the velocity along its most uncertain direction."""
-    return covariance_terms(track.covariance_odom.tolist(), 1.0)[2]
-
-
-def _has_jumped(before: Person, track: PersonTrack, walking_mps: float) -> bool:
-    """Return whether a track is where the person remembered cannot be.
-
-    The place is explained by the place of the memory's track, or by its prediction with constant
-    velocity, within the covariances of both and the way walked at ``walking_mps``.
-    """
-    old = before.track
-    elapsed_s = max(track.stamp_s - old.stamp_s, 0.0)
-    x, y = track.position_odom_m.tolist()
-    (old_x, old_y), (vx, vy) = before.track_position_odom_m, before.velocity_odom_mps
-    apart_m = min(
-        math.hypot(x - old_x, y - old_y),
-        math.hypot(x - old_x - elapsed_s * vx, y - old_y - elapsed_s * vy),
-    )
-    way_m = walking_mps * elapsed_s + _SAME_PLACE_M
-    if apart_m <= way_m:
-        return False
-    sigma_m = math.hypot(position_sigma_m(old, elapsed_s), position_sigma_m(track, 0.0))
-    return apart_m > way_m + _EXPLAINED_SIGMAS * sigma_m
 
 
 def _is_finite_float(value: float) -> bool:

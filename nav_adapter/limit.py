@@ -2,7 +2,7 @@
 
 The robot keeps its course, turned by up to ``turn_deg`` either way, drives at v for the reaction
 time and brakes. The limit is the highest v such that, at v *and at every lower speed*, its
-footprint meets nobody's reach while it moves (:mod:`nav_adapter.reach`, ``docs/safety.md``).
+footprint stays out of all reaches while it moves (:mod:`nav_adapter.reach`, ``docs/safety.md``).
 
 For a fixed time t the way of the robot, s = v t − a (t − T)₊²/2, is linear in v, and it moves if
 v > a (t − T)₊. A rectangle whose base goes straight is within a distance of a point for an interval
@@ -18,16 +18,34 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from heapq import heappop, heappush
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
+from ._contact import Course, contact_m, reach_at
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 from .policies import ReachRules
 from .reach import Reach
+
+__all__ = [
+    "FINEST",
+    "PASSING_MPS",
+    "ROOM",
+    "STANDING_MPS",
+    "STEPS",
+    "Course",
+    "any_course_of",
+    "course_of",
+    "courses_of",
+    "in_the_path_mps",
+    "limit_mps",
+    "passing_radius_m",
+    "stops_in_time",
+    "straight_course_of",
+]
 
 #: Below this speed the robot counts as standing: it may start either way.
 STANDING_MPS: Final = 0.05
@@ -39,45 +57,8 @@ FINEST: Final = 0.13
 PASSING_MPS: Final = 0.3
 #: The room above the robot's maximum up to which limits are computed.
 ROOM: Final = 1.5
-# A person at the base origin has no direction.
-_SAME_PLACE_M: Final = 1e-9
-
-
-class Course(NamedTuple):
-    """The courses that a robot may take while it stops, as a fan of straight ways.
-
-    A robot on a curve is within the fan too: the chord of its arc lies between the courses, and the
-    rectangle is larger by what the turn about that chord swings out.
-
-    Attributes:
-        x_m: place of the base in odom.
-        y_m: the same.
-        cos: direction of the middle of the fan.
-        sin: the same.
-        fan_cos: half the opening of the fan.
-        fan_sin: the same.
-        front_m: farthest part of the footprint ahead of the base, along the course.
-        rear_m: the same behind it, mostly negative.
-        half_m: half the width.
-        circle_m: radius of a robot that may go anywhere at once, as a circle; 0 for a fan.
-        maximum_mps: highest speed of the robot.
-        deceleration_mps2: a > 0.
-        reaction_s: T ≥ 0.
-    """
-
-    x_m: float
-    y_m: float
-    cos: float
-    sin: float
-    fan_cos: float
-    fan_sin: float
-    front_m: float
-    rear_m: float
-    half_m: float
-    circle_m: float
-    maximum_mps: float
-    deceleration_mps2: float
-    reaction_s: float
+# More than the rounding of any distance that matters.
+_ROUNDING_M: Final = 1e-9
 
 
 def courses_of(
@@ -143,16 +124,18 @@ def straight_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.
     return _course(robot, state, age_s, off_rad, 0.0, extent)
 
 
-def limit_mps(person: Reach, course: Course) -> float:
+def limit_mps(person: Reach, course: Course, at_most_mps: float = math.inf) -> float:
     """Return the highest speed at which the robot meets the reach of one person at a stand only.
 
     The same holds for every lower speed. A number that is not finite gives 0. The result lies below
-    the exact one by what the last, finest steps of time leave open.
+    the exact one by what the last, finest steps of time leave open. It is ``at_most_mps``, which
+    takes less time, or the maximum where the limit is not lower.
     """
-    maximum = course.maximum_mps
+    maximum = min(course.maximum_mps, at_most_mps)
     if not person.elapsed_s >= 0.0:
         return 0.0
-    if _is_far(person, course):
+    size_m = _size_m(course)
+    if _is_far(person, course, size_m, maximum):
         return maximum
     a, T = course.deceleration_mps2, course.reaction_s + person.elapsed_s
     step_s = _step_s(course)
@@ -164,7 +147,7 @@ def limit_mps(person: Reach, course: Course) -> float:
     while True:
         if a * (t - T) < limit:  # a robot at the limit so far still moves at t
             later = t + step_s
-            lowest = _lowest_mps(person, course, T, t, later)
+            lowest = _lowest_mps(person, course, size_m, maximum, T, t, later)
             if lowest < maximum:
                 heappush(meetings, (lowest, t, later))
             t = later
@@ -177,22 +160,29 @@ def limit_mps(person: Reach, course: Course) -> float:
             heappop(meetings)
             middle = 0.5 * (first + last)
             for start, end in ((first, middle), (middle, last)):
-                lowest = _lowest_mps(person, course, T, start, end)
+                lowest = _lowest_mps(person, course, size_m, maximum, T, start, end)
                 if lowest < maximum:
                     heappush(meetings, (lowest, start, end))
         limit = meetings[0][0] if meetings else maximum
 
 
-def _lowest_mps(person: Reach, course: Course, T: float, t0: float, t1: float) -> float:
+def _lowest_mps(
+    person: Reach, course: Course, size_m: float, maximum: float, T: float, t0: float, t1: float
+) -> float:
     """Return the lowest speed at which the robot meets the reach from t0 to t1; ∞ if there is none.
 
     The reach is that at t1 about the middle of the person's way between, larger by half of it.
+    Speeds from ``maximum`` on may count as none.
     """
     a = course.deceleration_mps2
     need0 = a * (t0 - T) if t0 > T else 0.0  # a faster robot still moves at t0
     braked0_m = 0.5 * need0 * (t0 - T)
     braked1_m = 0.5 * a * (t1 - T) * (t1 - T) if t1 > T else 0.0
-    near, past, past_behind = contact_m(person, course, t0, t1)
+    x, y, distance2, reach = reach_at(person, course, t0, t1)
+    apart_m = math.sqrt(distance2) - reach - person.margin_m - size_m - _ROUNDING_M
+    if apart_m > 0.0 and apart_m >= _way_m(maximum, a, T, t1):
+        return math.inf
+    near, past, past_behind = contact_m(course, person.margin_m, x, y, distance2, reach)
     if need0 * t0 - braked0_m <= past_behind:
         return need0
     if past == -math.inf:
@@ -215,74 +205,22 @@ def stops_in_time(person: Reach, course: Course, speed_mps: float) -> bool:
     t0 = way0 = 0.0
     while a * (t0 - T) < speed_mps:
         t1 = t0 + step_s
-        late = max(t1 - T, 0.0)
-        way1 = speed_mps * t1 - 0.5 * a * late * late
-        near, past, past_behind = contact_m(person, course, t0, t1)
+        way1 = _way_m(speed_mps, a, T, t1)
+        near, past, past_behind = contact_m(
+            course, person.margin_m, *reach_at(person, course, t0, t1)
+        )
         if way0 <= past_behind or not (way1 < near or way0 > past):
             return False
         t0, way0 = t1, way1
     return True
 
 
-def contact_m(
-    person: Reach, course: Course, t0_s: float, t1_s: float
-) -> tuple[float, float, float]:
-    """Return the ways on which the robot meets somebody's reach from t0 to t1.
-
-    The first two numbers are the ends of an interval, with the person ahead; it is empty, (∞, −∞),
-    where there is none. The third is the end of one that begins before the robot, with the person
-    behind the base, or −∞. A body behind the rear edge does not count: the robot drives away.
-    """
-    m0, m1 = person.drift_s(t0_s), person.drift_s(t1_s)
-    vx, vy, middle_s = person.velocity_x_mps, person.velocity_y_mps, 0.5 * (m0 + m1)
-    dx = person.x_m + vx * middle_s - course.x_m
-    dy = person.y_m + vy * middle_s - course.y_m
-    # Along and across the middle of the fan.
-    x = course.cos * dx + course.sin * dy
-    y = abs(course.cos * dy - course.sin * dx)
-    reach = person.radius_m(t1_s) + 0.5 * (m1 - m0) * math.sqrt(vx * vx + vy * vy)
-    reach += person.uncertainty_m(m1)
-    front, rear, half = course.front_m, course.rear_m, course.half_m
-    cos, sin = course.fan_cos, course.fan_sin
-    rho, side = reach + person.margin_m, half + person.margin_m
-    distance2 = x * x + y * y
-    distance = math.sqrt(distance2)
-    if not (distance > _SAME_PLACE_M and reach >= 0.0):  # at the base, or NaN
-        return -math.inf, math.inf, math.inf
-    if course.circle_m > 0.0:  # straight to the person
-        return distance - course.circle_m - course.front_m - rho, math.inf, -math.inf
-    # Seen from the courses of the fan, the middle of the reach lies on an arc about the base, from
-    # the course nearest to it to the one farthest from it. The ends of the arc, and the point to
-    # which a corner of the footprint leads straight, hold the least and the largest way.
-    low_x, low_y = cos * x + sin * y, cos * y - sin * x
-    if low_y <= 0.0:
-        low_x, low_y = distance, 0.0
-    high_x, high_y = cos * x - sin * y, cos * y + sin * x
-    if high_y < 0.0:
-        high_x, high_y = -distance, 0.0
-    near, past, past_behind = math.inf, -math.inf, -math.inf
-    if low_x >= 0.0 and low_y < half + rho:
-        off = low_y - side
-        past = low_x - rear + (math.sqrt(reach * reach - off * off) if off > 0.0 else reach)
-        at, beyond = max(high_x, 0.0), distance - rho
-        if beyond > half:
-            share = half / beyond
-            at = max(at, distance * math.sqrt(1.0 - share * share))
-        at = min(at, low_x)
-        off = math.sqrt(max(distance2 - at * at, 0.0)) - half
-        near = at - front - (math.sqrt(max(rho * rho - off * off, 0.0)) if off > 0.0 else rho)
-    if high_x < 0.0 and high_y < half + rho:
-        at, beyond = min(low_x, 0.0), distance - reach
-        if beyond > side:
-            share = side / beyond
-            at = min(at, -distance * math.sqrt(1.0 - share * share))
-        at = max(at, high_x)
-        off = math.sqrt(max(distance2 - at * at, 0.0)) - side
-        past_behind = at - rear
-        past_behind += math.sqrt(max(reach * reach - off * off, 0.0)) if off > 0.0 else reach
-    if past < 0.0:
-        near, past = math.inf, -math.inf
-    return near, past, past_behind
+def _way_m(speed_mps: float, a: float, T: float, t: float) -> float:
+    """Return the way until t of a robot that brakes from T on, and then stands."""
+    braked_s = min(t - T, speed_mps / a)
+    if braked_s <= 0.0:
+        return speed_mps * t
+    return speed_mps * (T + braked_s) - 0.5 * a * braked_s * braked_s
 
 
 def in_the_path_mps(
@@ -352,18 +290,23 @@ def passing_radius_m(
     return high_m
 
 
-def _is_far(person: Reach, course: Course) -> bool:
-    """Return whether a person cannot be met before a robot at its maximum has stopped."""
-    stop_s = course.reaction_s + person.elapsed_s + course.maximum_mps / course.deceleration_mps2
+def _is_far(person: Reach, course: Course, size_m: float, maximum_mps: float) -> bool:
+    """Return whether a person cannot be met before a robot at that speed has stopped."""
+    stop_s = course.reaction_s + person.elapsed_s + maximum_mps / course.deceleration_mps2
     stop_s += _step_s(course)
-    way_m = course.maximum_mps * stop_s
+    way_m = maximum_mps * stop_s
     drift_s = person.drift_s(stop_s)
     walked_m = drift_s * math.hypot(person.velocity_x_mps, person.velocity_y_mps)
-    size_m = math.hypot(max(course.front_m, -course.rear_m), course.half_m) + course.circle_m
     uncertainty_m = max(person.uncertainty_m(drift_s), person.uncertainty_m(0.0))
     around_m = person.radius_m(stop_s) + walked_m + uncertainty_m + person.margin_m + size_m
     distance_m = math.hypot(person.x_m - course.x_m, person.y_m - course.y_m)
     return distance_m > way_m + around_m
+
+
+def _size_m(course: Course) -> float:
+    """Return the distance from the base of the farthest part of the robot, on any course."""
+    length_m = max(course.front_m, -course.rear_m)
+    return math.hypot(length_m, course.half_m) + course.circle_m
 
 
 def _step_s(course: Course) -> float:
@@ -393,7 +336,8 @@ def _course(
     middle_rad += state.heading_odom_rad
     return Course(
         *(x, y, math.cos(middle_rad), math.sin(middle_rad)),
-        *(math.cos(fan_rad), math.sin(fan_rad), front_m + driven_m, rear_m, half_m, 0.0),
+        *(math.cos(fan_rad), math.sin(fan_rad), front_m + driven_m, rear_m, half_m),
+        *(robot.circumscribed_radius_m + driven_m, 0.0),
         ROOM * robot.max_speed_mps,
         robot.max_deceleration_mps2,
         robot.reaction_time_s,
@@ -422,8 +366,10 @@ def _extent_m(
         return front, rear, half
     radius = max(math.hypot(x, y) for x, y in corners)
     cos, sin = math.cos(min(swing_rad, 0.5 * math.pi)), math.sin(min(swing_rad, 0.5 * math.pi))
+    long = max(front, -rear)
     return (
         min(front + half * sin, radius),
         max(rear - half * sin, -radius),
-        min(half * cos + max(front, -rear) * sin, radius) if cos > 0.0 else radius,
+        # A corner that has swung past the side was out at the radius.
+        min(half * cos + long * sin, radius) if half * sin < long * cos else radius,
     )

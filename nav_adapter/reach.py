@@ -1,4 +1,4 @@
-"""How far a person can come: the one model of people's motion that limit and proof rest on.
+"""The reach of people: the one model of their motion that limit and proof rest on.
 
 Somebody at p with velocity u may change, from now on, to any velocity up to U, with the time
 constant τ, after going unnoticed for δ. At time t they are within
@@ -20,6 +20,8 @@ from perception.anthropometry import BODY_RADIUS_M
 
 #: A time constant with which a velocity does not change within seconds.
 WALKING_ON_S: Final = 1e4
+#: Speeds closer than this are equal: U may be the sum of another speed and the rest of theirs.
+SAME_MPS: Final = 1e-9
 
 
 class Reach(NamedTuple):
@@ -53,8 +55,9 @@ class Reach(NamedTuple):
 
     @property
     def walks_faster(self) -> bool:
-        """Whether this person walks faster than U: walking on is not within the reach then."""
-        return math.hypot(self.velocity_x_mps, self.velocity_y_mps) > self.speed_mps
+        """True if this person walks faster than U: walking on is not within the reach then."""
+        walking_mps = math.hypot(self.velocity_x_mps, self.velocity_y_mps)
+        return walking_mps > self.speed_mps + SAME_MPS
 
     def walking_on(self) -> Reach:
         """Return the reach of this person if they walk straight on."""

@@ -22,8 +22,9 @@ _UPDATES = 200
 def field_ms(repeats: int, seed: int) -> dict[str, float]:
     """Return the least processor milliseconds over the repeats.
 
-    ``field`` is for positions alone, ``driven`` for headings and speeds too, ``map`` for 200 × 200
-    cells, and ``updates`` for as many calls of :meth:`NavAdapter.update` as the field has poses.
+    ``field`` is for positions alone, ``headed`` for headings too, ``driven`` for speeds and yaw
+    rates too, ``map`` for 200 × 200 cells, ``coarse map`` for 100 × 100, and ``updates`` for as
+    many calls of :meth:`NavAdapter.update` as the field has poses.
     """
     rng = np.random.default_rng([seed, PEOPLE])
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), ROBOT)
@@ -34,6 +35,7 @@ def field_ms(repeats: int, seed: int) -> dict[str, float]:
     shape = TRAJECTORIES, TIMES
     positions = rng.uniform(-4.0, 4.0, (*shape, 2))
     headings, speeds = rng.uniform(-np.pi, np.pi, shape), rng.uniform(0.1, 1.5, shape)
+    rates = rng.uniform(-1.0, 1.0, shape)
     poses = [
         RobotState(now, position, heading, speed, 0.0)
         for position, heading, speed in zip(
@@ -47,11 +49,15 @@ def field_ms(repeats: int, seed: int) -> dict[str, float]:
 
     work: dict[str, Callable[[], object]] = {
         "field": lambda: speed_limit_at(constraints, positions, dt_s=0.1),
+        "headed": lambda: speed_limit_at(constraints, positions, headings, dt_s=0.1),
         "driven": lambda: speed_limit_at(
-            constraints, positions, headings, dt_s=0.1, speeds_mps=speeds
+            constraints, positions, headings, dt_s=0.1, speeds_mps=speeds, yaw_rates_radps=rates
         ),
         "map": lambda: SpeedMap.around(
             constraints, [0.0, 0.0], size_m=SIDE_M, resolution_m=RESOLUTION_M
+        ),
+        "coarse map": lambda: SpeedMap.around(
+            constraints, [0.0, 0.0], size_m=SIDE_M, resolution_m=2.0 * RESOLUTION_M
         ),
         "updates": updates,
     }

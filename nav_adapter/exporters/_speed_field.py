@@ -12,7 +12,7 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._reach_field import limits_at
+from ._limits_at import limits_at
 
 
 def speed_limit_at(
@@ -31,19 +31,21 @@ def speed_limit_at(
 
     It is a lower bound of the limit that ``NavAdapter.update`` will give at that time to a robot
     that is there. All people count, and so do lost ones, the age of the data and the recovery after
-    stale data. Without headings the robot's circumscribed circle counts, and people in every
-    direction; without speeds it drives forwards, and without yaw rates straight on.
+    stale data. Without headings a circle about the robot counts, and people in every direction, so
+    it may drive straight on, turn or stand. With headings but without speeds it drives forwards,
+    and without yaw rates straight on.
 
     The bound holds if
 
     * people keep the velocity of their track, and those whom the latest frames show are seen as
-      now: with the same covariance, the same age of the data and at least the same awareness;
+      now: with the same covariance, the same age of the data and the same awareness;
     * people out of sight, and missing ones, are not seen again; the uncertainty of a track that
       coasts grows with its velocity's;
     * the tracker reports at least once per ``fresh_within_s``, and the adapter is updated as often;
     * the robot is no faster than its maximum.
 
-    For people who stand and are seen, it is the limit itself but for steps of time.
+    For people who stand and are seen, it is the limit itself within some millimetres per second,
+    but for a few poses where a person just comes to the edge of the robot's way, or just not.
 
     Args:
         constraints: of ``NavAdapter.update``.
@@ -62,7 +64,7 @@ def speed_limit_at(
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
             constraints that do not come from ``update`` unless they stop the robot.
     """
-    limits, _ = _limits(
+    limits, _, _ = _limits(
         *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
         *(speeds_mps, yaw_rates_radps, aware_for_s, fine),
     )
@@ -85,11 +87,11 @@ def limited_by_at(
     The texts are those of :attr:`~nav_adapter.NavConstraints.limited_by`, such as ``"track 3:
     reach"``. The arguments and errors are those of :func:`speed_limit_at`.
     """
-    _, texts = _limits(
+    _, by, texts = _limits(
         *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
         *(speeds_mps, yaw_rates_radps, aware_for_s),
     )
-    return texts
+    return np.array(texts, dtype=object)[by]
 
 
 def time_cost(
@@ -155,7 +157,7 @@ def _limits(
     yaw_rates_radps: Any,
     aware_for_s: float,
     fine: bool = False,
-) -> tuple[FloatArray, NDArray[np.object_]]:
+) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
     """Return the limits and their reasons after a check of all arguments."""
     positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
     shape = positions.shape[:2]

@@ -13,7 +13,7 @@ from .._errors import NavError
 
 
 class ReachRules(StrictConfig):
-    """How people change their motion, and how far the robot may turn while it stops.
+    """Rules of how people change their motion, and how far the robot may turn while it stops.
 
     Attributes:
         time_constant_s: τ, in which a person changes to another velocity. 0.54 s is the fit to
