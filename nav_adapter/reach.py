@@ -61,7 +61,14 @@ class Reach(NamedTuple):
 
     def walking_on(self) -> Reach:
         """Return the reach of this person if they walk straight on."""
-        return self._replace(speed_mps=0.0, delay_s=0.0, time_constant_s=WALKING_ON_S)
+        # The place is as uncertain as now: the same people, unaware, must not come less far.
+        a0, a1, _ = self.variances
+        return self._replace(
+            speed_mps=0.0,
+            delay_s=0.0,
+            time_constant_s=WALKING_ON_S,
+            variances=(a0 if a1 >= 0.0 else 0.0, 0.0, 0.0),
+        )
 
     def drift_s(self, ahead_s: float) -> float:
         """Return m, by which u carries the middle of the reach until ``ahead_s`` from now."""

@@ -68,7 +68,13 @@ class PersonAhead(NamedTuple):
 
     def walking_on(self) -> PersonAhead:
         """Return the person if they walk straight on, as :meth:`Reach.walking_on` does."""
-        return self._replace(speed_mps=0.0, delay_s=0.0, time_constant_s=WALKING_ON_S)
+        a0, a1, _ = self.variances
+        return self._replace(
+            speed_mps=0.0,
+            delay_s=0.0,
+            time_constant_s=WALKING_ON_S,
+            variances=(np.where(np.asarray(a1) >= 0.0, a0, 0.0), 0.0, 0.0),
+        )
 
 
 @dataclass(frozen=True, slots=True)
