@@ -24,8 +24,7 @@ COPIED: Final = (
     *("perception", "tracking", "nav_adapter", "awarenav", "sim_tests", "benchmarks", "tests"),
     *("docs", "examples", "pyproject.toml", "README.md"),
 )
-_BRISK: Final = "tests/nav_adapter/test_safety_brisk.py"
-_INVARIANTS: Final = "tests/nav_adapter/test_safety_invariants.py"
+_LIMIT: Final = "tests/nav_adapter/test_limit.py"
 _SEPARATION: Final = "tests/nav_adapter/test_separation.py"
 
 
@@ -41,18 +40,23 @@ class Mutant(NamedTuple):
 
 # fmt: off
 MUTANTS: Final = (
-    # Speed and separation.
-    Mutant("brisk_share", "nav_adapter/_governor.py", "BRISK_SHARE: Final = 0.75", "BRISK_SHARE: Final = 0.90", _BRISK),
-    Mutant("running_share", "nav_adapter/_governor.py", "RUNNING_SHARE: Final = 0.25", "RUNNING_SHARE: Final = 0.50", _BRISK),
-    Mutant("braking_distance", "nav_adapter/_separation.py", "v**2 / (2.0 * a)", "v**2 / (2.5 * a)", _SEPARATION),
-    Mutant("human_way_while_braking", "nav_adapter/_separation.py", "v_h * (T + v / a)", "v_h * T", _SEPARATION),
-    Mutant("reaction_way", "nav_adapter/_separation.py", "b = share * a * T + v_h", "b = v_h", _SEPARATION),
+    # Reach and limit: every term of the model is needed.
+    Mutant("reach_delay", "nav_adapter/_contact.py", "since_s = t1_s + elapsed_s + delay_s", "since_s = t1_s + elapsed_s", _LIMIT),
+    Mutant("reach_age", "nav_adapter/_contact.py", "m1 = tau * -_expm1(-(t1_s + elapsed_s) / tau)", "m1 = tau * -_expm1(-t1_s / tau)", _LIMIT),
+    Mutant("time_constant", "nav_adapter/_contact.py", "reach = U * (since_s + tau * _expm1(-since_s / tau))", "reach = U * (since_s + 2.0 * tau * _expm1(-since_s / tau))", _LIMIT),
+    Mutant("way_between_steps", "nav_adapter/_contact.py", "reach += 0.5 * (m1 - m0)", "reach += 0.0 * (m1 - m0)", _LIMIT),
+    Mutant("other_courses", "nav_adapter/_contact.py", "low_x, low_y = cos * x + sin * y, cos * y - sin * x", "low_x, low_y = x, y", _LIMIT),
+    Mutant("corner", "nav_adapter/_contact.py", "if beyond > half:", "if beyond > 1e9:", _LIMIT),
+    Mutant("braking_way", "nav_adapter/limit.py", "braked1_m = 0.5 * a * (t1 - T) * (t1 - T)", "braked1_m = 0.6 * a * (t1 - T) * (t1 - T)", _LIMIT),
+    Mutant("reaction", "nav_adapter/limit.py", "a, T = course.deceleration_mps2, course.reaction_s + person.elapsed_s", "a, T = course.deceleration_mps2, person.elapsed_s", _LIMIT),
+    Mutant("walking_on", "nav_adapter/reach.py", "> self.speed_mps + SAME_MPS", "> 9.0 + SAME_MPS", "tests/nav_adapter/test_safety_pages.py"),
+    Mutant("reaction_way", "nav_adapter/_separation.py", "b = a * T + v_h", "b = v_h", _SEPARATION),
     Mutant("slowest_speed_limit", "nav_adapter/ros2/_speed_limit.py", "SLOWEST_MPS: Final = 0.01", "SLOWEST_MPS: Final = 0.0", "tests/nav_adapter/test_ros2_conversions.py"),
     # Policies.
-    Mutant("least_clearance", "nav_adapter/policies/_margins.py", "Field(default=0.10, ge=0.10, le=2.0)", "Field(default=0.10, ge=0.05, le=2.0)", "tests/nav_adapter/test_policy.py"),
-    Mutant("unseen_sigmas", "nav_adapter/policies/_margins.py", "unseen_sigmas: float = Field(default=2.5", "unseen_sigmas: float = Field(default=2.0", "tests/nav_adapter"),
-    Mutant("unaware_human_speed", "nav_adapter/policies/_human_speed.py", "unaware_human_speed_mps: float = Field(default=1.6", "unaware_human_speed_mps: float = Field(default=1.4", _SEPARATION),
-    Mutant("stale_after", "nav_adapter/policies/_margins.py", "stale_after_s: float = Field(default=0.5", "stale_after_s: float = Field(default=1.0", "tests/nav_adapter"),
+    Mutant("least_clearance", "nav_adapter/policies/_settings.py", "Field(default=0.10, ge=0.10, le=2.0)", "Field(default=0.10, ge=0.05, le=2.0)", "tests/nav_adapter/test_policy.py"),
+    Mutant("unseen_sigmas", "nav_adapter/policies/_settings.py", "unseen_sigmas: float = Field(default=2.5", "unseen_sigmas: float = Field(default=2.0", "tests/nav_adapter"),
+    Mutant("unaware_human_speed", "nav_adapter/policies/_awareness.py", "unaware_human_speed_mps: float = Field(default=1.5", "unaware_human_speed_mps: float = Field(default=1.2", "tests/nav_adapter/test_policy_docs.py"),
+    Mutant("stale_after", "nav_adapter/policies/_settings.py", "stale_after_s: float = Field(default=0.5", "stale_after_s: float = Field(default=1.0", "tests/nav_adapter"),
     # Bodies and heads.
     Mutant("body_radius", "perception/anthropometry.py", "BODY_RADIUS_M: Final = 0.30", "BODY_RADIUS_M: Final = 0.25", "tests/nav_adapter tests/perception/test_body.py"),
     Mutant("head_stature", "perception/_placement.py", "_HEAD_STATURE_STD: Final = 0.4 * 0.04", "_HEAD_STATURE_STD: Final = 0.0", "tests/perception/test_head_range.py"),
