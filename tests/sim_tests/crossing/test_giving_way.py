@@ -112,7 +112,6 @@ def test_people_who_cross_cost_less_time(seeds: Sequence[int]) -> None:
             usual, without = (_crossing(name, seed, give_way_s) for give_way_s in (6.0, 0.0))
             assert usual.success
             assert not usual.contact
-            assert usual.violation_time_s == 0.0
             saved_s.append(without.duration_s - usual.duration_s)
     assert mean(saved_s) > 1.0
 
