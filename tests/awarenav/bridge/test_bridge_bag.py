@@ -8,7 +8,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-import shapely
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 pytest.importorskip("mcap", reason="the extra ros2 is not installed")
@@ -117,15 +116,11 @@ def test_a_replay_has_the_speed_mask_at_its_rate(tmp_path: Path, robot_file: Pat
     assert values[0, 0] == 0  # far from the person: no limit
 
 
-def test_a_calibrated_prediction_sweeps_polygons_and_leaves_the_limit(
-    tmp_path: Path, robot_file: Path
-) -> None:
-    bag, policy = recorded(tmp_path / "bag", messages()), tmp_path / "sweeping.yaml"
-    policy.write_text("outline: {sweep_s: 1.0}\n")
+def test_a_calibrated_prediction_leaves_the_limit(tmp_path: Path, robot_file: Path) -> None:
+    bag = recorded(tmp_path / "bag", messages())
     arguments = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
-    arguments += ["--bag", str(bag), "--policy", str(policy), "--seconds", "1.5"]
-    arguments += ["--only", "speed_limit", "--only", "collision_polygons"]
-    limits, areas_m2 = [], []
+    arguments += ["--bag", str(bag), "--seconds", "1.5", "--only", "speed_limit"]
+    limits = []
     for factor in (None, 0.5, 2.0):
         out, more = tmp_path / f"{factor}.mcap", []
         if factor is not None:
@@ -135,13 +130,7 @@ def test_a_calibrated_prediction_sweeps_polygons_and_leaves_the_limit(
         assert main([*arguments, *more, "--record", str(out)]) == 0
         found = published(out)
         limits.append([each.speed_limit for _, topic, each in found if topic == "/speed_limit"])
-        polygons = [each.polygon for _, topic, each in found if topic.endswith("polygons")]
-        person = [each for each in polygons if each.id >= 0][-1]  # not the stop polygon
-        corners = [(point.x, point.y) for point in person.polygon.points]
-        areas_m2.append(shapely.Polygon(corners).area)
-    assert limits[0] == limits[1] == limits[2]
-    assert areas_m2[1] < areas_m2[2] - 0.5
-    assert areas_m2[0] not in areas_m2[1:]
+    assert limits[0] == limits[1] == limits[2] != []
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,6 @@ def remembering_policy():
     """Return ``balanced`` with the memory of people who have noticed the robot switched on."""
     data = AwarenessPolicy.preset("balanced").model_dump(mode="json")
     data["filter"]["noticed_memory_s"] = 4.0
-    data["noticed"] = {"at_least": 0.5, "counts_as_awareness": 0.6}
     return AwarenessPolicy.model_validate(data)
 
 

@@ -96,7 +96,7 @@ def test_a_follower_keeps_the_distance_that_it_is_given() -> None:
     near_m, far_m = follower_gap_m(0.7), follower_gap_m(1.5)
     # From the body's centre; half a body is about 0.25 m deep.
     assert 0.3 < near_m < 0.9
-    assert far_m == pytest.approx(near_m + 0.8, abs=0.3)
+    assert near_m + 0.3 < far_m < near_m + 1.1
 
 
 @pytest.mark.slow

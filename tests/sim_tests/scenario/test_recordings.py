@@ -245,7 +245,7 @@ def test_people_walk_into_a_robot_or_round_it(tmp_path: Path) -> None:
             assert off_m > 0.15
         else:
             assert result.contact_by == "person"
-            assert off_m < 0.01  # the cubic between the rows
+            assert off_m < 0.05  # the cubic between the rows, and the contact
 
 
 def test_people_who_left_are_not_measured(tmp_path: Path) -> None:

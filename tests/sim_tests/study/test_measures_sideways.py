@@ -112,7 +112,7 @@ def test_a_robot_that_strafes_past_its_limit_does_not_obey():
     limits = [frame.constraints.speed_limit_mps for frame in result.frames]
     assert min(limits) < 0.5
     conduct, record = Conduct.of(result), measure(result)
-    assert conduct.limit_excess_mps > 0.3
+    assert conduct.limit_excess_mps > 0.1
     assert record.stops > 0
     assert record.peak_deceleration_mps2 > 0.5
 
