@@ -101,8 +101,7 @@ class SpeedGovernor:
             for track_id, person in lost.items():
                 own_mps, _ = self.person_mps(person, straight, courses, now)
                 first_mps = own_mps if person.lost_limit_mps is None else person.lost_limit_mps
-                lost_s = now - (person.lost_since_s or now)
-                ceiling_mps = first_mps + (self._rise_mps2 or 0.0) * lost_s
+                ceiling_mps = first_mps + (self._rise_mps2 or 0.0) * person.lost_for_s(now)
                 if ceiling_mps >= maximum_mps:
                     continue
                 kept[track_id] = person._replace(lost_limit_mps=first_mps)

@@ -77,6 +77,10 @@ class Person(NamedTuple):
         """True until frames have shown this person long enough for awareness to raise a speed."""
         return self.known_s < _FIRST_SIGHT_S - _ROUNDING_S
 
+    def lost_for_s(self, stamp_s: float) -> float:
+        """Return for how long a person has been lost; 0 for one who has not been dropped."""
+        return 0.0 if self.lost_since_s is None else stamp_s - self.lost_since_s
+
     def is_kept(self, stamp_s: float, hold_s: float) -> bool:
         """Return whether a person who is missing from the input must be kept at ``stamp_s``.
 

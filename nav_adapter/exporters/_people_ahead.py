@@ -188,8 +188,9 @@ def people_ahead(
         is_shown = shown.get(track_id) is person.track
         yield _ahead(basis, now, times_s, aware_for_s, track_id, person, is_shown)
     for track_id, person in basis.lost.items():
-        rise_mps2, since_s = basis.policy.timing.lost_rise_mps2 or 0.0, person.lost_since_s or now
-        least_mps = (person.lost_limit_mps or 0.0) + rise_mps2 * (now + times_s - since_s)
+        rise_mps2 = basis.policy.timing.lost_rise_mps2 or 0.0
+        lost_s = person.lost_for_s(now) + times_s
+        least_mps = (person.lost_limit_mps or 0.0) + rise_mps2 * lost_s
         ahead = _ahead(basis, now, times_s, aware_for_s, track_id, person, False)
         yield ahead._replace(least_mps=least_mps)
 

@@ -20,7 +20,7 @@ _STEP_S = 0.01
 
 @dataclass(frozen=True)
 class Outcome:
-    """What happened in some worlds."""
+    """The outcome of some worlds: how many robots moved, and who touched one."""
 
     worlds: int
     moving: int

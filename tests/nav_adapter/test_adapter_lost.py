@@ -78,6 +78,17 @@ def test_the_limit_rises_from_where_it_was_at_the_rate_of_the_policy() -> None:
     assert after[-1].limited_by == "robot maximum"
 
 
+def test_somebody_lost_at_stamp_0_lets_the_limit_rise_too() -> None:
+    nav = NavAdapter(with_rise(0.5, hold_s=0.0), ROBOT)
+    nav.update([person(position=(2.0, 0.0))], robot_at(), 0.0, perception_stamp_s=0.0)
+    limits = [
+        nav.update([], robot_at(now), now, perception_stamp_s=now).speed_limit_mps
+        for now in (0.1, 0.4, 0.7)
+    ]
+    assert limits[1] == pytest.approx(limits[0] + 0.15)
+    assert limits[2] == pytest.approx(limits[0] + 0.30)
+
+
 def test_without_the_rule_the_limit_jumps() -> None:
     results = lose(NavAdapter(with_rise(None), ROBOT), 0.5)
     limits = [each.speed_limit_mps for each in results]

@@ -1,4 +1,4 @@
-"""Where the robot meets somebody's reach: corners that swing out, noise, and the way to a stop."""
+"""Contact of the robot with a reach: corners that swing out, noise, and the way to a stop."""
 
 from __future__ import annotations
 

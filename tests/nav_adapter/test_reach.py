@@ -1,4 +1,4 @@
-"""How far people come: the closed forms against integration of their motion."""
+"""The reach of people: the closed forms against integration of their motion."""
 
 from __future__ import annotations
 
