@@ -13,7 +13,7 @@ _CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
 run_path(str(_CLASH))["require_sole_owner"](__name__)
 
 from ._adapter import NavAdapter
-from ._alert import Alert
+from ._alert import Alert, Answer
 from ._constraints import NavConstraints, PersonObstacle
 from ._errors import NavError
 from ._policy import AwarenessPolicy
@@ -24,6 +24,7 @@ from .policies import InflationPolicy, SpeedPolicy
 
 __all__ = [
     "Alert",
+    "Answer",
     "AwarenessPolicy",
     "InflationPolicy",
     "NavAdapter",

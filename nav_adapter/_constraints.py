@@ -18,7 +18,7 @@ from perception.arrays import (
 )
 from perception.short_repr import short_repr
 
-from ._alert import Alert
+from ._alert import Alert, Answer
 from ._errors import NavError
 from ._robot import RobotProfile
 from ._speed_basis import SpeedBasis
@@ -142,7 +142,8 @@ class NavConstraints:
             limit fell faster than the robot can brake. For planners whose window of reachable
             speeds must not be empty. It starts from the measured speed, so a drive with its own
             ramp should get ``speed_limit_mps``: following a late measurement brakes too softly.
-        alerts: people to warn now. An alert is given once, not in every update.
+        alerts: people to warn now, and then the person to ask for attention, if any. An alert is
+            given once, not in every update.
         braking_suffices: False if a robot that brakes from now on at full deceleration may still be
             met before it stands, by the model of people. A limit is then not enough: warn, evade or
             stop harder.
@@ -153,6 +154,7 @@ class NavConstraints:
         robot: the profile that they hold for; None if they were made without an adapter.
         speed_basis: what the limit was computed from, for
             :func:`nav_adapter.exporters.speed_limit_at`; None for constraints made by hand.
+        answers: people who were asked for attention and have just looked, each once.
     """
 
     stamp_s: float
@@ -166,6 +168,7 @@ class NavConstraints:
     fastest_point_limit_mps: float | None = field(default=None, repr=False)
     robot: RobotProfile | None = field(default=None, repr=False)
     speed_basis: SpeedBasis | None = field(default=None, repr=False)
+    answers: tuple[Answer, ...] = ()
 
     __repr__ = short_repr
 
@@ -181,6 +184,7 @@ class NavConstraints:
             speed_limit_mps=limit,
             reachable_speed_limit_mps=max(limit, reachable),
             alerts=tuple(self.alerts),
+            answers=tuple(self.answers),
             fastest_point_limit_mps=self._checked_fastest_mps(limit),
         )
 

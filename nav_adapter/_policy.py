@@ -18,6 +18,7 @@ from tracking.config import StrictConfig
 from ._errors import NavError
 from .policies import (
     AlertRules,
+    AttentionRules,
     InflationPolicy,
     InterpolatedHumanSpeed,
     InterpolatedInflation,
@@ -86,7 +87,8 @@ class AwarenessPolicy(StrictConfig):
             who does not look now knows of the robot, the lower bound of α is at least this; None
             for nothing. It needs ``filter.noticed_memory_s`` and a laser scanner: with a camera
             alone it changes nothing.
-        alerts: rules for alerts, or None.
+        alerts: rules for warnings of collisions, or None.
+        attention: rules for requests to look at the robot, or None.
         margins: distances that hold for every α.
         timing: how fast obstacles may shrink and how long data may be trusted.
         filter: settings of the tracker's awareness filter. They belong to the policy because they
@@ -105,6 +107,7 @@ class AwarenessPolicy(StrictConfig):
     reach: ReachRules | None = ReachRules()
     noticed_counts_as: float | None = Field(default=0.6, ge=0.0, le=1.0)
     alerts: AlertRules | None = AlertRules()
+    attention: AttentionRules | None = AttentionRules()
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
     filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=3.0)

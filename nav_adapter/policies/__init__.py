@@ -8,10 +8,11 @@ from ._awareness import (
     InterpolatedInflation,
     SpeedPolicy,
 )
-from ._settings import AlertRules, ReachRules, SafetyMargins, TimeBehaviour
+from ._settings import AlertRules, AttentionRules, ReachRules, SafetyMargins, TimeBehaviour
 
 __all__ = [
     "AlertRules",
+    "AttentionRules",
     "InflationPolicy",
     "InterpolatedHumanSpeed",
     "InterpolatedInflation",

@@ -1,8 +1,8 @@
-"""Settings besides radius and speed: reach, margins, time behaviour and alerts."""
+"""Settings besides radius and speed: reach, margins, time behaviour, alerts and requests."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -111,3 +111,29 @@ class AlertRules(StrictConfig):
     light_within_s: float = Field(default=5.0, ge=0.0, le=30.0)
     voice_within_s: float = Field(default=3.5, ge=0.0, le=30.0)
     horn_within_s: float = Field(default=2.0, ge=0.0, le=30.0)
+
+
+class AttentionRules(StrictConfig):
+    """Rules for requests for attention: whom to ask to look at the robot, and how often at most.
+
+    A person is asked who sets the speed limit and has not noticed the robot, if the robot would
+    drive faster once they have. People close together are asked once. A request that is not
+    answered doubles the pause until the next one to the same person, which uses the next louder
+    means. Only a look that perception measures raises a limit, never a request.
+
+    Attributes:
+        min_gain_s: the time that the robot would win must be at least this.
+        pause_s: time between the first two requests to the same person.
+        per_minute: the robot makes at most so many requests in any minute.
+        within_m: distance from the robot's base within which people are asked.
+        means: what the robot has to ask with, the quietest first: ``"light"``, ``"voice"``. Light
+            is left out for somebody who walks away from the robot.
+    """
+
+    error: ClassVar[type[ValueError]] = NavError
+
+    min_gain_s: float = Field(default=0.5, ge=0.0, le=10.0)
+    pause_s: float = Field(default=3.0, ge=1.0, le=60.0)
+    per_minute: int = Field(default=6, ge=1, le=60)
+    within_m: float = Field(default=8.0, gt=0.0, le=30.0)
+    means: tuple[Literal["light", "voice"], ...] = Field(default=("light", "voice"), min_length=1)

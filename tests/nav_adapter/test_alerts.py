@@ -116,7 +116,15 @@ def test_a_refused_update_uses_up_no_alert() -> None:
 
 
 def test_an_alert_is_checked() -> None:
-    with pytest.raises(NavError, match="kind must be one of light, voice, horn, got 'siren'"):
+    with pytest.raises(NavError, match="kind must be one of light, voice, horn, attention, got"):
         Alert(1, "siren", 1.0, 0.0, "")
     with pytest.raises(NavError, match="time_to_closest_s must lie in"):
         Alert(1, "horn", -1.0, 0.0, "")
+    with pytest.raises(NavError, match="means must be light, voice, horn with kind 'attention'"):
+        Alert(1, "attention", 1.0, 0.0, "")
+    with pytest.raises(NavError, match="means must be horn with kind 'horn', got 'light'"):
+        Alert(1, "horn", 1.0, 0.0, "", means="light")
+    with pytest.raises(NavError, match="wins_s must lie in"):
+        Alert(1, "attention", 1.0, 0.0, "", means="voice", wins_s=-1.0)
+    assert Alert(1, "horn", 1.0, 0.0, "").means == "horn"
+    assert Alert(1, "attention", 1.0, 0.0, "", means="voice").means == "voice"
