@@ -41,7 +41,7 @@ OUTLINE: Final = (
     *("sweep_s", "acceleration_density_m2ps3", "overconfidence_per_s"),
 )
 #: Keys that 0.2 did not know.
-OF_TODAY: Final = ("reach", "noticed_counts_as")
+OF_TODAY: Final = ("reach", "noticed_counts_as", "attention")
 # Defaults of 0.2 that another value would be more careful or less careful than.
 HUMAN_SPEEDS: Final = {"unaware_human_speed_mps": 1.6, "aware_human_speed_mps": 0.7}
 ACCELERATION_MPS2, DELAY_S, TURN_DEG, SHOWN_S = 2.0, 0.25, 90.0, 0.2

@@ -92,9 +92,9 @@ def show(**values: Any) -> int:
 def upgrade(**values: Any) -> int:
     """Say what becomes of each setting of a policy file of 0.2, and write the new file.
 
-    A line begins with kept, renamed, replaced, dropped or check. What the old file left out and has
-    another default now is written with its old value. 'check' means that the new file may be less
-    careful than the old one in this point, and says what to do.
+    A line begins with kept, renamed, replaced, dropped, added or check. What the old file left out
+    and has another default now is written with its old value. 'check' means that the new file may
+    be less careful than the old one in this point, and says what to do.
     """
     from ._upgrade import upgrade_command  # noqa: PLC0415 - help needs no policies
 

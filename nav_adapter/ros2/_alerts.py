@@ -1,10 +1,10 @@
-"""Alerts and the state of the speed limit as diagnostics."""
+"""Alerts, answers and the state of the speed limit as diagnostics."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from .._alert import Alert
+from .._alert import Alert, Answer
 from .._constraints import NavConstraints
 from .conversions import header
 from .messages.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -19,16 +19,18 @@ def alerts(
     details: Mapping[str, str] | None = None,
     sensors: DiagnosticStatus | None = None,
 ) -> DiagnosticArray:
-    """Return ``diagnostic_msgs/DiagnosticArray``: the state of the limit and one status per alert.
+    """Return ``diagnostic_msgs/DiagnosticArray``: the limit's state, alerts and answers.
 
     The first status is always there: ``"awarenav: speed limit"``, with ``limited_by`` as its
     message. Its level is ERROR if full braking from now on comes too late (``braking_suffices`` is
-    False), WARN if the data are stale, else OK. The alerts given now follow as WARN, the most
-    urgent first, named ``"awarenav: horn"``, ``"awarenav: voice"`` or ``"awarenav: light"``. Each
-    alert is in one message only: sound the horn once per status.
+    False), WARN if the data are stale, else OK. The warnings of a collision given now follow as
+    WARN, the most urgent first, named ``"awarenav: horn"``, ``"awarenav: voice"`` or
+    ``"awarenav: light"``. A request to look at the robot is ``"awarenav: attention"`` and a look
+    that answers one is ``"awarenav: answer"``, both OK, since they are no fault. Each alert and
+    each answer is in one message only: sound the horn once per status.
 
     Args:
-        constraints: the alerts and the limit.
+        constraints: the alerts, the answers and the limit.
         frame_id: of the header; diagnostics do not use it.
         details: more values of the first status, by name.
         sensors: the second status, from :func:`sensor_status`; None to leave it out.
@@ -36,7 +38,11 @@ def alerts(
     states = (_limit(constraints, details or {}), *(() if sensors is None else (sensors,)))
     return DiagnosticArray(
         header(constraints.stamp_s, frame_id),
-        (*states, *(_alert(each) for each in constraints.alerts)),
+        (
+            *states,
+            *(_alert(each) for each in constraints.alerts),
+            *(_answer(each) for each in constraints.answers),
+        ),
     )
 
 
@@ -76,13 +82,26 @@ def _limit(constraints: NavConstraints, details: Mapping[str, str]) -> Diagnosti
 
 
 def _alert(alert: Alert) -> DiagnosticStatus:
+    asks = alert.kind == "attention"
+    request = {"means": str(alert.means), "wins_s": f"{alert.wins_s:.3f}"} if asks else {}
     return _status(
-        DiagnosticStatus.WARN,
+        DiagnosticStatus.OK if asks else DiagnosticStatus.WARN,
         alert.kind,
         alert.reason,
         track_id=str(alert.track_id),
+        **request,
         time_to_closest_s=f"{alert.time_to_closest_s:.3f}",
         closest_gap_m=f"{alert.closest_gap_m:.3f}",
+    )
+
+
+def _answer(answer: Answer) -> DiagnosticStatus:
+    return _status(
+        DiagnosticStatus.OK,
+        "answer",
+        f"track {answer.track_id} looked {answer.after_s:.1f} s after the request",
+        track_id=str(answer.track_id),
+        after_s=f"{answer.after_s:.3f}",
     )
 
 

@@ -54,7 +54,7 @@ PUBLISHED: Final = MappingProxyType(
         "people": Topic("people", People, depth=1),
         "detections": Topic("awarenav/detections", Detection3DArray, depth=1),
         "markers": Topic("awarenav/markers", MarkerArray, depth=1),
-        # Each alert is in one message only, so the depth covers two seconds and more.
+        # Each alert and answer is in one message only, so the depth covers two seconds and more.
         "alerts": Topic("awarenav/alerts", DiagnosticArray, depth=64),
     }
 )

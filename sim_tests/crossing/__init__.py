@@ -11,6 +11,7 @@ from ._crossing import (
 from ._drawing import TopView, draw_camera_view
 from ._metrics import CLEARANCE_M, STANDING_SPEED_MPS, ContactEvent, SafetyMeter
 from ._policies import named_policy
+from ._requests import RequestMemory
 from ._result import CrossingFrame, CrossingResult
 from ._stage import Stage, TrueView
 from .planner import StraightOn
@@ -23,6 +24,7 @@ __all__ = [
     "CrossingFrame",
     "CrossingResult",
     "Observer",
+    "RequestMemory",
     "SafetyMeter",
     "Situation",
     "Stage",

@@ -14,6 +14,7 @@ from awarenav.drawing import awareness_colour, draw_disc, draw_line
 from perception import AttentionCone, Camera
 from perception.arrays import FloatArray, ImageRgb
 
+from ._requests import RequestMemory, ShownRequest
 from ._result import CrossingFrame
 from ._stage import Stage
 from .eyes import NOBODY
@@ -25,9 +26,12 @@ _RACK_COLOUR: Final = (176, 182, 190)
 _ROBOT_COLOUR: Final = (38, 84, 140)
 _PATH_COLOUR: Final = (120, 120, 126)
 _SCAN_COLOUR: Final = (150, 40, 120)
+_TEXT_SIZE: Final = 0.42
 _CONE_LENGTH_M: Final = 0.4
 # Radius of the disc that marks a person on the map.
 _PERSON_RADIUS_M: Final = 0.22
+# Radii of the two rings around a person who is asked, like the waves of a sound.
+_WAVES_M: Final = (0.42, 0.62)
 # Points farther than this outside the image are not drawn.
 _FAR_PX: Final = 1.0e4
 _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
@@ -86,13 +90,17 @@ def draw_camera_view(
             text = "no face seen"
             if alpha is not None and spread is not None:
                 text = f"alpha {alpha:.2f} +- {spread:.2f}"
-            _write(image, [text], (int(left) + 4, max(int(top) - 4, 18)), 0.42)
-    _write(image, _captions(frame), (8, 18), 0.42)
+            _write(image, [text], (int(left) + 4, max(int(top) - 4, 18)), _TEXT_SIZE)
+    _write(image, _captions(frame), (8, 18), _TEXT_SIZE)
     return image
 
 
 class TopView:
     """A map of the hall from above: odom x to the right, y up.
+
+    A request for attention is a line to the person with two rings and its text for 2 s, an answer
+    two green rings. Each is in one control cycle, so :meth:`watch` gets the cycles that are not
+    drawn.
 
     Args:
         stage: the stage to draw.
@@ -122,12 +130,18 @@ class TopView:
             )
         self._robot_path: list[FloatArray] = []
         self._worker_paths: list[list[FloatArray]] = [[] for _ in stage.workers]
+        self._requests = RequestMemory()
+
+    def watch(self, frame: CrossingFrame) -> None:
+        """Remember the requests and answers of a frame, for the next ones that are drawn."""
+        self._requests.take(frame)
 
     def _pixels(self, points_odom_m: FloatArray) -> FloatArray:
         return np.asarray(points_odom_m * (self._scale, -self._scale) + self._offset)
 
     def draw(self, frame: CrossingFrame, stage: Stage, cone: AttentionCone) -> ImageRgb:
         """Draw one frame; the paths grow with every call."""
+        self.watch(frame)
         image: ImageRgb = self._background.copy()
         state = frame.robot_state
         self._robot_path.append(state.position_odom_m)
@@ -159,8 +173,29 @@ class TopView:
         cv2.fillConvexPoly(image, _fixed_point(outline), _ROBOT_COLOUR, cv2.LINE_AA, _SHIFT)
         nose = np.stack([state.position_odom_m, state.position_odom_m + 0.7 * rotation[:, 0]])
         draw_line(image, self._pixels(nose), _ROBOT_COLOUR, 2)
+        for each in self._requests.shown(frame):
+            self._draw_request(image, each, state.position_odom_m)
         self._draw_scale(image)
         return image
+
+    def _draw_request(
+        self, image: ImageRgb, request: ShownRequest, robot_odom_m: FloatArray
+    ) -> None:
+        if request.place_odom_m is None:
+            return
+        place = self._pixels(request.place_odom_m)
+        colour = awareness_colour(1.0) if request.answered else _ROBOT_COLOUR
+        if not request.answered:
+            draw_line(image, np.stack([self._pixels(robot_odom_m), place]), colour, 1)
+        angles = np.linspace(0.0, 2.0 * math.pi, 49)
+        for radius_m in _WAVES_M:
+            ring = np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius_m * self._scale
+            draw_line(image, place + ring, colour, 2)
+        width, height = cv2.getTextSize(request.text, _FONT, _TEXT_SIZE, 1)[0]
+        above = place + (-0.5 * width, -_WAVES_M[1] * self._scale - height)
+        most = np.maximum((4.0, 18.0), (image.shape[1] - width - 8.0, image.shape[0] - 8.0))
+        left, top = np.clip(above, (4.0, 18.0), most).round().astype(int).tolist()
+        _write(image, [request.text], (left, top), _TEXT_SIZE)
 
     def _draw_scale(self, image: ImageRgb) -> None:
         y_px = image.shape[0] - 14.0

@@ -87,6 +87,7 @@ class _Recorder(AbstractContextManager["_Recorder"]):
         if self._map is None:
             size = (self._camera.width_px, self._camera.height_px)
             self._map = TopView(stage, size, _MAP_WINDOW_M)
+        self._map.watch(frame)
         half_tick = 0.5 / stage.scenario.control_hz
         case = next((c for c in self._pending_cases if abs(c.t_s - frame.t_s) <= half_tick), None)
         filming = self._video is not None and self._ticks % self._every == 0

@@ -11,7 +11,7 @@ from awarenav.drawing import Colour, Font, awareness_colour, draw_disc, draw_lin
 from perception import AttentionCone
 from perception.arrays import FloatArray, ImageRgb
 
-from ..crossing import CrossingFrame, CrossingResult
+from ..crossing import CrossingFrame, CrossingResult, RequestMemory
 from ._film_values import WITHOUT_AWARENESS, FilmRun, FilmValues, film_values, frame_index
 
 #: Width and height of a panel, pixels.
@@ -39,6 +39,8 @@ _SMALL: Final = Font(24, weight=500)
 
 _BODY_RADIUS_M: Final = 0.24
 _HEAD_RADIUS_M: Final = 0.13
+# Radii of the rings around a person who is asked to look.
+_WAVES_M: Final = (0.45, 0.65)
 _CONE_LENGTH_M: Final = 1.6
 _PLATE: Final[Colour] = (214, 217, 222)
 
@@ -123,7 +125,7 @@ def draw_map(run: FilmRun, free: CrossingResult, t_s: float) -> ImageRgb:
     """Draw the hall from above, the robot's way pointing up.
 
     Shows racks, the worker with head and attention cone, each obstacle as its circle, the robot,
-    and as an outline the robot that meets nobody.
+    requests to look and their answers, and as an outline the robot that meets nobody.
     """
     result = run.result
     index = frame_index(result, t_s)
@@ -148,7 +150,21 @@ def draw_map(run: FilmRun, free: CrossingResult, t_s: float) -> ImageRgb:
     fill_hull(image, map_px(_footprint(frame, result)), run.colour, 1.0)
     nose = frame.robot_state.position_odom_m + _turn(frame) @ np.array([0.62, 0.0])
     draw_line(image, map_px(np.stack([frame.robot_state.position_odom_m, nose])), run.colour, 3)
+    _draw_requests(image, result, index, run.colour)
     return image
+
+
+def _draw_requests(image: ImageRgb, result: CrossingResult, index: int, asks: Colour) -> None:
+    memory = RequestMemory()
+    for each in result.frames[: index + 1]:
+        memory.take(each)
+    for row, request in enumerate(memory.shown(result.frames[index])):
+        colour = awareness_colour(1.0) if request.answered else asks
+        _SMALL.write(image, request.text, (8, 6 + 28 * row), colour)
+        if request.place_odom_m is not None:
+            for radius_m in _WAVES_M:
+                ring = request.place_odom_m + radius_m * _circle()
+                draw_line(image, map_px(ring), colour, 2)
 
 
 def map_px(points_odom_m: FloatArray) -> FloatArray:

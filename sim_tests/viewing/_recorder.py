@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
+
+from nav_adapter import Alert, Answer
 
 from ..crossing import CrossingFrame, Stage
 from ._pictures import CameraPictures
@@ -46,6 +49,8 @@ class CrossingRecorder:
         self._cycles = 0
         self._scan = np.zeros((0, 2))
         self._scan_s = 0.0
+        self._alerts: tuple[Alert, ...] = ()
+        self._answers: tuple[Answer, ...] = ()
         self.begin: dict[str, Any] = {}
         self.states: list[dict[str, Any]] = []
 
@@ -60,9 +65,15 @@ class CrossingRecorder:
         elif frame.t_s - self._scan_s > _SCAN_AGE_S:
             self._scan = np.zeros((0, 2))
         number, self._cycles = self._cycles, self._cycles + 1
+        # An alert is in one control cycle only, which may be one between two states.
+        limit = frame.constraints
+        self._alerts += limit.alerts
+        self._answers += limit.answers
         if number % cycles_per_state(stage.scenario.control_hz):
             return
-        state = state_of(frame, stage, self._scan)
+        limit = replace(limit, alerts=self._alerts, answers=self._answers)
+        self._alerts, self._answers = (), ()
+        state = state_of(replace(frame, constraints=limit), stage, self._scan)
         picture = None if self._pictures is None else self._pictures.take(frame, stage)
         if picture is not None:
             state["picture"] = picture

@@ -86,8 +86,11 @@ def state_of(
         ``robot_odom`` is x (m), y (m) and heading (rad); each of ``people``, the truth, has
         ``odom`` (x, y and direction of gaze), the true α, distance and margin; each of ``tracks``
         has ``odom`` (x, y, vx, vy), α with its standard deviation and lower bound; each of
-        ``obstacles`` has its radius, and its outline where that is no circle. A number that is not
-        finite is None.
+        ``obstacles`` has its radius, and its outline where that is no circle. ``alerts`` are the
+        tracks that are warned of a collision. Each of ``requests`` to look at the robot has the
+        track, the means, the time that a look would win and the reason; each of ``answers`` has
+        the track and the time since the request. All three are in one state only. A number that
+        is not finite is None.
     """
     state, limit = frame.robot_state, frame.constraints
     points = frame.scan_points_odom_m if scan_points_odom_m is None else scan_points_odom_m
@@ -102,7 +105,21 @@ def state_of(
         "limited_by": limit.limited_by,
         "stale": limit.stale,
         "braking_suffices": limit.braking_suffices,
-        "alerts": [alert.track_id for alert in limit.alerts],
+        "alerts": [each.track_id for each in limit.alerts if each.kind != "attention"],
+        "requests": [
+            {
+                "id": each.track_id,
+                "means": each.means,
+                "wins_s": _rounded_number(each.wins_s),
+                "reason": each.reason,
+            }
+            for each in limit.alerts
+            if each.kind == "attention"
+        ],
+        "answers": [
+            {"id": each.track_id, "after_s": _rounded_number(each.after_s)}
+            for each in limit.answers
+        ],
         "people": _people(frame),
         "tracks": [
             {

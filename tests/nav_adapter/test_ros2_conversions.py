@@ -13,7 +13,15 @@ from shapely import affinity
 from shapely.geometry import Point as ShapelyPoint
 from shapely.geometry import Polygon
 
-from nav_adapter import Alert, AwarenessPolicy, NavAdapter, NavConstraints, NavError, paint_costmap
+from nav_adapter import (
+    Alert,
+    Answer,
+    AwarenessPolicy,
+    NavAdapter,
+    NavConstraints,
+    NavError,
+    paint_costmap,
+)
 from nav_adapter.ros2 import (
     SLOWEST_MPS,
     STOP_POLYGON_ID,
@@ -277,3 +285,28 @@ def test_alerts_follow_the_state_of_the_limit_as_warnings(
         assert int(values["track_id"]) == alert.track_id
         assert values["time_to_closest_s"] == f"{alert.time_to_closest_s:.3f}"
         assert values["closest_gap_m"] == f"{alert.closest_gap_m:.3f}"
+        assert not {"means", "wins_s"} & set(values)
+
+
+@pytest.mark.parametrize("means", ["light", "voice"])
+def test_requests_and_answers_are_no_fault_and_follow_the_warnings(means: str) -> None:
+    warning = Alert(3, "horn", 1.0, 0.2, "track 3: 1.0 s to contact")
+    request = Alert(4, "attention", 0.0, 1.5, "limits the robot", means=means, wins_s=2.1)
+    constraints = replace(
+        limited(0.25), alerts=(warning, request), answers=(Answer(4, 0.9), Answer(7, 1.25))
+    )
+    _, horn, asked, *answers = alerts(constraints).status
+    assert (horn.name, horn.level) == ("awarenav: horn", DiagnosticStatus.WARN)
+    assert (asked.name, asked.level) == ("awarenav: attention", DiagnosticStatus.OK)
+    assert asked.message == "limits the robot"
+    values = {each.key: each.value for each in asked.values}
+    assert values["track_id"] == "4"
+    assert (values["means"], values["wins_s"]) == (means, "2.100")
+    assert [(each.name, each.level) for each in answers] == [
+        ("awarenav: answer", DiagnosticStatus.OK)
+    ] * 2
+    told = [{each.key: each.value for each in status.values} for status in answers]
+    assert told == [
+        {"track_id": "4", "after_s": "0.900"},
+        {"track_id": "7", "after_s": "1.250"},
+    ]

@@ -11,7 +11,7 @@ import yaml
 from paths import ROOT
 
 from awarenav.bridge.command import bridge
-from nav_adapter import Alert, NavConstraints
+from nav_adapter import Alert, Answer, NavConstraints
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, SLOWEST_MPS, RobotFile, Topic, alerts
 from nav_adapter.ros2.messages import ros_type
 
@@ -59,8 +59,10 @@ def test_nav2_reads_the_published_topics() -> None:
 
 def test_alerts_have_the_documented_names() -> None:
     kinds = get_args(get_type_hints(Alert)["kind"])
-    given = tuple(Alert(1, kind, 1.0, 0.0, "why") for kind in kinds)
-    message = alerts(NavConstraints(0.0, (), 0.0, "why", False, alerts=given))
+    means = {kind: "voice" if kind == "attention" else kind for kind in kinds}
+    given = tuple(Alert(1, kind, 1.0, 0.0, "why", means=means[kind]) for kind in kinds)
+    answers = (Answer(1, 0.9),)
+    message = alerts(NavConstraints(0.0, (), 0.0, "why", False, alerts=given, answers=answers))
     assert [status.name for status in message.status if f"`{status.name}`" not in TEXT] == []
 
 

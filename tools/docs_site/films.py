@@ -62,13 +62,14 @@ class Film:
 
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
         """Draw the frame if it is time for the next picture."""
-        if frame.t_s < self._next_s - 1e-9:
-            return
-        self._next_s += _EVERY_S
         if self._view is None:
             window = _window(stage)
             height = round(_WIDTH_PX * (window[3] - window[1]) / (window[2] - window[0]))
             self._view = TopView(stage, (_WIDTH_PX, min(height, _MAX_HEIGHT_PX)), window)
+        self._view.watch(frame)
+        if frame.t_s < self._next_s - 1e-9:
+            return
+        self._next_s += _EVERY_S
         # The points of the scans flicker, and would make up most of the file.
         calm = dataclasses.replace(frame, scan_points_odom_m=np.zeros((0, 2)))
         picture = Image.fromarray(self._view.draw(calm, stage, self._cone))

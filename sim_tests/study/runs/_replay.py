@@ -93,10 +93,11 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         number, self._cycles = self._cycles, self._cycles + 1
         nearest_m = min(frame.separations_m, default=float("inf"))
         closer = nearest_m < self._closest_m or self._closest is None
-        if number % every and not closer:
-            return
         if self._view is None:
             self._view = TopView(stage, (_MAP_WIDTH_PX, _HEIGHT_PX), _window(stage))
+        self._view.watch(frame)
+        if number % every and not closer:
+            return
         above = self._view.draw(frame, stage, self._cone)
         if closer:
             self._closest_m, self._closest = nearest_m, above

@@ -47,6 +47,23 @@ function font(pen, size, weight = 400) {
   pen.font = `${weight} ${size}px system-ui, -apple-system, "Segoe UI", Roboto, sans-serif`;
 }
 
+// Requests and answers of the last 2 s, of each track the latest; each is in one state only.
+const SHOWN_S = 2;
+
+function recentRequests(states, index) {
+  const latest = new Map();
+  for (let at = index; at >= 0 && states[index].t_s - states[at].t_s <= SHOWN_S; at -= 1) {
+    const { requests = [], answers = [] } = states[at];
+    for (const { id, after_s } of answers) {
+      if (!latest.has(id)) latest.set(id, { id, answered: true, text: `track ${id} looked after ${after_s.toFixed(1)} s` });
+    }
+    for (const { id, means, wins_s, reason } of requests) {
+      if (!latest.has(id)) latest.set(id, { id, answered: false, reason, text: `asks track ${id} by ${means}: wins ${wins_s.toFixed(1)} s` });
+    }
+  }
+  return [...latest.values()];
+}
+
 // Text that stays legible over any drawing.
 function writeOver(pen, text, x, y, colour, halo) {
   pen.lineWidth = 4;
@@ -101,6 +118,7 @@ function drawPlan(canvas, begin, states, index, layers) {
   viewEdges(pen, begin, state, x, y);
   robot(pen, begin, state, x, y, scale);
   if (layers.tracks) for (const track of state.tracks) trackMark(pen, track, state, x, y, scale, height);
+  for (const each of recentRequests(states, index)) requestMark(pen, each, state, x, y, scale);
   scaleBar(pen, scale, height);
 }
 
@@ -249,6 +267,29 @@ function trackMark(pen, track, state, x, y, scale, bottom) {
   const name = state.tracks.length > 3 ? "" : "track ";
   const text = `${name}${track.id}: α ≥ ${bound.toFixed(2)}`;
   writeOver(pen, text, u, Math.max(v - away - 6, 14), PALETTE.ink, PALETTE.floor);
+}
+
+// Waves about the person and a line from the robot that asks; green once the person has looked.
+function requestMark(pen, request, state, x, y, scale) {
+  const held = (each) => each.id === request.id;
+  const found = state.tracks.find(held) || state.obstacles.find(held);
+  if (!found) return;
+  const u = x(found.odom[0]), v = y(found.odom[1]);
+  pen.strokeStyle = request.answered ? PALETTE.aware : PALETTE.robot;
+  pen.lineWidth = 2;
+  if (!request.answered) {
+    pen.beginPath();
+    pen.moveTo(x(state.robot_odom[0]), y(state.robot_odom[1]));
+    pen.lineTo(u, v);
+    pen.setLineDash([2, 5]);
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+  for (const radius_m of [0.42, 0.62]) {
+    pen.beginPath();
+    pen.arc(u, v, Math.max(radius_m * scale, 40 * radius_m), 0, 7);
+    pen.stroke();
+  }
 }
 
 function scaleBar(pen, scale, height) {

@@ -49,6 +49,9 @@
     const more = (state.stale ? " (data too old)" : "") +
       (state.braking_suffices ? "" : " (braking does not suffice)");
     find("reason").textContent = state.limited_by + more;
+    const asked = recentRequests(player.states, player.index);
+    find("requests").textContent = asked.map((each) => each.text).join("; ") || "–";
+    find("requests").title = asked.map((each) => each.reason).filter(Boolean).join("; ");
     const last = player.states[player.states.length - 1].t_s;
     find("clock").textContent = `${state.t_s.toFixed(2)} of ${last.toFixed(2)} s`;
     const said = `${state.t_s.toFixed(2)} seconds: speed ${fixed(state.speed_mps)}, limit ` +

@@ -16,6 +16,7 @@ from nav_adapter import (
     RobotState,
     max_speed_mps,
 )
+from nav_adapter.policies import AttentionRules
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -37,7 +38,7 @@ def upgrade(tmp_path, capsys):
         lines = {}
         for line in capsys.readouterr().out.splitlines():
             what, _, rest = line.partition(" ")
-            if what in ("kept", "renamed", "replaced", "dropped", "check"):
+            if what in ("kept", "renamed", "replaced", "dropped", "added", "check"):
                 key, _, said = rest.strip().partition(": ")
                 lines[key] = (what, said)
         return status, AwarenessPolicy.from_yaml(new), lines
@@ -88,6 +89,15 @@ def test_what_the_old_file_left_out_keeps_the_old_default(upgrade):
     assert "default of 0.2" in lines["speed.aware_human_speed_mps"][1]
     assert policy.filter.noticed_memory_s == 3.0
     assert lines["filter.noticed_memory_s"][0] == "replaced"
+
+
+@pytest.mark.parametrize(
+    ("text", "asks"), [("", True), ("alerts: {miss_within_m: 0.4}", True), ("alerts: null", False)]
+)
+def test_the_new_requests_are_named_and_off_where_alerts_were(upgrade, text, asks):
+    _, policy, lines = upgrade(ALIKE + text)
+    assert policy.attention == (AttentionRules() if asks else None)
+    assert lines["attention"][0] == "added"
 
 
 def share(shape, below, above):
@@ -269,6 +279,7 @@ def test_a_quicker_person_and_a_longer_delay_are_kept(upgrade):
         ("timing: null", "timing must be a mapping"),
         ("inflation: null", "inflation must be a mapping"),
         ("reach: {turn_deg: 40}", "policy of the present version"),
+        ("attention: null", "policy of the present version"),
         ("- 1", "must hold a mapping"),
     ],
 )
