@@ -12,8 +12,7 @@ from tracking import PersonTrack
 from tracking.clock import JumpedClock
 from tracking.prediction import PredictionModel
 
-from ._alert import Alert
-from ._alerting import AlertHistory, alerts_due
+from ._asking import Addressed, AddressHistory, Addressing
 from ._checks import age_of_s, checked_tracks, goes_back, refuse_absurd, require_type
 from ._constraints import NavConstraints
 from ._errors import NavError
@@ -37,7 +36,7 @@ class _Memory:
 
     Attributes:
         people: by id.
-        alert_history: stamps of the latest alerts.
+        addressed: the latest warnings and requests.
         constraints: the latest, or None before the first update.
         given: the latest tracks, state of the robot, and stamp of perception.
         ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
@@ -45,7 +44,7 @@ class _Memory:
     """
 
     people: Mapping[int, Person] = field(default_factory=dict)
-    alert_history: AlertHistory = field(default_factory=AlertHistory)
+    addressed: AddressHistory = field(default_factory=AddressHistory)
     constraints: NavConstraints | None = None
     given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
     ceiling_mps: float | None = None
@@ -126,6 +125,7 @@ class NavAdapter:
         self._prediction = prediction
         self._people = People(policy, robot)
         self._governor = SpeedGovernor(policy, robot, self._people)
+        self._addressing = Addressing(policy, robot, self._people, self._governor, prediction)
         self._memory = _Memory()
         self._clock = _Clock()
         self._warned_of_drive = False
@@ -169,7 +169,7 @@ class NavAdapter:
 
         Returns:
             Obstacles in the order of track ids, the speed limit with the rule that set it, and
-            alerts, the most urgent first.
+            alerts: warnings, the most urgent first, then a request for attention.
 
         Raises:
             NavError: for input of the wrong type or not finite, a position or standard deviation
@@ -301,18 +301,10 @@ class NavAdapter:
         if self._drives_sideways(robot_state):
             limit = limit.stopped(self._drive_problem(robot_state))
         limit, ceiling_mps = self._limit_recovery(before, limit, robot_state, pause_s, stale)
-        alerts: tuple[Alert, ...] = ()
-        alert_history = before.alert_history
-        if self._policy.alerts is not None and not stale:
-            alerts, alert_history = alerts_due(
-                self._policy.alerts,
-                self._robot,
-                people,
-                robot_state,
-                now,
-                self._policy.margins.uncertainty_sigmas,
-                alert_history,
-                self._prediction,
+        addressed = Addressed((), (), before.addressed)
+        if not stale:
+            addressed = self._addressing.step(
+                before.addressed, people, limit, robot_state, now, robot_age_s
             )
         braked_mps = _latest_travel_mps(before, robot_state)
         braked_mps -= self._robot.max_deceleration_mps2 * pause_s
@@ -323,7 +315,8 @@ class NavAdapter:
             limited_by=limit.limited_by,
             stale=stale,
             reachable_speed_limit_mps=max(limit.limit_mps, braked_mps),
-            alerts=alerts,
+            alerts=addressed.alerts,
+            answers=addressed.answers,
             braking_suffices=limit.braking_suffices,
             fastest_point_limit_mps=limit.fastest_point_mps,
             robot=self._robot,
@@ -333,7 +326,7 @@ class NavAdapter:
             ),
         )
         given = current, robot_state, perceived_s
-        return _Memory(people, alert_history, constraints, given, ceiling_mps, lost)
+        return _Memory(people, addressed.history, constraints, given, ceiling_mps, lost)
 
     def _limit_recovery(
         self,

@@ -83,6 +83,11 @@ def alerts_due(
     return tuple(alerts), AlertHistory(latest, sound_stamp_s)
 
 
+def is_quiet(history: AlertHistory, now: float) -> bool:
+    """Return whether no warning has sounded in the last second."""
+    return now - history.sound_stamp_s >= _QUIET_S
+
+
 def _candidates(
     rules: AlertRules,
     robot: RobotProfile,
@@ -103,7 +108,7 @@ def _candidates(
     for track_id, memory in people.items():
         if memory.track.status == "tentative" or memory.awareness_lower >= _UNAWARE_BELOW:
             continue
-        time_s, gap_m = _closest_approach(
+        time_s, gap_m = closest_approach(
             memory, position, velocity, age_s, reach_m + sigmas * memory.sigma_m
         )
         if prediction is not None and math.isfinite(time_s):
@@ -129,7 +134,7 @@ def _kind(rules: AlertRules, time_s: float) -> AlertKind | None:
     return "light" if time_s < rules.light_within_s else None
 
 
-def _closest_approach(
+def closest_approach(
     memory: Person, robot_m: Vector2, robot_mps: Vector2, age_s: float, reach_m: float
 ) -> tuple[float, float]:
     """Return time (s) and gap (m) of the closest approach; the time is infinite if they move apart.

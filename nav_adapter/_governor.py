@@ -32,12 +32,14 @@ class GovernedSpeed:
         braking_suffices: whether a robot that brakes from now on stops in time.
         fastest_point_mps: the limit without the robot's own maximum, ≥ ``limit_mps``; infinite if
             nobody limits the robot.
+        track_id: the person who sets the limit; None if nobody does, or somebody who is lost.
     """
 
     limit_mps: float
     limited_by: str
     braking_suffices: bool
     fastest_point_mps: float
+    track_id: int | None = None
 
     def at_most(self, limit_mps: float, limited_by: str) -> GovernedSpeed:
         """Return the lower of this limit and another one, which has a reason of its own."""
@@ -85,6 +87,7 @@ class SpeedGovernor:
         """
         maximum_mps = self._robot.max_speed_mps
         lowest_mps, reason, suffices = math.inf, "robot maximum", True
+        lowest_id: int | None = None
         kept: dict[int, Person] = {}
         if people or lost:
             straight, courses = self.courses(robot_state, robot_age_s)
@@ -95,6 +98,7 @@ class SpeedGovernor:
                 own_mps, rule = self.person_mps(person, straight, courses, now, counts_mps)
                 if own_mps < lowest_mps:
                     lowest_mps, reason = own_mps, f"track {track_id}: {rule}"
+                    lowest_id = track_id
                 # A robot within its limit has the whole reaction time left.
                 if own_mps < speed_mps and suffices and speed_mps >= STANDING_MPS:
                     suffices = self._stops_in_time(person, straight, courses, speed_mps, now)
@@ -107,10 +111,10 @@ class SpeedGovernor:
                 kept[track_id] = person._replace(lost_limit_mps=first_mps)
                 if max(own_mps, ceiling_mps) < lowest_mps:
                     lowest_mps = max(own_mps, ceiling_mps)
-                    reason = f"track {track_id}: lost"
+                    reason, lowest_id = f"track {track_id}: lost", None
         if lowest_mps >= maximum_mps:
             return GovernedSpeed(maximum_mps, "robot maximum", suffices, lowest_mps), kept
-        return GovernedSpeed(lowest_mps, reason, suffices, lowest_mps), kept
+        return GovernedSpeed(lowest_mps, reason, suffices, lowest_mps, lowest_id), kept
 
     def courses(
         self, robot_state: RobotState, robot_age_s: float

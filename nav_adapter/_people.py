@@ -324,7 +324,7 @@ class People:
         # Clutter, and people who are known by their own id, explain nobody's absence.
         takers = [
             track
-            for track in tracks
+            for track in sorted(tracks, key=lambda track: track.id)
             if track.status != "tentative" and (track.id in jumped or track.id not in people)
         ]
         for track_id in sorted(jumped):

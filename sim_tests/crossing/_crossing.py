@@ -15,7 +15,7 @@ from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfil
 from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
 
-from ..actors.behaviour import PersonOutcome
+from ..actors.behaviour import PersonOutcome, RequestMeans
 from ..actors.robot import RobotModel
 from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
 from ..world.render import RendererName
@@ -197,6 +197,7 @@ class Crossing(AbstractContextManager["Crossing"]):
         constraints = self._adapter.update(
             sensed.tracks, sensed.state, t_s, perception_stamp_s=sensed.stamp_s
         )
+        self._ask(constraints, sensed)
         return Situation(
             t_s,
             state,
@@ -208,6 +209,14 @@ class Crossing(AbstractContextManager["Crossing"]):
             tuple(self.meter.separations_m),
             _at_goal(self.scenario, state, self.goal_odom_m),
         )
+
+    def _ask(self, constraints: NavConstraints, sensed: Sensed) -> None:
+        """Let the people hear the robot's requests for attention; warnings do not reach them."""
+        places = {track.id: track.position_odom_m for track in sensed.tracks}
+        for alert in constraints.alerts:
+            if alert.kind == "attention" and alert.track_id in places:
+                means: RequestMeans = "light" if alert.means == "light" else "voice"
+                self.stage.request(means, places[alert.track_id])
 
     def command(self, speed_mps: float, yaw_rate_radps: float, lateral_mps: float = 0.0) -> None:
         """Give the robot a command; it holds until the next one.
@@ -260,8 +269,8 @@ def run_crossing(
         fault: a fault of sensors, detections or odometry; frames keep the truth about the robot.
         renderer: renderer of the images: ``"tiny"``, ``"gl"``, or ``"auto"`` for the fastest
             available. Their pixels are nearly, but not exactly, the same.
-        population: habits of the people, ``"classic"`` or ``"recorded"``; None for the scenario's
-            own. See :meth:`Scenario.with_population`.
+        population: habits of the people, such as ``"recorded"``, ``"answers=0.3"``, or both; None
+            for the scenario's own. See :meth:`Scenario.with_population`.
 
     Raises:
         SimError: unknown scenario, robot, population or perception, a planner without ``plan``, or

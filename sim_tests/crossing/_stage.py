@@ -16,16 +16,11 @@ from perception.arrays import FloatArray
 
 from ..actors.behaviour import (
     MovingBody,
-    PersonBehaviour,
     PersonMotion,
     PersonOutcome,
+    RequestMeans,
     RobotBody,
-    Scripted,
     Surroundings,
-    Walker,
-    displaced_people,
-    replayed_people,
-    walker_of,
 )
 from ..actors.body import Worker
 from ..actors.robot import NOVA_CARTER, Amr, AmrLook, KinematicLook, KinematicRobot
@@ -33,7 +28,9 @@ from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.bullet import pybullet
 from ..world.render import RendererName
+from ._audience import Audience
 from ._metrics import STANDING_SPEED_MPS, SafetyMeter
+from ._people import staged_people
 from ._robot_sight import RobotSight, near_robot
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.
@@ -106,16 +103,11 @@ class Stage(AbstractContextManager["Stage"]):
         self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
             self.amr = _robot(self.warehouse, scenario)
-            self.walkers = self._walkers(
-                np.random.default_rng(0) if people_rng is None else people_rng
-            )
-            self._behaviours: tuple[PersonBehaviour, ...] = (
-                *(
-                    Scripted(script, float(offset))
-                    for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
-                ),
-                *self.walkers,
-                *self._recorded_people(),
+            self.walkers, self._behaviours, ears = staged_people(
+                scenario,
+                self.warehouse.obstacle_boxes_odom,
+                start_offsets_s,
+                np.random.default_rng(0) if people_rng is None else people_rng,
             )
             self.workers = tuple(
                 Worker(self.warehouse, each.stature_m, look=each.look, stride_m=each.stride_m)
@@ -130,6 +122,7 @@ class Stage(AbstractContextManager["Stage"]):
             else AmrLook.of(self.warehouse, self.amr)
         )
         self._sight = RobotSight(self.amr, self.workers)
+        self._audience = Audience(ears, self.workers, self._sight)
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
@@ -176,6 +169,22 @@ class Stage(AbstractContextManager["Stage"]):
                 if near:
                     self._update_contact(index, (previous, current), meter)
         self._place_workers()
+
+    def request(self, means: RequestMeans, place_odom_m: FloatArray) -> None:
+        """Ask the person at a place for attention, from where the robot is now.
+
+        The person nearest to the place, and within 1 m of it, is addressed. Everybody else within
+        earshot may hear it as well.
+
+        Args:
+            means: a light or a voice.
+            place_odom_m: (2,) where the robot takes the person to be.
+        """
+        robot = self.amr.T_odom_base[:2, 3]
+        heard = self._audience.hear(self.t_s, means, place_odom_m, robot, self._motions)
+        for behaviour, what in zip(self._behaviours, heard, strict=True):
+            if what is not None:
+                behaviour.hear(what)
 
     def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
         """Measure the separation of every person; return the separation margins."""
@@ -225,28 +234,6 @@ class Stage(AbstractContextManager["Stage"]):
     def outcomes(self) -> tuple[PersonOutcome, ...]:
         """Outcomes of the people who react, in their order."""
         return tuple(walker.outcome() for walker in self.walkers)
-
-    def _walkers(self, rng: np.random.Generator) -> tuple[Walker, ...]:
-        """Return the people who react, each with a random generator of their own."""
-        jitter = self.scenario.start_jitter_s
-        make = walker_of(self.scenario.population)
-        walkers = []
-        for spec, own in zip(
-            self.scenario.people, rng.spawn(len(self.scenario.people)), strict=True
-        ):
-            offset = float(own.uniform(-jitter, jitter))
-            boxes = self.warehouse.obstacle_boxes_odom
-            walkers.append(make(spec, own, boxes, offset_s=offset))
-        return tuple(walkers)
-
-    def _recorded_people(self) -> tuple[PersonBehaviour, ...]:
-        scenario = self.scenario
-        path, leaves = scenario.replay_csv, scenario.replay_leaves
-        if path is None:
-            return ()
-        if scenario.replay_reacts:
-            return displaced_people(path, self.warehouse.obstacle_boxes_odom, leaves=leaves)
-        return replayed_people(path, leaves=leaves)
 
     def _place_workers(self) -> None:
         robot, others = self._robot_body(), self._moving_bodies()

@@ -17,7 +17,7 @@ from perception.arrays import FloatArray
 from perception.installation import install_command
 from tracking.config import complaints
 
-from ..actors.behaviour import known_population
+from ..actors.behaviour import population_of
 from ..actors.robot import NOVA_CARTER, RobotModel
 from ..crossing import (
     STANDING_SPEED_MPS,
@@ -156,7 +156,9 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
-        self._population = None if population is None else known_population(population)
+        if population is not None:
+            population_of(population)  # refuses an unknown one now
+        self._population = population
         self._robot = None if robot is None else RobotModel.of(robot)
         profile = NOVA_CARTER if self._robot is None else self._robot.profile
         limits = np.array(action_limits(profile))

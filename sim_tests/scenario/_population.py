@@ -39,6 +39,7 @@ def person_of_script(script: WorkerScript, name: str) -> PersonSpec:
         "start_s": max(start_s, 0.0),
         "pauses": pauses,
         "activity": script.activities[0].activity if script.activities else "none",
+        "hearing": script.hearing,
         "glances": {"notices_within_m": _SEES_WITHIN_M if watches else 0.0, "watches": watches},
     }
     if moving_s > 0.0:

@@ -20,10 +20,11 @@ from tracking.config import StrictConfig
 
 from ..actors.behaviour import (
     DEFAULT_POPULATION,
+    Hearing,
     PersonSpec,
     PopulationName,
     WorkerScript,
-    known_population,
+    population_of,
 )
 from ..actors.robot import NOVA_CARTER, RobotModel
 from ..world.camera import CameraTiming, SensorConfig
@@ -198,6 +199,7 @@ class Scenario(StrictConfig):
         people: people who look, react and walk by themselves; names are unique.
         population: habits of the people: ``"classic"``, or ``"recorded"`` as fitted to recorded
             people, see :meth:`with_population`.
+        hearing: how people hear a robot that asks for attention, and answer it.
         replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
             to the scenario's own file.
         replay_reacts: the recorded people leave their paths where the robot forces them off, and
@@ -224,6 +226,7 @@ class Scenario(StrictConfig):
     workers: tuple[WorkerScript, ...] = ()
     people: tuple[PersonSpec, ...] = ()
     population: PopulationName = DEFAULT_POPULATION
+    hearing: Hearing = Hearing()
     replay_csv: str | None = None
     replay_reacts: bool = False
     replay_leaves: bool = False
@@ -314,18 +317,24 @@ class Scenario(StrictConfig):
             del data["robot_model"]
         return yaml_text(data)
 
-    def with_population(self, name: str) -> Scenario:
-        """Return the same task among people of another population.
+    def with_population(self, text: str) -> Scenario:
+        """Return the same task among people with other habits.
 
         With ``"recorded"``, people who react also take the place of scripted workers, unless the
         robot drives straight on.
 
+        Args:
+            text: a population, ``"classic"`` or ``"recorded"``, numbers of :class:`Hearing`, or
+                both: ``"recorded"``, ``"recorded,answers=0.8,startles=0.2"``, ``"answers=0.3"``.
+
         Raises:
-            SimError: for an unknown name.
+            SimError: for an unknown population or number.
         """
-        population = known_population(name)
-        changes: dict[str, Any] = {"population": population}
-        if population == "recorded" and self.robot.straight_on_speed_mps is None:
+        name, numbers = population_of(text)
+        changes: dict[str, Any] = {} if name is None else {"population": name}
+        if numbers:
+            changes["hearing"] = self.hearing.with_numbers(numbers)
+        if name == "recorded" and self.robot.straight_on_speed_mps is None:
             taken = {person.name for person in self.people}
             names = (f"worker {number}" for number in itertools.count(1))
             free = (each for each in names if each not in taken)

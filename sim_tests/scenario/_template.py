@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from nav_adapter import RobotProfile
 from perception.documents import yaml_text
 
-from ..actors.behaviour import known_population
+from ..actors.behaviour import population_of
 from ..actors.robot import RobotModel
 from ..world.errors import SimError
 from ._distributions import Distribution, error_text
@@ -206,19 +206,22 @@ class ScenarioTemplate:
             {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
         )
 
-    def with_population(self, name: str) -> ScenarioTemplate:
-        """Return the same scenario among people of another population.
+    def with_population(self, text: str) -> ScenarioTemplate:
+        """Return the same scenario among people with other habits.
 
         Args:
-            name: as for :meth:`Scenario.with_population`; empty for the scenario's own.
+            text: as for :meth:`Scenario.with_population`; empty for the scenario's own.
 
         Raises:
-            SimError: for an unknown name.
+            SimError: for an unknown population or number.
         """
-        if not name:
+        if not text:
             return self
-        population = known_population(name)
-        return ScenarioTemplate({**self._data, "population": population}, self._source)
+        name, numbers = population_of(text)
+        changes: dict[str, Any] = {} if name is None else {"population": name}
+        if numbers:
+            changes["hearing"] = {**self._data.get("hearing", {}), **numbers}
+        return ScenarioTemplate({**self._data, **changes}, self._source)
 
     def to_text(self) -> str:
         """Return YAML for :meth:`from_text`, with the shared defaults written out."""

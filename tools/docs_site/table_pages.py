@@ -10,7 +10,14 @@ import griffe
 
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, Topic
 from nav_adapter.ros2.messages import ros_type
-from sim_tests.study.measures import METRICS, RECORD_COLUMNS, SHARES, EpisodeRecord, Metric
+from sim_tests.study.measures import (
+    METRICS,
+    RATIOS,
+    RECORD_COLUMNS,
+    SHARES,
+    EpisodeRecord,
+    Metric,
+)
 
 from .config_pages import unit_of
 from .roles import plain
@@ -41,6 +48,8 @@ def metrics_page() -> str:
             _metric_table(SHARES),
             "## Means over episodes",
             _metric_table(METRICS),
+            "## Ratios of sums over episodes",
+            _metric_table({name: ratio.metric for name, ratio in RATIOS.items()}),
             "## Columns of episodes.csv",
             "\n".join(columns) + "\n",
         ]

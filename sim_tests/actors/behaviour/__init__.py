@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from ._answering import Answering
 from ._displaced import Displaced, displaced_people
+from ._hearing import Ears, Heard, Hearing, Request, RequestMeans, StartleKind
 from ._obstacles import WALKER_RADIUS_M
 from ._person import (
     ALONE,
@@ -10,6 +12,7 @@ from ._person import (
     PersonBehaviour,
     PersonMotion,
     PersonOutcome,
+    PersonPath,
     RobotBody,
     Surroundings,
 )
@@ -22,6 +25,7 @@ from ._population import (
     draw_person,
     known_population,
     median_person,
+    population_of,
     walker_of,
 )
 from ._replayed import RecordedPath, Replayed, read_recordings, replayed_people
@@ -39,21 +43,29 @@ __all__ = [
     "POPULATIONS",
     "START_SHARES",
     "WALKER_RADIUS_M",
+    "Answering",
     "Displaced",
+    "Ears",
     "Glances",
+    "Heard",
+    "Hearing",
     "Lapse",
     "MovingBody",
     "PersonBehaviour",
     "PersonMotion",
     "PersonOutcome",
+    "PersonPath",
     "PersonSpec",
     "PopulationName",
     "Reactions",
     "RecordedPath",
     "RecordedWalker",
     "Replayed",
+    "Request",
+    "RequestMeans",
     "RobotBody",
     "Scripted",
+    "StartleKind",
     "Surroundings",
     "Walker",
     "WorkerScript",
@@ -61,6 +73,7 @@ __all__ = [
     "draw_person",
     "known_population",
     "median_person",
+    "population_of",
     "read_recordings",
     "replayed_people",
     "start_share",

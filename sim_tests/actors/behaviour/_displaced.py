@@ -18,7 +18,7 @@ from ._person import PersonMotion, RobotBody, Surroundings
 from ._replayed import Replayed, replayed_people
 from ._route import DesiredVelocity
 from ._social_force import RELAXATION_S, robot_force
-from ._trajectory import Trajectory
+from ._trajectory import MAX_ACCELERATION_MPS2, Trajectory, limited
 from ._walker import DECISION_PERIOD_S
 
 # A social force from here on moves a person off the recorded path.
@@ -29,7 +29,6 @@ _STANDOFF_M: Final = 0.45
 _RETURN_S: Final = 1.0
 _DISPLACED_MPS: Final = 1.6
 _DISPLACED_FACTOR: Final = 1.3
-_MAX_ACCELERATION_MPS2: Final = 3.0
 # The recording goes on from a place and a velocity this near to it.
 _BACK_WITHIN_M: Final = 0.01
 _BACK_WITHIN_MPS: Final = 0.05
@@ -185,9 +184,7 @@ class Displaced:
             (wish - now) / RELAXATION_S + push
             for wish, now, push in zip(wanted, state[2:], forced, strict=True)
         )
-        size = math.hypot(ax, ay)
-        if size > _MAX_ACCELERATION_MPS2:
-            ax, ay = ax * _MAX_ACCELERATION_MPS2 / size, ay * _MAX_ACCELERATION_MPS2 / size
+        ax, ay = limited(ax, ay, MAX_ACCELERATION_MPS2)
         next_vx, next_vy = state[2] + ax * DECISION_PERIOD_S, state[3] + ay * DECISION_PERIOD_S
         fastest = _fastest_mps(math.hypot(vx, vy))
         share = min(fastest / max(math.hypot(next_vx, next_vy), 1e-9), 1.0)

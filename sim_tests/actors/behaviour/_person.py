@@ -10,6 +10,7 @@ from typing import Final, Protocol
 from perception.arrays import FloatArray
 
 from ..body import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Activity, GaitPose
+from ._hearing import Heard
 
 #: Height of the eyes as a share of stature.
 EYE_HEIGHT_SHARE: Final = 0.94
@@ -145,8 +146,8 @@ class PersonMotion:
     away: bool = False
 
 
-class PersonBehaviour(Protocol):
-    """The behaviour of one person: a script, a recording or a walker that reacts."""
+class PersonPath(Protocol):
+    """A person who moves: by a script, a recording or decisions of their own."""
 
     @property
     def stature_m(self) -> float:
@@ -173,6 +174,14 @@ class PersonBehaviour(Protocol):
 
     def touch(self, towards_x: float, towards_y: float) -> None:
         """Note a contact with the robot, which lies in this direction (a unit vector in odom)."""
+        ...
+
+
+class PersonBehaviour(PersonPath, Protocol):
+    """The behaviour of one person, who also answers a request for attention."""
+
+    def hear(self, heard: Heard) -> None:
+        """Do what the person does who has heard a request of the robot."""
         ...
 
 

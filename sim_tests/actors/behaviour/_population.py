@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Callable
 from typing import Any, ClassVar, Final, Literal, get_args
@@ -11,6 +12,7 @@ import numpy as np
 from ...world.errors import SimError
 from ._gait_variation import GaitVariation, VariationFigures
 from ._gaze import EyeRest
+from ._hearing import Hearing
 from ._person import RobotBody, Surroundings
 from ._route import STANDING_BELOW_MPS, DesiredVelocity, Route, RouteFollower
 from ._spec import PersonSpec
@@ -68,6 +70,39 @@ def known_population(name: str) -> PopulationName:
         if name == known:
             return known
     raise SimError(f"population must be one of {', '.join(POPULATIONS)}, got {name!r}")
+
+
+def population_of(text: str) -> tuple[PopulationName | None, dict[str, float]]:
+    """Return the population and the numbers of :class:`Hearing` that a text names.
+
+    Args:
+        text: ``"recorded"``, ``"recorded,answers=0.8,startles=0.2"``, or ``"answers=0.3"`` for
+            other numbers alone, without a population.
+
+    Raises:
+        SimError: for an unknown population or number, and a value that is not possible.
+    """
+    first, *others = text.split(",")
+    name = None if "=" in first else known_population(first)
+    pairs = others if name else [first, *others]
+    valid = tuple(Hearing.model_fields)
+    numbers: dict[str, float] = {}
+    for pair in pairs:
+        key, equals, value = (part.strip() for part in pair.partition("="))
+        if not equals or key not in valid:
+            near = difflib.get_close_matches(key, valid, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise SimError(
+                f"population may be followed by KEY=VALUE of how people hear a request, with the "
+                f"keys {', '.join(valid)}, got {pair!r} in {text!r}{hint}"
+            )
+        if key in numbers:
+            raise SimError(f"population names {key} twice, got {text!r}")
+        try:
+            numbers[key] = float(value)
+        except ValueError:
+            raise SimError(f"{key} of a population must be a number, got {pair!r}") from None
+    return name, numbers
 
 
 def walker_of(population: str) -> Callable[..., Walker]:

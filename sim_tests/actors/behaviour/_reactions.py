@@ -137,8 +137,8 @@ class ReactionModel:
         self.first_reaction = self.first_reaction or self.reaction
         self._began_s, self._robot_waited_s = t_s, 0.0
         self._completed = self._passed = False
-        self._line = _robot_line(robot)
-        side = _left_of_line_m(place, robot, self._line)
+        self._line = robot_line(robot)
+        side = left_of_line_m(place, robot, self._line)
         # A person on the line leaves it to the side of the route, or to the left.
         onward = desired.speed_mps * (self._line[0] * desired.uy - self._line[1] * desired.ux)
         if abs(side) < 0.1:
@@ -159,7 +159,7 @@ class ReactionModel:
         """Return the desired velocity of the present reaction; update the encounter's state."""
         moves = math.hypot(robot.vx_mps, robot.vy_mps) > _ROBOT_STANDING_MPS
         if moves:
-            self._line = _robot_line(robot)
+            self._line = robot_line(robot)
         ux, uy = self._line
         dx, dy = place[0] - robot.x_m, place[1] - robot.y_m
         ahead = dx * ux + dy * uy
@@ -214,7 +214,7 @@ class ReactionModel:
         return DesiredVelocity(vx / speed, vy / speed, speed)
 
 
-def _robot_line(robot: RobotBody) -> tuple[float, float]:
+def robot_line(robot: RobotBody) -> tuple[float, float]:
     """Return the unit vector of the robot's course, of its heading if it stands."""
     speed = math.hypot(robot.vx_mps, robot.vy_mps)
     if speed > _ROBOT_STANDING_MPS:
@@ -226,7 +226,7 @@ def _distance_m(place: tuple[float, float], robot: RobotBody) -> float:
     return math.hypot(place[0] - robot.x_m, place[1] - robot.y_m)
 
 
-def _left_of_line_m(
+def left_of_line_m(
     place: tuple[float, float], robot: RobotBody, line: tuple[float, float]
 ) -> float:
     """Return the distance of a place to the left of the robot's line."""

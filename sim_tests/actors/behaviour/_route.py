@@ -204,6 +204,17 @@ class RouteFollower:
         if self._resumes_s is not None and self.arrived_s is None:
             self._resumes_s = min(self._resumes_s, t_s)
 
+    def times_s(self, now_s: float, alone: FreeWalk) -> tuple[float | None, float | None]:
+        """Return the time from the start to the end, and how late somebody on the way is.
+
+        Both are None before the start, and one of them after it; see :class:`PersonOutcome`.
+        """
+        if self.started_s is None:
+            return None, None
+        if self.arrived_s is not None:
+            return self.arrived_s - self.started_s, None
+        return None, alone.late_s(now_s - self.started_s, self.along_m)
+
     def _update(self, t_s: float, x: float, y: float, speed_mps: float) -> bool:
         """Update progress, stops and times; return whether the person is walking."""
         if t_s < self._start_s - 1e-9:

@@ -21,6 +21,7 @@ from ..body import (
     ActivityName,
     worker_names,
 )
+from ._hearing import Hearing
 from ._person import PersonMotion, Surroundings, eye_height_m
 from ._planned_walk import HeadingKey, PlannedMotion, PlannedWalk, Waypoint, planned_walk
 
@@ -84,6 +85,7 @@ class WorkerScript(StrictConfig):
         activities: keys of the hands in order of time, at least 0.6 s apart. The first one holds
             before its time as well. Empty is none. ``sitting`` and ``kneeling`` are postures of the
             whole body for the whole script, of a worker who stays at one place with one heading.
+        hearing: how the worker hears a request for attention; None as the scenario says.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -95,6 +97,7 @@ class WorkerScript(StrictConfig):
     heading: tuple[HeadingKey, ...] = ()
     gaze: tuple[GazeKey, ...] = ()
     activities: tuple[ActivityKey, ...] = ()
+    hearing: Hearing | None = None
 
     @model_validator(mode="after")
     def _in_order_of_time(self) -> WorkerScript:

@@ -10,6 +10,7 @@ from tracking.config import StrictConfig
 
 from ...world.errors import SimError
 from ..body import MAX_STATURE_M, MIN_STATURE_M, STAYING, ActivityName
+from ._hearing import Hearing
 
 
 class RoutePoint(StrictConfig):
@@ -170,6 +171,7 @@ class PersonSpec(StrictConfig):
         keeps_off_m: distance from the body's centre that the person keeps from a known robot ahead;
             more for a person who walks behind the robot.
         social: social forces of racks, people and, once it has been noticed, the robot.
+        hearing: how this person hears a request for attention; None as the scenario says.
         as_written: a population that draws speeds and glances keeps those of this person.
     """
 
@@ -192,6 +194,7 @@ class PersonSpec(StrictConfig):
     lapse: Lapse | None = None
     keeps_off_m: float = Field(default=0.45, ge=0.3, le=3.0)
     social: bool = True
+    hearing: Hearing | None = None
     as_written: bool = False
 
     @model_validator(mode="after")

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from typing import Final
+
 from ._obstacles import Obstacles
 
 State = tuple[float, float, float, float]  # x, y, vx, vy
+#: Largest acceleration of a person who walks.
+MAX_ACCELERATION_MPS2: Final = 3.0
 
 
 class Trajectory:
@@ -62,3 +67,9 @@ class Trajectory:
             vx, vy = (end[0] - x) / duration_s, (end[1] - y) / duration_s
             self.end = (*end, vx, vy)
         self._start_s, self._start, self.acceleration = t_s, (x, y, vx, vy), (ax, ay)
+
+
+def limited(x: float, y: float, most: float) -> tuple[float, float]:
+    """Return a vector, shortened to this length if it is longer."""
+    size = math.hypot(x, y)
+    return (x * most / size, y * most / size) if size > most else (x, y)

@@ -13,13 +13,16 @@ from ..body import Activity, Gait, OnlineFootsteps, skeleton
 from ._attention_span import AttentionSpan
 from ._avoidance import SlowRobotDetour, limit_approach, without_part
 from ._gaze import Gaze
+from ._head import AnsweringLook, turn_rate, twisted
+from ._hearing import Heard
 from ._obstacles import Obstacles
 from ._person import ALONE, PersonMotion, PersonOutcome, RobotBody, Surroundings
 from ._reactions import ReactionModel
 from ._route import STANDING_BELOW_MPS, DesiredVelocity, FreeWalk, Route, RouteFollower
 from ._social_force import RELAXATION_S, people_force, robot_force
 from ._spec import PersonSpec
-from ._trajectory import Trajectory
+from ._startle import Startle
+from ._trajectory import MAX_ACCELERATION_MPS2, Trajectory, limited
 
 #: Time between two decisions of a walker; in between its motion follows closed forms.
 DECISION_PERIOD_S: Final = 1.0 / 20.0
@@ -27,17 +30,13 @@ DECISION_PERIOD_S: Final = 1.0 / 20.0
 # A robot out of sight is extrapolated for this time, then forgotten.
 _REMEMBERED_S: Final = 3.0
 _BRAKING_S: Final = 0.1
-# Limits of acceleration and speed; the speed relative to the larger of free and desired speed.
-_MAX_ACCELERATION_MPS2: Final = 3.0
+# Highest speed, relative to the larger of free and desired speed.
 _MAX_SPEED_FACTOR: Final = 1.3
 _MIN_REFERENCE_MPS: Final = 0.5
 # Weaker social forces do not move a standing person.
 _UNMOVED_BELOW_MPS2: Final = 1.0
 # A person who goes first avoids the robot only within this distance.
 _TOO_NEAR_M: Final = 0.5
-_TURN_RATE_HZ: Final = 4.0
-_MAX_TURN_RADPS: Final = 2.6
-_MAX_TURN_RADPS2: Final = 15.0
 # A person whose heading is farther off walks slower until it is turned, down to this speed share.
 _TURN_FIRST_RAD: Final = math.radians(60.0)
 _MIN_TURNING_SHARE: Final = 0.1
@@ -117,6 +116,7 @@ class Walker:
         self._known_robot: tuple[RobotBody, float] | None = None
         self._touch: tuple[float, float, float] | None = None
         self._bumped_s = -math.inf
+        self._startle: Startle | None = None
         # The feet, and the positions of the last two motions.
         self._feet: OnlineFootsteps | None = None
         self._feet_s = 0.0
@@ -159,13 +159,8 @@ class Walker:
 
     def outcome(self) -> PersonOutcome:
         """Return the outcome for the person up to now."""
-        time_s = late_s = None
-        task, free = self._task, self._free_walk
-        if free is not None and task.started_s is not None:
-            if task.arrived_s is not None:
-                time_s = task.arrived_s - task.started_s
-            else:
-                late_s = free.late_s(self._now_s - task.started_s, task.along_m)
+        free = self._free_walk
+        time_s, late_s = (None, None) if free is None else self._task.times_s(self._now_s, free)
         return PersonOutcome(
             name=self.spec.name,
             noticed_s=self._gaze.noticed_s,
@@ -201,12 +196,13 @@ class Walker:
             )
         self._feet_s = t_s
         head_yaw, head_pitch, eye_yaw, eye_pitch = self._gaze.angles(after_s)
+        twist = self._gaze.twist_rad(after_s)
         return PersonMotion(
             position_odom_m=np.array([x, y]),
             velocity_odom_mps=np.array([vx, vy]),
-            heading_odom_rad=heading,
+            heading_odom_rad=heading + twist,
             walked_m=self._walked_m,
-            feet=feet,
+            feet=twisted(feet, twist),
             head_yaw_rad=head_yaw,
             head_pitch_rad=head_pitch,
             eye_yaw_rad=eye_yaw,
@@ -228,6 +224,13 @@ class Walker:
         self._last_position = self._previous_position
         if self._feet is not None:
             self._feet.undo()
+
+    def hear(self, heard: Heard) -> None:
+        """Turn to the robot that has asked for attention, or startle, as :class:`Heard` says."""
+        if heard.looks:
+            self._gaze.answer = AnsweringLook(heard.from_s, heard.looks_for_s)
+        if heard.startle:
+            self._startle = Startle(heard.startle, heard.from_s)
 
     def touch(self, towards_x: float, towards_y: float) -> None:
         """Note a contact with the robot in this direction: the person steps back and looks at it.
@@ -279,6 +282,10 @@ class Walker:
         if robot is not None:
             desired = limit_approach(desired, x, y, robot, self.spec.keeps_off_m)
         desired, facing = self._recoil_or_face(t_s, on_route, desired)
+        if self._startle is not None and around.robot is not None:
+            startled = self._startle.velocity(t_s, (x, y), around.robot)
+            if startled is not None:
+                desired, facing = startled, self._heading
         acceleration = self._acceleration((x, y, vx, vy), desired, robot, around)
         self._turn(facing)
         self._trajectory.start_segment(t_s, (x, y, vx, vy), acceleration, DECISION_PERIOD_S)
@@ -290,13 +297,14 @@ class Walker:
         robot = around.robot
         if robot is None:
             return None
-        visible = (
-            self._gaze.in_field_of_view(DECISION_PERIOD_S, place, robot) and around.sees_robot()
-        )
+        in_view = self._gaze.in_field_of_view(DECISION_PERIOD_S, place, robot)
+        asked = self._gaze.asked(t_s)
+        sighted = (in_view or asked) and around.sees_robot()
+        visible, answers = in_view and sighted, asked and sighted
         visible = self._span.sees(t_s, self._gaze.noticed_s, self._touch is not None, visible)
-        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, visible)
+        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, visible, answers)
         felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
-        if (visible and self._gaze.noticed_s is not None) or felt:
+        if ((visible or answers) and self._gaze.noticed_s is not None) or felt:
             self._known_robot = (robot, t_s)
         if self._known_robot is None or t_s - self._known_robot[1] > _REMEMBERED_S:
             return None
@@ -325,9 +333,7 @@ class Walker:
     def _turn(self, facing: float) -> None:
         """Set the turn rate of the body towards a heading."""
         off = math.remainder(facing - self._heading, math.tau)
-        rate = min(max(_TURN_RATE_HZ * off, -_MAX_TURN_RADPS), _MAX_TURN_RADPS)
-        most = _MAX_TURN_RADPS2 * DECISION_PERIOD_S
-        self._turning += min(max(rate - self._turning, -most), most)
+        self._turning = turn_rate(off, self._turning, DECISION_PERIOD_S)
 
     def _acceleration(
         self,
@@ -344,19 +350,14 @@ class Walker:
         ax, ay = (desired_vx - vx) / within_s, (desired_vy - vy) / within_s
         if self.spec.social:
             fx, fy = self._social_force(state, robot, around)
-            moves = desired.speed_mps > STANDING_BELOW_MPS
-            if moves or math.hypot(fx, fy) > _UNMOVED_BELOW_MPS2:
+            if desired.speed_mps > STANDING_BELOW_MPS or math.hypot(fx, fy) > _UNMOVED_BELOW_MPS2:
                 ax, ay = ax + fx, ay + fy
-        size = math.hypot(ax, ay)
-        if size > _MAX_ACCELERATION_MPS2:
-            ax, ay = ax * _MAX_ACCELERATION_MPS2 / size, ay * _MAX_ACCELERATION_MPS2 / size
+        ax, ay = limited(ax, ay, MAX_ACCELERATION_MPS2)
         next_vx, next_vy = vx + ax * DECISION_PERIOD_S, vy + ay * DECISION_PERIOD_S
         fastest = _MAX_SPEED_FACTOR * max(
             self.spec.speed_mps, desired.speed_mps, _MIN_REFERENCE_MPS
         )
-        speed = math.hypot(next_vx, next_vy)
-        if speed > fastest:
-            next_vx, next_vy = next_vx * fastest / speed, next_vy * fastest / speed
+        next_vx, next_vy = limited(next_vx, next_vy, fastest)
         t_s = self._tick * DECISION_PERIOD_S
         if self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S:
             next_vx, next_vy = without_part(next_vx, next_vy, self._touch[0], self._touch[1])
@@ -374,8 +375,7 @@ class Walker:
         fx, fy = people_force(x, y, vx, vy, around.others)
         ax, ay = ax + self._FORCE_SHARE * fx, ay + self._FORCE_SHARE * fy
         if robot is not None:
-            near_x, near_y = robot.nearest_point_m(x, y)
-            too_near = math.hypot(near_x - x, near_y - y) < _TOO_NEAR_M
+            too_near = math.dist(robot.nearest_point_m(x, y), (x, y)) < _TOO_NEAR_M
             if too_near or not self._reactions.expects_robot_to_yield:
                 fx, fy = robot_force(x, y, vx, vy, robot)
                 ax, ay = ax + fx, ay + fy

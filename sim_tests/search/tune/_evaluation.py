@@ -86,6 +86,15 @@ class Evaluation:
         return self.figures[1]
 
     @property
+    def requests(self) -> float:
+        """Mean requests for attention per crossing."""
+        return float(np.mean(self._values("requests"))) if self.records else 0.0
+
+    def is_within(self, risk: float, requests: float | None) -> bool:
+        """Return whether step-out impacts and requests per crossing are at most the given ones."""
+        return self.risk <= risk and (requests is None or self.requests <= requests)
+
+    @property
     def moving_contacts(self) -> int:
         """Number of episodes in which a moving robot and a person touched, by any cause."""
         return sum(record.moving_touched for record in self.records)

@@ -13,7 +13,7 @@ from ._evaluation import OBJECTIVE, Evaluation
 
 #: The name of a finalist that is shown to be better than the base policy.
 BEATS_BASE: Final = "beats_base"
-#: The names of the trials with the least time lost within the risk.
+#: The names of the trials with the least time lost within the bounds.
 PLACES: Final = ("least_time_lost", "second", "third")
 #: All names of finalists.
 REASONS: Final = (BEATS_BASE, *PLACES)
@@ -75,21 +75,25 @@ def beats(
     risk: float,
     hold_out_scenarios: Container[str],
     level: float,
+    requests: float | None = None,
 ) -> bool:
     """Return whether the held-out episodes show that a policy is better than the base policy.
 
-    They show it if its step-out impacts are within the given risk, the moving robot touched nobody,
-    and over at least :data:`FEW_PAIRS` pairs the paired interval of the time lost lies below 0,
-    without a worse mean in the held-out scenarios alone. The time does not matter if the base
-    policy is above the risk.
+    They show it if its step-out impacts are within the given risk and its requests for attention
+    per crossing within their bound, if there is one, the moving robot touched nobody, and over at
+    least :data:`FEW_PAIRS` pairs the paired interval of the time lost lies below 0, without a worse
+    mean in the held-out scenarios alone. The time does not matter if the base policy is above the
+    risk or the bound.
     """
     held_out = candidate.held_out
-    if held_out.moving_contacts or candidate.tuning.moving_contacts or held_out.risk > risk:
+    if held_out.moving_contacts or candidate.tuning.moving_contacts:
+        return False
+    if not held_out.is_within(risk, requests):
         return False
     whole = held_out.minus(base.held_out, OBJECTIVE, level)
     if whole.n < FEW_PAIRS:
         return False
-    if base.held_out.risk > risk:
+    if not base.held_out.is_within(risk, requests):
         return True
     part = held_out.within(hold_out_scenarios).minus(base.held_out, OBJECTIVE, level)
     return whole.high < 0.0 and not (part.n and part.value > 0.0)
@@ -100,10 +104,13 @@ def named_winner(
     base: Candidate,
     risk: float,
     hold_out_scenarios: Container[str],
+    requests: float | None = None,
 ) -> list[Candidate]:
     """Return the candidates; the best of those that beat the base policy has that name first."""
     level = level_of(len(candidates))
-    winners = [each for each in candidates if beats(each, base, risk, hold_out_scenarios, level)]
+    winners = [
+        each for each in candidates if beats(each, base, risk, hold_out_scenarios, level, requests)
+    ]
     if not winners:
         return list(candidates)
     best = min(winners, key=lambda each: each.held_out.figures)

@@ -40,7 +40,7 @@ def _draw_trials(axes: Axes, tuning: Tuning) -> None:
     within = {trial.number for trial in tuning.ranked}
     groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {
         (_TRIAL, "o", "trial"): [],
-        (_WITHIN, "o", "trial within the risk"): [],
+        (_WITHIN, "o", "trial within the bounds"): [],
         (_CONTACT, "x", "trial with a contact"): [],
     }
     other, fine, touched = groups.values()

@@ -60,7 +60,8 @@ class PolicyRange(Range):
 class PolicySpace:
     """The policies that differ from a base policy in some numbers.
 
-    Every point of the space is a valid policy: numbers that do not fit together are moved to the
+    A part that the base policy has turned off, such as ``attention: null``, is not searched. Every
+    point of the space is a valid policy: numbers that do not fit together are moved to the
     nearest that do. No policy is below the floor.
 
     Args:
@@ -74,8 +75,11 @@ class PolicySpace:
     def __init__(
         self, base: AwarenessPolicy, ranges: Mapping[str, PolicyRange] | None = None
     ) -> None:
-        self.ranges = dict(shipped_ranges() if ranges is None else ranges)
         self._data: dict[str, Any] = base.model_dump(mode="json")
+        given = shipped_ranges() if ranges is None else ranges
+        self.ranges = {key: each for key, each in given.items() if not _is_off(self._data, key)}
+        if not self.ranges:
+            raise SimError("the policy has turned off every part that the ranges search")
         for key, each in self.ranges.items():
             for place in (key, *each.also):
                 bound = _LOWER_BOUNDS.get(place)
@@ -83,6 +87,8 @@ class PolicySpace:
                     raise SimError(
                         f"{place}: must not be searched below {bound:g}, got {each.low:g}"
                     )
+                if _is_off(self._data, place):
+                    continue
                 if not isinstance(_get(self._data, place), float | int):
                     near = difflib.get_close_matches(place, _number_keys(self._data), n=1)
                     hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -158,6 +164,19 @@ def _get(data: Mapping[str, Any], place: str) -> Any:
             return None
         node = node[key]
     return node
+
+
+def _is_off(data: Mapping[str, Any], place: str) -> bool:
+    """Return whether the policy has null for a part that holds the dotted key."""
+    *parts, _ = place.split(".")
+    node: Any = data
+    for part in parts:
+        if not isinstance(node, Mapping) or part not in node:
+            return False
+        node = node[part]
+        if node is None:
+            return True
+    return False
 
 
 def _has_both(data: Mapping[str, Any], *places: str) -> bool:

@@ -110,22 +110,27 @@ def table_lines(tuning: Tuning) -> list[str]:
     rows = (*tuning.anchors, *tuning.chosen)
     names = [", ".join(each.names) for each in rows]
     width = max(18, *map(len, names)) + 1
+    asks = f"{'requests':>10s}" if tuning.asks else ""
+    heads = f"{'time lost (s)':>21s}{'step-out':>21s}{'contacts':>10s}{asks}"
     lines = [
-        f"{'':{width + 5}s}{'tuning seeds':^52s}  {'held-out seeds':^52s}".rstrip(),
-        f"{'policy':{width}s}{'trial':>5s}"
-        + (2 * f"{'time lost (s)':>21s}{'step-out':>21s}{'contacts':>10s}  ").rstrip(),
+        " " * (width + 5)
+        + f"{'tuning seeds':^{len(heads)}s}  {'held-out seeds':^{len(heads)}s}".rstrip(),
+        f"{'policy':{width}s}{'trial':>5s}" + (2 * f"{heads}  ").rstrip(),
     ]
     for name, each in zip(names, rows, strict=True):
         trial = "" if each.trial is None else str(each.trial)
         cells = f"{name:{width}s}{trial:>5s}"
         for evaluation in (each.tuning, each.held_out):
             time_s, risk = (evaluation.interval(name) for name in FIGURES)
-            cells += f"{time_s.text(2):>21s}{risk.text(2):>21s}{evaluation.moving_contacts:10d}  "
+            cells += f"{time_s.text(2):>21s}{risk.text(2):>21s}{evaluation.moving_contacts:10d}"
+            cells += f"{evaluation.requests:10.2f}  " if asks else "  "
         lines.append(cells.rstrip())
     lines.append(
         f"At most {tuning.risk:.2f} step-out impacts with unaware people per 1 000 crossings on "
         f"tuning seeds, {tuning.held_out_risk:.2f} on held-out seeds."
     )
+    if tuning.settings.requests is not None:
+        lines.append(f"At most {tuning.settings.requests:g} requests for attention per crossing.")
     trials = [trial.user_attrs.get(NOTES, {}) for trial in tuning.trials]
     early = [notes for notes in trials if notes.get("dropped")]
     if early:
@@ -140,7 +145,7 @@ def table_lines(tuning: Tuning) -> list[str]:
 def _write_trials(tuning: Tuning, path: Path) -> None:
     rank = {trial.number: place for place, trial in enumerate(tuning.ranked, start=1)}
     names = list(tuning.space.ranges)
-    notes = ("moving_contacts", "reached", "episodes", "dropped")
+    notes = ("moving_contacts", "requests", "reached", "episodes", "dropped")
     write_csv(
         path,
         ["trial", "state", *FIGURES, *notes, "rank", *names],
@@ -175,6 +180,7 @@ def _figures(tuning: Tuning, candidate: Candidate) -> dict[str, Any]:
         figures[name] = {
             "episodes": len(evaluation.records),
             "moving_contacts": evaluation.moving_contacts,
+            "requests_per_crossing": round(evaluation.requests, 6),
             "reached_goal": evaluation.reached,
             **{key: _interval_data(evaluation.interval(key)) for key in FIGURES},
             "minus_base": {key: _interval_data(evaluation.minus(other, key)) for key in FIGURES},
@@ -210,7 +216,7 @@ def _header(tuning: Tuning, candidate: Candidate, name: str) -> str:
         )
     lines.append(
         f"  contacts with the moving robot: {held_out.moving_contacts}; goals reached: "
-        f"{held_out.reached}"
+        f"{held_out.reached}; requests for attention per crossing: {held_out.requests:.2f}"
     )
     return "".join(f"# {line}\n" for line in lines)
 

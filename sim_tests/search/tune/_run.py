@@ -31,6 +31,7 @@ class TuneOptions:
     generation: int
     sampler: SamplerName
     risk: float | None
+    requests: float | None
     perception: PerceptionKind
     sensors: SensorSet
     camera: str
@@ -75,6 +76,7 @@ def tune_command(options: TuneOptions) -> int:
             options.hold_out_scenarios, templates_of(common["scenarios"])
         ),
         risk=options.risk,
+        requests=options.requests,
     )
 
     def report(tuning: Tuning) -> None:
@@ -120,12 +122,14 @@ def _continued(options: TuneOptions, trials: int, held_out: int) -> str:
     """Return the command that goes on with the tuning."""
     ranges = () if options.ranges is None else ("--ranges", options.ranges)
     risk = () if options.risk is None else ("--risk", options.risk)
+    requests = () if options.requests is None else ("--requests", options.requests)
     return command_text(
         "tune",
         *("--policy", options.policy),
         *episode_words(options),
         *ranges,
         *risk,
+        *requests,
         *("--trials", trials, "--episodes", options.episodes, "--held-out", held_out),
         *("--hold-out-scenarios", *options.hold_out_scenarios),
         *("--generation", options.generation, "--sampler", options.sampler),

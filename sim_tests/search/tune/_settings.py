@@ -43,6 +43,7 @@ class TuneSettings:
         hold_out_scenarios: names of the scenarios that no trial runs.
         risk: step-out impacts per 1 000 crossings that a policy may have; None for a twentieth of
             those of today's AMR in the same episodes.
+        requests: requests for attention that a policy may make per crossing; None for no bound.
     """
 
     policy_name: str
@@ -59,6 +60,7 @@ class TuneSettings:
     generation: int
     hold_out_scenarios: tuple[str, ...] = ()
     risk: float | None = None
+    requests: float | None = None
 
     @property
     def templates(self) -> tuple[ScenarioTemplate, ...]:

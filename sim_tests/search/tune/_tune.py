@@ -40,9 +40,11 @@ _RESULTS: Final = (
 )
 # Evaluated beside the trials.
 _PRESETS: Final = ("blind", "conservative", "balanced", "assertive", TODAY)
-# Constraints of a trial: the moving robot touches nobody, and the risk is at most the given one.
+# Constraints of a trial: the moving robot touches nobody, and the risk and, with a bound, the
+# requests for attention are at most the given ones.
 _CONTACTS: Final = "moving_contacts"
 _OVER_RISK: Final = "over_risk"
+_OVER_REQUESTS: Final = "over_requests"
 _POLL_S: Final = 0.5
 # Without a number of their own, policies may have this share of the risk of today's AMR.
 _SHARE_OF_TODAY: Final = 1.0 / 20.0
@@ -83,6 +85,17 @@ class Tuning:
     def winner(self) -> Candidate | None:
         """The chosen policy that is shown to be better than the base policy, if there is one."""
         return next((each for each in self.chosen if each.name == BEATS_BASE), None)
+
+    @property
+    def asks(self) -> bool:
+        """True if requests for attention are bounded, or a policy of the result made any."""
+        rows = (*self.anchors, *self.chosen)
+        made = any(each.tuning.requests or each.held_out.requests for each in rows)
+        return made or self.settings.requests is not None
+
+    def allows(self, candidate: Candidate) -> bool:
+        """Return whether risk and requests of a policy on held-out are at most the given ones."""
+        return candidate.held_out.is_within(self.held_out_risk, self.settings.requests)
 
     def minus_base(self, candidate: Candidate) -> Interval:
         """Return the paired difference in time lost to the base policy on the held-out episodes.
@@ -183,7 +196,11 @@ def _tuning(study: SharedStudy, race: _Race) -> Tuning:
         trials=tuple(trials),
         ranked=tuple(ranked),
         anchors=anchors,
-        chosen=tuple(named_winner(new, anchors[0], held_out_risk, settings.hold_out_scenarios)),
+        chosen=tuple(
+            named_winner(
+                new, anchors[0], held_out_risk, settings.hold_out_scenarios, settings.requests
+            )
+        ),
         risk=race.risk,
         held_out_risk=held_out_risk,
     )
@@ -317,13 +334,17 @@ class _Race:
                 if reason:
                     break
         time_s, risk = evaluation.estimate(base)
-        contacts = evaluation.moving_contacts
+        contacts, requests = evaluation.moving_contacts, evaluation.requests
+        constraints = {_CONTACTS: float(contacts), _OVER_RISK: risk - self.risk}
+        if self.settings.requests is not None:
+            constraints[_OVER_REQUESTS] = requests - self.settings.requests
         return Outcome(
             (time_s,),
-            {_CONTACTS: float(contacts), _OVER_RISK: risk - self.risk},
+            constraints,
             {
                 RISK: risk,
                 _CONTACTS: contacts,
+                "requests": requests,
                 "reached": evaluation.reached,
                 "episodes": len(evaluation.records),
                 "dropped": reason,

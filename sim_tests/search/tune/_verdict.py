@@ -16,8 +16,8 @@ def verdict_text(tuning: Tuning) -> str:
     base, winner = tuning.base, tuning.winner
     if not tuning.ranked:
         return (
-            f"keep {base.name}. No trial ran all of its episodes within the risk and without a "
-            "contact with the moving robot."
+            f"keep {base.name}. No trial ran all of its episodes within the bounds and without "
+            "a contact with the moving robot."
         )
     if winner is not None:
         return (
@@ -27,7 +27,7 @@ def verdict_text(tuning: Tuning) -> str:
         )
     nearest = nearest_candidate(tuning)
     if nearest is None:
-        return f"keep {base.name}. No trial within the risk differs from it and the presets."
+        return f"keep {base.name}. No trial within the bounds differs from it and the presets."
     reason = _reason(tuning, nearest)
     return (
         f"keep {base.name}. The nearest is {nearest.name} ({_also(nearest)}): {reason}. "
@@ -38,13 +38,13 @@ def verdict_text(tuning: Tuning) -> str:
 def nearest_candidate(tuning: Tuning) -> Candidate | None:
     """Return the chosen policy with the fewest contacts and the least time lost on held-out.
 
-    One above the risk comes after those within it.
+    One above the risk or the bound of requests comes after those within it.
     """
     return min(
         tuning.chosen,
         key=lambda each: (
             each.held_out.moving_contacts,
-            each.held_out.risk > tuning.held_out_risk,
+            not tuning.allows(each),
             each.held_out.figures,
         ),
         default=None,
@@ -55,7 +55,7 @@ def is_undecided(tuning: Tuning) -> bool:
     """Return whether more held-out episodes could show that a chosen policy is better."""
     return tuning.winner is None and any(
         not each.held_out.moving_contacts
-        and each.held_out.risk <= tuning.held_out_risk
+        and tuning.allows(each)
         and tuning.minus_base(each).value < 0.0
         for each in tuning.chosen
     )
@@ -69,8 +69,10 @@ def _reason(tuning: Tuning, candidate: Candidate) -> str:
     """Return why a policy does not beat the base policy."""
     if candidate.held_out.moving_contacts:
         return "the moving robot and a person touched in held-out episodes"
-    if candidate.held_out.risk > tuning.held_out_risk:
-        return "it is above the risk on held-out episodes"
+    if not tuning.allows(candidate):
+        risky = candidate.held_out.risk > tuning.held_out_risk
+        what = "is above the risk" if risky else "asks for attention too often"
+        return f"it {what} on held-out episodes"
     change = tuning.minus_base(candidate)
     if change.n < FEW_PAIRS:
         return f"fewer than {FEW_PAIRS} pairs of held-out episodes show nothing"
@@ -108,4 +110,10 @@ def _comparison(tuning: Tuning, candidate: Candidate) -> str:
         f"It has {held_out.risk:.2f} step-out impacts per 1 000 crossings, {base.name} "
         f"{base.held_out.risk:.2f}; {tuning.held_out_risk:.2f} are allowed."
     )
+    if tuning.asks:
+        most = "" if settings.requests is None else f"; {settings.requests:g} are allowed"
+        risk += (
+            f" It makes {held_out.requests:.2f} requests for attention per crossing, {base.name} "
+            f"{base.held_out.requests:.2f}{most}."
+        )
     return f"{text} ({100.0 * level:.4g} % intervals). {risk} {touched}"

@@ -77,6 +77,13 @@ from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, opt
     metavar="N",
     help="Step-out impacts with unaware people that a policy may have, per 1 000 crossings.",
 )
+@option(
+    "--requests",
+    type=Number(0.0),
+    show_default="no bound",
+    metavar="N",
+    help="Requests for attention that a policy may make per crossing.",
+)
 @options.perception()
 @options.sensors()
 @options.camera()

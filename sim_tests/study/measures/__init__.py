@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from ._answering import answering_note
     from ._attention import (
         ATTENTION_WITHIN_M,
         ATTENTIVE_FROM,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
         violation_excess_of_time,
         won_back,
     )
+    from ._ratios import RATIOS, Ratio
     from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
     from ._record_file import (
         read_record_file,
@@ -61,6 +63,7 @@ __all__ = [
     "FEW_PAIRS",
     "METRICS",
     "OVERSHOOT_MPS",
+    "RATIOS",
     "RECORD_COLUMNS",
     "SHARES",
     "STEP_OUT",
@@ -72,12 +75,14 @@ __all__ = [
     "Interval",
     "MeasuredAttention",
     "Metric",
+    "Ratio",
     "StepOut",
     "StepOutImpacts",
     "Summary",
     "SummaryRow",
     "Trace",
     "Variant",
+    "answering_note",
     "bootstrap_interval",
     "fastest_point_excess_mps",
     "labels",
@@ -111,6 +116,7 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
+        "._answering": ("answering_note",),
         "._attention": (
             "ATTENTION_WITHIN_M",
             "ATTENTIVE_FROM",
@@ -151,6 +157,10 @@ __getattr__ = lazy_names(
             "violation_excess",
             "violation_excess_of_time",
             "won_back",
+        ),
+        "._ratios": (
+            "RATIOS",
+            "Ratio",
         ),
         "._record": (
             "EpisodeRecord",

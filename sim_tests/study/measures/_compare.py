@@ -9,13 +9,16 @@ from pathlib import Path
 from typing import Final
 
 from awarenav.files import json_text
+from perception.documents import read_json
 
 from ...world.errors import SimError
+from ._answering import answering_note
 from ._record_file import read_records, write_records
 from ._summary import BASELINE, summarise_sources
 from ._summary_text import summary_text
 
 _EPISODES: Final = "episodes.csv"
+_RUN: Final = "run.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +56,11 @@ def compare_command(options: CompareOptions) -> int:
     summary = summarise_sources(
         sources, baseline=options.baseline, level=options.level, seed=options.seed
     )
-    print(json_text(asdict(summary)).rstrip() if options.as_json else summary_text(summary))
+    if options.as_json:
+        print(json_text(asdict(summary)).rstrip())
+    else:
+        asked = any(row.asked for row in summary.policies)
+        print(summary_text(summary, _answering(options.runs) if asked else ()))
     if options.out is not None:
         write_records(options.out, records)
     return 0
@@ -61,6 +68,19 @@ def compare_command(options: CompareOptions) -> int:
 
 def _episodes_file(path: Path) -> Path:
     return path / _EPISODES if path.is_dir() else path
+
+
+def _answering(runs: Sequence[Path]) -> list[str]:
+    """Return each note on the share of people who answer, from the settings of the runs."""
+    notes: dict[str, None] = {}
+    for path in runs:
+        try:
+            note = answering_note(read_json(path / _RUN, SimError))
+        except SimError:  # a file alone, or a folder without settings
+            continue
+        if note:
+            notes[note] = None
+    return list(notes)
 
 
 def _run_names(runs: Sequence[Path]) -> list[str]:

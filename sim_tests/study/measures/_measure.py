@@ -21,6 +21,7 @@ from ._driving import (
     success_weighted_path_length,
 )
 from ._record import Awareness, EpisodeRecord, rounded
+from ._requests import Requests
 from ._step_out import FASTER_STEP_OUT, is_unaware, since_look_of, step_out_impacts
 from ._trace import Trace
 
@@ -71,6 +72,7 @@ def measure(
     unaware = _with_unaware(moving, trace)
     step_out = step_out_impacts(result)
     stress = step_out_impacts(result, FASTER_STEP_OUT)
+    requests = Requests.of(result, trace)
     separation_m, speed_then = _smallest_separation(result, trace, nearest_m)
     return _rounded(
         EpisodeRecord(
@@ -113,7 +115,11 @@ def measure(
             ),
             human_delay_s=delay_s,
             human_detour_m=detour_m,
-            warnings=sum(len(frame.constraints.alerts) for frame in result.frames),
+            warnings=sum(
+                alert.kind != "attention"
+                for frame in result.frames
+                for alert in frame.constraints.alerts
+            ),
             awareness_error=error,
             awareness=awareness,
             reaction=reaction,
@@ -130,6 +136,11 @@ def measure(
             step_out_worst_mps=step_out.worst_mps,
             step_out_stress_unaware=stress.unaware,
             step_out_stress_worst_mps=stress.worst_mps,
+            requests=requests.requests,
+            requests_answered=requests.answered,
+            requests_needless=requests.needless,
+            asked_twice=requests.asked_twice,
+            requests_after_answer=requests.after_answer,
         )
     )
 

@@ -62,7 +62,7 @@ class EpisodeRecord:
         stops: how often the robot came to a stand before the goal.
         human_delay_s: delay of all people over their free walks, of those on the way so far.
         human_detour_m: detour of all people, over their free walks.
-        warnings: number of alerts that the robot asked for.
+        warnings: number of warnings of a collision that the robot asked for.
         awareness_error: mean |α of the track − true α| over the tracked people.
         awareness: awareness of the person who came nearest, and the robot's judgement of it.
         reaction: reaction of that person, see :class:`PersonOutcome`.
@@ -85,6 +85,11 @@ class EpisodeRecord:
         step_out_worst_mps: the robot's highest closing speed in an impact with an unaware person.
         step_out_stress_unaware: ``step_out_unaware`` with faster starts than recorded.
         step_out_stress_worst_mps: ``step_out_worst_mps`` with faster starts than recorded.
+        requests: number of requests for attention.
+        requests_answered: those whose person then looked at the robot.
+        requests_needless: those to somebody who was no obstacle a second later and had not looked.
+        asked_twice: people who were asked more than once.
+        requests_after_answer: requests to a track that had answered before; there should be none.
     """
 
     scenario: str
@@ -141,6 +146,11 @@ class EpisodeRecord:
     moving_contacts_unaware: int = 0
     moving_contact_unaware_mps: float | None = None
     min_margin_unaware_m: float | None = None
+    requests: int = 0
+    requests_answered: int = 0
+    requests_needless: int = 0
+    asked_twice: int = 0
+    requests_after_answer: int = 0
 
     def __repr__(self) -> str:
         """Return the fields that do not have their default."""

@@ -23,6 +23,7 @@ from ._pairs import (
     violation_excess_of_time,
     won_back,
 )
+from ._ratios import RATIOS
 from ._record import EpisodeRecord
 from ._variants import Variant, baselines_of, labels
 
@@ -80,7 +81,8 @@ class SummaryRow:
             robot touched, by any cause.
         robot_contact: share of them in which the robot moved into a person.
         person_contact: share of them in which a person walked into the robot.
-        means: mean of each of :data:`METRICS` over the episodes to which it applies.
+        means: mean of each of :data:`METRICS` over the episodes to which it applies, and each of
+            :data:`RATIOS` over all.
         worst: worst value of each metric, where it applies to an episode and has a better
             direction.
     """
@@ -98,6 +100,11 @@ class SummaryRow:
     worst: Mapping[str, float]
 
     __repr__ = short_repr
+
+    @property
+    def asked(self) -> bool:
+        """True if the robot asked somebody for attention."""
+        return self.means["requests"].value > 0.0
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -249,9 +256,19 @@ def _summary_row(
     values = [[getattr(record, name) for name in METRICS] for record in ran]
     table = np.array(values, dtype=np.float64).reshape(len(ran), len(METRICS))  # None becomes NaN
     present = np.isfinite(table)
+    ratios = [
+        [
+            (each.factor * getattr(record, each.column), over)
+            if (over := getattr(record, each.over)) is not None
+            else (0.0, 0.0)
+            for each in RATIOS.values()
+        ]
+        for record in ran
+    ]
+    parts = np.array(ratios, dtype=np.float64).reshape(len(ran), len(RATIOS), 2)
     intervals = ratio_intervals(
-        np.where(present, table, 0.0),
-        present.astype(np.float64),
+        np.hstack([np.where(present, table, 0.0), parts[..., 0]]),
+        np.hstack([present.astype(np.float64), parts[..., 1]]),
         rng,
         level,
         strata=[(record.scenario, record.scenario_version) for record in ran],
@@ -271,7 +288,7 @@ def _summary_row(
         moving_contact=proportion_interval(sum(r.moving_touched for r in ran), len(ran), level),
         robot_contact=proportion_interval(sum(r.robot_touched for r in ran), len(ran), level),
         person_contact=proportion_interval(sum(r.person_touched for r in ran), len(ran), level),
-        means=dict(zip(METRICS, intervals, strict=True)),
+        means=dict(zip((*METRICS, *RATIOS), intervals, strict=True)),
         worst=worst,
     )
 

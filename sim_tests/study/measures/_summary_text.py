@@ -10,14 +10,20 @@ from awarenav.errors import counted
 from ._attention import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
 from ._interval import Interval, number_text
 from ._metrics import METRICS
+from ._ratios import RATIOS
 from ._record import EpisodeRecord
 from ._summary import Comparison, Summary, SummaryRow
 
 _Row = TypeVar("_Row", Comparison, SummaryRow)
 
 
-def summary_text(summary: Summary) -> str:
-    """Return all tables of a summary, each with a heading, and notes on what is left out."""
+def summary_text(summary: Summary, notes: Iterable[str] = ()) -> str:
+    """Return all tables of a summary, each with a heading, and notes on what is left out.
+
+    Args:
+        summary: the summary.
+        notes: further notes, put last.
+    """
     if not summary.policies:
         return "no episodes"
     percent = f"{100.0 * summary.level:g} %"
@@ -28,6 +34,9 @@ def summary_text(summary: Summary) -> str:
     if any(row.means["step_out_unaware"].known for row in summary.policies):
         title = "Step-out impacts per 1 000 crossings: an index, not a rate of accidents"
         blocks.append(_titled(title, _step_out_table(summary.policies)))
+    asking = [row for row in summary.policies if row.asked]
+    if asking:
+        blocks.append(_titled("Requests for attention", _request_table(asking)))
     if summary.comparisons:
         blocks.append(
             _titled(
@@ -41,7 +50,7 @@ def summary_text(summary: Summary) -> str:
         ("By scenario", summary.scenarios),
     ):
         blocks.append(_titled(title, _part_table(rows)))
-    blocks.append("\n".join(_notes(summary)))
+    blocks.append("\n".join([*_notes(summary), *notes]))
     return "\n\n".join(blocks)
 
 
@@ -112,6 +121,20 @@ def _step_out_table(rows: Sequence[SummaryRow]) -> str:
     )
 
 
+def _request_table(rows: Sequence[SummaryRow]) -> str:
+    return _table(
+        rows,
+        {
+            "policy": lambda row: row.variant,
+            "per crossing": _mean("requests"),
+            "per hour": _mean("requests_per_hour"),
+            "answered %": _mean("answered_share"),
+            "needless %": _mean("needless_share"),
+            "people asked twice": _mean("asked_twice"),
+        },
+    )
+
+
 def _comparison_table(comparisons: Sequence[Comparison]) -> str:
     return _table(
         comparisons,
@@ -158,13 +181,14 @@ def _table(rows: Sequence[_Row], columns: dict[str, Callable[[_Row], str]], left
 
 def _mean(name: str, *, bounds: bool = True) -> Callable[[SummaryRow], str]:
     """Return the column of a metric's mean, with or without its interval."""
-    decimals = METRICS[name].decimals
+    metric = RATIOS[name].metric if name in RATIOS else METRICS[name]
+    decimals, scale = (0, 100.0) if metric.share else (metric.decimals, 1.0)
 
     def cell(row: SummaryRow) -> str:
         interval = row.means[name]
         if bounds or not interval.known:
-            return interval.text(decimals)
-        return number_text(interval.value, decimals)
+            return interval.text(decimals, scale)
+        return number_text(scale * interval.value, decimals)
 
     return cell
 
@@ -232,6 +256,12 @@ def _notes(summary: Summary) -> list[str]:
         ran = row.episodes - row.errors
         if row.nondeterministic:
             notes.append(nondeterminism_note(row.variant, row.nondeterministic, ran))
+        again = row.means["requests_after_answer"]
+        if again.value > 0.0:
+            notes.append(
+                f"{row.variant}: {counted(round(again.value * again.n), 'request')} to people who "
+                "had answered; there should be none"
+            )
         not_reached = ran - row.means["time_to_goal_s"].n
         if not_reached:
             notes.append(

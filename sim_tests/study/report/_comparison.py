@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from ..measures import METRICS, SHARES, UNCONFIRMED, Metric
+from ..measures import METRICS, RATIOS, SHARES, UNCONFIRMED, Metric
 from ._panel import Panel, panel
 from ._statistics import MARGIN, TIME_LOST, VIOLATION, RunStatistics, estimate
 
@@ -49,6 +49,12 @@ FURTHER: Final = (
             "warnings",
         )
     ),
+)
+#: Metrics of requests for attention, which are shown where somebody was asked.
+REQUESTS: Final = (
+    METRICS["requests"],
+    *(each.metric for each in RATIOS.values()),
+    METRICS["asked_twice"],
 )
 #: Parts of the episodes by what their people look at.
 ATTENTIONS: Final = ("attentive", UNCONFIRMED, "mixed", "unaware")
@@ -106,12 +112,14 @@ class ComparisonSection:
     Attributes:
         main: metrics that are shown first, over all scenarios.
         further: metrics that are shown on demand, over all scenarios.
+        requests: requests for attention, over all scenarios; empty where nobody was asked.
         references: names of the arms that differences are taken from.
         paired: differences and time won back, by attention of the scenarios.
     """
 
     main: tuple[Panel, ...]
     further: tuple[Panel, ...]
+    requests: tuple[Panel, ...]
     references: tuple[str, ...]
     paired: tuple[Panel, ...]
 
@@ -133,9 +141,11 @@ def comparison_section(statistics: RunStatistics) -> ComparisonSection:
         for metric in _PAIRED
         if any(getattr(against, metric.name).known for _, _, against in groups)
     ]
+    asked = any(statistics.of_arm(arm).asked for arm in statistics.shown)
     return ComparisonSection(
         _panels(statistics, MAIN),
         _panels(statistics, FURTHER),
+        _panels(statistics, REQUESTS) if asked else (),
         tuple(dict.fromkeys(against.baseline for _, _, against in groups)),
         tuple(paired),
     )

@@ -160,7 +160,8 @@ def estimate(row: SummaryRow | None, metric: Metric) -> Interval:
         "person_contacts": row.person_contact,
         "success": row.success,
     }
-    return shares[metric.name] if metric.share else row.means[metric.name]
+    is_of_episodes = metric.share and metric.name in shares
+    return shares[metric.name] if is_of_episodes else row.means[metric.name]
 
 
 def moving_contacts(episodes: Sequence[Episode]) -> Interval:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from ..measures import nondeterminism_notes
+from ..measures import answering_note, nondeterminism_notes
 from ._awareness_split import split_by_awareness
-from ._comparison import FURTHER, MAIN, PAIRED_ONLY, comparison_section
+from ._comparison import FURTHER, MAIN, PAIRED_ONLY, REQUESTS, comparison_section
 from ._episode_list import failures, list_episodes
 from ._fault_table import fault_rows
 from ._page import write_page
@@ -45,6 +45,7 @@ def write_report(
     statistics = RunStatistics.of(run.episodes)
     arms = statistics.arms
     path = run.path / _REPORT if path is None else path
+    comparison = comparison_section(statistics)
     listed = list_episodes(run, arms, path.parent)
     errors = sum(len(arm.errors) for arm in arms)
     write_page(
@@ -56,7 +57,8 @@ def write_report(
         condition=f"under the fault {statistics.fault}" if statistics.fault else "without faults",
         arms=arms,
         verdicts=verdicts(statistics),
-        comparison=comparison_section(statistics),
+        comparison=comparison,
+        answering=answering_note(run.about),
         groups=split_by_awareness(statistics),
         scatter=scatter(arms, listed.episodes, run.replay_prefix),
         table=scenario_table(statistics),
@@ -69,6 +71,6 @@ def write_report(
         failed=f"{plural(errors, 'episode')} failed",
         episodes=listed,
         reproduction=reproduction(run),
-        metrics=(*MAIN, *FURTHER, *PAIRED_ONLY),
+        metrics=(*MAIN, *FURTHER, *(REQUESTS if comparison.requests else ()), *PAIRED_ONLY),
     )
     return path

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
+from sim_tests.crossing import named_policy
 from sim_tests.search.tune import (
     Evaluation,
     PolicySpace,
@@ -64,6 +65,31 @@ def _number(data: dict, path: str) -> float | None:
     for key in path.split("."):
         data = None if data is None else data.get(key)
     return data
+
+
+@pytest.mark.parametrize(
+    ("base", "part", "searched_with"),
+    [
+        (AwarenessPolicy.preset("blind"), "attention", "reach"),
+        (named_policy("scanner")[1], "reach", "timing"),
+        (AwarenessPolicy(attention=None, reach=None), "attention", "filter"),
+    ],
+)
+def test_a_part_that_is_turned_off_is_not_searched_and_stays_off(base, part, searched_with):
+    space = PolicySpace(base)
+    starts = {name.partition(".")[0] for name in space.ranges}
+    assert part not in starts
+    assert searched_with in starts
+    assert getattr(space.policy(space.base_parameters()), part) is None
+    with pytest.raises(SimError, match="turned off every part"):
+        PolicySpace(base, {n: r for n, r in shipped_ranges().items() if n.startswith(part)})
+
+
+def test_the_gain_that_a_request_must_bring_is_searched():
+    space = _SPACES["balanced"]
+    assert space.base_parameters()["attention.min_gain_s"] == 0.5
+    policy = space.policy({**space.base_parameters(), "attention.min_gain_s": 2.0})
+    assert policy.attention.min_gain_s == 2.0
 
 
 def test_one_parameter_may_set_several_keys():
@@ -241,6 +267,7 @@ def test_a_killed_and_resumed_tuning_with_two_workers_writes_the_same_files(tmp_
         (["--hold-out-scenarios", "crossing_attentive"], "must leave a scenario to tune on"),
         (["--resume"], "there is no tuning"),
         (["--risk", "-1"], "must be"),
+        (["--requests", "-1"], "must be"),
         (["--generation", "1"], "at least 2 trials"),
         (["--planner", "nowhere"], "module:Class"),
     ],

@@ -24,7 +24,7 @@ from sim_tests.search.tune._finalists import (
     named_winner,
 )
 from sim_tests.search.tune._race import dropped, stages
-from sim_tests.search.tune._results import _header
+from sim_tests.search.tune._results import _header, table_lines
 from sim_tests.search.tune._settings import TuneSettings, held_out_scenarios
 from sim_tests.search.tune._tune import Tuning
 from sim_tests.search.tune._verdict import is_undecided, verdict_text
@@ -33,7 +33,9 @@ from sim_tests.study.measures import EpisodeRecord
 _TASKS = [(scenario, seed) for scenario in "abcdef" for seed in range(5)]
 
 
-def _evaluation(time_s=5.0, risk=0.0, *, tasks=_TASKS, contacts=0, spread=0.3, name="p"):
+def _evaluation(
+    time_s=5.0, risk=0.0, *, tasks=_TASKS, contacts=0, spread=0.3, name="p", requests=0
+):
     """Episodes of which each scenario and seed has the same chance part in every policy."""
     records = []
     for row, (scenario, seed) in enumerate(tasks):
@@ -45,6 +47,7 @@ def _evaluation(time_s=5.0, risk=0.0, *, tasks=_TASKS, contacts=0, spread=0.3, n
                 time_lost_s=time_s + 2.0 * chance + spread * own,
                 step_out_unaware=risk,
                 moving_contacts=int(row < contacts),
+                requests=requests,
             )
         )
     return Evaluation.of(records)
@@ -143,6 +146,17 @@ def test_a_policy_within_the_risk_beats_one_above_it_though_it_is_slower():
     assert not beats(_candidate("risky", time_s=4.0, risk=0.55), base, 0.5, (), 0.95)
 
 
+def test_a_policy_that_asks_too_often_beats_nobody():
+    base, asks = _candidate("base", None), _candidate("asks", time_s=4.0, requests=2)
+    assert beats(asks, base, 0.5, (), 0.95)
+    assert beats(asks, base, 0.5, (), 0.95, requests=2.0)
+    assert not beats(asks, base, 0.5, (), 0.95, requests=1.9)
+    # The base policy asks too often itself: a slower one that asks less is what is looked for.
+    loud, quiet = _candidate("loud", None, requests=3), _candidate("quiet", time_s=6.0, requests=1)
+    assert not beats(quiet, loud, 0.5, (), 0.95)
+    assert beats(quiet, loud, 0.5, (), 0.95, requests=1.0)
+
+
 def test_a_gain_must_hold_in_the_held_out_scenarios():
     base = _candidate("base", None)
     gains = _evaluation(3.0, tasks=_TASKS[:20])
@@ -178,13 +192,14 @@ def test_equal_policies_and_equal_episodes_are_one_row():
     assert rows[0].trial is None
 
 
-def _tuning(*chosen: Candidate, hold_out=("e", "f")) -> Tuning:
+def _tuning(*chosen: Candidate, hold_out=("e", "f"), requests=None) -> Tuning:
     settings = TuneSettings(
         *("balanced", "{}", (), {}, 10, 5, 5, "truth", "", 0, "tpe", 4),
         hold_out_scenarios=hold_out,
+        requests=requests,
     )
     base = _candidate("balanced", None)
-    rows = tuple(named_winner(chosen, base, 0.5, hold_out))
+    rows = tuple(named_winner(chosen, base, 0.5, hold_out, requests))
     return Tuning(settings, None, None, (), ("a trial",), (base,), rows, 0.5, 0.5)
 
 
@@ -216,6 +231,24 @@ def test_the_verdict_keeps_the_base_policy_and_says_why(values, reason, undecide
     text = verdict_text(tuning)
     assert text.startswith(f"keep balanced. The nearest is second (trial 7): {reason}")
     assert is_undecided(tuning) == undecided
+
+
+def test_requests_per_crossing_are_said_where_somebody_asked():
+    silent, asks = _candidate("second", 7, time_s=4.0), _candidate("second", 7, requests=2)
+    assert "requests" not in verdict_text(_tuning(silent))
+    assert "requests" not in "\n".join(table_lines(_tuning(silent)))
+    said = "It makes 2.00 requests for attention per crossing, balanced 0.00"
+    assert f"{said}." in verdict_text(_tuning(asks))
+    bounded = _tuning(_candidate("second", 7, time_s=4.0, requests=2), requests=1.5)
+    text = verdict_text(bounded)
+    assert "second (trial 7): it asks for attention too often on held-out episodes" in text
+    assert f"{said}; 1.5 are allowed." in text
+    assert not is_undecided(bounded)
+    lines = table_lines(bounded)
+    assert lines[1].split().count("requests") == 2
+    assert [line.split()[-1] for line in lines[2:4]] == ["0.00", "2.00"]
+    assert "At most 1.5 requests for attention per crossing." in lines
+    assert len(set(map(len, lines[1:4]))) == 1
 
 
 def test_the_verdict_says_that_no_scenario_was_held_out():

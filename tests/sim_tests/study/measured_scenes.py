@@ -49,13 +49,14 @@ def crossing(
     contacts=(),
     reached=True,
     alerts=None,
+    constraints=None,
     **values,
 ):
     """A result whose frames follow formulas.
 
     ``robot(t)`` gives x, y, heading, forward speed, and perhaps the speed to the left; each of
     ``walks``, of t, gives x, y, vx, vy; ``awareness(t, person)`` the truth, ``tracked(t, person)``
-    α and lower bound or None.
+    α and lower bound or None; ``constraints(t)`` fields of the constraints.
     """
     frames = []
     for t in np.asarray(times).tolist():
@@ -79,14 +80,13 @@ def crossing(
             if said is not None:
                 tracks.append(track_at((px + 0.1, py), *said, ident=index + 1, t_s=t))
             separations.append(max(outline.distance(Point(px, py)) - BODY_RADIUS_M, 0.0))
-        constraints = NavConstraints(
-            stamp_s=t,
-            obstacles=(),
-            speed_limit_mps=1.5,
-            limited_by="nothing",
-            stale=False,
-            alerts=() if alerts is None else alerts(t),
-        )
+        given = {
+            "obstacles": (),
+            "limited_by": "nothing",
+            "alerts": () if alerts is None else alerts(t),
+            **({} if constraints is None else constraints(t)),
+        }
+        limits = NavConstraints(stamp_s=t, speed_limit_mps=1.5, stale=False, **given)
         frames.append(
             CrossingFrame(
                 t_s=t,
@@ -103,7 +103,7 @@ def crossing(
                 observations=(),
                 observed_workers=(),
                 tracks=tuple(tracks),
-                constraints=constraints,
+                constraints=limits,
                 command=(speed, 0.0),
                 margins_m=tuple(separations),
                 separations_m=tuple(separations),

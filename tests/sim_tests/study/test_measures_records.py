@@ -125,7 +125,7 @@ def test_an_error_of_many_lines_is_one_row(tmp_path):
         (("scenario,", ""), "no column 'scenario'"),
         ((",true,", ",yes,"), "line 2: success must be true or false, got 'yes'"),
         (("glance,3,", "glance,3.5,"), "line 2: seed must be a whole number, got '3.5'"),
-        (("late_glance,", "late,glance,"), "line 2 has 55 cells, its header 54"),
+        (("late_glance,", "late,glance,"), "line 2 has 60 cells, its header 59"),
         (("mixed", "mixed,nan"), "cells"),
         (("scenario", "\x00\x01"), "not a table of episodes"),
     ],
