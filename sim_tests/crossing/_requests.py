@@ -45,7 +45,8 @@ class RequestMemory:
         """Remember the requests and answers of a control cycle."""
         limit = frame.constraints
         asked = [each for each in limit.alerts if each.kind == "attention"]
-        for each in (*asked, *limit.answers):
+        events: tuple[Alert | Answer, ...] = (*asked, *limit.answers)
+        for each in events:
             self._latest[each.track_id] = (frame.t_s, each)
 
     def shown(self, frame: CrossingFrame) -> tuple[ShownRequest, ...]:
