@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
+from tracking.awareness_filter import estimate, prior
 from tracking.prediction import PredictionModel
 
 from ._alerting import AlertHistory, alerts_due, closest_approach, is_quiet
@@ -27,15 +28,17 @@ _LOOKED: Final = 0.5
 _ANSWER_S: Final = 1.0
 # People so near to the one who is asked are asked too.
 _GROUP_M: Final = 1.5
+# A look lasts about so long, and what is remembered of it comes on top.
+_LOOK_S: Final = 1.0
 # Neither way is expected to take longer than this.
 _LONGEST_S: Final = 10.0
 # A robot that has stood for so long is not on its way, and asks nobody.
 _PARKED_AFTER_S: Final = 10.0
 # Budget, and how long people count as asked.
 _MINUTE_S: Final = 60.0
-# Somebody who walks away at this speed or more sees no light behind their back.
-_WALKS_MPS: Final = 0.3
-_AWAY_COS: Final = 0.2
+# A light is not noticed by somebody who looks this far past the robot: with the default cone, by
+# 57° and more.
+_AVERTED: Final = 0.1
 
 
 class Asked(NamedTuple):
@@ -94,9 +97,13 @@ class Addressing:
     ) -> None:
         self._policy, self._robot = policy, robot
         self._people, self._governor, self._prediction = people, governor, prediction
-        # What a look leaves behind, or a look itself where nothing does.
-        counts_as = policy.noticed_counts_as
+        # A look, and what it leaves behind.
+        counts_as, self._lasts_s = policy.noticed_counts_as, _LOOK_S
         self._looked_lower = 1.0 if counts_as is None else counts_as
+        if counts_as is not None:
+            self._lasts_s += policy.filter.noticed_memory_s
+        nothing_known = estimate(prior(policy.filter), policy.filter)
+        self._unseen_std = 0.5 * float(nothing_known.awareness_std)
 
     def step(
         self,
@@ -135,7 +142,7 @@ class Addressing:
         person = self._to_ask(rules, history, people, limit, robot_state, now)
         if person is None or any(alert.track_id == person.track.id for alert in alerts):
             return Addressed(alerts, answers, history)
-        means = _means(rules, history, person, robot_state, now)
+        means = _means(rules, history, person, now)
         group = _group(person, people)
         wins_s = 0.0
         if means is not None:
@@ -165,8 +172,10 @@ class Addressing:
         person = None if limit.track_id is None else people.get(limit.track_id)
         if person is None or person.awareness_lower >= _LOOKED or person.is_at_first_sight:
             return None
-        # Nobody would see the answer of somebody out of sight.
+        # Nobody would see the answer of somebody out of sight, or whose face no camera can see:
+        # what is known of their α is then hardly more than of anybody's.
         unseen = now - person.seen_stamp_s > self._policy.timing.fresh_within_s
+        unseen |= person.track.awareness_std > self._unseen_std
         parked = now - history.moved_s > _PARKED_AFTER_S
         distance_m = math.dist(person.position_odom_m, robot_state.position_odom_m)
         if unseen or parked or person.track.status == "tentative" or distance_m > rules.within_m:
@@ -207,14 +216,17 @@ class Addressing:
             aware = moved._replace(awareness_lower=lower)
             aware_mps, _ = self._governor.person_mps(aware, straight, courses, now)
             now_mps, then_mps = min(now_mps, own_mps), min(then_mps, aware_mps)
-        dx, dy = (
-            there - here
-            for there, here in zip(
-                _moved(person, _ANSWER_S).position_odom_m, (straight.x_m, straight.y_m), strict=True
-            )
-        )
-        way_m = straight.cos * dx + straight.sin * dy - straight.rear_m + BODY_RADIUS_M
-        return _time_s(way_m, min(now_mps, others_mps)) - _time_s(way_m, min(then_mps, others_mps))
+        now_mps, then_mps = min(now_mps, others_mps), min(then_mps, others_mps)
+        x, y = _moved(person, _ANSWER_S).position_odom_m
+        way_m = straight.cos * (x - straight.x_m) + straight.sin * (y - straight.y_m)
+        way_m += BODY_RADIUS_M - straight.rear_m
+        # People who walk the same way take longer to pass.
+        vx, vy = person.velocity_odom_mps
+        along_mps = straight.cos * vx + straight.sin * vy
+        passing_s = _time_s(way_m, then_mps - along_mps)
+        if passing_s > self._lasts_s:
+            return 0.0  # the look would be forgotten: ask later
+        return _time_s(way_m, now_mps - along_mps) - passing_s
 
     def _request(
         self,
@@ -275,7 +287,6 @@ def _means(
     rules: AttentionRules,
     history: AddressHistory,
     person: Person,
-    robot_state: RobotState,
     now: float,
 ) -> AlertMeans | None:
     """Return the quietest means that can reach a person, the next louder for each request before.
@@ -283,20 +294,13 @@ def _means(
     None if there is none now: warnings sound first.
     """
     usable: tuple[AlertMeans, ...] = rules.means
-    if _walks_away(person, robot_state):
+    if person.track.awareness <= _AVERTED:
         usable = tuple(each for each in usable if each != "light")
     if not usable:
         return None
     before = history.asked.get(person.track.id)
     means = usable[min(0 if before is None else before.times, len(usable) - 1)]
     return None if means == "voice" and not is_quiet(history.warnings, now) else means
-
-
-def _walks_away(person: Person, robot_state: RobotState) -> bool:
-    (x, y), (vx, vy) = person.position_odom_m, person.velocity_odom_mps
-    dx, dy = x - float(robot_state.position_odom_m[0]), y - float(robot_state.position_odom_m[1])
-    speed_mps, distance_m = math.hypot(vx, vy), math.hypot(dx, dy)
-    return speed_mps >= _WALKS_MPS and vx * dx + vy * dy > _AWAY_COS * speed_mps * distance_m
 
 
 def _group(person: Person, people: Mapping[int, Person]) -> frozenset[int]:

@@ -127,13 +127,13 @@ class AttentionRules(StrictConfig):
         per_minute: the robot makes at most so many requests in any minute.
         within_m: distance from the robot's base within which people are asked.
         means: what the robot has to ask with, the quietest first: ``"light"``, ``"voice"``. Light
-            is left out for somebody who walks away from the robot.
+            is left out for somebody who looks far past the robot (an α of at most 0.1).
     """
 
     error: ClassVar[type[ValueError]] = NavError
 
     min_gain_s: float = Field(default=0.5, ge=0.0, le=10.0)
-    pause_s: float = Field(default=3.0, ge=1.0, le=60.0)
+    pause_s: float = Field(default=2.5, ge=1.0, le=60.0)
     per_minute: int = Field(default=6, ge=1, le=60)
     within_m: float = Field(default=8.0, gt=0.0, le=30.0)
     means: tuple[Literal["light", "voice"], ...] = Field(default=("light", "voice"), min_length=1)

@@ -27,13 +27,25 @@ def policy_of(**rules: Any) -> AwarenessPolicy:
     return AwarenessPolicy(attention=AttentionRules(**rules))
 
 
+def _person(
+    t_s: float,
+    track_id: int,
+    place: tuple[float, float],
+    awareness: float = 0.3,
+    awareness_std: float = 0.02,
+    **options: Any,
+) -> PersonTrack:
+    track = person(t_s, track_id=track_id, position=place, **options)
+    awareness = max(awareness, track.awareness_lower)
+    return replace(track, awareness=awareness, awareness_std=awareness_std)
+
+
 def standing(*places: tuple[float, float], **options: Any) -> Scene:
     """People who stand relative to the robot, as seen at each instant."""
 
     def tracks(t_s: float) -> list[PersonTrack]:
         return [
-            person(t_s, track_id=number, position=place, **options)
-            for number, place in enumerate(places, start=1)
+            _person(t_s, number, place, **options) for number, place in enumerate(places, start=1)
         ]
 
     return tracks
@@ -66,8 +78,8 @@ def requests(results: Sequence[NavConstraints]) -> list[tuple[float, Alert]]:
 def test_who_limits_the_robot_and_has_not_looked_is_asked_the_quietest_means_first() -> None:
     results = driven(standing(BESIDE), 12.0)
     asked = requests(results)
-    # Asked once seen for 0.2 s; the pause doubles: 3 s, then 6 s.
-    assert [t for t, _ in asked] == pytest.approx([0.2, 3.2, 9.2])
+    # Asked once seen for 0.2 s; the pause doubles: 2.5 s, then 5 s.
+    assert [t for t, _ in asked] == pytest.approx([0.2, 2.7, 7.7])
     assert [alert.means for _, alert in asked] == ["light", "voice", "voice"]
     limit_mps = results[2].speed_limit_mps
     for _, alert in asked:
@@ -123,18 +135,33 @@ def test_a_robot_that_waits_asks_but_one_that_is_parked_does_not() -> None:
     assert not requests(driven(standing(BESIDE), 2.0, speed_mps=0.0, from_s=11.0, adapter=adapter))
 
 
-def test_a_light_is_left_out_for_somebody_who_walks_away() -> None:
-    def ahead(t_s: float) -> list[PersonTrack]:
-        return [person(t_s, position=(2.5 + 0.6 * t_s, 1.0), velocity=(0.6, 0.0))]
+def test_a_light_is_left_out_for_somebody_who_looks_far_past_the_robot() -> None:
+    averted = standing(BESIDE, awareness=0.05)
+    assert [alert.means for _, alert in requests(driven(averted, 1.0))] == ["voice"]
+    assert requests(driven(averted, 1.0, policy=policy_of(means=("light",)))) == []
 
-    assert [alert.means for _, alert in requests(driven(ahead, 1.0))] == ["voice"]
-    assert requests(driven(ahead, 1.0, policy=policy_of(means=("light",)))) == []
+
+def test_nobody_is_asked_whose_answer_no_camera_would_see() -> None:
+    """An α that is not measured is hardly more certain than that of anybody."""
+    unseen = standing(BESIDE, awareness=0.05, awareness_std=0.18)
+    assert requests(driven(unseen, 1.0)) == []
+
+
+def test_nobody_is_asked_before_the_look_lasts_until_they_are_passed() -> None:
+    """Three seconds of memory and one of looking: 4 s."""
+
+    def ahead(start_m: float) -> Scene:
+        return lambda t_s: [person(t_s, position=(start_m + 0.6 * t_s, 1.0), velocity=(0.6, 0.0))]
+
+    anything = policy_of(min_gain_s=0.0)
+    assert requests(driven(ahead(2.2), 1.0, policy=anything))
+    assert not requests(driven(ahead(4.0), 1.0, policy=anything))
 
 
 def answering(at_s: float, for_s: float = 0.5) -> Scene:
     def tracks(t_s: float) -> list[PersonTrack]:
         looks = at_s - 1e-9 <= t_s < at_s + for_s
-        return [person(t_s, position=BESIDE, awareness_lower=0.7 if looks else 0.0)]
+        return [_person(t_s, 1, BESIDE, awareness_lower=0.7 if looks else 0.0)]
 
     return tracks
 
@@ -158,10 +185,10 @@ def test_a_look_long_after_the_request_is_no_answer() -> None:
 
 
 def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> None:
-    beside = driven(standing((3.5, 1.3), (3.5, 1.9)), 3.0)
+    beside = driven(standing((3.5, 1.3), (3.5, 1.9)), 2.0)
     assert [alert.track_id for _, alert in requests(beside)] == [1]
     # Nothing would be won if the one beside them had not looked either.
-    apart = driven(standing((3.5, 1.3), (3.5, -1.3)), 3.0)
+    apart = driven(standing((3.5, 1.3), (3.5, -1.3)), 2.0)
     assert requests(apart) == []
     looked = [1, 2]
 
@@ -169,7 +196,7 @@ def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> 
         both = standing((3.5, 1.3), (3.5, -1.3))(t_s)
         return [replace(both[0], awareness_lower=0.7), both[1]]
 
-    assert [alert.track_id for _, alert in requests(driven(one_looks, 3.0))] == looked[1:]
+    assert [alert.track_id for _, alert in requests(driven(one_looks, 2.0))] == looked[1:]
 
 
 def test_warnings_of_collisions_stay_as_they_are_and_come_first() -> None:
