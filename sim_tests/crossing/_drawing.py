@@ -192,7 +192,7 @@ class TopView:
             ring = np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius_m * self._scale
             draw_line(image, place + ring, colour, 2)
         width, height = cv2.getTextSize(request.text, _FONT, _TEXT_SIZE, 1)[0]
-        above = place + (-0.5 * width, -_WAVES_M[1] * self._scale - height)
+        above = place - np.array([0.5 * width, _WAVES_M[1] * self._scale + height])
         most = np.maximum((4.0, 18.0), (image.shape[1] - width - 8.0, image.shape[0] - 8.0))
         left, top = np.clip(above, (4.0, 18.0), most).round().astype(int).tolist()
         _write(image, [request.text], (left, top), _TEXT_SIZE)

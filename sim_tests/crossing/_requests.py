@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from nav_adapter import Alert, Answer
+from nav_adapter import Alert
+from nav_adapter.alerts import Answer
 from perception.arrays import FloatArray
 
 from ._result import CrossingFrame
@@ -45,7 +46,8 @@ class RequestMemory:
         """Remember the requests and answers of a control cycle."""
         limit = frame.constraints
         asked = [each for each in limit.alerts if each.kind == "attention"]
-        for each in (*asked, *limit.answers):
+        events: tuple[Alert | Answer, ...] = (*asked, *limit.answers)
+        for each in events:
             self._latest[each.track_id] = (frame.t_s, each)
 
     def shown(self, frame: CrossingFrame) -> tuple[ShownRequest, ...]:

@@ -160,7 +160,7 @@ def _draw_requests(image: ImageRgb, result: CrossingResult, index: int, asks: Co
         memory.take(each)
     for row, request in enumerate(memory.shown(result.frames[index])):
         colour = awareness_colour(1.0) if request.answered else asks
-        _SMALL.write(image, request.text, (8, 6 + 28 * row), colour)
+        _SMALL.write(image, request.text, (8, 6 + 28 * row), _INK)
         if request.place_odom_m is not None:
             for radius_m in _WAVES_M:
                 ring = request.place_odom_m + radius_m * _circle()

@@ -8,6 +8,7 @@ from paths import ROOT
 
 from awarenav.errors import AwarenavError
 from awarenav.figures import Image
+from nav_adapter import Alert
 from sim_tests import Scenario, run_crossing
 from sim_tests.demo import FilmRun, film_runs, film_values, write_crossing_film
 from sim_tests.demo._demo import ComparisonRow
@@ -99,6 +100,23 @@ def test_the_circle_on_the_map_has_the_radius_and_place_of_the_obstacle(run, fre
     assert 0.5 * np.ptp(rows) / MAP_PX_PER_M == pytest.approx(obstacle.radius_m, abs=0.08)
     assert 0.5 * (columns.min() + columns.max()) == pytest.approx(u, abs=1.5)
     assert 0.5 * (rows.min() + rows.max()) == pytest.approx(v, abs=1.5)
+
+
+def test_the_map_shows_a_request_for_two_seconds(run, free):
+    frames = [
+        replace(each, constraints=replace(each.constraints, alerts=(), answers=()))
+        for each in run.result.frames
+    ]
+    silent = replace(run, result=replace(run.result, frames=tuple(frames)))
+    (track,) = frames[60].tracks
+    request = Alert(track.id, "attention", 0.0, 1.0, "why", means="light", wins_s=1.4)
+    limit = replace(frames[60].constraints, alerts=(request,))
+    frames[60] = replace(frames[60], constraints=limit)
+    asks = replace(run, result=replace(run.result, frames=tuple(frames)))
+    asked_s = frames[60].t_s
+    for t_s, shown in ((-0.05, False), (0.0, True), (1.9, True), (2.1, False)):
+        maps = [draw_map(each, free, asked_s + t_s) for each in (asks, silent)]
+        assert bool((maps[0] != maps[1]).any()) is shown
 
 
 def test_the_robots_way_points_up_and_its_left_is_left():
