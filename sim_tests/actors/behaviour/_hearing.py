@@ -31,8 +31,8 @@ class Hearing(StrictConfig):
     A request is heard with a probability: the product of the factors of distance, activity,
     repetition and, of a light, ``light_factor``. A person who hears it answers by a look with the
     probability ``answers``, and startles at a voice with the probability ``startles``. People who
-    were not meant do both with ``bystander_factor`` times these. ``docs/people.md`` names the sources;
-    most of these numbers nobody has measured.
+    were not meant do both with ``bystander_factor`` times these. Most of these numbers have not
+    been measured; ``docs/people.md`` names the sources.
 
     Attributes:
         answers: probability that a person who was addressed and has heard it looks at the robot.
