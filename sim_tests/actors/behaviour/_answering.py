@@ -32,11 +32,12 @@ _SETTLED_RAD: Final = math.radians(1.0)
 
 
 class Answering:
-    """A person on a path of their own, which goes on as it is as long as nobody asks.
+    """A person on a path of their own, who follows it unchanged without a request.
 
-    Who answers turns eyes, head and, as far as needed, the trunk to the robot, and back to where
-    the path has them look. Who startles holds the clock of the path, and may step beside it; the
-    body then returns to the path slowly. People who sit or kneel turn the head alone.
+    A person who answers turns eyes, head and, as far as needed, the trunk to the robot, and back to
+    where the path has them look. A person who startles holds the clock of the path, and may step
+    beside it; the body then returns to the path slowly. People who sit or kneel turn the head
+    alone.
 
     Args:
         path: the person as scripted or recorded.

@@ -1,4 +1,4 @@
-"""How people hear a request for attention, and what they do then."""
+"""The hearing of people whom a robot asks for attention, and their answers."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ FIELD_RAD: Final = math.radians(100.0)
 
 
 class Hearing(StrictConfig):
-    """How people hear a robot that asks for attention, and answer it.
+    """The hearing of people: figures of how they hear a request for attention and answer it.
 
     A request is heard with a probability: the product of the factors of distance, activity,
-    repetition and, of a light, ``light_factor``. Whoever hears it answers by a look with the
-    probability ``answers``, and startles at a voice with the probability ``startles``. Who was not
-    meant does both with ``bystander_factor`` times these. ``docs/people.md`` names the sources;
-    most of these numbers nobody has measured.
+    repetition and, of a light, ``light_factor``. A person who hears it answers by a look with the
+    probability ``answers``, and startles at a voice with the probability ``startles``. People who
+    were not meant do both with ``bystander_factor`` times these. Most of these numbers have not
+    been measured; ``docs/people.md`` names the sources.
 
     Attributes:
         answers: probability that a person who was addressed and has heard it looks at the robot.
@@ -140,7 +140,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What a person does who has heard a request.
+    """The answer of a person who has heard a request.
 
     Attributes:
         from_s: time at which the answer begins.
@@ -163,8 +163,8 @@ class Ears:
     """The hearing of one person.
 
     Every request draws the same random numbers in the same order, whatever comes of it. With one
-    seed, whoever answers at one value of ``answers`` therefore also answers at any higher one, at
-    the same time and for as long.
+    seed, a person who answers at one value of ``answers`` therefore also answers at any higher one,
+    at the same time and for as long.
 
     Args:
         hearing: the figures.

@@ -245,7 +245,7 @@ class Walker:
         if self._touch is None or self._now_s - self._touch[2] > _RECOIL_S:
             self._bumped_s = self._now_s
             self._heading += self._turning * (self._now_s - self._tick * DECISION_PERIOD_S)
-            self._turning = 0.0
+            self._turning, self._startle = 0.0, None
             self._gaze.startle(self._now_s)
         if self.spec.stays:
             return

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from awarenav.cli import main
-from sim_tests.actors.behaviour import Lapse
+from sim_tests.actors.behaviour import Hearing, Lapse
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.search.falsify import ScenarioSpace
 from sim_tests.search.falsify._joint_parameters import (
@@ -148,3 +148,32 @@ def test_the_search_runs_from_keypoints_and_scans(tmp_path):
     case = (out / "worst_001.yaml").read_text()
     assert "--perception keypoints --sensors camera+scanner" in case
     assert "DOES NOT REPLAY" not in case
+
+
+@pytest.mark.parametrize("name", ["crossing_from_left", "crossing_distracted"])
+def test_how_people_answer_is_a_lever_where_the_robot_asks(name):
+    """Neutral values change nothing; the others set one person's hearing alone."""
+    template = ScenarioTemplate.shipped(name)
+    space = ScenarioSpace(template, asks=True)
+    kind = "people" if template.median().people else "workers"
+    silent = ScenarioSpace(template)
+    added = set(space.parameters) - set(silent.parameters)
+    answers, delay, into = (
+        f"{kind}.0.{key}" for key in ("answers", "answer_delay_s", "startles_into_path")
+    )
+    assert {answers, delay, into} <= added
+    neutral = space.scenario(space.neutral)
+    assert neutral == silent.scenario(silent.neutral)
+    for values, changes in (
+        ({answers: 0.1}, {"answers": 0.0}),
+        ({answers: 0.9, delay: 1.5}, {"answers": 1.0, "delay_median_s": 1.5, "delay_spread": 1.0}),
+        ({into: 0.8}, {"startles": 1.0, "startles_into_path": 1.0}),
+    ):
+        varied = space.scenario({**space.neutral, **values})
+        first, *others = getattr(varied, kind)
+        assert first.hearing == Hearing().with_numbers(changes)
+        assert [each.hearing for each in others] == [None] * len(others)
+        assert varied.hearing == Hearing()
+    other = ScenarioSpace(template.with_population("phone_factor=0.2"), asks=True)
+    (first, *_) = getattr(other.scenario({**other.neutral, into: 0.8}), kind)
+    assert first.hearing.phone_factor == 0.2
