@@ -13,18 +13,17 @@ _CLASH = Path(__file__).parents[1] / "perception" / "_clash.py"
 run_path(str(_CLASH))["require_sole_owner"](__name__)
 
 from ._adapter import NavAdapter
-from ._alert import Alert, Answer
 from ._constraints import NavConstraints, PersonObstacle
 from ._errors import NavError
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
 from ._separation import max_speed_mps, protective_separation_m
+from .alerts import Alert
 from .exporters import boxes, circles, paint_costmap, points, polygons
 from .policies import InflationPolicy, SpeedPolicy
 
 __all__ = [
     "Alert",
-    "Answer",
     "AwarenessPolicy",
     "InflationPolicy",
     "NavAdapter",

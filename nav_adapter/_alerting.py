@@ -12,10 +12,10 @@ import numpy as np
 from perception.anthropometry import BODY_RADIUS_M
 from tracking.prediction import PredictionModel
 
-from ._alert import Alert, AlertKind
 from ._people import Person, Vector2
 from ._predicted import predicted_sigmas_m
 from ._robot import RobotProfile, RobotState
+from .alerts import Alert, AlertKind
 from .policies import AlertRules
 
 # Nobody is warned of a robot slower than this.

@@ -12,12 +12,12 @@ import numpy as np
 from perception.anthropometry import BODY_RADIUS_M
 from tracking.prediction import PredictionModel
 
-from ._alert import Alert, AlertMeans, Answer
 from ._alerting import AlertHistory, alerts_due, closest_approach, is_quiet
 from ._governor import GovernedSpeed, SpeedGovernor
 from ._people import People, Person
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
+from .alerts import Alert, AlertMeans, Answer
 from .limit import STANDING_MPS
 from .policies import AttentionRules
 

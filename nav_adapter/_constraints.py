@@ -18,10 +18,10 @@ from perception.arrays import (
 )
 from perception.short_repr import short_repr
 
-from ._alert import Alert, Answer
 from ._errors import NavError
 from ._robot import RobotProfile
 from ._speed_basis import SpeedBasis
+from .alerts import Alert, Answer
 
 
 class _WithOutline:

@@ -105,6 +105,22 @@ class OneOf(click.Choice[str]):
         return str(value)
 
 
+class WordAndNumbers(OneOf):
+    """One of several words, numbers as ``key=value,key=value``, or both: ``word,key=value``.
+
+    The command itself knows the keys.
+    """
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the text, or fail and name the nearest valid word."""
+        words = str(value).split(",")
+        if "=" not in words[0]:
+            super().convert(words.pop(0), param, ctx)
+        if not all(word.partition("=")[2] for word in words):
+            self.fail(f"must hold KEY=VALUE after a comma, got {str(value)!r}", param, ctx)
+        return str(value)
+
+
 class FilePath(click.Path):
     """The path of a file; the command itself checks whether the file exists."""
 

@@ -14,7 +14,7 @@ from click.shell_completion import CompletionItem
 
 from ._command import Decorator, option
 from ._network_options import allow_simulator_networks, networks, running
-from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole
+from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole, WordAndNumbers
 
 __all__ = [
     "COMPLETE_POLICIES",
@@ -264,9 +264,11 @@ def population() -> Decorator:
     """Add ``--population``: the habits of the people in a crossing."""
     return option(
         "--population",
-        type=OneOf(POPULATIONS),
+        type=WordAndNumbers(POPULATIONS),
         show_default="each scenario's own",
-        help="Habits of the people: 'classic', or 'recorded' as fitted to recorded people.",
+        metavar="NAME|KEY=VALUE,...",
+        help="Habits of the people: 'classic', or 'recorded' as fitted to recorded people; and how "
+        "they hear a request for attention: 'answers=0.3', or 'recorded,answers=0.8,startles=0.2'.",
     )
 
 

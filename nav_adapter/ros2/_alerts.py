@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from .._alert import Alert, Answer
 from .._constraints import NavConstraints
+from ..alerts import Alert, Answer
 from .conversions import header
 from .messages.diagnostic_msgs import DiagnosticArray, DiagnosticStatus, KeyValue
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from nav_adapter import Alert, Answer
+from nav_adapter import Alert
+from nav_adapter.alerts import Answer
 from perception.arrays import FloatArray
 
 from ._result import CrossingFrame

@@ -71,7 +71,7 @@ def compare_policies(
         progress: whether to show a progress bar, on a terminal.
         filmed: whether to take the pictures for the film.
         robot: a shipped name or a YAML file of the robot; empty for the Nova Carter.
-        population: habits of the worker, ``"classic"`` or ``"recorded"``; empty for the scenario's.
+        population: habits of the worker, as for ``run_crossing``; empty for the scenario's.
 
     Raises:
         SimError: an unknown robot or population.

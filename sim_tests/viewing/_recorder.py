@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from nav_adapter import Alert, Answer
+from nav_adapter import Alert
+from nav_adapter.alerts import Answer
 
 from ..crossing import CrossingFrame, Stage
 from ._pictures import CameraPictures

@@ -11,7 +11,8 @@ import yaml
 from paths import ROOT
 
 from awarenav.bridge.command import bridge
-from nav_adapter import Alert, Answer, NavConstraints
+from nav_adapter import Alert, NavConstraints
+from nav_adapter.alerts import Answer
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, SLOWEST_MPS, RobotFile, Topic, alerts
 from nav_adapter.ros2.messages import ros_type
 

@@ -82,6 +82,12 @@ class Hearing(StrictConfig):
             )
         return self
 
+    @property
+    def changes_text(self) -> str:
+        """The numbers that are not the default, as ``--population`` takes them."""
+        changed = self.model_dump(exclude_defaults=True)
+        return ",".join(f"{key}={value:g}" for key, value in changed.items())
+
     def with_numbers(self, numbers: Mapping[str, float]) -> Hearing:
         """Return the figures with other numbers.
 

@@ -12,7 +12,7 @@ from perception.documents import yaml_text
 
 from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
-from ...study.runs import Job, ProcessLock, refuse_unusable_planner
+from ...study.runs import Job, ProcessLock, policy_of, refuse_unusable_planner
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from .._files import templates_of, write_or_check_settings
@@ -170,7 +170,8 @@ def falsify(
         SimError: settings that do not fit together, or another process that works in the folder.
     """
     templates = templates_of(settings.scenarios)
-    spaces = {each.name: ScenarioSpace(each, settings.people) for each in templates}
+    asks = policy_of(settings.policy).attention is not None
+    spaces = {each.name: ScenarioSpace(each, settings.people, asks=asks) for each in templates}
     budget = Budget.of(settings.episodes, len(spaces), settings.generation)
     refuse_unusable_planner(settings.planner, templates[0].median())
     write_or_check_settings(

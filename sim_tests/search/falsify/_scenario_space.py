@@ -16,6 +16,7 @@ from ...actors.robot import NOVA_CARTER
 from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
 from ...world.errors import SimError
 from .._optimizer import Range
+from ._hearing_parameters import changed_hearing, hearing_parameters
 from ._joint_parameters import add_joint, is_joint_possible, joint_parameters
 from ._person_parameters import (
     FASTEST_WALK_MPS,
@@ -50,18 +51,21 @@ class ScenarioSpace:
     Args:
         template: the scenario.
         people: number of people that are varied, in the stage's order.
+        asks: the robot asks for attention, so how the varied people answer is varied as well
+            (:func:`hearing_parameters`).
 
     Raises:
         SimError: a scenario without people.
     """
 
-    def __init__(self, template: ScenarioTemplate, people: int = 2) -> None:
+    def __init__(self, template: ScenarioTemplate, people: int = 2, *, asks: bool = False) -> None:
         self.template = template
         median = template.median()
         self._median: dict[str, Any] = median.model_dump(mode="json")
         self._boxes = median.layout.obstacle_boxes_odom
         reach_m = median.robot_profile.circumscribed_radius_m
         self._longer_m = max(reach_m - NOVA_CARTER.circumscribed_radius_m, 0.0)
+        self._asks = asks
         self._is_recorded = median.population == "recorded"
         everybody = [(kind, row) for kind in _KINDS for row in range(len(self._median[kind]))]
         varied = everybody[:people]
@@ -125,16 +129,21 @@ class ScenarioSpace:
                 if name.startswith(prefix)
             }
             change = changed_script if kind == "workers" else changed_person
-            data[kind][row] = change(data[kind][row], own_values)
+            own = data[kind][row] = change(data[kind][row], own_values)
+            if self._asks:
+                own["hearing"] = changed_hearing(own["hearing"], data["hearing"], own_values)
         add_joint(data, {name: values[name] for name in self._joint})
         return data
 
     def _own_parameters(self, kind: str, row: int) -> dict[str, Parameter]:
         person = self._median[kind][row]
+        answer: dict[str, Parameter] = {}
+        if self._asks:
+            answer = hearing_parameters(person["hearing"] or self._median["hearing"])
         if kind == "workers":
-            return script_parameters(person)
+            return script_parameters(person) | answer
         fastest = FASTEST_RECORDED_MPS if self._is_recorded else FASTEST_WALK_MPS
-        return person_parameters(person, fastest)
+        return person_parameters(person, fastest) | answer
 
     def _take_medians(self, data: dict[str, Any]) -> None:
         """Give the varied people of the recorded population its medians."""

@@ -222,12 +222,13 @@ def _header(tuning: Tuning, candidate: Candidate, name: str) -> str:
 
 
 def _others(tuning: Tuning) -> str:
-    """Return robots and populations that are not the default."""
+    """Return robots, populations and hearing that are not the default."""
     medians = [template.median() for template in tuning.settings.templates]
     robots = {each.robot_model.name for each in medians if each.robot_model is not None}
     populations = {each.population for each in medians} - {DEFAULT_POPULATION}
     words = [f"robot {name}" for name in sorted(robots)]
     words += [f"{name} people" for name in sorted(populations)]
+    words += sorted({text for each in medians if (text := each.hearing.changes_text)})
     return "".join(f", {each}" for each in words)
 
 

@@ -29,4 +29,4 @@ def answering_note(about: Any) -> str:
         share, source = found[1], f"population {population}"
     else:
         share, source = f"{DEFAULT_ANSWERS:g}", "the default, unless a scenario has its own"
-    return f"Simulated people answer a request with probability {share} ({source})."
+    return f"Simulated people answer a request that they hear with probability {share} ({source})."

@@ -65,7 +65,7 @@ def compare_planners(
         sensors: ``"camera"``, ``"camera+scanner"`` or ``"scanner"``.
         camera: a shipped name or a YAML file that replaces each scenario's camera.
         robot: a shipped name or a YAML file of the robot that they are fitted to.
-        population: ``"classic"`` or ``"recorded"`` people; empty for each scenario's own.
+        population: habits of the people, as for ``run_crossing``; empty for each scenario's own.
         workers: number of processes; 1 runs in this process unless there is a time limit.
         time_limit_s: wall-clock limit of an episode, which ends planners that hang.
         resume: continue the comparison in the folder.

@@ -22,7 +22,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         ("sensors", "SET", "camera", "camera, camera+scanner or scanner (default: camera)"),
         ("camera", "NAME|FILE", "", "forward, surround or YAML file (default: the scenarios')"),
         ("robot", "NAME|FILE", "", "forklift, omni, delivery or YAML file (default: nova_carter)"),
-        ("population", "NAME", "", "classic or recorded people (default: the scenarios')"),
+        ("population", "TEXT", "", "people, as recorded,answers=0.3 (default: the scenarios')"),
         ("fault", "NAME|FILE", "none", "shipped fault or YAML file (default: none)"),
         ("episodes", "N", "3", "seeds per scenario (default: 3)"),
         ("seed", "N", "0", "first seed (default: 0)"),

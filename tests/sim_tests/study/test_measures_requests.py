@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from measured_scenes import crossing, straight, walking
 from shapely.geometry import Point
 
-from nav_adapter import Alert, Answer, PersonObstacle
+from nav_adapter import Alert, PersonObstacle
+from nav_adapter.alerts import Answer
 from sim_tests.study.measures import (
     RECORD_COLUMNS,
     measure,

@@ -12,7 +12,7 @@ from sim_tests.study.measures import EpisodeRecord, summarise, summary_text, wri
 from sim_tests.study.report import write_report
 
 HEADING = "Requests for attention"
-NOTE = "Simulated people answer a request with probability"
+NOTE = "Simulated people answer a request that they hear with probability"
 
 
 def episode(seed, policy, duration_s, *counts):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from viewed_crossing import EPISODE, SHORT
 
-from nav_adapter import Alert, Answer
+from nav_adapter import Alert
+from nav_adapter.alerts import Answer
 from perception import AttentionCone
 from sim_tests.crossing import CrossingFrame, RequestMemory, Stage, TopView, run_crossing
 from sim_tests.scenario import ScenarioTemplate

@@ -9,6 +9,8 @@ from perception.arrays import finite_number, set_fields
 
 from ._errors import NavError
 
+__all__ = ["Alert", "AlertKind", "AlertMeans", "Answer"]
+
 AlertMeans = Literal["light", "voice", "horn"]
 AlertKind = Literal["light", "voice", "horn", "attention"]
 

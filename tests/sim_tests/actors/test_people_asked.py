@@ -1,0 +1,324 @@
+"""People on the stage whom the robot asks for attention: they turn, look, or startle."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from nav_adapter import Alert
+from perception import AttentionCone
+from sim_tests import Scenario
+from sim_tests.actors.behaviour import WALKER_RADIUS_M, Hearing
+from sim_tests.actors.robot import NOVA_CARTER
+from sim_tests.crossing import Crossing, Stage, named_policy
+from sim_tests.crossing._metrics import SafetyMeter
+from sim_tests.world.hall import WarehouseLayout
+
+DT_S = 0.05
+ANSWERS = {"answers": 1.0, "startles": 0.0, "delay_spread": 1.0, "look_spread": 1.0}
+DEAF = {"answers": 0.0, "startles": 0.0}
+# They walk away ahead of the robot, and never look by themselves.
+WALKER = {
+    "name": "p",
+    "route": [{"x_m": 4.0, "y_m": 0.6}, {"x_m": 12.0, "y_m": 0.6}],
+    "speed_mps": 1.0,
+    "glances": {"notices_within_m": 0.0},
+}
+SCRIPT = {"path": [{"t_s": 0.0, "x_m": 4.0, "y_m": 0.6}, {"t_s": 8.0, "x_m": 12.0, "y_m": 0.6}]}
+
+
+@dataclass(frozen=True)
+class Run:
+    """T times of the first person, and the motions of everybody."""
+
+    times_s: np.ndarray
+    places: np.ndarray  # (T, P, 2)
+    speeds: np.ndarray  # (T, P) as reported
+    headings: np.ndarray  # (T, P)
+    heads: np.ndarray  # (T, P) yaw
+    awareness: np.ndarray  # (T, P)
+    angles: np.ndarray  # (T, P, 5)
+    noticed_s: tuple[float | None, ...]
+
+    @property
+    def moved_mps(self) -> np.ndarray:
+        """(T-1, P) speeds by the places."""
+        return np.linalg.norm(np.diff(self.places, axis=0), axis=2) / DT_S
+
+    def looks_s(self, person: int = 0) -> float:
+        """Return how long the true awareness is at least 0.5."""
+        return float((self.awareness[:, person] >= 0.5).sum() * DT_S)
+
+
+def run(
+    *,
+    at_s: tuple[float, ...] = (2.0,),
+    who: int = 0,
+    means: Any = "voice",
+    seconds: float = 6.0,
+    robot_mps: float = 0.4,
+    seed: int = 0,
+    **scenario: Any,
+) -> Run:
+    """Run a stage with a robot that drives straight ahead and asks one person."""
+    data = {"name": "ask", "duration_s": seconds, "layout": "open", "robot": {"goal_x_m": 12.0}}
+    case = Scenario.model_validate({**data, **scenario})
+    rows, cone, meter = [], AttentionCone(), SafetyMeter(NOVA_CARTER)
+    with Stage(case, np.zeros(len(case.workers)), np.random.default_rng(seed)) as stage:
+        stage.amr.command(robot_mps, 0.0)
+        for tick in range(round(seconds / DT_S)):
+            stage.measure(meter, DT_S)
+            motions = stage.motions
+            views = stage.truth(cone, stage.amr.T_odom_camera)
+            rows.append(
+                (
+                    [m.position_odom_m for m in motions],
+                    [np.hypot(*m.velocity_odom_mps) for m in motions],
+                    [m.heading_odom_rad for m in motions],
+                    [m.head_yaw_rad for m in motions],
+                    [view.awareness for view in views],
+                    [
+                        (m.heading_odom_rad, m.head_yaw_rad, m.head_pitch_rad, *eyes(m))
+                        for m in motions
+                    ],
+                )
+            )
+            if any(abs(stage.t_s - t_s) < 0.5 * DT_S for t_s in at_s):
+                stage.request(means, motions[who].position_odom_m)
+            stage.advance((tick + 1) * DT_S, meter)
+        noticed = tuple(outcome.noticed_s for outcome in stage.outcomes)
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return Run(np.arange(len(rows)) * DT_S, *columns, noticed)
+
+
+def eyes(motion: Any) -> tuple[float, float]:
+    return motion.eye_yaw_rad, motion.eye_pitch_rad
+
+
+def recorded_csv(folder: Path) -> dict[str, Any]:
+    """Return the keys of a scenario that replays somebody who walks away ahead of the robot."""
+    path = folder / "recorded.csv"
+    with path.open("w", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(["t_s", "id", "x_m", "y_m"])
+        table.writerows([0.1 * n, "one", 4.0 + 0.1 * n, 0.6] for n in range(81))
+    return {"replay_csv": str(path)}
+
+
+KINDS = ("walker", "recorded walker", "scripted", "replayed", "displaced")
+
+
+def of_kind(kind: str, folder: Path) -> dict[str, Any]:
+    if kind == "scripted":
+        return {"workers": [SCRIPT]}
+    if kind in ("replayed", "displaced"):
+        return {**recorded_csv(folder), "replay_reacts": kind == "displaced"}
+    return {"people": [WALKER], "population": "recorded" if "recorded" in kind else "classic"}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_walks_away_turns_back_and_looks(kind: str, tmp_path: Path) -> None:
+    """The true awareness rises after the delay, and falls again after the look."""
+    people = of_kind(kind, tmp_path)
+    asked = run(**people, hearing=ANSWERS, seconds=8.0)
+    before = asked.times_s < 2.7
+    assert asked.awareness[before].max() == 0.0
+    assert asked.awareness.max() > 0.7
+    assert 0.8 <= asked.looks_s() <= 1.6  # and turning to it and away takes time too
+    met = asked.times_s[np.flatnonzero(asked.awareness[:, 0] >= 0.5)[0]]
+    assert 3.0 <= met <= 4.0
+    # Eyes, head and trunk turn at human speeds, and the feet walk on.
+    turned = np.unwrap(asked.headings[:, 0]) + asked.heads[:, 0]
+    assert np.abs(np.diff(turned)).max() / DT_S <= 3.2 + 2.6 + 0.2
+    assert np.abs(np.diff(np.unwrap(asked.headings[:, 0]))).max() / DT_S <= 2.6 + 0.2
+    silent = run(**people, hearing=ANSWERS, seconds=8.0, at_s=())
+    if kind in ("scripted", "replayed"):
+        assert np.array_equal(asked.places, silent.places)
+        assert asked.angles[-1] == pytest.approx(silent.angles[-1])
+    assert silent.awareness.max() == 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_at_no_answers_asking_changes_nothing_at_all(kind: str, tmp_path: Path) -> None:
+    people = of_kind(kind, tmp_path)
+    silent = run(**people, at_s=())
+    asked = run(**people, hearing=DEAF, at_s=(0.5, 2.0, 3.0))
+    for name in ("places", "speeds", "angles", "awareness"):
+        assert np.array_equal(getattr(silent, name), getattr(asked, name)), name
+
+
+def test_who_has_looked_knows_the_robot_and_glances_no_more_than_before() -> None:
+    asked = run(people=[WALKER], hearing=ANSWERS, seconds=12.0)
+    assert asked.noticed_s[0] == pytest.approx(3.4, abs=0.4)
+    assert asked.looks_s() <= 1.6
+    silent = run(people=[WALKER], hearing=DEAF, seconds=12.0)
+    assert silent.noticed_s == (None,)
+
+
+def test_who_has_forgotten_the_robot_looks_but_stays_lapsed() -> None:
+    """The person crosses the robot's line: the look alone does not make them wait."""
+    crosser = {
+        "name": "p",
+        "route": [{"x_m": 5.0, "y_m": -4.0}, {"x_m": 5.0, "y_m": 4.0}],
+        "glances": {"watches": True, "first_glance_delay_s": 0.0},
+        "reactions": {"wait": 1.0},
+        "lapse": {"after_look_s": 0.2},
+        "social": False,
+    }
+    asked = run(people=[crosser], hearing=ANSWERS, robot_mps=0.8, at_s=(1.0,))
+    silent = run(people=[crosser], at_s=(), robot_mps=0.8)
+    late = asked.times_s > 1.5
+    assert asked.awareness[late].max() > 0.7 > silent.awareness[late].max()
+    assert np.array_equal(asked.places, silent.places)
+
+
+@pytest.mark.parametrize("activity", ["sitting", "kneeling"])
+@pytest.mark.parametrize("kind", ["people", "workers"])
+def test_low_people_turn_the_head_alone_and_never_move(kind: str, activity: str) -> None:
+    place = {"x_m": 5.0, "y_m": 1.0}
+    keys = [{"t_s": 0.0, "activity": activity}]
+    heading = [{"t_s": 0.0, "heading_deg": 90.0}]
+    person = {"name": "p", "activity": activity, "route": [place], "heading_deg": 90.0}
+    script = {"path": [{"t_s": 0.0, **place}], "activities": keys, "heading": heading}
+    low = [{**person, "glances": {"notices_within_m": 0.0}} if kind == "people" else script]
+    jumpy = {**ANSWERS, "startles": 1.0, "distracted_factor": 1.0}
+    asked = run(**{kind: low}, hearing=jumpy)
+    assert np.ptp(asked.places, axis=0).max() < 1e-9
+    assert np.ptp(asked.headings) < 1e-9
+    assert asked.awareness.max() > 0.7
+    assert asked.heads.max() > 1.0
+
+
+def test_nobody_looks_through_a_rack() -> None:
+    """A voice is heard there; the look meets nothing, and the person does not notice the robot."""
+    layout = WarehouseLayout.open_floor().model_dump()
+    rack = {"x_m": 2.8, "y_m": 0.0, "length_m": 1.0, "width_m": 3.0}
+    hidden = {**layout, "racks": [*layout["racks"], rack]}
+    stands = {**WALKER, "route": [{"x_m": 5.0, "y_m": 0.3}]}
+    script = {"path": [{"t_s": 0.0, "x_m": 5.0, "y_m": 0.3}]}
+    for people in ({"people": [stands]}, {"workers": [script]}):
+        seen = run(**people, hearing=ANSWERS, layout=layout, robot_mps=0.0)
+        asked = run(**people, hearing=ANSWERS, layout=hidden, robot_mps=0.0)
+        assert seen.awareness.max() > 0.7
+        assert asked.awareness.max() == 0.0
+        assert asked.noticed_s in ((None,), ())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("into", [0.0, 1.0])
+def test_a_startle_stays_within_the_speed_that_the_limit_counts_with(
+    kind: str, into: float, tmp_path: Path
+) -> None:
+    """A person off the robot's line stops, steps aside, or steps towards it, and walks on."""
+    people = of_kind(kind, tmp_path)
+    jumpy = {**DEAF, "startles": 1.0, "startles_into_path": into, "delay_spread": 1.0}
+    silent = run(**people, hearing=jumpy, at_s=(), seconds=9.0)
+    ways = set()
+    for seed in range(1 if into else 4):
+        asked = run(**people, hearing=jumpy, seconds=9.0, seed=seed)
+        assert asked.moved_mps.max() <= 1.5 if "recorded w" not in kind else 1.7
+        assert asked.speeds.max() <= 1.5 if "recorded w" not in kind else 1.7
+        y_m = asked.places[:, 0, 1]
+        near = asked.times_s < 4.5
+        if into:
+            assert y_m[near].min() < 0.6 - 0.35
+            assert y_m[near].min() > -0.35
+        else:
+            assert y_m.min() > 0.6 - 0.3
+            ways.add("aside" if y_m[near].max() > 0.6 + 0.25 else "stop")
+        behind = silent.places[90, 0, 0] - asked.places[90, 0, 0]
+        assert 0.5 < behind < 2.2  # a second and a half of its way
+        assert np.array_equal(silent.places[:53], run_start(asked, seed, silent, people, jumpy))
+    assert into or len(ways) == 2
+
+
+def run_start(asked: Run, seed: int, silent: Run, people: Any, jumpy: Any) -> np.ndarray:
+    """Return the places up to the startle; of another seed those of its own silent run."""
+    if seed == 0:
+        return asked.places[:53]
+    own = run(**people, hearing=jumpy, at_s=(), seconds=3.0, seed=seed)
+    assert np.array_equal(asked.places[:53], own.places[:53])
+    return silent.places[:53]
+
+
+@pytest.mark.parametrize("kind", ["workers", "people"])
+def test_a_step_never_leads_into_a_rack(kind: str) -> None:
+    """The step aside of people who walk 0.4 m beside a rack ends half a body's width before it."""
+    rack_y_m = 1.6
+    spots = [{"x_m": 2.0, "y_m": 1.2}, {"x_m": 6.0, "y_m": 1.2}]
+    script = {"path": [{"t_s": 4.0 * n, **spot} for n, spot in enumerate(spots)]}
+    people = {kind: [script if kind == "workers" else {**WALKER, "route": spots}]}
+    jumpy = {**DEAF, "startles": 1.0, "startles_into_path": 0.0, "delay_spread": 1.0}
+    boxes = [shapely.box(*box) for box in WarehouseLayout.aisles().obstacle_boxes_odom.tolist()]
+    highest = []
+    for seed in range(4):
+        asked = run(**people, hearing=jumpy, layout="aisles", seed=seed, at_s=(0.5,))
+        for place in asked.places[:, 0]:
+            gap_m = min(box.distance(shapely.Point(place)) for box in boxes)
+            assert gap_m > WALKER_RADIUS_M - 0.01
+        highest.append(float(asked.places[:, 0, 1].max()))
+    assert rack_y_m - WALKER_RADIUS_M - 0.05 < max(highest) <= rack_y_m - WALKER_RADIUS_M + 0.01
+
+
+def test_the_nearest_person_is_addressed_and_others_are_bystanders() -> None:
+    stands = {**WALKER, "route": [{"x_m": 5.0, "y_m": 0.6}]}
+    beside = {**WALKER, "name": "q", "route": [{"x_m": 5.0, "y_m": 1.8}]}
+    hearing = {**ANSWERS, "bystander_factor": 0.0}
+    first = run(people=[stands, beside], hearing=hearing)
+    assert [first.looks_s(person) > 0.5 for person in (0, 1)] == [True, False]
+    second = run(people=[stands, beside], hearing=hearing, who=1)
+    assert [second.looks_s(person) > 0.5 for person in (0, 1)] == [False, True]
+    both = run(people=[stands, beside], hearing={**hearing, "bystander_factor": 1.0})
+    assert [both.looks_s(person) > 0.5 for person in (0, 1)] == [True, True]
+
+
+def test_a_person_may_hear_otherwise_than_the_scenario_says() -> None:
+    deaf = {"hearing": {"answers": 0.0, "startles": 0.0}}
+    for people in ({"people": [{**WALKER, **deaf}]}, {"workers": [{**SCRIPT, **deaf}]}):
+        assert run(**people, hearing=ANSWERS).awareness.max() == 0.0
+
+
+def test_a_light_is_not_seen_behind_the_back() -> None:
+    facing = {**WALKER, "route": [{"x_m": 6.0, "y_m": 0.6}], "heading_deg": 120.0}
+    hearing = {**ANSWERS, "light_factor": 1.0}
+    assert run(people=[WALKER], hearing=hearing, means="light").awareness.max() == 0.0
+    assert run(people=[facing], hearing=hearing, means="light").awareness.max() > 0.7
+
+
+def test_a_crossing_lets_people_hear_its_requests_and_not_its_warnings(monkeypatch) -> None:
+    scenario = Scenario.shipped("crossing_distracted").with_population("answers=1,startles=0")
+    asked: list[tuple[str, tuple[float, ...]]] = []
+    monkeypatch.setattr(
+        Stage, "request", lambda _, means, place: asked.append((means, tuple(place)))
+    )
+    with Crossing(scenario, named_policy("balanced")[1]) as crossing:
+        update = crossing._adapter.update
+
+        def with_alerts(*words: Any, **named: Any) -> Any:
+            constraints = update(*words, **named)
+            ids = [each.track_id for each in constraints.obstacles]
+            warned = [Alert(each, "horn", 1.0, 0.0, "test") for each in ids]
+            calls = [
+                Alert(each, "attention", 1.0, 0.0, "test", means="light", wins_s=2.0)
+                for each in ids
+            ]
+            return replace(constraints, alerts=(*warned, *calls))
+
+        monkeypatch.setattr(crossing._adapter, "update", with_alerts)
+        for _ in range(20):
+            now = crossing.sense()
+            crossing.advance()
+    assert asked
+    assert {means for means, _ in asked} == {"light"}
+    near = now.truth[0].position_odom_m
+    assert asked[-1][1] == pytest.approx(tuple(near), abs=0.5)
+
+
+def test_the_figures_of_a_scenario_are_the_default_ones() -> None:
+    assert Scenario.shipped("late_glance").hearing == Hearing()

@@ -1,0 +1,80 @@
+"""The text of a population: a name, numbers of hearing, or both."""
+
+from __future__ import annotations
+
+import pytest
+
+from awarenav.cli import main
+from sim_tests import Scenario, ScenarioTemplate
+from sim_tests.actors.behaviour import Hearing, population_of
+from sim_tests.world.errors import SimError
+
+
+def test_a_name_numbers_or_both() -> None:
+    assert population_of("recorded") == ("recorded", {})
+    assert population_of("answers=0.3") == (None, {"answers": 0.3})
+    both = population_of("classic, answers=0.8 ,startles=0.2")
+    assert both == ("classic", {"answers": 0.8, "startles": 0.2})
+
+
+def test_scenarios_and_templates_take_it_and_keep_the_rest() -> None:
+    text = "recorded,answers=0.8,startles=0.2"
+    for owner in (Scenario.shipped("late_glance"), ScenarioTemplate.shipped("late_glance")):
+        changed = owner.with_population(text)
+        scenario = changed if isinstance(changed, Scenario) else changed.median()
+        assert scenario.population == "recorded"
+        assert scenario.hearing == Hearing(answers=0.8, startles=0.2)
+        again = changed.with_population("habituation=0.5")
+        scenario = again if isinstance(again, Scenario) else again.median()
+        assert scenario.population == "recorded"
+        assert scenario.hearing == Hearing(answers=0.8, startles=0.2, habituation=0.5)
+
+
+def test_numbers_alone_leave_people_as_they_are() -> None:
+    scenario = Scenario.shipped("crossing_distracted")
+    changed = scenario.with_population("answers=0.3")
+    assert (changed.population, changed.workers) == (scenario.population, scenario.workers)
+    assert changed.hearing.changes_text == "answers=0.3"
+
+
+def test_the_written_scenario_holds_them() -> None:
+    changed = ScenarioTemplate.shipped("late_glance").with_population("answers=0.3")
+    assert ScenarioTemplate.from_text(changed.to_text()).median().hearing.answers == 0.3
+    text = changed.median().to_text()
+    assert ScenarioTemplate.from_text(text).median().hearing.answers == 0.3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("odd", "population must be one of classic, recorded, got 'odd'"),
+        ("recorded,odd", "KEY=VALUE .*habituation.*got 'odd'"),
+        ("recorded,answer=0.3", "answers, startles.*did you mean 'answers'"),
+        ("recorded,", "KEY=VALUE"),
+        ("answers=lots", "answers of a population must be a number, got 'answers=lots'"),
+        ("answers=0.3,answers=0.4", "names answers twice"),
+        ("answers=0.3,recorded", "got 'recorded'"),
+        ("answers=1.5", "answers.*less than or equal to 1"),
+        ("answers=nan", "answers"),
+        ("heard_within_m=20", "heard_within_m must be at most not_heard_beyond_m"),
+    ],
+)
+def test_another_text_is_refused(text: str, message: str) -> None:
+    for owner in (Scenario.shipped("late_glance"), ScenarioTemplate.shipped("late_glance")):
+        with pytest.raises(SimError, match=message):
+            owner.with_population(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("record,answers=0.3", "did you mean 'recorded'"),
+        ("recorded,answers", "must hold KEY=VALUE after a comma"),
+        ("recorded,answer=0.3", "did you mean 'answers'"),
+    ],
+)
+def test_the_command_line_says_what_is_wrong(text: str, message: str, capsys, tmp_path) -> None:
+    out = str(tmp_path / "out")
+    words = ["crossings", "--scenario", "late_glance", "--out", out, "--population", text]
+    assert main(words) == 2
+    assert message in capsys.readouterr().err
