@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from awarenav.video import VideoWriter
+from nav_adapter import AwarenessPolicy
 from perception import AttentionCone, Camera
 from perception.arrays import ImageRgb
 
@@ -50,9 +51,11 @@ def run_encounter(
         The crossing, with the truth and the observation of every frame.
     """
     scenario = Scenario.shipped("paper_encounter")
+    # The robot of the paper asks nobody, and the worker's looks are those of the script.
+    policy = AwarenessPolicy.preset("balanced").model_copy(update={"attention": None})
     with _Recorder(scenario, out / "encounter.mp4" if video else None, progress) as recorder:
         result = run_crossing(
-            scenario, policy="balanced", perception=perception, seed=seed, observer=recorder
+            scenario, policy=policy, perception=perception, seed=seed, observer=recorder
         )
     write_encounter(out / "encounter.csv", result.frames, perception)
     plot_encounter(out / "encounter.png", result, recorder.images)
