@@ -290,7 +290,8 @@ class NavAdapter:
         if pause_s > timing.stale_after_s:
             # After a pause in the updates nobody counts as aware any more.
             people = self._people.after_silence(people)
-        people = self._people.updated(people, current, now, stale)
+        answered = self._addressing.answered(before.addressed, now)
+        people = self._people.updated(people, current, now, stale, answered)
         refuse_absurd(people)
         lost = self._people.lost(before.lost, before.people, before.stamp_s, people, now)
         limit, lost = self._governor.limit(people, lost, robot_state, now, robot_age_s)

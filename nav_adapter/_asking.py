@@ -105,6 +105,18 @@ class Addressing:
         nothing_known = estimate(prior(policy.filter), policy.filter)
         self._unseen_std = 0.5 * float(nothing_known.awareness_std)
 
+    def answered(self, history: AddressHistory, now: float) -> frozenset[int]:
+        """Return the people whose answer may still be remembered."""
+        rules = self._policy.attention
+        if rules is None:
+            return frozenset()
+        lasts_s = rules.pause_s + self._lasts_s
+        return frozenset(
+            track_id
+            for track_id, each in history.asked.items()
+            if each.answered and now - each.stamp_s <= lasts_s
+        )
+
     def step(
         self,
         history: AddressHistory,
@@ -269,6 +281,9 @@ def _answers(
             continue
         kept[track_id] = each
         person = people.get(track_id)
+        if person is not None and person.is_at_first_sight:
+            del kept[track_id]  # the id belongs to somebody else now
+            continue
         if person is None or each.answered or person.awareness_lower < _LOOKED:
             continue
         after_s = person.seen_stamp_s - each.stamp_s

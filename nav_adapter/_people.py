@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -134,6 +134,7 @@ class People:
         tracks: tuple[PersonTrack, ...],
         now: float,
         stale: bool,
+        answered: Collection[int] = (),
     ) -> dict[int, Person]:
         """Return all people as of ``now``, in the order of their ids.
 
@@ -142,6 +143,7 @@ class People:
             tracks: the input.
             now: stamp of the update.
             stale: whether the data are too old to trust.
+            answered: who has just looked because the robot asked for it.
         """
         jumped = {
             track.id
@@ -151,7 +153,7 @@ class People:
         current = {
             track.id: self._at(track, None, 0.0, now)
             if track.id in jumped
-            else self._tracked(track, people.get(track.id), now, stale)
+            else self._tracked(track, people.get(track.id), now, stale, track.id in answered)
             for track in tracks
         }
         if jumped:
@@ -243,13 +245,18 @@ class People:
         return margins.uncertainty_sigmas
 
     def _tracked(
-        self, track: PersonTrack, before: Person | None, now: float, stale: bool
+        self,
+        track: PersonTrack,
+        before: Person | None,
+        now: float,
+        stale: bool,
+        answered: bool,
     ) -> Person:
         """Return the person of a track in the input."""
         seen_stamp_s, fresh_s = track.stamp_s - track.time_since_seen_s, self._timing.fresh_within_s
         lower = 0.0
         if not stale and track.status != "tentative" and now - seen_stamp_s <= fresh_s:
-            lower = max(track.awareness_lower, self._noticed_lower(track))
+            lower = max(track.awareness_lower, self._noticed_lower(track, answered))
         if before is None:
             return self._at(track, None, lower, now)
         advance_s = seen_stamp_s - before.seen_stamp_s
@@ -305,12 +312,17 @@ class People:
             lost_limit_mps=before.lost_limit_mps,
         )
 
-    def _noticed_lower(self, track: PersonTrack) -> float:
-        """Return the lower bound of α that stands for having noticed the robot before."""
+    def _noticed_lower(self, track: PersonTrack, answered: bool) -> float:
+        """Return the lower bound of α that stands for having noticed the robot before.
+
+        A look at a robot that has just asked for it is no chance look: the belief counts until it
+        ends.
+        """
         counts_as = self._policy.noticed_counts_as
-        if counts_as is None or track.status != "confirmed" or track.noticed < _NOTICED:
-            return 0.0
-        return counts_as
+        believed = track.noticed >= _NOTICED or (answered and track.noticed > 0.0)
+        return (
+            counts_as if counts_as is not None and believed and track.status == "confirmed" else 0.0
+        )
 
     def _without_owner(
         self, people: Mapping[int, Person], jumped: set[int], tracks: tuple[PersonTrack, ...]
