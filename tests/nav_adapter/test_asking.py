@@ -184,6 +184,33 @@ def test_a_look_long_after_the_request_is_no_answer() -> None:
     assert not any(result.answers for result in late)
 
 
+def test_an_answer_is_remembered_until_the_belief_ends() -> None:
+    """A look leaves a belief of 0.3, too weak to count by itself, for 2 s."""
+
+    def looks(t_s: float) -> list[PersonTrack]:
+        lower = 0.7 if 0.95 < t_s < 1.45 else 0.0
+        (track,) = standing(BESIDE, awareness_lower=lower)(t_s)
+        return [replace(track, noticed=0.3 if 0.95 < t_s < 3.45 else 0.0)]
+
+    def lowers(policy: AwarenessPolicy) -> list[float]:
+        results = driven(looks, 6.0, policy=policy)
+        return [result.obstacles[0].awareness_lower for result in results[15:]]
+
+    counts_as = AwarenessPolicy().noticed_counts_as
+    assert lowers(policy_of()) == [counts_as] * 20 + [0.0] * 25
+    assert lowers(AwarenessPolicy(attention=None)) == [0.0] * 45
+
+
+def test_nothing_is_remembered_of_somebody_who_did_not_look() -> None:
+    def believed(t_s: float) -> list[PersonTrack]:
+        (track,) = standing(BESIDE, awareness_lower=0.2)(t_s)
+        return [replace(track, noticed=0.3)]
+
+    results = driven(believed, 5.0)
+    assert requests(results)
+    assert {result.obstacles[0].awareness_lower for result in results} == {0.2}
+
+
 def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> None:
     beside = driven(standing((3.5, 1.3), (3.5, 1.9)), 2.0)
     assert [alert.track_id for _, alert in requests(beside)] == [1]

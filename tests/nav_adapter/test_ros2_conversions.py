@@ -15,13 +15,13 @@ from shapely.geometry import Polygon
 
 from nav_adapter import (
     Alert,
-    Answer,
     AwarenessPolicy,
     NavAdapter,
     NavConstraints,
     NavError,
     paint_costmap,
 )
+from nav_adapter.alerts import Answer
 from nav_adapter.ros2 import (
     SLOWEST_MPS,
     STOP_POLYGON_ID,
