@@ -78,8 +78,8 @@ def requests(results: Sequence[NavConstraints]) -> list[tuple[float, Alert]]:
 def test_who_limits_the_robot_and_has_not_looked_is_asked_the_quietest_means_first() -> None:
     results = driven(standing(BESIDE), 12.0)
     asked = requests(results)
-    # Asked once seen for 0.2 s; the pause doubles: 2.5 s, then 5 s.
-    assert [t for t, _ in asked] == pytest.approx([0.2, 2.7, 7.7])
+    # Asked once seen for 0.2 s; the pause doubles: 3 s, then 6 s.
+    assert [t for t, _ in asked] == pytest.approx([0.2, 3.2, 9.2])
     assert [alert.means for _, alert in asked] == ["light", "voice", "voice"]
     limit_mps = results[2].speed_limit_mps
     for _, alert in asked:
