@@ -202,17 +202,30 @@ def stops_in_time(person: Reach, course: Course, speed_mps: float) -> bool:
     No reaction time is left to it, but for the age of the data.
     """
     T, a, step_s = person.elapsed_s, course.deceleration_mps2, _step_s(course)
-    t0 = way0 = 0.0
-    while a * (t0 - T) < speed_mps:
-        t1 = t0 + step_s
-        way1 = _way_m(speed_mps, a, T, t1)
-        near, past, past_behind = contact_m(
-            course, person.margin_m, *reach_at(person, course, t0, t1)
-        )
-        if way0 <= past_behind or not (way1 < near or way0 > past):
+    t = 0.0
+    while a * (t - T) < speed_mps:
+        if not _apart(person, course, speed_mps, t, t + step_s):
             return False
-        t0, way0 = t1, way1
+        t += step_s
     return True
+
+
+def _apart(person: Reach, course: Course, speed_mps: float, t0: float, t1: float) -> bool:
+    """Return whether a robot that brakes at once is out of reach from t0 to t1.
+
+    As for the limit, an interval in which they may meet is halved down to the finest.
+    """
+    T, a = person.elapsed_s, course.deceleration_mps2
+    way0, way1 = _way_m(speed_mps, a, T, t0), _way_m(speed_mps, a, T, t1)
+    near, past, past_behind = contact_m(course, person.margin_m, *reach_at(person, course, t0, t1))
+    if way0 > past_behind and (way1 < near or way0 > past):
+        return True
+    if t1 - t0 <= FINEST * _step_s(course) or a * (t0 - T) >= speed_mps:
+        return a * (t0 - T) >= speed_mps  # a robot that stands meets nobody
+    middle = 0.5 * (t0 + t1)
+    return _apart(person, course, speed_mps, t0, middle) and _apart(
+        person, course, speed_mps, middle, t1
+    )
 
 
 def _way_m(speed_mps: float, a: float, T: float, t: float) -> float:

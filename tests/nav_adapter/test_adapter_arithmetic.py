@@ -109,7 +109,7 @@ def test_finite_tracks_give_constraints_or_an_error_of_the_package(
     assert 0.0 <= constraints.speed_limit_mps <= ROBOT.max_speed_mps
 
 
-@pytest.mark.parametrize("stage", ["obstacles_of", "alerts_due", "NavConstraints"])
+@pytest.mark.parametrize("stage", ["obstacles_of", "SpeedBasis", "NavConstraints"])
 def test_a_failure_at_any_stage_leaves_the_adapter_as_it_was(
     stage: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
