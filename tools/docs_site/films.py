@@ -2,6 +2,7 @@
 
     python -m tools.docs_site.films                # all scenarios, into docs/images/films
     python -m tools.docs_site.films blind_corner   # one
+    python -m tools.docs_site.films asking         # the two of docs/asking.md
 
 The robot has the recommended set-up, a camera ahead and two laser scanners, and drives with the
 policy ``balanced`` and seed 0. Films run at twice the real speed.
@@ -24,9 +25,12 @@ from PIL import Image, ImageDraw, ImageFont
 from perception import AttentionCone
 from sim_tests import CrossingFrame, run_crossing, shipped_scenarios
 from sim_tests.crossing import Stage, TopView
-from sim_tests.scenario import SCENARIO_SETS
+from sim_tests.scenario import SCENARIO_SETS, ScenarioTemplate
 
 FOLDER: Final = Path(__file__).parents[2] / "docs" / "images" / "films"
+# Films of docs/asking.md, beside the folder: the same crossing with somebody who answers or not.
+_ASKING: Final = {"asking_answered": 1.0, "asking_in_vain": 0.0}
+_ASKING_SEED: Final = 1
 #: Largest film, and largest sum of all films.
 MAX_FILM_BYTES: Final = 150_000
 MAX_SUM_BYTES: Final = 5_200_000
@@ -148,6 +152,26 @@ def _window(stage: Stage) -> tuple[float, float, float, float]:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
+def _film_asking() -> None:
+    """Film the robot behind a worker with a phone, who answers its request or does not."""
+    scenario = ScenarioTemplate.shipped("robot_overtaking").for_seed(_ASKING_SEED)
+    worker = scenario.people[0].model_copy(update={"activity": "phone"})
+    for name, answers in _ASKING.items():
+        hearing = scenario.hearing.with_numbers(
+            {"answers": answers, "phone_factor": 1.0, "startles": 0.0}
+        )
+        film = Film()
+        run_crossing(
+            scenario.model_copy(update={"people": (worker,), "hearing": hearing}),
+            policy="balanced",
+            perception="keypoints+scanner",
+            seed=_ASKING_SEED,
+            observer=film,
+        )
+        (FOLDER.parent / f"{name}.webp").write_bytes(film.webp())
+        print(f"{name}: {len(film.pictures)} pictures", flush=True)
+
+
 def filmed_scenarios() -> tuple[str, ...]:
     """Return the names of the shipped scenarios of all sets."""
     return tuple(name for each in SCENARIO_SETS for name in shipped_scenarios(each))
@@ -157,9 +181,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Make the films; return 1 if they are too large."""
     parser = argparse.ArgumentParser(description="Make the films of the gallery.")
     parser.add_argument("scenarios", nargs="*", help="default: all that are shipped")
-    names = parser.parse_args(arguments).scenarios or filmed_scenarios()
+    names = parser.parse_args(arguments).scenarios or [*filmed_scenarios(), "asking"]
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name in names:
+        if name == "asking":
+            _film_asking()
+            continue
         film = Film()
         run_crossing(name, policy="balanced", perception="keypoints+scanner", seed=0, observer=film)
         data = film.webp()

@@ -1,0 +1,75 @@
+"""Requests for attention in closed loop: what they win, and that silence costs nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from nav_adapter import AwarenessPolicy
+from sim_tests import CrossingResult, run_crossing
+from sim_tests.crossing import STANDING_SPEED_MPS
+
+BALANCED = AwarenessPolicy.preset("balanced")
+
+
+def crossing(
+    scenario: str,
+    seed: int,
+    population: str,
+    *,
+    asks: bool = True,
+    perception: str = "keypoints+scanner",
+) -> CrossingResult:
+    policy = BALANCED if asks else BALANCED.model_copy(update={"attention": None})
+    return run_crossing(
+        scenario, policy=policy, perception=perception, seed=seed, population=population
+    )
+
+
+def requests(result: CrossingResult) -> list[tuple[float, int]]:
+    return [
+        (frame.t_s, alert.track_id)
+        for frame in result.frames
+        for alert in frame.constraints.alerts
+        if alert.kind == "attention"
+    ]
+
+
+def test_where_nobody_answers_or_startles_the_robot_drives_as_one_that_does_not_ask() -> None:
+    deaf, silent = (
+        crossing("two_people_one_aware", 3, "answers=0,startles=0", asks=asks, perception="truth")
+        for asks in (True, False)
+    )
+    assert requests(deaf)
+    assert not requests(silent)
+    assert [frame.command for frame in deaf.frames] == [frame.command for frame in silent.frames]
+    assert deaf.time_to_goal_s == silent.time_to_goal_s
+
+
+def test_a_worker_who_answers_is_passed_seconds_sooner() -> None:
+    answered, in_vain = (
+        crossing("robot_overtaking", 1, f"answers={share},startles=0") for share in (1, 0)
+    )
+    assert answered.time_to_goal_s is not None
+    assert in_vain.time_to_goal_s is not None
+    assert answered.time_to_goal_s < in_vain.time_to_goal_s - 5.0
+    answers = [
+        (frame.t_s, each.track_id)
+        for frame in answered.frames
+        for each in frame.constraints.answers
+    ]
+    assert len(answers) == 1
+    assert not [t for t, track_id in requests(answered) if (track_id, t) > answers[0][::-1]]
+    assert not any(frame.constraints.answers for frame in in_vain.frames)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_somebody_who_startles_into_the_path_is_not_met_by_a_moving_robot(seed: int) -> None:
+    startled = crossing(
+        "busy_in_aisle", seed, "startles=1,startles_into_path=1,answers=0", perception="truth"
+    )
+    assert requests(startled)
+    places_m = [frame.truth[0].position_odom_m for frame in startled.frames]
+    assert max(float(np.hypot(*(place - places_m[0]))) for place in places_m) > 0.3
+    moving = [each for each in startled.contacts if each.robot_speed_mps > STANDING_SPEED_MPS]
+    assert moving == []
