@@ -16,6 +16,7 @@ from tracking.prediction import PredictionModel
 from ._alerting import AlertHistory, alerts_due, closest_approach, is_quiet
 from ._governor import GovernedSpeed, SpeedGovernor
 from ._people import People, Person
+from ._places import velocity_variance_m2ps2
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
 from .alerts import Alert, AlertMeans, Answer
@@ -28,6 +29,8 @@ _LOOKED: Final = 0.5
 _ANSWER_S: Final = 1.0
 # People so near to the one who is asked are asked too.
 _GROUP_M: Final = 1.5
+# Beside somebody who walks the same way this fast, a look is forgotten before the robot has passed.
+_WALKS_AHEAD_MPS: Final = 0.4
 # A look lasts about so long, and what is remembered of it comes on top.
 _LOOK_S: Final = 1.0
 # Neither way is expected to take longer than this.
@@ -232,9 +235,10 @@ class Addressing:
         x, y = _moved(person, _ANSWER_S).position_odom_m
         way_m = straight.cos * (x - straight.x_m) + straight.sin * (y - straight.y_m)
         way_m += BODY_RADIUS_M - straight.rear_m
-        # People who walk the same way take longer to pass.
         vx, vy = person.velocity_odom_mps
         along_mps = straight.cos * vx + straight.sin * vy
+        if along_mps + math.sqrt(velocity_variance_m2ps2(person.track)) >= _WALKS_AHEAD_MPS:
+            return 0.0
         passing_s = _time_s(way_m, then_mps - along_mps)
         if passing_s > self._lasts_s:
             return 0.0  # the look would be forgotten: ask later

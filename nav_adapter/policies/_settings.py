@@ -133,7 +133,7 @@ class AttentionRules(StrictConfig):
     error: ClassVar[type[ValueError]] = NavError
 
     min_gain_s: float = Field(default=0.5, ge=0.0, le=10.0)
-    pause_s: float = Field(default=3.0, ge=1.0, le=60.0)
+    pause_s: float = Field(default=2.0, ge=1.0, le=60.0)
     per_minute: int = Field(default=6, ge=1, le=60)
     within_m: float = Field(default=8.0, gt=0.0, le=30.0)
     means: tuple[Literal["light", "voice"], ...] = Field(default=("light", "voice"), min_length=1)

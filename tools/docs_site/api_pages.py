@@ -13,6 +13,7 @@ PACKAGES: Final = (
     "perception.networks",
     "tracking",
     "nav_adapter",
+    "nav_adapter.alerts",
     "nav_adapter.policies",
     "nav_adapter.exporters",
     "nav_adapter.ros2",

@@ -25,8 +25,9 @@ Everything here is made from the code of this version.
 - **Python**: [perception](perception.md) (with [laser](perception.laser.md),
   [surround](perception.surround.md), [networks](perception.networks.md)),
   [tracking](tracking.md), [nav_adapter](nav_adapter.md) (with
-  [policies](nav_adapter.policies.md), [exporters](nav_adapter.exporters.md),
-  [ros2](nav_adapter.ros2.md)), [awarenav](awarenav.md), [sim_tests](sim_tests.md)
+  [alerts](nav_adapter.alerts.md), [policies](nav_adapter.policies.md),
+  [exporters](nav_adapter.exporters.md), [ros2](nav_adapter.ros2.md)), [awarenav](awarenav.md),
+  [sim_tests](sim_tests.md)
 - **[Commands](commands.md)** of `awarenav`, with every option
 - **Files**: keys of a [policy](policy-keys.md), a [scenario](scenario-keys.md), a
   [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md),
