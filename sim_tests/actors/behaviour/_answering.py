@@ -76,7 +76,7 @@ class Answering:
     def hear(self, heard: Heard) -> None:
         """Turn to the robot that has asked for attention, or startle, as :class:`Heard` says."""
         if heard.looks:
-            self._look = AnsweringLook(heard.from_s, heard.looks_for_s)
+            self._look = AnsweringLook.after(self._look, heard.from_s, heard.looks_for_s)
         if heard.startle:
             self._startle = Startle(heard.startle, heard.from_s)
 

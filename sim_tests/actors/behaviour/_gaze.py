@@ -13,7 +13,7 @@ import numpy as np
 from ..body import MAX_EYE_YAW_RAD, STAYING
 from ._duration import LogNormalDuration
 from ._head import ON_TARGET_RAD, AnsweringLook, HeadAndEyes, angles_to, clipped
-from ._hearing import FIELD_RAD
+from ._hearing import FIELD_RAD, Heard
 from ._person import RobotBody, eye_height_m
 from ._spec import Glances
 
@@ -151,6 +151,10 @@ class Gaze:
     def asked(self, t_s: float) -> bool:
         """Return whether the person looks for the robot that has asked for it."""
         return self.answer is not None and self.answer.lasts(t_s)
+
+    def hear(self, heard: Heard) -> None:
+        """Look for the robot that has asked for it."""
+        self.answer = AnsweringLook.after(self.answer, heard.from_s, heard.looks_for_s)
 
     def startle(self, t_s: float) -> None:
         """Start glancing because the robot has touched the person."""

@@ -48,6 +48,17 @@ class AnsweringLook:
         self._until_s = from_s + for_s + _SEARCH_S
         self._met = False
 
+    @classmethod
+    def after(cls, before: AnsweringLook | None, from_s: float, for_s: float) -> AnsweringLook:
+        """Return the look of a person asked again: the one ``before``, unless it is over by then.
+
+        A later request does not stop anybody who turns to the robot already, but may be answered
+        sooner.
+        """
+        if before is not None and before._from_s <= from_s < before._until_s:
+            return before
+        return cls(from_s, for_s)
+
     def lasts(self, t_s: float) -> bool:
         """Return whether the person turns to the robot, or looks at it, at ``t_s``."""
         return self._from_s <= t_s < self._until_s

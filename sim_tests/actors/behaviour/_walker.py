@@ -13,7 +13,7 @@ from ..body import Activity, Gait, OnlineFootsteps, skeleton
 from ._attention_span import AttentionSpan
 from ._avoidance import SlowRobotDetour, limit_approach, without_part
 from ._gaze import Gaze
-from ._head import AnsweringLook, turn_rate, twisted
+from ._head import turn_rate, twisted
 from ._hearing import Heard
 from ._obstacles import Obstacles
 from ._person import ALONE, PersonMotion, PersonOutcome, RobotBody, Surroundings
@@ -228,7 +228,7 @@ class Walker:
     def hear(self, heard: Heard) -> None:
         """Turn to the robot that has asked for attention, or startle, as :class:`Heard` says."""
         if heard.looks:
-            self._gaze.answer = AnsweringLook(heard.from_s, heard.looks_for_s)
+            self._gaze.hear(heard)
         if heard.startle:
             self._startle = Startle(heard.startle, heard.from_s)
 

@@ -153,6 +153,15 @@ def test_at_no_answers_asking_changes_nothing_at_all(kind: str, tmp_path: Path) 
         assert np.array_equal(getattr(silent, name), getattr(asked, name)), name
 
 
+@pytest.mark.parametrize("person", [{"people": [WALKER]}, {"workers": [SCRIPT]}])
+def test_a_second_request_does_not_stop_a_person_who_turns_already(person: Any) -> None:
+    once, twice = (run(at_s=at_s, hearing=ANSWERS, **person) for at_s in ((2.0,), (2.0, 2.9)))
+    assert once.looks_s() > 0.5
+    assert twice.looks_s() >= once.looks_s() - 1e-9
+    first = [int(np.argmax(each.awareness[:, 0] >= 0.5)) for each in (once, twice)]
+    assert first[0] == first[1]
+
+
 def test_who_has_looked_knows_the_robot_and_glances_no_more_than_before() -> None:
     asked = run(people=[WALKER], hearing=ANSWERS, seconds=12.0)
     assert asked.noticed_s[0] == pytest.approx(3.4, abs=0.4)
