@@ -165,13 +165,11 @@ class Addressing:
         if means is None or wins_s < rules.min_gain_s or wins_s <= 0.0:
             return Addressed(alerts, answers, history)
         request = self._request(person, means, wins_s, limit.limit_mps, robot_state, now)
-        repeated = {
-            track_id: Asked(asked[track_id].times + 1 if track_id in asked else 1, now)
-            for track_id in group
-        }
-        history = replace(
-            history, asked={**asked, **repeated}, requests_s=(*history.requests_s, now)
-        )
+        for track_id in group:
+            before = asked.get(track_id, Asked(0, now))
+            if not before.answered:
+                asked[track_id] = Asked(before.times + 1, now)
+        history = replace(history, requests_s=(*history.requests_s, now))
         return Addressed((*alerts, request), answers, history)
 
     def _to_ask(

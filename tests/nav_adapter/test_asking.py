@@ -233,6 +233,20 @@ def test_two_side_by_side_are_asked_once_and_two_apart_one_after_the_other() -> 
     assert [alert.track_id for _, alert in requests(driven(one_looks, 2.0))] == looked[1:]
 
 
+def test_a_neighbour_who_answered_is_not_asked_again_when_the_other_one_is() -> None:
+    def pair(t_s: float) -> list[PersonTrack]:
+        lower = 0.7 if 0.45 < t_s < 1.05 else 0.0
+        return [
+            _person(t_s, 1, BESIDE, awareness_lower=lower),
+            _person(t_s, 2, (3.5, 1.9)),
+        ]
+
+    results = driven(pair, 20.0)
+    assert [each.track_id for result in results for each in result.answers] == [1]
+    assert [(t, alert.track_id) for t, alert in requests(results)][:1] == [(0.2, 1)]
+    assert all(alert.track_id != 1 for t, alert in requests(results) if t > 0.5)
+
+
 def test_warnings_of_collisions_stay_as_they_are_and_come_first() -> None:
     def towards(t_s: float) -> list[PersonTrack]:
         crossing = person(t_s, position=(3.5, 2.0 - 0.8 * t_s), velocity=(0.0, -0.8))
