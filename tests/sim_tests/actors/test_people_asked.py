@@ -154,7 +154,7 @@ def test_at_no_answers_asking_changes_nothing_at_all(kind: str, tmp_path: Path) 
 
 
 def test_people_look_once_or_glance_on_as_those_who_have_noticed_the_robot() -> None:
-    standing = {**WALKER, "route": [{"x_m": 4.0, "y_m": 1.2}], "heading_deg": 130.0}
+    standing = {**WALKER, "route": [{"x_m": 4.0, "y_m": 1.2}], "heading_deg": 90.0}
     once, on = (
         run(people=[standing], hearing={**ANSWERS, "glances_on": each}, seconds=14.0, robot_mps=0.1)
         for each in (0, 1)
@@ -202,8 +202,8 @@ def test_who_has_forgotten_the_robot_looks_but_stays_lapsed() -> None:
 def test_low_people_turn_the_head_alone_and_never_move(kind: str, activity: str) -> None:
     place = {"x_m": 5.0, "y_m": 1.0}
     keys = [{"t_s": 0.0, "activity": activity}]
-    heading = [{"t_s": 0.0, "heading_deg": 130.0}]
-    person = {"name": "p", "activity": activity, "route": [place], "heading_deg": 130.0}
+    heading = [{"t_s": 0.0, "heading_deg": 90.0}]
+    person = {"name": "p", "activity": activity, "route": [place], "heading_deg": 90.0}
     script = {"path": [{"t_s": 0.0, **place}], "activities": keys, "heading": heading}
     low = [{**person, "glances": {"notices_within_m": 0.0}} if kind == "people" else script]
     jumpy = {**ANSWERS, "startles": 1.0, "distracted_factor": 1.0}
