@@ -139,7 +139,6 @@ class Gaze:
         self.noticed_s: float | None = None
         self.looking = False
         self.answer: AnsweringLook | None = None
-        self._glances_on = False
 
     def angles(self, after_s: float) -> tuple[float, float, float, float]:
         """Return yaw and pitch of the head and of the eyes, ``after_s`` after the last update."""
@@ -156,10 +155,9 @@ class Gaze:
     def hear(self, heard: Heard) -> None:
         """Look for the robot that has asked for it."""
         self.answer = AnsweringLook.after(self.answer, heard.from_s, heard.looks_for_s)
-        self._glances_on = heard.glances_on
 
     def startle(self, t_s: float) -> None:
-        """Start glancing because the robot has touched the person, or asked for it."""
+        """Start glancing because the robot has touched the person."""
         if self._first_glance_s is None:
             self._first_glance_s = t_s
             self._process.begin(t_s)
@@ -195,8 +193,6 @@ class Gaze:
                     self.noticed_s = t_s
                 if answers and self.answer is not None:
                     self.answer.meet(t_s)
-                    if self._glances_on:
-                        self.startle(t_s)
         rest = (0.0 if self.eye_rest is None else self.eye_rest.yaw_rad(dt_s, self.looking), 0.0)
         self._posture.turn(target, rest, dt_s, back=answers)
 

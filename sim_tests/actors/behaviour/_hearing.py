@@ -53,8 +53,6 @@ class Hearing(StrictConfig):
             times the lower quartile; 1 always gives the median.
         look_median_s: median duration of the look, from the moment that it meets the robot.
         look_spread: as ``delay_spread``.
-        glances_on: 1 for people who, having answered, go on glancing at the robot as those do who
-            have noticed it by themselves; 0 for one look alone.
     """
 
     error: ClassVar[type[ValueError]] = SimError
@@ -74,7 +72,6 @@ class Hearing(StrictConfig):
     delay_spread: float = Field(default=1.4, ge=1.0, le=5.0)
     look_median_s: float = Field(default=1.0, gt=0.0, le=30.0)
     look_spread: float = Field(default=1.27, ge=1.0, le=5.0)
-    glances_on: Literal[0, 1] = 0
 
     @model_validator(mode="after")
     def _falls_off_outwards(self) -> Hearing:
@@ -150,13 +147,11 @@ class Heard:
         looks_for_s: how long the person looks at the robot once their gaze has met it; 0 for not
             at all.
         startle: empty, ``"stop"``, ``"aside"`` or ``"into_path"``.
-        glances_on: the person has noticed the robot for good once they have looked.
     """
 
     from_s: float
     looks_for_s: float = 0.0
     startle: StartleKind = ""
-    glances_on: bool = False
 
     @property
     def looks(self) -> bool:
@@ -201,7 +196,6 @@ class Ears:
             now_s + _drawn_s(hearing.delay_median_s, hearing.delay_spread, delay),
             _drawn_s(hearing.look_median_s, hearing.look_spread, duration) if answers else 0.0,
             startle,
-            hearing.glances_on == 1,
         )
 
     def _chance(self, request: Request) -> float:

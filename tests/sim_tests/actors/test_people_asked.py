@@ -153,16 +153,6 @@ def test_at_no_answers_asking_changes_nothing_at_all(kind: str, tmp_path: Path) 
         assert np.array_equal(getattr(silent, name), getattr(asked, name)), name
 
 
-def test_people_look_once_or_glance_on_as_those_who_have_noticed_the_robot() -> None:
-    standing = {**WALKER, "route": [{"x_m": 4.0, "y_m": 1.2}], "heading_deg": 90.0}
-    once, on = (
-        run(people=[standing], hearing={**ANSWERS, "glances_on": each}, seconds=14.0, robot_mps=0.1)
-        for each in (0, 1)
-    )
-    assert 0.5 < once.looks_s() < 2.0
-    assert on.looks_s() > once.looks_s() + 1.0
-
-
 @pytest.mark.parametrize("person", [{"people": [WALKER]}, {"workers": [SCRIPT]}])
 def test_a_second_request_does_not_stop_a_person_who_turns_already(person: Any) -> None:
     once, twice = (run(at_s=at_s, hearing=ANSWERS, **person) for at_s in ((2.0,), (2.0, 2.9)))
