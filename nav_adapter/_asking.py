@@ -25,6 +25,8 @@ from .policies import AttentionRules
 
 # The lower bound of α from which a person has looked.
 _LOOKED: Final = 0.5
+# Before frames have shown somebody for so long, their speed is hardly known, nor what a look wins.
+_KNOWN_S: Final = 1.0 - 1e-9
 # An answer takes about so long. Only what it wins from then on counts.
 _ANSWER_S: Final = 1.0
 # People so near to the one who is asked are asked too.
@@ -183,7 +185,7 @@ class Addressing:
     ) -> Person | None:
         """Return the person who sets the limit, if they may be asked now."""
         person = None if limit.track_id is None else people.get(limit.track_id)
-        if person is None or person.awareness_lower >= _LOOKED or person.is_at_first_sight:
+        if person is None or person.awareness_lower >= _LOOKED or person.known_s < _KNOWN_S:
             return None
         # Nobody would see the answer of somebody out of sight, or whose face no camera can see:
         # what is known of their α is then hardly more than of anybody's.

@@ -60,10 +60,16 @@ def driven(
     from_s: float = 0.0,
     adapter: NavAdapter | None = None,
 ) -> list[NavConstraints]:
-    """The updates of a robot at the origin whose state says that it drives along x."""
+    """The updates of a robot at the origin whose state says that it drives along x.
+
+    Frames have shown the people of a drive from 0 s on for 0.8 s before, so that they may be asked
+    from 0.2 s on.
+    """
     adapter = adapter or NavAdapter(policy or policy_of(), ROBOT)
-    times = (from_s + DT_S * step for step in range(round(for_s / DT_S)))
-    return [adapter.update(scene(t), robot_at(t, speed_mps=speed_mps), t) for t in times]
+    first = -8 if from_s == 0.0 else 0
+    times = (from_s + DT_S * step for step in range(first, round(for_s / DT_S)))
+    results = [adapter.update(scene(t), robot_at(t, speed_mps=speed_mps), t) for t in times]
+    return results[-first:]
 
 
 def requests(results: Sequence[NavConstraints]) -> list[tuple[float, Alert]]:
@@ -78,7 +84,7 @@ def requests(results: Sequence[NavConstraints]) -> list[tuple[float, Alert]]:
 def test_who_limits_the_robot_and_has_not_looked_is_asked_the_quietest_means_first() -> None:
     results = driven(standing(BESIDE), 12.0)
     asked = requests(results)
-    # Asked once seen for 0.2 s; the pause doubles: 2 s, then 4 s.
+    # Asked once seen for 1 s; the pause doubles: 2 s, then 4 s.
     assert [t for t, _ in asked] == pytest.approx([0.2, 2.2, 6.2])
     assert [alert.means for _, alert in asked] == ["light", "voice", "voice"]
     limit_mps = results[2].speed_limit_mps
@@ -339,4 +345,4 @@ def test_the_state_of_requests_is_forgotten_with_the_people() -> None:
     adapter = NavAdapter(policy_of(), ROBOT)
     assert len(requests(driven(standing(BESIDE), 1.0, adapter=adapter))) == 1
     adapter.reset()
-    assert len(requests(driven(standing(BESIDE), 1.0, from_s=1.0, adapter=adapter))) == 1
+    assert len(requests(driven(standing(BESIDE), 2.0, from_s=1.0, adapter=adapter))) == 1
