@@ -97,7 +97,12 @@ def compare(
     rows = []
     for worker, task, radius_m in cases:
         result = run_crossing(
-            task, policy=policy(radius_m), planner=make(), perception=perception, seed=seed
+            task,
+            policy=policy(radius_m),
+            planner=make(),
+            perception=perception,
+            seed=seed,
+            population="answers=0,startles=0",  # a worker who answers would be none of these
         )
         rows.append(Row(name, worker, result))
         done(rows[-1])

@@ -202,9 +202,9 @@ def test_every_alert_is_in_one_message() -> None:
         (stamp, status.name) for stamp, status in sent
     ]
     kinds = [status.name.removeprefix("awarenav: ") for _, status in sent]
-    # As the person comes nearer: light, then voice, then the horn; and once a request to look.
+    # As the person comes nearer: light, then voice, then the horn; and requests to look.
     assert [each for each in kinds if each != "attention"] == ["light", "voice", "horn"]
-    assert kinds.count("attention") == 1
+    assert kinds.count("attention") == 2
     assert all(message.status[0].name == "awarenav: speed limit" for message in nav.heard["alerts"])
     assert len(nav.heard["alerts"]) == 100
 

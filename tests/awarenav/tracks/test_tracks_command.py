@@ -29,6 +29,7 @@ HEADS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 CROSSING = """
 name: two_workers
 description: Two workers pass each other in front of the robot.
+hearing: {answers: 0.0, startles: 0.0}
 duration_s: 5.5
 layout:
   x_min_m: -5.0

@@ -212,7 +212,8 @@ def test_a_lane_along_y_is_the_rotated_lane_along_x():
 @pytest.mark.parametrize("name", sorted(set(shipped_scenarios()) - {"paper_encounter"}))
 def test_the_robot_reaches_its_goal_without_hitting_anybody(name, seed):
     scenario = ScenarioTemplate.shipped(name).for_seed(seed)
-    result = run_crossing(scenario, policy="balanced", seed=seed)
+    deaf = "answers=0,startles=0"  # what people do by themselves counts
+    result = run_crossing(scenario, policy="balanced", seed=seed, population=deaf)
     assert result.success
     assert result.contact_by != "robot"
     # What its people look at is what it says of them.
