@@ -220,6 +220,10 @@ class Addressing:
             robot_state, position_odom_m=np.array([x + _ANSWER_S * vx, y + _ANSWER_S * vy])
         )
         straight, courses = self._governor.courses(later, robot_age_s)
+        vx, vy = person.velocity_odom_mps
+        along_mps = straight.cos * vx + straight.sin * vy
+        if along_mps + math.sqrt(velocity_variance_m2ps2(person.track)) >= _WALKS_AHEAD_MPS:
+            return 0.0
         others_mps, now_mps, then_mps = self._robot.max_speed_mps, math.inf, math.inf
         for track_id, each in people.items():
             moved = _moved(each, _ANSWER_S)
@@ -235,10 +239,6 @@ class Addressing:
         x, y = _moved(person, _ANSWER_S).position_odom_m
         way_m = straight.cos * (x - straight.x_m) + straight.sin * (y - straight.y_m)
         way_m += BODY_RADIUS_M - straight.rear_m
-        vx, vy = person.velocity_odom_mps
-        along_mps = straight.cos * vx + straight.sin * vy
-        if along_mps + math.sqrt(velocity_variance_m2ps2(person.track)) >= _WALKS_AHEAD_MPS:
-            return 0.0
         passing_s = _time_s(way_m, then_mps - along_mps)
         if passing_s > self._lasts_s:
             return 0.0  # the look would be forgotten: ask later
@@ -283,11 +283,10 @@ def _answers(
     for track_id, each in asked.items():
         if now - each.stamp_s >= max(_MINUTE_S, _pause_s(rules, each)):
             continue
-        kept[track_id] = each
         person = people.get(track_id)
         if person is not None and person.is_at_first_sight:
-            del kept[track_id]  # the id belongs to somebody else now
-            continue
+            continue  # the id belongs to somebody else now
+        kept[track_id] = each
         if person is None or each.answered or person.awareness_lower < _LOOKED:
             continue
         after_s = person.seen_stamp_s - each.stamp_s

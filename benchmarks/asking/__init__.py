@@ -1,1 +1,1 @@
-"""How many of the looks that answer a request the robot measures, and how soon."""
+"""Looks that answer a request: how many the robot measures, and how soon."""

@@ -22,7 +22,7 @@ SAME_PLACE_M: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class AskedPerson:
-    """What came of one request.
+    """The outcome of one request.
 
     Attributes:
         look_s: time from the request to the true look; None without one.

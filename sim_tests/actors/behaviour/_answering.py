@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..body import STAYING, GaitPose
+from ..body import STAYING
 from ._head import ON_TARGET_RAD, AnsweringLook, HeadAndEyes, angles_to, twisted
 from ._hearing import Heard
 from ._obstacles import Obstacles
@@ -152,7 +152,7 @@ class Answering:
             motion,
             position_odom_m=np.array([x, y]),
             velocity_odom_mps=np.array([vx + self._step[0], vy + self._step[1]]),
-            feet=_moved(motion.feet, self._beside),
+            feet=motion.feet.moved(*self._beside),
         )
 
     def _turned(
@@ -195,11 +195,3 @@ class Answering:
             eye_yaw_rad=eye_yaw,
             eye_pitch_rad=eye_pitch,
         )
-
-
-def _moved(feet: GaitPose, by_m: tuple[float, float]) -> GaitPose:
-    """Return a gait pose moved in odom."""
-    (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = feet.feet
-    dx, dy = by_m
-    moved = (ax + dx, ay + dy, az, ayaw, apitch), (bx + dx, by + dy, bz, byaw, bpitch)
-    return replace(feet, feet=moved)

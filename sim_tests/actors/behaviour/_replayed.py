@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -136,9 +136,7 @@ class Replayed:
         feet = walk.feet
         if self.is_away(t_s):
             position = position + np.array([_AWAY_M, 0.0])
-            (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = feet.feet
-            left, right = (ax + _AWAY_M, ay, az, ayaw, apitch), (bx + _AWAY_M, by, bz, byaw, bpitch)
-            feet = replace(feet, feet=(left, right))
+            feet = feet.moved(_AWAY_M, 0.0)
         return PersonMotion(
             position_odom_m=position,
             velocity_odom_mps=velocity,

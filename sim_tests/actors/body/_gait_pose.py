@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 #: Column of the hip height in a table of :meth:`Gait.table`, after five numbers per foot.
@@ -39,3 +39,9 @@ class GaitPose:
         """Read a row of a table of :meth:`Gait.table`."""
         a, b, c, d, e, f, g, h, i, j = row[:10]
         return cls(((a, b, c, d, e), (f, g, h, i, j)), *row[10:17])
+
+    def moved(self, dx_m: float, dy_m: float) -> GaitPose:
+        """Return the same pose elsewhere in odom."""
+        (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = self.feet
+        left = ax + dx_m, ay + dy_m, az, ayaw, apitch
+        return replace(self, feet=(left, (bx + dx_m, by + dy_m, bz, byaw, bpitch)))

@@ -1,4 +1,4 @@
-"""Who hears a request for attention, who answers it by a look, and who startles."""
+"""People who hear a request for attention: the answer by a look, and the startle."""
 
 from __future__ import annotations
 
