@@ -11,7 +11,7 @@ from paths import ROOT
 
 import awarenav
 
-MAX_LINES = 400
+MAX_LINES = 500
 MAX_NAMES = 17
 
 # The fixed public contract: these names may gain company, and may not go.
