@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from ..lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._findings import Finding, Severity, by_importance
@@ -24,12 +24,4 @@ __all__ = [
     "picture_findings",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._findings": ("Finding", "Severity", "by_importance"),
-        "._installation": ("installation_findings",),
-        "._pictures": ("PictureFigures", "picture_figures", "picture_findings"),
-        "._run": ("DoctorOptions", "doctor_command"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from ..lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._judge import JudgeConfig, JudgeLimits, judge_files, judge_frames
@@ -22,12 +22,4 @@ __all__ = [
     "requirements",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._judge": ("JudgeConfig", "JudgeLimits", "judge_files", "judge_frames"),
-        "._precision": ("average_precision",),
-        "._report": ("markdown_report",),
-        "._requirements": ("requirements",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)
