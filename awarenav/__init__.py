@@ -16,7 +16,7 @@ run_path(str(_CLASH))["require_sole_owner"](__name__)
 
 from typing import TYPE_CHECKING
 
-from .lazy import lazy_page
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from nav_adapter import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_page
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._show import read_policy
