@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._judge import JudgeConfig, JudgeLimits, judge_files, judge_frames
+    from ._judge import JudgeConfig, judge_files, judge_frames
     from ._precision import average_precision
     from ._report import markdown_report
     from ._requirements import requirements
 
 __all__ = [
     "JudgeConfig",
-    "JudgeLimits",
     "average_precision",
     "judge_files",
     "judge_frames",
