@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._findings import Finding, Severity, by_importance
+    from ._findings import Finding, by_importance
     from ._installation import installation_findings
     from ._pictures import PictureFigures, picture_figures, picture_findings
     from ._run import DoctorOptions, doctor_command
@@ -16,7 +16,6 @@ __all__ = [
     "DoctorOptions",
     "Finding",
     "PictureFigures",
-    "Severity",
     "by_importance",
     "doctor_command",
     "installation_findings",
