@@ -10,7 +10,6 @@ from nav_adapter.ros2 import RobotFile
 from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
 from sim_tests.scenario import Scenario
-from sim_tests.study.suite import Thresholds
 from tracking import TrackerConfig
 
 from .api_pages import PACKAGES, front_door_page, package_page
@@ -67,8 +66,7 @@ CONFIG_PAGES: Final = {
         f"The file that `awarenav bridge --robot` reads, for [Nav2](../nav2.md). {_KEYS}",
         RobotFile,
     ),
-    "threshold-keys": ConfigPage(
-        "Thresholds of the test suite",
+    "Thresholds of the test suite",
         f"The thresholds of [the crossings as a test suite](../test-suite.md). {_KEYS}",
         Thresholds,
     ),
