@@ -29,8 +29,8 @@ Everything here is made from the code of this version.
   [sim_tests](sim_tests.md)
 - **[Commands](commands.md)** of `awarenav`, with every option
 - **Files**: keys of a [policy](policy-keys.md), a [scenario](scenario-keys.md), a
-  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md),
-  [thresholds](threshold-keys.md) and [rendered sets](render-keys.md)
+  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md)
+  and [rendered sets](render-keys.md)
 - **[Metrics](metrics.md)** and columns of `episodes.csv`, and their
   [definitions](../metrics.md)
 - **[ROS 2 topics](topics.md)** of the bridge
@@ -65,10 +65,6 @@ CONFIG_PAGES: Final = {
         "Robot file of the bridge",
         f"The file that `awarenav bridge --robot` reads, for [Nav2](../nav2.md). {_KEYS}",
         RobotFile,
-    ),
-    "Thresholds of the test suite",
-        f"The thresholds of [the crossings as a test suite](../test-suite.md). {_KEYS}",
-        Thresholds,
     ),
     "render-keys": ConfigPage(
         "Settings of rendered sets",
