@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
@@ -12,6 +11,7 @@ from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from perception.documents import parse_yaml
+from perception.errors import not_one_of
 from tracking import AwarenessFilterConfig
 from tracking.config import StrictConfig
 
@@ -132,11 +132,7 @@ class AwarenessPolicy(StrictConfig):
             if entry.name.endswith(".yaml")
         }
         if name not in files:
-            near = difflib.get_close_matches(str(name), files, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise NavError(
-                f"preset must be one of {', '.join(map(repr, sorted(files)))}, got {name!r}{hint}"
-            )
+            raise NavError(not_one_of("preset", name, sorted(files)))
         policy = cls.model_validate(
             parse_yaml(files[name].read_text(encoding="utf-8"), name, NavError)
         )

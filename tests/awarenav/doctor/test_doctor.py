@@ -138,7 +138,7 @@ def test_a_camera_that_is_frozen(capsys, renders, tmp_path):
     # Without a calibration distances are wrong. In the order of importance, what sees the wrong
     # thing comes before what measures it wrongly.
     assert severities(found, "calibration") == {"error"}
-    assert list(found)[0] == "networks"
+    assert next(iter(found)) == "networks"
     (folder / "3.png").write_bytes(b"damaged")
     found = findings(capsys, folder, "--out", "none")
     assert severities(found, "images") == {"error", "warning"}
