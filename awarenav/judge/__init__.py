@@ -8,13 +8,11 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._judge import JudgeConfig, judge_files, judge_frames
-    from ._precision import average_precision
     from ._report import markdown_report
     from ._requirements import requirements
 
 __all__ = [
     "JudgeConfig",
-    "average_precision",
     "judge_files",
     "judge_frames",
     "markdown_report",

@@ -13,10 +13,9 @@ from tracking.config import StrictConfig
 
 from ..errors import AwarenavError
 from ..records import PersonRecord, people_by_frame, read_records
+from ._detection import DetectionFrame, match_frame, precision_with_interval
 from ._intervals import LEVEL, Metrics
-from ._matching import match_frame
 from ._metrics import PersonFrame, person_metrics
-from ._precision import DetectionFrame, precision_with_interval
 
 #: The people of every frame, by the frame's name.
 Frames = dict[str, list[PersonRecord]]
