@@ -6,7 +6,7 @@ import copy
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from pydantic import ValidationError
 
@@ -51,8 +51,6 @@ class PolicyRange(Range):
     Attributes:
         also: other keys of the policy that get the same value.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     also: tuple[str, ...] = ()
 
