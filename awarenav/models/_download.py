@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import zipfile
 import zlib
@@ -53,11 +54,13 @@ def download(model: RealModel, folder: Path, *, progress: bool = True) -> Path:
     except requests.HTTPError as cause:
         raise AwarenavError(f"{model.name}: the server answers {cause}") from cause
     except requests.RequestException as cause:
-        reason = str(getattr(cause.args[0] if cause.args else "", "reason", cause))
+        # The rest of the text names objects of the libraries.
+        told = re.search(r"\[Errno -?\d+\] [\w ]+", str(cause))
         raise AwarenavError(
-            f"no connection to {urlsplit(model.url).hostname} ({reason.rpartition(': ')[2]}); run "
-            "it again, or fetch on another computer and copy the folder. Without it, ONNX files "
-            "of your own and, in the simulator, the shipped networks work"
+            f"no connection to {urlsplit(model.url).hostname} "
+            f"({told[0] if told else type(cause).__name__}); run it again, or "
+            "fetch on another computer and copy the folder. Without it, ONNX files of your own "
+            "and, in the simulator, the shipped networks work"
         ) from cause
     return path if model.member is None else _unpacked(path, model.member, folder / model.file)
 
