@@ -141,6 +141,7 @@ class ModelStore:
             )
         if model.sha256 is None:
             write_text(self._record(model.name), f"{found}  {model.file}\n")
+        fresh.chmod(0o644)  # a temporary file is its owner's alone; other users may read networks
         fresh.replace(self._file(model.name))
 
     def _file(self, name: str) -> Path:

@@ -96,6 +96,7 @@ def test_pinned_network_is_fetched_once_and_verified(server, tmp_path):
     path, downloaded = fetched.fetch("tiny", progress=False)
     assert downloaded
     assert path.read_bytes() == CONTENT
+    assert path.stat().st_mode & 0o444 == 0o444  # another user may run the robot
     assert fetched.path("tiny") == path
     assert fetched.fetch("tiny", progress=False) == (path, False)
     assert server.requests == ["/a.onnx"]
