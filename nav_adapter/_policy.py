@@ -143,13 +143,13 @@ class AwarenessPolicy(NavConfig):
         """Read and validate a policy file.
 
         Raises:
-            NavError: naming the file and the key; for a key of 0.2 also the page that helps.
+            NavError: naming the file and the key; for a key of 0.2 also the command that helps.
         """
         try:
             return super().from_yaml(path)
         except NavError as cause:
             if any(f"unknown key {key!r} " in str(cause) for key in _OF_0_2):
-                hint = "a file of 0.2? docs/upgrading.md says what its settings are now"
+                hint = f"a file of 0.2? awarenav policy upgrade {path}"
                 raise NavError(f"{cause}; {hint}") from cause
             raise
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,63 +30,52 @@ ROBOT: Final = RobotProfile(
 )
 
 
-def show_command(
-    policies: Sequence[str],
-    *,
-    out: Path,
-    as_json: bool,
-    robot: Path | None,
-    max_speed: float | None,
-    deceleration: float | None,
-    reaction_time: float | None,
-    farthest: float,
-) -> int:
-    """Run the command; return the exit status.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShowOptions:
+    """The options of ``awarenav policy show``."""
 
-    Args:
-        policies: presets and files.
-        out: of the drawing, or ``none``.
-        as_json: prints JSON instead of the table.
-        robot: a robot file.
-        max_speed: m/s, instead of that of the robot.
-        deceleration: m/s², likewise.
-        reaction_time: s, likewise.
-        farthest: end of the distance axis, m.
+    policies: tuple[str, ...]
+    out: Path
+    as_json: bool
+    robot: Path | None
+    max_speed: float | None
+    deceleration: float | None
+    reaction_time: float | None
+    farthest: float
+
+
+def show_command(options: ShowOptions) -> int:
+    """Run the command; return the exit status.
 
     Raises:
         AwarenavError: for options that cannot be used; nothing is written then.
         NavError: for a policy or a robot that cannot be used.
     """
-    drawing = None if str(out) == "none" else out
-    if drawing is not None and drawing.suffix.lower() not in _FORMATS:
+    out = None if str(options.out) == "none" else options.out
+    if out is not None and out.suffix.lower() not in _FORMATS:
         raise AwarenavError(f"--out must end in {', '.join(_FORMATS)} or be none, got {out}")
     farthest_m = finite_number(
-        "--farthest (m)", farthest, AwarenavError, minimum=0.5, maximum=100.0
+        "--farthest (m)", options.farthest, AwarenavError, minimum=0.5, maximum=100.0
     )
-    profile = _robot(
-        robot,
-        max_speed_mps=("--max-speed (m/s)", max_speed),
-        max_deceleration_mps2=("--deceleration (m/s²)", deceleration),
-        reaction_time_s=("--reaction-time (s)", reaction_time),
-    )
-    named = [(name, read_policy(name)) for name in policies]
-    if drawing is not None:
-        if drawing.is_dir():
+    robot = _robot(options)
+    policies = [(name, read_policy(name)) for name in options.policies]
+    if out is not None:
+        if out.is_dir():
             raise AwarenavError(f"--out must be a file, {out} is a folder")
-        if drawing.resolve() in {Path(name).resolve() for name in policies}:
+        if out.resolve() in {Path(name).resolve() for name in options.policies}:
             raise AwarenavError(f"--out {out} would replace a policy")
         # Only the drawing needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
         from ._drawing import policy_figure  # noqa: PLC0415
 
-        save_figure(policy_figure(named, profile, farthest_m), drawing)
-    if as_json:
-        print(json_text({name: _table(policy, profile) for name, policy in named}), end="")
+        save_figure(policy_figure(policies, robot, farthest_m), out)
+    if options.as_json:
+        print(json_text({name: _table(policy, robot) for name, policy in policies}), end="")
         return 0
-    for name, policy in named:
-        print("\n".join(table_lines(name, policy, profile)))
-    if drawing is not None:
-        print(f"Written to {drawing}")
+    for name, policy in policies:
+        print("\n".join(table_lines(name, policy, robot)))
+    if out is not None:
+        print(f"Written to {out}")
     return 0
 
 
@@ -134,14 +122,14 @@ def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list
     return [*lines, ""]
 
 
-def _robot(file: Path | None, **given: tuple[str, float | None]) -> RobotProfile:
-    """Return the robot of the file, or that of the page, with the numbers of the options.
-
-    Args:
-        file: a robot file.
-        given: the option of a field of the profile, and its number.
-    """
-    robot = ROBOT if file is None else RobotFile.from_yaml(file).profile()
+def _robot(options: ShowOptions) -> RobotProfile:
+    """Return the robot of the file, or that of the page, with the numbers of the options."""
+    robot = ROBOT if options.robot is None else RobotFile.from_yaml(options.robot).profile()
+    given = {
+        "max_speed_mps": ("--max-speed (m/s)", options.max_speed),
+        "max_deceleration_mps2": ("--deceleration (m/s²)", options.deceleration),
+        "reaction_time_s": ("--reaction-time (s)", options.reaction_time),
+    }
     numbers: dict[str, Any] = {
         name: finite_number(
             option,

@@ -9,7 +9,7 @@ from ..cli import NUMBER, FilePath, argument, command, group, option, options
 
 @group("policy")
 def policy() -> None:
-    """Show awareness policies."""
+    """Show awareness policies, or translate a policy file of version 0.2."""
 
 
 @command(
@@ -69,9 +69,37 @@ def show(**values: Any) -> int:
     person beside the way stands 1.2 m from its middle. Distances run along the way, from the
     robot's front to the body. Frames have shown the person for a while, at an exactly known place.
     """
-    from ._show import show_command  # noqa: PLC0415 - help needs no policies
+    from ._show import ShowOptions, show_command  # noqa: PLC0415 - help needs no policies
 
-    return show_command(**values)
+    return show_command(ShowOptions(**values))
+
+
+@command(
+    "upgrade",
+    short_help="Translate a policy file of version 0.2.",
+    examples=[
+        "awarenav policy upgrade old.yaml",
+        "awarenav policy upgrade old.yaml --out new.yaml",
+    ],
+    exit_status={
+        0: "Every setting was translated, or could be dropped safely.",
+        1: "Lines that begin with 'check' need a decision; the new file is written all the same.",
+        2: "Bad input; nothing was written.",
+    },
+)
+@argument("old", type=FilePath(), metavar="OLD.yaml", help="A policy file of version 0.2.")
+@options.out_file(None, "The new file; replaces it.", "NEW.yaml", show_default="none")
+def upgrade(**values: Any) -> int:
+    """Say what becomes of each setting of a policy file of 0.2, and write the new file.
+
+    A line begins with kept, renamed, replaced, dropped, added or check. What the old file left out
+    and has another default now is written with its old value. 'check' means that the new file may
+    be less careful than the old one in this point, and says what to do.
+    """
+    from ._upgrade import upgrade_command  # noqa: PLC0415 - help needs no policies
+
+    return upgrade_command(**values)
 
 
 policy.add_command(show)
+policy.add_command(upgrade)
