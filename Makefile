@@ -52,7 +52,6 @@ lock: setup ## pin the newest packages that pyproject.toml allows, for every sup
 		--upgrade --quiet --custom-compile-command "make lock" \
 		--output-file requirements.lock pyproject.toml
 	$(MAKE) setup
-	$(PY) -m tools.sbom
 
 clean: ## remove results and caches, but not .venv
 	rm -rf demo build dist site .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
