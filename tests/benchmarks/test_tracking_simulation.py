@@ -14,9 +14,7 @@ from benchmarks.tracking import (
     WalkerSettings,
     record,
     walk,
-    white_acceleration_walk,
 )
-from tracking import TrackerConfig
 
 STAMPS_S = np.arange(400) / 20.0
 
@@ -101,12 +99,3 @@ def test_nobody_is_measured_while_out_of_sight() -> None:
     sensor = replace(OCCLUDED, miss_probability=0.0, clutter_per_m2=0.0)
     recording = record(10, 300, np.random.default_rng(6), sensor)
     assert [len(m) for m in recording.measured_m] == recording.visible.sum(axis=1).tolist()
-
-
-def test_walkers_of_the_trackers_model_spread_as_white_acceleration_does() -> None:
-    config = TrackerConfig(initial_velocity_std_mps=1e-3)
-    rng = np.random.default_rng(7)
-    ends = np.array([white_acceleration_walk(0.1, 21, rng, config)[-1] for _ in range(600)])
-    q, t = config.acceleration_density_m2ps3, 2.0
-    assert ends[:, :2].var() == pytest.approx(q * t**3 / 3.0, rel=0.15)
-    assert ends[:, 2:].var() == pytest.approx(q * t, rel=0.15)
