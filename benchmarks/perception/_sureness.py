@@ -1,12 +1,10 @@
-"""Uncertainties of head poses and α on renders as real cameras take them: ``python -m benchmarks.perception_sureness``.
+"""Uncertainties of head poses and α on renders as real cameras take them.
 
-The pictures are those of :mod:`benchmarks._degraded_pictures`. For everybody found with a head
-pose: the NEES of the head's forward axis across itself (2 on average for an exact covariance), the
-share of errors within the 95 % ellipse, and the share of α within one σ (68 %). The latter is also
-counted of active people alone, whose α or true α is above 0.02: errors of 0 say little of σ. The
-pipeline knows how far the rendered eyes wander. ``--head pnp`` judges PnP on the keypoints of the
-same pose network.
-"""  # noqa: E501 - the command is one word
+For everybody found with a head pose: the NEES of the head's forward axis across itself (2 on
+average for an exact covariance), the share of errors within the 95 % ellipse, and the share of α
+within one σ (68 %). The latter is also counted of active people alone, whose α or true α is above
+0.02: errors of 0 say little of σ. The pipeline knows how far the rendered eyes wander.
+"""
 
 from __future__ import annotations
 
@@ -19,15 +17,6 @@ from typing import Final, Literal
 
 import numpy as np
 
-from benchmarks._degraded_pictures import (
-    Condition,
-    add_pictures,
-    chosen_conditions,
-    degraded_pictures,
-    pipeline_of,
-)
-from benchmarks._harness import make_parser
-from benchmarks.perception_photographs import matched
 from perception import (
     AwarenessPipeline,
     Camera,
@@ -39,6 +28,9 @@ from perception import (
 from perception.arrays import FloatArray, ImageRgb
 from perception.networks.heads import OnnxHeadPoseEstimator
 from perception.shipped import HEAD, load_shipped
+
+from ._photographs import matched
+from ._pictures import Condition, chosen_conditions, degraded_pictures, pipeline_of
 
 HeadKind = Literal["network", "pnp"]
 
@@ -190,20 +182,10 @@ def measure(
     return groups
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def run(parser: argparse.ArgumentParser, chosen: argparse.Namespace) -> None:
     """Print a row for each condition."""
-    parser = make_parser("benchmarks.perception_sureness", str(__doc__).splitlines()[0])
-    add_pictures(parser)
-    parser.add_argument(
-        "--head", choices=("network", "pnp"), default="network", help="default: %(default)s"
-    )
-    chosen: argparse.Namespace = parser.parse_args(arguments)
     wanted = chosen_conditions(parser, chosen.conditions)
     print(HEADER)
     groups = measure(wanted, chosen.frames, chosen.seed, chosen.networks, chosen.head)
     for name, group in groups.items():
         print(group.row(name), flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.records import Record
-from benchmarks._harness import add_seed, count
 from perception import AwarenessPipeline, Camera, HeadPoseEstimator
 from perception.confirmation import KeypointConfirmation
 from perception.networks import OnnxPersonDetector, OnnxPoseEstimator
@@ -28,6 +27,8 @@ from perception.shipped import DETECTOR, HEAD, POSE, detector_input_size, load_s
 from sim_tests.dataset import RenderConfig, RenderScene
 from sim_tests.world.camera import RenderedView
 from training.networks import Degradation, Recipe, degrade, random_background, rolling_shutter
+
+from .._harness import add_seed, count
 
 Image = NDArray[np.uint8]
 
@@ -260,11 +261,16 @@ def add_pictures(parser: argparse.ArgumentParser) -> None:
         metavar="TEXT",
         help="only conditions whose names contain one of these",
     )
+    add_networks(parser)
+    add_seed(parser)
+    parser.set_defaults(seed=_SEED)
+
+
+def add_networks(parser: argparse.ArgumentParser) -> None:
+    """Add the option that chooses networks."""
     parser.add_argument(
         "--networks", type=Path, metavar="DIR", help="folder of networks with their manifest"
     )
-    add_seed(parser)
-    parser.set_defaults(seed=_SEED)
 
 
 def chosen_conditions(

@@ -1,4 +1,4 @@
-"""Calibration of PnP head poses over head shapes: ``python -m benchmarks.perception_calibration``.
+"""People whose heads have shapes of their own, to judge the covariance of PnP head poses.
 
 People stand before a camera, turned and with their heads turned in every direction. Their heads
 have shapes of their own, the estimator knows the template. Keypoints have pixel noise, and those on
@@ -8,7 +8,6 @@ covariance is right) and the share of errors within its 95 % ellipsoid.
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -158,39 +157,3 @@ def _rotation_vector(rotation: FloatArray) -> FloatArray:
     axis = np.array([rotation[2, 1], rotation[0, 2], rotation[1, 0]])
     axis -= np.array([rotation[1, 2], rotation[2, 0], rotation[0, 1]])
     return np.asarray(axis * (0.5 if angle < 1e-6 else angle / (2.0 * math.sin(angle))))
-
-
-def main() -> None:
-    """Print the table of ``docs/perception.md``, for the template alone and for all shapes."""
-    parser = argparse.ArgumentParser(description=__doc__, prog="perception_calibration")
-    parser.add_argument("--count", type=int, default=400, help="people per row (400)")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    print("heads     turned     range m   noise px |  template alone  |  spread of shapes")
-    near, all_ranges = (1.0, 2.5), (1.5, 5.0)
-    for heads in ("workers", "drawn"):
-        for turned, range_m, noise_px in (
-            ("all round", all_ranges, 1.0),
-            ("all round", all_ranges, 2.0),
-            ("all round", all_ranges, 3.0),
-            ("profile", all_ranges, 1.0),
-            ("all round", near, 1.0),
-        ):
-            rng = np.random.default_rng(options.seed)
-            samples = list(
-                draw_people(heads, noise_px, options.count, rng, range_m=range_m, turned=turned)  # type: ignore[arg-type]
-            )
-            cells = []
-            for spread in (0.0, 1.0):
-                estimator = PnpHeadPoseEstimator(noise_px, head_shape_spread=spread)
-                result = calibrate(samples, estimator)
-                cells.append(f"NEES {result.mean:4.1f}, {result.coverage:4.0%}")
-            print(
-                f"{heads:9s} {turned:10s} {range_m[0]}–{range_m[1]}    {noise_px:6.1f}   | "
-                f"{cells[0]} | {cells[1]}",
-                flush=True,
-            )
-
-
-if __name__ == "__main__":
-    main()

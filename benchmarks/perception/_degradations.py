@@ -1,8 +1,4 @@
-"""Perception on held-out renders under what real cameras do: ``python -m benchmarks.perception_degradations``.
-
-Every picture of :mod:`benchmarks._degraded_pictures` is judged with the truth that belongs to it.
-``--networks`` judges other files than the shipped ones, so before and after are one command each.
-"""  # noqa: E501 - the command is one word
+"""Perception on held-out renders under what real cameras do, judged with the truth."""
 
 from __future__ import annotations
 
@@ -13,15 +9,9 @@ from typing import Any, Final
 
 from awarenav.judge import judge_frames
 from awarenav.records import PersonRecord, read_person
-from benchmarks._degraded_pictures import (
-    Condition,
-    add_pictures,
-    chosen_conditions,
-    degraded_pictures,
-    pipeline_of,
-)
-from benchmarks._harness import make_parser
 from perception import AwarenessPipeline, Camera, PersonObservation
+
+from ._pictures import Condition, chosen_conditions, degraded_pictures, pipeline_of
 
 #: Bounds of the figures: median and 90th percentile of the head's direction, recall, false aware.
 MAX_MEDIAN_DEG: Final = 6.0
@@ -109,11 +99,8 @@ def meets(metrics: dict[str, Any]) -> bool:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def run(parser: argparse.ArgumentParser, chosen: argparse.Namespace) -> None:
     """Print a row for each condition."""
-    parser = make_parser("benchmarks.perception_degradations", str(__doc__).splitlines()[0])
-    add_pictures(parser)
-    chosen: argparse.Namespace = parser.parse_args(arguments)
     wanted = chosen_conditions(parser, chosen.conditions)
     print(HEADER)
     failed = []
@@ -126,7 +113,3 @@ def main(arguments: Sequence[str] | None = None) -> None:
         f" and ≤ {MAX_P90_DEG:g}° (90 %), recall ≥ {MIN_RECALL:.0%}, falsely aware "
         f"≤ {MAX_FALSE_AWARE:.1%}"
     )
-
-
-if __name__ == "__main__":
-    main()

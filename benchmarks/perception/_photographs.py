@@ -1,10 +1,9 @@
-"""Detection and awareness on photographs: ``python -m benchmarks.perception_photographs FOLDER``.
+"""Detection and awareness on labelled photographs.
 
 The folder holds photographs and ``agreed_boxes.json``: for each file its size and the boxes of the
 people in it (``people_xyxy_px``). It prints recall and false positives a picture at the pipeline's
 default score, and lists everybody to whom the networks give α ≥ 0.5. Whether such a person looks at
-the camera is for the reader to judge: the boxes do not say it. ``--sheet`` writes the pictures with
-what was found.
+the camera is for the reader to judge: the boxes do not say it.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from benchmarks._degraded_pictures import pipeline_of
-from benchmarks._harness import make_parser
 from perception import Camera, PersonObservation
+
+from ._pictures import add_networks, pipeline_of
 
 Image = NDArray[np.uint8]
 
@@ -35,8 +34,6 @@ AWARE: Final = 0.5
 LABELS: Final = "agreed_boxes.json"
 
 _MIN_IOU: Final = 0.5
-_SHEET_COLUMNS: Final = 4
-_TILE_PX: Final = 480
 
 
 @dataclass(frozen=True)
@@ -158,54 +155,8 @@ def aware_lines(results: Sequence[PhotographResult]) -> list[str]:
     return lines
 
 
-def sheet(folder: Path, results: Sequence[PhotographResult]) -> Image:
-    """Return the photographs side by side: people's boxes in white, what was found in red or green.
-
-    Green boxes match a person. The text is score and α.
-    """
-    tiles = []
-    for each in results:
-        rgb = read_rgb(folder / each.name)
-        for box in each.truth.astype(int).tolist():
-            cv2.rectangle(rgb, tuple(box[:2]), tuple(box[2:]), (255, 255, 255), 1)
-        people = {column for _, column in each.pairs}
-        for row, observation in enumerate(each.observations):
-            if observation.box_xyxy_px is None:
-                continue
-            x1, y1, x2, y2 = observation.box_xyxy_px.astype(int).tolist()
-            colour = (40, 220, 60) if row in people else (240, 50, 40)
-            cv2.rectangle(rgb, (x1, y1), (x2, y2), colour, 2)
-            alpha = observation.awareness
-            text = f"{observation.score:.2f} " + ("-" if alpha is None else f"a={alpha:.2f}")
-            cv2.putText(
-                rgb, text, (x1, max(y1, 14)), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA
-            )
-        scale = _TILE_PX / max(rgb.shape[:2])
-        small = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-        tile = np.zeros((_TILE_PX, _TILE_PX, 3), np.uint8)
-        tile[: small.shape[0], : small.shape[1]] = small
-        tiles.append(tile)
-    while len(tiles) % _SHEET_COLUMNS:
-        tiles.append(np.zeros_like(tiles[0]))
-    rows = [
-        np.hstack(tiles[start : start + _SHEET_COLUMNS])
-        for start in range(0, len(tiles), _SHEET_COLUMNS)
-    ]
-    return np.asarray(np.vstack(rows), dtype=np.uint8)
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
+def run(parser: argparse.ArgumentParser, chosen: argparse.Namespace) -> None:
     """Print the figures and the people with α ≥ 0.5."""
-    parser = make_parser("benchmarks.perception_photographs", str(__doc__).splitlines()[0])
-    parser.add_argument("folder", type=Path, help=f"photographs and {LABELS}")
-    parser.add_argument(
-        "--networks", type=Path, metavar="DIR", help="folder of networks with their manifest"
-    )
-    parser.add_argument(
-        "--fov", type=float, default=60.0, metavar="DEG", help="of the longer side (default: 60)"
-    )
-    parser.add_argument("--sheet", type=Path, metavar="FILE", help="write a contact sheet")
-    chosen: argparse.Namespace = parser.parse_args(arguments)
     try:
         results = judge_folder(chosen.folder, chosen.networks, math.radians(chosen.fov))
     except ValueError as cause:
@@ -219,9 +170,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     lines = aware_lines(results)
     print(f"α ≥ {AWARE:g}: {len(lines) or 'nobody'}")
     print("\n".join(lines))
-    if chosen.sheet is not None:
-        cv2.imwrite(str(chosen.sheet), sheet(chosen.folder, results)[..., ::-1])
 
 
-if __name__ == "__main__":
-    main()
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the folder of photographs, and how they were taken."""
+    parser.add_argument("folder", type=Path, help=f"photographs and {LABELS}")
+    add_networks(parser)
+    parser.add_argument(
+        "--fov", type=float, default=60.0, metavar="DEG", help="of the longer side (default: 60)"
+    )
