@@ -112,12 +112,15 @@ def test_every_metric_column_and_topic_is_listed() -> None:
     assert topics["/speed_limit"] == ["`nav2_msgs/SpeedLimit`", "reliable", "volatile", "10"]
 
 
-def test_every_key_of_a_file_is_on_its_page() -> None:
+def test_every_key_of_a_file_is_on_one_page() -> None:
+    shown = "".join(PAGES[f"reference/{name}.md"] for name in reference.SETTINGS_PAGES)
     for name, page in reference.SETTINGS_PAGES.items():
-        shown = PAGES[f"reference/{name}.md"]
         models = [model for _, model in page.models()]
         assert page.model in models
         for model in models:
+            path = f"::: {model.__module__}.{model.__qualname__}\n"
+            assert shown.count(path) == 1, model.__name__
+            assert f"{{ #{model.__name__.lower()} }}" in PAGES[f"reference/{name}.md"]
             assert f"members: [{', '.join(model.model_fields)}]" in shown, model.__name__
 
 

@@ -96,9 +96,7 @@ The main names of three packages, imported when they are first used.
 """
 _KEYS: Final = """The suffix of a key is its unit. An unknown key is refused with the nearest valid
 one. A key that is left out has its default; "null" stands for None in YAML."""
-_MODEL: Final = """## {heading} {{ #{anchor} }}
-
-::: {path}
+_MODEL: Final = """::: {path}
     options:
       extensions: [griffe_pydantic]
       heading_level: 3
@@ -146,18 +144,25 @@ class SettingsPage:
     model: type[BaseModel]
     alternatives: Mapping[type, tuple[type[BaseModel], ...]] = field(default_factory=dict)
 
-    def markdown(self) -> str:
-        """Return the page: each model once, below the path of the first key that holds it."""
+    def markdown(self, name: str, homes: dict[type[BaseModel], str]) -> str:
+        """Return the page: each model below the path of the first key that holds it.
+
+        Args:
+            name: of the page.
+            homes: pages of models that other pages show, which get a link here; this page's own
+                are added.
+        """
         parts = [f"# {self.title}\n\n{self.intro} {_KEYS}\n"]
         for path, model in self.models():
-            parts.append(
-                _MODEL.format(
-                    heading=f"{path}: {model.__name__}" if path else "The file",
-                    anchor=model.__name__.lower(),
-                    path=f"{model.__module__}.{model.__qualname__}",
-                    names=", ".join(model.model_fields),
-                )
-            )
+            anchor = model.__name__.lower()
+            heading = f"{path}: {model.__name__}" if path else "The file"
+            parts.append(f"## {heading} {{ #{anchor} }}\n")
+            home = homes.setdefault(model, name)
+            if home != name:
+                parts.append(f"See [{model.__name__}]({home}.md#{anchor}).\n")
+                continue
+            dotted = f"{model.__module__}.{model.__qualname__}"
+            parts.append(_MODEL.format(path=dotted, names=", ".join(model.model_fields)))
         return "\n".join(parts)
 
     def models(self) -> Iterator[tuple[str, type[BaseModel]]]:
@@ -224,7 +229,10 @@ def pages(metrics: str) -> dict[str, str]:
     Args:
         metrics: path of the page of metrics.
     """
-    settings = {f"reference/{name}.md": page.markdown() for name, page in SETTINGS_PAGES.items()}
+    homes: dict[type[BaseModel], str] = {}
+    settings = {
+        f"reference/{name}.md": page.markdown(name, homes) for name, page in SETTINGS_PAGES.items()
+    }
     in_reference = metrics.removeprefix("reference/")
     return {
         "reference/index.md": _INDEX.format(
