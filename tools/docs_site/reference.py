@@ -30,7 +30,6 @@ from sim_tests.study.measures import (
     EpisodeRecord,
     Metric,
 )
-from sim_tests.study.suite import Thresholds
 from tracking import TrackerConfig
 
 from .roles import plain
@@ -61,8 +60,8 @@ Everything here is made from the code of this version.
   [sim_tests](sim_tests.md)
 - **[Commands](commands.md)** of `awarenav`, with every option
 - **Files**: keys of a [policy](policy-keys.md), a [scenario](scenario-keys.md), a
-  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md),
-  [thresholds](threshold-keys.md) and [rendered sets](render-keys.md)
+  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md)
+  and [rendered sets](render-keys.md)
 - **[Metrics]({metrics})** and columns of `episodes.csv`
 - **[ROS 2 topics](topics.md)** of the bridge
 """
@@ -213,9 +212,6 @@ SETTINGS_PAGES: Final = {
         "Robot file of the bridge",
         "The file that `awarenav bridge --robot` reads, for [Nav2](../nav2.md).",
         RobotFile,
-    ),
-    "threshold-keys": SettingsPage(
-        "Thresholds of the test suite", "The thresholds of crossings as tests.", Thresholds
     ),
     "render-keys": SettingsPage(
         "Settings of rendered sets", "The settings of `awarenav render`.", RenderConfig
