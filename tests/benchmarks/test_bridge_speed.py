@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
-from benchmarks.bridge import main
+from benchmarks.bridge.__main__ import main
 
 
 @pytest.fixture(autouse=True)
