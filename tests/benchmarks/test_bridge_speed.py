@@ -20,7 +20,7 @@ def as_before(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(os, "sched_setaffinity", lambda pid, cores: None)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_every_figure_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("pybullet", reason="the extra sim is not installed")
     out = tmp_path / "figures.json"
