@@ -37,22 +37,6 @@ def test_every_figure_is_measured(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "bridge_latency" in out.read_text()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--seconds", "0"], "must be a whole number of at least 1, got '0'"),
-        (["--out", "no/such/folder/x.json"], "a folder that exists"),
-    ],
-)
-def test_bad_input_is_refused(
-    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    assert stopped.value.code == 2
-    assert message in capsys.readouterr().err
-
-
 def test_a_folder_without_images_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
