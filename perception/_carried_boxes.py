@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._boxes import area, common_area, extent, iou
 from ._detection import PersonDetection
-from ._keypoints import PersonKeypoints
 from ._protocols import PersonDetector
-from ._scene_changes import SceneChanges
 from .arrays import FloatArray, ImageRgb
-from .evidence import AwarenessReason
+from .ownership import FoundPerson
 
 #: Longest permitted time between two looks of the detector.
 MAX_DETECT_EVERY_S: Final = 0.2
@@ -31,6 +31,21 @@ _OVERLAP: Final = 0.1
 _SAME_IOU: Final = 0.5
 # Rounding of stamps.
 _SLACK_S: Final = 1e-6
+
+# The image is sampled at about this many pixels along its shorter side, and this many samples along
+# each side make a cell.
+_SAMPLES: Final = 60
+_CELL_SAMPLES: Final = 5
+# A cell has changed if it differs by more than so many grey levels, and so many times the median of
+# all cells: noise and light change all of them. With a larger median the camera moves.
+_LEAST_CHANGE: Final = 4.0
+_TIMES_MEDIAN: Final = 3.0
+_CAMERA_MOVES: Final = 6.0
+# A change in so many cells is no noise. If more than this share of all cells changes by a lot, the
+# scene is another one.
+_FEWEST_CELLS: Final = 2
+_LARGE_CHANGE: Final = 25.0
+_SCENE_SHARE: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,19 +86,13 @@ class CarriedBoxes:
     The detector must then look at the same image.
 
     Args:
-        detectors: find people, with smaller and smaller inputs; :attr:`size` is the number of the
-            one in use.
-        every_s: longest time between two looks, in [0, 0.2]; it may be set anew.
+        detector: finds people.
+        every_s: longest time between two looks, in (0, 0.2].
         min_score: keypoints with a lower score count as not seen.
     """
 
-    def __init__(
-        self, detectors: Sequence[PersonDetector], every_s: float, min_score: float
-    ) -> None:
-        self._detectors = tuple(detectors)
-        self._first_every_s = every_s
-        self.every_s, self.size = every_s, 0
-        self._min_score = min_score
+    def __init__(self, detector: PersonDetector, every_s: float, min_score: float) -> None:
+        self._detector, self._every_s, self._min_score = detector, every_s, min_score
         self._changes = SceneChanges()
         # People of the last image; None if the next one needs the detector.
         self._people: list[_Carried] | None = None
@@ -93,20 +102,20 @@ class CarriedBoxes:
         self._carrying = False
 
     def unused(self) -> CarriedBoxes:
-        """Return carried boxes of the same detectors that have seen no image yet."""
-        return CarriedBoxes(self._detectors, self._first_every_s, self._min_score)
+        """Return carried boxes of the same detector that have seen no image yet."""
+        return CarriedBoxes(self._detector, self._every_s, self._min_score)
 
     def detections(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonDetection, ...]:
         """Return the boxes of the people in an image: carried, or detected."""
         self._gap_s, self._stamp_s = stamp_s - self._stamp_s, stamp_s
         # Where an image fails, the next one needs the detector.
         people, self._people = self._people, None
-        if not 0.0 < self._gap_s <= self.every_s + _SLACK_S:
+        if not 0.0 < self._gap_s <= self._every_s + _SLACK_S:
             self._before = []
             return self.detect(image_rgb)
         self._before = people or []
         # The second condition: the image after this one would be too late.
-        if people is None or stamp_s + self._gap_s - self._looked_s > self.every_s + _SLACK_S:
+        if people is None or stamp_s + self._gap_s - self._looked_s > self._every_s + _SLACK_S:
             return self.detect(image_rgb)
         boxes = [_moved(person, self._gap_s, image_rgb.shape) for person in people]
         known = [*boxes, *(person.box_px for person in people)]
@@ -121,7 +130,7 @@ class CarriedBoxes:
 
     def detect(self, image_rgb: ImageRgb) -> tuple[PersonDetection, ...]:
         """Return the boxes that the detector finds in the image of the last stamp."""
-        detections = tuple(self._detectors[self.size].detect(image_rgb))
+        detections = tuple(self._detector.detect(image_rgb))
         self._carrying, self._looked_s = False, self._stamp_s
         self._changes.refer_to(image_rgb)
         if not detections:
@@ -133,24 +142,18 @@ class CarriedBoxes:
         """True if the detector has looked at the last image."""
         return not self._carrying
 
-    def follow(
-        self,
-        detections: Sequence[PersonDetection],
-        people: Sequence[PersonKeypoints],
-        reasons: Sequence[AwarenessReason | None],
-    ) -> bool:
-        """Take the keypoints of the boxes; return False if a carried one has lost its person.
+    def follow(self, found: Sequence[FoundPerson]) -> bool:
+        """Take the people in the boxes; return False if a carried one has lost its person.
 
         Args:
-            detections: as :meth:`detections` or :meth:`detect` returned them.
-            people: their keypoints, with scores of 0 where they are not the person's.
-            reasons: why they are not.
+            found: of the boxes that :meth:`detections` or :meth:`detect` returned; scores of
+                keypoints that are not the person's are 0.
         """
         before, self._people = self._before, None
-        if any(reason is not None for reason in reasons):
+        if any(one.disowned is not None for one in found):
             return not self._carrying
         carried = []
-        for row, (detection, person) in enumerate(zip(detections, people, strict=True)):
+        for row, (detection, person, _) in enumerate(found):
             points = person.keypoints_px[kp.BODY]
             seen = person.scores[kp.BODY] >= self._min_score
             last = before[row] if self._carrying else _same(before, detection.box_xyxy_px)
@@ -177,6 +180,62 @@ class CarriedBoxes:
             )
         self._people = carried
         return True
+
+
+class SceneChanges:
+    """Compares images with a reference: is there something new outside known boxes?"""
+
+    def __init__(self) -> None:
+        self._reference: NDArray[np.uint8] | None = None
+        self._step = 1
+
+    def refer_to(self, image_rgb: ImageRgb) -> None:
+        """Make this image (H, W, 3) the reference."""
+        self._step = max(round(min(image_rgb.shape[:2]) / _SAMPLES), 1)
+        self._reference = self._sampled(image_rgb)
+
+    def found_in(self, image_rgb: ImageRgb, boxes_px: Sequence[FloatArray]) -> bool:
+        """Return whether an image shows another scene, or something new outside the boxes (4,).
+
+        Changes are compared with the median over the image. If that is large, because the camera
+        moves or its noise is strong, only another scene counts.
+        """
+        changes = self.cells(image_rgb)
+        if changes is None:
+            return True
+        if np.count_nonzero(changes > _LARGE_CHANGE) > _SCENE_SHARE * changes.size:
+            return True
+        median = float(np.median(changes))
+        if median > _CAMERA_MOVES:
+            return False
+        changed = changes > max(_LEAST_CHANGE, _TIMES_MEDIAN * median)
+        side = self._step * _CELL_SAMPLES
+        for box in boxes_px:
+            left, top, right, bottom = (box / side).tolist()
+            # A cell more on each side: limbs and shadows reach beyond a box.
+            rows = slice(max(math.floor(top) - 1, 0), math.ceil(bottom) + 1)
+            changed[rows, max(math.floor(left) - 1, 0) : math.ceil(right) + 1] = False
+        return int(np.count_nonzero(changed)) >= _FEWEST_CELLS
+
+    def cells(self, image_rgb: ImageRgb) -> NDArray[np.float32] | None:
+        """Return mean changes (rows, columns) of the cells in grey levels; None without reference.
+
+        Only the green channel counts.
+        """
+        reference = self._reference
+        if reference is None:
+            return None
+        sampled = self._sampled(image_rgb)
+        difference = cv2.absdiff(sampled, reference).astype(np.float32)
+        height, width = difference.shape
+        size = max(round(width / _CELL_SAMPLES), 1), max(round(height / _CELL_SAMPLES), 1)
+        return np.asarray(
+            cv2.resize(difference, size, interpolation=cv2.INTER_AREA), dtype=np.float32
+        )
+
+    def _sampled(self, image_rgb: ImageRgb) -> NDArray[np.uint8]:
+        first = self._step // 2
+        return np.ascontiguousarray(image_rgb[first :: self._step, first :: self._step, 1])
 
 
 def _velocity(

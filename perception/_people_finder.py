@@ -3,34 +3,18 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Sequence
 
 from ._camera import Camera
 from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
 from ._detection import PersonDetection
-from ._frame_time import FrameBudget, StageClock, StageTimings
+from ._frame_time import StageClock
 from ._keypoints import PersonKeypoints
-from ._protocols import PersonDetector, PoseEstimator, ResizableDetector
+from ._protocols import PersonDetector, PoseEstimator
 from .arrays import ImageRgb, finite_number
 from .confirmation import KeypointConfirmation, keypoint_score
 from .errors import PerceptionError
-from .evidence import AwarenessReason
-from .ownership import disowned_keypoints, without_disowned
-
-
-class FoundPeople(NamedTuple):
-    """The people of an image, row by row.
-
-    Attributes:
-        detections: their boxes.
-        keypoints: their keypoints, with scores of 0 where they are not the person's.
-        disowned: why they are not, or None.
-    """
-
-    detections: tuple[PersonDetection, ...]
-    keypoints: tuple[PersonKeypoints, ...]
-    disowned: list[AwarenessReason | None]
+from .ownership import FoundPerson, disowned_keypoints, without_disowned
 
 
 class PeopleFinder:
@@ -43,10 +27,9 @@ class PeopleFinder:
         min_score: keypoints with a lower score count as not seen.
         confirmation: lets the keypoints confirm what the detector found; None takes it as it is.
         detect_every_s: see :class:`~perception.AwarenessPipeline`.
-        frame_budget_s: the same.
 
     Raises:
-        PerceptionError: for an invalid time, and for both times.
+        PerceptionError: for an invalid time.
     """
 
     def __init__(
@@ -57,35 +40,26 @@ class PeopleFinder:
         min_score: float,
         confirmation: KeypointConfirmation | None,
         detect_every_s: float,
-        frame_budget_s: float | None,
     ) -> None:
         self._camera, self._detector, self._pose = camera, detector, pose_estimator
         self._min_score, self._confirmation = min_score, confirmation
         detect_every_s = finite_number(
             "detect_every_s", detect_every_s, minimum=0.0, maximum=MAX_DETECT_EVERY_S
         )
-        self._budget: FrameBudget | None = None
         self._carrier: CarriedBoxes | None = None
-        if frame_budget_s is not None:
-            if detect_every_s > 0.0:
-                raise PerceptionError("give detect_every_s or frame_budget_s, got both")
-            finite_number("frame_budget_s", frame_budget_s, minimum=0.0, exclusive_minimum=True)
-            smaller = detector.smaller() if isinstance(detector, ResizableDetector) else ()
-            self._budget = FrameBudget(frame_budget_s, (1.0, *(share for _, share in smaller)))
-            self._carrier = CarriedBoxes((detector, *(d for d, _ in smaller)), 0.0, min_score)
-        elif detect_every_s > 0.0:
-            self._carrier = CarriedBoxes((detector,), detect_every_s, min_score)
+        if detect_every_s > 0.0:
+            self._carrier = CarriedBoxes(detector, detect_every_s, min_score)
 
     def for_another_view(self) -> PeopleFinder:
         """Return a finder with the same networks and settings that has seen no image yet."""
         other = copy.copy(self)
         if self._carrier is not None:
             other._carrier = self._carrier.unused()
-        if self._budget is not None:
-            other._budget = self._budget.unused()
         return other
 
-    def find(self, image_rgb: ImageRgb, stamp_s: float, clock: StageClock) -> FoundPeople:
+    def find(
+        self, image_rgb: ImageRgb, stamp_s: float, clock: StageClock
+    ) -> tuple[FoundPerson, ...]:
         """Return the people of an image; the clock counts detector and pose."""
         carrier = self._carrier
         if carrier is None:
@@ -96,29 +70,19 @@ class PeopleFinder:
             looked = carrier.looked
         clock.count("detector")
         found = self._with_keypoints(image_rgb, detections, looked=looked)
-        if carrier is not None and not carrier.follow(*found):
+        if carrier is not None and not carrier.follow(found):
             # A carried box has lost its person: look at once.
             clock.count("pose")
             detections = carrier.detect(image_rgb)
             clock.count("detector")
             found = self._with_keypoints(image_rgb, detections, looked=True)
-            carrier.follow(*found)
+            carrier.follow(found)
         clock.count("pose")
         return found
 
-    def note(self, timings: StageTimings) -> StageTimings:
-        """Choose when the detector looks next; return the times of a frame with its input's."""
-        if self._budget is None or self._carrier is None:
-            return timings
-        noted = replace(timings, detector_share=self._budget.share)
-        looked = timings.detector_s if self._carrier.looked else None
-        self._budget.record(looked, timings.total_s - timings.detector_s)
-        self._carrier.every_s, self._carrier.size = self._budget.every_s, self._budget.size
-        return noted
-
     def _with_keypoints(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...], *, looked: bool
-    ) -> FoundPeople:
+    ) -> tuple[FoundPerson, ...]:
         """Return the people among the detections, which the detector found or which were carried.
 
         A carried box is that of a person whom keypoints have confirmed.
@@ -127,21 +91,18 @@ class PeopleFinder:
         if confirmation is not None:
             detections = confirmation.candidates(detections)
         if not detections:
-            return FoundPeople((), (), [])
+            return ()
         people = self._keypoints(image_rgb, detections)
-        disowned = disowned_keypoints(self._camera, detections, people, self._min_score)
+        found = self._with_owners(list(zip(detections, people, strict=True)))
         if confirmation is not None:
-            detections, people, disowned = self._grown(
-                image_rgb, FoundPeople(detections, people, disowned), confirmation
-            )
-            rows, detections = confirmation.confirmed(detections, people, disowned)
-            people = tuple(people[row] for row in rows)
-            disowned = [disowned[row] for row in rows]
-        return FoundPeople(detections, tuple(map(without_disowned, people, disowned)), disowned)
+            found = confirmation.confirmed(self._grown(image_rgb, found, confirmation))
+        return tuple(
+            one._replace(keypoints=without_disowned(one.keypoints, one.disowned)) for one in found
+        )
 
     def _grown(
-        self, image_rgb: ImageRgb, found: FoundPeople, confirmation: KeypointConfirmation
-    ) -> FoundPeople:
+        self, image_rgb: ImageRgb, found: list[FoundPerson], confirmation: KeypointConfirmation
+    ) -> list[FoundPerson]:
         """Return the people with boxes that have grown to their keypoints, where that is better.
 
         It is better if the keypoints in the new box have a higher score, and if the person does
@@ -150,8 +111,9 @@ class PeopleFinder:
         height, width = image_rgb.shape[:2]
         grown = {
             row: larger
-            for row, pair in enumerate(zip(found.detections, found.keypoints, strict=True))
-            if (larger := confirmation.grown(*pair, (width, height), self._min_score)) is not None
+            for row, one in enumerate(found)
+            if (larger := confirmation.grown(*one[:2], (width, height), self._min_score))
+            is not None
         }
         if not grown:
             return found
@@ -159,20 +121,30 @@ class PeopleFinder:
         better = {
             row: (larger, person)
             for (row, larger), person in zip(grown.items(), again, strict=True)
-            if keypoint_score(person) >= keypoint_score(found.keypoints[row])
+            if keypoint_score(person) >= keypoint_score(found[row].keypoints)
         }
         if not better:
             return found
-        detections, people = list(found.detections), list(found.keypoints)
-        for row, pair in better.items():
-            detections[row], people[row] = pair
-        disowned = disowned_keypoints(self._camera, detections, people, self._min_score)
-        lost = [row for row in better if disowned[row] is not None and found.disowned[row] is None]
-        if lost:
-            for row in lost:
-                detections[row], people[row] = found.detections[row], found.keypoints[row]
-            disowned = disowned_keypoints(self._camera, detections, people, self._min_score)
-        return FoundPeople(tuple(detections), tuple(people), disowned)
+        pairs = [better.get(row, one[:2]) for row, one in enumerate(found)]
+        changed = self._with_owners(pairs)
+        lost = {
+            row
+            for row in better
+            if changed[row].disowned is not None and found[row].disowned is None
+        }
+        if not lost:
+            return changed
+        return self._with_owners(
+            [found[row][:2] if row in lost else pair for row, pair in enumerate(pairs)]
+        )
+
+    def _with_owners(
+        self, pairs: Sequence[tuple[PersonDetection, PersonKeypoints]]
+    ) -> list[FoundPerson]:
+        """Return detections and their keypoints with why these are not the person's."""
+        detections, people = zip(*pairs, strict=True)
+        reasons = disowned_keypoints(self._camera, detections, people, self._min_score)
+        return [FoundPerson(*pair, reason) for pair, reason in zip(pairs, reasons, strict=True)]
 
     def _keypoints(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]

@@ -21,15 +21,6 @@ class PersonDetector(Protocol):
 
 
 @runtime_checkable
-class ResizableDetector(PersonDetector, Protocol):
-    """Interface: a detector whose input can be made smaller, which takes less time."""
-
-    def smaller(self) -> tuple[tuple[PersonDetector, float], ...]:
-        """Return detectors with smaller inputs, and their pixels as shares of this one's."""
-        ...
-
-
-@runtime_checkable
 class PoseEstimator(Protocol):
     """Interface: finds the keypoints of detected people."""
 

@@ -54,14 +54,6 @@ _BOX_LATERAL_M2: Final = (0.15 * MEAN_STATURE_M) ** 2 * _IDENTITY
 BOX_LEAST_TRACE_M2: Final = 3.0 * (0.15 * MEAN_STATURE_M) ** 2
 
 
-# Hip of each leg, and the keypoints that tell where its shank is: the knee if the image ends above
-# the foot.
-_LEG_ROWS: Final = (
-    (kp.LEFT_HIP, kp.LEFT_ANKLE, kp.LEFT_KNEE),
-    (kp.RIGHT_HIP, kp.RIGHT_ANKLE, kp.RIGHT_KNEE),
-)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPlacement:
     """A person's metric keypoints in the camera frame.
@@ -320,26 +312,3 @@ def cut_by_border(
     """Return (N,) True for boxes (N, 4) that end at the upper, and at the lower border."""
     margin = _BORDER * camera.height_px
     return boxes_xyxy_px[:, 1] < margin, boxes_xyxy_px[:, 3] > camera.height_px - margin
-
-
-def middle_of_shanks(
-    person: PersonKeypoints, body: BodyPlacement | None, position_m: FloatArray, min_score: float
-) -> FloatArray | None:
-    """Return the middle (3,) of the shanks, from the body moved along its ray to its place.
-
-    Each leg that is seen counts as far from the middle of the hips as its ankle, or its knee, is
-    from its own hip.
-    """
-    if body is None or not person.lifted:
-        return None
-    points = body.keypoints_camera_m
-    reaches = []
-    for hip, *rows in _LEG_ROWS:
-        seen = [row for row in rows if person.scores[row] >= min_score]
-        if seen:
-            reaches.append(points[seen[0]] - points[hip])
-    if not reaches:
-        return None
-    legs = body.hips_camera_m + np.mean(reaches, axis=0)
-    scale = float(np.linalg.norm(position_m) / np.linalg.norm(body.position_camera_m))
-    return np.asarray(scale * legs)

@@ -15,6 +15,7 @@ from ._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ._keypoints import PersonKeypoints
 from .arrays import finite_number, set_fields
 from .evidence import AwarenessReason
+from .ownership import FoundPerson
 
 # Logarithm of the odds below which the other end counts: scores of 0 and 1 have none.
 _LEAST_PROBABILITY: Final = 1e-4
@@ -142,41 +143,32 @@ class KeypointConfirmation:
             return None
         return PersonDetection(grown, detection.score)
 
-    def confirmed(
-        self,
-        detections: Sequence[PersonDetection],
-        people: Sequence[PersonKeypoints],
-        disowned: Sequence[AwarenessReason | None],
-    ) -> tuple[list[int], tuple[PersonDetection, ...]]:
-        """Return the rows of the detections that are people, and these with their new scores.
-
-        Args:
-            detections: of the detector.
-            people: their keypoints.
-            disowned: why the keypoints are not theirs, or None.
-        """
-        scores = [self.score(*pair) for pair in zip(detections, people, strict=True)]
+    def confirmed(self, found: Sequence[FoundPerson]) -> list[FoundPerson]:
+        """Return those of the detections that are people, in their order, with their new scores."""
+        scores = [self.score(one.detection, one.keypoints) for one in found]
         kept: list[int] = []
         for row in sorted(range(len(scores)), key=lambda each: -scores[each]):
             if scores[row] < self.score_threshold:
                 break
-            box = detections[row].box_xyxy_px
-            within = max(
-                (common_area(box, detections[each].box_xyxy_px) for each in kept), default=0.0
-            )
+            detection, _, disowned = found[row]
+            box = detection.box_xyxy_px
+            better = (found[each].detection.box_xyxy_px for each in kept)
+            within = max((common_area(box, other) for other in better), default=0.0)
             is_part = within > _MOSTLY * area(box)
-            if detections[row].score < self.score_threshold:
-                drop = is_part or disowned[row] is not None
-            elif detections[row].score < self.certain_score:
-                drop = is_part and disowned[row] in _ANOTHERS
+            if detection.score < self.score_threshold:
+                drop = is_part or disowned is not None
+            elif detection.score < self.certain_score:
+                drop = is_part and disowned in _ANOTHERS
             else:
                 drop = False
             if not drop:
                 kept.append(row)
-        kept.sort()
-        return kept, tuple(
-            PersonDetection(detections[row].box_xyxy_px, scores[row]) for row in kept
-        )
+        return [
+            found[row]._replace(
+                detection=PersonDetection(found[row].detection.box_xyxy_px, scores[row])
+            )
+            for row in sorted(kept)
+        ]
 
 
 def keypoint_score(person: PersonKeypoints) -> float:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from typing import Final
+from dataclasses import replace
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import layouts as kp
+from ._boxes import extent, iou
 from ._camera import Camera
 from ._detection import PersonDetection
 from ._keypoints import PersonKeypoints
@@ -24,6 +26,21 @@ DISOWNED: Final[tuple[AwarenessReason, ...]] = (
     "no body has such limbs",
     "head of another person",
 )
+
+
+class FoundPerson(NamedTuple):
+    """A person in an image.
+
+    Attributes:
+        detection: their box.
+        keypoints: what the pose estimator found in it.
+        disowned: why the keypoints are not the person's, one of :data:`DISOWNED`; None if they are.
+    """
+
+    detection: PersonDetection
+    keypoints: PersonKeypoints
+    disowned: AwarenessReason | None
+
 
 #: (17,) or (P, 17) which keypoints are seen.
 Seen = NDArray[np.bool_]
@@ -104,7 +121,7 @@ def disowned_keypoints(
     rows = [row for row in rows if reasons[row] is None]
     if len(rows) < 2:
         return reasons
-    fits = {row: _fit(points[row][seen[row]], detections[row]) for row in rows}
+    fits = {row: _fit(points[row], seen[row], detections[row]) for row in rows}
     # The best fit keeps what it has; those after it must differ from all before.
     kept: list[int] = []
     for row in sorted(rows, key=lambda each: -fits[each]):
@@ -128,15 +145,7 @@ def without_disowned(person: PersonKeypoints, reason: AwarenessReason | None) ->
         return person
     scores = person.scores.copy()
     scores[kp.HEAD if reason == DISOWNED[-1] else slice(None)] = 0.0
-    return PersonKeypoints(
-        person.keypoints_px,
-        person.keypoints_root_m,
-        scores,
-        person.layout,
-        person.lifted,
-        person.face_evidence,
-        person.scale_relative_std,
-    )
+    return replace(person, scores=scores)
 
 
 def _unit_rays(camera: Camera, points: FloatArray) -> FloatArray:
@@ -203,15 +212,9 @@ def _head_off_m(rays: FloatArray, seen: Seen, scales: Sequence[float]) -> float:
     return float(np.linalg.norm(rays[kp.HEAD][head].mean(axis=0) - expected)) / max(scales)
 
 
-def _fit(shown: FloatArray, detection: PersonDetection) -> float:
+def _fit(points: FloatArray, seen: Seen, detection: PersonDetection) -> float:
     """Return how well seen points fit a detection: their boxes' overlap times its score."""
-    left, top, right, bottom = detection.box_xyxy_px.tolist()
-    u, v = shown.min(axis=0).tolist()
-    u_max, v_max = shown.max(axis=0).tolist()
-    across, down = min(u_max, right) - max(u, left), min(v_max, bottom) - max(v, top)
-    overlap = max(across, 0.0) * max(down, 0.0)
-    union = (u_max - u) * (v_max - v) + (right - left) * (bottom - top) - overlap
-    return float(overlap / max(union, 1e-9) * detection.score)
+    return iou(extent(points, seen), detection.box_xyxy_px) * detection.score
 
 
 def _apart(points: FloatArray, seen: Seen, row: int, other: int) -> float:

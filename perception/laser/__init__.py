@@ -10,8 +10,7 @@ The order of use, for every scan of every scanner::
 
 With several scanners each scan is detected with its own number, ``detector.detect(points, 1)``, and
 :func:`merge_candidates` reports every person once. :func:`observations_of` makes the observations
-that ``tracking.PersonTracker`` takes. :class:`SeatedPeople` puts the candidates of people whom a
-camera saw sitting where their trunk is.
+that ``tracking.PersonTracker`` takes.
 """
 
 from __future__ import annotations
@@ -27,7 +26,6 @@ from ._observations import observations_of
 from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner
-from ._seated import SeatedPeople
 from ._sight import AHEAD_RAD, ScannerSight, SeenDirections, sight_of
 from ._static_map import MapCells, StaticMap
 
@@ -50,7 +48,6 @@ __all__ = [
     "ScanPoints",
     "Scanner",
     "ScannerSight",
-    "SeatedPeople",
     "SeenDirections",
     "StaticMap",
     "clusters_of",

@@ -24,8 +24,6 @@ class PersonCandidate:
         score: probability that it is a person, in [0, 1].
         kind: ``"two_legs"``, ``"one_leg"`` (or two that touch), or ``"trolley"``: something of a
             trolley's size that has come to where the floor was free, which a person may push.
-        legs_odom_m: (2,) middle of the legs that were met; None for a trolley. They are ahead of
-            the body's centre line if the person sits.
 
     Raises:
         PerceptionError: for a wrong shape, a value that is not finite, or an unknown kind.
@@ -36,7 +34,6 @@ class PersonCandidate:
     covariance_m2: FloatArray
     score: float
     kind: CandidateKind
-    legs_odom_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in _KINDS:
@@ -47,7 +44,4 @@ class PersonCandidate:
             position_odom_m=finite_array("position_odom_m", self.position_odom_m, (2,)),
             covariance_m2=covariance_matrix("covariance_m2", self.covariance_m2, 2),
             score=finite_number("score", self.score, minimum=0.0, maximum=1.0),
-            legs_odom_m=None
-            if self.legs_odom_m is None
-            else finite_array("legs_odom_m", self.legs_odom_m, (2,)),
         )

@@ -75,14 +75,7 @@ def _fused(one: PersonCandidate, other: PersonCandidate) -> PersonCandidate:
         position_odom_m=np.array(mean),
         covariance_m2=better.covariance_m2,
         kind=kind,
-        legs_odom_m=_middle(one.legs_odom_m, other.legs_odom_m),
     )
-
-
-def _middle(one: FloatArray | None, other: FloatArray | None) -> FloatArray | None:
-    if one is None or other is None:
-        return one if other is None else other
-    return np.asarray(0.5 * (one + other))
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:

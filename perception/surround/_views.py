@@ -48,14 +48,13 @@ class FlatView:
     def in_camera(self, observation: PersonObservation) -> PersonObservation:
         """Return the observation in the camera frame; its box stays in pixels of the view."""
         R = self.rotation_camera_view
-        gaze, legs = observation.gaze_camera, observation.legs_camera_m
+        gaze = observation.gaze_camera
         covariance = R @ observation.position_covariance_m2 @ R.T
         return replace(
             observation,
             position_camera_m=R @ observation.position_camera_m,
             position_covariance_m2=0.5 * (covariance + covariance.T),
             gaze_camera=None if gaze is None else R @ gaze,
-            legs_camera_m=None if legs is None else R @ legs,
         )
 
     def sampling_maps(self, lens: WideLens) -> tuple[FloatArray, FloatArray]:

@@ -33,9 +33,6 @@ _RTMDET_HW_PX: Final = (320, 320)
 # Most boxes that enter the removal of overlaps; no scene has so many people.
 _MAX_CANDIDATES: Final = 1000
 _MIN_SIDE_PX: Final = 1.0
-# Sides of smaller inputs, as shares of the whole one's, and of what they must be multiples.
-_SMALLER: Final = (0.8, 0.65)
-_STRIDE_PX: Final = 32
 
 
 class OnnxPersonDetector:
@@ -112,37 +109,6 @@ class OnnxPersonDetector:
     def layout(self) -> str:
         """Name of the recognised layout."""
         return self._layout.name
-
-    def smaller(self) -> tuple[tuple[OnnxPersonDetector, float], ...]:
-        """Return detectors of the same network with smaller inputs, largest first.
-
-        Each comes with its pixels as a share of this one's. Empty for a network whose input size
-        is fixed. They find people who are so much nearer as their input is smaller.
-        """
-        if None not in self.model.inputs[0].shape[2:]:
-            return ()
-        found: list[tuple[OnnxPersonDetector, float]] = []
-        for share in _SMALLER:
-            size = tuple(
-                math.ceil(round(share * side / _STRIDE_PX, 6)) * _STRIDE_PX
-                for side in self.input_size_hw_px
-            )
-            pixels = math.prod(size) / math.prod(self.input_size_hw_px)
-            if pixels < (found[-1][1] if found else 1.0):
-                try:
-                    found.append((self._with_input(*size), pixels))
-                except PerceptionError:
-                    break  # the network declares a free size, and takes one only
-        return tuple(found)
-
-    def _with_input(self, height_px: int, width_px: int) -> OnnxPersonDetector:
-        return OnnxPersonDetector(
-            self.model,
-            score_threshold=self._score_threshold,
-            iou_threshold=self._iou_threshold,
-            input_size_hw_px=(height_px, width_px),
-            **self._told,
-        )
 
     def detect(self, image_rgb: ImageRgb) -> tuple[PersonDetection, ...]:
         """Return the people in an image, highest score first.
