@@ -25,7 +25,6 @@ from perception.laser import (
     OnnxLegClassifier,
     PersonCandidate,
     RobotMotion,
-    SeatedPeople,
     merge_candidates,
     scan_points,
 )
@@ -138,7 +137,6 @@ def encounter(
         heading = math.radians(case.heading_deg)
         start = np.array(case.position_m)
         along = np.array([math.cos(heading), math.sin(heading)])
-        seated = SeatedPeople()
         tracks: tuple[PersonTrack, ...] = ()
         in_view = False
         for tick in range(round(case.duration_s * _SCAN_HZ)):
@@ -154,17 +152,11 @@ def encounter(
                 T_odom_camera = pose[0] @ amr.T_base_camera
                 in_view = bool(eye.look(T_odom_camera, [worker]))
                 seen = pipeline.process(image, t)
-                seated.see(seen, T_odom_camera)
                 tracks = tracker.update(seen, t, T_odom_camera)
             if sensors != "camera":
                 motion = RobotMotion(t, pose[0], np.array([speed, 0.0]))
                 found = merge_candidates(
-                    seated.placed(
-                        detector.detect(
-                            scan_points(scanner.scan(motion), mounting, motion), number
-                        ),
-                        t,
-                    )
+                    detector.detect(scan_points(scanner.scan(motion), mounting, motion), number)
                     for number, (scanner, mounting) in enumerate(scanners)
                 )
                 tracks = tracker.update(

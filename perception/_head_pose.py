@@ -9,6 +9,7 @@ from .arrays import (
     covariance_matrix,
     finite_array,
     finite_number,
+    given,
     rotation_matrix,
     set_fields,
 )
@@ -43,7 +44,6 @@ class HeadPose:
     range_relative_std: float | None = None
 
     def __post_init__(self) -> None:
-        seen, range_std = self.face_seen, self.range_relative_std
         set_fields(
             self,
             position_camera_m=finite_array("position_camera_m", self.position_camera_m, (3,)),
@@ -52,13 +52,13 @@ class HeadPose:
             reprojection_error_px=finite_number(
                 "reprojection_error_px", self.reprojection_error_px, minimum=0.0
             ),
-            face_seen=None
-            if seen is None
-            else finite_number("face_seen", seen, minimum=0.0, maximum=1.0),
-            range_relative_std=None
-            if range_std is None
-            else finite_number(
-                "range_relative_std", range_std, minimum=0.0, exclusive_minimum=True
+            face_seen=given(finite_number, "face_seen", self.face_seen, minimum=0.0, maximum=1.0),
+            range_relative_std=given(
+                finite_number,
+                "range_relative_std",
+                self.range_relative_std,
+                minimum=0.0,
+                exclusive_minimum=True,
             ),
         )
 

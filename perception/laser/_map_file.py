@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import logging
 import re
-import warnings
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -31,10 +30,10 @@ _OCCUPIED: Final = (65, 100)
 # Side of a cell, as for maps that come as messages.
 _SIDE_M: Final = (0.005, 1.0)
 _MAX_IMAGE_BYTES: Final = 256 << 20
-_MAX_CELLS: Final = 100_000_000
 # The head of a PGM or PPM file: kind, width, height, the value of white; "#" begins a comment.
-_NETPBM_HEAD: Final = re.compile(rb"P([2356])" + 3 * rb"(?:\s|#[^\n]*\n)+(\d{1,9})" + rb"\s")
-_COMMENT: Final = re.compile(rb"#[^\n]*")
+_NETPBM_HEAD: Final = re.compile(rb"P[2356]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)" + rb"\s")
+# A PNG names its transparent grey before its pixels.
+_PNG_HEAD_BYTES: Final = 4096
 _LOG: Final = logging.getLogger("perception")
 
 
@@ -124,81 +123,36 @@ def _shades(path: Path) -> tuple[FloatArray, NDArray[np.bool_] | None]:
     if len(data) > _MAX_IMAGE_BYTES:
         limit = _MAX_IMAGE_BYTES >> 20
         raise PerceptionError(f"the map's image {path} is too large: at most {limit} MiB are read")
-    head = _NETPBM_HEAD.match(data)
-    if head is not None:
-        return _netpbm_shades(path, data, head), None
-    if data.startswith((b"P7", b"II*\0", b"MM\0*")):
-        # OpenCV takes the numbers of one for shares of 255 or 65535, and drops the other's alpha.
-        kind = "PAM (P7)" if data.startswith(b"P7") else "TIFF"
-        raise PerceptionError(f"the map's image {path} is a {kind}; save it as PGM or PNG")
+    _check_kind(path, data)
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     except cv2.error:
         image = None
     if image is None or image.dtype not in (np.uint8, np.uint16):
-        raise _damaged(path)
-    _check_size(path, image.shape[1], image.shape[0])
+        raise PerceptionError(
+            f"the map's image {path} is damaged, or no PGM, PPM, PBM, PNG or BMP of 8 or 16 bits"
+        )
     white = 255.0 if image.dtype == np.uint8 else 65535.0
     channels = image.reshape(*image.shape[:2], -1)
     colours = channels[..., :3]
     shade = np.asarray(colours.sum(axis=2, dtype=np.float64) / (white * colours.shape[2]))
-    if channels.shape[2] == 4:
-        return shade, np.asarray(channels[..., 3] == white)
-    clear = _transparent_grey(data)
-    return shade, None if clear is None else np.abs(shade - clear) > 0.5 / white
+    return shade, np.asarray(channels[..., 3] == white) if channels.shape[2] == 4 else None
 
 
-def _transparent_grey(data: bytes) -> float | None:
-    """Return the brightness of the transparent pixels of a grey PNG, which OpenCV drops."""
-    if not data.startswith(b"\x89PNG") or data[25:26] != b"\x00":
-        return None
-    at = 8
-    while (kind := data[at + 4 : at + 8]) not in (b"tRNS", b"IDAT", b""):
-        at += 12 + int.from_bytes(data[at : at + 4], "big")
-    if kind != b"tRNS":
-        return None
-    return int.from_bytes(data[at + 8 : at + 10], "big") / ((1 << data[24]) - 1)
-
-
-def _netpbm_shades(path: Path, data: bytes, head: re.Match[bytes]) -> FloatArray:
-    """Return the brightness (H, W) of a PGM or PPM file in [0, 1].
-
-    White is what the file says, not what the bits could hold: OpenCV reads 1023 of 1023 as 1 of 64.
-    """
-    kind, width, height, white = map(int, head.groups())
-    _check_size(path, width, height)
-    count = width * height * (3 if kind in (3, 6) else 1)
-    deep = white >= 256
-    body = data[head.end() :]
-    least_bytes = 2 * count - 1 if kind in (2, 3) else count * (2 if deep else 1)
-    if not count or not 0 < white < 65536 or len(body) < least_bytes:
-        raise _damaged(path)
-    if kind in (2, 3):
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error")  # older NumPy warns of what is no number
-                values = np.fromstring(_COMMENT.sub(b"", body), np.int64, sep=" ")[:count]
-        except (ValueError, DeprecationWarning) as cause:
-            raise _damaged(path) from cause
+def _check_kind(path: Path, data: bytes) -> None:
+    """Refuse images of which OpenCV would return other values than the file has."""
+    netpbm = _NETPBM_HEAD.match(data)
+    if netpbm is not None and int(netpbm[3]) not in (255, 65535):
+        kind = f"PGM or PPM in which white is {int(netpbm[3])}, not 255 or 65535"
+    elif data.startswith(b"P7"):
+        kind = "PAM (P7)"
+    elif data.startswith((b"II*\0", b"MM\0*")):
+        kind = "TIFF"
+    elif data.startswith(b"\x89PNG") and data[25:26] == b"\0" and b"tRNS" in data[:_PNG_HEAD_BYTES]:
+        kind = "grey PNG with a transparent grey"
     else:
-        values = np.frombuffer(body, ">u2" if deep else np.uint8, count)
-    if len(values) < count or values.min() < 0 or values.max() > white:
-        raise _damaged(path)
-    shade = values.reshape(height, width, -1).mean(axis=2, dtype=np.float64) / white
-    return np.asarray(shade)
-
-
-def _check_size(path: Path, width: int, height: int) -> None:
-    if width * height > _MAX_CELLS:
-        raise PerceptionError(
-            f"the map's image {path} must have at most {_MAX_CELLS} pixels, got {width} x {height}"
-        )
-
-
-def _damaged(path: Path) -> PerceptionError:
-    return PerceptionError(
-        f"the map's image {path} is damaged, or no PGM, PPM, PBM, PNG or BMP of 8 or 16 bits"
-    )
+        return
+    raise PerceptionError(f"the map's image {path} is a {kind}; save it as PGM or PNG")
 
 
 def _percent(
