@@ -90,11 +90,6 @@ class _Terms(NamedTuple):
     as_outlier: float
 
 
-def combine_cues(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -> tuple[float, float]:
-    """Return the logarithm of the range and its standard deviation, as :func:`combined_range`."""
-    return combined_range(cues, unusual_probability)[:2]
-
-
 def combined_range(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -> CombinedRange:
     """Combine the cues for the range of one person.
 

@@ -45,28 +45,6 @@ class AwarenessEstimate:
     awareness_std: float
 
 
-def awareness_of(
-    cone: AttentionCone, head: HeadPose, robot_points_camera_m: FloatArray
-) -> tuple[float, float]:
-    """Return α, for the robot point with the highest score, and its standard deviation.
-
-    α follows eqs. (1)–(3) of the paper, with the cone's apex at the midpoint of the eyes. The
-    standard deviation is that of α over repeated measurements of the same head, from the 6×6
-    covariance of the head pose. The errors of the gaze, and of the apex across the line of sight,
-    are angles across the gaze; the score is integrated numerically over their joint normal
-    distribution.
-
-    Args:
-        cone: the attention cone.
-        head: head pose in the camera frame.
-        robot_points_camera_m: (M, 3) points of the robot in the camera frame.
-    """
-    lines = _LinesOfSight((head,), robot_points_camera_m)
-    nominal = float(cone_scores(cone, lines.cosines).max())
-    mean, square = _moments(cone, lines, lines.pose_covariance())
-    return nominal, float(np.sqrt(max(square[0] - mean[0] ** 2, 0.0)))
-
-
 def estimate_awareness(
     cone: AttentionCone,
     heads: Sequence[HeadPose],

@@ -75,38 +75,28 @@ class BodyPlacement:
     keypoints_camera_m: FloatArray
 
 
-def place_body(
-    camera: Camera,
-    person: PersonKeypoints,
-    keypoint_std_px: float,
-    min_score: float = DEFAULT_MIN_SCORE,
-) -> BodyPlacement | None:
-    """Place a body: find the translation that projects its metric skeleton onto the pixels.
-
-    Linear least squares in the three unknowns of the translation, iterated with Huber's weights on
-    the reprojection error. The covariance includes the pixel noise (at least as large as the
-    residuals) and the uncertainty of the scale, which acts along the ray.
-
-    Args:
-        camera: camera of the image.
-        person: the keypoints.
-        keypoint_std_px: standard deviation of the pixel noise.
-        min_score: keypoints with a lower score count as not seen.
-
-    Returns:
-        The placement; None if fewer than three keypoints are seen, the skeleton has no limb, or
-        the body would lie behind the camera.
-    """
-    return place_bodies(camera, (person,), keypoint_std_px, min_score)[0]
-
-
 def place_bodies(
     camera: Camera,
     people: Sequence[PersonKeypoints],
     keypoint_std_px: float,
     min_score: float = DEFAULT_MIN_SCORE,
 ) -> tuple[BodyPlacement | None, ...]:
-    """Place the bodies of several people at once, each as :func:`place_body` does."""
+    """Place bodies: find the translations that project metric skeletons onto the pixels.
+
+    Linear least squares in the three unknowns of each translation, iterated with Huber's weights on
+    the reprojection error. The covariance includes the pixel noise (at least as large as the
+    residuals) and the uncertainty of the scale, which acts along the ray.
+
+    Args:
+        camera: camera of the image.
+        people: keypoints of each person.
+        keypoint_std_px: standard deviation of the pixel noise.
+        min_score: keypoints with a lower score count as not seen.
+
+    Returns:
+        A placement per person; None if fewer than three keypoints are seen, the skeleton has no
+        limb, or the body would lie behind the camera.
+    """
     return _place_bodies(camera, tuple(people), keypoint_std_px, min_score)
 
 
@@ -267,8 +257,10 @@ def _trunks(
     return shoulders, usable, hips, (1.0 - CHEST_FRACTION) * neck + CHEST_FRACTION * hips
 
 
-def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Estimate a position from a box, as that of a standing adult.
+def place_boxes(
+    camera: Camera, boxes_xyxy_px: Sequence[FloatArray]
+) -> list[tuple[FloatArray, FloatArray] | None]:
+    """Estimate positions from boxes, as those of standing adults.
 
     It is for people whose keypoints cannot place the body. Of a box that ends at the upper or lower
     border of the image only a part of the height is seen: it is taken from the width, if that
@@ -277,13 +269,6 @@ def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, Floa
     Returns:
         Position (3,) and covariance (3, 3) in the camera frame; None for a box without extent.
     """
-    return place_boxes(camera, [box_xyxy_px])[0]
-
-
-def place_boxes(
-    camera: Camera, boxes_xyxy_px: Sequence[FloatArray]
-) -> list[tuple[FloatArray, FloatArray] | None]:
-    """Estimate positions from several boxes at once, each as :func:`place_box` does."""
     pixels = np.reshape(boxes_xyxy_px, (-1, 2))
     edges = camera.normalise(pixels, nearest=True).reshape(-1, 4)
     low, extent = edges[:, :2], edges[:, 2:] - edges[:, :2]

@@ -13,8 +13,6 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._box_format import BoxFormatVote, centre_to_corners
-
 STRIDES: Final = (8, 16, 32)
 
 Floats = NDArray[np.float32]
@@ -53,18 +51,10 @@ class YoloV8Decoder:
 
 
 class RowsDecoder:
-    """Output (1, M, 6) of a box (4 numbers), score and class; the network removes overlaps.
+    """Output (1, M, 6) of x1, y1, x2, y2, score and class; the network removes overlaps."""
 
-    Args:
-        person_class: number of the class that counts.
-        vote: finds out whether the boxes are corners or centre and size.
-        input_px: width and height of the network's input.
-    """
-
-    def __init__(self, person_class: int, vote: BoxFormatVote, input_px: tuple[int, int]) -> None:
+    def __init__(self, person_class: int) -> None:
         self._person_class = person_class
-        self._vote = vote
-        self._input_px = input_px
 
     def decode(
         self, outputs: Sequence[NDArray[Any]], score_threshold: float
@@ -72,9 +62,8 @@ class RowsDecoder:
         """See :class:`Decoder`."""
         rows = _float32(outputs[0][0])
         rows = rows[rows[:, 4] >= score_threshold]
-        self._vote.update(rows[:, :4], rows[:, 4], self._input_px)
         rows = rows[np.rint(rows[:, 5]) == self._person_class]
-        return self._vote.corners(rows[:, :4]), rows[:, 4]
+        return rows[:, :4], rows[:, 4]
 
 
 class YoloxDecoder:
@@ -137,6 +126,11 @@ def cells(height_px: int, width_px: int) -> tuple[Floats, Floats]:
         places.append(np.stack([columns.ravel(), rows.ravel()], axis=1))
         strides.append(np.full((columns.size, 1), stride))
     return _float32(np.concatenate(places)), _float32(np.concatenate(strides))
+
+
+def centre_to_corners(centre: NDArray[Any], size: NDArray[Any]) -> NDArray[Any]:
+    """Return the corners x1, y1, x2, y2 (N, 4) of boxes with centres (N, 2) and sizes (N, 2)."""
+    return np.concatenate([centre - 0.5 * size, centre + 0.5 * size], axis=1)
 
 
 def _float32(values: NDArray[Any]) -> Floats:

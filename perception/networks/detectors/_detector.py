@@ -40,8 +40,8 @@ class OnnxPersonDetector:
 
     Known layouts: YOLOv8, YOLO11 and relatives; networks that need no NMS or contain it, with
     output (1, M, 6); YOLOX with its raw head or its own NMS; RTMDet. The class "person" of the
-    metadata counts; without class names the first class counts, as in COCO. Boxes of (1, M, 6) may
-    be corners or centre and size: see :class:`~perception.networks.detectors.BoxFormatVote`.
+    metadata counts; without class names the first class counts, as in COCO. Boxes of (1, M, 6) are
+    x1, y1, x2, y2, as all known exporters write them.
 
     Several threads may share a detector; their calls run one after another.
 
@@ -53,7 +53,6 @@ class OnnxPersonDetector:
         input_size_hw_px: (height, width) for a network that leaves its input size free; default
             the metadata's ``imgsz``, and 320 × 320 for RTMDet.
         person_class: number of the class that counts, where the metadata do not name it.
-        box_format: ``"xyxy"`` or ``"cxcywh"`` for (1, M, 6); None finds it out from the boxes.
         family: ``"rtmdet"`` or ``"yolox"`` for a network with the outputs ``dets`` and ``labels``,
             these or ``"ultralytics"`` for one with output (1, M, 6). They want different pixels.
             None takes it from the names of weights and nodes and, for Ultralytics, from the
@@ -74,7 +73,6 @@ class OnnxPersonDetector:
         iou_threshold: float = 0.5,
         input_size_hw_px: tuple[int, int] | None = None,
         person_class: int | None = None,
-        box_format: str | None = None,
         family: str | None = None,
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
@@ -90,13 +88,8 @@ class OnnxPersonDetector:
                 f"person_class must be a whole number of at least 0 or None, got {person_class!r}"
             )
         self.model = as_onnx_model(path, settings, sha256)
-        self._told: dict[str, Any] = {
-            "person_class": person_class,
-            "box_format": box_format,
-            "family": checked_family(family),
-        }
         self.input_size_hw_px = _detector_input_size(self.model, input_size_hw_px, family)
-        self._layout = self._recognise()
+        self._layout = self._recognise(person_class, checked_family(family))
         self._letterbox = Letterbox(
             *self.input_size_hw_px, self._layout.pixels, centred=self._layout.centred
         )
@@ -168,13 +161,15 @@ class OnnxPersonDetector:
         )
         return np.asarray(kept, dtype=np.intp).reshape(-1)
 
-    def _recognise(self) -> DetectorLayout:
+    def _recognise(self, person_class: int | None, family: str | None) -> DetectorLayout:
         height, width = self.input_size_hw_px
         dtype = input_dtype(self.model)
         # Some exports declare fixed extents as free. A run on an empty input shows all of them.
         outputs = run_on_images(self.model, np.zeros((1, 3, height, width), dtype))
         with np.errstate(all="ignore"):
-            return recognise(TrialRun(self.model, outputs, height, width, dtype, **self._told))
+            return recognise(
+                TrialRun(self.model, outputs, height, width, dtype, person_class, family)
+            )
 
 
 def _detector_input_size(

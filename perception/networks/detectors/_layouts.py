@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from ...errors import PerceptionError
 from .._model import OnnxModel, output_shapes
 from .._pixels import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
-from ._box_format import BoxFormatVote
 from ._decoders import (
     STRIDES,
     Decoder,
@@ -88,7 +87,6 @@ class TrialRun:
         width_px: width of the input.
         dtype: number type of the input.
         person_class: class number given by the caller, or None.
-        box_format: box format given by the caller, or None.
         family: family given by the caller, or None.
     """
 
@@ -98,7 +96,6 @@ class TrialRun:
     width_px: int
     dtype: str
     person_class: int | None = None
-    box_format: str | None = None
     family: str | None = None
 
     def refusal(self, reason: str) -> PerceptionError:
@@ -134,51 +131,46 @@ def recognise(trial: TrialRun) -> DetectorLayout:
 def _single_output(trial: TrialRun, first: int, second: int) -> DetectorLayout:
     """Recognise a detector with one output (1, first, second)."""
     size = trial.height_px, trial.width_px
-    counts = {cell_count(*size, strides) for strides in _PYRAMIDS}
     names = class_names(trial.model)
-    candidates: dict[str, Any] = {}
-    if second in counts and first >= 5 and (names is None or first == 4 + len(names)):
-        candidates["YOLOv8"] = lambda: _yolov8(trial, first - 4)
+    found: list[str] = []
+    if (
+        second in {cell_count(*size, strides) for strides in _PYRAMIDS}
+        and first >= 5
+        and (names is None or first == 4 + len(names))
+    ):
+        found.append("YOLOv8")
     in_cells = first == cell_count(*size)
     if second == _ROW_LENGTH and (not in_cells or _are_boxes(trial)):
-        candidates["rows"] = lambda: _rows(trial)
-    elif in_cells:
-        if second >= 6 and (names is None or second == 5 + len(names)):
-            candidates["YOLOX raw"] = lambda: _yolox(trial, second - 5)
-        # Without class names, a transposed YOLOv8 is recognised only with 1 or COCO's 80 classes.
-        classes = second - 4
-        if classes in ((1, _COCO_CLASSES) if names is None else (len(names),)):
-            candidates["YOLOv8 with its axes swapped"] = None
-    if len(candidates) > 1:
-        raise trial.refusal(f"it could be {' or '.join(candidates)}")
-    make = next(iter(candidates.values()), None)
-    if make is None:
-        raise trial.refusal(_refusal_reason(trial, first, second, candidates))
-    layout: DetectorLayout = make()
-    return layout
+        found.append("rows")
+    elif in_cells and second >= 6 and second == 5 + _class_count(names, second):
+        found.append("YOLOX raw")
+    if len(found) > 1:
+        raise trial.refusal(f"it could be {' or '.join(found)}")
+    if not found:
+        wanted = cell_count(*size)
+        raise trial.refusal(f"an input of this size has {wanted} cells of strides 8, 16 and 32")
+    if found == ["YOLOv8"]:
+        return _yolov8(trial, first - 4)
+    return _rows(trial) if found == ["rows"] else _yolox(trial, second - 5)
+
+
+def _class_count(names: dict[int, str] | None, row_length: int) -> int:
+    """Return the number of classes of a raw YOLOX with rows of this length.
+
+    Without class names, rows of 84 numbers are those of a transposed YOLOv8 of COCO.
+    """
+    if names is not None:
+        return len(names)
+    return _COCO_CLASSES if row_length == 4 + _COCO_CLASSES else row_length - 5
 
 
 def _are_boxes(trial: TrialRun) -> bool:
     """Return whether (1, cells, 6) are boxes in pixels with a class, not YOLOX's raw numbers."""
-    if trial.box_format is not None:
-        return True
     numbers = trial.outputs[0][0].astype(np.float32)
     classes = numbers[:, 5]
     whole = bool((classes == np.rint(classes)).all())
     # An NMS that finds nobody may leave nothing but zeros, a raw head never does.
     return whole and (not numbers.any() or float(np.abs(numbers[:, :4]).max()) > _LARGEST_RAW)
-
-
-def _refusal_reason(trial: TrialRun, first: int, second: int, candidates: dict[str, Any]) -> str:
-    wanted = cell_count(trial.height_px, trial.width_px)
-    if candidates:
-        return f"it looks like {next(iter(candidates))}; export it as (1, {second}, {first})"
-    if 3 * wanted in (first, second):
-        return "it has three outputs per cell, as YOLOv5 and YOLOv7 have with their anchors"
-    if wanted in (first, second):
-        extent = second if first == wanted else first
-        return f"{extent} numbers per cell do not agree with the classes that its metadata names"
-    return f"an input of this size has {wanted} cells of strides 8, 16 and 32"
 
 
 def _yolov8(trial: TrialRun, classes: int) -> DetectorLayout:
@@ -187,11 +179,7 @@ def _yolov8(trial: TrialRun, classes: int) -> DetectorLayout:
 
 
 def _rows(trial: TrialRun) -> DetectorLayout:
-    input_px = (trial.width_px, trial.height_px)
-    vote = BoxFormatVote(trial.box_format)
-    rows = trial.outputs[0][0].astype(np.float32)
-    vote.update(rows[:, :4], rows[:, 4], input_px)
-    decoder = RowsDecoder(_person_class(trial, None), vote, input_px)
+    decoder = RowsDecoder(_person_class(trial, None))
     family = trial.family or family_of(trial.model)
     if family is None:
         if not any(key in trial.model.metadata for key in _ULTRALYTICS_KEYS):

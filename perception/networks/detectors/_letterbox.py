@@ -54,11 +54,6 @@ class LetterboxGeometry:
         boxes = (boxes_xyxy.astype(np.float64) - self.corner_px * 2) * np.tile(factor, 2)
         return np.asarray(np.clip(boxes, 0.0, self.image_px * 2))
 
-    def to_input(self, boxes_xyxy_px: NDArray[Any]) -> FloatArray:
-        """Map boxes (N, 4) from the image to the input."""
-        factor = np.divide(self.scaled_px, self.image_px)
-        return np.asarray(boxes_xyxy_px * np.tile(factor, 2) + self.corner_px * 2)
-
 
 class Letterbox:
     """Network input that is filled with one image at a time, padded with grey (114).
