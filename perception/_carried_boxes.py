@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._boxes import area, common_area, extent, iou
-from ._detection import PersonDetection
-from ._protocols import PersonDetector
+from ._stages import PersonDetection, PersonDetector
 from .arrays import FloatArray, ImageRgb
 from .ownership import FoundPerson
 

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from ._rotations import rotation_exp, skew
 from .anthropometry import HEAD_CENTRE_HEAD_M
 from .arrays import FloatArray
 from .body import BodyPlacement
+from .matrices import rotation_exp, skew
 
 # The joint of head and neck lies below and between the ears.
 _PIVOT_HEAD_M: Final = np.array([0.035, -0.100, 0.0])

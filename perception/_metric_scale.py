@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from . import layouts as kp
-from ._keypoints import PersonKeypoints
+from ._stages import PersonKeypoints
 from .anthropometry import LIMBS, STATURE_RELATIVE_STD
 from .arrays import FloatArray
 

@@ -7,10 +7,7 @@ from collections.abc import Sequence
 
 from ._camera import Camera
 from ._carried_boxes import MAX_DETECT_EVERY_S, CarriedBoxes
-from ._detection import PersonDetection
-from ._frame_time import StageClock
-from ._keypoints import PersonKeypoints
-from ._protocols import PersonDetector, PoseEstimator
+from ._stages import PersonDetection, PersonDetector, PersonKeypoints, PoseEstimator
 from .arrays import ImageRgb, finite_number
 from .confirmation import KeypointConfirmation, keypoint_score
 from .errors import PerceptionError
@@ -57,10 +54,8 @@ class PeopleFinder:
             other._carrier = self._carrier.unused()
         return other
 
-    def find(
-        self, image_rgb: ImageRgb, stamp_s: float, clock: StageClock
-    ) -> tuple[FoundPerson, ...]:
-        """Return the people of an image; the clock counts detector and pose."""
+    def find(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[FoundPerson, ...]:
+        """Return the people of an image."""
         carrier = self._carrier
         if carrier is None:
             detections = tuple(self._detector.detect(image_rgb))
@@ -68,16 +63,12 @@ class PeopleFinder:
         else:
             detections = carrier.detections(image_rgb, stamp_s)
             looked = carrier.looked
-        clock.count("detector")
         found = self._with_keypoints(image_rgb, detections, looked=looked)
         if carrier is not None and not carrier.follow(found):
             # A carried box has lost its person: look at once.
-            clock.count("pose")
             detections = carrier.detect(image_rgb)
-            clock.count("detector")
             found = self._with_keypoints(image_rgb, detections, looked=True)
             carrier.follow(found)
-        clock.count("pose")
         return found
 
     def _with_keypoints(

@@ -9,21 +9,24 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ._attention import AttentionCone
 from ._camera import Camera
-from ._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ._floor import FloorPlane
-from ._frame_time import StageClock, StageTimings
-from ._head_pose import HeadPose
 from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import PersonObservation
 from ._people_finder import PeopleFinder, check_count
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
-from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+from ._stages import (
+    DEFAULT_SCORE_THRESHOLD,
+    HeadPose,
+    HeadPoseEstimator,
+    PersonDetection,
+    PersonDetector,
+    PoseEstimator,
+)
 from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
-from .awareness import AwarenessEstimate, estimate_awareness
+from .awareness import AttentionCone, AwarenessEstimate, estimate_awareness
 from .confirmation import KeypointConfirmation
 from .depth_image import checked_depth
 from .errors import PerceptionError
@@ -163,7 +166,6 @@ class AwarenessPipeline:
                 f"{type(eye_estimator).__name__}"
             )
         self._eye_estimator = eye_estimator
-        self._timings = StageTimings()
 
     def for_another_view(self) -> AwarenessPipeline:
         """Return a pipeline with the same camera, networks and settings that has seen no image.
@@ -174,13 +176,7 @@ class AwarenessPipeline:
         """
         other = copy.copy(self)
         other._people = self._people.for_another_view()
-        other._timings = StageTimings()
         return other
-
-    @property
-    def last_timings(self) -> StageTimings:
-        """Times of the stages of the last processed frame; zeros before the first."""
-        return self._timings
 
     def process(
         self,
@@ -215,7 +211,6 @@ class AwarenessPipeline:
             PerceptionError: for an image of another size or type, a non-finite stamp, and an
                 estimator that does not return one result per person.
         """
-        clock = StageClock()
         stamp_s = finite_number("stamp_s", stamp_s)
         floor = self._floor if floor is None else _checked_floor(floor)
         self._check_image(image_rgb)
@@ -224,15 +219,13 @@ class AwarenessPipeline:
             depth_m = checked_depth(depth_m, shape, stamp_s, depth_stamp_s)
         elif depth_stamp_s is not None:
             raise PerceptionError("depth_stamp_s needs depth_m, got None")
-        clock.count("rest")
-        found = self._people.find(image_rgb, stamp_s, clock)
+        found = self._people.find(image_rgb, stamp_s)
         observations: tuple[PersonObservation, ...] = ()
         if found:
             people = tuple(one.keypoints for one in found)
             heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
             check_count("head_pose_estimator", len(heads), len(people))
             eyes = self._eyes(image_rgb, heads)
-            clock.count("head_pose")
             places = place_people(
                 self.camera,
                 tuple(one.detection for one in found),
@@ -250,8 +243,6 @@ class AwarenessPipeline:
                 for one, place, look in zip(found, places, looks, strict=True)
                 if place is not None
             )
-            clock.count("rest")
-        self._timings = clock.timings()
         return observations
 
     def _observation(

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._head_prior import HeadPrior
-from ._rotations import rotation_exp, rotation_log, skew
 from .arrays import FloatArray
+from .matrices import rotation_exp, rotation_log, skew
 
 _ITERATIONS: Final = 8
 # The second pass starts at the optimum of the first.

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
-from ._keypoints import PersonKeypoints
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scales
+from ._stages import PersonKeypoints
 from .anthropometry import LIMBS, MEAN_STATURE_M, STATURE_RELATIVE_STD
 from .arrays import FloatArray
 

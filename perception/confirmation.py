@@ -11,12 +11,22 @@ import numpy as np
 
 from . import layouts as kp
 from ._boxes import area, common_area, extent
-from ._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
-from ._keypoints import PersonKeypoints
+from ._stages import DEFAULT_SCORE_THRESHOLD, PersonDetection, PersonKeypoints
 from .arrays import finite_number, set_fields
 from .evidence import AwarenessReason
 from .ownership import FoundPerson
 
+# Detector's score from which on a detection is a candidate, or the threshold if that is lower.
+_CANDIDATE_SCORE: Final = 0.05
+# Detector's score from which on a person is kept whatever the keypoints say: of somebody half
+# hidden few are seen.
+_CERTAIN_SCORE: Final = 0.4
+# Weight of the keypoints' odds, and the mean of their scores that leaves a score as it is.
+_WEIGHT: Final = 3.0
+_NEUTRAL: Final = 0.4
+# Candidates below the threshold that are looked at, the best first; each costs a run of the pose
+# network.
+_MOST: Final = 8
 # Logarithm of the odds below which the other end counts: scores of 0 and 1 have none.
 _LEAST_PROBABILITY: Final = 1e-4
 # A box of which more lies within another shows a part of that person.
@@ -51,65 +61,40 @@ class KeypointConfirmation:
     within a better one, of which it then shows a part; one that is not certain may not lie within
     a better one whose skeleton or head it shares.
 
-    The defaults are made for the shipped detector with the shipped pose network. Scores of other
+    The numbers are made for the shipped detector with the shipped pose network. Scores of other
     networks mean something else.
 
     Attributes:
         score_threshold: people with a lower score are dropped.
-        candidate_score: detector's score from which on a detection is a candidate; one above
-            ``score_threshold`` counts as that.
-        certain_score: detector's score from which on a person is kept whatever the keypoints say:
-            of somebody half hidden few are seen.
-        weight: of the keypoints' odds, ≥ 0.
-        neutral: mean of the keypoints' scores that leaves a detection's score as it is, in (0, 1).
-        most: number of candidates below ``score_threshold`` that are looked at, the best first;
-            each costs a run of the pose network.
 
     Raises:
-        PerceptionError: for a value outside its range.
+        PerceptionError: for a value outside [0, 1].
     """
 
     score_threshold: float = DEFAULT_SCORE_THRESHOLD
-    candidate_score: float = 0.05
-    certain_score: float = 0.4
-    weight: float = 3.0
-    neutral: float = 0.4
-    most: int = 8
 
     def __post_init__(self) -> None:
         threshold = finite_number("score_threshold", self.score_threshold, minimum=0.0, maximum=1.0)
-        set_fields(
-            self,
-            score_threshold=threshold,
-            candidate_score=finite_number(
-                "candidate_score", self.candidate_score, minimum=0.0, maximum=1.0
-            ),
-            certain_score=finite_number(
-                "certain_score", self.certain_score, minimum=0.0, maximum=1.0
-            ),
-            weight=finite_number("weight", self.weight, minimum=0.0),
-            neutral=finite_number("neutral", self.neutral, minimum=0.01, maximum=0.99),
-            most=int(finite_number("most", self.most, minimum=0.0, maximum=1000.0)),
-        )
+        set_fields(self, score_threshold=threshold)
 
     @property
     def detector_threshold(self) -> float:
         """The score threshold that the detector must have, so that candidates are found."""
-        return min(self.candidate_score, self.score_threshold)
+        return min(_CANDIDATE_SCORE, self.score_threshold)
 
     def candidates(self, detections: Sequence[PersonDetection]) -> tuple[PersonDetection, ...]:
         """Return the detections whose keypoints are worth a look, in their order."""
         weak = [each.score for each in detections if each.score < self.score_threshold]
-        if len(weak) <= self.most:
+        if len(weak) <= _MOST:
             return tuple(detections)
-        least = sorted(weak, reverse=True)[self.most - 1] if self.most else self.score_threshold
+        least = sorted(weak, reverse=True)[_MOST - 1]
         return tuple(each for each in detections if each.score >= least)
 
     def score(self, detection: PersonDetection, person: PersonKeypoints) -> float:
         """Return the score of a detection with its keypoints, in [0, 1]."""
-        odds = _logit(keypoint_score(person)) - _logit(self.neutral)
-        score = 1.0 / (1.0 + math.exp(-_logit(detection.score) - self.weight * odds))
-        if detection.score >= self.certain_score:
+        odds = _logit(keypoint_score(person)) - _logit(_NEUTRAL)
+        score = 1.0 / (1.0 + math.exp(-_logit(detection.score) - _WEIGHT * odds))
+        if detection.score >= _CERTAIN_SCORE:
             score = max(score, min(detection.score, self.score_threshold))
         return score
 
@@ -157,7 +142,7 @@ class KeypointConfirmation:
             is_part = within > _MOSTLY * area(box)
             if detection.score < self.score_threshold:
                 drop = is_part or disowned is not None
-            elif detection.score < self.certain_score:
+            elif detection.score < _CERTAIN_SCORE:
                 drop = is_part and disowned in _ANOTHERS
             else:
                 drop = False

@@ -10,8 +10,7 @@ import numpy as np
 
 from . import layouts as kp
 from ._camera import Camera
-from ._head_pose import HeadPose
-from ._keypoints import PersonKeypoints
+from ._stages import HeadPose, PersonKeypoints
 from .anthropometry import HEAD_TEMPLATE_M, HEAD_WIDTH_M
 
 #: Why there is no evidence of awareness.

@@ -1,9 +1,9 @@
-"""Symmetric 2 × 2 matrices in closed form: inverse, larger eigenvalue, Mahalanobis distance."""
+"""Small matrices in closed form: symmetric 2 × 2 ones, cross products and rotations."""
 
 from __future__ import annotations
 
 import math
-from typing import overload
+from typing import Final, overload
 
 import numpy as np
 
@@ -47,3 +47,49 @@ def larger_eigenvalue(
     if isinstance(xx, float) and isinstance(yy, float) and isinstance(xy, float):
         return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)
     return np.asarray(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy))
+
+
+_IDENTITY: Final = np.eye(3)
+# (3, 9): a vector times this gives the rows of its cross-product matrix, one after the other.
+_SKEW: Final = np.array(
+    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]],
+    dtype=np.float64,
+)
+
+
+def skew(vectors: FloatArray) -> FloatArray:
+    """Return cross-product matrices (…, 3, 3) of vectors (…, 3): ``skew(a) @ b == cross(a, b)``."""
+    return np.asarray((vectors @ _SKEW).reshape(*vectors.shape, 3))
+
+
+def rotation_exp(vectors: FloatArray) -> FloatArray:
+    """Return rotations (…, 3, 3) of rotation vectors (…, 3), by Rodrigues' formula."""
+    angle = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None, None]
+    cross = skew(vectors)
+    if np.minimum.reduce(angle, axis=None, initial=1.0) >= 1e-8:
+        first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / (angle * angle)
+    else:
+        small = angle < 1e-8
+        safe = np.where(small, 1.0, angle)
+        first = np.where(small, 1.0, np.sin(angle) / safe)
+        second = np.where(small, 0.5, (1.0 - np.cos(angle)) / safe**2)
+    return np.asarray(_IDENTITY + first * cross + second * (cross @ cross))
+
+
+def rotation_log(rotations: FloatArray) -> FloatArray:
+    """Return rotation vectors (…, 3), of length at most π, of rotations (…, 3, 3)."""
+    trace = rotations[..., 0, 0] + rotations[..., 1, 1] + rotations[..., 2, 2]
+    angle = np.arccos(np.minimum(np.maximum(0.5 * (trace - 1.0), -1.0), 1.0))
+    axis = np.empty(rotations.shape[:-1])
+    axis[..., 0] = rotations[..., 2, 1] - rotations[..., 1, 2]
+    axis[..., 1] = rotations[..., 0, 2] - rotations[..., 2, 0]
+    axis[..., 2] = rotations[..., 1, 0] - rotations[..., 0, 1]
+    length = np.sqrt(np.einsum("...i,...i->...", axis, axis))
+    if length.min(initial=1.0) > 1e-6:
+        return np.asarray((angle / length)[..., None] * axis)
+    # Near a half turn the antisymmetric part vanishes; the diagonal still gives the axis.
+    diagonal = np.sqrt(np.maximum(0.5 * (1.0 + np.diagonal(rotations, axis1=-2, axis2=-1)), 0.0))
+    turned = np.where(axis < 0.0, -diagonal, diagonal)
+    usable = length > 1e-6
+    unit = np.where(usable[..., None], axis / np.where(usable, length, 1.0)[..., None], turned)
+    return np.asarray(np.where((angle < 1e-8)[..., None], 0.5 * axis, angle[..., None] * unit))

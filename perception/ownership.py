@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from . import layouts as kp
 from ._boxes import extent, iou
 from ._camera import Camera
-from ._detection import PersonDetection
-from ._keypoints import PersonKeypoints
+from ._stages import PersonDetection, PersonKeypoints
 from .arrays import FloatArray
 from .evidence import AwarenessReason
 

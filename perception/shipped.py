@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Final
 
 from ._camera import Camera
-from ._detection import DEFAULT_SCORE_THRESHOLD
 from ._manifest import (
     DETECTOR,
     HEAD,
@@ -23,6 +22,7 @@ from ._manifest import (
     simulator_networks_warning,
     verify_shipped_model,
 )
+from ._stages import DEFAULT_SCORE_THRESHOLD
 from .networks import OnnxModel, OnnxPersonDetector, OnnxPoseEstimator, OnnxSettings
 from .networks.heads import OnnxHeadPoseEstimator
 

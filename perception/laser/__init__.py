@@ -15,14 +15,18 @@ that ``tracking.PersonTracker`` takes.
 
 from __future__ import annotations
 
-from ._candidate import CandidateKind, PersonCandidate
-from ._classifier import LegClassifier, OnnxLegClassifier
+from ._candidates import CandidateKind, PersonCandidate, merge_candidates, observations_of
 from ._clusters import Clusters, clusters_of
 from ._detector import LegDetector, LegDetectorConfig
-from ._hypotheses import CUTOUT, HYPOTHESIS_FEATURES, Hypotheses, hypotheses_of
+from ._hypotheses import (
+    CUTOUT,
+    HYPOTHESIS_FEATURES,
+    Hypotheses,
+    LegClassifier,
+    OnnxLegClassifier,
+    hypotheses_of,
+)
 from ._memory import OccupancyMemory
-from ._merging import merge_candidates
-from ._observations import observations_of
 from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan
 from ._scanner import Scanner

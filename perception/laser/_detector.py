@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ..arrays import FloatArray, finite_number, set_fields
 from ..errors import PerceptionError
-from ._candidate import CandidateKind, PersonCandidate
-from ._classifier import LegClassifier, OnnxLegClassifier
+from ._candidates import CandidateKind, PersonCandidate
 from ._clusters import Clusters, clusters_of
-from ._hypotheses import Hypotheses, hypotheses_of
+from ._hypotheses import Hypotheses, LegClassifier, OnnxLegClassifier, hypotheses_of
 from ._memory import OccupancyMemory
 from ._points import ScanPoints
 from ._static_map import StaticMap

@@ -138,22 +138,12 @@ class LaserScan:
         """(N,) True for rays that met no object within ``range_max_m``."""
         return np.asarray((self.ranges_m == np.inf) | (self.ranges_m == self._nothing_m))
 
-    @property
-    def too_near(self) -> NDArray[np.bool_]:
-        """(N,) True for rays that met an object too near to measure (−inf)."""
-        return np.asarray(np.isneginf(self.ranges_m))
-
-    @property
-    def free_m(self) -> FloatArray:
-        """The distance (N,) over which each ray met nothing.
+    def free_of(self, measured: NDArray[np.bool_]) -> FloatArray:
+        """Return the distance (N,) over which each ray met nothing.
 
         It is the range where there is one, ``range_max_m`` for :attr:`no_return`, and 0 where
-        nothing is known.
+        nothing is known. :attr:`measured` (N,) is given.
         """
-        return self.free_of(self.measured)
-
-    def free_of(self, measured: NDArray[np.bool_]) -> FloatArray:
-        """Return :attr:`free_m` (N,) for rays of which :attr:`measured` is known."""
         free = np.where(measured, self.ranges_m, 0.0)
         np.putmask(free, self.no_return, self.range_max_m)
         return free

@@ -17,8 +17,7 @@ reported once, in the camera frame::
 from __future__ import annotations
 
 from ._lenses import FisheyeLens, PanoramaLens, WideLens
-from ._merging import SeenInView, merge_views
-from ._pipeline import SurroundPipeline
+from ._pipeline import SeenInView, SurroundPipeline, merge_views
 from ._views import FlatView, ring_of_views
 
 __all__ = [

@@ -10,11 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
+from ..._stages import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ...arrays import ImageRgb, finite_number
 from ...errors import PerceptionError
-from .._image import rgb_image
-from .._image_input import input_batch, input_dtype, input_size, run_on_images
+from .._images import input_batch, input_dtype, input_size, rgb_image, run_on_images
 from .._model import ModelSource, OnnxModel, as_onnx_model
 from .._settings import OnnxSettings
 from ._decoders import Floats
@@ -33,6 +32,9 @@ _RTMDET_HW_PX: Final = (320, 320)
 # Most boxes that enter the removal of overlaps; no scene has so many people.
 _MAX_CANDIDATES: Final = 1000
 _MIN_SIDE_PX: Final = 1.0
+# Of two boxes that overlap more than this, only the one with the higher score stays. One person may
+# hide half of another, and both are reported.
+_SAME_PERSON_IOU: Final = 0.5
 
 
 class OnnxPersonDetector:
@@ -48,8 +50,6 @@ class OnnxPersonDetector:
     Args:
         path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`.
         score_threshold: detections with a lower score are dropped, in [0, 1].
-        iou_threshold: of two boxes that overlap more than this, only the one with the higher score
-            stays, in [0, 1]. At 0.5 one person may hide half of another and both are reported.
         input_size_hw_px: (height, width) for a network that leaves its input size free; default
             the metadata's ``imgsz``, and 320 × 320 for RTMDet.
         person_class: number of the class that counts, where the metadata do not name it.
@@ -70,7 +70,6 @@ class OnnxPersonDetector:
         path: ModelSource,
         *,
         score_threshold: float = DEFAULT_SCORE_THRESHOLD,
-        iou_threshold: float = 0.5,
         input_size_hw_px: tuple[int, int] | None = None,
         person_class: int | None = None,
         family: str | None = None,
@@ -79,9 +78,6 @@ class OnnxPersonDetector:
     ) -> None:
         self._score_threshold = finite_number(
             "score_threshold", score_threshold, minimum=0.0, maximum=1.0
-        )
-        self._iou_threshold = finite_number(
-            "iou_threshold", iou_threshold, minimum=0.0, maximum=1.0
         )
         if person_class is not None and (not isinstance(person_class, int) or person_class < 0):
             raise PerceptionError(
@@ -156,7 +152,7 @@ class OnnxPersonDetector:
             corners_and_sizes.tolist(),
             scores.tolist(),
             0.0,  # boxes below the score threshold are already dropped
-            self._iou_threshold,
+            _SAME_PERSON_IOU,
             top_k=_MAX_CANDIDATES,
         )
         return np.asarray(kept, dtype=np.intp).reshape(-1)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PerceptionError
+from .._images import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
 from .._model import OnnxModel, output_shapes
-from .._pixels import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
 from ._decoders import (
     STRIDES,
     Decoder,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import FloatArray, ImageRgb
-from .._pixels import PixelFormat
+from .._images import PixelFormat
 
 _PADDING_GREY: Final = 114
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import layouts as kp
-from ..._keypoints import PersonKeypoints
 from ..._metric_scale import metric_scales
+from ..._stages import PersonKeypoints
 from ...anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M, LIMBS, NECK_TO_NOSE_UP_M
 from ...arrays import FloatArray
 

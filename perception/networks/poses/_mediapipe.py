@@ -18,11 +18,10 @@ import cv2
 import numpy as np
 
 from ... import layouts as kp
-from ..._detection import PersonDetection
-from ..._keypoints import PersonKeypoints
+from ..._stages import PersonDetection, PersonKeypoints
 from ...arrays import FloatArray, ImageRgb
-from .._image import rgb_image
-from ._mediapipe_solutions import MediaPipeEstimator, without_protobuf_warnings
+from .._images import rgb_image
+from ._mediapipe_solutions import CONFIDENCE, MediaPipeEstimator, without_protobuf_warnings
 
 # MediaPipe's landmark of each COCO keypoint.
 _LANDMARKS: Final = (0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28)
@@ -52,22 +51,17 @@ class MediaPipePoseEstimator(MediaPipeEstimator):
 
     An estimator serves one thread. Close it, or use it in a ``with`` block, to release its memory.
 
-    Args:
-        min_detection_confidence: smallest confidence of a person in the box and of a face in the
-            head's square, in [0, 1].
-
     Raises:
-        PerceptionError: if MediaPipe is not installed (the message names the extra), and for an
-            invalid value.
+        PerceptionError: if MediaPipe is not installed; the message names the extra.
     """
 
-    def _made(self, face_mesh: Any, pose: Any, confidence: float) -> tuple[Any, ...]:
+    def _made(self, face_mesh: Any, pose: Any) -> tuple[Any, ...]:
         # The package contains the network of complexity 1 only; others would be downloaded.
         self._pose = pose.Pose(
-            static_image_mode=True, model_complexity=1, min_detection_confidence=confidence
+            static_image_mode=True, model_complexity=1, min_detection_confidence=CONFIDENCE
         )
         self._mesh = face_mesh.FaceMesh(
-            static_image_mode=True, max_num_faces=1, min_detection_confidence=confidence
+            static_image_mode=True, max_num_faces=1, min_detection_confidence=CONFIDENCE
         )
         return self._pose, self._mesh
 

@@ -9,11 +9,13 @@ import warnings
 from abc import abstractmethod
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
-from ...arrays import finite_number
 from ...errors import PerceptionError
 from ...installation import install_command
+
+#: Smallest confidence of a person in a box, and of a face in a square about a head.
+CONFIDENCE: Final = 0.4
 
 _E = TypeVar("_E", bound="MediaPipeEstimator")
 
@@ -23,24 +25,17 @@ class MediaPipeEstimator(AbstractContextManager[Any]):
 
     A class makes its solutions in ``_made``. An estimator serves one thread.
 
-    Args:
-        min_detection_confidence: smallest confidence of what is found, in [0, 1].
-
     Raises:
-        PerceptionError: if MediaPipe is not installed (the message names the extra), and for an
-            invalid value.
+        PerceptionError: if MediaPipe is not installed; the message names the extra.
     """
 
-    def __init__(self, min_detection_confidence: float = 0.4) -> None:
-        confidence = finite_number(
-            "min_detection_confidence", min_detection_confidence, minimum=0.0, maximum=1.0
-        )
+    def __init__(self) -> None:
         face_mesh, pose = mediapipe_solutions(type(self).__name__)
         with without_protobuf_warnings():
-            self._solutions = self._made(face_mesh, pose, confidence)
+            self._solutions = self._made(face_mesh, pose)
 
     @abstractmethod
-    def _made(self, face_mesh: Any, pose: Any, confidence: float) -> tuple[Any, ...]:
+    def _made(self, face_mesh: Any, pose: Any) -> tuple[Any, ...]:
         """Return the solutions, from MediaPipe's modules ``face_mesh`` and ``pose``."""
 
     def __enter__(self: _E) -> _E:
