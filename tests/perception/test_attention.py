@@ -90,10 +90,6 @@ def test_the_highest_score_of_several_points_of_the_robot_counts():
     assert cone.score([0, 0, 0], [0, 0, 1], parts) == 0.0
 
 
-def test_a_target_at_the_apex_has_score_0():
-    assert AttentionCone().score([1, 2, 3], [1, 0, 0], [1, 2, 3]) == 0.0
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

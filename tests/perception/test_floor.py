@@ -64,13 +64,6 @@ def test_the_standard_deviation_agrees_with_random_errors():
     assert std[0] == pytest.approx(drawn.std(), rel=0.1)
 
 
-@given(nearer=st.floats(0.1, 0.6), farther=st.floats(0.03, 0.09))
-def test_the_depth_of_farther_feet_is_less_certain(nearer, farther):
-    floor = FloorPlane(np.array([0.0, -1.0, 0.0]), 1.2)
-    _, std = floor.depth_of(np.array([[0.0, nearer], [0.0, farther]]), 0.0, 0.02, 0.003)
-    assert std[0] < std[1]
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [

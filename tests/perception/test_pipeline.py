@@ -19,7 +19,6 @@ from perception import (
     PersonObservation,
 )
 from perception.eyes import EyeGaze
-from perception.networks import NETWORK_TIME
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 FRAME = np.zeros((960, 1280, 3), np.uint8)
@@ -111,10 +110,6 @@ def test_a_person_who_looks_at_any_point_of_the_robot_is_aware():
     assert two_points.awareness > 0.95
 
 
-def test_no_people_give_an_empty_result():
-    assert pipeline(KnownPeople([])).process(FRAME, 0.0) == ()
-
-
 @pytest.mark.parametrize(
     ("image", "message"),
     [
@@ -130,11 +125,6 @@ def test_unusable_images_are_refused(image, message):
         pipeline(KnownPeople([])).process(image, 0.0)
 
 
-def test_a_stamp_that_is_not_finite_is_refused():
-    with pytest.raises(PerceptionError, match="stamp_s"):
-        pipeline(KnownPeople([])).process(FRAME, math.nan)
-
-
 def test_invalid_arguments_are_refused_by_name():
     for change, name in [
         ({"robot_points_camera_m": np.empty((0, 3))}, "robot_points_camera_m"),
@@ -148,11 +138,8 @@ def test_invalid_arguments_are_refused_by_name():
             pipeline(KnownPeople([]), **change)
     with pytest.raises(PerceptionError, match="floor must be a FloorPlane"):
         pipeline(KnownPeople([])).process(FRAME, 0.0, floor="z = 0")
-
-
-def test_the_shipped_networks_are_the_default():
-    seen = AwarenessPipeline(CAMERA).process(FRAME, 0.0)
-    assert all(person.awareness is None or person.awareness_std is not None for person in seen)
+    with pytest.raises(PerceptionError, match="stamp_s"):
+        pipeline(KnownPeople([])).process(FRAME, math.nan)
 
 
 def test_the_back_of_a_head_is_unaware_with_certainty():
@@ -222,39 +209,6 @@ def test_a_floor_improves_the_range_and_may_be_given_per_frame():
             ]
         )
     assert all(with_floor < 0.6 * without_floor for without_floor, with_floor in errors)
-
-
-def test_timings_are_those_of_the_last_frame_and_add_up():
-    person = person_at((0.0, 0.4, 3.0))
-    known = KnownPeople([person])
-    tested = pipeline(known)
-    assert tested.last_timings.total_s == 0.0
-    tested.process(FRAME, 0.0)
-    timings = tested.last_timings
-    parts = (timings.detector_s, timings.pose_s, timings.head_pose_s, timings.rest_s)
-    assert min(parts) > 0.0
-    assert timings.total_s == pytest.approx(sum(parts))
-    known.people = []
-    tested.process(FRAME, 0.1)
-    assert tested.last_timings.head_pose_s == 0.0
-
-
-def test_timings_separate_the_runs_of_networks_from_the_rest():
-    class SlowDetector(KnownPeople):
-        def detect(self, image_rgb):
-            NETWORK_TIME.elapsed_s += 0.015  # as after a run of a network that took that long
-            return super().detect(image_rgb)
-
-    person = person_at((0.0, 0.4, 3.0))
-    known = SlowDetector([person])
-    tested = pipeline(known)
-    assert tested.last_timings.networks_s == 0.0
-    for people in ([person], [person], []):  # the time of each frame, not the sum
-        known.people = people
-        tested.process(FRAME, 0.0)
-        timings = tested.last_timings
-        assert timings.networks_s == pytest.approx(0.015)
-        assert timings.outside_s == pytest.approx(timings.total_s - 0.015)
 
 
 def test_an_estimator_with_too_few_results_is_named():

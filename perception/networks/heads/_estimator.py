@@ -49,8 +49,6 @@ _MAX_ROTATION_COVARIANCE: Final = _MAX_ROTATION_STD_RAD**2 * _IDENTITY
 # logarithm of its distance, which then comes from the body's scale.
 _CENTRE_STD_M: Final = 0.04
 _BODY_LOG_STD: Final = 0.12
-# A crop is cut at most so often; one that is centred is not cut again.
-_PASSES: Final = 2
 # A crop with a lower probability of a head gives no pose.
 _MIN_HEAD: Final = 0.5
 
@@ -78,6 +76,9 @@ class OnnxHeadPoseEstimator:
         PerceptionError: for a file that cannot be loaded, an unknown layout (the message says what
             was found and what is known), and an invalid value.
     """
+
+    # A crop is cut at most so often; one that is centred is not cut again.
+    _passes = 2
 
     def __init__(
         self,
@@ -155,7 +156,7 @@ class OnnxHeadPoseEstimator:
         pictures = [crops.cut(image, row, size) for row in range(len(crops.side_px))]
         rows = self._run(pictures)
         scatter = np.zeros((len(rows), 3, 3))
-        for _ in range(_PASSES - 1 if self.layout.is_awarenav else 0):
+        for _ in range(self._passes - 1 if self.layout.is_awarenav else 0):
             centre, side_m, head = read_placement(rows)
             larger = side_m / self.layout.crop_side_m
             off = np.abs(centre - 0.5).max(axis=1) > _MAX_OFFSET

@@ -100,7 +100,6 @@ def test_exclusions_are_those_that_are_known():
             for name in ("bridge", "doctor", "estimate")
             for option in ("--detector", "--pose", "--head", "--eyes")
         ),
-        *((name, "--frame-budget-s", "--detect-every-s") for name in ("bridge", "estimate")),
         ("replay", "--view", "--no-video"),
         ("tracks", "--ids", "--config"),
         ("tracks", "--smooth", "--ids"),

@@ -122,7 +122,7 @@ def test_colours_count_by_their_mean(tmp_path: Path) -> None:
     np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.85])
 
 
-@settings(max_examples=40)
+@settings(max_examples=15, deadline=None)
 @given(
     st.integers(0, 10_000),
     st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-3.1, 3.1)),
@@ -253,7 +253,7 @@ def test_a_damaged_image_is_refused(image: bytes, text: str, tmp_path: Path) -> 
         StaticMap.from_yaml(written(tmp_path, image))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.binary(max_size=40), st.integers(0, 60), st.sampled_from([".pgm", ".png", ".bmp"]))
 def test_damage_to_an_image_never_crashes(
     tmp_path_factory, noise: bytes, at: int, kind: str

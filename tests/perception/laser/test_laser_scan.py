@@ -39,9 +39,8 @@ def pose(x: float, y: float, yaw: float) -> np.ndarray:
 def test_special_ranges_mean_what_rep_117_says() -> None:
     scan = scan_of([np.nan, np.inf, -np.inf, 0.05, 0.1, 10.0, 10.01, 3.0])
     assert scan.measured.tolist() == [False] * 4 + [True, True, False, True]
-    assert scan.too_near.tolist() == [False, False, True] + [False] * 5
     # Free as far as the range, to the limit without a return, unknown for the rest.
-    assert scan.free_m.tolist() == [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0]
+    assert scan.free_of(scan.measured).tolist() == [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0]
 
 
 @pytest.mark.parametrize(

@@ -70,12 +70,6 @@ def test_a_side_that_is_not_positive_is_refused(side):
         head_crop(np.zeros((9, 9, 3), np.uint8), (4.0, 4.0), side)
 
 
-def test_an_image_of_one_pixel_can_be_cropped():
-    crop = head_crop(np.full((1, 1, 3), 7, np.uint8), (0.0, 0.0), 1.0, 8)
-    assert crop.shape == (8, 8, 3)
-    assert (crop[4, 4] < 114).all()
-
-
 def test_points_of_a_crop_are_mapped_to_the_image():
     corner = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0)
     np.testing.assert_allclose(corner, [6.0, 16.0])

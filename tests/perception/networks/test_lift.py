@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from perception import Camera, PersonKeypoints
 from perception.anthropometry import LIMBS
-from perception.body import place_body
+from perception.body import place_bodies
 from perception.networks.poses import lift_keypoints, metres_per_pixel
 
 FOCAL_PX = 500.0
@@ -97,6 +97,8 @@ def test_the_pipeline_places_a_lifted_body(distance_m: float, yaw_deg: float) ->
     true = root + 0.7 * points[5:7].mean(axis=0)
     for depths, limit in ((points[None, :, 2], 0.06), (None, 0.12)):
         skeleton = lift_keypoints(pixels[None], depths, np.ones((1, 17)))[0]
-        found = place_body(camera, PersonKeypoints(pixels, skeleton, np.ones(17), "coco"), 1.0)
+        found = place_bodies(camera, [PersonKeypoints(pixels, skeleton, np.ones(17), "coco")], 1.0)[
+            0
+        ]
         assert found is not None
         assert np.linalg.norm(found.position_camera_m - true) < limit * distance_m
