@@ -15,7 +15,7 @@ import numpy as np
 from . import layouts as kp
 from ._stages import PersonKeypoints
 from .anthropometry import LIMBS, STATURE_RELATIVE_STD
-from .arrays import FloatArray
+from .arrays import FloatArray, median_of
 
 #: Keypoints scored below this count as not seen.
 DEFAULT_MIN_SCORE: Final = 0.3
@@ -125,8 +125,7 @@ def _scale(
         return None
     information = list(compress(_INFORMATION, counted))
     inverse_huber = list(compress(_INVERSE_HUBER, counted))
-    ordered, last = sorted(votes), len(votes) - 1
-    middle, total = 0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]), 0.0
+    middle, total = median_of(votes), 0.0
     for _ in range(4):
         weights = [
             part / max(1.0, abs(vote - middle) * scale)
@@ -137,7 +136,7 @@ def _scale(
     variance = 1.0 / total + STATURE_RELATIVE_STD**2 + person.scale_relative_std**2
     spread = math.sqrt(variance + (0.0 if measured else _UNSEEN_RELATIVE_STD**2))
     if not person.lifted:
-        middle = ordered[1 if len(votes) >= 3 else 0]
+        middle = sorted(votes)[1 if len(votes) >= 3 else 0]
         spread = math.hypot(spread, _FLAT_RELATIVE_STD)
     elif abs(middle) <= _METRIC_UNIT_LIMIT:
         middle *= _METRIC_UNIT_STD**2 / (_METRIC_UNIT_STD**2 + spread**2)

@@ -46,12 +46,10 @@ class _Priors:
     position_information: FloatArray
 
     @classmethod
-    def of(
-        cls, priors: Sequence[HeadPrior | None] | None, owner: NDArray[np.int64]
-    ) -> _Priors | None:
+    def of(cls, priors: Sequence[HeadPrior | None], owner: NDArray[np.int64]) -> _Priors | None:
         """Return the priors of starts that belong to the heads ``owner``; None without priors."""
-        known = [prior for prior in priors or () if prior is not None]
-        if priors is None or not known:
+        known = [prior for prior in priors if prior is not None]
+        if not known:
             return None
         rows: slice | NDArray[np.int64] = slice(None)
         if len(known) < len(priors):
@@ -165,10 +163,10 @@ def refine(
     keypoint_std_px: float,
     rotations: FloatArray,
     translations_m: FloatArray,
-    priors: Sequence[HeadPrior | None] | None,
-    seen: FloatArray | None = None,
-    owner: NDArray[np.int64] | None = None,
-    shape_factor_m: FloatArray | None = None,
+    priors: Sequence[HeadPrior | None],
+    seen: FloatArray,
+    owner: NDArray[np.int64],
+    shape_factor_m: FloatArray | None,
 ) -> list[RefinedPose]:
     """Refine B starting poses at once, of one or several heads, by Levenberg–Marquardt.
 
@@ -176,26 +174,23 @@ def refine(
     other heads.
 
     Args:
-        model_m: (N, 3) points in the head frame, or (B, N, 3) points per start.
-        rays: (N, 2) or (B, N, 2) measured x/z and y/z of the points.
+        model_m: (B, N, 3) points of each start in the head frame.
+        rays: (B, N, 2) measured x/z and y/z of the points.
         focal_px: (2,) fx and fy.
         keypoint_std_px: standard deviation of the pixel noise.
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
-        priors: prior of each head, or None for a head without one; None for no priors at all.
-        seen: (B, N) 1 for points that count, 0 for others; default all count.
-        owner: (B,) head of each start, with the starts of a head in consecutive rows; default one
-            head.
+        priors: prior of each head, or None for a head without one.
+        seen: (B, N) 1 for points that count, 0 for others.
+        owner: (B,) head of each start, with the starts of a head in consecutive rows.
         shape_factor_m: (N, 3, M) factor F of the covariance F Fᵀ of the points (flattened to 3 N)
             over heads, in the head frame; None for points that are known exactly.
 
     Returns:
         One local optimum per start, in the same order.
     """
-    weight = focal_px / keypoint_std_px
-    weight = weight[None, None] if seen is None else seen[..., None] * weight
+    weight = seen[..., None] * (focal_px / keypoint_std_px)
     count = len(rotations)
-    owner = np.zeros(count, dtype=np.int64) if owner is None else owner
     prior = _Priors.of(priors, owner)
     problem = _Problem(model_m, rays, weight, prior, owner)
     rotation, translation, state = _descend(problem, rotations, translations_m, None, _ITERATIONS)
@@ -224,7 +219,7 @@ def refine(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Problem:
-    """The measurements of B starts; arrays as in :func:`refine`, ``weight_px`` (B or 1, N, 2)."""
+    """The measurements of B starts; arrays as in :func:`refine`, ``weight_px`` (B, N, 2)."""
 
     model: FloatArray
     rays: FloatArray

@@ -7,7 +7,7 @@ what is valid, and the unit. A caller passes the error class of its own package.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from operator import mul
 from typing import Any, TypeVar
 
@@ -224,6 +224,13 @@ def pixel_count(name: str, value: Any) -> int:
     if number != int(number):
         raise PerceptionError(f"{name} must be a whole number of pixels, got {number:g}")
     return int(number)
+
+
+def median_of(values: Iterable[float]) -> float:
+    """Return the median of a few numbers, at least one; ``np.median`` takes ten times as long."""
+    ordered = sorted(values)
+    last = len(ordered) - 1
+    return 0.5 * (ordered[last // 2] + ordered[(last + 1) // 2])
 
 
 def given(check: Callable[..., _T], name: str, value: Any, *args: Any, **bounds: Any) -> _T | None:

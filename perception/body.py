@@ -16,7 +16,7 @@ from ._camera import Camera
 from ._metric_scale import DEFAULT_MIN_SCORE, metric_scales
 from ._stages import PersonKeypoints
 from .anthropometry import LIMBS, MEAN_STATURE_M, STATURE_RELATIVE_STD
-from .arrays import FloatArray
+from .arrays import FloatArray, median_of
 
 _TORSO_M: Final = LIMBS[0].length_m
 #: Distance of the chest below the shoulders, as a fraction of the torso.
@@ -223,12 +223,8 @@ def _has_changed(values: FloatArray, previous: FloatArray) -> bool:
 
 def _masked_median(values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
     """Return (P,) medians of the seen values of each row; 0 for a row without seen values."""
-    medians = []
-    for row, counts in zip(values.tolist(), seen.tolist(), strict=True):
-        ordered = sorted(compress(row, counts))
-        last = len(ordered) - 1
-        medians.append(0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]) if ordered else 0.0)
-    return np.array(medians)
+    rows = zip(values.tolist(), seen.tolist(), strict=True)
+    return np.array([median_of(compress(*row)) if any(row[1]) else 0.0 for row in rows])
 
 
 def _trunks(

@@ -18,6 +18,7 @@ from ._camera import Camera
 from ._stages import HeadPose
 from .arrays import FloatArray, ImageRgb, covariance_matrix, finite_array, set_fields
 from .errors import PerceptionError
+from .matrices import mahalanobis2
 
 #: Distance of the iris ahead of the eye's centre of rotation. The centre lies 13.5 mm behind the
 #: front of the cornea (Fry and Hill 1962), the iris 3.6 mm.
@@ -172,7 +173,7 @@ def fuse_with_prior(eyes: EyeGaze, eye_in_head_std_rad: tuple[float, float]) -> 
     """
     prior = np.diag(np.square(eye_in_head_std_rad))
     both = prior + eyes.covariance_rad2
-    if float(eyes.angles_rad @ np.linalg.solve(both, eyes.angles_rad)) > _LIMIT_CHI2:
+    if mahalanobis2(eyes.angles_rad, both) > _LIMIT_CHI2:
         return None
     gain = prior @ np.linalg.inv(both)
     keep = np.eye(2) - gain

@@ -15,7 +15,7 @@ from . import layouts as kp
 from ._boxes import extent, iou
 from ._camera import Camera
 from ._stages import PersonDetection, PersonKeypoints
-from .arrays import FloatArray
+from .arrays import FloatArray, median_of
 from .evidence import AwarenessReason
 
 #: The reasons that this module gives; the last one is about the head alone.
@@ -229,7 +229,7 @@ def _apart(points: FloatArray, seen: Seen, row: int, other: int) -> float:
     for each in (row, other):
         shown = points[each][seen[each]]
         extents.append((shown.max(axis=0) - shown.min(axis=0)).tolist())
-    return _median(away) / max(min(math.sqrt(w * h) for w, h in extents), 1e-9)
+    return median_of(away.tolist()) / max(min(math.sqrt(w * h) for w, h in extents), 1e-9)
 
 
 def _have_one_head(
@@ -241,11 +241,4 @@ def _have_one_head(
     if np.count_nonzero(common) < _FEWEST_OF_HEAD or not both:
         return False
     apart = (rays[row, kp.HEAD] - rays[other, kp.HEAD])[common]
-    return _median(np.sqrt((apart * apart).sum(axis=1))) < _SAME_HEAD_M * max(both)
-
-
-def _median(values: FloatArray) -> float:
-    """Return the median of a few values; ``np.median`` takes ten times as long."""
-    ordered = sorted(values.tolist())
-    last = len(ordered) - 1
-    return float(0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]))
+    return median_of(np.sqrt((apart * apart).sum(axis=1)).tolist()) < _SAME_HEAD_M * max(both)

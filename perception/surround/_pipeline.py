@@ -16,6 +16,7 @@ from .._observation import PersonObservation
 from .._pipeline import AwarenessPipeline
 from ..arrays import ImageRgb
 from ..errors import PerceptionError
+from ..matrices import mahalanobis2
 from ._lenses import PanoramaLens, WideLens
 from ._views import FlatView
 
@@ -102,7 +103,7 @@ def _distance_if_same_m(first: PersonObservation, second: PersonObservation) -> 
         return None
     both = first.position_covariance_m2 + second.position_covariance_m2
     spread = both[np.ix_([0, 2], [0, 2])] + _CUT_OFF_STD_M**2 * np.eye(2)
-    chi2 = float(difference @ np.linalg.solve(spread, difference))
+    chi2 = float(mahalanobis2(difference, spread))
     return distance_m if chi2 <= _SAME_CHI2 else None
 
 

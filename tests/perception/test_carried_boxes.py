@@ -240,12 +240,6 @@ def test_after_a_failure_the_detector_looks():
     assert len(world.looks) == count + 1
 
 
-@pytest.mark.parametrize("every_s", [-0.01, 0.21, math.nan, "often"])
-def test_an_interval_beyond_its_limits_is_refused(every_s):
-    with pytest.raises(PerceptionError, match="detect_every_s"):
-        pipeline(World(stander), every_s)
-
-
 def changed(image, boxes=(), reference=None):
     changes = SceneChanges()
     changes.refer_to(np.repeat(HALL, 3, axis=2) if reference is None else reference)

@@ -17,7 +17,6 @@ from perception import (
 )
 from perception.confirmation import KeypointConfirmation
 from perception.ownership import FoundPerson
-from perception.shipped import shipped_detector, shipped_pose_estimator
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 FRAME = np.zeros((480, 640, 3), np.uint8)
@@ -252,12 +251,3 @@ def test_a_carried_box_is_not_judged_again():
     scores = [pipe.process(FRAME, 0.05 * step)[0].score for step in range(8)]
     assert world.looks < 8
     assert scores == pytest.approx([scores[0]] * 8)
-
-
-def test_the_shipped_detector_is_confirmed_by_the_shipped_pose_network_only():
-    whole = AwarenessPipeline(CAMERA)
-    assert whole._people._confirmation == RULE
-    own_pose = AwarenessPipeline(CAMERA, pose_estimator=shipped_pose_estimator())
-    assert own_pose._people._confirmation is None
-    own_detector = AwarenessPipeline(CAMERA, shipped_detector())
-    assert own_detector._people._confirmation is None

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, Camera, HeadPose, PerceptionError
+from perception import AttentionCone, Camera, HeadPose
 from perception.anthropometry import EYES_HEAD_M
 from perception.awareness import estimate_awareness
 from perception.eyes import (
@@ -24,7 +24,6 @@ from perception.eyes import (
     known_eyes,
 )
 from perception.networks.heads import looking_at
-from perception.networks.poses import iris_std_m
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 CONE = AttentionCone()
@@ -114,25 +113,6 @@ def test_the_covariance_is_that_of_repeated_measurements(head_yaw):
     ratio = np.linalg.eigvals(np.linalg.solve(spread_found, found.covariance_rad2)).real
     assert ratio.min() > 0.7
     assert ratio.max() < 1.45
-
-
-def test_the_farther_a_face_the_less_its_eyes_say():
-    before = (0.0, 0.0)
-    for distance in (0.7, 1.0, 1.5, 2.0, 2.5, 4.0, 8.0):
-        head = head_at(eyes_at=(0.0, 0.0, distance))
-        axes = ray_axes_of(head)
-        std = iris_std_m(CAMERA.fx_px / distance)
-        offset = synthetic_offset(head, axes, 0.15, 0.0)
-        found = eyes_from_irises(offset, axes, head, iris_std_m=std)
-        fused = fuse_with_prior(found, PRIOR)
-        measured = math.sqrt(found.covariance_rad2[0, 0])
-        left = math.sqrt(fused.covariance_rad2[0, 0])
-        assert measured > before[0]
-        assert before[1] < left < PRIOR[0]
-        before = measured, left
-    # At 8 m the prior stands, within a tenth.
-    assert left > 0.9 * PRIOR[0]
-    assert abs(fused.angles_rad[0]) < 0.2 * 0.15
 
 
 @given(
@@ -237,28 +217,3 @@ def test_awareness_is_the_mean_over_head_and_eyes():
     scores = CONE.score(np.tile([0.0, 0.0, 1.5], (count, 1)), gazes, np.zeros((count, 3)))
     assert alpha <= np.mean(scores) + 0.005
     assert std == pytest.approx(np.sqrt(np.mean((scores - alpha) ** 2)), rel=0.08)
-
-
-# --- refusals -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("angles", "covariance", "message"),
-    [
-        ([0.0], np.eye(2), "angles_rad"),
-        ([0.0, np.nan], np.eye(2), "angles_rad"),
-        ([2.0, 0.0], np.eye(2), "within ±π/2"),
-        ([0.0, 0.0], -np.eye(2), "covariance_rad2"),
-        ([0.0, 0.0], np.eye(3), "covariance_rad2"),
-    ],
-)
-def test_invalid_eyes_are_refused(angles, covariance, message):
-    with pytest.raises(PerceptionError, match=message):
-        EyeGaze(angles, covariance)
-
-
-def test_invalid_irises_are_refused():
-    head = head_at()
-    for offset, std in (([np.nan, 0.0], (1e-3, 1e-3)), ([0.0, 0.0], (0.0, 1e-3))):
-        with pytest.raises(PerceptionError, match=r"offset_m|iris_std_m"):
-            eyes_from_irises(offset, np.eye(3), head, iris_std_m=std)

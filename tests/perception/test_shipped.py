@@ -22,7 +22,6 @@ from perception.shipped import (
     HEAD,
     LEGS,
     POSE,
-    ShippedModel,
     detector_input_size,
     load_shipped,
     shipped_model_path,
@@ -162,31 +161,3 @@ def test_an_invalid_manifest_is_refused(tmp_path, text):
 def test_a_missing_manifest_is_refused(tmp_path):
     with pytest.raises(PerceptionError, match=r"cannot be read.*pip install"):
         shipped_models(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"name": "../up"}, "name must match"),
-        ({"name": ""}, "needs all of its texts"),
-        ({"licence": None}, "needs all of its texts"),
-        ({"sha256": "abc"}, "64 lower-case hexadecimal"),
-        ({"sha256": "G" * 64}, "64 lower-case hexadecimal"),
-        ({"size_bytes": 0}, "size_bytes must be"),
-        ({"size_bytes": "7"}, "size_bytes must be"),
-        ({"training_domain": "dreams"}, "training_domain must be one of 'renders'"),
-    ],
-)
-def test_entries_with_invalid_fields_are_refused(change, message):
-    good = {
-        "name": "thing",
-        "sha256": "0" * 64,
-        "size_bytes": 7,
-        "licence": "Apache-2.0",
-        "input": "1×3×8×8",
-        "summary": "Does.",
-        "training_domain": "renders",
-    }
-    ShippedModel(**good)
-    with pytest.raises(PerceptionError, match=message):
-        ShippedModel(**(good | change))

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import Camera, PerceptionError
+from perception import Camera
 from perception.body import place_boxes
 from tracking import CameraView
 
@@ -100,8 +100,3 @@ def test_somebody_beyond_the_end_is_still_placed_and_tracked() -> None:
     seen = CameraView(BARREL).visibility([[3.0, 0.0], [3.0, 2.0], [1.0, 3.0]], level)
     assert (seen[:2] > 0.0).all()
     assert seen[2] == 0.0
-
-
-def test_pixels_that_are_not_finite_are_refused() -> None:
-    with pytest.raises(PerceptionError, match="pixels_px must be finite"):
-        BARREL.normalise([[math.nan, 1.0]])

@@ -118,7 +118,7 @@ class OnnxPersonDetector:
             outputs = run_on_images(self.model, blob)
             # Non-finite numbers are dropped below; they need no warning here.
             with np.errstate(all="ignore"):
-                boxes, scores = self._layout.decoder.decode(outputs, self._score_threshold)
+                boxes, scores = self._layout.decoder(outputs, self._score_threshold)
                 sizes = boxes[:, 2:] - boxes[:, :2]
                 # One sum shows that all numbers are finite, but for those too large to add.
                 finite = math.isfinite(float(boxes.sum()) + float(scores.sum()))

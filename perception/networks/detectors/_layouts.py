@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -16,12 +17,12 @@ from .._model import OnnxModel, output_shapes
 from ._decoders import (
     STRIDES,
     Decoder,
-    DetsDecoder,
-    RowsDecoder,
-    YoloV8Decoder,
-    YoloxDecoder,
     cell_count,
     cells,
+    decode_dets,
+    decode_rows,
+    decode_yolov8,
+    decode_yolox,
 )
 
 _KNOWN: Final = (
@@ -175,11 +176,13 @@ def _are_boxes(trial: TrialRun) -> bool:
 
 def _yolov8(trial: TrialRun, classes: int) -> DetectorLayout:
     person = _person_class(trial, classes)
-    return DetectorLayout("YOLOv8", _pixels(trial, _ULTRALYTICS), True, YoloV8Decoder(person))
+    return DetectorLayout(
+        "YOLOv8", _pixels(trial, _ULTRALYTICS), True, partial(decode_yolov8, person_class=person)
+    )
 
 
 def _rows(trial: TrialRun) -> DetectorLayout:
-    decoder = RowsDecoder(_person_class(trial, None))
+    decoder = partial(decode_rows, person_class=_person_class(trial, None))
     family = trial.family or family_of(trial.model)
     if family is None:
         if not any(key in trial.model.metadata for key in _ULTRALYTICS_KEYS):
@@ -201,7 +204,7 @@ def _yolox(trial: TrialRun, classes: int) -> DetectorLayout:
             "it looks like YOLOX with boxes decoded in the network; export it with "
             "decode_in_inference=False"
         )
-    decoder = YoloxDecoder(_person_class(trial, classes), *size)
+    decoder = partial(decode_yolox, person_class=_person_class(trial, classes), grid=cells(*size))
     return DetectorLayout("YOLOX raw", _pixels(trial, _YOLOX), False, decoder)
 
 
@@ -229,7 +232,9 @@ def _dets(trial: TrialRun) -> DetectorLayout:
                     "is; say it with family='rtmdet' or family='yolox' (--detector rtmdet:FILE "
                     "or yolox:FILE on the command line)"
                 )
-            decoder = DetsDecoder(_person_class(trial, None), dets, labels)
+            decoder = partial(
+                decode_dets, person_class=_person_class(trial, None), dets=dets, labels=labels
+            )
             pixels = _pixels(trial, _FAMILIES[family])
             return DetectorLayout(_WITH_DETS[family], pixels, False, decoder)
     raise trial.refusal("of the known detectors only RTMDet and YOLOX with NMS have two outputs")

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of, pose, two_legs
 
-from perception import PerceptionError
 from perception.laser import (
     LaserScan,
     LegDetector,
@@ -222,18 +221,3 @@ def test_the_order_of_the_scanners_does_not_matter(order, gap) -> None:
     home = merge_candidates(groups)
     mixed = merge_candidates([groups[k] for k in order])
     np.testing.assert_allclose(places(mixed), places(home), atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: candidate(0.0, 0.0, kind="ghost"), "kind must be one of two_legs"),
-        (lambda: candidate(0.0, math.nan), "finite"),
-        (lambda: candidate(0.0, 0.0, score=1.5), "score"),
-        (lambda: LegDetectorConfig(score_threshold=2.0), "score_threshold"),
-        (lambda: LegDetector(static_map=np.zeros((3, 3))), "must be a StaticMap, got ndarray"),
-    ],
-)
-def test_bad_input_is_refused(make, message) -> None:
-    with pytest.raises(PerceptionError, match=message):
-        make()

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of
 
-from perception import PerceptionError
 from perception.laser import OccupancyMemory, StaticMap
 
 POST = (2.0, 0.5, 0.08)
@@ -112,18 +110,3 @@ def test_a_map_holds_what_lies_within_its_margin(seed, margin, side) -> None:
 def test_a_map_keeps_nothing_of_points_that_are_nowhere() -> None:
     held = StaticMap(np.ones((3, 3), dtype=bool), (0.0, 0.0), 1.0)
     assert not held.holds(np.array([[np.nan, 0.5], [np.inf, 0.5]])).any()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ((np.zeros(3, dtype=bool), (0.0, 0.0), 0.1), r"shape \(H, W\)"),
-        ((np.zeros((0, 3), dtype=bool), (0.0, 0.0), 0.1), r"shape \(H, W\)"),
-        ((np.zeros((3, 3), dtype=bool), (0.0, 0.0), 0.0), "resolution_m"),
-        ((np.zeros((3, 3), dtype=bool), (0.0, 0.0), 0.1, -1.0), "margin_m"),
-        ((np.zeros((3, 3), dtype=bool), (0.0, np.nan), 0.1), "origin_odom_m"),
-    ],
-)
-def test_maps_that_are_none_are_refused(arguments, message) -> None:
-    with pytest.raises(PerceptionError, match=message):
-        StaticMap(*arguments)

@@ -18,8 +18,8 @@ from onnx_graphs import (
     fixed,
 )
 
-from perception import PerceptionError, PersonDetector
-from perception.networks import OnnxModel, OnnxPersonDetector
+from perception import PersonDetector
+from perception.networks import OnnxPersonDetector
 from perception.networks.detectors import LetterboxGeometry
 
 HEIGHT, WIDTH = 256, 320
@@ -226,24 +226,3 @@ def test_several_threads_may_share_a_detector() -> None:
     for thread in threads:
         thread.join()
     assert not wrong
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"score_threshold": 1.5}, r"score_threshold must lie in \[0, 1\], got 1.5"),
-        ({"person_class": -1}, "person_class must be a whole number"),
-        ({"person_class": 3}, r"person_class must lie in \[0, 0\]"),
-        (
-            {"family": "yolo"},
-            "family must be one of 'rtmdet', 'yolox', 'ultralytics' or None, got 'yolo'",
-        ),
-        ({"input_size_hw_px": (320, 320)}, "takes an input of 256 x 320"),
-        ({"input_size_hw_px": 320}, "two whole numbers"),
-        ({"input_size_hw_px": (0, 320)}, "two whole numbers"),
-    ],
-)
-def test_invalid_arguments_are_refused(options: dict[str, object], words: str) -> None:
-    model = OnnxModel(colour_yolov8(HEIGHT, WIDTH))
-    with pytest.raises(PerceptionError, match=words):
-        OnnxPersonDetector(model, **options)  # type: ignore[arg-type]

@@ -68,14 +68,6 @@ def test_scaling_is_bilinear_between_pixel_centres(
     np.testing.assert_allclose(found, wanted.transpose(2, 1, 0), atol=1.5)
 
 
-def test_an_image_of_the_inputs_size_is_not_scaled() -> None:
-    image = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
-    pixels = PixelFormat(**IMAGENET)
-    blob, _ = Letterbox(48, 64, pixels, centred=True).fill(image)
-    wanted = (image - np.array(pixels.mean_rgb)) / np.array(pixels.std_rgb)
-    np.testing.assert_array_equal(blob[0], wanted.transpose(2, 0, 1).astype(np.float32))
-
-
 @pytest.mark.parametrize("centred", [True, False])
 def test_padding_is_grey_also_after_an_image_of_another_shape(centred: bool) -> None:
     letterbox = Letterbox(64, 64, PixelFormat(), centred=centred)

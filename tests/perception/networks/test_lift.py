@@ -72,20 +72,6 @@ def test_unseen_limbs_vote_only_if_no_limb_is_seen() -> None:
     assert guessed[0] == pytest.approx(FAR_M / FOCAL_PX)
 
 
-def test_the_scale_of_a_body_without_extent_is_0() -> None:
-    same = np.full((2, 17, 2), 7.0)
-    for depths in (None, np.zeros((2, 17))):
-        np.testing.assert_array_equal(metres_per_pixel(same, depths, np.ones((2, 17))), 0.0)
-        np.testing.assert_array_equal(lift_keypoints(same, depths, np.ones((2, 17))), 0.0)
-
-
-def test_the_scale_of_a_person_does_not_depend_on_others() -> None:
-    points = np.stack([body(0.3), body(1.2)])
-    pixels = points[..., :2] * np.array([2.0, 5.0])[:, None, None]
-    scale = metres_per_pixel(pixels, points[..., 2], np.ones((2, 17)))
-    np.testing.assert_allclose(scale, [1 / 2.0, 1 / 5.0])
-
-
 @pytest.mark.parametrize("yaw_deg", [0, 45, 110])
 @pytest.mark.parametrize("distance_m", [2.0, 4.0])
 def test_the_pipeline_places_a_lifted_body(distance_m: float, yaw_deg: float) -> None:

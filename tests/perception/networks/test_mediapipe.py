@@ -197,15 +197,3 @@ def test_the_skeleton_has_camera_axes(estimator, photographs):
     body = slice(5, 17)
     assert np.corrcoef(root[body, 0], pixels[body, 0])[0, 1] > 0.8  # x right
     assert root[NOSE, 2] < root[[3, 4], 2].mean()  # z away: the person faces the camera
-
-
-@needs_mediapipe
-@needs_images
-def test_the_result_of_a_person_does_not_depend_on_others(estimator, photographs):
-    image = photographs[-1][0]
-    boxes = tuple(detection(person) for other, person in photographs if other is image)
-    together = estimator.estimate(image, boxes)
-    for box, person in zip(boxes[::-1], together[::-1], strict=True):
-        (alone,) = estimator.estimate(image, (box,))
-        assert np.array_equal(alone.keypoints_px, person.keypoints_px)
-        assert np.array_equal(alone.scores, person.scores)
