@@ -11,7 +11,6 @@ import numpy as np
 
 from ._camera import Camera
 from ._floor import FloorPlane
-from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import PersonObservation
 from ._people_finder import PeopleFinder, check_count
 from ._placement import PersonPlace, place_people
@@ -27,13 +26,13 @@ from ._stages import (
 from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
 from .awareness import AttentionCone, AwarenessEstimate, estimate_awareness
-from .confirmation import KeypointConfirmation
+from .body import DEFAULT_MIN_SCORE
+from .confirmation import FoundPerson, KeypointConfirmation
 from .depth_image import checked_depth
 from .errors import PerceptionError
 from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import OnnxSettings
-from .ownership import FoundPerson
 from .shipped import shipped_detector, shipped_head_pose_estimator, shipped_pose_estimator
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))

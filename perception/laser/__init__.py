@@ -28,8 +28,7 @@ from ._hypotheses import (
 )
 from ._memory import OccupancyMemory
 from ._points import RobotMotion, ScanPoints, scan_points
-from ._scan import LaserScan
-from ._scanner import Scanner
+from ._scan import LaserScan, Scanner
 from ._sight import AHEAD_RAD, ScannerSight, SeenDirections, sight_of
 from ._static_map import MapCells, StaticMap
 

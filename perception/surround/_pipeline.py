@@ -17,8 +17,7 @@ from .._pipeline import AwarenessPipeline
 from ..arrays import ImageRgb
 from ..errors import PerceptionError
 from ..matrices import mahalanobis2
-from ._lenses import PanoramaLens, WideLens
-from ._views import FlatView
+from ._lenses import FlatView, PanoramaLens, WideLens
 
 # Two observations are of the same person up to this χ² in the plane across the camera's y axis (two
 # degrees of freedom, exceeded by chance in 0.1 % of cases), and up to this distance.

@@ -16,7 +16,7 @@ from perception import (
     PersonKeypoints,
     PnpHeadPoseEstimator,
 )
-from perception._carried_boxes import SceneChanges
+from perception._people_finder import SceneChanges
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 HALL = np.random.default_rng(3).integers(90, 130, (480, 640, 1)).astype(np.uint8)

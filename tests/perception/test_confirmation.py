@@ -15,8 +15,7 @@ from perception import (
     PersonKeypoints,
     PnpHeadPoseEstimator,
 )
-from perception.confirmation import KeypointConfirmation
-from perception.ownership import FoundPerson
+from perception.confirmation import FoundPerson, KeypointConfirmation
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 FRAME = np.zeros((480, 640, 3), np.uint8)

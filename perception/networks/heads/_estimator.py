@@ -11,17 +11,16 @@ from numpy.typing import NDArray
 
 from ..._camera import Camera
 from ..._manifest import HEAD
-from ..._metric_scale import DEFAULT_MIN_SCORE
 from ..._stages import HeadPose, PersonKeypoints
 from ...anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M
 from ...arrays import FloatArray, ImageRgb, finite_number
+from ...body import DEFAULT_MIN_SCORE
 from ...errors import PerceptionError
 from ...matrices import rotation_log, skew
 from .._images import rgb_image, run_on_images
 from .._model import ModelSource, OnnxModel, as_onnx_model
 from .._settings import OnnxSettings
-from ._blur import uncertainty_factors
-from ._crops import HeadCrops
+from ._crops import HeadCrops, uncertainty_factors
 from ._locate import locate_heads
 from ._outputs import (
     HeadOutputs,

@@ -20,7 +20,7 @@ from ...arrays import FloatArray, ImageRgb
 from ...eyes import EyeGaze, eyes_from_irises
 from .._images import rgb_image
 from ..heads import head_crop, looking_at, ray_focal_px
-from ._mediapipe_solutions import CONFIDENCE, MediaPipeEstimator, without_protobuf_warnings
+from ._mediapipe import CONFIDENCE, MediaPipeEstimator, without_protobuf_warnings
 
 # Landmarks of the left and of the right eye: iris, corners, upper and lower lid.
 _IRISES: Final = (473, 468)

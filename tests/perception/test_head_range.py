@@ -1,0 +1,122 @@
+"""The head's range and the body's share the error of an unknown stature."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+from synthetic_people import person_at
+
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    HeadPose,
+    PersonDetection,
+    PersonKeypoints,
+    PersonObservation,
+)
+from perception.anthropometry import (
+    HEAD_CENTRE_HEAD_M,
+    STATURE_RELATIVE_STD,
+    UNUSUAL_SIZE_LOG_OFFSET,
+    UNUSUAL_SIZE_LOG_STD,
+    UNUSUAL_SIZE_PROBABILITY,
+)
+from perception.body import place_bodies
+
+CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+IMAGE = np.zeros((480, 640, 3), np.uint8)
+KEYPOINT_STD_PX = 2.0
+# Adults' heads vary by 4 %, and their size follows the stature with a correlation of 0.4.
+HEAD_STATURE_STD = 0.4 * 0.04
+# Depth of the head against the chest, and how often each cue is wrong.
+HEAD_OFFSET_M, BODY_WRONG, HEAD_WRONG = 0.05, 0.03, 0.05
+
+
+class _Given:
+    """A detector, pose estimator and head pose estimator that answer what they were given."""
+
+    def __init__(self, person: PersonKeypoints, head: HeadPose | None) -> None:
+        self._person, self._head = person, head
+
+    def detect(self, image_rgb: np.ndarray) -> tuple[PersonDetection, ...]:
+        low, high = self._person.keypoints_px.min(axis=0), self._person.keypoints_px.max(axis=0)
+        return (PersonDetection(np.array([*low, *high]), 0.9),)
+
+    def estimate(self, image_rgb: np.ndarray, *given: object) -> tuple[object, ...]:
+        return (self._person,) if len(given) == 1 else (self._head,)
+
+
+def observed(person: PersonKeypoints, head: HeadPose | None) -> PersonObservation:
+    given = _Given(person, head)
+    pipeline = AwarenessPipeline(
+        CAMERA,
+        given,
+        given,
+        given,
+        keypoint_std_px=KEYPOINT_STD_PX,  # type: ignore[arg-type]
+    )
+    (observation,) = pipeline.process(IMAGE, 0.0)
+    return observation
+
+
+def range_std(observation: PersonObservation) -> float:
+    """The relative standard deviation of the range."""
+    position, covariance = observation.position_camera_m, observation.position_covariance_m2
+    return math.sqrt(position @ covariance @ position) / float(position @ position)
+
+
+def mixture_std(own: tuple[float, float], stature_stds: tuple[float, float]) -> float:
+    """Two cues that agree: generalised least squares over what is right, by matrices.
+
+    ``own`` are the variances of the cues but for the stature. The person is an adult who stands, or
+    not; and each cue is right or wrong.
+    """
+    wrong = (BODY_WRONG, HEAD_WRONG)
+    found = [(0.0, 0.5**2, 0.5**-1 * math.prod(0.5 * each for each in wrong))]
+    unusual = (UNUSUAL_SIZE_LOG_STD, UNUSUAL_SIZE_LOG_STD)
+    for usual, right in product((True, False), product((False, True), repeat=2)):
+        if not any(right):
+            continue
+        rows = [row for row in range(2) if right[row]]
+        shared = np.array([(stature_stds if usual else unusual)[row] for row in rows])
+        covariance = np.diag([own[row] for row in rows]) + np.outer(shared, shared)
+        information = float(np.linalg.inv(covariance).sum())
+        weight = math.sqrt(2.0 * math.pi / information)
+        weight /= math.sqrt(float(np.linalg.det(2.0 * math.pi * covariance)))
+        weight *= 1.0 - UNUSUAL_SIZE_PROBABILITY if usual else UNUSUAL_SIZE_PROBABILITY
+        for row in range(2):
+            weight *= 1.0 - wrong[row] if right[row] else 0.5 * wrong[row]
+        found.append((0.0 if usual else UNUSUAL_SIZE_LOG_OFFSET, 1.0 / information, weight))
+    total = sum(weight for *_, weight in found)
+    return math.sqrt(sum((off**2 + var) * weight for off, var, weight in found) / total)
+
+
+@pytest.mark.parametrize("head_std", [0.02, 0.05, 0.10])
+@pytest.mark.parametrize("range_m", [2.0, 5.0])
+def test_the_range_is_that_of_cues_that_err_together(range_m: float, head_std: float) -> None:
+    truth = person_at((0.2, 0.1, range_m), stature_m=1.74)
+    person = truth.keypoints(CAMERA, 0.0, np.random.default_rng(0))
+    alone = observed(person, None)
+    body = place_bodies(CAMERA, [person], KEYPOINT_STD_PX)[0]
+    assert body is not None
+    # A head where the body has it, so that the two agree and only their errors count.
+    rotation = truth.rotation_camera_head
+    centre = truth.points_camera_m[0] + rotation @ HEAD_CENTRE_HEAD_M
+    head_depth = float(body.keypoints_camera_m[:5, 2].mean())
+    nose = centre * head_depth / centre[2] - rotation @ HEAD_CENTRE_HEAD_M
+    head = HeadPose(nose, rotation, 1e-4 * np.eye(6), 0.0, range_relative_std=head_std)
+    both = observed(person, head)
+
+    stature_std = min(body.scale_relative_std, STATURE_RELATIVE_STD)
+    unusual = UNUSUAL_SIZE_LOG_STD**2 + UNUSUAL_SIZE_LOG_OFFSET**2
+    lasting = stature_std**2 + UNUSUAL_SIZE_PROBABILITY * (unusual - stature_std**2)
+    own = range_std(alone) ** 2 - lasting
+    measured_std = math.hypot(head_std, HEAD_OFFSET_M / head_depth)
+    head_stature_std = min(HEAD_STATURE_STD, 0.5 * measured_std)
+    expected = mixture_std(
+        (own, measured_std**2 - head_stature_std**2), (stature_std, head_stature_std)
+    )
+    assert range_std(both) == pytest.approx(expected, rel=2e-3)
