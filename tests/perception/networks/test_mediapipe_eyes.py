@@ -50,13 +50,6 @@ def landmarks(left=(0.0, 0.0), right=(0.0, 0.0), opening=0.03):
     return marks
 
 
-@pytest.mark.skipif(HAS_MEDIAPIPE, reason="mediapipe is installed")
-def test_a_missing_package_is_refused_with_the_name_of_the_extra():
-    missing = "MediaPipeEyeEstimator needs .*" + re.escape(install_command("mediapipe"))
-    with pytest.raises(PerceptionError, match=missing):
-        MediaPipeEyeEstimator()
-
-
 def test_a_broken_package_is_refused_with_the_name_of_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
