@@ -17,8 +17,8 @@ from ._meshes import (
     tube,
 )
 from ._props import PROP_PARTS, Prop
-from ._scenery import TEXTURE_NAMES, scenery, scenery_texture
-from ._texture_amr import AMR_ATLAS
+from ._scenery import scenery
+from ._textures import AMR_ATLAS, TEXTURE_NAMES, scenery_texture
 
 __all__ = [
     "AMR_ATLAS",

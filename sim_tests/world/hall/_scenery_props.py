@@ -11,7 +11,7 @@ import numpy as np
 from ._meshes import Mesh, Region, SceneryChunk, box, merge, tube
 from ._props import PROP_PARTS, Prop
 from ._scenery_goods import PALLET_M, Load, goods_box, pallets, side_cell
-from ._texture_goods import CARTONS, CRATES, GOODS_ATLAS, GOODS_SETS
+from ._textures import GOODS_ATLAS, GOODS_SETS
 
 _Maker = Callable[[np.random.Generator], Iterator[Mesh]]
 _SIDES: Final = ("-x", "+x", "-y", "+y")
@@ -71,7 +71,7 @@ def _loaded_pallet(load: Load) -> _Maker:
         if load == "cartons":  # the last layer: two stacks of other cartons
             for x, length in ((-0.3, 0.56), (0.3, 0.58)):
                 upper = (free - height) * float(rng.uniform(0.85, 1.0))
-                carton = f"carton{rng.integers(CARTONS)}"
+                carton = GOODS_ATLAS.drawn("carton", rng)
                 size = (length, 0.76, upper)
                 yield goods_box((x, 0.0, PALLET_M + height), size, carton, "top1")
 
@@ -160,7 +160,7 @@ def _shelf(_: np.random.Generator) -> Iterator[Mesh]:
 
 def _crates(rng: np.random.Generator) -> Iterator[Mesh]:
     yield _solid(
-        (0.0, 0.0, 0.625), (0.59, 0.39, 1.25), f"crates{rng.integers(CRATES)}", "crates_top"
+        (0.0, 0.0, 0.625), (0.59, 0.39, 1.25), GOODS_ATLAS.drawn("crates", rng), "crates_top"
     )
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._canvas import Canvas, Rgb, finished, plain
-from ._meshes import WHOLE, Region
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,23 +48,6 @@ class Atlas:
             self.cells[name] = AtlasCell(left, top, width, height)
             left += width
             tallest = max(tallest, height)
-
-    def region(self, name: str, part: Region = WHOLE) -> Region:
-        """Return the texture coordinates of a cell, or of ``part`` of it.
-
-        ``part`` counts u and v from 0 to 1, from the cell's lower left corner. The outermost half
-        texel of a cell is left out, so the nearest texel always belongs to the cell.
-        """
-        cell = self.cells[name]
-        width, height = cell.width_px - 1, cell.height_px - 1
-        left = cell.left_px + 0.5
-        bottom = self.size_px - cell.top_px - cell.height_px + 0.5
-        return (
-            (left + part[0] * width) / self.size_px,
-            (bottom + part[1] * height) / self.size_px,
-            (left + part[2] * width) / self.size_px,
-            (bottom + part[3] * height) / self.size_px,
-        )
 
     def painted(
         self, background: Rgb, paint: Callable[[Canvas, str, int], None]
