@@ -57,7 +57,7 @@ class CameraSpec(StrictConfig):
             height; half the width and height render four times as fast.
         scenery_divisor: these images take one sample of the scenery per block of this many pixels a
             side; people get full resolution.
-        sensor: exposure, noise and blur of rendered images; the default adds none.
+        sensor: noise of rendered images; the default adds none.
         timing: frame rate, losses and delays; the default is one frame per control cycle, without
             delay.
     """

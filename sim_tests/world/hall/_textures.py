@@ -88,7 +88,7 @@ class Atlas:
         )
 
     def count(self, kind: str) -> int:
-        """Return how many cells of a kind there are: those named ``kind0``, ``kind1``, …"""
+        """Return how many cells of a kind there are: those named ``kind0``, ``kind1`` and so on."""
         return sum(cell.rstrip("0123456789") == kind != cell for cell in self.cells_px)
 
     def drawn(self, kind: str, rng: np.random.Generator) -> str:

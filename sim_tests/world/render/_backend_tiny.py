@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from ..bullet import pybullet
 from ..errors import SimError
 from ..hall import Colour, Lighting, Mesh
-from ._backend import BackendName, Drawing
+from ._backend import BackendName, Drawing, texture_key
+from ._texture_islands import cut_texture
 from ._view import RenderView
 
 # The last half metre before the far plane counts as nothing: float32 depth is coarse there.
@@ -31,14 +32,16 @@ class TinyBackend:
     """See :class:`RenderBackend`. A body hidden by zero opacity costs 0.06 µs per image."""
 
     name: BackendName = "tiny"
-    shares_textures = False
 
     def __init__(self) -> None:
         self.client: int = pybullet.connect(pybullet.DIRECT)
         if self.client < 0:
             raise SimError("PyBullet could not start another render world")
         self._folder: tempfile.TemporaryDirectory[str] | None = None
-        self._textures = 0
+        self._textures: list[NDArray[np.uint8]] = []
+        # PyBullet's numbers of the cut textures by content, and of each shape's texture.
+        self._loaded: dict[bytes, int] = {}
+        self._texture_of_shape: dict[int, int] = {}
         # Each link that has a shape, with its colour, by body.
         self._colours: dict[int, tuple[tuple[int, Colour], ...]] = {}
 
@@ -52,24 +55,35 @@ class TinyBackend:
             self.client = -1
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
-        """Register a texture (H, W, 3)."""
+        """Register a texture (H, W, 3); PyBullet loads the parts of it that shapes use."""
+        self._textures.append(rgb)
+        return len(self._textures) - 1
+
+    def _load(self, rgb: NDArray[np.uint8]) -> int:
+        """Return PyBullet's number of a texture; equal textures are loaded once."""
+        key = texture_key(rgb)
+        if key in self._loaded:
+            return self._loaded[key]
         # PyBullet takes textures from files only; this format is the fastest to write and to read.
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="awarenav-")
-        self._textures += 1
-        path = Path(self._folder.name) / f"{self._textures}.bmp"
+        path = Path(self._folder.name) / f"{len(self._loaded)}.bmp"
         if not cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1])):
             raise SimError(f"cannot write the texture {path.name}")
         number = int(pybullet.loadTexture(str(path), physicsClientId=self.client))
         path.unlink()
         if number < 0:
             raise SimError(f"PyBullet did not take a texture of shape {rgb.shape}")
+        self._loaded[key] = number
         return number
 
     def shape(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
         """Register a visual shape; :meth:`attach` adds its texture."""
-        uv = {} if mesh.uv is None else {"uvs": mesh.uv.tolist()}
-        return int(
+        uv, number = mesh.uv, None
+        if texture is not None and uv is not None:
+            uv, rgb = cut_texture(uv, mesh.indices.ravel(), self._textures[texture])
+            number = self._load(rgb)
+        shape = int(
             pybullet.createVisualShape(
                 pybullet.GEOM_MESH,
                 vertices=mesh.vertices_m.tolist(),
@@ -78,12 +92,16 @@ class TinyBackend:
                 rgbaColor=[*colour, 1.0],
                 specularColor=[0.0, 0.0, 0.0],
                 physicsClientId=self.client,
-                **uv,
+                **({} if uv is None else {"uvs": uv.tolist()}),
             )
         )
+        if number is not None:
+            self._texture_of_shape[shape] = number
+        return shape
 
-    def attach(self, body: int, link: int, shape: int, texture: int | None) -> None:
+    def attach(self, body: int, link: int, shape: int) -> None:
         """Set the texture of a link."""
+        texture = self._texture_of_shape.get(shape)
         if texture is not None:
             pybullet.changeVisualShape(
                 body, link, textureUniqueId=texture, physicsClientId=self.client
