@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ..hall import WarehouseLayout
-from ..sightlines import Occluder, PlacedSurface, TriangleSet, cut_surfaces, scenery_triangles
+from ..sightlines import Occluder, PlacedSurface, TriangleSet, cut_surfaces, scenery_surface
 from ._merging import merged_segments
 
 #: Number of the scenery in :meth:`ScanScene.cut`; actors count from 0.
@@ -193,6 +193,6 @@ def _own_cut(triangles: TriangleSet, plane: _Plane) -> FloatArray:
 
 @lru_cache(maxsize=32)  # a robot that stands level scans the same plane again and again
 def _scenery_cut(layout: WarehouseLayout, variant: int, plane: _Plane) -> FloatArray:
-    surface = PlacedSurface(scenery_triangles(layout, variant), _HOME)
+    surface = scenery_surface(layout, variant)
     segments, _ = cut_surfaces([surface], np.array(plane.normal), plane.offset_m)
     return merged_segments(segments) if plane.normal[:2] == (0.0, 0.0) else segments
