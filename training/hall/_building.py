@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ._atlas import Atlas
+from ._atlas import PaintedAtlas
 from ._canvas import (
     Canvas,
     band,
@@ -29,7 +29,7 @@ _TILE_M: Final = 4.0
 # The mean colour of the slab's textures: worn paint shows it, and shades end in it.
 _SLAB_RGB: Final = (158.0, 157.0, 152.0)
 
-FIXTURE_ATLAS: Final = Atlas(
+FIXTURE_ATLAS: Final = PaintedAtlas(
     512,
     {
         "dock": (192, 192),
@@ -53,7 +53,7 @@ FIXTURE_ATLAS: Final = Atlas(
     },
 )
 
-MARKING_ATLAS: Final = Atlas(
+MARKING_ATLAS: Final = PaintedAtlas(
     256,
     {
         "line": (256, 24),

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ._atlas import Atlas
+from ._atlas import PaintedAtlas
 from ._canvas import Canvas, Rgb, grain
 from ._goods_painters import GOODS_PAINTERS
 
@@ -33,7 +33,7 @@ _MATERIALS: Final[dict[str, Rgb]] = {
     "lamp": (255, 255, 255),
 }
 
-GOODS_ATLAS: Final = Atlas(
+GOODS_ATLAS: Final = PaintedAtlas(
     1024,
     {
         **{f"stack{k}": (128, 128) for k in range(_STACKS)},

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ._atlas import Atlas
+from ._atlas import PaintedAtlas
 from ._building import (
     FIXTURE_ATLAS,
     MARKING_ATLAS,
@@ -19,15 +19,14 @@ from ._building import (
     wall_texture,
 )
 from ._goods import GOODS_ATLAS, goods_texture
-from ._robot import AMR_ATLAS, amr_texture
+from ._robot import amr_texture
 
 _GOODS_SETS: Final = 4
 _FLOORS: Final = 2
-_ATLASES: Final[dict[str, Atlas]] = {
+_ATLASES: Final[dict[str, PaintedAtlas]] = {
     "goods": GOODS_ATLAS,
     "paint": MARKING_ATLAS,
     "fixtures": FIXTURE_ATLAS,
-    "amr": AMR_ATLAS,
 }
 
 
@@ -49,10 +48,7 @@ def atlases() -> dict[str, Any]:
     return {
         name: {
             "size_px": atlas.size_px,
-            "cells_px": {
-                key: [cell.left_px, cell.top_px, cell.width_px, cell.height_px]
-                for key, cell in atlas.cells.items()
-            },
+            "cells_px": {name: list(cell) for name, cell in atlas.cells_px.items()},
         }
         for name, atlas in _ATLASES.items()
     }

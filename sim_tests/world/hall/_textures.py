@@ -100,8 +100,7 @@ _ATLASES: Final = {
     name: Atlas(atlas["size_px"], {key: tuple(cell) for key, cell in atlas["cells_px"].items()})
     for name, atlas in json.loads((_FOLDER / "atlases.json").read_text("utf-8")).items()
 }
-#: Cells of the textures ``goods0``, ``goods1``, …, of ``paint``, ``fixtures`` and ``amr``.
+#: Cells of the textures ``goods0``, ``goods1`` and so on, of ``paint`` and of ``fixtures``.
 GOODS_ATLAS: Final = _ATLASES["goods"]
 MARKING_ATLAS: Final = _ATLASES["paint"]
 FIXTURE_ATLAS: Final = _ATLASES["fixtures"]
-AMR_ATLAS: Final = _ATLASES["amr"]
