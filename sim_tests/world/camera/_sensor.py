@@ -51,7 +51,7 @@ def expose(rgb: Any, config: SensorConfig, rng: np.random.Generator) -> NDArray[
     if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
         raise SimError(f"rgb must be uint8 of shape (H, W, 3), got {image.dtype} {image.shape}")
     if not (config.shot_noise or config.read_noise_e > 0.0):
-        return image.copy()
+        return np.array(image, dtype=np.uint8)
     return to_srgb(_electrons(to_linear(image), config, rng) / config.full_well_e)
 
 

@@ -48,8 +48,8 @@ def scenery_texture(name: str) -> NDArray[np.uint8]:
     if name not in TEXTURE_NAMES:
         raise SimError(not_one_of("texture", name, TEXTURE_NAMES))
     data = np.frombuffer((_FOLDER / f"{name}.webp").read_bytes(), dtype=np.uint8)
-    rgb = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1], dtype=np.uint8)
-    texture = np.ascontiguousarray(rgb)
+    bgr = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), dtype=np.uint8)
+    texture = np.ascontiguousarray(bgr[..., ::-1])
     texture.setflags(write=False)
     return texture
 

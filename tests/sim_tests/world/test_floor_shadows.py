@@ -18,7 +18,7 @@ from sim_tests.world.render import gl_works
 
 CAMERA = Camera(240, 180, 160.0, 160.0, 119.5, 89.5)
 ABOVE = level_pose((0.5, 0.0, 4.5), 0.0, 0.5 * math.pi - 1e-3)  # looks straight down
-LAMPS = [(0.4, -0.9, 1.5), (-1.0, 0.6, 2.0), (1.5, 1.0, 2.0)]
+LAMPS = [(0.4, -0.9, 1.5), (-1.0, 0.6, 2.0)]
 RADIUS_M = 0.3
 
 

@@ -34,17 +34,6 @@ def hall_with_face() -> Iterator[tuple[Warehouse, Mesh]]:
         yield warehouse, face
 
 
-def test_there_are_at_least_six_presets_and_no_two_are_alike() -> None:
-    assert len(LIGHTINGS) >= 6
-    assert len({repr(lighting) for lighting in LIGHTINGS.values()}) == len(LIGHTINGS)
-    assert Lighting.preset("bright_led") == Lighting()
-    brightness = {
-        name: (light.ambient + light.diffuse) * np.mean(light.colour_rgb)
-        for name, light in LIGHTINGS.items()
-    }
-    assert min(brightness, key=lambda name: brightness[name]) == "night"
-
-
 @pytest.mark.parametrize("name", LIGHTINGS)
 def test_a_lit_face_has_the_colour_of_the_formula(
     hall_with_face: tuple[Warehouse, Mesh], name: str

@@ -75,28 +75,6 @@ def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(
     assert actor.builds == 1
 
 
-def test_an_actor_that_is_never_seen_is_never_built(
-    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
-) -> None:
-    behind_the_rack = ball(position_m=(5.0, 6.3, 1.0))
-    add_actor(behind_the_rack)
-    CameraRenderer(hall).render(CAMERA, level_pose((5.0, 0.0, 1.4), 0.5 * math.pi))
-    assert behind_the_rack.builds == 0
-
-
-def test_level_of_detail_follows_the_grid_and_not_the_rectangle(
-    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
-) -> None:
-    actor = ball(position_m=(2.0, 0.0, 1.4))
-    add_actor(actor)
-    renderer = CameraRenderer(hall)
-    renderer.render(CAMERA, AHEAD)
-    renderer.render(CAMERA, AHEAD, (70, 50, 90, 70))
-    renderer.render(CAMERA, AHEAD, (70, 50, 90, 70), (40, 40))
-    CameraRenderer(hall, supersampling=2).render(CAMERA, AHEAD)
-    assert actor.shown == pytest.approx([75.0, 75.0, 150.0, 150.0])
-
-
 def test_only_shows_silhouettes_through_everything(
     hall: Warehouse, add_actor: Callable[[ShapeActor], int]
 ) -> None:
