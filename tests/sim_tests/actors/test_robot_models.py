@@ -15,7 +15,6 @@ from pydantic import ValidationError
 from nav_adapter import RobotProfile
 from sim_tests import NOVA_CARTER, SimError, Warehouse, Worker
 from sim_tests.actors.robot import (
-    KinematicLook,
     KinematicRobot,
     RobotModel,
     model_meshes,
@@ -166,11 +165,3 @@ def test_people_touch_the_outline_where_it_is_and_not_beside_it(hall, heading_ra
             place = np.array([1.0, 0.0]) + (edge_m + side * gap_m) * forward
             worker.place(place, heading_rad, 0.0, 0.0, 0.0, 0.0)
             assert robot.touches(worker.body) is touches
-
-
-def test_the_look_lies_within_its_bounds(hall) -> None:
-    robot = KinematicRobot(hall, FORKLIFT, (1.0, 0.5), 0.4)
-    low, high = KinematicLook(robot).bounds_odom_m()
-    x0, y0, x1, y1 = outline(robot).bounds
-    assert low == pytest.approx([x0, y0, 0.03])
-    assert high == pytest.approx([x1, y1, 1.9])

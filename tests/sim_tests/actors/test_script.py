@@ -89,34 +89,6 @@ def test_impossible_walks_are_refused(change):
         script(**change)
 
 
-def test_unknown_keys_are_refused_with_the_nearest_name():
-    with pytest.raises(ValueError, match="did you mean 'yaw_deg'"):
-        script([(0, 0, 0)], gaze=[{"t_s": 0.0, "yaw": 3.0}])
-
-
-def test_a_copied_script_walks_its_own_path():
-    WALK.motion(1.0)
-    moved = WALK.model_copy(update={"path": (WALK.path[0].model_copy(update={"x_m": 9.0}),)})
-    assert moved.motion(1.0).position_odom_m[0] == 9.0
-
-
-def test_the_eyes_turn_smoothly_between_keys_and_rest_without_keys():
-    looking = script(
-        [(0, 0, 0)],
-        gaze=[
-            {"t_s": 1.0, "eye_yaw_deg": 0.0},
-            {"t_s": 2.0, "eye_yaw_deg": 30.0, "eye_pitch_deg": -10.0},
-        ],
-    )
-    assert looking.eye_angles(0.0) == (0.0, 0.0)
-    assert looking.eye_angles(1.5) == pytest.approx((math.radians(15.0), math.radians(-5.0)))
-    assert looking.eye_angles(9.0) == pytest.approx((math.radians(30.0), math.radians(-10.0)))
-    assert looking.gaze_angles(1.5, 0.2, (0.0, 0.0)) == (0.2, 0.0)  # the head does not follow
-    assert WALK.eye_angles(1.0) == (0.0, 0.0)
-    with pytest.raises(ValueError, match="eye_yaw_deg"):
-        script([(0, 0, 0)], gaze=[{"t_s": 0.0, "eye_yaw_deg": 50.0}])
-
-
 def test_activities_change_in_six_tenths_of_a_second():
     busy = script(
         [(0, 0, 0)],
@@ -146,25 +118,6 @@ def test_unknown_looks_are_refused():
     assert script([(0, 0, 0)], look=worker_names()[0]).look == worker_names()[0]
     with pytest.raises(ValueError, match="look must be one of"):
         script([(0, 0, 0)], look="nobody")
-
-
-def test_headings_turn_without_jerks():
-    """Between keys the body starts and stops turning smoothly, without overshoot."""
-    turning = script(
-        [(0, 0, 0)],
-        heading=[
-            {"t_s": 1.0, "heading_deg": 0.0},
-            {"t_s": 2.0, "heading_deg": 0.0},
-            {"t_s": 3.0, "heading_deg": 90.0},
-            {"t_s": 4.0, "heading_deg": 90.0},
-        ],
-    )
-    headings = np.array([turning.motion(t).heading_odom_rad for t in np.arange(0.0, 5.0, 0.02)])
-    assert headings.min() >= -1e-9
-    assert headings.max() <= math.pi / 2 + 1e-9
-    rate = np.diff(headings) / 0.02
-    assert rate.max() < math.pi  # 1.5 times the mean rate of a smooth turn
-    assert np.abs(np.diff(rate)).max() / 0.02 < 12.0
 
 
 def test_feet_stand_before_the_first_and_after_the_last_waypoint():

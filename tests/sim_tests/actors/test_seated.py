@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from worker_looks import LOOKS
 
 from perception import layouts as kp
 from sim_tests import SimError
@@ -17,7 +18,6 @@ from sim_tests.actors.behaviour import (
     RobotBody,
     Surroundings,
     Walker,
-    WorkerScript,
 )
 from sim_tests.actors.body import (
     SEATED_EYE_HEIGHT_SHARE,
@@ -25,7 +25,6 @@ from sim_tests.actors.body import (
     Worker,
     load_worker,
     skin_points,
-    worker_names,
 )
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
@@ -57,7 +56,7 @@ def in_body(points_odom_m: np.ndarray) -> np.ndarray:
     return (points_odom_m - [*PLACE_M, 0.0]) @ turn
 
 
-@pytest.mark.parametrize("look", worker_names())
+@pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("stature_m", [None, 1.1])
 def test_thighs_are_level_shanks_upright_and_the_trunk_is_above_the_place(
     hall: Warehouse, look: str, stature_m: float | None
@@ -150,18 +149,6 @@ def test_nobody_sits_down_or_stands_up(hall: Warehouse) -> None:
             Activity(name, before, 0.5)
     with pytest.raises(SimError, match=r"seat must be one of 'stool', 'box', got 'sofa'"):
         Worker(hall, seat="sofa")  # type: ignore[arg-type]
-
-
-def test_a_script_of_somebody_seated_stays_at_one_place() -> None:
-    here, there = {"t_s": 0.0, "x_m": 1.0, "y_m": 0.0}, {"t_s": 2.0, "x_m": 2.0, "y_m": 0.0}
-    script = WorkerScript(path=[here], activities=[SEATED])
-    assert script.stays
-    assert script.activity(3.0).seated
-    assert not WorkerScript(path=[here, there]).stays
-    with pytest.raises(ValidationError, match="stays at one place"):
-        WorkerScript(path=[here, there], activities=[SEATED])
-    with pytest.raises(ValidationError, match="must all be 'sitting', got none, sitting"):
-        WorkerScript(path=[here], activities=[SEATED, {"t_s": 3.0, "activity": "none"}])
 
 
 def test_a_seated_person_watches_but_never_moves() -> None:
