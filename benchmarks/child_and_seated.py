@@ -115,7 +115,7 @@ def encounter(
 ) -> Iterator[Sample]:
     """Simulate a case, and yield the tracks after every scan."""
     rng = np.random.default_rng([case.seed, 21])
-    layout = WarehouseLayout.open_floor()
+    layout = WarehouseLayout.named("open")
     with Warehouse(layout) as warehouse:
         worker = Worker(warehouse, case.stature_m, look=case.look, seat=case.seat)
         amr = Amr(warehouse)

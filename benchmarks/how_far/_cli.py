@@ -91,7 +91,7 @@ def main() -> None:
     print("Error of the range: median, 90 %; its reported σ; share within the 95 % bound.\n")
     print("| who | stature | camera alone | σ | in | floor | σ | in | depth | σ | in |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         for row in _rows(HowFar(warehouse), chosen.count, chosen.seed, chosen.cues):
             print(row, flush=True)
         if chosen.tracks:

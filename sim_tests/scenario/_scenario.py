@@ -174,7 +174,7 @@ def _layout(value: Any) -> Any:
         raise ValueError(
             f"layout must be one of {', '.join(map(repr, LAYOUTS))} or a mapping, got {value!r}"
         )
-    return LAYOUTS[value]()
+    return WarehouseLayout.named(value)
 
 
 class Scenario(StrictConfig):
@@ -218,7 +218,7 @@ class Scenario(StrictConfig):
     attention: Literal["attentive", "unaware", "mixed"] = "mixed"
     duration_s: float = Field(gt=0.0, le=600.0)
     control_hz: float = Field(default=20.0, gt=0.0, le=240.0)
-    layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.crossing()
+    layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.named("crossing")
     robot: RobotTask
     robot_model: Annotated[RobotModel | None, BeforeValidator(_robot_model)] = None
     camera: CameraSpec = CameraSpec()

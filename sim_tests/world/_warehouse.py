@@ -66,7 +66,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         )
         if renderer not in RENDERERS:
             raise SimError(not_one_of("renderer", renderer, RENDERERS))
-        self.layout = WarehouseLayout.crossing() if layout is None else layout
+        self.layout = WarehouseLayout.named("crossing") if layout is None else layout
         self._renderer: RendererName = renderer
         self._variant = variant
         self._visuals: Visuals | None = None

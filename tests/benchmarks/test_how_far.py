@@ -17,7 +17,7 @@ POSTURES = ("standing", "seated", "bent")
 
 @pytest.fixture(scope="module")
 def far() -> Iterator[HowFar]:
-    with Warehouse(WarehouseLayout.open_floor(), renderer="auto") as warehouse:
+    with Warehouse(WarehouseLayout.named("open"), renderer="auto") as warehouse:
         yield HowFar(warehouse)
 
 

@@ -26,7 +26,7 @@ QUIET = KeypointNoise(pixel_std_px=0.3, lift_std_m=0.0, miss_rate=0.0)
 def test_legs_are_ahead_of_the_trunk_of_people_who_sit(
     activity: str, stature_m: float, fov_deg: float
 ) -> None:
-    layout = WarehouseLayout.open_floor()
+    layout = WarehouseLayout.named("open")
     with Warehouse(layout) as warehouse:
         worker = Worker(warehouse, stature_m, look="linnea")
         heading = 2.4

@@ -46,7 +46,7 @@ def main() -> int:
     """Render the picture; return 0."""
     from PIL import Image  # noqa: PLC0415 - a development dependency
 
-    with Warehouse(WarehouseLayout.open_floor(), renderer="auto") as warehouse:
+    with Warehouse(WarehouseLayout.named("open"), renderer="auto") as warehouse:
         for name, place in PLACES_M.items():
             model = RobotModel.shipped(name)
             if model.body == "nova_carter":

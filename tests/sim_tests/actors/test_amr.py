@@ -28,7 +28,7 @@ A_MPS2 = NOVA_CARTER.max_acceleration_mps2
 
 @pytest.fixture
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 

@@ -49,7 +49,7 @@ def test_no_part_of_it_is_in_view_of_its_camera() -> None:
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.5])
 def test_it_is_drawn_where_the_robot_is_and_its_camera_does_not_see_it(heading_rad: float) -> None:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         amr = Amr(warehouse, (2.0, 1.0), heading_rad)
         look = AmrLook.of(warehouse, amr)
         number = warehouse.visuals.add_actor(look)

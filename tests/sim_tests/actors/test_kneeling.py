@@ -32,7 +32,7 @@ SHINS = (
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 
@@ -60,7 +60,7 @@ def test_thighs_are_upright_and_knees_and_feet_on_the_floor(
 
 @pytest.mark.parametrize("stature_m", [1.8, 1.2])
 def test_rays_meet_the_shanks_behind_and_pass_above_the_head(stature_m: float) -> None:
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
+    with Warehouse(WarehouseLayout.named("open")) as hall:
         worker = Worker(hall, stature_m)
         worker.place((1.0, 2.0), 0.5 * math.pi, activity="kneeling")
         behind, size = 0.3 * stature_m / 1.75, stature_m / 1.75

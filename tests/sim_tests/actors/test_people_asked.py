@@ -189,7 +189,7 @@ def test_low_people_turn_the_head_alone_and_never_move(kind: str, activity: str)
 
 def test_nobody_looks_through_a_rack() -> None:
     """A voice is heard there; the look meets nothing, and the person does not notice the robot."""
-    layout = WarehouseLayout.open_floor().model_dump()
+    layout = WarehouseLayout.named("open").model_dump()
     rack = {"x_m": 2.8, "y_m": 0.0, "length_m": 1.0, "width_m": 3.0}
     hidden = {**layout, "racks": [*layout["racks"], rack]}
     stands = {**WALKER, "route": [{"x_m": 5.0, "y_m": 0.3}]}
@@ -248,7 +248,9 @@ def test_a_step_never_leads_into_a_rack(kind: str) -> None:
     script = {"path": [{"t_s": 4.0 * n, **spot} for n, spot in enumerate(spots)]}
     people = {kind: [script if kind == "workers" else {**WALKER, "route": spots}]}
     jumpy = {**DEAF, "startles": 1.0, "startles_into_path": 0.0, "delay_spread": 1.0}
-    boxes = [shapely.box(*box) for box in WarehouseLayout.aisles().obstacle_boxes_odom.tolist()]
+    boxes = [
+        shapely.box(*box) for box in WarehouseLayout.named("aisles").obstacle_boxes_odom.tolist()
+    ]
     highest = []
     for seed in range(4):
         asked = run(**people, hearing=jumpy, layout="aisles", seed=seed, at_s=(0.5,))

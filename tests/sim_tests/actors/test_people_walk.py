@@ -23,7 +23,7 @@ from sim_tests.actors.behaviour import (
 from sim_tests.world.hall import WarehouseLayout
 
 NO_BOXES = np.empty((0, 4))
-HALL = WarehouseLayout.crossing().obstacle_boxes_odom
+HALL = WarehouseLayout.named("crossing").obstacle_boxes_odom
 
 
 def walker(route, boxes=NO_BOXES, seed: int = 0, **fields) -> Walker:

@@ -37,7 +37,7 @@ PASSING_M = 0.02
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 
@@ -198,7 +198,7 @@ def test_hands_change_smoothly_from_one_activity_to_the_next(
 def test_a_carried_box_is_solid_and_an_absent_one_is_not() -> None:
     """A probe ahead of the person is nearest to the box, if there is one."""
     gaps = {}
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
+    with Warehouse(WarehouseLayout.named("open")) as hall:
         worker = Worker(hall, look="kofi", stature_m=1.84)
         ball = pybullet.createCollisionShape(
             pybullet.GEOM_SPHERE, radius=0.05, physicsClientId=hall.client

@@ -30,7 +30,7 @@ STEP_S = 1.0 / 240.0
 
 @pytest.fixture(scope="module")
 def hall():
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 
@@ -102,7 +102,7 @@ twists = st.lists(
 def test_a_body_moves_within_the_limits_of_its_profile(name: str, commands: list) -> None:
     model = RobotModel.shipped(name)
     profile = model.profile
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         robot = KinematicRobot(warehouse, model, (4.0, 0.0), 0.3)
         most = max(profile.max_acceleration_mps2, profile.max_deceleration_mps2) * STEP_S
         before = robot.state(0.0)

@@ -39,7 +39,7 @@ SEATED = {"t_s": 0.0, "activity": "sitting"}
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 
@@ -127,7 +127,7 @@ def test_at_a_scanners_height_there_are_two_shanks_before_four_legs(hall: Wareho
 
 
 def test_a_robot_meets_the_seat_and_it_leaves_with_the_person() -> None:
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
+    with Warehouse(WarehouseLayout.named("open")) as hall:
         worker = seated(hall, "mateo", seat="box")
         above, below = [*PLACE_M, 1.9], [*PLACE_M, 0.2]
         behind = [*(PLACE_M - [math.cos(HEADING_RAD), math.sin(HEADING_RAD)]), 0.2]

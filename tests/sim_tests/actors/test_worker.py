@@ -54,7 +54,7 @@ postures = st.fixed_dictionaries(
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 
@@ -254,7 +254,7 @@ def test_physics_does_not_move_a_placed_worker(hall: Warehouse, worker: Worker) 
 
 def test_a_worker_stops_a_robot_that_drives_into_it() -> None:
     """The robot touches shins and feet, is stopped, and moves no limb."""
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
+    with Warehouse(WarehouseLayout.named("open")) as hall:
         amr = Amr(hall)
         worker = Worker(hall, 1.8, look="ivan", position_odom_m=(1.3, 0.05), heading_odom_rad=2.8)
         before = _links(hall, worker)

@@ -45,7 +45,7 @@ POSES = (
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor(), renderer="auto") as warehouse:
+    with Warehouse(WarehouseLayout.named("open"), renderer="auto") as warehouse:
         yield warehouse
 
 

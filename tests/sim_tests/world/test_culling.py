@@ -86,7 +86,7 @@ def test_images_with_and_without_culling_are_the_same(monkeypatch: pytest.Monkey
     """Cameras stand in aisles, in front of a rack, above it, in it, and outside the hall."""
     rng = np.random.default_rng(5)
     camera = Camera.from_fov(160, 120, math.radians(75.0))
-    layout = WarehouseLayout.blind_corner()
+    layout = WarehouseLayout.named("blind_corner")
     with Warehouse(layout) as hall:
         renderer = CameraRenderer(hall)
         for number in range(6):

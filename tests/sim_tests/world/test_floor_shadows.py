@@ -27,7 +27,7 @@ def hall_with_ball(request: pytest.FixtureRequest) -> Iterator[tuple[Warehouse, 
     """Return a hall with a ball at (0.4, 0.1, 0.8), and the ball's number."""
     if request.param == "gl" and not gl_works():
         pytest.skip("no OpenGL here: install moderngl and libEGL (Mesa's will do)")
-    with Warehouse(WarehouseLayout.open_floor(), renderer=request.param) as hall:
+    with Warehouse(WarehouseLayout.named("open"), renderer=request.param) as hall:
         yield hall, hall.visuals.add_actor(ball(RADIUS_M, position_m=(0.4, 0.1, 0.8)))
 
 
@@ -75,7 +75,7 @@ def test_the_shadow_of_a_ball_is_where_the_rays_put_it(
 
 def test_a_rectangle_shows_the_same_shadow_as_the_whole_image() -> None:
     light = Lighting(shadows=True, ambient=0.3, diffuse=0.6)
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
+    with Warehouse(WarehouseLayout.named("open")) as hall:
         post = ShapeActor(box((0.0, 0.0, 0.9), (0.3, 0.4, 1.8)), (3.0, 0.3, 0.0))
         hall.visuals.add_actor(post)
         renderer = CameraRenderer(hall, lighting=light)

@@ -34,7 +34,7 @@ def _needs_gl() -> None:
 
 @pytest.fixture(scope="module")
 def halls() -> Iterator[tuple[Warehouse, Warehouse]]:
-    layout = WarehouseLayout.crossing()
+    layout = WarehouseLayout.named("crossing")
     with Warehouse(layout) as tiny, Warehouse(layout, renderer="gl") as opengl:
         assert (tiny.visuals.renderer, opengl.visuals.renderer) == ("tiny", "gl")
         for hall in (tiny, opengl):

@@ -36,7 +36,7 @@ def test_the_boxes_of_the_crossing_are_those_of_the_published_results() -> None:
         (-5.0, -8.7, 17.0, -8.5),
         (-5.0, 8.5, 17.0, 8.7),
     ]
-    layout = WarehouseLayout.crossing()
+    layout = WarehouseLayout.named("crossing")
     np.testing.assert_allclose(layout.obstacle_boxes_odom, expected, atol=1e-12)
     np.testing.assert_array_equal(layout.obstacle_heights_m, [4.0] * 8 + [6.0] * 4)
 
@@ -64,7 +64,7 @@ def test_every_hall_has_a_free_robot_aisle_and_no_overlapping_things(name: str) 
 
 
 def test_the_blind_corner_is_blind() -> None:
-    layout = WarehouseLayout.blind_corner()
+    layout = WarehouseLayout.named("blind_corner")
     assert _blocked(layout, (1.0, 0.0), (6.0, 6.0))
     assert _blocked(layout, (3.0, 0.0), (6.0, 5.0))
     assert not _blocked(layout, (5.8, 0.5), (6.0, 6.0))
@@ -83,7 +83,7 @@ def test_unusable_halls_are_refused_by_name_and_others_are_read_back(tmp_path: P
         WarehouseLayout(**_HALL, rack=())
     with pytest.raises(SimError, match="did you mean 'crossing'"):
         WarehouseLayout.named("crosing")
-    layout = WarehouseLayout.staging_hall()
+    layout = WarehouseLayout.named("staging_hall")
     layout.to_yaml(tmp_path / "hall.yaml")
     assert WarehouseLayout.from_yaml(tmp_path / "hall.yaml") == layout
     (tmp_path / "hall.yaml").write_text("x_min_m: .nan\n")

@@ -29,7 +29,7 @@ def hall_with_face() -> Iterator[tuple[Warehouse, Mesh]]:
     centre, side = np.array([0.0, 2.0, 1.4]), np.array([0.5, 0.0, 0.0])
     corners = [centre - side - up, centre + side - up, centre + side + up, centre - side + up]
     face = quad([tuple(corner) for corner in corners])
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         warehouse.visuals.add_static(face, tuple(_COLOUR.tolist()))
         yield warehouse, face
 

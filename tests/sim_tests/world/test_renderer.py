@@ -21,7 +21,7 @@ OFF_CENTRE = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 

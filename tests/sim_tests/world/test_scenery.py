@@ -111,7 +111,7 @@ def test_chunks_are_well_formed_and_stay_inside_the_hall(name: str, variant: int
 
 
 def test_the_same_hall_and_variant_give_the_same_bytes() -> None:
-    layout = WarehouseLayout.staging_hall()
+    layout = WarehouseLayout.named("staging_hall")
     first = _bytes(scenery(layout, 3))
     scenery.cache_clear()
     assert _bytes(scenery(layout, 3)) == first

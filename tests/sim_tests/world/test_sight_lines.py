@@ -30,7 +30,7 @@ HOME = np.eye(4)[None]
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[tuple[Warehouse, list[Worker]]]:
-    with Warehouse(WarehouseLayout.crossing()) as warehouse:
+    with Warehouse(WarehouseLayout.named("crossing")) as warehouse:
         workers = [Worker(warehouse, 1.62), Worker(warehouse, 1.85)]
         yield warehouse, workers
 
@@ -98,7 +98,7 @@ def test_moving_and_scaling_lines_and_surface_together_changes_nothing() -> None
 
 
 def test_a_rack_hides_what_is_behind_it_and_the_aisle_is_free() -> None:
-    layout = WarehouseLayout.crossing()
+    layout = WarehouseLayout.named("crossing")
     lines = SightLines(layout)
     x_min, y_min, x_max, y_max = layout.racks[0].box_odom_m
     middle = 0.5 * (x_min + x_max)
@@ -194,7 +194,7 @@ def test_a_person_hides_another_and_a_carried_box_hides_the_chest(
 
 
 def test_the_robot_hides_others_but_never_blocks_its_own_camera() -> None:
-    with Warehouse(WarehouseLayout.crossing()) as warehouse:
+    with Warehouse(WarehouseLayout.named("crossing")) as warehouse:
         amr = Amr(warehouse)
         lines = SightLines(warehouse.layout, actors=[AmrLook.of(warehouse, amr)])
         low = np.array([[1.5, 0.0, 0.3]])

@@ -142,7 +142,7 @@ def test_rays_with_places_and_turns_of_their_own_find_the_nearest_segment(
 
 def test_people_are_hit_where_lines_of_sight_are_blocked() -> None:
     """Points just behind a hit are hidden, points just before it are not."""
-    with Warehouse(WarehouseLayout.staging_hall()) as warehouse:
+    with Warehouse(WarehouseLayout.named("staging_hall")) as warehouse:
         worker = Worker(warehouse, 1.8)
         worker.place((3.0, 0.4), 0.7, 0.35, 1.3)
         scene = ScanScene(warehouse.layout, 0, warehouse.actors)
@@ -168,7 +168,7 @@ def test_people_are_hit_where_lines_of_sight_are_blocked() -> None:
 
 
 def test_the_diagonal_scanners_see_all_around_and_not_their_robot() -> None:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         amr = Amr(warehouse)
         warehouse.add_actor(AmrLook.of(warehouse, amr))
         scene = ScanScene(warehouse.layout, 0, warehouse.actors)
@@ -195,7 +195,7 @@ def test_the_diagonal_scanners_see_all_around_and_not_their_robot() -> None:
 )
 def test_the_scanners_of_a_moving_robot_see_as_little_of_it(velocity_mps, yaw_rate_radps) -> None:
     """Its body moves with them, so that no ray starts behind its own front."""
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         amr = Amr(warehouse)
         warehouse.add_actor(AmrLook.of(warehouse, amr))
         scene = ScanScene(warehouse.layout, 0, warehouse.actors)

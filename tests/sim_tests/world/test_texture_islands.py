@@ -65,7 +65,7 @@ def test_a_repeated_texture_is_left_alone(uv: list[tuple[float, float]]) -> None
 
 def test_racks_look_the_same_with_a_part_of_the_texture() -> None:
     sizes = []
-    for chunk in scenery(WarehouseLayout.crossing()):
+    for chunk in scenery(WarehouseLayout.named("crossing")):
         if chunk.texture is not None and chunk.texture.startswith("goods"):
             texture = scenery_texture(chunk.texture)
             share, cut = _same_look(chunk.mesh.uv, chunk.mesh.indices.ravel(), texture)

@@ -28,7 +28,7 @@ AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         yield warehouse
 
 
@@ -177,7 +177,7 @@ def test_rendering_never_changes_the_physics() -> None:
 
 
 def test_a_closed_warehouse_cannot_be_rendered() -> None:
-    warehouse = Warehouse(WarehouseLayout.open_floor())
+    warehouse = Warehouse(WarehouseLayout.named("open"))
     visuals = warehouse.visuals
     client = visuals.client
     warehouse.close()

@@ -96,7 +96,7 @@ def _run() -> bytes:
 
 def test_same_inputs_give_the_same_bytes_whatever_other_worlds_do() -> None:
     first_run = _run()
-    with Warehouse(WarehouseLayout.open_floor()) as other:
+    with Warehouse(WarehouseLayout.named("open")) as other:
         _ball(other, (1.0, 0.0, 0.5))
         other.step()
         assert _run() == first_run
