@@ -33,7 +33,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
     second world, :attr:`visuals`, so that rendering never changes the physics.
 
     Args:
-        layout: the hall; None is :meth:`WarehouseLayout.crossing`.
+        layout: the hall; None is the shipped layout ``"crossing"``.
         physics_dt_s: length of one step, in (0, 1/60].
         renderer: ``"tiny"``, ``"gl"`` or ``"auto"``, the renderer of :attr:`visuals`.
         variant: number of the scenery's variant (goods, colours, wear).

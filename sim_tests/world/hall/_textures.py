@@ -5,7 +5,6 @@ They are files beside this module: ``python -m training.hall`` paints them.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.errors import not_one_of
+from perception.documents import parse_json
 
 from ..errors import SimError
 from ._meshes import WHOLE, Region
@@ -98,7 +98,9 @@ class Atlas:
 
 _ATLASES: Final = {
     name: Atlas(atlas["size_px"], {key: tuple(cell) for key, cell in atlas["cells_px"].items()})
-    for name, atlas in json.loads((_FOLDER / "atlases.json").read_text("utf-8")).items()
+    for name, atlas in parse_json(
+        (_FOLDER / "atlases.json").read_bytes(), "atlases.json", SimError
+    ).items()
 }
 #: Cells of the textures ``goods0``, ``goods1`` and so on, of ``paint`` and of ``fixtures``.
 GOODS_ATLAS: Final = _ATLASES["goods"]

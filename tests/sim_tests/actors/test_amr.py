@@ -75,19 +75,6 @@ def test_stops_within_its_braking_distance(hall: Warehouse, speed_mps: float) ->
     assert abs(states[-1].speed_mps) < 1e-3
 
 
-def test_acceleration_stays_within_its_limits(hall: Warehouse) -> None:
-    amr = Amr(hall, (-2.0, 0.0))
-    states = []
-    for speed in (1.5, 0.2, -0.5, 1.0):
-        states += _drive(hall, amr, 1.2, speed)
-    speeds = np.array([state.speed_mps for state in states])
-    window = 12  # 50 ms
-    accelerations = (speeds[window:] - speeds[:-window]) / (window * hall.physics_dt_s)
-    assert np.abs(accelerations).max() < 1.05
-    assert accelerations.max() > 0.95
-    assert accelerations.min() < -0.95
-
-
 def test_drives_a_circle_of_the_commanded_radius(hall: Warehouse) -> None:
     amr = Amr(hall, (2.0, -1.0))
     states = _drive(hall, amr, 9.0, 0.8, 0.8)
@@ -114,20 +101,6 @@ def test_wheels_roll_without_slip(hall: Warehouse) -> None:
     assert (right - left) / TRACK_M == pytest.approx(end.heading_odom_rad, abs=0.01)
     # Their mean is the path's length: 1.5 m in the first 2 s with the ramp, then 1.5 m on the arc.
     assert 0.5 * (left + right) == pytest.approx(3.0, abs=0.01)
-
-
-def test_motion_does_not_depend_on_where_odom_is(hall: Warehouse) -> None:
-    one, other = Amr(hall, (0.0, -2.0)), Amr(hall, (3.0, 1.0), 2.0)
-    for amr in (one, other):
-        amr.command(0.9, 0.5)
-    for _ in range(480):
-        for amr in (one, other):
-            amr.advance(hall.physics_dt_s)
-        hall.step()
-    turn = np.array([[math.cos(2.0), -math.sin(2.0)], [math.sin(2.0), math.cos(2.0)]])
-    moved_one = one.state(0.0).position_odom_m - (0.0, -2.0)
-    moved_other = other.state(0.0).position_odom_m - (3.0, 1.0)
-    np.testing.assert_allclose(turn @ moved_one, moved_other, atol=0.005)
 
 
 def test_collision_shapes_fill_the_published_outline(hall: Warehouse) -> None:

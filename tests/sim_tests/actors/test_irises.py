@@ -3,43 +3,12 @@
 from __future__ import annotations
 
 import math
-from importlib import resources
 
-import cv2
 import numpy as np
 import pytest
-from worker_looks import LOOKS
 
 from perception import Camera
 from sim_tests import CameraRenderer, Warehouse, Worker
-from sim_tests.actors.body import JOINTS, load_worker
-
-FOLDER = resources.files("sim_tests.actors.body") / "workers"
-
-
-def shipped_texture(name, level):
-    data = np.frombuffer((FOLDER / f"{name}_lod{level}.jpg").read_bytes(), np.uint8)
-    return cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1]
-
-
-@pytest.mark.parametrize("name", LOOKS)
-def test_only_eyeballs_are_painted_and_only_for_near_people(name):
-    asset = load_worker(name)
-    for level in (1, 2):
-        assert np.array_equal(asset.levels[level].texture_rgb, shipped_texture(name, level))
-    finest = asset.levels[0]
-    changed = (finest.texture_rgb != shipped_texture(name, 0)).any(axis=2)
-    assert changed.any()
-    eyes = [row for row, joint in enumerate(JOINTS) if joint.endswith("_eye")]
-    is_eye = (finest.weights[:, eyes] > 0.5).any(axis=1)
-    height, width = changed.shape
-    others = np.zeros_like(changed, dtype=np.uint8)
-    for triangle in finest.triangles[~is_eye[finest.triangles].all(axis=1)]:
-        corners = np.column_stack(
-            [finest.uv[triangle, 0] * width, (1.0 - finest.uv[triangle, 1]) * height]
-        )
-        cv2.fillConvexPoly(others, np.floor(corners).astype(np.int32), 1)
-    assert np.count_nonzero(changed & (others > 0)) == 0
 
 
 def pupil_m(view, camera, eye_camera_m):

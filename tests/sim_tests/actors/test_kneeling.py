@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -28,12 +27,6 @@ SHINS = (
     (kp.LEFT_HIP, kp.LEFT_KNEE, kp.LEFT_ANKLE),
     (kp.RIGHT_HIP, kp.RIGHT_KNEE, kp.RIGHT_ANKLE),
 )
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.named("open")) as warehouse:
-        yield warehouse
 
 
 @pytest.mark.parametrize("look", LOOKS)

@@ -123,17 +123,6 @@ def test_glances_alternate_and_stop_for_good_after_giving_up():
     assert not ended[70:].any()
 
 
-def test_between_glances_the_head_points_at_the_phone():
-    gaze = Gaze(
-        Glances(notices_within_m=0.0, away_yaw_deg=10.0, away_pitch_deg=-40.0),
-        1.75,
-        np.random.default_rng(0),
-    )
-    rows = watch(gaze, lambda t: robot_at(4.0, 0.0), 3.0)
-    np.testing.assert_allclose(np.degrees(rows[:, 1]), 10.0, atol=1e-9)
-    np.testing.assert_allclose(np.degrees(rows[:, 2]), -40.0, atol=1e-9)
-
-
 def test_quartiles_must_lie_on_either_side_of_the_median():
     with pytest.raises(SimError, match="either side of the median"):
         LogNormalDuration.fitted(1.0, (1.2, 2.0))

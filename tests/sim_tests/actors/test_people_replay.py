@@ -81,8 +81,3 @@ def test_invalid_tables_are_refused(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(SimError, match=message):
         read_recordings(path)
-
-
-def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(SimError, match="cannot read recorded people from"):
-        read_recordings(tmp_path / "none.csv")

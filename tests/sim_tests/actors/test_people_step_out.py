@@ -66,12 +66,6 @@ def test_without_the_robot_they_stay_and_nothing_counts_as_lost() -> None:
     assert outcome.time_s == pytest.approx(outcome.free_time_s, abs=0.2)
 
 
-def test_they_do_not_set_off_before_their_start() -> None:
-    person = {**BESIDE, "sets_off_within_m": 4.0, "start_s": 6.0}
-    run = run_stage([person], robot_mps=1.0, seconds=8.0)
-    assert run.times_s[start_row(run)] == pytest.approx(6.05, abs=0.06)
-
-
 @pytest.mark.parametrize("population", ["classic", "recorded"])
 def test_who_has_watched_looks_away_and_forgets_the_robot(population: str) -> None:
     person = {

@@ -58,14 +58,6 @@ def test_an_undisturbed_walk_takes_the_free_time_exactly():
         assert outcome.length_m == pytest.approx(outcome.free_length_m, abs=1e-9)
 
 
-def test_pauses_have_the_given_place_and_duration():
-    rows = walk(walker([(0, 0), (8, 0)], pauses=[{"at_m": 3.0, "for_s": 2.0}]), 14.0)
-    standing = rows[(np.hypot(rows[:, 3], rows[:, 4]) < 0.05) & (rows[:, 1] > 1) & (rows[:, 1] < 7)]
-    np.testing.assert_allclose(standing[:, 1], 3.0, atol=0.1)
-    assert standing[-1, 0] - standing[0, 0] == pytest.approx(2.0, abs=0.5)
-    assert rows[-1, 1] == pytest.approx(8.0, abs=0.1)
-
-
 def test_a_person_who_turns_back_ends_at_the_start_and_faces_back():
     rows = walk(walker([(0, 0), (8, 0)], turns_back_at_m=3.0), 12.0)
     assert rows[:, 1].max() == pytest.approx(3.0, abs=0.15)

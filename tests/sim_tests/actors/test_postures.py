@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -27,18 +26,10 @@ from sim_tests.actors.body import (
     worker_names,
 )
 from sim_tests.world import Warehouse
-from sim_tests.world.bullet import pybullet
-from sim_tests.world.hall import WarehouseLayout
 
 PELVIS = -1
 WRISTS = [kp.LEFT_WRIST, kp.RIGHT_WRIST]
 PASSING_M = 0.02
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.named("open")) as warehouse:
-        yield warehouse
 
 
 @pytest.fixture(scope="module")
@@ -193,28 +184,3 @@ def test_hands_change_smoothly_from_one_activity_to_the_next(
         blended = hands(end)
         worker.place((0.0, 0.0), 0.0, 0.3, speed_mps, activity=activity)
         np.testing.assert_allclose(blended, worker.keypoints_odom_m[WRISTS], atol=1e-9)
-
-
-def test_a_carried_box_is_solid_and_an_absent_one_is_not() -> None:
-    """A probe ahead of the person is nearest to the box, if there is one."""
-    gaps = {}
-    with Warehouse(WarehouseLayout.named("open")) as hall:
-        worker = Worker(hall, look="kofi", stature_m=1.84)
-        ball = pybullet.createCollisionShape(
-            pybullet.GEOM_SPHERE, radius=0.05, physicsClientId=hall.client
-        )
-        probe = pybullet.createMultiBody(
-            0.0, ball, basePosition=(1.5, 0.0, 1.1), physicsClientId=hall.client
-        )
-        for activity in ("none", "carry_box"):
-            worker.place((0.0, 0.0), 0.0, activity=activity)
-            points = pybullet.getClosestPoints(probe, worker.body, 3.0, physicsClientId=hall.client)
-            gaps[activity] = min(point[8] for point in points)
-            ray = pybullet.rayTest((1.4, 0.0, 1.1), (0.0, 0.0, 1.1), physicsClientId=hall.client)
-            assert ray[0][0] == worker.body
-        T = worker.T_odom_held
-        assert T is not None
-        front = T[0, 3] + 0.5 * BOX_SIZE_M[0]
-        assert ray[0][3][0] == pytest.approx(front, abs=0.005)
-    assert gaps["carry_box"] == pytest.approx(1.5 - 0.05 - front, abs=0.005)
-    assert gaps["none"] > gaps["carry_box"] + 0.25

@@ -28,12 +28,6 @@ OMNI = RobotModel.shipped("omni")
 STEP_S = 1.0 / 240.0
 
 
-@pytest.fixture(scope="module")
-def hall():
-    with Warehouse(WarehouseLayout.named("open")) as warehouse:
-        yield warehouse
-
-
 def outline(robot: KinematicRobot) -> shapely.Polygon:
     state = robot.state(0.0)
     c, s = math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)

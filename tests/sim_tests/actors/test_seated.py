@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -35,12 +34,6 @@ NO_BOXES = np.empty((0, 4))
 HEADING_RAD = 0.7
 PLACE_M = np.array([1.0, -2.0])
 SEATED = {"t_s": 0.0, "activity": "sitting"}
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.named("open")) as warehouse:
-        yield warehouse
 
 
 def seated(hall: Warehouse, look: str, stature_m: float | None = None, **seat: str) -> Worker:
@@ -84,28 +77,6 @@ def test_thighs_are_level_shanks_upright_and_the_trunk_is_above_the_place(
         :, 2
     ].min()
     assert lowest == pytest.approx(0.0, abs=0.012)
-
-
-@pytest.mark.parametrize("kind", ["stool", "box"])
-def test_the_seat_stands_on_the_floor_under_the_hips(hall: Warehouse, kind: str) -> None:
-    worker = seated(hall, "kofi", seat=kind)
-    place = worker.T_odom_held
-    assert place is not None
-    assert worker.held == "seat"
-    assert worker.seat.kind == kind
-    depth, width, height = worker.seat.size_m
-    middle = in_body(place[:3, 3])
-    assert middle[2] == pytest.approx(0.5 * height)
-    assert 0.35 < height < 0.5
-    hips = in_body(worker.keypoints_odom_m[[kp.LEFT_HIP, kp.RIGHT_HIP]])
-    assert np.all(np.abs(hips[:, 0] - middle[0]) < 0.5 * depth)
-    assert np.all(np.abs(hips[:, 1]) < 0.5 * width)
-    assert 0.05 < hips[0, 2] - height < 0.2
-    surface = worker.held_object.surface(0)
-    assert surface is not None
-    floor, _ = cut_surfaces([surface], np.array([0.0, 0.0, 1.0]), 0.01)
-    corners = in_body(np.column_stack([floor[:, 0, :2], np.zeros(len(floor))]))
-    assert np.abs(corners[:, 1]).max() == pytest.approx(0.5 * width, abs=0.01)
 
 
 def test_at_a_scanners_height_there_are_two_shanks_before_four_legs(hall: Warehouse) -> None:

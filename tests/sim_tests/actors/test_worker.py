@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -50,12 +49,6 @@ postures = st.fixed_dictionaries(
         **heads,
     }
 )
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.named("open")) as warehouse:
-        yield warehouse
 
 
 @pytest.fixture(scope="module")
@@ -227,19 +220,6 @@ def test_invalid_placements_are_refused_and_move_nothing(
     assert worker.keypoints_odom_m.tobytes() == before
     assert worker.held == "phone"
     assert base == pybullet.getBasePositionAndOrientation(worker.body, physicsClientId=hall.client)
-
-
-def test_invalid_bodies_are_refused(hall: Warehouse) -> None:
-    bodies = pybullet.getNumBodies(physicsClientId=hall.client)
-    with pytest.raises(SimError, match="stature_m"):
-        Worker(hall, 0.9)
-    with pytest.raises(SimError, match="stride_m"):
-        Worker(hall, 1.7, stride_m=3.0)
-    with pytest.raises(SimError, match="nobody"):
-        Worker(hall, 1.7, look="nobody")
-    with pytest.raises(SimError, match="position_odom_m"):
-        Worker(hall, 1.7, position_odom_m=(0.0, math.inf))
-    assert pybullet.getNumBodies(physicsClientId=hall.client) == bodies
 
 
 def test_physics_does_not_move_a_placed_worker(hall: Warehouse, worker: Worker) -> None:

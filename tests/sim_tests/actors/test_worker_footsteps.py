@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -21,7 +20,6 @@ from sim_tests.actors.body import (
 )
 from sim_tests.scenario import Scenario, shipped_scenarios
 from sim_tests.world import Warehouse
-from sim_tests.world.hall import WarehouseLayout
 
 HZ = 40.0
 TOUCHING_M = 0.004
@@ -66,12 +64,6 @@ WALKS = {
         for number, worker in enumerate(Scenario.shipped(name).workers)
     },
 }
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.named("open")) as warehouse:
-        yield warehouse
 
 
 @pytest.fixture(scope="module")

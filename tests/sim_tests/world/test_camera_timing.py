@@ -42,16 +42,6 @@ def test_losses_and_delays_have_the_configured_statistics() -> None:
     assert delays.var() == pytest.approx(0.03**2 / 12.0, rel=0.08)
 
 
-def test_losing_one_frame_does_not_change_the_others() -> None:
-    """A higher loss rate removes frames; the remaining frames arrive at the same times."""
-    settings_of = {"rate_hz": 30.0, "latency_s": 0.02, "latency_jitter_s": 0.05}
-    few = _frames(CameraTiming(drop_rate=0.1, **settings_of), 300)
-    many = _frames(CameraTiming(drop_rate=0.5, **settings_of), 300)
-    assert _frames(CameraTiming(drop_rate=0.1, **settings_of), 300) == few
-    for one, other in zip(few, many, strict=True):
-        assert other in (one, (one[0], None))
-
-
 @settings(max_examples=50, deadline=None)
 @given(
     st.floats(5.0, 60.0),

@@ -89,8 +89,3 @@ def test_a_rectangle_shows_the_same_shadow_as_the_whole_image() -> None:
         # A silhouette has no floor to cast a shadow on.
         alone = renderer.render(CAMERA, pose, only={0})
         assert (alone.rgb[alone.actors < 0] == 255).all()
-
-
-def test_a_lamp_below_the_floor_casts_no_shadow(hall_with_ball: tuple[Warehouse, int]) -> None:
-    loss, _ = _loss(hall_with_ball[0], Lighting(direction_odom=(0.0, 0.5, -1.0)), ABOVE)
-    assert not loss.any()

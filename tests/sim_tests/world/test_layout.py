@@ -63,15 +63,6 @@ def test_every_hall_has_a_free_robot_aisle_and_no_overlapping_things(name: str) 
                     assert min(shared) < 1e-9, (prop, other)
 
 
-def test_the_blind_corner_is_blind() -> None:
-    layout = WarehouseLayout.named("blind_corner")
-    assert _blocked(layout, (1.0, 0.0), (6.0, 6.0))
-    assert _blocked(layout, (3.0, 0.0), (6.0, 5.0))
-    assert not _blocked(layout, (5.8, 0.5), (6.0, 6.0))
-    assert not _blocked(layout, (6.0, 0.0), (6.0, 11.0))
-    assert not _blocked(layout, (-3.0, 0.0), (6.0, 0.0))
-
-
 def test_unusable_halls_are_refused_by_name_and_others_are_read_back(tmp_path: Path) -> None:
     with pytest.raises(ValidationError, match=r"the rack at \(5, 2\) m reaches outside the hall"):
         WarehouseLayout(**_HALL, racks=(RackBox(x_m=5.0, y_m=2.0, length_m=2.0, width_m=1.0),))

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from genuine_detectors import MODELS, REQUIRED, GenuineDetector
 
-from perception import Camera
 from sim_tests import SimError
-from sim_tests.world import Warehouse
-from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import (
     LAYOUTS,
-    LIGHTINGS,
     PROP_PARTS,
     TEXTURE_NAMES,
-    Lighting,
     Mesh,
     Prop,
     RackBox,
@@ -172,40 +164,3 @@ def test_a_prop_fills_its_boxes_and_does_not_stick_out(kind: str, yaw_deg: float
         rows = np.arange(120)
         starts[rows, axis], ends[rows, axis] = low[axis], high[axis]
         assert _hits(mesh, starts, ends).mean() > 0.8, (kind, box)
-
-
-def _free_pose(layout: WarehouseLayout, rng: np.random.Generator) -> np.ndarray:
-    """Return T_odom_camera at the height of the robot's camera, 0.4 m clear of everything."""
-    boxes = layout.obstacle_boxes_odom
-    while True:
-        x = rng.uniform(layout.x_min_m + 0.5, layout.x_max_m - 0.5)
-        y = rng.uniform(layout.y_min_m + 0.5, layout.y_max_m - 0.5)
-        near = (np.array([x, y]) > boxes[:, :2] - 0.4) & (np.array([x, y]) < boxes[:, 2:] + 0.4)
-        if not near.all(axis=1).any():
-            break
-    heading = rng.uniform(-math.pi, math.pi)
-    c, s = math.cos(heading), math.sin(heading)
-    pose = np.eye(4)
-    pose[:3, :3] = np.array([[s, 0.0, c], [-c, 0.0, s], [0.0, -1.0, 0.0]])
-    pose[:3, 3] = (x, y, 1.4)
-    return pose
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("detector", REQUIRED)
-def test_genuine_detectors_find_nobody_in_an_empty_hall(detector: str) -> None:
-    if not (MODELS / f"{detector}.onnx").exists():
-        pytest.skip(f"the genuine detector {detector} is not here")
-    network = GenuineDetector(detector)
-    rng = np.random.default_rng(8)
-    camera = Camera.from_fov(640, 480, math.radians(75.0))
-    lights = sorted(LIGHTINGS)
-    highest = []
-    for number, name in enumerate(LAYOUTS):
-        with Warehouse(WarehouseLayout.named(name), variant=number, renderer="auto") as warehouse:
-            for _ in range(4):
-                light = Lighting.preset(lights[rng.integers(len(lights))])
-                renderer = CameraRenderer(warehouse, lighting=light)
-                image = renderer.rgb(camera, _free_pose(warehouse.layout, rng))
-                highest.append(network.people(image).scores.max(initial=0.0))
-    assert max(highest) < 0.5

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from perception import Camera
 from sim_tests.actors.body import Worker
 from sim_tests.actors.body._pose import skin_points
-from sim_tests.actors.robot import Amr, AmrLook
 from sim_tests.crossing.eyes import KeypointNoise
 from sim_tests.crossing.eyes._keypoint_camera import KeypointCamera
 from sim_tests.world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M, Warehouse
@@ -191,31 +190,6 @@ def test_a_person_hides_another_and_a_carried_box_hides_the_chest(
     assert not lines.blocked(eye, navel, detail).any()
     far.place((4.0, 0.0), math.pi, activity="carry_box")
     assert lines.blocked(eye, navel + np.array([0.1, 0.0, 0.0]), detail).all()
-
-
-def test_the_robot_hides_others_but_never_blocks_its_own_camera() -> None:
-    with Warehouse(WarehouseLayout.named("crossing")) as warehouse:
-        amr = Amr(warehouse)
-        lines = SightLines(warehouse.layout, actors=[AmrLook.of(warehouse, amr)])
-        low = np.array([[1.5, 0.0, 0.3]])
-        assert lines.blocked(np.array([-1.5, 0.0, 0.3]), low, FINE).all()
-        T = amr.T_odom_camera
-        pixels = np.stack(np.meshgrid(np.linspace(0, 1919, 25), np.linspace(0, 1199, 25)), -1)
-        rays = np.concatenate(
-            [
-                (pixels.reshape(-1, 2) - [CAMERA.cx_px, CAMERA.cy_px])
-                / [CAMERA.fx_px, CAMERA.fy_px],
-                np.ones((625, 1)),
-            ],
-            axis=1,
-        )
-        own = SightLines(warehouse.layout, actors=[AmrLook.of(warehouse, amr)])
-        bare = SightLines(warehouse.layout)
-        ends = T[:3, 3] + 0.9 * rays @ T[:3, :3].T
-        detail = np.zeros(625, dtype=np.int64)
-        np.testing.assert_array_equal(
-            own.blocked(T[:3, 3], ends, detail), bare.blocked(T[:3, 3], ends, detail)
-        )
 
 
 def _pose(

@@ -19,17 +19,11 @@ from sim_tests.actors.robot import Amr
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.camera import CameraRenderer
-from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout, box
+from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout
 from sim_tests.world.render import RenderView, Visuals, gl_works
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.named("open")) as warehouse:
-        yield warehouse
 
 
 @pytest.fixture
@@ -125,37 +119,6 @@ def test_equal_textures_are_kept_once_and_unusable_ones_are_refused() -> None:
         bare = Mesh(square.vertices_m, square.normals, square.indices)
         with pytest.raises(SimError, match="uv"):
             visuals.shape(bare, texture=first)
-
-
-def test_hidden_bodies_of_many_links_leave_no_trace() -> None:
-    """A chain of three shapes on spherical joints is posed, hidden, and shown again."""
-    with Visuals() as visuals:
-        texture = visuals.texture(CHECKERBOARD.astype(np.uint8))
-        square = upright_square(0.2)
-        shapes = tuple(visuals.shape(square, texture=texture) for _ in range(2))
-        body = visuals.add_body(
-            visuals.shape(box((0.0, 0.0, 0.0), (0.1, 0.3, 0.3)), (0.2, 0.4, 0.9)),
-            shapes,
-            np.array([(0.0, 0.5, 0.0), (0.0, 0.5, 0.0)]),
-            (-1, 0),
-        )
-        view = RenderView.of_rectangle(CAMERA, level_pose((-3.0, 0.5, 0.0), 0.0))
-        light = Lighting(ambient=1.0, diffuse=0.0)
-        shown = visuals.draw(view, light)
-        assert (shown.body_ids == body).sum() > 500
-        columns = np.flatnonzero((shown.body_ids == body).any(axis=0))
-        half_turn = (0.0, 0.0, 1.0, 0.0)
-        pybullet.resetJointStatesMultiDof(body, [1], [half_turn], physicsClientId=visuals.client)
-        turned = visuals.draw(view, light)
-        # The first link now faces away from the camera, and faces are visible from in front only.
-        assert np.flatnonzero((turned.body_ids == body).any(axis=0)).min() > columns.min()
-        visuals.hide(body)
-        gone = visuals.draw(view, light)
-        assert (gone.body_ids == -1).all()
-        assert np.isinf(gone.depth_m).all()
-        visuals.reveal(body)
-        again = visuals.draw(view, light)
-        np.testing.assert_array_equal(again.rgb, turned.rgb)
 
 
 def test_rendering_never_changes_the_physics() -> None:
