@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim_tests.world.hall import WarehouseLayout, scenery, scenery_texture
-from sim_tests.world.render._texture_islands import cut_texture
+from sim_tests.world.render._backend_tiny import cut_texture
 
 
 def _colours(uv: np.ndarray, texture: np.ndarray) -> np.ndarray:
