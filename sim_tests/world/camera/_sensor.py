@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
+from ..config import SimConfig
 from ..errors import SimError
 
 # From this number of electrons on, the Poisson distribution is replaced by a normal one.
@@ -20,7 +20,7 @@ _MANY_ELECTRONS: Final = 60.0
 _LIGHT_STEPS: Final = 65536
 
 
-class SensorConfig(StrictConfig):
+class SensorConfig(SimConfig):
     """The noise of an image sensor; the default leaves the image unchanged.
 
     Noise follows the photon transfer curve of EMVA 1288: a pixel with N electrons has the variance
@@ -31,8 +31,6 @@ class SensorConfig(StrictConfig):
         full_well_e: electrons of a saturated pixel.
         read_noise_e: standard deviation of the read noise, in electrons.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     shot_noise: bool = False
     full_well_e: float = Field(default=10_000.0, ge=10.0, le=1.0e7)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import resources
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
+from ..config import SimConfig
 from ..errors import SimError
 from ._props import Prop
 
@@ -21,7 +21,7 @@ _Positive = Annotated[float, Field(gt=0.0)]
 LAYOUTS: Final = ("crossing", "open", "blind_corner", "aisles", "staging_hall")
 
 
-class RackBox(StrictConfig):
+class RackBox(SimConfig):
     """A pallet rack as the box that it fills; it stands on the floor, its sides along the axes.
 
     Attributes:
@@ -31,8 +31,6 @@ class RackBox(StrictConfig):
         width_m: extent along odom y.
         height_m: height above the floor.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     x_m: float
     y_m: float
@@ -47,7 +45,7 @@ class RackBox(StrictConfig):
         return self.x_m - half_x, self.y_m - half_y, self.x_m + half_x, self.y_m + half_y
 
 
-class WarehouseLayout(StrictConfig):
+class WarehouseLayout(SimConfig):
     """A walled hall; the robot's aisle runs along odom x, centred on y = 0.
 
     Attributes:
@@ -66,8 +64,6 @@ class WarehouseLayout(StrictConfig):
 
     Raises pydantic's ``ValidationError`` (a ``ValueError``) or, from a file, :class:`SimError`.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     x_min_m: float
     y_min_m: float
