@@ -1,23 +1,19 @@
-"""Visual meshes of the robot by link."""
+"""Meshes of the robot by link."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 from perception.arrays import FloatArray
+from sim_tests.actors.robot import CAMERA_HEIGHT_M, WHEEL_RADIUS_M
+from sim_tests.world.hall import Mesh, Region, box, merge, quad
 
-from ...world.hall import AMR_ATLAS, Colour, Mesh, Region, box, ellipsoid, merge, quad, tube
-from ...world.sightlines import TriangleSet
-from ._amr import CAMERA_HEIGHT_M, WHEEL_RADIUS_M
+from ._robot import AMR_ATLAS
+from ._round_meshes import ellipsoid, tube
 
-#: A mesh in its link's frame, its colour, and the name of its texture or None.
-Piece = tuple[Mesh, Colour, "str | None"]
-
-_WHITE: Final[Colour] = (1.0, 1.0, 1.0)
 _HALF_LENGTH_M: Final = 0.3625
 _HALF_WIDTH_M: Final = 0.25
 # Rotation about x that takes z to y.
@@ -27,30 +23,23 @@ _SIDE_FACES: Final = ("-x", "+x", "-y", "+y")
 _region = AMR_ATLAS.region
 
 
-@lru_cache(maxsize=1)
-def amr_meshes() -> Mapping[str, tuple[Piece, ...]]:
+def robot_meshes() -> dict[str, Mesh]:
     """Return the meshes of ``base_link``, ``left_wheel`` and ``right_wheel`` in their link frames.
 
     The base frame is that of :class:`Amr`. A wheel's frame has its origin in the hub and its axis
     along y. Every part lies within the robot's footprint and outside the view of its own camera
     looking ahead: the camera's housing ends behind the optical centre.
     """
-    base = merge([*_body(), *_deck(), *_post(), *_casters()])
     return {
-        "base_link": ((base, _WHITE, "amr"),),
-        "left_wheel": ((_wheel(1.0), _WHITE, "amr"),),
-        "right_wheel": ((_wheel(-1.0), _WHITE, "amr"),),
+        "base_link": merge(base_pieces()),
+        "left_wheel": _wheel(1.0),
+        "right_wheel": _wheel(-1.0),
     }
 
 
-@lru_cache(maxsize=1)
-def base_triangles() -> TriangleSet:
-    """Return the triangles of ``base_link`` in pieces.
-
-    A line of sight skips every piece that it passes above.
-    """
-    meshes = [*_body(), *_deck(), *_post(), *_casters()]
-    return TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes])
+def base_pieces() -> list[Mesh]:
+    """Return the pieces of ``base_link``: a line of sight skips each that it passes above."""
+    return [*_body(), *_deck(), *_post(), *_casters()]
 
 
 def _outline(half_x: float, half_y: float, radius: float) -> FloatArray:

@@ -7,18 +7,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ._atlas import Atlas
+from ._atlas import PaintedAtlas
 from ._canvas import Canvas, Rgb, grain
-from ._texture_goods_painters import GOODS_PAINTERS
+from ._goods_painters import GOODS_PAINTERS
 
-#: Number of goods textures; a variant of the scenery uses one of them.
-GOODS_SETS: Final = 4
 # Number of cells of each kind in the atlas.
-CARTONS: Final = 8
-STACKS: Final = 10
-WRAPS: Final = 4
-CRATES: Final = 5
-SIGNS: Final = 12
+_CARTONS: Final = 8
+_STACKS: Final = 10
+_WRAPS: Final = 4
+_CRATES: Final = 5
+_SIGNS: Final = 12
 
 _MATERIALS: Final[dict[str, Rgb]] = {
     "steel": (138, 142, 146),
@@ -35,12 +33,12 @@ _MATERIALS: Final[dict[str, Rgb]] = {
     "lamp": (255, 255, 255),
 }
 
-GOODS_ATLAS: Final = Atlas(
+GOODS_ATLAS: Final = PaintedAtlas(
     1024,
     {
-        **{f"stack{k}": (128, 128) for k in range(STACKS)},
-        **{f"wrap{k}": (128, 128) for k in range(WRAPS)},
-        **{f"crates{k}": (128, 128) for k in range(CRATES)},
+        **{f"stack{k}": (128, 128) for k in range(_STACKS)},
+        **{f"wrap{k}": (128, 128) for k in range(_WRAPS)},
+        **{f"crates{k}": (128, 128) for k in range(_CRATES)},
         "sacks0": (128, 128),
         "sacks1": (128, 128),
         "drums0": (128, 128),
@@ -52,7 +50,7 @@ GOODS_ATLAS: Final = Atlas(
         "end": (64, 256),
         "upright": (16, 256),
         "ladder": (64, 256),
-        **{f"carton{k}": (96, 96) for k in range(CARTONS)},
+        **{f"carton{k}": (96, 96) for k in range(_CARTONS)},
         "window": (96, 64),
         "deck": (96, 64),
         **{f"top{k}": (64, 64) for k in range(4)},
@@ -60,7 +58,7 @@ GOODS_ATLAS: Final = Atlas(
         "wrap_top": (64, 64),
         "crates_top": (64, 64),
         "mast": (64, 64),
-        **{f"sign{k}": (64, 32) for k in range(SIGNS)},
+        **{f"sign{k}": (64, 32) for k in range(_SIGNS)},
         "hazard": (128, 32),
         "beam": (128, 16),
         "pallet_side": (128, 20),

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ._atlas import Atlas
+from ._atlas import PaintedAtlas
 from ._canvas import (
     Canvas,
     band,
@@ -24,12 +24,12 @@ from ._canvas import (
     text,
 )
 
-#: Extent that a texture covers: side of a square of floor or ceiling, width of a piece of wall.
-TILE_M: Final = 4.0
+# Extent that a texture covers: side of a square of floor or ceiling, width of a piece of wall.
+_TILE_M: Final = 4.0
 # The mean colour of the slab's textures: worn paint shows it, and shades end in it.
 _SLAB_RGB: Final = (158.0, 157.0, 152.0)
 
-FIXTURE_ATLAS: Final = Atlas(
+FIXTURE_ATLAS: Final = PaintedAtlas(
     512,
     {
         "dock": (192, 192),
@@ -53,7 +53,7 @@ FIXTURE_ATLAS: Final = Atlas(
     },
 )
 
-MARKING_ATLAS: Final = Atlas(
+MARKING_ATLAS: Final = PaintedAtlas(
     256,
     {
         "line": (256, 24),
@@ -100,7 +100,7 @@ def floor_texture(number: int) -> NDArray[np.uint8]:
         marks = np.maximum(marks, cv2.GaussianBlur(one, (0, 0), 3.0))
     marks *= 0.75 + 0.25 * noise(rng, 512, 512, 40, 40)
     canvas *= 1.0 - np.clip(cv2.GaussianBlur(marks, (0, 0), 1.2), 0.0, 0.4)[..., None]
-    centre_m = (np.arange(512) + 0.5) / 512 * TILE_M - 0.5 * TILE_M
+    centre_m = (np.arange(512) + 0.5) / 512 * _TILE_M - 0.5 * _TILE_M
     pool = np.exp(-(centre_m[:, None] ** 2 + centre_m[None, :] ** 2) / (2.0 * 1.3**2))
     canvas *= (0.94 + 0.13 * pool)[..., None].astype(np.float32)
     for edge in (slice(0, 2), slice(510, 512)):

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ._atlas import Atlas
+from ._atlas import PaintedAtlas
 from ._canvas import Canvas, Rgb, band, disc, fade, grain, text
 
 _MATERIALS: Final[dict[str, Rgb]] = {
@@ -24,7 +24,7 @@ _MATERIALS: Final[dict[str, Rgb]] = {
     "lid": (34, 66, 122),
 }
 
-AMR_ATLAS: Final = Atlas(
+AMR_ATLAS: Final = PaintedAtlas(
     256,
     {
         "flank": (128, 64),
