@@ -34,20 +34,13 @@ if TYPE_CHECKING:
         violation_excess_of_time,
         won_back,
     )
-    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric, Ratio
+    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric
     from ._record_file import (
         RECORD_COLUMNS,
         read_records,
         read_rows,
         record_row,
         write_records,
-    )
-    from ._step_out import (
-        FASTER_STEP_OUT,
-        STEP_OUT,
-        StepOut,
-        StepOutImpacts,
-        step_out_impacts,
     )
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, Variant, labels, summarise
     from ._summary_text import nondeterminism_notes, summary_text, table_text
@@ -58,14 +51,12 @@ __all__ = [
     "ATTENTIVE_FROM",
     "BASELINE",
     "COLUMNS",
-    "FASTER_STEP_OUT",
     "FEW_PAIRS",
     "METRICS",
     "OVERSHOOT_MPS",
     "RATIOS",
     "RECORD_COLUMNS",
     "SHARES",
-    "STEP_OUT",
     "UNAWARE_UP_TO",
     "UNCONFIRMED",
     "Comparison",
@@ -74,9 +65,6 @@ __all__ = [
     "Interval",
     "MeasuredAttention",
     "Metric",
-    "Ratio",
-    "StepOut",
-    "StepOutImpacts",
     "Summary",
     "SummaryRow",
     "Trace",
@@ -99,7 +87,6 @@ __all__ = [
     "record_row",
     "resampled_interval",
     "resampled_means",
-    "step_out_impacts",
     "summarise",
     "summary_text",
     "table_text",
@@ -158,7 +145,6 @@ __getattr__ = lazy_names(
             "SHARES",
             "EpisodeRecord",
             "Metric",
-            "Ratio",
         ),
         "._record_file": (
             "RECORD_COLUMNS",
@@ -166,13 +152,6 @@ __getattr__ = lazy_names(
             "read_rows",
             "record_row",
             "write_records",
-        ),
-        "._step_out": (
-            "FASTER_STEP_OUT",
-            "STEP_OUT",
-            "StepOut",
-            "StepOutImpacts",
-            "step_out_impacts",
         ),
         "._summary": (
             "BASELINE",

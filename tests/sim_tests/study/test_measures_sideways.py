@@ -105,6 +105,7 @@ class Strafer:
         return 0.0, math.copysign(0.8, math.sin(robot_state.stamp_s)), 0.0
 
 
+@pytest.mark.slow
 def test_a_robot_that_strafes_past_its_limit_does_not_obey():
     result = run_crossing(
         "head_on_in_aisle", policy="balanced", planner=Strafer(), robot="omni", seed=0
