@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from run_scenes import SHORT
@@ -11,7 +10,6 @@ from run_scenes import SHORT
 from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.actors.robot import RobotModel
-from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.runs import (
     Conditions,
     job_key,
@@ -20,8 +18,6 @@ from sim_tests.study.runs import (
     read_jobs,
     template_of,
 )
-from sim_tests.study.scorecard._compare import CompareOptions, _command_line
-from sim_tests.study.scorecard._plan import plan_comparison
 from sim_tests.study.watch._watch import WatchOptions, _job
 
 
@@ -49,44 +45,6 @@ def test_planners_get_the_profile_of_the_robot() -> None:
     planner = make_planner(f"{__name__}:Keeps", template_of(job.scenario).median())
     assert isinstance(planner, Keeps)
     assert planner.robot.drive == "holonomic"
-
-
-def test_a_comparison_of_planners_takes_a_robot() -> None:
-    _, jobs = plan_comparison(
-        ["straight_on"],
-        ["crossing_from_left"],
-        ["balanced"],
-        (0,),
-        perception="truth",
-        robot="delivery",
-    )
-    assert {job_key(job).scenario for job in jobs} == {"crossing_from_left_delivery"}
-
-
-def test_a_comparison_of_planners_takes_a_population() -> None:
-    _, jobs = plan_comparison(
-        ["straight_on"],
-        ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
-        ["balanced"],
-        (0,),
-        perception="truth",
-        population="recorded",
-    )
-    drawn = [template_of(job.scenario).for_seed(0) for job in jobs]
-    assert {(each.population, each.workers) for each in drawn} == {("recorded", ())}
-
-
-def test_the_command_of_a_comparison_names_robot_and_population() -> None:
-    options = CompareOptions(
-        **{"planners": ("reference",), "scenario": ("runs_out",), "policy": ("blind",)},
-        **{"seeds": (0, 1), "perception": "truth", "sensors": "camera", "camera": ""},
-        **{"robot": "omni", "population": "recorded", "workers": 1, "time_limit": 60.0},
-        **{"out": Path("out"), "resume": False, "overwrite": False, "as_json": False},
-    )
-    words = _command_line(options)
-    assert "--robot omni --population recorded --out out" in words
-    usual = _command_line(replace(options, robot="", population=None))
-    assert words.replace(" --robot omni --population recorded", "") == usual
 
 
 def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> None:
