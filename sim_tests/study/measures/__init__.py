@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         record_row,
         write_records,
     )
+    from ._step_out import StepOut, step_out_impacts
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, Variant, labels, summarise
     from ._summary_text import nondeterminism_notes, summary_text, table_text
     from ._trace import Trace
@@ -65,6 +66,7 @@ __all__ = [
     "Interval",
     "MeasuredAttention",
     "Metric",
+    "StepOut",
     "Summary",
     "SummaryRow",
     "Trace",
@@ -87,6 +89,7 @@ __all__ = [
     "record_row",
     "resampled_interval",
     "resampled_means",
+    "step_out_impacts",
     "summarise",
     "summary_text",
     "table_text",
@@ -153,6 +156,7 @@ __getattr__ = lazy_names(
             "record_row",
             "write_records",
         ),
+        "._step_out": ("StepOut", "step_out_impacts"),
         "._summary": (
             "BASELINE",
             "Comparison",

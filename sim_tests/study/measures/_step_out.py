@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception.anthropometry import BODY_RADIUS_M
-from perception.arrays import FloatArray
+from perception.arrays import FloatArray, finite_number, set_fields
 
 from ...actors.behaviour import LOOK_WITHIN_S, START_SHARES
 from ...crossing import STANDING_SPEED_MPS
+from ...world.errors import SimError
 from ._awareness import AWARE_FROM
 from ._conflict import Outline
 from ._trace import Trace
@@ -56,12 +57,36 @@ class StepOut:
         start_shares: share of people who start within a second, each in [0, 1), by the last look
             at the robot: now, up to 1 s and up to 4 s ago, longer ago or never. The default was
             recorded at the kerb, before vehicles that move (docs/people.md).
+
+    Raises:
+        SimError: for other values.
     """
 
     speed_mps: float = 1.34
     time_constant_s: float = 0.54
     noticed_after_s: float = 0.2
     start_shares: tuple[float, ...] = START_SHARES["moving"]
+
+    def __post_init__(self) -> None:
+        for name, zero_is_valid in (
+            ("speed_mps", False),
+            ("time_constant_s", False),
+            ("noticed_after_s", True),
+        ):
+            value = finite_number(
+                name,
+                getattr(self, name),
+                SimError,
+                minimum=0.0,
+                exclusive_minimum=not zero_is_valid,
+            )
+            set_fields(self, **{name: value})
+        shares = tuple(finite_number("start_shares", each, SimError) for each in self.start_shares)
+        if len(shares) != len(LOOK_WITHIN_S) + 1 or not all(0.0 <= each < 1.0 for each in shares):
+            raise SimError(
+                f"start_shares must be {len(LOOK_WITHIN_S) + 1} shares in [0, 1), got {shares}"
+            )
+        set_fields(self, start_shares=shares)
 
     def ways(self, t_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the time (s) for which the velocity at the start counts, and the way (m) ahead.

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, crossing, straight, walking
 
 from nav_adapter import RobotProfile
-from sim_tests import NOVA_CARTER, ScenarioTemplate, run_crossing
+from sim_tests import NOVA_CARTER, ScenarioTemplate, SimError, run_crossing
 from sim_tests.study.measures import measure
 from sim_tests.study.measures._step_out import (
     FASTER_STEP_OUT,
@@ -254,6 +254,21 @@ def test_the_row_has_both_models_and_nothing_without_people():
     assert stress.unaware > found.unaware > found.unaware_fast > 0.0
     alone = measure(crossing(T_S, straight(1.2)))
     assert alone.step_out_unaware is alone.step_out_stress_worst_mps is None
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"speed_mps": 0.0}, "speed_mps"),
+        ({"time_constant_s": math.nan}, "time_constant_s"),
+        ({"noticed_after_s": -0.1}, "noticed_after_s"),
+        ({"start_shares": (0.1, 0.1, 0.1)}, "start_shares must be 4 shares"),
+        ({"start_shares": (0.1, 0.1, 0.1, 1.0)}, "start_shares must be 4 shares"),
+    ],
+)
+def test_constants_that_nobody_has_are_refused(values, message):
+    with pytest.raises(SimError, match=message):
+        StepOut(**values)
 
 
 def test_a_crossing_logs_the_racks_of_its_hall():
