@@ -166,7 +166,7 @@ def test_no_other_module_parses_yaml_or_json():
     The record of an installer is read by the guard against a clash, which may import nothing.
     """
     own = {
-        "sim_tests/study/runs/_seeded_crossing.py",
+        "sim_tests/study/runs/_episode.py",
         "sim_tests/dataset/_render.py",
         "perception/installation.py",
     }
