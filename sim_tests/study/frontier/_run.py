@@ -13,7 +13,7 @@ from awarenav.files import json_text, write_text
 
 from ...crossing.eyes import PerceptionKind, SensorSet
 from ...world.errors import SimError
-from ..measures import EpisodeRecord, read_records
+from ..measures import EpisodeRecord, read_rows
 from ..runs import Job, RunFiles, plan_jobs, policy_text, run_jobs
 from ._family import TODAY, family, sensors_of_today
 from ._frontier import frontier_of
@@ -54,7 +54,7 @@ def frontier_command(options: FrontierOptions) -> int:
         failed = sum(bool(record.error) for record in records)
     else:
         folder = options.folder
-        records = read_records(RunFiles(folder).episodes)
+        records = read_rows(folder)
     frontier = frontier_of(records)
     text, data = frontier_text(frontier), json_text(asdict(frontier))
     write_text(folder / "frontier.md", text, SimError)

@@ -38,9 +38,8 @@ if TYPE_CHECKING:
     from ._ratios import RATIOS, Ratio
     from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
     from ._record_file import (
-        read_record_file,
         read_records,
-        salvage_record_file,
+        read_rows,
         write_records,
     )
     from ._step_out import (
@@ -95,12 +94,11 @@ __all__ = [
     "path_length_m",
     "proportion_interval",
     "ratio_interval",
-    "read_record_file",
     "read_records",
+    "read_rows",
     "record_row",
     "resampled_interval",
     "resampled_means",
-    "salvage_record_file",
     "step_out_impacts",
     "summarise",
     "summary_text",
@@ -168,9 +166,8 @@ __getattr__ = lazy_names(
             "record_row",
         ),
         "._record_file": (
-            "read_record_file",
             "read_records",
-            "salvage_record_file",
+            "read_rows",
             "write_records",
         ),
         "._step_out": (

@@ -13,11 +13,10 @@ from perception.documents import read_json
 
 from ...world.errors import SimError
 from ._answering import answering_note
-from ._record_file import read_records, write_records
+from ._record_file import read_rows, write_records
 from ._summary import BASELINE, summarise_sources
 from ._summary_text import summary_text
 
-_EPISODES: Final = "episodes.csv"
 _RUN: Final = "run.json"
 
 
@@ -45,10 +44,7 @@ def compare_command(options: CompareOptions) -> int:
         raise SimError(f"--level must lie in (0, 1), got {options.level:g}")
     if options.out is not None and options.out.suffix not in (".csv", ".parquet"):
         raise SimError(f"--out must be a .csv or .parquet file, got {options.out}")
-    sources = {
-        name: read_records(_episodes_file(path))
-        for name, path in zip(names, options.runs, strict=True)
-    }
+    sources = {name: read_rows(path) for name, path in zip(names, options.runs, strict=True)}
     records = [record for table in sources.values() for record in table]
     if not records:
         raise SimError(f"no episodes yet in {', '.join(map(str, options.runs))}")
@@ -64,10 +60,6 @@ def compare_command(options: CompareOptions) -> int:
     if options.out is not None:
         write_records(options.out, records)
     return 0
-
-
-def _episodes_file(path: Path) -> Path:
-    return path / _EPISODES if path.is_dir() else path
 
 
 def _answering(runs: Sequence[Path]) -> list[str]:

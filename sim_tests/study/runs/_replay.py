@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import cv2
 import numpy as np
@@ -19,22 +19,27 @@ from awarenav.video import VideoWriter
 from perception import AttentionCone
 
 from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
-from ...viewing import outcome_text, show_page, write_page
+from ...crossing.eyes import Perception
+from ...viewing import (
+    CameraPictures,
+    CrossingRecorder,
+    Episode,
+    outcome_text,
+    show_page,
+    write_page,
+)
 from ...world.camera import CameraRenderer
 from ...world.errors import SimError
 from ..measures import (
     RECORD_COLUMNS,
     EpisodeRecord,
     nondeterminism_notes,
-    read_record_file,
+    read_rows,
     record_row,
 )
 from ._episode import observed_episode
-from ._job import Job
-from ._plan import describe, job_key, template_of
-from ._recording import recorder_of
-from ._run_files import RunFiles, read_jobs
-from ._run_folder import record_key
+from ._job import Job, describe, job_key, template_of
+from ._run_folder import RunFiles, read_jobs, record_key
 
 Image = NDArray[np.uint8]
 
@@ -207,6 +212,29 @@ def _write_view(job: Job, path: Path, bar: tqdm[NoReturn]) -> tuple[EpisodeRecor
     return record, [path]
 
 
+def recorder_of(
+    job: Job,
+    *,
+    camera: bool = True,
+    share: float = 1.0,
+    on_begin: Callable[[dict[str, Any]], None] | None = None,
+    on_state: Callable[[dict[str, Any]], None] | None = None,
+) -> CrossingRecorder:
+    """Return an observer that records a job's crossing.
+
+    Args:
+        job: the episode.
+        camera: whether to render the robot's camera.
+        share: most of the elapsed time that rendering may take; 1 for no limit.
+        on_begin: as for :class:`~sim_tests.viewing.CrossingRecorder`.
+        on_state: likewise.
+    """
+    episode = Episode(**job_key(job)._asdict())
+    scaled = Perception.named(job.perception).kind == "pixels"
+    pictures = CameraPictures(boxes_are_scaled=scaled, share=share) if camera else None
+    return CrossingRecorder(episode, pictures=pictures, on_begin=on_begin, on_state=on_state)
+
+
 def find_episode(jobs: Sequence[Job], episode: str) -> int:
     """Return the number of an episode, given as number or SCENARIO:SEED:POLICY[:PLANNER][:FAULT].
 
@@ -246,19 +274,18 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
 
 def _compare_row(folder: Path, job: Job, record: EpisodeRecord) -> int:
     """Print the difference to the row of the run; return 0 for the same row, else 1."""
-    path = RunFiles(folder).episodes
     key = job_key(job)
-    before = [each for each in read_record_file(path).records if record_key(each) == key]
+    before = [each for each in read_rows(folder) if record_key(each) == key]
     if not before:
-        print(f"{path} has no row of this episode yet")
+        print(f"{folder} has no row of this episode yet")
         return 0
     pairs = zip(RECORD_COLUMNS, record_row(before[0]), record_row(record), strict=True)
     changed = [(name, was, now) for name, was, now in pairs if was != now]
     if not changed:
-        print(f"The same row as in {path}.")
+        print(f"The same row as in {folder}.")
         return 0
     print(
-        f"Not the row in {path}: "
+        f"Not the row in {folder}: "
         + "; ".join(
             f"{name} was {was or 'empty'}, is {now or 'empty'}" for name, was, now in changed
         )
