@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ._measure import differences, measure, read_results, remeasured
-from ._page import leaderboard_page, ranked
+from ._page import leaderboard_page, ranked, write_leaderboard
 from ._rows import PAGE, RESULTS, Board, Row
 
 __all__ = [
@@ -17,4 +17,5 @@ __all__ = [
     "ranked",
     "read_results",
     "remeasured",
+    "write_leaderboard",
 ]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from awarenav.errors import AwarenavError
 from benchmarks._harness import count, make_parser
 
 from ._measure import differences, measure, read_results, remeasured
-from ._page import leaderboard_page
+from ._page import leaderboard_page, write_leaderboard
 from ._rows import PAGE, RESULTS, Board, Row
 
 
@@ -17,7 +18,7 @@ def main() -> int:
     """Run the command; return 1 if an episode is another one now, 2 for bad input."""
     parser = make_parser(
         "benchmarks.leaderboard",
-        "Measure the episodes that docs/leaderboard lacks, and write docs/leaderboard.md. An "
+        "Measure the rows that docs/leaderboard lacks, and write docs/leaderboard.md. An "
         "interrupted run continues with the same command.",
     )
     parser.add_argument(
@@ -28,6 +29,9 @@ def main() -> int:
     )
     parser.add_argument("--again", action="store_true", help="measure the rows from the beginning")
     parser.add_argument("--page", action="store_true", help="measure nothing, write the page")
+    parser.add_argument(
+        "--html", type=Path, metavar="FILE", help="write the tables as one HTML page, too"
+    )
     parser.add_argument(
         "--check",
         metavar="SCENARIO",
@@ -42,6 +46,8 @@ def main() -> int:
         if not options.page:
             measure(board, rows, workers=options.workers, again=options.again)
         PAGE.write_text(leaderboard_page(board, RESULTS), encoding="utf-8")
+        if options.html:
+            write_leaderboard(board, options.html)
     except AwarenavError as error:
         print(f"leaderboard: {error}", file=sys.stderr)
         return 2

@@ -21,6 +21,8 @@ from tracking.config import StrictConfig
 _ROOT: Final = Path(__file__).resolve().parents[2]
 #: Folder of the rows and of their results.
 RESULTS: Final = _ROOT / "docs" / "leaderboard"
+#: Folder of the runs that measure them, which git ignores.
+WORK: Final = _ROOT / "build" / "leaderboard"
 #: The page.
 PAGE: Final = _ROOT / "docs" / "leaderboard.md"
 _ROWS_FILE: Final = "rows.yaml"

@@ -23,7 +23,6 @@ from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
 from ..measures import BASELINE, EpisodeRecord, table_text
 from ..runs import KNOWN_PLANNERS, Job, RunFiles, plan_jobs, policy_of, run_jobs, template_of
-from ._conducts import ConductFile
 from ._run import WIDE_KEY, Run
 
 #: The command line's name of the reference planner, whose name in jobs is empty.
@@ -84,7 +83,6 @@ def compare_planners(
     folder = Path(out_dir)
     names = [each if isinstance(each, str) else _import_name(each) for each in planners]
     jobs, wide = plan_comparison(names, scenarios, policies, tuple(seeds), **conditions)
-    conducts = ConductFile(folder, resume=resume)
     try:
         records = run_jobs(
             jobs,
@@ -95,7 +93,6 @@ def compare_planners(
             overwrite=overwrite,
             progress=progress,
             about={**(about or {}), WIDE_KEY: wide},
-            on_attempt=conducts.add,
         )
     except KeyboardInterrupt:
         with contextlib.suppress(SimError):  # nothing has run yet

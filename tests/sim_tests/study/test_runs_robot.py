@@ -12,9 +12,9 @@ from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.actors.robot import RobotModel
 from sim_tests.scenario import ScenarioTemplate
+from sim_tests.study.report._compare import plan_comparison
+from sim_tests.study.report.command import command_line
 from sim_tests.study.runs import job_key, make_planner, plan_jobs, read_jobs, template_of
-from sim_tests.study.scorecard._compare import CompareOptions, _command_line
-from sim_tests.study.scorecard._plan import plan_comparison
 from sim_tests.study.watch._watch import WatchOptions, _job
 
 
@@ -45,24 +45,22 @@ def test_planners_get_the_profile_of_the_robot() -> None:
 
 
 def test_a_comparison_of_planners_takes_a_robot() -> None:
-    _, jobs = plan_comparison(
+    jobs, _ = plan_comparison(
         ["straight_on"],
         ["crossing_from_left"],
         ["balanced"],
         (0,),
-        perception="truth",
         robot="delivery",
     )
     assert {job_key(job).scenario for job in jobs} == {"crossing_from_left_delivery"}
 
 
 def test_a_comparison_of_planners_takes_a_population() -> None:
-    _, jobs = plan_comparison(
+    jobs, _ = plan_comparison(
         ["straight_on"],
         ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
         ["balanced"],
         (0,),
-        perception="truth",
         population="recorded",
     )
     drawn = [template_of(job.scenario).for_seed(0) for job in jobs]
@@ -70,16 +68,15 @@ def test_a_comparison_of_planners_takes_a_population() -> None:
 
 
 def test_the_command_of_a_comparison_names_robot_and_population() -> None:
-    options = CompareOptions(
-        **{"planners": ("reference",), "scenario": ("runs_out",), "policy": ("blind",)},
-        **{"seeds": (0, 1), "perception": "truth", "sensors": "camera", "camera": ""},
-        **{"robot": "omni", "population": "recorded", "workers": 1, "time_limit": 60.0},
-        **{"out": Path("out"), "resume": False, "overwrite": False, "as_json": False},
+    settings = {"scenario": ["runs_out"], "policy": ["blind"], "seeds": (0, 1)}
+    settings |= {"perception": "truth", "sensors": "camera", "camera": ""}
+    words = command_line(
+        ("reference",), Path("out"), settings | {"robot": "omni", "population": "recorded"}
     )
-    words = _command_line(options)
-    assert "--robot omni --population recorded --out out" in words
-    usual = _command_line(replace(options, robot="", population=None))
-    assert words.replace(" --robot omni --population recorded", "") == usual
+    assert words == (
+        "awarenav planners compare reference --scenario runs_out --policy blind --seeds 0-1 "
+        "--perception truth --sensors camera --robot omni --population recorded --out out"
+    )
 
 
 def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> None:
