@@ -8,7 +8,6 @@ from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
     from ._episode import (
-        Attempt,
         attempt,
         died,
         free_run_of,
@@ -16,18 +15,18 @@ if TYPE_CHECKING:
         run_episode,
         seeded_crossing,
     )
-    from ._job import (
-        Job,
-        JobKey,
-        describe,
+    from ._job import Attempt, Job, JobKey, describe
+    from ._parallel import in_parallel, tidy
+    from ._plan import (
         fault_of,
         job_key,
+        named_templates,
+        plan_jobs,
         policy_of,
         policy_text,
+        sample_jobs,
         template_of,
     )
-    from ._parallel import in_parallel, tidy
-    from ._plan import named_templates, plan_jobs, sample_jobs
     from ._planner_choice import (
         KNOWN_PLANNERS,
         make_planner,
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     )
     from ._replay import find_episode, recorder_of
     from ._run import run_jobs
-    from ._run_folder import RunFiles, read_attempts, read_jobs, read_run
+    from ._run_files import RunFiles, read_attempts, read_jobs, read_run
 
 __all__ = [
     "KNOWN_PLANNERS",
@@ -78,7 +77,6 @@ __getattr__ = lazy_names(
     __name__,
     {
         "._episode": (
-            "Attempt",
             "attempt",
             "died",
             "free_run_of",
@@ -86,18 +84,18 @@ __getattr__ = lazy_names(
             "run_episode",
             "seeded_crossing",
         ),
-        "._job": (
-            "Job",
-            "JobKey",
-            "describe",
+        "._job": ("Attempt", "Job", "JobKey", "describe"),
+        "._parallel": ("in_parallel", "tidy"),
+        "._plan": (
             "fault_of",
             "job_key",
+            "named_templates",
+            "plan_jobs",
             "policy_of",
             "policy_text",
+            "sample_jobs",
             "template_of",
         ),
-        "._parallel": ("in_parallel", "tidy"),
-        "._plan": ("named_templates", "plan_jobs", "sample_jobs"),
         "._planner_choice": (
             "KNOWN_PLANNERS",
             "make_planner",
@@ -107,6 +105,6 @@ __getattr__ = lazy_names(
         ),
         "._replay": ("find_episode", "recorder_of"),
         "._run": ("run_jobs",),
-        "._run_folder": ("RunFiles", "read_attempts", "read_jobs", "read_run"),
+        "._run_files": ("RunFiles", "read_attempts", "read_jobs", "read_run"),
     },
 )

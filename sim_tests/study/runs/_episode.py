@@ -18,7 +18,8 @@ from ...crossing.eyes import Perception, pixel_pipeline
 from ...scenario import Scenario
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, measure, path_length_m
-from ._job import Job, fault_of, job_key, policy_of, template_of
+from ._job import Attempt, Job
+from ._plan import fault_of, job_key, policy_of, template_of
 from ._planner_choice import import_planner, make_planner, planner_label, seeded_generators
 
 # Seed of the planner in the task without people, the same for every episode of the task.
@@ -28,21 +29,6 @@ _FREE_SEED: Final = 0
 _GRACE_S: Final = 5.0
 # An episode runs on one core, beside others.
 _ONE_CORE: Final = OnnxSettings(intra_op_threads=1)
-
-
-@dataclass(frozen=True, slots=True)
-class Attempt:
-    """The outcome of one episode.
-
-    Attributes:
-        record: its row in the table.
-        traceback: of the error that ended it; empty without an error.
-        conduct: of its planner; None for an episode that ended with an error.
-    """
-
-    record: EpisodeRecord
-    traceback: str = ""
-    conduct: Conduct | None = None
 
 
 @dataclass(frozen=True, slots=True)

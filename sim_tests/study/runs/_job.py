@@ -1,26 +1,13 @@
-"""One episode to run, as plain data, its key in tables, and the versions it depends on."""
+"""An episode as plain data: its job, its key, its outcome, and the versions it depends on."""
 
 from __future__ import annotations
 
 import platform
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from importlib import metadata
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
-import yaml
-from pydantic import ValidationError
-
-from nav_adapter import AwarenessPolicy
-from perception.documents import parse_yaml, yaml_text
-from tracking.config import StrictConfig, complaints
-
-from ...crossing.faults import Fault
-from ...scenario import ScenarioTemplate
-from ...world.errors import SimError
-from ._planner_choice import planner_label
-
-_ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
+from ..measures import Conduct, EpisodeRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +53,6 @@ class JobKey(NamedTuple):
     fault: str
 
 
-def job_key(job: Job) -> JobKey:
-    """Return the key of a job, which is unique in its run."""
-    scenario = template_of(job.scenario).median()
-    label = planner_label(job.planner, scenario)
-    return JobKey(scenario.name, job.seed, job.policy_name, label, job.perception, job.fault_name)
-
-
 def describe(key: JobKey) -> str:
     """Return an episode in words."""
     fault = f", fault {key.fault}" if key.fault else ""
@@ -82,41 +62,31 @@ def describe(key: JobKey) -> str:
     )
 
 
-@lru_cache(maxsize=256)
-def template_of(text: str) -> ScenarioTemplate:
-    """Return the scenario of a job; raise SimError for YAML that holds none."""
-    return ScenarioTemplate.from_text(text)
+def record_key(record: EpisodeRecord) -> JobKey:
+    """Return the key of a record, which is unique in its run."""
+    return JobKey(
+        record.scenario,
+        record.seed,
+        record.policy,
+        record.planner,
+        record.perception,
+        record.fault,
+    )
 
 
-@lru_cache(maxsize=256)
-def policy_of(text: str) -> AwarenessPolicy:
-    """Return the policy of a job; raise SimError for YAML that holds none."""
-    return _of_text("policy", AwarenessPolicy, text)
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """The outcome of one episode.
 
+    Attributes:
+        record: its row in the table.
+        traceback: of the error that ended it; empty without an error.
+        conduct: of its planner; None for an episode that ended with an error.
+    """
 
-@lru_cache(maxsize=256)
-def fault_of(text: str) -> Fault | None:
-    """Return the fault of a job, None without one; raise SimError for YAML that holds none."""
-    return _of_text("fault", Fault, text) if text else None
-
-
-def _of_text(name: str, kind: type[_ConfigT], text: str) -> _ConfigT:
-    try:
-        return kind.model_validate(parse_yaml(text, "it", SimError))
-    except ValidationError as cause:
-        raise SimError(f"the {name} of an episode is not valid: {complaints(cause)}") from cause
-    except SimError as cause:
-        raise SimError(f"the {name} of an episode is not valid: {cause}") from cause
-
-
-def policy_text(policy: AwarenessPolicy) -> str:
-    """Return a policy as YAML; raise SimError for one with objects that YAML cannot hold."""
-    try:
-        return yaml_text(policy.model_dump(mode="json"))
-    except (TypeError, ValueError, yaml.YAMLError) as cause:
-        raise SimError(
-            f"a policy must be one that YAML can hold, without objects of your own: {cause}"
-        ) from cause
+    record: EpisodeRecord
+    traceback: str = ""
+    conduct: Conduct | None = None
 
 
 _PACKAGES: Final = ("awarenav", "numpy", "scipy", "opencv-python-headless", "pybullet")

@@ -7,21 +7,28 @@ import itertools
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
+import yaml
+from pydantic import ValidationError
 
 from nav_adapter import AwarenessPolicy
 from perception.arrays import finite_number
+from perception.documents import parse_yaml, yaml_text
+from tracking.config import StrictConfig, complaints
 
 from ...crossing import named_policy
 from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault, shipped_faults
 from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
-from ._job import Job, JobKey, describe, job_key, policy_text
-from ._planner_choice import refuse_unusable_planner
+from ._job import Job, JobKey, describe
+from ._planner_choice import planner_label, refuse_unusable_planner
+
+_ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
 
 # The name that stands for "without a fault".
 _NO_FAULT: Final = "none"
@@ -119,6 +126,50 @@ def named_templates(
         if found.setdefault(template.name, template) != template:
             raise SimError(f"two scenarios are called {template.name!r}; give them other names")
     return tuple(found.values())
+
+
+def job_key(job: Job) -> JobKey:
+    """Return the key of a job, which is unique in its run."""
+    scenario = template_of(job.scenario).median()
+    label = planner_label(job.planner, scenario)
+    return JobKey(scenario.name, job.seed, job.policy_name, label, job.perception, job.fault_name)
+
+
+@lru_cache(maxsize=256)
+def template_of(text: str) -> ScenarioTemplate:
+    """Return the scenario of a job; raise SimError for YAML that holds none."""
+    return ScenarioTemplate.from_text(text)
+
+
+@lru_cache(maxsize=256)
+def policy_of(text: str) -> AwarenessPolicy:
+    """Return the policy of a job; raise SimError for YAML that holds none."""
+    return _of_text("policy", AwarenessPolicy, text)
+
+
+@lru_cache(maxsize=256)
+def fault_of(text: str) -> Fault | None:
+    """Return the fault of a job, None without one; raise SimError for YAML that holds none."""
+    return _of_text("fault", Fault, text) if text else None
+
+
+def _of_text(name: str, kind: type[_ConfigT], text: str) -> _ConfigT:
+    try:
+        return kind.model_validate(parse_yaml(text, "it", SimError))
+    except ValidationError as cause:
+        raise SimError(f"the {name} of an episode is not valid: {complaints(cause)}") from cause
+    except SimError as cause:
+        raise SimError(f"the {name} of an episode is not valid: {cause}") from cause
+
+
+def policy_text(policy: AwarenessPolicy) -> str:
+    """Return a policy as YAML; raise SimError for one with objects that YAML cannot hold."""
+    try:
+        return yaml_text(policy.model_dump(mode="json"))
+    except (TypeError, ValueError, yaml.YAMLError) as cause:
+        raise SimError(
+            f"a policy must be one that YAML can hold, without objects of your own: {cause}"
+        ) from cause
 
 
 def _expanded(

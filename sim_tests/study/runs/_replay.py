@@ -38,8 +38,9 @@ from ..measures import (
     record_row,
 )
 from ._episode import observed_episode
-from ._job import Job, describe, job_key, template_of
-from ._run_folder import RunFiles, read_jobs, record_key
+from ._job import Job, describe, record_key
+from ._plan import job_key, template_of
+from ._run_files import RunFiles, read_jobs
 
 Image = NDArray[np.uint8]
 

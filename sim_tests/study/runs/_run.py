@@ -17,8 +17,8 @@ from perception.arrays import finite_number
 
 from ...world.errors import SimError
 from ..measures import EpisodeRecord
-from ._episode import Attempt, attempt, attempt_within, died, failed
-from ._job import Job, versions
+from ._episode import attempt, attempt_within, died, failed
+from ._job import Attempt, Job, versions
 from ._parallel import in_parallel
 from ._run_folder import RunFolder
 

@@ -1,11 +1,11 @@
-"""The folder of a run: its plan, one file for each episode that has ended, and the tables."""
+"""The folder of a run as its writer keeps it, so that an interrupted run can be resumed."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,145 +13,16 @@ import filelock
 
 from awarenav.errors import counted
 from awarenav.files import write_text
-from perception.documents import parse_json, read_json, read_lines
 
 from ...world.errors import SimError
-from ..measures import Conduct, EpisodeRecord, write_records
-from ._episode import Attempt
-from ._job import JOB_FIELDS, Job, JobKey, describe, job_key
+from ..measures import EpisodeRecord, write_records
+from ._job import JOB_FIELDS, Attempt, Job, describe, record_key
+from ._plan import job_key
+from ._run_files import RunFiles, not_of_this_run, read_attempts, read_jobs, read_run
 
 _OTHER_WAY: Final = (
     "resume with the arguments that began it, which run.json holds, or run into another folder"
 )
-
-
-@dataclass(frozen=True, slots=True)
-class RunFiles:
-    """The paths of the files in the folder of a run."""
-
-    folder: Path
-
-    @property
-    def jobs(self) -> Path:
-        """The planned episodes, one job per line."""
-        return self.folder / "jobs.jsonl"
-
-    @property
-    def ended(self) -> Path:
-        """The folder with one file for each episode that has ended."""
-        return self.folder / "episodes"
-
-    def episode(self, number: int) -> Path:
-        """Return the path of the file of an episode."""
-        return self.ended / f"{number:05d}.json"
-
-    @property
-    def episodes(self) -> Path:
-        """The table of the episodes that have ended, one row per episode."""
-        return self.folder / "episodes.csv"
-
-    @property
-    def parquet(self) -> Path:
-        """The same table as Parquet, of a complete run."""
-        return self.folder / "episodes.parquet"
-
-    @property
-    def run(self) -> Path:
-        """State, versions, command and settings of the run."""
-        return self.folder / "run.json"
-
-    @property
-    def errors(self) -> Path:
-        """Tracebacks of failed episodes; absent if none failed."""
-        return self.folder / "errors.log"
-
-    @property
-    def replays(self) -> Path:
-        """The folder of videos, maps and pages of episodes that were replayed."""
-        return self.folder / "replays"
-
-    @property
-    def social(self) -> Path:
-        """The table of ``awarenav measures``, one row per episode."""
-        return self.folder / "social.csv"
-
-    @property
-    def exports(self) -> Path:
-        """The folder of episodes in the formats of other projects."""
-        return self.folder / "exports"
-
-    def page(self, number: int) -> Path:
-        """Return the path of the replay page of an episode."""
-        return self.replays / f"episode_{number:05d}.html"
-
-    @property
-    def lock(self) -> Path:
-        """The lock file of the process that runs episodes into the folder."""
-        return self.folder / ".lock"
-
-
-def read_jobs(folder: Path) -> tuple[Job, ...]:
-    """Return the jobs of a run; raise SimError for a folder that holds none."""
-    path = RunFiles(folder).jobs
-    if not path.is_file():
-        raise SimError(f"{folder} is not the folder of a run: no {path.name} in it")
-    return tuple(
-        _parse_job(line, f"{path}, line {number}")
-        for number, line in enumerate(read_lines(path, SimError), start=1)
-    )
-
-
-def _parse_job(line: str | bytes, source: str) -> Job:
-    try:
-        return Job(**parse_json(line, source, SimError))
-    except (ValueError, TypeError) as cause:
-        raise SimError(
-            f"{source} is not an episode: it must be an object with the keys "
-            f"{', '.join(JOB_FIELDS)} ({cause})"
-        ) from cause
-
-
-def read_run(folder: Path) -> dict[str, Any]:
-    """Return the content of ``run.json``; empty without one."""
-    try:
-        content = read_json(RunFiles(folder).run, SimError)
-    except SimError:
-        return {}
-    return content if isinstance(content, dict) else {}
-
-
-def read_attempts(folder: Path) -> dict[int, Attempt]:
-    """Return the outcome of every episode that has ended, by its number.
-
-    Raises:
-        SimError: a file that is not of an episode of this run; the message names it.
-    """
-    files = RunFiles(folder)
-    paths = sorted(files.ended.glob("*.json")) if files.ended.is_dir() else []
-    if not paths:
-        return {}
-    jobs = read_jobs(folder)
-    found = {}
-    for path in paths:
-        try:
-            number = int(path.stem)
-            content = read_json(path, SimError)
-            conduct = content["conduct"]
-            attempt = Attempt(
-                EpisodeRecord(**content["record"]),
-                content["traceback"],
-                None if conduct is None else Conduct(**conduct),
-            )
-            key = record_key(attempt.record)
-            if path != files.episode(number) or key != job_key(jobs[number]):
-                raise ValueError(f"it is {describe(key)}")
-        except (OSError, ValueError, TypeError, KeyError, IndexError) as cause:
-            raise SimError(
-                f"{path} is not the file of an episode of this run ({cause}): move it away, and "
-                "--resume runs its episode again"
-            ) from cause
-        found[number] = attempt
-    return found
 
 
 class RunFolder(AbstractContextManager["RunFolder"]):
@@ -201,7 +72,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         try:
             if resume:
                 self._refuse_another_run()
-                self.done = read_attempts(path)
+                self.done = self._own_attempts()
                 self._write_run("running")
             else:
                 if not overwrite:
@@ -278,6 +149,15 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         lines = (json.dumps(asdict(job), ensure_ascii=False) + "\n" for job in self._jobs)
         write_text(files.jobs, "".join(lines), SimError)
 
+    def _own_attempts(self) -> dict[int, Attempt]:
+        """Return the outcomes in the folder; refuse a file of another episode by its name."""
+        found = read_attempts(self._files.folder)
+        for number, attempt in found.items():
+            key = record_key(attempt.record)
+            if number >= len(self._jobs) or key != job_key(self._jobs[number]):
+                raise not_of_this_run(self._files.episode(number), f"it is {describe(key)}")
+        return found
+
     def _refuse_another_run(self) -> None:
         """Raise SimError, saying what differs, unless the folder holds this run."""
         folder = self._files.folder
@@ -327,16 +207,4 @@ def _refuse_other_job(folder: Path, number: int, was: Job, job: Job) -> None:
     raise SimError(
         f"the run in {folder} has other episodes than these: episode {number} has another "
         f"{name}{values}; {_OTHER_WAY}"
-    )
-
-
-def record_key(record: EpisodeRecord) -> JobKey:
-    """Return the key of a record, which is unique in its run."""
-    return JobKey(
-        record.scenario,
-        record.seed,
-        record.policy,
-        record.planner,
-        record.perception,
-        record.fault,
     )

@@ -81,7 +81,7 @@ def test_a_table_of_another_command_is_not_overwritten(name, tmp_path, capsys):
 
 
 def test_a_search_that_another_process_runs_is_not_overwritten(tmp_path, capsys):
-    from sim_tests.study.runs import ProcessLock  # noqa: PLC0415 - needs the simulator
+    from sim_tests.search import ProcessLock  # noqa: PLC0415 - needs the simulator
 
     command, out = words("falsify", tmp_path)
     assert main(command) == 0

@@ -1,0 +1,143 @@
+"""The files in the folder of a run, read without the simulator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from perception.documents import parse_json, read_json, read_lines
+
+from ...world.errors import SimError
+from ..measures import Conduct, EpisodeRecord
+from ._job import JOB_FIELDS, Attempt, Job
+
+
+@dataclass(frozen=True, slots=True)
+class RunFiles:
+    """The paths of the files in the folder of a run."""
+
+    folder: Path
+
+    @property
+    def jobs(self) -> Path:
+        """The planned episodes, one job per line."""
+        return self.folder / "jobs.jsonl"
+
+    @property
+    def ended(self) -> Path:
+        """The folder with one file for each episode that has ended."""
+        return self.folder / "episodes"
+
+    def episode(self, number: int) -> Path:
+        """Return the path of the file of an episode."""
+        return self.ended / f"{number:05d}.json"
+
+    @property
+    def episodes(self) -> Path:
+        """The table of the episodes that have ended, one row per episode."""
+        return self.folder / "episodes.csv"
+
+    @property
+    def parquet(self) -> Path:
+        """The same table as Parquet, of a complete run."""
+        return self.folder / "episodes.parquet"
+
+    @property
+    def run(self) -> Path:
+        """State, versions, command and settings of the run."""
+        return self.folder / "run.json"
+
+    @property
+    def errors(self) -> Path:
+        """Tracebacks of failed episodes; absent if none failed."""
+        return self.folder / "errors.log"
+
+    @property
+    def replays(self) -> Path:
+        """The folder of videos, maps and pages of episodes that were replayed."""
+        return self.folder / "replays"
+
+    @property
+    def social(self) -> Path:
+        """The table of ``awarenav measures``, one row per episode."""
+        return self.folder / "social.csv"
+
+    @property
+    def exports(self) -> Path:
+        """The folder of episodes in the formats of other projects."""
+        return self.folder / "exports"
+
+    def page(self, number: int) -> Path:
+        """Return the path of the replay page of an episode."""
+        return self.replays / f"episode_{number:05d}.html"
+
+    @property
+    def lock(self) -> Path:
+        """The lock file of the process that runs episodes into the folder."""
+        return self.folder / ".lock"
+
+
+def read_jobs(folder: Path) -> tuple[Job, ...]:
+    """Return the jobs of a run; raise SimError for a folder that holds none."""
+    path = RunFiles(folder).jobs
+    if not path.is_file():
+        raise SimError(f"{folder} is not the folder of a run: no {path.name} in it")
+    return tuple(
+        _parse_job(line, f"{path}, line {number}")
+        for number, line in enumerate(read_lines(path, SimError), start=1)
+    )
+
+
+def _parse_job(line: str | bytes, source: str) -> Job:
+    try:
+        return Job(**parse_json(line, source, SimError))
+    except (ValueError, TypeError) as cause:
+        raise SimError(
+            f"{source} is not an episode: it must be an object with the keys "
+            f"{', '.join(JOB_FIELDS)} ({cause})"
+        ) from cause
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """Return the content of ``run.json``; empty without one."""
+    try:
+        content = read_json(RunFiles(folder).run, SimError)
+    except SimError:
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def read_attempts(folder: Path) -> dict[int, Attempt]:
+    """Return the outcome of every episode that has ended, by its number.
+
+    Raises:
+        SimError: a file that is not of an episode of this run; the message names it.
+    """
+    files = RunFiles(folder)
+    paths = sorted(files.ended.glob("*.json")) if files.ended.is_dir() else []
+    if not paths:
+        return {}
+    found = {}
+    for path in paths:
+        try:
+            number = int(path.stem)
+            content = read_json(path, SimError)
+            conduct = content["conduct"]
+            attempt = Attempt(
+                EpisodeRecord(**content["record"]),
+                content["traceback"],
+                None if conduct is None else Conduct(**conduct),
+            )
+        except (ValueError, TypeError, KeyError) as cause:
+            raise not_of_this_run(path, str(cause)) from cause
+        found[number] = attempt
+    return found
+
+
+def not_of_this_run(path: Path, reason: str) -> SimError:
+    """Return the error about a file that is not of an episode of its run."""
+    return SimError(
+        f"{path} is not the file of an episode of this run ({reason}): move it away, and "
+        "--resume runs its episode again"
+    )
