@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ._measure import differences, measure, read_results, remeasured
+from ._measure import measure, read_results
 from ._page import leaderboard_page, ranked, write_leaderboard
 from ._rows import PAGE, RESULTS, Board, Row
 
@@ -11,11 +11,9 @@ __all__ = [
     "RESULTS",
     "Board",
     "Row",
-    "differences",
     "leaderboard_page",
     "measure",
     "ranked",
     "read_results",
-    "remeasured",
     "write_leaderboard",
 ]

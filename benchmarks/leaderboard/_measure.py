@@ -8,22 +8,18 @@ import subprocess
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import awarenav
 from awarenav.files import write_text
 from perception.documents import read_json
 from sim_tests import SimError
-from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import EpisodeRecord, read_records, write_records
-from sim_tests.study.runs import RunFiles, run_episode, run_jobs
+from sim_tests.study.runs import RunFiles, run_jobs
 
 from ._rows import RESULTS, WORK, Board, Row
 
 _ABOUT_FILE: Final = "about.json"
-# Differences that another kind of processor makes by rounding.
-_SAME_TIME_S: Final = 0.25
-_SAME_VIOLATION_S: Final = 0.15
 
 
 def read_results(board: Board, row: Row, folder: Path = RESULTS) -> tuple[EpisodeRecord, ...]:
@@ -90,38 +86,19 @@ def measure(
         begun = RunFiles(run).jobs.exists() and not again
         records = run_jobs(jobs, run, workers=workers, resume=begun, overwrite=again, progress=True)
         about = {**read_about(folder), row.name: _about(row)}
-        write_text(folder / _ABOUT_FILE, _json(about), SimError)
+        text = json.dumps(about, indent=1, sort_keys=True) + "\n"
+        write_text(folder / _ABOUT_FILE, text, SimError)
         write_records(path, sorted(records, key=lambda each: (each.scenario, each.seed)))
         shutil.rmtree(run)  # what is measured later is another run
-
-
-def remeasured(row: Row, scenario: str, seed: int) -> EpisodeRecord:
-    """Return one episode of a row, measured now."""
-    (job,) = row.jobs([ScenarioTemplate.shipped(scenario)], [seed])
-    return run_episode(job)
-
-
-def differences(committed: EpisodeRecord, now: EpisodeRecord) -> list[str]:
-    """Return in what an episode differs from the committed one by more than rounding."""
-    found = [
-        f"{name}: committed {getattr(committed, name)}, now {getattr(now, name)}"
-        for name in ("robot_contacts", "person_contacts", "success", "error")
-        if getattr(committed, name) != getattr(now, name)
-    ]
-    for name, same_s in (("time_lost_s", _SAME_TIME_S), ("violation_time_s", _SAME_VIOLATION_S)):
-        was, is_now = (getattr(each, name) for each in (committed, now))
-        if (was is None) != (is_now is None) or (was is not None and abs(was - is_now) > same_s):
-            found.append(f"{name}: committed {was} s, now {is_now} s")
-    return found
 
 
 def _about(row: Row) -> dict[str, str]:
     """Return what the results of a row were measured with."""
     return {
-        "version": awarenav.__version__,
         "commit": _commit(),
         "date": date.today().isoformat(),
         "digest": row.digest,
+        "version": awarenav.__version__,
     }
 
 
@@ -135,7 +112,3 @@ def _commit() -> str:
     except OSError:
         return ""
     return found.stdout.strip() if found.returncode == 0 else ""
-
-
-def _json(data: Any) -> str:
-    return json.dumps(dict(sorted(data.items())), indent=1) + "\n"

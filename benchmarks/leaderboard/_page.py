@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ from ._rows import RESULTS, Board, Row
 _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
 _RANKED_DECIMALS: Final = 2
+# Marks of Markdown, and the address of a link.
+_MARKUP: Final = re.compile(r"[`*]|\[(\w+)\]\(\S+\)")
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 
 
@@ -122,7 +125,10 @@ def write_leaderboard(board: Board, path: Path, folder: Path = RESULTS) -> None:
         "step_out": "Step-out impacts",
         "parts": "By what people look at",
     }
-    sections = [Section(name, titles[name], tables=(each,)) for name, each in tables.items()]
+    sections = []
+    for name, each in tables.items():
+        plain = [[_MARKUP.sub(r"\1", cell.text) for cell in row] for row in each.cells]
+        sections.append(Section(name, titles[name], tables=(Table(each.columns, plain),)))
     lead = "Rows are policies with sensors and a planner; docs/leaderboard.md has the definitions."
     write_page(path, "Leaderboard", sections, lead=lead)
 

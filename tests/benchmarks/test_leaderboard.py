@@ -12,31 +12,37 @@ from benchmarks.leaderboard import (
     RESULTS,
     Board,
     Row,
-    differences,
     leaderboard_page,
     measure,
     ranked,
     read_results,
-    remeasured,
     write_leaderboard,
 )
 from benchmarks.leaderboard._page import Standing
 from sim_tests import SimError
+from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import EpisodeRecord
+from sim_tests.study.runs import run_episode
 
 _BOARD = Board.read()
 # Short episodes of a cheap and of a costly row.
-_CELLS = [("balanced-truth", "crossing_attentive", 0), ("today", "crossing_attentive", 0)]
+_CELLS = [("balanced-truth", "crossing_attentive"), ("today", "crossing_attentive")]
 
 
-@pytest.mark.parametrize(("name", "scenario", "seed"), _CELLS)
-def test_a_committed_episode_is_measured_again_and_the_same(name, scenario, seed):
+@pytest.mark.parametrize(("name", "scenario"), _CELLS)
+def test_a_committed_episode_is_measured_again_and_the_same(name, scenario):
     """After a change of planner, people or sensors: python -m benchmarks.leaderboard --again."""
     row = _BOARD.named(name)
-    (committed,) = (
-        each for each in read_results(_BOARD, row) if (each.scenario, each.seed) == (scenario, seed)
+    (was,) = (
+        each for each in read_results(_BOARD, row) if (each.scenario, each.seed) == (scenario, 0)
     )
-    assert differences(committed, remeasured(row, scenario, seed)) == []
+    (job,) = row.jobs([ScenarioTemplate.shipped(scenario)], [0])
+    now = run_episode(job)
+    for field in ("robot_contacts", "person_contacts", "success", "error"):
+        assert getattr(now, field) == getattr(was, field), field
+    # Another kind of processor rounds differently.
+    assert now.time_lost_s == pytest.approx(was.time_lost_s, abs=0.25)
+    assert now.violation_time_s == pytest.approx(was.violation_time_s, abs=0.15)
 
 
 def test_the_page_is_made_from_the_committed_results():
@@ -143,13 +149,3 @@ def test_results_of_another_policy_are_not_continued(tmp_path):
 def test_rows_that_are_not_valid_are_refused(tmp_path, changed, message):
     with pytest.raises((SimError, ValueError), match=message):
         _small_board(tmp_path, **changed)
-
-
-def test_differences_beyond_rounding_are_said():
-    was = EpisodeRecord("a", 0, "p", "q", "truth", time_lost_s=5.0, violation_time_s=0.0)
-    assert differences(was, replace(was, time_lost_s=5.1)) == []
-    assert differences(was, replace(was, time_lost_s=5.4)) == [
-        "time_lost_s: committed 5.0 s, now 5.4 s"
-    ]
-    assert len(differences(was, replace(was, robot_contacts=1, violation_time_s=0.3))) == 2
-    assert len(differences(was, replace(was, time_lost_s=None))) == 1

@@ -124,7 +124,6 @@ class Section:
         stills: episodes with pictures.
         commands: commands to copy.
         tables: tables.
-        facts: names and values.
         texts: names and texts that are folded away.
         folded: the section is folded away.
     """
@@ -136,7 +135,6 @@ class Section:
     stills: Sequence[Still] = ()
     commands: Sequence[str] = ()
     tables: Sequence[Table] = ()
-    facts: Sequence[tuple[str, str]] = ()
     texts: Sequence[tuple[str, str]] = ()
     folded: bool = False
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.files import json_text
 from perception.documents import parse_yaml
 
 from ...world.errors import SimError
@@ -305,45 +305,16 @@ def failures_section(run: Run) -> Section | None:
 
 def reproduction_section(run: Run) -> Section:
     """Return the configuration of a run, from which it can be repeated."""
-    facts = dict(run.about)
-    command = facts.pop("command", "")
-    records = [each.record for each in run.episodes]
-    scenarios = sorted({f"{each.scenario}@{each.scenario_version}" for each in records})
+    command = str(run.about.get("command", ""))
     policies = dict.fromkeys((f"Policy {job.policy_name}", job.policy) for job in run.jobs)
     faults = dict.fromkeys((f"Fault {j.fault_name}", j.fault) for j in run.jobs if j.fault_name)
     return Section(
         "reproduce",
         "Reproduce",
         "" if command else "The command is not known.",
-        commands=[str(command)] if command else [],
-        facts=[
-            ("scenarios", ", ".join(scenarios) or "none"),
-            ("seeds", _ranges(each.seed for each in records) or "none"),
-            *_flat(facts),
-        ],
-        texts=[*policies, *faults],
+        commands=[command] if command else [],
+        texts=[("Versions and settings (run.json)", json_text(run.about)), *policies, *faults],
     )
-
-
-def _ranges(numbers: Iterable[int]) -> str:
-    """Return whole numbers as ranges: ``0–4, 7``."""
-    parts = []
-    for _, pairs in itertools.groupby(
-        enumerate(sorted(set(numbers))), lambda pair: pair[1] - pair[0]
-    ):
-        values = [value for _, value in pairs]
-        parts.append(f"{values[0]}–{values[-1]}" if len(values) > 1 else str(values[0]))
-    return ", ".join(parts)
-
-
-def _flat(content: Any, prefix: str = "") -> list[tuple[str, str]]:
-    """Return nested mappings with dotted names, and a list as one line."""
-    if isinstance(content, dict):
-        named = ((f"{prefix}.{key}" if prefix else str(key), each) for key, each in content.items())
-        return [pair for name, each in named for pair in _flat(each, name)]
-    if isinstance(content, list):
-        content = ", ".join(map(str, content))
-    return [(prefix, NOTHING if content is None else str(content))]
 
 
 def episodes_section(run: Run, results: Results, folder: Path) -> Section:
