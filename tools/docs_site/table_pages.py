@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-import griffe
-
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, Topic
 from nav_adapter.ros2.messages import ros_type
-from sim_tests.study.measures import (
-    METRICS,
-    RATIOS,
-    RECORD_COLUMNS,
-    SHARES,
-    EpisodeRecord,
-    Metric,
-)
+from sim_tests.study.measures import COLUMNS, METRICS, RATIOS, SHARES, Metric
 
 from .config_pages import unit_of
 from .roles import plain
@@ -39,8 +29,10 @@ _BETTER: Final = {"lower": "lower", "higher": "higher", "neither": "–"}
 def metrics_page() -> str:
     """Return the page of metrics and columns."""
     columns = ["| column | unit | meaning |", "| --- | --- | --- |"]
-    meanings = _attributes(EpisodeRecord)
-    columns += [f"| `{name}` | {unit_of(name)} | {meanings[name]} |" for name in RECORD_COLUMNS]
+    columns += [
+        f"| `{name}` | {unit_of(name)} | {_cell(plain(meaning))} |"
+        for name, meaning in COLUMNS.items()
+    ]
     return "\n\n".join(
         [
             _METRICS,
@@ -95,17 +87,6 @@ def _topic_table(topics: Iterable[Topic]) -> str:
         for each in topics
     ]
     return "\n".join(rows)
-
-
-def _attributes(record: type) -> dict[str, str]:
-    """Return the meaning of each attribute in a docstring."""
-    parts = griffe.Docstring(record.__doc__ or "", lineno=1).parse("google", warnings=False)
-    return {
-        one.name: _cell(re.sub(r"\bNone\b", "empty", plain(one.description)))
-        for part in parts
-        if part.kind is griffe.DocstringSectionKind.attributes
-        for one in part.value
-    }
 
 
 def _cell(text: str) -> str:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from ._answering import answering_note
-    from ._attention import (
+    from ._awareness import (
         ATTENTION_WITHIN_M,
         ATTENTIVE_FROM,
         UNAWARE_UP_TO,
@@ -22,11 +21,11 @@ if TYPE_CHECKING:
         resampled_interval,
         resampled_means,
     )
+    from ._compare import answering_note
     from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
     from ._driving import path_length_m
     from ._interval import FEW_PAIRS, Interval, proportion_interval, zero_of_n_upper
     from ._measure import measure
-    from ._metrics import METRICS, SHARES, Metric
     from ._pairs import (
         paired,
         paired_difference,
@@ -35,11 +34,12 @@ if TYPE_CHECKING:
         violation_excess_of_time,
         won_back,
     )
-    from ._ratios import RATIOS, Ratio
-    from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
+    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric, Ratio
     from ._record_file import (
+        RECORD_COLUMNS,
         read_records,
         read_rows,
+        record_row,
         write_records,
     )
     from ._step_out import (
@@ -49,15 +49,15 @@ if TYPE_CHECKING:
         StepOutImpacts,
         step_out_impacts,
     )
-    from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
+    from ._summary import BASELINE, Comparison, Summary, SummaryRow, Variant, labels, summarise
     from ._summary_text import nondeterminism_notes, summary_text, table_text
     from ._trace import Trace
-    from ._variants import Variant, labels
 
 __all__ = [
     "ATTENTION_WITHIN_M",
     "ATTENTIVE_FROM",
     "BASELINE",
+    "COLUMNS",
     "FASTER_STEP_OUT",
     "FEW_PAIRS",
     "METRICS",
@@ -114,8 +114,8 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
-        "._answering": ("answering_note",),
-        "._attention": (
+        "._compare": ("answering_note",),
+        "._awareness": (
             "ATTENTION_WITHIN_M",
             "ATTENTIVE_FROM",
             "UNAWARE_UP_TO",
@@ -143,11 +143,6 @@ __getattr__ = lazy_names(
             "zero_of_n_upper",
         ),
         "._measure": ("measure",),
-        "._metrics": (
-            "METRICS",
-            "SHARES",
-            "Metric",
-        ),
         "._pairs": (
             "paired",
             "paired_difference",
@@ -156,18 +151,20 @@ __getattr__ = lazy_names(
             "violation_excess_of_time",
             "won_back",
         ),
-        "._ratios": (
+        "._record": (
+            "COLUMNS",
+            "METRICS",
             "RATIOS",
+            "SHARES",
+            "EpisodeRecord",
+            "Metric",
             "Ratio",
         ),
-        "._record": (
-            "EpisodeRecord",
-            "RECORD_COLUMNS",
-            "record_row",
-        ),
         "._record_file": (
+            "RECORD_COLUMNS",
             "read_records",
             "read_rows",
+            "record_row",
             "write_records",
         ),
         "._step_out": (
@@ -179,9 +176,12 @@ __getattr__ = lazy_names(
         ),
         "._summary": (
             "BASELINE",
+            "COLUMNS",
             "Comparison",
             "Summary",
             "SummaryRow",
+            "Variant",
+            "labels",
             "summarise",
         ),
         "._summary_text": (
@@ -190,9 +190,5 @@ __getattr__ = lazy_names(
             "table_text",
         ),
         "._trace": ("Trace",),
-        "._variants": (
-            "Variant",
-            "labels",
-        ),
     },
 )

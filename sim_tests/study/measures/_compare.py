@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from awarenav.files import json_text
 from perception.documents import read_json
 
 from ...world.errors import SimError
-from ._answering import answering_note
 from ._record_file import read_rows, write_records
 from ._summary import BASELINE, summarise_sources
 from ._summary_text import summary_text
 
 _RUN: Final = "run.json"
+# Hearing.answers of sim_tests.actors.behaviour, whose import needs the simulator.
+DEFAULT_ANSWERS: Final = 0.5
+_SETTING: Final = re.compile(r"(?:^|,)\s*answers\s*=\s*([^,\s]+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,3 +103,24 @@ def _check_baseline(baseline: str, policies: Sequence[str]) -> None:
         f"--baseline must be one of the policies {', '.join(map(repr, policies))}, "
         f"got {baseline!r}{hint}"
     )
+
+
+def answering_note(about: Any) -> str:
+    """Return a sentence on the probability with which simulated people answer a request.
+
+    Args:
+        about: content of ``run.json``.
+
+    Returns:
+        The sentence; empty where the settings of the run are not known.
+    """
+    settings = about.get("settings") if isinstance(about, Mapping) else None
+    if not isinstance(settings, Mapping):
+        return ""
+    population = str(settings.get("population") or "")
+    found = _SETTING.search(population)
+    if found is not None:
+        share, source = found[1], f"population {population}"
+    else:
+        share, source = f"{DEFAULT_ANSWERS:g}", "the default, unless a scenario has its own"
+    return f"Simulated people answer a request that they hear with probability {share} ({source})."

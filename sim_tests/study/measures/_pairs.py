@@ -12,7 +12,8 @@ import numpy as np
 from ...world.errors import SimError
 from ._bootstrap import bootstrap_interval, ratio_interval
 from ._interval import Interval, proportion_interval
-from ._record import COLUMN_KINDS, EpisodeRecord
+from ._record import EpisodeRecord
+from ._record_file import COLUMN_KINDS
 
 Pair = tuple[EpisodeRecord, EpisodeRecord]
 

@@ -3,30 +3,45 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import io
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 from awarenav.files import atomic_path
 from perception.documents import read_json
 from perception.installation import install_command
 
 from ...world.errors import SimError
-from ._record import (
-    COLUMN_KINDS,
-    RECORD_COLUMNS,
-    EpisodeRecord,
-    check_columns,
-    one_line,
-    parse_row,
-    record_row,
-    rounded,
-)
+from ._record import Awareness, EpisodeRecord
 
 if TYPE_CHECKING:
     import pyarrow
 
+Kind = Literal["text", "flag", "count", "number"]
+
+#: Decimals of numbers in files: micrometres.
+DECIMALS: Final = 6
+
+_KINDS: Final[dict[str, Kind]] = {
+    "str": "text",
+    "Awareness": "text",
+    "bool": "flag",
+    "int": "count",
+    "float | None": "number",
+}
+#: Columns of ``episodes.csv`` in their order, and the kind of each.
+COLUMN_KINDS: Final[dict[str, Kind]] = {
+    field.name: _KINDS[str(field.type)] for field in fields(EpisodeRecord)
+}
+RECORD_COLUMNS: Final = tuple(COLUMN_KINDS)
+#: Columns that every table must have; others take their defaults.
+REQUIRED_COLUMNS: Final = tuple(
+    field.name for field in fields(EpisodeRecord) if field.default is MISSING
+)
 _PARQUET: Final = ".parquet"
 
 
@@ -167,3 +182,102 @@ def _parquet_rows(path: Path) -> list[list[str]]:
         list(table.column_names),
         *([cell(v) for v in row.values()] for row in table.to_pylist()),
     ]
+
+
+def rounded(value: float | None) -> float | None:
+    """Return a number as it is read back from a file; None for None, NaN and infinity.
+
+    A record in memory therefore equals the same record read from a file, and a resumed run gives
+    the same records as an uninterrupted one.
+    """
+    if value is None or not math.isfinite(value):
+        return None
+    return float(f"{value:.{DECIMALS}f}") + 0.0  # no negative zero
+
+
+def record_row(record: EpisodeRecord) -> list[str]:
+    """Return the cells of one episode in the order of :data:`RECORD_COLUMNS`.
+
+    Numbers have six decimals, and None is an empty cell. Line breaks in texts become spaces, so
+    that an episode is always one line.
+    """
+    return [_cell_text(kind, getattr(record, name)) for name, kind in COLUMN_KINDS.items()]
+
+
+def one_line(text: str) -> str:
+    """Return a text on one line and without NUL, which the csv module of Python 3.10 refuses."""
+    return " ".join(text.replace("\0", "").splitlines())
+
+
+def check_columns(columns: Sequence[str], source: str) -> None:
+    """Check the header of a table of episodes.
+
+    Raises:
+        SimError: a column is unknown or there twice, or a required one is missing.
+    """
+    for name in columns:
+        if name not in COLUMN_KINDS:
+            near = difflib.get_close_matches(name, RECORD_COLUMNS, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise SimError(
+                f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
+                "(docs/metrics.md lists all)"
+            )
+        if list(columns).count(name) > 1:
+            raise SimError(f"{source} has the column {name!r} {list(columns).count(name)} times")
+    missing = [name for name in REQUIRED_COLUMNS if name not in columns]
+    if missing:
+        raise SimError(f"{source} is not a table of episodes: it has no column {missing[0]!r}")
+
+
+def parse_row(columns: Sequence[str], cells: Sequence[str], source: str) -> EpisodeRecord:
+    """Return the episode of a row.
+
+    Args:
+        columns: the header, already checked.
+        cells: one text per column.
+        source: file and line, for messages.
+
+    Raises:
+        SimError: a cell does not fit its column, or there are more or fewer cells than columns.
+    """
+    if len(cells) != len(columns):
+        raise SimError(f"{source} has {len(cells)} cells, its header {len(columns)}")
+    values: dict[str, Any] = {
+        name: _parse_cell(name, cell, source) for name, cell in zip(columns, cells, strict=True)
+    }
+    return EpisodeRecord(**values)
+
+
+def _cell_text(kind: Kind, value: Any) -> str:
+    if kind == "number":
+        number = rounded(value)
+        return "" if number is None else f"{number:.{DECIMALS}f}"
+    if kind == "flag":
+        return str(bool(value)).lower()
+    if kind == "count":
+        return str(int(value))
+    return one_line(str(value))
+
+
+def _parse_cell(name: str, cell: str, source: str) -> Any:
+    kind = COLUMN_KINDS[name]
+    if kind == "flag":
+        if cell not in ("true", "false"):
+            raise SimError(f"{source}: {name} must be true or false, got {cell[:80]!r}")
+        return cell == "true"
+    if kind == "text":
+        if name == "awareness" and cell not in get_args(Awareness):
+            known = ", ".join(map(repr, get_args(Awareness)))
+            raise SimError(f"{source}: awareness must be one of {known}, got {cell[:80]!r}")
+        return cell
+    if kind == "number" and not cell:
+        return None
+    try:
+        number = int(cell) if kind == "count" else float(cell)
+    except ValueError as cause:
+        what = "a whole number" if kind == "count" else "a number or empty"
+        raise SimError(f"{source}: {name} must be {what}, got {cell[:80]!r}") from cause
+    if not math.isfinite(number):
+        raise SimError(f"{source}: {name} must be finite or empty, got {cell[:80]!r}")
+    return number
