@@ -14,6 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.errors import AwarenavError
 from awarenav.files import json_text
 from nav_adapter import AwarenessPolicy
 
@@ -22,7 +23,7 @@ from ...crossing.planner import SamplingPlanner
 from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
 from ..measures import BASELINE, EpisodeRecord, table_text
-from ..runs import KNOWN_PLANNERS, Job, RunFiles, plan_jobs, policy_of, run_jobs, template_of
+from ..runs import KNOWN_PLANNERS, Job, plan_jobs, policy_of, run_jobs, template_of
 from ._run import WIDE_KEY, Run
 
 #: The command line's name of the reference planner, whose name in jobs is empty.
@@ -151,7 +152,7 @@ def _write_report(folder: Path, *, progress: bool = False) -> None:
         from ._write import write_report  # noqa: PLC0415 - needs the extra bench
 
         write_report(folder, progress=progress)
-    except SimError as error:  # the episodes are complete; the report can be made later
+    except AwarenavError as error:  # the episodes are complete; the report can be made later
         print(f"no report: {error}; then: awarenav report {folder}", file=sys.stderr)
 
 
@@ -191,7 +192,7 @@ def _scaled(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 def print_comparison(folder: Path, *, as_json: bool) -> None:
     """Print the figures of a comparison that fit on a terminal, and what its planners obey."""
-    from ._planners import planners_section  # noqa: PLC0415 - needs the extra bench
+    from ._planners import planners_section  # noqa: PLC0415 - makes tables of results
     from ._results import Results  # noqa: PLC0415
     from ._sections import arms_section  # noqa: PLC0415
 
@@ -211,7 +212,7 @@ def print_comparison(folder: Path, *, as_json: bool) -> None:
     for table in (arms_section(results).tables[0], *tables):
         print(table_text(list(table.columns), [[cell.text for cell in row] for row in table.cells]))
         print()
-    print(f"Report: {RunFiles(folder).folder / 'report.html'}")
+    print(f"Report: {folder / 'report.html'}")
 
 
 def known_planners() -> dict[str, str]:

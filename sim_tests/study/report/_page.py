@@ -15,15 +15,6 @@ from perception.installation import install_command
 from ...world.errors import SimError
 from ..measures import Interval
 
-try:
-    from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
-except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise SimError(
-        "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
-        + install_command("bench")
-    ) from cause
-
 #: What stands in a cell without a value.
 NOTHING: Final = "–"
 #: A narrow space that breaks no line, before a sign of per cent.
@@ -159,8 +150,16 @@ def write_page(
         notices: what is missing.
 
     Raises:
-        SimError: the page cannot be written.
+        SimError: the page cannot be written, or the extra ``bench`` is missing.
     """
+    try:
+        from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - an optional dependency
+        from markupsafe import Markup  # noqa: PLC0415
+    except ImportError as cause:  # pragma: no cover - depends on the installation
+        raise SimError(
+            "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
+            + install_command("bench")
+        ) from cause
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -49,7 +49,7 @@ def planners_section(results: Results, run: Run) -> Section | None:
         caption=f"Obeyed: no excess of more than {OVERSHOOT_MPS:g} m/s, about the motors' "
         "overshoot. Times depend on the computer and its load.",
     )
-    tables = (conduct, _radii_table(results, run)) if results.probe else (conduct,)
+    tables = (conduct, _radii_table(results, run)) if results.probe and run.jobs else (conduct,)
     return Section("planners", "Planners", tables=tables)
 
 

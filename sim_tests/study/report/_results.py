@@ -30,6 +30,8 @@ from ._run import Episode, Run
 
 #: The policy that knows the truth: a bound, and no candidate.
 CEILING: Final = "oracle"
+# Arms are shown in this order; candidates lie between.
+_ORDER: Final = {BASELINE: 0, CEILING: 2}
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,17 +98,13 @@ class Results:
                     tuple(each for each in found if each.record.fault != fault),
                 )
             )
-        order = (BASELINE, "", CEILING)
-        arms.sort(
-            key=lambda arm: order.index(arm.variant.policy if arm.variant.policy in order else "")
-        )
+        arms.sort(key=lambda arm: _ORDER.get(arm.variant.policy, 1))
         return cls(fault, tuple(arms), summary, probe)
 
     @property
     def judged(self) -> tuple[Arm, ...]:
         """The arms that verdicts are about: all but ``blind`` and ``oracle``, unless none is."""
-        bounds = (BASELINE, CEILING)
-        return tuple(arm for arm in self.arms if arm.variant.policy not in bounds) or self.arms
+        return tuple(arm for arm in self.arms if arm.variant.policy not in _ORDER) or self.arms
 
     def against(self, arm: Arm, part: str = "", *, scenario: bool = False) -> Comparison | None:
         """Return the comparison of an arm with ``blind`` and the same planner; None without one.

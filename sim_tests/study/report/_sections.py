@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from awarenav.files import json_text
 from perception.documents import parse_yaml
@@ -28,7 +28,6 @@ from ._run import Episode, Run
 
 #: Most lines in the list of episodes, which keeps a report below 2 MB.
 MOST_LINES: Final = 3000
-_MOST_REPLAYS: Final = 5
 # Awareness classes, and their meaning.
 _AWARENESS: Final = {
     "aware": "aware, and recognised",
@@ -212,10 +211,12 @@ def recorded_people(jobs: Iterable[Job]) -> tuple[str, ...]:
 def faults_section(results: Results) -> Section | None:
     """Return each fault with each arm, compared with the same seeds without it."""
     lines: list[Row] = []
-    for arm in results.arms:
-        before = [each.record for each in arm.episodes]
-        for fault in sorted({each.record.fault for each in arm.others}):
+    for fault in sorted({each.record.fault for arm in results.arms for each in arm.others}):
+        for arm in results.arms:
+            before = [each.record for each in arm.episodes]
             ran = [e for e in arm.others if e.record.fault == fault and not e.record.error]
+            if not ran:
+                continue
             now = [each.record for each in ran]
             margins = [each.min_margin_m for each in now if each.min_margin_m is not None]
             lines.append(
@@ -238,11 +239,7 @@ def faults_section(results: Results) -> Section | None:
         "Negative margin more, s": "mean difference to the same seeds without the fault",
         "Least margin, m": "the worst episode",
     }
-    return Section("faults", "Faults", tables=(Table(columns, sorted(lines, key=_first), 2),))
-
-
-def _first(row: Sequence[Any]) -> str:
-    return str(row[0])
+    return Section("faults", "Faults", tables=(Table(columns, lines, 2),))
 
 
 def requests_section(results: Results, run: Run) -> Section | None:

@@ -32,7 +32,9 @@ def pictures(page: PageReader) -> list[np.ndarray]:
 
 
 def test_worst_episode_is_shown_at_its_least_margin(folder: Path) -> None:
-    page = PageReader(write_report(folder).read_text("utf-8"))
+    text = write_report(folder).read_text("utf-8")
+    page = PageReader(text)
+    assert write_report(folder).read_text("utf-8") == text
     camera, plan = pictures(page)
     assert camera.shape == plan.shape
     assert camera.std() > 10.0
@@ -44,10 +46,6 @@ def test_worst_episode_is_shown_at_its_least_margin(folder: Path) -> None:
     assert len(times) == 1
     assert record.duration_s is not None
     assert 0.0 < float(times.pop()) < record.duration_s
-
-
-def test_stills_are_the_same_every_time(folder: Path) -> None:
-    assert write_report(folder).read_bytes() == write_report(folder).read_bytes()
 
 
 @pytest.mark.parametrize("how", ["other", "broken"])
