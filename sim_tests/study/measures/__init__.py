@@ -176,7 +176,6 @@ __getattr__ = lazy_names(
         ),
         "._summary": (
             "BASELINE",
-            "COLUMNS",
             "Comparison",
             "Summary",
             "SummaryRow",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from awarenav.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from ._conditions import Conditions
     from ._episode import (
         attempt,
         died,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 __all__ = [
     "KNOWN_PLANNERS",
     "Attempt",
+    "Conditions",
     "Job",
     "JobKey",
     "RunFiles",
@@ -76,6 +78,7 @@ __all__ = [
 __getattr__ = lazy_names(
     __name__,
     {
+        "._conditions": ("Conditions",),
         "._episode": (
             "attempt",
             "died",

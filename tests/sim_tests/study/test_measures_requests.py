@@ -14,7 +14,6 @@ from nav_adapter.alerts import Answer
 from sim_tests.study.measures import (
     RECORD_COLUMNS,
     measure,
-    read_record_file,
     read_records,
     record_row,
     write_records,
@@ -186,5 +185,5 @@ def test_tables_of_earlier_versions_have_no_requests(tmp_path):
         csv.writer(file).writerows([RECORD_COLUMNS[:-5], record_row(record)[:-5]])
     assert read_records(path) == (record,)
     assert [getattr(record, name) for name in COLUMNS] == [0] * 5
-    write_records(path, read_record_file(path).records)
+    write_records(path, read_records(path))
     assert read_records(path) == (record,)

@@ -14,7 +14,14 @@ from sim_tests.actors.robot import RobotModel
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.report._compare import plan_comparison
 from sim_tests.study.report.command import command_line
-from sim_tests.study.runs import job_key, make_planner, plan_jobs, read_jobs, template_of
+from sim_tests.study.runs import (
+    Conditions,
+    job_key,
+    make_planner,
+    plan_jobs,
+    read_jobs,
+    template_of,
+)
 from sim_tests.study.watch._watch import WatchOptions, _job
 
 
@@ -95,17 +102,18 @@ def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> N
 
 
 def test_a_crossing_is_watched_with_another_robot_and_population() -> None:
+    values = {"scenario": "late_glance", "perception": "truth", "seed": 3}
+    usual = Conditions.taken_from(dict(values))
+    conditions = Conditions.taken_from({**values, "robot": "omni", "population": "recorded"})
     options = WatchOptions(
-        **{"scenario": "late_glance", "policy": "blind", "planner": "", "perception": "truth"},
-        **{"sensors": "camera", "camera": "", "robot": "omni", "population": "recorded"},
-        **{"fault": "none", "seed": 3, "speed": 1.0, "port": 0, "wait": 0.0, "out": None},
-        **{"no_camera": True, "no_browser": True},
-    )
+        conditions=conditions, policy="blind", speed=1.0, port=0, wait=0.0, out=None,
+        no_camera=True, no_browser=True,
+    )  # fmt: skip
     scenario = template_of(_job(options).scenario).for_seed(3)
     assert scenario.robot_model == RobotModel.shipped("omni")
     assert scenario.population == "recorded"
     (own,) = plan_jobs(["late_glance"], ["blind"], [3], perception="truth")
-    assert _job(replace(options, robot="", population=None)) == own
+    assert _job(replace(options, conditions=usual)) == own
 
 
 def test_the_command_names_the_robots_that_there_are(tmp_path, capsys) -> None:
