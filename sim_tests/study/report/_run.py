@@ -75,7 +75,8 @@ class Run:
         else:
             records = read_rows(path)
             # A whole table is in the order of its jobs.
-            numbers = range(len(jobs)) if len(records) == len(jobs) else [None] * len(records)
+            is_whole = len(records) == len(jobs) and all(map(_fits, jobs, records))
+            numbers = range(len(jobs)) if is_whole else [None] * len(records)
             episodes = [Episode(*each) for each in zip(numbers, records, strict=True)]
         if waiting := max(len(jobs) - len(episodes), 0):
             missing.append(
@@ -101,3 +102,9 @@ class Run:
             return ""
         page = RunFiles(self.path).page(episode.number)
         return quote(Path(os.path.relpath(page, folder)).as_posix()) if page.is_file() else ""
+
+
+def _fits(job: Job, record: EpisodeRecord) -> bool:
+    """Return whether a row can be that of a job."""
+    asked = job.seed, job.policy_name, job.perception, job.fault_name
+    return asked == (record.seed, record.policy, record.perception, record.fault)
