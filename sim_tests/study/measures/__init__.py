@@ -34,7 +34,7 @@ if TYPE_CHECKING:
         violation_excess_of_time,
         won_back,
     )
-    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric, Ratio
+    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric
     from ._record_file import (
         RECORD_COLUMNS,
         read_records,
@@ -42,13 +42,7 @@ if TYPE_CHECKING:
         record_row,
         write_records,
     )
-    from ._step_out import (
-        FASTER_STEP_OUT,
-        STEP_OUT,
-        StepOut,
-        StepOutImpacts,
-        step_out_impacts,
-    )
+    from ._step_out import StepOut, step_out_impacts
     from ._summary import BASELINE, Comparison, Summary, SummaryRow, Variant, labels, summarise
     from ._summary_text import nondeterminism_notes, summary_text, table_text
     from ._trace import Trace
@@ -58,14 +52,12 @@ __all__ = [
     "ATTENTIVE_FROM",
     "BASELINE",
     "COLUMNS",
-    "FASTER_STEP_OUT",
     "FEW_PAIRS",
     "METRICS",
     "OVERSHOOT_MPS",
     "RATIOS",
     "RECORD_COLUMNS",
     "SHARES",
-    "STEP_OUT",
     "UNAWARE_UP_TO",
     "UNCONFIRMED",
     "Comparison",
@@ -74,9 +66,7 @@ __all__ = [
     "Interval",
     "MeasuredAttention",
     "Metric",
-    "Ratio",
     "StepOut",
-    "StepOutImpacts",
     "Summary",
     "SummaryRow",
     "Trace",
@@ -158,7 +148,6 @@ __getattr__ = lazy_names(
             "SHARES",
             "EpisodeRecord",
             "Metric",
-            "Ratio",
         ),
         "._record_file": (
             "RECORD_COLUMNS",
@@ -167,13 +156,7 @@ __getattr__ = lazy_names(
             "record_row",
             "write_records",
         ),
-        "._step_out": (
-            "FASTER_STEP_OUT",
-            "STEP_OUT",
-            "StepOut",
-            "StepOutImpacts",
-            "step_out_impacts",
-        ),
+        "._step_out": ("StepOut", "step_out_impacts"),
         "._summary": (
             "BASELINE",
             "Comparison",

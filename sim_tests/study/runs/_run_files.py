@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,69 +12,46 @@ from ..measures import Conduct, EpisodeRecord
 from ._job import JOB_FIELDS, Attempt, Job
 
 
-@dataclass(frozen=True, slots=True)
 class RunFiles:
-    """The paths of the files in the folder of a run."""
+    """The paths of the files in the folder of a run.
 
-    folder: Path
+    Args:
+        folder: of the run.
 
-    @property
-    def jobs(self) -> Path:
-        """The planned episodes, one job per line."""
-        return self.folder / "jobs.jsonl"
+    Attributes:
+        folder: of the run.
+        run: state, versions, command and settings of the run.
+        jobs: the planned episodes, one job per line.
+        ended: the folder with one file for each episode that has ended.
+        episodes: the table of these episodes, one row per episode.
+        parquet: the same table as Parquet, of a complete run.
+        errors: tracebacks of failed episodes; absent if none failed.
+        replays: the folder of videos, maps and pages of episodes that were replayed.
+        social: the table of ``awarenav measures``, one row per episode.
+        exports: the folder of episodes in the formats of other projects.
+        lock: the lock file of the process that runs episodes into the folder.
+    """
 
-    @property
-    def ended(self) -> Path:
-        """The folder with one file for each episode that has ended."""
-        return self.folder / "episodes"
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.run = folder / "run.json"
+        self.jobs = folder / "jobs.jsonl"
+        self.ended = folder / "episodes"
+        self.episodes = folder / "episodes.csv"
+        self.parquet = folder / "episodes.parquet"
+        self.errors = folder / "errors.log"
+        self.replays = folder / "replays"
+        self.social = folder / "social.csv"
+        self.exports = folder / "exports"
+        self.lock = folder / ".lock"
 
     def episode(self, number: int) -> Path:
         """Return the path of the file of an episode."""
         return self.ended / f"{number:05d}.json"
 
-    @property
-    def episodes(self) -> Path:
-        """The table of the episodes that have ended, one row per episode."""
-        return self.folder / "episodes.csv"
-
-    @property
-    def parquet(self) -> Path:
-        """The same table as Parquet, of a complete run."""
-        return self.folder / "episodes.parquet"
-
-    @property
-    def run(self) -> Path:
-        """State, versions, command and settings of the run."""
-        return self.folder / "run.json"
-
-    @property
-    def errors(self) -> Path:
-        """Tracebacks of failed episodes; absent if none failed."""
-        return self.folder / "errors.log"
-
-    @property
-    def replays(self) -> Path:
-        """The folder of videos, maps and pages of episodes that were replayed."""
-        return self.folder / "replays"
-
-    @property
-    def social(self) -> Path:
-        """The table of ``awarenav measures``, one row per episode."""
-        return self.folder / "social.csv"
-
-    @property
-    def exports(self) -> Path:
-        """The folder of episodes in the formats of other projects."""
-        return self.folder / "exports"
-
     def page(self, number: int) -> Path:
         """Return the path of the replay page of an episode."""
         return self.replays / f"episode_{number:05d}.html"
-
-    @property
-    def lock(self) -> Path:
-        """The lock file of the process that runs episodes into the folder."""
-        return self.folder / ".lock"
 
 
 def read_jobs(folder: Path) -> tuple[Job, ...]:

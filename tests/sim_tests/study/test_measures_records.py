@@ -34,7 +34,7 @@ records = st.builds(
 )
 PLAIN = EpisodeRecord("late_glance", 3, "balanced", "SamplingPlanner", "truth", success=True)
 in_one_folder = settings(
-    max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

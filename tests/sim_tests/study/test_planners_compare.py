@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from page_reader import PageReader
@@ -19,7 +20,15 @@ from sim_tests.study.report._compare import plan_comparison
 from sim_tests.study.report._planners import planners_section
 from sim_tests.study.report._results import Results
 from sim_tests.study.report._run import Run
-from sim_tests.study.runs import job_key, make_planner, policy_of, read_attempts, read_jobs
+from sim_tests.study.report.command import command_line
+from sim_tests.study.runs import (
+    job_key,
+    make_planner,
+    policy_of,
+    read_attempts,
+    read_jobs,
+    template_of,
+)
 
 SCENE = """
 name: beside
@@ -203,6 +212,27 @@ def test_the_probe_of_radii_changes_radii_alone():
     assert changed.inflation.radius_m(0.0) == 2.0 * same.inflation.radius_m(0.0)
     assert changed.inflation.radius_m(1.0) == 2.0 * same.inflation.radius_m(1.0)
     assert changed.model_copy(update={"inflation": same.inflation}) == same
+
+
+def test_robot_and_population_are_those_of_every_episode_and_of_the_command():
+    jobs, _ = plan_comparison(
+        ["straight_on"],
+        ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
+        ["balanced"],
+        (0,),
+        robot="delivery",
+        population="recorded",
+    )
+    names = {job_key(job).scenario for job in jobs}
+    assert names == {"late_glance_delivery", "crossing_attentive_delivery"}
+    assert {template_of(job.scenario).for_seed(0).population for job in jobs} == {"recorded"}
+    settings = {"scenario": ["runs_out"], "policy": ["blind"], "seeds": (0, 1)}
+    settings |= {"perception": "truth", "sensors": "camera", "camera": ""}
+    settings |= {"robot": "omni", "population": "recorded"}
+    assert command_line(("reference",), Path("out"), settings) == (
+        "awarenav planners compare reference --scenario runs_out --policy blind --seeds 0-1 "
+        "--perception truth --sensors camera --robot omni --population recorded --out out"
+    )
 
 
 def test_the_planners_that_have_a_name_are_listed(capsys):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from run_scenes import SHORT
@@ -11,9 +10,6 @@ from run_scenes import SHORT
 from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.actors.robot import RobotModel
-from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.report._compare import plan_comparison
-from sim_tests.study.report.command import command_line
 from sim_tests.study.runs import (
     Conditions,
     job_key,
@@ -49,41 +45,6 @@ def test_planners_get_the_profile_of_the_robot() -> None:
     planner = make_planner(f"{__name__}:Keeps", template_of(job.scenario).median())
     assert isinstance(planner, Keeps)
     assert planner.robot.drive == "holonomic"
-
-
-def test_a_comparison_of_planners_takes_a_robot() -> None:
-    jobs, _ = plan_comparison(
-        ["straight_on"],
-        ["crossing_from_left"],
-        ["balanced"],
-        (0,),
-        robot="delivery",
-    )
-    assert {job_key(job).scenario for job in jobs} == {"crossing_from_left_delivery"}
-
-
-def test_a_comparison_of_planners_takes_a_population() -> None:
-    jobs, _ = plan_comparison(
-        ["straight_on"],
-        ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
-        ["balanced"],
-        (0,),
-        population="recorded",
-    )
-    drawn = [template_of(job.scenario).for_seed(0) for job in jobs]
-    assert {(each.population, each.workers) for each in drawn} == {("recorded", ())}
-
-
-def test_the_command_of_a_comparison_names_robot_and_population() -> None:
-    settings = {"scenario": ["runs_out"], "policy": ["blind"], "seeds": (0, 1)}
-    settings |= {"perception": "truth", "sensors": "camera", "camera": ""}
-    words = command_line(
-        ("reference",), Path("out"), settings | {"robot": "omni", "population": "recorded"}
-    )
-    assert words == (
-        "awarenav planners compare reference --scenario runs_out --policy blind --seeds 0-1 "
-        "--perception truth --sensors camera --robot omni --population recorded --out out"
-    )
 
 
 def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> None:
