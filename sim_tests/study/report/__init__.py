@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._compare import compare_planners
@@ -13,11 +13,4 @@ if TYPE_CHECKING:
 
 __all__ = ["NOTHING", "Section", "Table", "compare_planners", "write_page", "write_report"]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._compare": ("compare_planners",),
-        "._page": ("NOTHING", "Section", "Table", "write_page"),
-        "._write": ("write_report",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)
