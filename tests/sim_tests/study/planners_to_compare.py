@@ -18,20 +18,6 @@ class Straight:
         return min(self.speed_mps, stopping_mps, constraints.speed_limit_mps), 0.0
 
 
-class Field(Straight):
-    """Is faster with the speed field."""
-
-    def __init__(self, robot, use_speed_field=True):
-        super().__init__(robot, 0.9 if use_speed_field else 0.3)
-
-
-class NoField(Straight):
-    """Can use the speed field, but only if it is told to."""
-
-    def __init__(self, robot, *, use_speed_field=False):
-        super().__init__(robot, 0.9 if use_speed_field else 0.3)
-
-
 class Raises(Straight):
     """Raises an error in its first cycle."""
 
