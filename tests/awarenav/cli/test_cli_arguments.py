@@ -8,8 +8,7 @@ import click
 import pytest
 from command_line import COMMANDS, options_of
 
-from awarenav.cli import OneOf, Option, command, main, option
-from awarenav.judge import JudgeConfig
+from awarenav.cli import OneOf, Option, main
 
 # `render` names the people who appear by an option that elsewhere counts processes.
 OTHER_MEANING = {("render", "--workers")}
@@ -41,22 +40,6 @@ def test_several_values_after_an_option_equal_the_option_given_several_times():
         ["--episodes", "3", "--policy", "blind", "mine.yaml"],
     ):
         assert parsed(path, *words) == expected
-
-
-def test_a_word_after_an_option_of_one_value_belongs_to_no_option(capsys):
-    assert main(["crossings", "--episodes", "3", "4"]) == 2
-    assert "unexpected extra argument (4)" in capsys.readouterr().err
-
-
-def test_words_after_two_dashes_are_arguments():
-    @command("either")
-    @option("--name", many=True, help="Names.")
-    @click.argument("rest", nargs=-1)
-    def either(**values):
-        return values
-
-    with either.make_context("either", ["--name", "a", "b", "--", "--name", "c"]) as context:
-        assert context.params == {"name": ("a", "b"), "rest": ("--name", "c")}
 
 
 def test_no_command_takes_positional_arguments_beside_an_option_of_several_values():
@@ -104,9 +87,13 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
         (["crossings", "--fault", "ghost"], "did you mean 'ghosts'?"),
         (["policy", "show", "balancd"], "did you mean 'balanced'?"),
         (["models", "fetch", "yolox-tny"], "did you mean 'yolox-tiny'?"),
+        (["doctor", "nowhere"], "no such file or folder: nowhere"),
+        (["doctor", "nowhere", "--fov-deg", "60", "--camera", "a.yaml"], "exclude each other"),
+        (["judge", "x", "y", "--max-occlusion", "2"], "max_occlusion"),
+        (["judge", "x", "y", "--out", "report.txt"], "must end in .json or .md"),
     ],
 )
-def test_a_wrong_word_is_refused_with_the_nearest_right_one(words, message, tmp_path, capsys):
+def test_a_wrong_word_is_refused_with_what_is_right(words, message, tmp_path, capsys):
     out = ["--out", str(tmp_path / "out")] if words[0] == "crossings" else []
     assert main([*words, *out]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
@@ -176,9 +163,3 @@ def test_every_seed_is_zero_unless_it_is_given():
     }
     assert defaults.pop(("scenario", "show")) is None  # the whole scenario, not one episode of it
     assert set(defaults.values()) == {0}
-
-
-def test_defaults_of_judge_are_those_of_its_config():
-    values = parsed(("judge",), "truth.jsonl", "estimates.jsonl")
-    fields = JudgeConfig().model_dump()
-    assert {name: values[name] for name in fields} == fields

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import re
 import shlex
 
 import click
 import pytest
-from command_line import COMMANDS, options_of, run_python
+from command_line import COMMANDS, run_python
 
-import awarenav
 from awarenav.cli import Command, main
 
 HEAVY = ("cv2", "matplotlib", "numpy", "onnxruntime", "pybullet", "pydantic", "scipy", "shapely")
@@ -26,18 +24,6 @@ print(json.dumps(sorted(sys.modules)), file=sys.stderr)
 def help_of(path, capsys):
     assert main([*path, "--help"]) == 0
     return capsys.readouterr().out
-
-
-def test_the_list_of_commands_is_grouped(capsys):
-    sections = re.split(r"^(\S.*):$", help_of([], capsys), flags=re.MULTILINE)
-    listed = {
-        heading: re.findall(r"^  (\w+)  ", text, re.MULTILINE)
-        for heading, text in zip(sections[1::2], sections[2::2], strict=True)
-    }
-    on_a_robot = ["estimate", "judge", "tracks", "bridge", "models", "doctor", "policy"]
-    assert listed["On a robot"] == on_a_robot
-    assert {"demo", "crossings", "replay"} < set(listed["Simulation"])
-    assert "completion" in listed["Development"]
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
@@ -85,21 +71,3 @@ def test_the_list_of_commands_and_the_version_import_no_command():
 
 def test_help_of_commands_imports_neither_arrays_nor_networks_nor_the_simulator():
     assert imported(*(f"{' '.join(path)} --help" for path in COMMANDS)).isdisjoint(HEAVY)
-
-
-def test_the_version_is_printed(capsys):
-    assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"awarenav {awarenav.__version__}\n"
-
-
-@pytest.mark.parametrize("words", [[], ["models"], ["policy"], ["scenario"]], ids=str)
-def test_no_arguments_print_the_help_and_are_bad_input(words, capsys):
-    assert main(words) == 2
-    printed = capsys.readouterr().out
-    assert main([*words, "--help"]) == 0
-    assert printed == capsys.readouterr().out
-
-
-def test_options_that_exclude_each_other_are_named_in_the_help():
-    text = options_of(COMMANDS["estimate",])["--overwrite"].help
-    assert text == "Replace the work in --out. Not with --resume."

@@ -15,21 +15,11 @@ from command_line import SHORT_SCENARIO, run_python
 from paths import ROOT
 
 from awarenav.cli import app, main
-from awarenav.records import write_records
 
 TABLE = "t_s,id,x_m,y_m\n" + "".join(f"{0.1 * k:.1f},bén,{0.1 * k:.2f},0\n" for k in range(12))
 POLICY = ROOT / "nav_adapter/policies/balanced.yaml"
 ROBOT = ROOT / "docs/nav2/robot.yaml"
 SCENARIO = ROOT / "sim_tests/scenario/shipped/late_glance.yaml"
-PERSON = {
-    "id": 0,
-    "box_xyxy_px": [100.0, 100.0, 200.0, 300.0],
-    "position_camera_m": [0.2, 0.1, 3.0],
-    "gaze_camera": [0.0, 0.0, -1.0],
-    "awareness": 0.5,
-    "awareness_std": 0.1,
-    "score": 0.9,
-}
 
 
 def json_of(capfd, *words):
@@ -48,21 +38,6 @@ def test_tools_print_json(capfd, tmp_path):
     assert set(states) == {each["name"] for each in listed["shipped"]}
     subjects = [each["subject"] for each in json_of(capfd, "doctor")]
     assert {"packages", "shipped networks", "extras"} <= set(subjects)
-
-
-def test_judge_and_tracks_print_json(capfd, tmp_path):
-    path = tmp_path / "estimates.jsonl"
-    frames = [
-        {"frame": f"{k}.png", "stamp_s": 0.1 * k, "T_odom_camera": None, "people": [PERSON]}
-        for k in range(4)
-    ]
-    write_records(path, frames)
-    (track,) = json_of(capfd, "tracks", path, "--out", tmp_path / "tracks.png")
-    assert (track["id"], track["seen_frames"]) == (1, 4)
-    assert (tmp_path / "tracks.png").exists()
-    metrics = json_of(capfd, "judge", path, path, "--out", tmp_path / "report.md")
-    assert metrics["detection"]["ap50"] == 1.0
-    assert (tmp_path / "report.md").read_text("utf-8").startswith("4 frames")
 
 
 def test_crossings_print_json_and_name_episodes_that_fail(capfd, tmp_path):
@@ -117,15 +92,6 @@ def test_a_process_without_outputs_works(tmp_path: Path, monkeypatch: pytest.Mon
     assert main(["policy", "show", "none"]) == 2
 
 
-def test_json_stays_the_same_document(tmp_path: Path, monkeypatch) -> None:
-    path = tmp_path / "m→é𝛼.yaml"
-    path.write_bytes(POLICY.read_bytes())
-    words = ["policy", "show", str(path), "--json", "--out", "none"]
-    found = [json.loads(printed(words, each, monkeypatch)) for each in ("ascii", "utf-8")]
-    assert found[0] == found[1]
-    assert str(path) in json.dumps(found[0], ensure_ascii=False)
-
-
 def test_a_file_name_that_is_not_utf_8_is_only_a_name(tmp_path: Path) -> None:
     folder = tmp_path / os.fsdecode(b"l\xe4ute")
     try:
@@ -167,14 +133,6 @@ def offered(*words):
 
 def values(*words):
     return [item.value for item in offered(*words)]
-
-
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_of_a_shell_is_printed(shell, capsys):
-    assert main(["completion", shell]) == 0
-    script = capsys.readouterr().out
-    assert "_AWARENAV_COMPLETE" in script
-    assert f"{shell}_complete" in script
 
 
 def test_commands_are_completed_with_their_help_and_without_importing_them():

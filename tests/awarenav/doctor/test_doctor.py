@@ -144,13 +144,6 @@ def test_a_camera_that_is_frozen(capsys, renders, tmp_path):
     assert severities(found, "images") == {"error", "warning"}
 
 
-def test_a_wide_lens_on_a_small_picture(capsys, renders, tmp_path):
-    folder = copied(renders, tmp_path / "set", lambda image: image)
-    found = findings(capsys, folder, "--out", "none", "--fov-deg", 120)
-    assert severities(found, "resolution") == {"warning"}
-    assert "up to 1.4 m" in found["resolution"][0].text
-
-
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="no photographs beside the checkout")
 def test_photographs_need_other_networks(capsys, tmp_path):
     detector = SHARED / "models" / "rtmdet_nano_person_320_mmpose.onnx"
@@ -161,19 +154,6 @@ def test_photographs_need_other_networks(capsys, tmp_path):
     assert picture.exists()
     found = findings(capsys, PHOTOGRAPHS, "--out", "none", "--frames", 2, "--detector", detector)
     assert "the pose and head networks" in found["networks"][0].text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["nowhere"], "no such file or folder: nowhere"),
-        (["nowhere", "--fov-deg", "60", "--camera", "a.yaml"], "exclude each other"),
-        (["nowhere", "--frames", "0"], "--frames"),
-    ],
-)
-def test_bad_input_is_refused(capsys, arguments, message):
-    assert main(["doctor", *arguments]) == 2
-    assert message in capsys.readouterr().err
 
 
 # --- figures ------------------------------------------------------------------------------------

@@ -147,13 +147,6 @@ def test_only_the_beginning_of_a_long_recording_is_read(capsys, tmp_path, drive,
     assert f"{COUNT} scans" not in found["scanners"][0][1]
 
 
-def test_few_blind_scans_are_counted(capsys, tmp_path, drive) -> None:
-    scans = iter(range(COUNT))
-    drive.ranges = lambda ranges: np.zeros_like(ranges) if next(scans) in (20, 21) else ranges
-    ((severity, text),) = findings(capsys, drive.record(tmp_path / "bag"))["scanners"]
-    assert (severity, f"{COUNT} scans, 2 blind" in text) == ("fine", True)
-
-
 def test_a_scanner_that_sees_nothing_or_repeats_itself(capsys, tmp_path, drive) -> None:
     drive.ranges = lambda ranges: np.full_like(ranges, np.inf)
     ((severity, text),) = findings(capsys, drive.record(tmp_path / "inf"))["scanners"]
@@ -202,17 +195,6 @@ def test_images_in_a_body_frame(capsys, tmp_path, drive) -> None:
     assert "'cam_link'" in text
     assert "'base_link'" in text
     assert "cam_optical_frame" in text
-
-
-@pytest.mark.parametrize("topic", ["/tf", "/robot1/tf_static"])
-def test_mounts_in_other_topics_are_read(capsys, tmp_path, drive, topic) -> None:
-    """Recordings of ROS 1 have no /tf_static; its publishers repeat mounts in /tf."""
-    drive.mounts_topic, drive.scanner_yaw_rad = topic, math.radians(40.0)
-    drive.image_topic, drive.camera_turn = "/cam/image_raw", Quaternion()
-    drive.ranges = lambda ranges: np.where(np.abs(ANGLES_RAD) < 0.6, 0.0, ranges)
-    found = findings(capsys, drive.record(tmp_path / "bag"), "--frames", "1")
-    assert "in 'base_link'" in found["scanners"][0][1]
-    assert any("'cam_link'" in text for severity, text in found["images"] if severity == "error")
 
 
 def test_images_that_cannot_be_used_hide_nothing_else(capsys, tmp_path, drive) -> None:

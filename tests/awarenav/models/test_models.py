@@ -122,25 +122,15 @@ def test_network_in_an_archive_lands_at_its_own_name_whatever_its_path_there(ser
         (zipped(**{"x__end2end.onnx": CONTENT})[:2000], "not a complete ZIP archive"),
         (b"<html>please log in</html>", "not a complete ZIP archive"),
         (zipped(other=CONTENT), "0 entries called end2end.onnx; it holds other"),
-        (zipped(**{"a__end2end.onnx": CONTENT, "b__end2end.onnx": OTHER}), "2 entries"),
         (zipped(**{"end2end.onnx": OTHER}), f"{sha256(OTHER)}, expected {sha256(CONTENT)}"),
     ],
-    ids=["half", "login page", "none", "two", "another file"],
+    ids=["half", "login page", "none", "another file"],
 )
 def test_archive_without_the_network_leaves_nothing_behind(server, tmp_path, content, message):
     entry = model(server, "a.zip", content, member="end2end.onnx", sha256=sha256(CONTENT))
     with pytest.raises(AwarenavError, match=message):
         store(tmp_path, entry).fetch("tiny", progress=False)
     assert names(tmp_path) == set()
-
-
-def test_download_with_a_wrong_sha256_is_dropped_and_the_old_file_stays(server, tmp_path):
-    (tmp_path / "tiny.onnx").write_bytes(b"what was there")
-    fetched = store(tmp_path, model(server, "a.onnx", OTHER, sha256=sha256(CONTENT)))
-    with pytest.raises(AwarenavError, match=f"{sha256(OTHER)}, expected {sha256(CONTENT)}"):
-        fetched.fetch("tiny", progress=False)
-    assert (tmp_path / "tiny.onnx").read_bytes() == b"what was there"
-    assert names(tmp_path) == {"tiny.onnx"}
 
 
 def test_first_fetch_is_trusted_and_later_ones_must_match_it(server, tmp_path):
@@ -169,12 +159,6 @@ def test_download_must_have_the_sha256_of_the_user(server, tmp_path):
     assert fetched.expected_sha256("tiny") == sha256(CONTENT)
 
 
-def test_file_that_was_not_fetched_is_refused(server, tmp_path):
-    (tmp_path / "tiny.onnx").write_bytes(CONTENT)
-    with pytest.raises(AwarenavError, match="not put there"):
-        store(tmp_path, model(server, "a.onnx")).path("tiny")
-
-
 def test_missing_file_and_server_are_named_with_what_works_without(server, tmp_path):
     with pytest.raises(AwarenavError, match=r"the server answers 404 .*b\.onnx"):
         store(tmp_path, model(server, "b.onnx")).fetch("tiny", progress=False)
@@ -185,26 +169,6 @@ def test_missing_file_and_server_are_named_with_what_works_without(server, tmp_p
         store(tmp_path, gone).fetch("tiny", progress=False)
     assert "\n" not in str(raised.value)
     assert names(tmp_path) == set()
-
-
-def test_broken_connection_leaves_nothing_behind(server, tmp_path, monkeypatch):
-    def half(self: Quiet) -> None:
-        self.send_response(200)
-        self.send_header("Content-Length", str(len(CONTENT)))
-        self.end_headers()
-        self.wfile.write(CONTENT[:1000])
-
-    monkeypatch.setattr(Quiet, "do_GET", half)
-    with pytest.raises(AwarenavError, match="no connection to 127"):
-        store(tmp_path, model(server, "a.onnx")).fetch("tiny", progress=False)
-    assert names(tmp_path) == set()
-
-
-def test_folder_that_cannot_be_made_is_named(server, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(AwarenavError, match=r"cannot write to .*file"):
-        store(tmp_path / "file" / "models", model(server, "a.onnx")).fetch("tiny")
-    assert server.requests == []
 
 
 def test_cache_folder_follows_the_environment(monkeypatch, tmp_path):
@@ -230,22 +194,6 @@ def test_catalogue_fetches_only_networks_with_permissive_licences():
 def test_catalogue_knows_the_genuine_detector():
     content = (MODELS / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
     assert Catalogue.shipped()["rtmdet-nano"].sha256 == sha256(content)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"licence": "AGPL-3.0"},
-        {"url": "ftp://somewhere/a.onnx"},
-        {"url": "https://somewhere/a.zip"},
-        {"member": "end2end.onnx"},
-        {"sha256": "abc"},
-        {"name": "../up"},
-    ],
-)
-def test_catalogue_entries_that_are_refused(server, change):
-    with pytest.raises(ValueError, match="RealModel"):
-        model(server, "a.onnx", **change)
 
 
 @pytest.fixture
@@ -313,37 +261,40 @@ def test_a_set_is_fetched_and_named_in_a_file_for_the_networks_option(
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("kind", "change", "message"),
     [
-        ({"detector": "small"}, "must name networks of these roles"),
-        ({"pose": "nothing"}, "must name networks of these roles"),
-        ({"name": "tiny"}, "is a network and a set"),
+        ("network", {"licence": "AGPL-3.0"}, "RealModel"),
+        ("network", {"url": "ftp://somewhere/a.onnx"}, "RealModel"),
+        ("network", {"url": "https://somewhere/a.zip"}, "RealModel"),
+        ("network", {"member": "end2end.onnx"}, "RealModel"),
+        ("network", {"name": "../up"}, "RealModel"),
+        ("set", {"detector": "small"}, "must name networks of these roles"),
+        ("set", {"pose": "nothing"}, "must name networks of these roles"),
+        ("set", {"name": "tiny"}, "is a network and a set"),
+        ("words", "fetch tny", "did you mean 'tiny'"),
+        ("words", f"fetch robot --sha256 {'0' * 64}", "single name"),
+        ("words", f"fetch tiny --sha256 {'0' * 64}", "the catalogue says"),
+        ("words", "fetch tiny --sha256 abc", "64 hexadecimal digits"),
+        ("words", "fetch yolov8", "AGPL-3.0"),
+        ("file", None, "not put there"),
     ],
 )
-def test_sets_that_make_no_sense_are_refused(catalogue, change, message):
-    good = catalogue.sets[0].model_dump()
-    with pytest.raises(ValueError, match=message):
-        Catalogue(models=catalogue.models, sets=(NetworkSet(**(good | change)),))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["fetch", "tny"], "did you mean 'tiny'"),
-        (["fetch", "robot", "--sha256", "0" * 64], "single name"),
-        (["fetch", "yolov8"], "AGPL-3.0"),
-        (["fetch", "tiny", "other", "--sha256", "0" * 64], "single name"),
-        (["fetch", "tiny", "--sha256", "0" * 64], "the catalogue says"),
-    ],
-)
-def test_command_refuses_in_one_line(catalogue, server, arguments, message, capsys):
-    assert main(["models", *arguments]) == 2
-    error = capsys.readouterr().err
-    assert message in error
-    assert "Traceback" not in error
-    assert server.requests == []
-
-
-def test_text_that_is_not_a_sha256_is_refused(catalogue, capsys):
-    assert main(["models", "fetch", "tiny", "--sha256", "abc"]) == 2
-    assert "64 hexadecimal digits" in capsys.readouterr().err
+def test_what_is_refused(catalogue, server, tmp_path, capsys, kind, change, message):
+    if kind == "words":
+        assert main(["models", *change.split()]) == 2
+        error = capsys.readouterr().err
+        assert message in error
+        assert "Traceback" not in error
+        assert server.requests == []
+        return
+    (tmp_path / "tiny.onnx").write_bytes(CONTENT)
+    made = {
+        "network": lambda: model(server, "a.onnx", **change),
+        "set": lambda: Catalogue(
+            models=catalogue.models,
+            sets=(NetworkSet(**(catalogue.sets[0].model_dump() | change)),),
+        ),
+        "file": lambda: store(tmp_path, model(server, "a.onnx")).path("tiny"),
+    }
+    with pytest.raises((ValueError, AwarenavError), match=message):
+        made[kind]()

@@ -70,16 +70,6 @@ def test_the_presets_of_0_2_are_translated_key_by_key(upgrade, name):
         assert (f"rules.{rule}" in lines) is (f"{rule}:" in text)
 
 
-def test_without_out_nothing_is_written_and_the_lines_are_the_same(tmp_path, capsys):
-    old = PRESETS / "balanced.yaml"
-    assert main(["policy", "upgrade", str(old)]) == 1
-    told = capsys.readouterr().out.splitlines()
-    new = tmp_path / "new.yaml"
-    assert main(["policy", "upgrade", str(old), "--out", str(new)]) == 1
-    assert set(told[:-2]) <= set(capsys.readouterr().out.splitlines())
-    assert list(tmp_path.iterdir()) == [new]
-
-
 def test_what_the_old_file_left_out_keeps_the_old_default(upgrade):
     """The new defaults are 1.5 and 0 m/s: less careful."""
     _, policy, lines = upgrade("speed: {aware_above: 0.7}\n")

@@ -15,8 +15,6 @@ from sim_tests.actors.robot import (
     CAMERA_HEIGHT_M,
     MAX_YAW_RATE_RADPS,
     NOVA_CARTER,
-    TRACK_M,
-    WHEEL_RADIUS_M,
     Amr,
 )
 from sim_tests.world import Warehouse
@@ -83,24 +81,6 @@ def test_drives_a_circle_of_the_commanded_radius(hall: Warehouse) -> None:
     design = np.column_stack([2.0 * points, np.ones(len(points))])
     (a, b, c), *_ = np.linalg.lstsq(design, (points**2).sum(axis=1), rcond=None)
     assert math.sqrt(c + a * a + b * b) == pytest.approx(1.0, abs=0.01)
-
-
-def test_wheels_roll_without_slip(hall: Warehouse) -> None:
-    amr = Amr(hall, (-2.0, 0.0))
-    names = {
-        pybullet.getJointInfo(amr.body, joint, physicsClientId=hall.client)[12].decode(): joint
-        for joint in range(pybullet.getNumJoints(amr.body, physicsClientId=hall.client))
-    }
-    _drive(hall, amr, 2.0, 1.0)
-    end = _drive(hall, amr, 1.5, 1.0, 0.4)[-1]
-    left, right = (
-        WHEEL_RADIUS_M
-        * pybullet.getJointState(amr.body, names[name], physicsClientId=hall.client)[0]
-        for name in ("left_wheel", "right_wheel")
-    )
-    assert (right - left) / TRACK_M == pytest.approx(end.heading_odom_rad, abs=0.01)
-    # Their mean is the path's length: 1.5 m in the first 2 s with the ramp, then 1.5 m on the arc.
-    assert 0.5 * (left + right) == pytest.approx(3.0, abs=0.01)
 
 
 def test_collision_shapes_fill_the_published_outline(hall: Warehouse) -> None:

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from sim_tests import SimError
 from sim_tests.actors.robot import (
     CAMERA_FORWARD_M,
     CAMERA_HEIGHT_M,
     NOVA_CARTER,
-    WHEEL_RADIUS_M,
     Amr,
     AmrLook,
     amr_meshes,
@@ -21,21 +19,6 @@ from sim_tests.actors.robot import (
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import WarehouseLayout
-
-
-def test_it_fills_its_footprint_and_stands_on_the_floor() -> None:
-    base = amr_meshes()["base_link"]
-    low, high = base.vertices_m.min(axis=0), base.vertices_m.max(axis=0)
-    footprint = NOVA_CARTER.footprint_m
-    np.testing.assert_allclose(low[:2], footprint.min(axis=0), atol=0.005)
-    np.testing.assert_allclose(high[:2], footprint.max(axis=0), atol=0.005)
-    assert low[2] == pytest.approx(0.0, abs=1e-6)
-    assert CAMERA_HEIGHT_M < high[2] < 1.5
-    for link in ("left_wheel", "right_wheel"):
-        wheel = amr_meshes()[link]
-        radius = np.hypot(wheel.vertices_m[:, 0], wheel.vertices_m[:, 2]).max()
-        assert radius == pytest.approx(WHEEL_RADIUS_M, abs=1e-9)
-    assert sum(mesh.triangles for mesh in amr_meshes().values()) < 1500
 
 
 def test_no_part_of_it_is_in_view_of_its_camera() -> None:
@@ -81,10 +64,3 @@ def test_it_is_drawn_where_the_robot_is_and_its_camera_does_not_see_it(heading_r
         world = seen + np.array([*amr.T_odom_base[:2, 3], 0.0])
         assert (world > low - 0.01).all()
         assert (world < high + 0.01).all()
-
-
-def test_a_look_cannot_be_shown_before_it_is_built() -> None:
-    look = AmrLook(lambda: (np.eye(4), 0.0, 0.0))
-    assert look.bodies() == frozenset()
-    with pytest.raises(SimError, match="build"):
-        look.show(100.0)

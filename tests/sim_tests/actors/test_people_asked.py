@@ -170,23 +170,6 @@ def test_who_has_forgotten_the_robot_looks_but_stays_lapsed() -> None:
     assert np.array_equal(asked.places, silent.places)
 
 
-@pytest.mark.parametrize("activity", ["sitting", "kneeling"])
-@pytest.mark.parametrize("kind", ["people", "workers"])
-def test_low_people_turn_the_head_alone_and_never_move(kind: str, activity: str) -> None:
-    place = {"x_m": 5.0, "y_m": 1.0}
-    keys = [{"t_s": 0.0, "activity": activity}]
-    heading = [{"t_s": 0.0, "heading_deg": 90.0}]
-    person = {"name": "p", "activity": activity, "route": [place], "heading_deg": 90.0}
-    script = {"path": [{"t_s": 0.0, **place}], "activities": keys, "heading": heading}
-    low = [{**person, "glances": {"notices_within_m": 0.0}} if kind == "people" else script]
-    jumpy = {**ANSWERS, "startles": 1.0, "distracted_factor": 1.0}
-    asked = run(**{kind: low}, hearing=jumpy)
-    assert np.ptp(asked.places, axis=0).max() < 1e-9
-    assert np.ptp(asked.headings) < 1e-9
-    assert asked.awareness.max() > 0.7
-    assert asked.heads.max() > 1.0
-
-
 def test_nobody_looks_through_a_rack() -> None:
     """A voice is heard there; the look meets nothing, and the person does not notice the robot."""
     layout = WarehouseLayout.named("open").model_dump()

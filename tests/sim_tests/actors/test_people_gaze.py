@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.stats import norm
 
 from sim_tests import SimError
@@ -15,21 +14,6 @@ from sim_tests.actors.behaviour._gaze import Gaze, LogNormalDuration
 
 GLANCE = LogNormalDuration.fitted(0.83, (0.47, 1.50))
 AWAY = LogNormalDuration.fitted(1.03, (0.63, 1.98))
-#: Share of pedestrians who had looked within the last 0.5, 1, 2, 3 s before crossing.
-OBSERVED = {0.5: 0.41, 1.0: 0.54, 2.0: 0.75, 3.0: 0.82}
-
-
-def survival(length: LogNormalDuration, t_s: float) -> float:
-    return float(norm.sf(math.log(t_s / length.median_s) / length.sigma)) if t_s > 0.0 else 1.0
-
-
-def looked_within(tau_s: float) -> float:
-    """Return the probability of a look within the last ``tau_s`` of a stationary process.
-
-    The person looks now, or has looked away for less than ``tau_s``.
-    """
-    recent, _ = quad(lambda age: survival(AWAY, age), 0.0, tau_s)
-    return (GLANCE.mean_s + recent) / (GLANCE.mean_s + AWAY.mean_s)
 
 
 @pytest.mark.parametrize("length", [GLANCE, AWAY])
@@ -40,16 +24,6 @@ def test_drawn_durations_have_the_fitted_median_mean_and_quartile_ratio(length):
     assert median == pytest.approx(length.median_s, rel=0.03)
     assert math.log(upper / lower) == pytest.approx(2.0 * norm.ppf(0.75) * length.sigma, rel=0.04)
     assert drawn.mean() == pytest.approx(length.mean_s, rel=0.05)
-
-
-def test_the_stated_share_of_lookers_fits_the_data_best():
-    process = np.array([looked_within(tau_s) for tau_s in OBSERVED])
-    data = np.array(list(OBSERVED.values()))
-    share = float(data @ process / (process @ process))
-    assert share == pytest.approx(0.81, abs=0.005)
-    np.testing.assert_allclose(share * process, [0.50, 0.60, 0.70, 0.75], atol=0.006)
-    assert np.sqrt(np.mean((share * process - data) ** 2)) < 0.08
-    assert np.sqrt(np.mean((process - data) ** 2)) > 0.15
 
 
 def robot_at(x: float, y: float, height_m: float = 1.4) -> RobotBody:

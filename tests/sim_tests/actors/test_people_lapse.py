@@ -74,13 +74,6 @@ def test_after_the_lapse_the_head_turns_away_or_stays_on_the_robot(looks_away):
     assert (off[after].min() > 30.0) if looks_away else (off[after].max() < 15.0)
 
 
-def test_somebody_who_never_looks_has_no_lapse():
-    never = {**LOOKER, "glances": {"notices_within_m": 0.0}, "start_s": 1.0}
-    plain = run_stage([never], seconds=6.0)
-    lapse = run_stage([{**never, "lapse": {"after_look_s": 0.0, "halts": True}}], seconds=6.0)
-    np.testing.assert_array_equal(plain.people, lapse.people)
-
-
 def test_the_robots_touch_ends_the_lapse():
     """A person whom the robot touches steps back, and does not walk on into it."""
     person = {

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from staged_people import crosser, run_stage
 
-from sim_tests import Scenario, SimError, run_crossing
-from sim_tests.crossing import Stage
+from sim_tests import Scenario, run_crossing
 
 
 def test_walk_on_changes_nothing():
@@ -73,14 +72,6 @@ def test_hurry_goes_first_and_faster_within_human_limits():
     _, ahead_m = hurrying.crossing()
     assert ahead_m > 0.36
     assert hurrying.outcomes[0].time_s < hurrying.outcomes[0].free_time_s - 0.5
-
-
-def test_claim_goes_first_a_little_faster():
-    claiming = run_stage([crosser("claim", start_s=2.0)])
-    assert claiming.outcomes[0].reaction == "claim"
-    assert 1.36 < claiming.speeds.max() <= 1.1 * 1.34 + 1e-6
-    _, ahead_m = claiming.crossing()
-    assert ahead_m > 0.0
 
 
 def test_pass_behind_walks_behind_the_robot_without_stopping():
@@ -176,14 +167,6 @@ def test_at_a_blind_corner_the_robot_is_noticed_only_past_the_rack():
     assert noticed_s > 2.4 + 1.0
 
 
-def test_the_same_seed_gives_the_same_reactions_and_another_seed_others():
-    case = [crosser(None) | {"glances": {}, "reactions": {}}]
-    first, again, other = (run_stage(case, seed=seed, seconds=7.0) for seed in (5, 5, 6))
-    assert first.people.tobytes() == again.people.tobytes()
-    assert first.heads.tobytes() == again.heads.tobytes()
-    assert first.heads.tobytes() != other.heads.tobytes()
-
-
 def test_people_are_ordered_scripted_then_reacting_then_replayed(tmp_path):
     table = tmp_path / "one.csv"
     table.write_text("t_s,id,x_m,y_m\n0,a,9,3\n2,a,10,3\n")
@@ -203,31 +186,3 @@ def test_people_are_ordered_scripted_then_reacting_then_replayed(tmp_path):
     assert xs == pytest.approx([7.0, 8.0, 9.0])
     assert [person.name for person in result.people] == ["p"]
     assert not run_crossing(case.without_people(), policy="balanced").frames[0].truth
-
-
-def test_unnamed_reactions_have_share_0():
-    person = crosser("wait")
-    case = {"name": "x", "duration_s": 1.0, "robot": {"goal_x_m": 1.0}, "people": [person, person]}
-    with pytest.raises(ValueError, match="names of people must be unique"):
-        Scenario.model_validate(case)
-    case["people"] = [person | {"reactions": {"wait": 0.0}}]
-    with pytest.raises(ValueError, match="at least one share"):
-        Scenario.model_validate(case)
-    case["people"] = [person]
-    reactions = Scenario.model_validate(case).people[0].reactions
-    assert reactions.wait == 1.0
-    assert reactions.walk_on == reactions.claim == reactions.hurry == 0.0
-
-
-def test_a_route_into_a_rack_is_refused_by_the_stage():
-    case = Scenario.model_validate(
-        {
-            "name": "x",
-            "duration_s": 1.0,
-            "layout": "crossing",
-            "robot": {"goal_x_m": 1.0},
-            "people": [{"name": "p", "route": [{"x_m": 0.0, "y_m": 2.2}]}],
-        }
-    )
-    with pytest.raises(SimError, match="inside a rack"):
-        Stage(case, np.zeros(0))

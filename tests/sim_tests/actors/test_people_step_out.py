@@ -9,7 +9,6 @@ import pytest
 from staged_people import StageRun, run_stage
 
 from sim_tests import ScenarioTemplate
-from sim_tests.actors.behaviour import PersonSpec
 from sim_tests.actors.robot import NOVA_CARTER
 
 FRONT_M = float(NOVA_CARTER.footprint_m[:, 0].max())
@@ -92,13 +91,6 @@ def test_who_has_watched_looks_away_and_forgets_the_robot(population: str) -> No
     # The head turns to the way at once, and they wait for nobody.
     assert np.degrees(off[row + 10]) > 30.0
     assert run.people[row : row + 30, 0, 1].min() < 0.5
-
-
-def test_a_place_without_a_way_is_refused() -> None:
-    with pytest.raises(ValueError, match="sets_off_within_m needs a route of at least two"):
-        PersonSpec.model_validate(
-            {"name": "p", "route": [{"x_m": 1.0, "y_m": 0.0}], "sets_off_within_m": 1.0}
-        )
 
 
 def test_the_shipped_ones_draw_the_moment_over_the_whole_approach() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 
 import numpy as np
@@ -10,23 +9,17 @@ import pytest
 
 from sim_tests import run_crossing
 from sim_tests.actors.behaviour import (
-    DEFAULT_POPULATION,
     PersonSpec,
     RecordedWalker,
     RobotBody,
     Surroundings,
-    Walker,
     draw_person,
-    walker_of,
 )
 from sim_tests.actors.behaviour._gait_variation import GaitVariation, VariationFigures
 from sim_tests.crossing.planner import StraightOn
 from sim_tests.scenario import Scenario, ScenarioTemplate
-from sim_tests.world.errors import SimError
 
 NO_BOXES = np.zeros((0, 4))
-#: Checksums of the people's positions, rounded to micrometres, before there were populations.
-BEFORE = {"late_glance": "482c96b29ee50060", "crossing_attentive": "6f88f6ed82c97ec6"}
 
 
 def short(name: str, duration_s: float = 7.5) -> Scenario:
@@ -51,13 +44,6 @@ def beside(x_m: float = -2.0, speed_mps: float = 0.0) -> Surroundings:
     return Surroundings(robot, (), lambda: True)
 
 
-@pytest.mark.parametrize("name", BEFORE)
-def test_classic_people_are_those_of_before(name: str) -> None:
-    assert DEFAULT_POPULATION == "classic"
-    found = positions(short(name))
-    assert hashlib.sha256(np.round(found, 6).tobytes()).hexdigest()[:16] == BEFORE[name]
-
-
 def test_recorded_people_repeat_with_their_seed() -> None:
     scenario = short("late_glance", 3.0)
     first, again = (positions(scenario, "recorded") for _ in range(2))
@@ -75,14 +61,6 @@ def test_a_scenario_keeps_its_tasks_among_recorded_people() -> None:
     assert ScenarioTemplate.from_text(template.median().to_text()).median() == template.median()
     paper = ScenarioTemplate.shipped("paper_encounter").with_population("recorded").median()
     assert paper.workers, "a robot that drives straight on keeps its scripted workers"
-
-
-def test_other_names_are_refused() -> None:
-    with pytest.raises(SimError, match="population must be one of classic, recorded, got 'odd'"):
-        ScenarioTemplate.shipped("late_glance").with_population("odd")
-    with pytest.raises(SimError, match="population"):
-        walker_of("odd")
-    assert walker_of("classic") is Walker
 
 
 def test_speed_and_looks_are_drawn_and_the_task_is_kept() -> None:

@@ -12,15 +12,6 @@ from sim_tests.actors.body._pose import (
     BodyPose,
     link_transforms,
     piece_transforms,
-    rotation_matrices,
-)
-from sim_tests.actors.body._quaternions import (
-    axis_angle,
-    from_axes,
-    multiply,
-    rotation_matrix,
-    rotation_vector,
-    slerp,
 )
 
 angles = st.floats(-1.5, 1.5)
@@ -69,25 +60,3 @@ def test_kinematics_against_scipy_joint_by_joint(
     np.testing.assert_allclose(moved[0], (link(elbow) @ whole[0])[:3], atol=1e-9)
     part = link(shoulder) @ about_joint(elbow, 0.3)
     np.testing.assert_allclose(moved[1], (part @ whole[1])[:3], atol=1e-9)
-
-
-@given(rotvecs, rotvecs, st.floats(0.0, 1.0))
-@settings(deadline=None)
-def test_quaternions_against_scipy(first: tuple, second: tuple, share: float) -> None:
-    one, other = (Rotation.from_rotvec(v) for v in (first, second))
-    p, q = (tuple(r.as_quat().tolist()) for r in (one, other))
-    np.testing.assert_allclose(
-        rotation_matrix(multiply(p, q)), (one * other).as_matrix(), atol=1e-12
-    )
-    np.testing.assert_allclose(rotation_matrices(np.array([first]))[0], one.as_matrix(), atol=1e-9)
-    np.testing.assert_allclose(rotation_vector(p), one.as_rotvec(), atol=1e-9)
-    columns = tuple(tuple(column) for column in one.as_matrix().T.tolist())
-    np.testing.assert_allclose(rotation_matrix(from_axes(*columns)), one.as_matrix(), atol=1e-9)
-    middle = one * Rotation.from_rotvec(share * (one.inv() * other).as_rotvec())
-    np.testing.assert_allclose(rotation_matrix(slerp(p, q, share)), middle.as_matrix(), atol=1e-9)
-    length = float(np.linalg.norm(first))
-    if length > 1e-6:
-        axis = tuple((np.array(first) / length).tolist())
-        np.testing.assert_allclose(
-            rotation_matrix(axis_angle(axis, length)), one.as_matrix(), atol=1e-9
-        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from sim_tests import NOVA_CARTER, SimError, Warehouse, Worker
 from sim_tests.actors.robot import (
     KinematicRobot,
     RobotModel,
-    model_meshes,
     shipped_robots,
 )
 from sim_tests.world.hall import WarehouseLayout
@@ -57,18 +55,6 @@ def test_a_robot_survives_yaml_and_sees_around_itself(name: str, tmp_path) -> No
         seen |= (directions - low) % 360 <= high - low
     assert seen.all()
     assert body.covers(shapely.Point(model.camera_m[:2]))
-
-
-def test_a_profile_becomes_a_robot_with_its_outline() -> None:
-    corners = [[0.9, 0.0], [0.0, 0.5], [-0.5, 0.3], [-0.5, -0.3], [0.0, -0.5], [0.1, 0.0]]
-    model = RobotModel.of(replace(NOVA_CARTER, footprint_m=np.array(corners)))
-    assert len(model.outline_m) == 5  # the last corner lies within
-    assert model.profile.circumscribed_radius_m == pytest.approx(0.9)
-    (mesh, _), *others = model_meshes(model)
-    assert not others
-    assert shapely.MultiPoint(mesh.vertices_m[:, :2]).convex_hull.area == pytest.approx(
-        shapely.Polygon(model.outline_m).area
-    )
 
 
 def test_unusable_robots_are_refused_with_a_reason() -> None:

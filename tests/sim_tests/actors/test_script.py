@@ -47,16 +47,6 @@ def test_a_gaze_key_at_the_robot_follows_the_robot():
         assert elevation == pytest.approx(-0.1)
 
 
-def test_the_head_turns_through_the_front_not_through_the_back():
-    """From a robot behind on the right to one behind on the left."""
-    keys = [
-        {"t_s": 0.0, "look": "ahead", "yaw_deg": -120.0},
-        {"t_s": 1.0, "look": "ahead", "yaw_deg": 120.0},
-    ]
-    angle, _ = script([(0, 0, 0)], gaze=keys).gaze_angles(0.5, 0.0, (0.0, 0.0))
-    assert angle == pytest.approx(0.0, abs=1e-9)
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -94,12 +84,3 @@ def test_activities_change_in_six_tenths_of_a_second():
             [(0, 0, 0)],
             activities=[{"t_s": 1.0, "activity": "phone"}, {"t_s": 1.2, "activity": "none"}],
         )
-
-
-def test_feet_stand_before_the_first_and_after_the_last_waypoint():
-    for t_s in (-1e6, -3.0, 8.0, 1e6):
-        feet = np.array(WALK.motion(t_s).feet.feet)
-        assert np.ptp(feet[:, 2]) < 1e-9
-        np.testing.assert_allclose(feet[:, 4], 0.0, atol=1e-9)
-        centre = WALK.motion(t_s).position_odom_m
-        assert np.linalg.norm(feet[:, :2].mean(axis=0) - centre) < 0.05

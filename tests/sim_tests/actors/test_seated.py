@@ -10,7 +10,6 @@ from pydantic import ValidationError
 from worker_looks import LOOKS
 
 from perception import layouts as kp
-from sim_tests import SimError
 from sim_tests.actors.behaviour import (
     MovingBody,
     PersonSpec,
@@ -20,7 +19,6 @@ from sim_tests.actors.behaviour import (
 )
 from sim_tests.actors.body import (
     SEATED_EYE_HEIGHT_SHARE,
-    Activity,
     Worker,
     load_worker,
     skin_points,
@@ -33,7 +31,6 @@ from sim_tests.world.sightlines import cut_surfaces
 NO_BOXES = np.empty((0, 4))
 HEADING_RAD = 0.7
 PLACE_M = np.array([1.0, -2.0])
-SEATED = {"t_s": 0.0, "activity": "sitting"}
 
 
 def seated(hall: Warehouse, look: str, stature_m: float | None = None, **seat: str) -> Worker:
@@ -112,14 +109,6 @@ def test_a_robot_meets_the_seat_and_it_leaves_with_the_person() -> None:
         worker.place(PLACE_M + 3.0, 0.0)
         assert worker.held is None
         assert (met(above), met(behind)) == (-1, -1)
-
-
-def test_nobody_sits_down_or_stands_up(hall: Warehouse) -> None:
-    for before, name in (("none", "sitting"), ("sitting", "phone")):
-        with pytest.raises(SimError, match="stays seated"):
-            Activity(name, before, 0.5)
-    with pytest.raises(SimError, match=r"seat must be one of 'stool', 'box', got 'sofa'"):
-        Worker(hall, seat="sofa")  # type: ignore[arg-type]
 
 
 def test_a_seated_person_watches_but_never_moves() -> None:

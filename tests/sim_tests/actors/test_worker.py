@@ -119,25 +119,6 @@ def test_head_eyes_and_chest_agree_with_the_whole_body(worker: Worker, posture: 
     np.testing.assert_allclose(face, HEAD_TEMPLATE_M[[0, 3, 4]], atol=0.025)
 
 
-@given(postures, st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
-@settings(max_examples=15, deadline=None)
-def test_a_posture_does_not_depend_on_place_and_heading(
-    worker: Worker, posture: dict, turn_rad: float, x_m: float, y_m: float
-) -> None:
-    worker.place(**posture)
-    points, gaze = np.array(worker.keypoints_odom_m), worker.gaze_odom
-    turn = np.eye(3)
-    turn[:2, :2] = [
-        [math.cos(turn_rad), -math.sin(turn_rad)],
-        [math.sin(turn_rad), math.cos(turn_rad)],
-    ]
-    position = turn[:2, :2] @ posture["position_odom_m"] + (x_m, y_m)
-    heading = posture["heading_odom_rad"] + turn_rad
-    worker.place(**{**posture, "position_odom_m": position, "heading_odom_rad": heading})
-    np.testing.assert_allclose(worker.keypoints_odom_m, points @ turn.T + (x_m, y_m, 0), atol=1e-9)
-    np.testing.assert_allclose(worker.gaze_odom, turn @ gaze, atol=1e-9)
-
-
 @pytest.mark.parametrize("look", LOOKS)
 def test_stands_upright_on_the_floor_as_tall_as_asked(hall: Warehouse, look: str) -> None:
     for stature_m in (1.52, 1.93):
@@ -220,16 +201,6 @@ def test_invalid_placements_are_refused_and_move_nothing(
     assert worker.keypoints_odom_m.tobytes() == before
     assert worker.held == "phone"
     assert base == pybullet.getBasePositionAndOrientation(worker.body, physicsClientId=hall.client)
-
-
-def test_physics_does_not_move_a_placed_worker(hall: Warehouse, worker: Worker) -> None:
-    worker.place((2.0, 2.0), 0.5, 0.3, 1.0, activity="carry_box")
-    before = _links(hall, worker)
-    for _ in range(240):
-        hall.step()
-    after = _links(hall, worker)
-    for name in LINKS:
-        np.testing.assert_allclose(after[name][1], before[name][1], atol=2e-4)
 
 
 def test_a_worker_stops_a_robot_that_drives_into_it() -> None:

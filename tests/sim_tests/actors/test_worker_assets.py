@@ -10,24 +10,15 @@ from worker_looks import LOOKS
 
 from perception.anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M, LIMBS, MEAN_STATURE_M
 from perception.arrays import FloatArray
-from sim_tests import SimError
 from sim_tests.actors.body import (
-    DETAIL_LEVELS,
     JOINTS,
-    PARENTS,
     WorkerAsset,
     load_worker,
     worker_names,
 )
 
 NAMES = worker_names()
-SPINE, NECK = JOINTS.index("spine"), JOINTS.index("neck")
-ARMS = [JOINTS.index(f"{side}_shoulder") for side in ("left", "right")]
 LEGS = [JOINTS.index(f"{side}_hip") for side in ("left", "right")]
-#: Quantisation step of the stored weights.
-STEP = 1.0 / 255.0
-#: Largest number of triangles of each level of detail.
-MOST_TRIANGLES = (9_500, 3_200, 1_000)
 
 
 @pytest.fixture(params=LOOKS)
@@ -55,27 +46,6 @@ def test_at_least_twelve_distinct_workers_ship_in_10_mb() -> None:
     assert 0.3 * len(lines) <= women <= 0.7 * len(lines)
 
 
-def test_an_unknown_worker_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(SimError, match=f"{NAMES[0]}.*got 'nobody'"):
-        load_worker("nobody")
-
-
-def test_levels_are_valid_meshes_with_decreasing_numbers_of_triangles(worker: WorkerAsset) -> None:
-    assert len(worker.levels) == DETAIL_LEVELS
-    for mesh, most in zip(worker.levels, MOST_TRIANGLES, strict=True):
-        count = len(mesh.vertices_m)
-        assert 0.5 * most < len(mesh.triangles) <= most
-        assert mesh.triangles.min() >= 0
-        assert mesh.triangles.max() < count
-        assert len(mesh.normals) == len(mesh.uv) == len(mesh.weights) == count
-        assert np.isfinite(mesh.vertices_m).all()
-        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
-        assert mesh.uv.min() >= 0.0
-        assert mesh.uv.max() <= 1.0
-        assert mesh.weights.min() >= 0.0
-        assert mesh.weights.max() <= 1.0
-
-
 def test_worker_stands_on_the_floor_at_the_origin(worker: WorkerAsset) -> None:
     for mesh in worker.levels:
         assert abs(mesh.vertices_m[:, 2].min()) < 0.005
@@ -87,32 +57,6 @@ def test_worker_stands_on_the_floor_at_the_origin(worker: WorkerAsset) -> None:
     )
     for leg in (left, right):
         np.testing.assert_allclose(leg[:, :2] - leg[0, :2], 0.0, atol=1e-3)
-
-
-def test_a_joints_weights_never_exceed_its_parents(worker: WorkerAsset) -> None:
-    rows = [mesh.weights for mesh in worker.levels] + [worker.keypoint_weights]
-    for weights in rows:
-        for joint, parent in enumerate(PARENTS):
-            if parent >= 0:
-                assert (weights[:, joint] <= weights[:, parent] + STEP).all(), JOINTS[joint]
-
-
-@pytest.mark.parametrize("joint", ["elbow", "knee"])
-def test_limbs_follow_their_joint_fully_beyond_it_and_not_before_it(
-    worker: WorkerAsset, joint: str
-) -> None:
-    """From 12 cm on either side of the joint, and smoothly in between."""
-    for side in ("left", "right"):
-        at = JOINTS.index(f"{side}_{joint}")
-        before, after = worker.joints_m[PARENTS[at]], worker.joints_m[at + 1]
-        axis = (after - before) / np.linalg.norm(after - before)
-        for mesh in worker.levels:
-            limb = mesh.weights[:, PARENTS[at]] > 0.999
-            beyond_m = (mesh.vertices_m - worker.joints_m[at]) @ axis
-            weight = mesh.weights[:, at]
-            assert (weight[limb & (beyond_m > 0.125)] == 1.0).all()
-            assert (weight[limb & (beyond_m < -0.125)] == 0.0).all()
-            assert (weight[mesh.weights[:, PARENTS[at]] == 0.0] == 0.0).all()
 
 
 def test_heads_match_the_template_of_perception(worker: WorkerAsset) -> None:

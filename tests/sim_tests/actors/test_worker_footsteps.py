@@ -165,20 +165,3 @@ def test_stance_feet_stay_in_any_walk(
     hips = np.array([row.hip_height_m for row in rows])
     assert hips.min() > 0.75 * hips[0]
     assert hips.max() <= hips[0] + 1e-9
-
-
-def test_footsteps_do_not_depend_on_place_heading_or_time() -> None:
-    """The same walk at another place, rotated by 90 degrees and later has the same feet."""
-    path, turn = [(0, 0, 0), (2, 2, 0.3), (4, 2.5, 2)], 0.5 * math.pi
-    cos, sin = math.cos(turn), math.sin(turn)
-    moved = [(t + 7, 3 + cos * x - sin * y, -1 + sin * x + cos * y) for t, x, y in path]
-    here, there = script(path), script(moved)
-    for t_s in np.linspace(-1.0, 5.0, 40):
-        first, second = here.motion(float(t_s)).feet, there.motion(float(t_s) + 7.0).feet
-        assert first.hip_height_m == pytest.approx(second.hip_height_m, abs=1e-6)
-        for foot, other in zip(first.feet, second.feet, strict=True):
-            expected = (3 + cos * foot[0] - sin * foot[1], -1 + sin * foot[0] + cos * foot[1])
-            np.testing.assert_allclose(other[:3], (*expected, foot[2]), atol=1e-5)
-            assert math.remainder(other[3] - foot[3] - turn, math.tau) == pytest.approx(
-                0.0, abs=1e-5
-            )

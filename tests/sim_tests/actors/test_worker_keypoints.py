@@ -9,7 +9,6 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from worker_looks import LOOKS
 
 from perception import Camera
 from sim_tests.actors.body import (
@@ -19,7 +18,6 @@ from sim_tests.actors.body import (
     WorkerSkin,
     load_worker,
     skin_points,
-    worker_names,
 )
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
@@ -129,20 +127,3 @@ def test_markers_are_found_where_keypoints_are_projected(hall: Warehouse, look: 
     assert len(errors) >= 15  # long hair hides ears
     assert np.median(errors) <= 1.0
     assert np.percentile(errors, 95) <= 2.5
-
-
-@pytest.mark.full
-def test_over_all_workers_the_median_is_within_two_pixels(hall: Warehouse) -> None:
-    errors = [error for look in worker_names() for error in pixel_errors(hall, look, headings=3)]
-    assert np.median(errors) <= 2.0
-
-
-@pytest.mark.parametrize("look", LOOKS)
-def test_keypoints_of_the_face_lie_on_it(look: str) -> None:
-    asset = load_worker(look)
-    _, places = marked(look)
-    gaps = np.linalg.norm(places - asset.keypoints_m[:5], axis=1)
-    assert gaps.max() < 0.02
-    eyes = asset.joints_m[[JOINTS.index("left_eye"), JOINTS.index("right_eye")]]
-    pupils = eyes + np.array([0.012, 0.0, 0.0])
-    assert np.linalg.norm(asset.keypoints_m[1:3] - pupils, axis=1).max() < 0.012

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from perception.laser import LaserScan, RobotMotion
-from sim_tests import Scenario, SimError, run_crossing
+from sim_tests import Scenario, run_crossing
 from sim_tests.crossing.eyes import TimedEyes
 from sim_tests.crossing.faults import (
     BlindSector,
     Fault,
     FaultInjection,
-    FaultyEyes,
     FaultyScans,
     Onset,
     ScannerFault,
@@ -119,29 +118,13 @@ def test_from_a_drawn_time_on_no_image_arrives():
     assert arrivals(Fault())[-1] == pytest.approx(10.6)
 
 
-def test_eyes_forget_poses_of_images_that_can_no_longer_arrive():
-    timing = CameraTiming(drop_rate=0.5, latency_s=0.4, latency_jitter_s=0.3)
-    timed = TimedEyes(Watcher(), timing, np.random.default_rng(0))
-    eyes = FaultyEyes(
-        Fault(),
-        timed,
-        Scenario.shipped("late_glance").camera.camera(),
-        np.random.default_rng(1),
-    )
-    seen = 0
-    for n in range(2000):
-        seen += len(eyes.look(0.05 * n, np.eye(4), np.eye(4), ()))
-        assert len(eyes._poses) <= 16
-    assert 900 < seen < 1100
-
-
 MET = Scenario.shipped("head_on_in_aisle")
 
 
-@pytest.mark.parametrize("views_deg", [(0.0,), (0.0, 90.0)])
+@pytest.mark.parametrize("views_deg", [(0.0, 90.0), pytest.param((0.0,), marks=pytest.mark.full)])
 def test_a_black_picture_is_no_view_for_the_judgement_of_real_pictures(views_deg):
     camera = MET.camera.model_copy(update={"views_deg": views_deg})
-    scenario = MET.model_copy(update={"duration_s": 2.0, "camera": camera})
+    scenario = MET.model_copy(update={"duration_s": 1.6, "camera": camera})
     fault = Fault(name="black", black_camera=Onset(after_s=0.5))
     result = run_crossing(scenario, policy="balanced", perception="pixels", fault=fault)
     assert not any(frame.constraints.stale for frame in result.frames if 0.1 < frame.t_s < 0.5)
@@ -149,11 +132,8 @@ def test_a_black_picture_is_no_view_for_the_judgement_of_real_pictures(views_deg
     assert result.frames[-1].constraints.speed_limit_mps == 0.0
 
 
-@pytest.mark.parametrize("perception", ["truth", "keypoints"])
-def test_the_robot_stops_once_its_only_camera_shows_nothing(perception):
-    scenario = MET.model_copy(update={"duration_s": 5.5})
-    fault = Fault(name="black", black_camera=Onset(after_s=2.0))
-    result = run_crossing(scenario, policy="balanced", perception=perception, fault=fault)
+def stops(result):
+    """Assert that the robot drove, and stands 2.5 s after it went blind at 2 s."""
     assert max(frame.robot_state.speed_mps for frame in result.frames) > 0.5
     late = [frame for frame in result.frames if frame.t_s > 3.6]
     assert all(frame.constraints.speed_limit_mps == 0.0 for frame in late)
@@ -161,36 +141,23 @@ def test_the_robot_stops_once_its_only_camera_shows_nothing(perception):
     assert not any(frame.observations for frame in late)
 
 
-def test_both_are_joined_and_kept_as_text(tmp_path):
-    both = Fault.of("black_camera+scanner_blind")
-    assert both.black_camera == Onset(within_s=10.0)
-    assert both.scanner.blind.returns == "any"
-    path = tmp_path / "fault.yaml"
-    for each in (both, Fault(name="dark", black_camera=Onset())):
-        each.to_yaml(path)
-        assert Fault.from_yaml(path) == each
-        path.write_text(each.to_text())
-        again = Fault.from_yaml(path)
-        assert (again.black_camera, again.scanner) == (each.black_camera, each.scanner)
-    with pytest.raises(SimError, match="both set 'blind'"):
-        Fault.of("scanner_blind+scanner_blind_sector")
-    path.write_text("scanner: {blind: {returns: nothing}}")
-    with pytest.raises(SimError, match="returns"):
-        Fault.from_yaml(path)
+@pytest.mark.parametrize("perception", ["truth", "keypoints"])
+def test_the_robot_stops_once_its_only_camera_shows_nothing(perception):
+    scenario = MET.model_copy(update={"duration_s": 4.5})
+    fault = Fault(name="black", black_camera=Onset(after_s=2.0))
+    stops(run_crossing(scenario, policy="balanced", perception=perception, fault=fault))
 
 
-@pytest.mark.parametrize("form", NO_ANSWERS)
-def test_a_robot_with_blind_scanners_alone_stops(form):
+@pytest.mark.parametrize(
+    ("width_deg", "form"), [(360.0, "inf"), (360.0, "zero"), (360.0, "above_max"), (100.0, "nan")]
+)
+def test_a_robot_with_scanners_that_are_blind_ahead_stops(width_deg, form):
     """Whatever a driver writes for no answer: it is not a view of nobody."""
-    blind = BlindSector(width_deg=360.0, returns=form, after_s=2.0)
-    scenario = MET.model_copy(update={"duration_s": 5.5})
+    blind = BlindSector(width_deg=width_deg, at_deg=0.0, returns=form, after_s=2.0)
     result = run_crossing(
-        scenario,
+        MET.model_copy(update={"duration_s": 4.5}),
         policy="balanced",
         perception="scanner",
         fault=Fault(name="blind", scanner=ScannerFault(blind=blind)),
     )
-    assert max(frame.robot_state.speed_mps for frame in result.frames) > 0.5
-    late = [frame for frame in result.frames if frame.t_s > 3.6]
-    assert all(frame.constraints.speed_limit_mps == 0.0 for frame in late)
-    assert result.frames[-1].robot_state.travel_mps < 0.05
+    stops(result)

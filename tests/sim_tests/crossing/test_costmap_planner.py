@@ -9,24 +9,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from planner_scenes import AISLE, DT_S, constraints
 
-from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
+from nav_adapter import RobotProfile, RobotState
 from sim_tests import ScenarioTemplate, run_crossing
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing.planner import CostmapPlanner, SamplingPlanner
 from sim_tests.study.runs import plan_jobs, policy_of
 
 GOAL = np.array([8.0, 0.0])
-DT_S = 0.05
-AISLE = np.array([[-3.0, 1.5, 14.0, 2.5], [-3.0, -2.5, 14.0, -1.5]])
 DRIVING = RobotState(0.0, np.zeros(2), 0.0, 1.2, 0.0)
 
 
-def among(
-    place: tuple[float, float], velocity: tuple[float, float], limit_mps: float = 1.5
-) -> NavConstraints:
-    circle = PersonObstacle(1, np.array(place), np.array(velocity), 0.45, 1.75, 0.0, None)
-    return NavConstraints(0.0, (circle,), limit_mps, "test", False)
+def among(place: tuple[float, float], velocity: tuple[float, float], limit_mps: float = 1.5):
+    return constraints([(place, velocity, 0.45)], limit_mps)
 
 
 @given(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing.eyes import ORACLE, Perception
-from sim_tests.study.runs import plan_jobs
 
 NAMES = ("truth", "keypoints", "pixels", "keypoints+scanner", "pixels+scanner", "scanner", ORACLE)
 
@@ -25,18 +25,6 @@ def test_other_names_are_refused(name: str) -> None:
 def test_the_truth_has_no_use_for_a_scanner() -> None:
     with pytest.raises(SimError, match="no use for a scanner"):
         Perception.of("truth", "camera+scanner")
-
-
-def test_several_sets_of_sensors_are_compared() -> None:
-    sets = ("camera", "camera+scanner", "scanner")
-    jobs = plan_jobs(["crossing_attentive"], ["balanced", ORACLE], [0], sensors=sets)
-    perceptions = [(job.policy_name, job.perception) for job in jobs]
-    assert perceptions == [
-        ("balanced", "keypoints"),
-        ("balanced", "keypoints+scanner"),
-        ("balanced", "scanner"),
-        (ORACLE, ORACLE),
-    ]
 
 
 def test_a_scenario_without_scanners_is_refused_where_they_are_needed() -> None:
@@ -66,3 +54,23 @@ def test_scanners_keep_somebody_who_has_left_the_picture() -> None:
         )
     assert unseen_s["keypoints"] > 1.0
     assert unseen_s["keypoints+scanner"] < 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, pytest.param(5, marks=pytest.mark.full)])
+def test_a_driving_robot_does_not_find_people_in_itself(seed: int) -> None:
+    within: list[tuple[float, list[float]]] = []
+
+    def look(frame, stage) -> None:
+        state, corners = frame.robot_state, stage.amr.profile.footprint_m
+        cos, sin = np.cos(state.heading_odom_rad), np.sin(state.heading_odom_rad)
+        for track in frame.tracks:
+            place = [[cos, sin], [-sin, cos]] @ (track.position_odom_m - state.position_odom_m)
+            if (place > corners.min(axis=0)).all() and (place < corners.max(axis=0)).all():
+                within.append((frame.t_s, place.tolist()))
+
+    result = run_crossing(
+        "late_glance", policy="balanced", perception="keypoints+scanner", seed=seed, observer=look
+    )
+    assert result.success
+    assert not within

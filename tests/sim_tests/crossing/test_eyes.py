@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from perception import AttentionCone
-from sim_tests import SimError, run_crossing
+from sim_tests import run_crossing
 from sim_tests.crossing import Stage
-from sim_tests.crossing.eyes import KeypointNoise, MapView, TrueEyes, make_eyes
+from sim_tests.crossing.eyes import MapView, TrueEyes
 from sim_tests.scenario import ScenarioTemplate
 
 CONE = AttentionCone()
@@ -53,11 +52,3 @@ def test_the_oracle_sees_everybody_who_is_not_hidden_by_a_high_box() -> None:
         assert seen == np.flatnonzero(free & near).tolist()
         everybody = [worker for _, worker in TrueEyes().observe(0.0, T_odom_camera, truth)]
         assert everybody == np.flatnonzero(near).tolist()
-
-
-def test_an_unknown_perception_is_refused_with_the_valid_ones() -> None:
-    scenario = ScenarioTemplate.shipped("crossing_attentive").median()
-    with Stage(scenario, np.zeros(len(scenario.workers)), np.random.default_rng(0)) as stage:
-        camera, rng = scenario.camera.camera(), np.random.default_rng(0)
-        with pytest.raises(SimError, match=r"perception must be one of 'truth'.*got 'x-ray'"):
-            make_eyes("x-ray", stage, camera, CONE, KeypointNoise(), rng)

@@ -115,21 +115,42 @@ def test_shipped_faults_are_named_after_their_files_and_round_trip(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("given", "message"),
     [
-        ("mis_rate: 0.3", "did you mean 'miss_rate'"),
-        ("miss_rate: 1.3", "less than or equal to 1"),
-        ("frozen_camera: {for_s: 3.0, every_s: 2.0}", "for_s must be shorter than every_s"),
-        ("name: a b", "name"),
+        ({"text": "mis_rate: 0.3"}, "did you mean 'miss_rate'"),
+        ({"text": "miss_rate: 1.3"}, "less than or equal to 1"),
+        ({"text": "frozen_camera: {for_s: 3.0, every_s: 2.0}"}, "for_s must be shorter than"),
+        ({"text": "name: a b"}, "name"),
+        ({"text": "scanner: {blind: {returns: nothing}}"}, "returns"),
+        ({"name": "misses_3"}, "did you mean 'misses_30'"),
+        ({"name": "ghosts+scanner_lat"}, "did you mean 'scanner_late'"),
+        ({"name": "ghosts+ghosts"}, "both set 'ghosts'"),
+        ({"name": "scanner_blind+scanner_blind_sector"}, "both set 'blind'"),
+        ({"name": "scanner_frozen+scanner_frozen_old_stamps"}, "both set 'frozen' of the scanners"),
+        ({"name": "scanner_one_dead+scanner_late"}, "same 'only'"),
     ],
 )
-def test_impossible_faults_are_refused(text, message, tmp_path):
+def test_impossible_faults_and_pairs_are_refused(given, message, tmp_path):
     path = tmp_path / "fault.yaml"
-    path.write_text(text)
+    path.write_text(given.get("text", ""))
     with pytest.raises(SimError, match=message):
-        Fault.of(str(path))
-    with pytest.raises(SimError, match="did you mean 'misses_30'"):
-        Fault.shipped("misses_3")
+        Fault.of(given.get("name", str(path)))
+
+
+@pytest.mark.parametrize(
+    "name", ["ghosts+scanner_late", "misses_30+scanner_late+scanner_yawed", "FILE+scanner_late"]
+)
+def test_several_faults_are_joined_and_each_keeps_its_own(name, tmp_path):
+    path = tmp_path / "mine.yaml"
+    Fault(name="mine", latency_s=0.1).to_yaml(path)
+    joined = Fault.of(name.replace("FILE", str(path)))
+    parts = [Fault.of(part.replace("FILE", str(path))) for part in name.split("+")]
+    for part in parts:
+        own = part.model_dump(exclude_defaults=True, exclude={"name", "description", "scanner"})
+        assert own.items() <= joined.model_dump().items()
+    assert joined.scanner.latency_s == 0.2
+    assert joined.scanner.yaw_error_deg == (3.0 if "yawed" in name else 0.0)
+    assert Fault.model_validate(joined.model_dump()) == joined
 
 
 def test_the_miss_rate_is_the_share_of_lost_observations():
@@ -219,14 +240,6 @@ def test_a_frozen_camera_repeats_its_last_image(fresh):
             assert taken_s == pytest.approx(last_true_s)
             assert sighting.stamp_s == (t_s if fresh else last_true_s)
     assert frozen == 4 * 20
-
-
-def test_a_camera_that_is_frozen_from_the_start_shows_nothing():
-    outage = Outage(for_s=1.0, every_s=10.0)
-    assert outage.holds(0.0, 0.0)
-    fault = Fault(frozen_camera=Outage(for_s=0.999, every_s=1.0))
-    early = [sightings for t_s, sightings in looks(fault, 1.0) if sightings]
-    assert all(sightings[0].stamp_s >= 0.0 for sightings in early)
 
 
 def known_states(fault, seconds=25.0):

@@ -80,11 +80,6 @@ def test_a_wall_hides_what_is_behind_it():
     assert u.max() <= 325.0
 
 
-def test_a_person_outside_the_field_of_view_is_not_detected():
-    assert look(Body(x_m=-3.0))[0] == ()
-    assert look(Body(x_m=1.0, y_m=4.0))[0] == ()
-
-
 def test_noise_has_the_configured_size_and_is_independent_between_frames():
     noise = KeypointNoise(pixel_std_px=2.0, lift_std_m=0.05, miss_rate=0.0)
     camera = KeypointCamera(CAMERA, Wall(), noise, np.random.default_rng(0))

@@ -6,10 +6,8 @@ import pytest
 
 from awarenav.policies import read_policy
 from nav_adapter import AwarenessPolicy, NavError
-from sim_tests import Scenario, SimError, run_crossing
+from sim_tests import SimError
 from sim_tests.crossing import named_policy
-from sim_tests.search._files import common_settings
-from sim_tests.study.runs import plan_jobs, policy_of
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 
@@ -39,21 +37,3 @@ def test_a_policy_a_file_and_a_path_are_named(tmp_path):
         assert named_policy(file) == named_policy(str(file)) == ("today", scanner)
     with pytest.raises(SimError, match=r"a preset's name or a \.yaml file"):
         named_policy(Path("scanner"))
-
-
-@pytest.mark.parametrize(("given", "near"), [("scaner", "scanner"), ("balance", "balanced")])
-def test_a_mistyped_name_gets_all_names_and_the_nearest(given, near):
-    message = rf"preset must be one of .*'blind'.*'scanner', got '{given}'; did you mean '{near}'"
-    with pytest.raises(NavError, match=message):
-        named_policy(given)
-
-
-def test_every_entry_to_the_simulator_knows_the_scanner():
-    _, scanner = named_policy("scanner")
-    (job,) = plan_jobs(["blind_corner"], ["scanner"], [0], sensors=["scanner"])
-    assert (job.policy_name, policy_of(job.policy)) == ("scanner", scanner)
-    searched = common_settings("scanner", ["blind_corner"], "")
-    assert searched["policy_name"] == "scanner"
-    assert policy_of(searched["policy"]) == scanner
-    short = Scenario.shipped("crossing_attentive").model_copy(update={"duration_s": 0.5})
-    assert run_crossing(short, policy="scanner").policy == "scanner"

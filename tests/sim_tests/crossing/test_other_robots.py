@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
-from sim_tests import NOVA_CARTER, SimError, run_crossing, shipped_scenarios
+from sim_tests import SimError, run_crossing, shipped_scenarios
 from sim_tests.study.measures import Conduct
 
 ROBOTS = ("forklift", "omni", "delivery")
@@ -109,19 +108,3 @@ def test_scanners_and_camera_of_a_robot_see_people_and_not_itself() -> None:
             observer=observe,
         )
     assert len(seen[-1]) == 1
-
-
-def test_a_profile_drives_as_a_robot_of_its_own() -> None:
-    slow = replace(NOVA_CARTER, max_speed_mps=0.7, max_acceleration_mps2=0.5)
-    frames = []
-
-    def observe(frame, stage):
-        frames.append(frame)
-        if frame.t_s >= 2.5:
-            raise EnoughError
-
-    with pytest.raises(EnoughError):
-        run_crossing("head_on_in_aisle", policy="balanced", robot=slow, observer=observe)
-    speeds = [frame.robot_state.speed_mps for frame in frames]
-    assert speeds[20] == pytest.approx(0.5, abs=0.03)
-    assert max(speeds) == pytest.approx(0.7)

@@ -18,7 +18,7 @@ from perception import (
     PersonObservation,
 )
 from perception.networks import OnnxPersonDetector
-from sim_tests import KeypointNoise, Scenario, SimError, run_crossing
+from sim_tests import KeypointNoise, Scenario, run_crossing
 from sim_tests.crossing import Stage, TrueView
 from sim_tests.crossing.eyes import (
     NOBODY,
@@ -102,15 +102,6 @@ def test_observations_are_matched_to_the_workers_they_show():
     assert match_to_workers((), truth, boxes) == ()
 
 
-def test_a_worker_is_matched_to_one_observation_only():
-    truth, boxes = (view(0.0, 3.0),), [np.array([100.0, 100, 200, 400])]
-    twice = (
-        observation(0.3, 3.0, (110, 100, 220, 400)),
-        observation(0.0, 3.0, (100, 100, 200, 400)),
-    )
-    assert match_to_workers(twice, truth, boxes) == (NOBODY, 0)
-
-
 def test_rendered_people_are_observed_at_their_true_positions(stage: Stage):
     cone = AttentionCone()
     lines = SightLines(stage.warehouse.layout, actors=stage.warehouse.actors)
@@ -168,25 +159,3 @@ def test_a_crossing_runs_with_a_real_detector_on_rendered_images(scenario: Scena
     assert workers == {0, 1}
     first, second = ([frame.command for frame in each.frames] for each in results)
     assert first == second
-
-
-def test_images_can_be_smaller_than_the_camera(scenario: Scenario):
-    half = scenario.camera.model_copy(update={"picture_scale": 0.5})
-    small = scenario.model_copy(update={"camera": half, "duration_s": 0.2})
-    camera = half.camera(0.5)
-    sizes = []
-
-    class Looker(Blind):
-        def detect(self, image_rgb: np.ndarray) -> tuple[PersonDetection, ...]:
-            sizes.append(image_rgb.shape)
-            return ()
-
-    pipeline = AwarenessPipeline(camera, Looker(), Looker())
-    run_crossing(small, policy="balanced", perception="pixels", pipeline=pipeline)
-    assert set(sizes) == {(240, 320, 3)}
-
-
-def test_a_pipeline_for_another_camera_is_refused(scenario: Scenario):
-    other = AwarenessPipeline(Camera.from_fov(640, 480, 1.2), Blind(), Blind())  # type: ignore[arg-type]
-    with pytest.raises(SimError, match="camera"):
-        run_crossing(scenario, policy="balanced", perception="pixels", pipeline=other)

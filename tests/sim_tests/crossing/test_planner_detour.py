@@ -6,15 +6,10 @@ import math
 
 import numpy as np
 import pytest
-import shapely
+from planner_scenes import DT_S, ROBOT, constraints, drive
 
-from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
+from nav_adapter import RobotState
 from sim_tests.crossing.planner import SamplingPlanner
-
-OUTLINE_M = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (0.3625, 0.25)
-ROBOT = RobotProfile(OUTLINE_M, 1.5, 1.0, 1.0, 0.3)
-DT_S = 0.05
-CONTOUR = shapely.Polygon([(0, 0), (1, 0), (0, 1)])
 
 
 def headings_rad(
@@ -22,16 +17,12 @@ def headings_rad(
 ) -> list[float]:
     """Return the headings of a robot at 0.5 m/s or less beside a person x, y, radius who stands."""
     x, y, radius_m = person
-    standing = PersonObstacle(1, (x, y), (0.0, 0.0), radius_m, 1.75, 0.0, CONTOUR)
-    constraints = NavConstraints(0.0, (standing,), 0.5, "test", False)
+    now = constraints([((x, y), (0.0, 0.0), radius_m)], 0.5)
     planner = SamplingPlanner(ROBOT, np.array(boxes))
     headings = []
     for _ in range(ticks):
-        speed, yaw_rate = planner.plan(state, (12.0, 0.0), constraints, DT_S)
-        headings.append(state.heading_odom_rad + yaw_rate * DT_S)
-        step = speed * DT_S * np.array([math.cos(headings[-1]), math.sin(headings[-1])])
-        place = state.position_odom_m + step
-        state = RobotState(state.stamp_s + DT_S, place, headings[-1], speed, yaw_rate)
+        state = drive(state, planner.plan(state, (12.0, 0.0), now, DT_S))
+        headings.append(state.heading_odom_rad)
     return headings
 
 

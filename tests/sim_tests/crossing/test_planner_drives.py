@@ -9,48 +9,15 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planner_scenes import DT_S, ROUNDING, constraints, drive, outline
 
-from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
+from nav_adapter import RobotProfile, RobotState
 from sim_tests.actors.robot import RobotModel
 from sim_tests.crossing.planner import SamplingPlanner
 
-DT_S = 0.05
-ROUNDING = 1e-9
 FORKLIFT = RobotModel.shipped("forklift").profile
 OMNI = RobotModel.shipped("omni").profile
-OUTLINE = shapely.box(0.0, 0.0, 1.0, 1.0)  # the planner takes the circle
-AISLE = np.array([[-6.0, 2.0, 20.0, 3.0], [-6.0, -3.0, 20.0, -2.0]])
-
-
-def constraints(people: list, limit_mps: float = 1.2) -> NavConstraints:
-    obstacles = tuple(
-        PersonObstacle(i, center, velocity, radius, 1.75, 0.0, OUTLINE)
-        for i, (center, velocity, radius) in enumerate(people)
-    )
-    return NavConstraints(0.0, obstacles, limit_mps, "test", False)
-
-
-def drive(state: RobotState, command: tuple[float, ...]) -> RobotState:
-    """Return the state after a tick of a constant twist."""
-    forward, left, yaw_rate = command if len(command) == 3 else (command[0], 0.0, command[1])
-    turn = yaw_rate * DT_S
-    middle = state.heading_odom_rad + 0.5 * turn
-    c, s = math.cos(middle), math.sin(middle)
-    step = DT_S * np.array([c * forward - s * left, s * forward + c * left])
-    return RobotState(
-        state.stamp_s + DT_S,
-        state.position_odom_m + step,
-        state.heading_odom_rad + turn,
-        forward,
-        yaw_rate,
-        np.array([forward, left]) if len(command) == 3 else None,
-    )
-
-
-def outline(robot: RobotProfile, state: RobotState) -> shapely.Polygon:
-    c, s = math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)
-    turned = robot.footprint_m @ np.array([[c, s], [-s, c]])
-    return shapely.MultiPoint(turned + state.position_odom_m).convex_hull
+WIDE_AISLE = np.array([[-6.0, 2.0, 20.0, 3.0], [-6.0, -3.0, 20.0, -2.0]])
 
 
 def run(
@@ -63,7 +30,7 @@ def run(
     duration_s: float = 60.0,
 ) -> list[RobotState]:
     """Return the states until the robot stands at its goal, or the time is up."""
-    planner, states, now = SamplingPlanner(robot, boxes), [start], constraints(people or [])
+    planner, states, now = SamplingPlanner(robot, boxes), [start], constraints(people or [], 1.2)
     while states[-1].stamp_s < duration_s:
         states.append(drive(states[-1], planner.plan(states[-1], goal, now, DT_S)))
         if math.dist(states[-1].position_odom_m, goal) < 0.25 and states[-1].travel_mps < 0.2:
@@ -83,12 +50,12 @@ def arrived(states: list[RobotState], goal: tuple[float, float]) -> bool:
 def test_a_robot_that_steers_reverses_out_of_a_dead_end(x, y, heading_deg) -> None:
     """No arc leads ahead to the goal, and it cannot turn on the spot."""
     start, goal = RobotState(0.0, (x, y), math.radians(heading_deg), 0.0, 0.0), (9.0, 0.0)
-    racks = shapely.union_all(shapely.box(*AISLE.T))
-    states = run(FORKLIFT, start, goal, boxes=AISLE)
+    racks = shapely.union_all(shapely.box(*WIDE_AISLE.T))
+    states = run(FORKLIFT, start, goal, boxes=WIDE_AISLE)
     assert arrived(states, goal)
     assert min(state.speed_mps for state in states) < -0.1
     assert min(state.speed_mps for state in states) >= -0.3 - ROUNDING
-    assert min(outline(FORKLIFT, state).distance(racks) for state in states) > 0.03
+    assert min(outline(state, FORKLIFT.footprint_m).distance(racks) for state in states) > 0.03
     for state in states:
         assert abs(state.yaw_rate_radps) <= abs(state.speed_mps) / 1.3 + ROUNDING
         # Forward and backward, the corners keep the limit too.
@@ -109,7 +76,7 @@ def test_a_robot_that_steers_waits_for_people_and_does_not_reverse() -> None:
         FORKLIFT,
         RobotState(0.0, (0.0, 0.0), 0.0, 0.0, 0.0),
         (9.0, 0.0),
-        boxes=AISLE,
+        boxes=WIDE_AISLE,
         people=people,
         duration_s=12.0,
     )
@@ -124,7 +91,7 @@ def test_a_holonomic_robot_passes_a_person_sideways_and_looks_ahead() -> None:
     assert max(abs(state.lateral_mps) for state in states) > 0.2
     assert max(abs(state.heading_odom_rad) for state in states) < 0.6
     person = shapely.Point(4.0, 0.1)
-    assert min(outline(OMNI, state).distance(person) for state in states) > 0.6
+    assert min(outline(state, OMNI.footprint_m).distance(person) for state in states) > 0.6
 
 
 @settings(max_examples=100, deadline=None)
@@ -139,7 +106,7 @@ def test_a_holonomic_robot_passes_a_person_sideways_and_looks_ahead() -> None:
         ),
         max_size=2,
     ),
-    st.sampled_from([None, AISLE]),
+    st.sampled_from([None, WIDE_AISLE]),
 )
 def test_velocities_of_a_holonomic_robot_keep_the_limits(twist, limit_mps, people, boxes) -> None:
     forward, left, yaw_rate = twist

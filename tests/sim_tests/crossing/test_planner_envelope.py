@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
-import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from planner_scenes import (
+    AISLE,
+    DT_S,
+    ROUNDING,
+    constraints,
+    coordinate,
+    drive,
+    person_data,
+)
 
-from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
+from nav_adapter import NavConstraints, RobotProfile, RobotState
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
 
-DT_S = 0.05
-ROUNDING = 1e-9
-AISLE = np.array([[-6.0, 1.5, 20.0, 2.5], [-6.0, -2.5, 20.0, -1.5]])
 # A tricycle whose base origin lies on the rear axle, with forks behind it.
 TRICYCLE = RobotProfile(
     footprint_m=[[1.4, 0.4], [-0.8, 0.4], [-0.8, -0.4], [1.4, -0.4]],
@@ -33,27 +37,6 @@ TRICYCLE = RobotProfile(
 SLUGGISH = replace(NOVA_CARTER, max_yaw_rate_radps=0.4, max_yaw_acceleration_radps2=0.8)
 ROBOTS = [NOVA_CARTER, SLUGGISH, TRICYCLE]
 
-coordinate = st.floats(-4.0, 4.0)
-people_data = st.lists(
-    st.tuples(
-        st.tuples(coordinate, coordinate),
-        st.tuples(st.floats(-1.6, 1.6), st.floats(-1.6, 1.6)),
-        st.floats(0.4, 1.2),
-    ),
-    max_size=2,
-)
-
-
-def constraints(people: list, limit_mps: float, fastest_mps: float) -> NavConstraints:
-    outline = shapely.box(0.0, 0.0, 1.0, 1.0)  # the planner takes the circle
-    obstacles = tuple(
-        PersonObstacle(i, center, velocity, radius, 1.75, 0.0, outline)
-        for i, (center, velocity, radius) in enumerate(people)
-    )
-    return NavConstraints(
-        0.0, obstacles, limit_mps, "test", False, fastest_point_limit_mps=fastest_mps
-    )
-
 
 @st.composite
 def situations(draw: st.DrawFn) -> tuple[RobotProfile, RobotState, NavConstraints]:
@@ -68,7 +51,7 @@ def situations(draw: st.DrawFn) -> tuple[RobotProfile, RobotState, NavConstraint
     state = RobotState(
         0.0, (draw(coordinate), draw(st.floats(-0.6, 0.6))), draw(st.floats(-3.0, 3.0)), speed, turn
     )
-    return robot, state, constraints(draw(people_data), limit, fastest)
+    return robot, state, constraints(draw(st.lists(person_data, max_size=2)), limit, fastest)
 
 
 @settings(max_examples=200, deadline=None)
@@ -103,15 +86,6 @@ def test_commands_keep_to_the_limits_of_the_profile(situation, boxes) -> None:
         assert abs(yaw_rate) <= abs(speed) / robot.min_turning_radius_m + ROUNDING  # or backward
 
 
-def drive(state: RobotState, speed_mps: float, yaw_rate_radps: float) -> RobotState:
-    """Return the state after a tick of a constant twist."""
-    turn, chord = yaw_rate_radps * DT_S, speed_mps * DT_S
-    middle = state.heading_odom_rad + 0.5 * turn
-    x, y = state.position_odom_m + chord * np.array([math.cos(middle), math.sin(middle)])
-    heading = state.heading_odom_rad + turn
-    return RobotState(state.stamp_s + DT_S, (x, y), heading, speed_mps, yaw_rate_radps)
-
-
 @pytest.mark.parametrize("robot", [NOVA_CARTER, SLUGGISH], ids=["Nova Carter", "sluggish"])
 def test_a_limited_robot_passes_somebody_who_stands_and_obeys_all_the_way(robot) -> None:
     """With 0.6 m/s for its fastest point a robot turns past a person and on to its goal."""
@@ -119,7 +93,7 @@ def test_a_limited_robot_passes_somebody_who_stands_and_obeys_all_the_way(robot)
     now = constraints([((4.0, 0.1), (0.0, 0.0), 0.6)], 0.6, 0.6)
     fastest_mps = []
     while state.position_odom_m[0] < 7.5 and state.stamp_s < 40.0:
-        state = drive(state, *planner.plan(state, (9.0, 0.0), now, DT_S))
+        state = drive(state, planner.plan(state, (9.0, 0.0), now, DT_S))
         corners_mps = abs(state.yaw_rate_radps) * robot.circumscribed_radius_m
         fastest_mps.append(state.speed_mps + corners_mps)
     assert state.stamp_s < 25.0

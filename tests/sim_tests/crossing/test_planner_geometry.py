@@ -10,18 +10,16 @@ import pytest
 import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from planner_scenes import HALF_LENGTH_M, HALF_WIDTH_M, OUTLINE_M, coordinate
 from scipy.integrate import quad
 
 from sim_tests.crossing.planner._detour import detour_bearing_rad
 from sim_tests.crossing.planner._rollout import (
     Poses,
-    follow_arcs,
     ramp_integral,
     stopping_integral,
 )
 from sim_tests.crossing.planner._scene import Rectangles, box_gap_m, disc_gap_m, strip_distance_m
-
-HALF_LENGTH_M, HALF_WIDTH_M = 0.3625, 0.25
 
 
 @given(
@@ -55,25 +53,13 @@ def test_stopping_integral_is_the_integral_of_a_stop(
     assert float(result) == pytest.approx(exact, abs=1e-8)
 
 
-@given(st.floats(0.0, 1.5), st.floats(-1.5, 1.5))
-def test_follow_arcs_is_exact_for_a_constant_twist(speed: float, yaw_rate: float) -> None:
-    t = np.arange(0.2, 3.01, 0.2)
-    poses = follow_arcs(speed * t, yaw_rate * t)
-    half = 0.5 * yaw_rate * t
-    chord = speed * t * np.sinc(half / math.pi)
-    np.testing.assert_allclose(poses.x_m, chord * np.cos(half), atol=1e-7)
-    np.testing.assert_allclose(poses.y_m, chord * np.sin(half), atol=1e-7)
-
-
 pose_data = st.tuples(st.floats(-2, 2), st.floats(-2, 2), st.floats(-4, 4))
-coordinate = st.floats(-4.0, 4.0)
 
 
 def rectangle(x: float, y: float, heading: float) -> tuple[Rectangles, shapely.Polygon]:
     c, s = math.cos(heading), math.sin(heading)
     arrays = [np.asarray(value) for value in (x, y, c, s)]
-    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (HALF_LENGTH_M, HALF_WIDTH_M)
-    polygon = shapely.Polygon(corners @ np.array([[c, s], [-s, c]]) + np.array([x, y]))
+    polygon = shapely.Polygon(OUTLINE_M @ np.array([[c, s], [-s, c]]) + np.array([x, y]))
     return Rectangles(Poses(*arrays), HALF_LENGTH_M, HALF_WIDTH_M), polygon
 
 

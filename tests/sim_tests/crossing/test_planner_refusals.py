@@ -1,4 +1,4 @@
-"""Arguments and settings that the reference planner refuses, with their messages."""
+"""What planners refuse, and what is said about a command that is none."""
 
 from __future__ import annotations
 
@@ -7,44 +7,113 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planner_scenes import DT_S, ROBOT, at_rest, constraints
 from pydantic import ValidationError
 
-from nav_adapter import NavConstraints, RobotProfile, RobotState
-from sim_tests import SimError
+from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
 
-OUTLINE_M = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
-ROBOT = RobotProfile(OUTLINE_M, 1.5, 1.0, 1.0, 0.3)
-AT_REST = RobotState(0.0, (0.0, 0.0), 0.0, 0.0, 0.0)
-NO_ONE = NavConstraints(0.0, (), 1.5, "test", False)
+EMPTY = Scenario.model_validate(
+    {
+        "name": "empty",
+        "description": "Half a second in an empty hall.",
+        "duration_s": 0.5,
+        "control_hz": 10.0,
+        "layout": {"x_min_m": -3.0, "y_min_m": -3.0, "x_max_m": 6.0, "y_max_m": 3.0},
+        "robot": {"goal_x_m": 2.0},
+        "workers": [],
+    }
+)
 
 
-@pytest.mark.parametrize("goal", [(math.nan, 0.0), (1.0, math.inf), (1.0, 2.0, 3.0), "home"])
-def test_an_unusable_goal_is_refused_by_name(goal: object) -> None:
-    with pytest.raises(SimError, match="goal_odom_m"):
-        SamplingPlanner(ROBOT).plan(AT_REST, goal, NO_ONE, 0.05)  # type: ignore[arg-type]
+class Returns:
+    """A planner that always returns the same."""
+
+    def __init__(self, command):
+        self.command = command
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        return self.command
 
 
-@pytest.mark.parametrize("dt_s", [0.0, -0.05, math.nan, math.inf])
-def test_an_unusable_tick_is_refused_by_name(dt_s: float) -> None:
-    with pytest.raises(SimError, match="dt_s"):
-        SamplingPlanner(ROBOT).plan(AT_REST, (8.0, 0.0), NO_ONE, dt_s)
+def cross(planner):
+    return run_crossing(EMPTY, policy="blind", planner=planner)
 
 
-@pytest.mark.parametrize("boxes", [[[0, 0, 0, 1]], [[0, 0, 1, math.nan]], [[0, 0, 1]]])
-def test_unusable_boxes_are_refused_by_name(boxes: list[list[float]]) -> None:
-    with pytest.raises(SimError, match="static_boxes_odom_m"):
-        SamplingPlanner(ROBOT, boxes)
+@pytest.mark.parametrize(
+    ("changed", "name"),
+    [
+        ({"goal": (math.nan, 0.0)}, "goal_odom_m"),
+        ({"goal": (1.0, 2.0, 3.0)}, "goal_odom_m"),
+        ({"goal": "home"}, "goal_odom_m"),
+        ({"dt_s": 0.0}, "dt_s"),
+        ({"dt_s": math.inf}, "dt_s"),
+        ({"boxes": [[0, 0, 0, 1]]}, "static_boxes_odom_m"),
+        ({"boxes": [[0, 0, 1, math.nan]]}, "static_boxes_odom_m"),
+    ],
+)
+def test_unusable_arguments_are_refused_by_name(changed, name):
+    given = {"goal": (8.0, 0.0), "dt_s": DT_S, "boxes": None, **changed}
+    with pytest.raises(SimError, match=name):
+        SamplingPlanner(ROBOT, given["boxes"]).plan(
+            at_rest(), given["goal"], constraints([]), given["dt_s"]
+        )
 
 
-def test_weights_with_which_a_robot_never_turns_to_its_goal_are_refused() -> None:
-    with pytest.raises(ValidationError, match="heading_weight"):
-        PlannerConfig(heading_weight=0.05)
-
-
-def test_the_config_survives_yaml_and_names_unknown_keys(tmp_path: Path) -> None:
+def test_the_config_survives_yaml_and_refuses_what_cannot_drive(tmp_path: Path) -> None:
     config = PlannerConfig(horizon_s=2.5, speed_samples=9)
     config.to_yaml(tmp_path / "planner.yaml")
     assert PlannerConfig.from_yaml(tmp_path / "planner.yaml") == config
     with pytest.raises(ValidationError, match="did you mean 'horizon_s'"):
         PlannerConfig.model_validate({"horizont_s": 2.0})
+    # With this weight a robot never turns to its goal.
+    with pytest.raises(ValidationError, match="heading_weight"):
+        PlannerConfig(heading_weight=0.05)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [[0.5, 0.25], np.array([0.5, 0.25], dtype=np.float32), (np.float32(0.5), np.array(0.25))],
+    ids=repr,
+)
+def test_two_numbers_are_a_command_in_any_array_type(command):
+    frames = cross(Returns(command)).frames
+    assert {frame.command for frame in frames} == {(0.5, 0.25)}
+    assert all(type(cell) is float for cell in frames[0].command)
+
+
+@pytest.mark.parametrize(
+    ("command", "described"),
+    [
+        (None, r"None \(NoneType\)"),
+        ((0.5,), r"\(0\.5,\) \(tuple\)"),
+        ((0.5, 0.0, 0.0), r"\(0\.5, 0\.0, 0\.0\) \(tuple\)"),
+        ((np.nan, 0.0), r"\(nan, 0\.0\) \(tuple\)"),
+        (("0.5", "0"), r"\('0\.5', '0'\) \(tuple\)"),
+        ((True, False), r"\(True, False\) \(tuple\)"),
+        ({"speed_mps": 0.5, "yaw_rate_radps": 0.0}, r"\{'speed_mps': .*\(dict\)"),
+        (np.zeros((2, 1)), r"\(ndarray of shape \(2, 1\)\)"),
+        ([0.5, 1j], r"\(list\)"),
+        (list(range(1000)), r"\[0, 1, .{60,80}… \(list\)"),
+    ],
+)
+def test_any_other_command_is_refused_with_what_was_returned(command, described):
+    message = (
+        f"^planner Returns returned .*{described} at 0.00 s; plan must return "
+        r"\(speed_mps, yaw_rate_radps\), two finite numbers in m/s and rad/s$"
+    )
+    with pytest.raises(SimError, match=message):
+        cross(Returns(command))
+
+
+def test_what_is_no_planner_is_refused_and_an_error_of_a_planner_is_its_own():
+    class Raises:
+        def plan(self, *_):
+            raise LookupError("lost")
+
+    with pytest.raises(LookupError, match="lost"):
+        cross(Raises())
+    with pytest.raises(SimError, match=r"got the class Returns: make one with Returns\("):
+        cross(Returns)
+    with pytest.raises(SimError, match="must be an object with plan"):
+        cross(0.5)

@@ -17,10 +17,10 @@ BODY_RADIUS_M = 0.30
 ALONG_M, ACROSS_M = 0.3625, 0.25  # half the robot's length and width
 
 
-def footprint_at(position, heading):
+def footprint_at(position, heading, footprint_m=NOVA_CARTER.footprint_m):
     cos, sin = math.cos(heading), math.sin(heading)
     turn = np.array([[cos, -sin], [sin, cos]])
-    return Polygon(NOVA_CARTER.footprint_m @ turn.T + np.asarray(position))
+    return Polygon(footprint_m @ turn.T + np.asarray(position))
 
 
 def track_at(position, awareness, lower, ident=1, t_s=0.0):
@@ -42,6 +42,7 @@ def track_at(position, awareness, lower, ident=1, t_s=0.0):
 def crossing(
     times,
     robot,
+    /,
     walks=(),
     *,
     awareness=None,
@@ -50,6 +51,7 @@ def crossing(
     reached=True,
     alerts=None,
     constraints=None,
+    footprint_m=NOVA_CARTER.footprint_m,
     **values,
 ):
     """A result whose frames follow formulas.
@@ -62,7 +64,7 @@ def crossing(
     for t in np.asarray(times).tolist():
         x, y, heading, *velocity = robot(t)
         speed = velocity[0]
-        outline = footprint_at((x, y), heading)
+        outline = footprint_at((x, y), heading, footprint_m)
         views, tracks, separations = [], [], []
         for index, person in enumerate(walks):
             px, py, vx, vy = person(t)

@@ -11,11 +11,8 @@ import pytest
 
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
-from sim_tests import SimError
 from sim_tests.study.frontier._family import SPEEDS_MPS, TODAY, Member, family
 from sim_tests.study.frontier._frontier import frontier_of
-from sim_tests.study.frontier._plot import draw_frontier
-from sim_tests.study.frontier._text import frontier_text, sentences
 from sim_tests.study.measures import EpisodeRecord, read_records, write_records
 
 # Mean time lost (s) and impacts of each policy. The line without awareness goes through
@@ -150,56 +147,6 @@ def test_points_are_compared_with_today_on_the_same_episodes_in_a_fixed_order():
         for each in part
     ]  # fmt: skip
     assert (frontier_of(part).episodes, frontier_of(part).scenarios) == (17, 3)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda found: [each for each in found if each.policy != TODAY], "today's AMR"),
-        (lambda found: [*found, replace(found[0], planner="other")], "policies alone"),
-        (
-            lambda found: [each for each in found if (each.policy == TODAY) == (each.seed == 0)],
-            "no",
-        ),
-    ],
-)
-def test_rows_that_cannot_be_compared_are_refused(change, message):
-    with pytest.raises(SimError, match=message):
-        frontier_of(change(rows(LINE)))
-
-
-def test_the_sentences_are_about_the_default_policy_and_say_losses_and_gaps():
-    policies = {**LINE, "aware_u1.5": (2.0, 2.25), "aware_u0.6": (1.0, 3.0)}
-    risk, time = sentences(frontier_of(rows(policies)))
-    assert risk == (
-        "At equal risk, awareness wins 1.00 s a crossing [1.00, 1.00], and wins 1.00 s with "
-        "attentive people [1.00, 1.00] (`aware_u1.5`)."
-    )
-    assert time == (
-        "At equal time, it avoids 1.75 step-out impacts with unaware people per 1 000 crossings "
-        "[1.75, 1.75]."
-    )
-    # With scanners: the policy that remembers a look, as balanced does.
-    risk, time = sentences(frontier_of(rows({**policies, "memory_u1.5": (4.5, 0.5)})))
-    assert "awareness loses 0.50 s a crossing [-0.50, -0.50]" in risk
-    assert "no figure" in time
-    assert sentences(frontier_of(rows(LINE))) == ()
-
-
-def test_the_picture_and_the_table_hold_every_policy(tmp_path):
-    policies = {**LINE, **ASIDE, "aware_u1.5": (2.0, 2.25), "mine": (3.0, 0.0)}
-    frontier = frontier_of(rows(policies, spread=0.3))
-    text = frontier_text(frontier)
-    for name in policies:
-        assert f"| `{name}` |" in text
-    assert "24 episodes of each policy in 4 scenarios" in text
-    draw_frontier(frontier, tmp_path / "one.svg")
-    draw_frontier(frontier, tmp_path / "two.svg")
-    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
-    # A single episode of one policy bounds nothing, and today's AMR alone is drawn, too.
-    for few in (rows(policies, seeds=1)[: len(policies)], rows({TODAY: (1.0, 12.0)})):
-        draw_frontier(frontier_of(few), tmp_path / "few.png")
-        assert (tmp_path / "few.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_a_folder_of_episodes_is_drawn_without_running_anything(tmp_path, capsys):

@@ -119,12 +119,6 @@ def test_perpendicular_paths_have_the_closed_form_post_encroachment_time(v, w, x
     assert found == pytest.approx(perpendicular(v, w, x, y), abs=0.021)
 
 
-def test_a_frame_rate_above_20_hz_changes_nothing_but_the_cost():
-    robot, person = straight(1.0), walking((4.0, -6.0), (0.0, 1.0))
-    fast = pet(robot, person, times=np.arange(0.0, 20.0, 1.0 / 60.0))
-    assert fast == pytest.approx(perpendicular(1.0, 1.0, 4.0, 6.0), abs=0.021)
-
-
 def test_paths_that_do_not_cross_have_no_post_encroachment_time():
     beside = walking((5.0, ACROSS_M + BODY_RADIUS_M + 0.01), (0.0, 1.0))
     assert pet(straight(1.0), beside) is None

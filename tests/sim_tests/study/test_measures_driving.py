@@ -39,11 +39,6 @@ def test_braking_counts_in_either_direction_and_is_never_overstated(dt_s, sign):
     assert 2.5 < jerk < 5.0  # a sudden m/s² spreads over the window; see docs/metrics.md
 
 
-def test_the_jerk_of_a_sudden_square_metre_per_second_is_as_documented():
-    speed = np.clip(1.5 - (T_S - 2.0), 0.0, 1.5)
-    assert peak_deceleration_and_jerk(T_S, speed)[1] == pytest.approx(3.5, abs=0.05)
-
-
 def test_white_noise_of_the_speed_counts_as_documented():
     """1 mm/s of noise reads as 1.9 mm/s² and 27 mm/s³ in standard deviation at 20 Hz."""
     rng = np.random.default_rng(5)

@@ -1,8 +1,7 @@
 """Tables of episodes: what is written is read again, and what is broken is said."""
 
 import csv
-import math
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -67,19 +66,6 @@ def test_the_documentation_defines_every_column():
     assert [name for name in RECORD_COLUMNS if f"`{name}`" not in text] == []
 
 
-def test_numbers_are_what_files_keep():
-    assert rounded(1.23456789) == 1.234568
-    assert math.copysign(1.0, rounded(-1e-9)) == 1.0
-    assert rounded(math.inf) is rounded(math.nan) is rounded(None) is None
-
-
-def test_an_error_of_many_lines_is_one_row(tmp_path):
-    path = tmp_path / "episodes.csv"
-    write_records(path, [replace(PLAIN, error="ValueError: a\nb\r\n\0c, 'd'")])
-    assert path.read_bytes().count(b"\n") == 2
-    assert read_records(path)[0].error == "ValueError: a b c, 'd'"
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -100,15 +86,6 @@ def test_foreign_files_are_refused_by_name_and_line(tmp_path, change, message):
     assert change[0] in text
     path.write_text(text.replace(*change, 1))
     with pytest.raises(SimError, match=message):
-        read_records(path)
-
-
-@pytest.mark.parametrize("value", ["nan", "inf", "fast"])
-def test_numbers_that_are_none_are_refused(tmp_path, value):
-    path = tmp_path / "episodes.csv"
-    write_records(path, [replace(PLAIN, time_to_goal_s=1.0)])
-    path.write_text(path.read_text().replace("1.000000", value))
-    with pytest.raises(SimError, match=r"line 2: time_to_goal_s must be"):
         read_records(path)
 
 

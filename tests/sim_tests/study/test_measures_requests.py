@@ -1,7 +1,5 @@
 """Requests for attention: what counts as a request, an answer and a nuisance."""
 
-import csv
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,10 +11,9 @@ from nav_adapter import Alert, PersonObstacle
 from nav_adapter.alerts import Answer
 from sim_tests.study.measures import (
     RECORD_COLUMNS,
+    EpisodeRecord,
     measure,
-    read_records,
-    record_row,
-    write_records,
+    summarise,
 )
 
 T_S = np.round(np.arange(0.0, 10.001, 0.05), 2)
@@ -179,12 +176,36 @@ def test_no_part_is_larger_than_the_whole(asked, looks):
     assert requests or not (answered or needless or twice or after)
 
 
-def test_tables_of_earlier_versions_have_no_requests(tmp_path):
-    record = measure(crossing(T_S, straight(1.0)))
-    path = tmp_path / "episodes.csv"
-    with path.open("w", newline="") as file:
-        csv.writer(file).writerows([RECORD_COLUMNS[:-5], record_row(record)[:-5]])
-    assert read_records(path) == (record,)
-    assert [getattr(record, name) for name in COLUMNS] == [0] * 5
-    write_records(path, read_records(path))
-    assert read_records(path) == (record,)
+def asking(seed, policy, duration_s, *counts):
+    names = ("requests", "requests_answered", "requests_needless", "asked_twice")
+    values = dict(zip(names, counts, strict=False))
+    return EpisodeRecord(
+        "late_glance", seed, policy, "Q", "truth", True, duration_s=duration_s, **values
+    )
+
+
+ASKED = [
+    asking(0, "balanced", 10.0, 4, 1, 2, 1),
+    asking(1, "balanced", 30.0, 0, 0, 0, 0),
+    asking(2, "balanced", 50.0, 1, 1, 0, 0),
+]
+BLIND = [asking(seed, "blind", 20.0) for seed in range(3)]
+
+
+def row_of(records, policy="balanced"):
+    return next(row for row in summarise(records).policies if row.variant == policy)
+
+
+def test_rates_and_shares_are_ratios_of_sums():
+    row = row_of([*ASKED, *BLIND])
+    values = {name: row.means[name].value for name in row.means}
+    assert values["requests"] == pytest.approx(5 / 3)
+    assert values["requests_per_hour"] == pytest.approx(5 * 3600 / 90)
+    assert values["answered_share"] == pytest.approx(2 / 5)  # not the mean of 1/4 and 1
+    assert values["needless_share"] == pytest.approx(2 / 5)
+    assert values["asked_twice"] == pytest.approx(1 / 3)
+    assert row.asked
+    blind = row_of([*ASKED, *BLIND], "blind")
+    assert not blind.asked
+    assert blind.means["requests_per_hour"].value == 0.0
+    assert not blind.means["answered_share"].known

@@ -98,6 +98,26 @@ def test_a_limit_holds_in_every_direction(course_rad):
     assert conduct.fastest_point_excess_mps == pytest.approx(conduct.limit_excess_mps)
 
 
+def test_no_measure_depends_on_the_way_in_which_a_square_robot_faces():
+    """The frame of a holonomic robot, turned by 90°: the same places, speeds and people."""
+    square_m = 0.4 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    robot = replace(NOVA_CARTER, footprint_m=square_m)
+    people = [walking((3.0, -3.0), (0.1, 0.9)), walking((5.0, 1.0), (-0.6, -0.1))]
+
+    def measured(heading):
+        result = crossing(
+            T_S, drifting(braking, 0.3, heading), people, footprint_m=square_m, robot=robot
+        )
+        return measure(result, time_without_people_s=5.0)
+
+    facing, aside = measured(0.3), measured(0.3 - 0.5 * math.pi)
+    assert facing.min_time_to_collision_s is not None
+    assert facing.step_out_unaware > 0.0
+    for name in facing.__dataclass_fields__:
+        mine, yours = getattr(facing, name), getattr(aside, name)
+        assert mine == (pytest.approx(yours, abs=3e-6) if isinstance(mine, float) else yours), name
+
+
 class Strafer:
     """A planner that moves from side to side at 0.8 m/s, whatever the limit."""
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, crossing, straight, walking
 
 from nav_adapter import RobotProfile
-from sim_tests import NOVA_CARTER, ScenarioTemplate, SimError, run_crossing
+from sim_tests import NOVA_CARTER
 from sim_tests.study.measures import measure
 from sim_tests.study.measures._step_out import (
     FASTER_STEP_OUT,
@@ -116,21 +116,6 @@ def test_a_robot_that_stands_meets_nobody():
     assert unaware(lambda t: (0.0, 0.0, 0.0, 0.0), near) == 0.0
     assert unaware(lambda t: (0.0, 0.0, 0.0, 0.029), near) == 0.0
     assert unaware(lambda t: (0.0, 0.0, 0.0, 0.04), near) > 0.0
-
-
-@given(st.floats(0.3, 3.0), st.floats(-2.0, 2.0), st.floats(0.1, 1.5), st.floats(0.05, 0.5))
-def test_a_faster_robot_meets_whomever_a_slower_one_meets(ahead_m, aside_m, v, faster):
-    """Somebody who does not move, so that the way alone counts."""
-    person = standing(ahead_m + ALONG_M + BODY_RADIUS_M, aside_m)
-    frozen = StepOut(time_constant_s=3600.0)
-
-    def found(speed):
-        robot = crossing(BRIEF_S, lambda t: (0.0, 0.0, 0.0, speed), [person])
-        return step_out_impacts(robot, frozen)
-
-    slow, fast = found(v), found(v + faster)
-    assert fast.unaware >= slow.unaware - 1e-9
-    assert fast.worst_mps >= slow.worst_mps - 0.01
 
 
 def curve(t):
@@ -254,24 +239,3 @@ def test_the_row_has_both_models_and_nothing_without_people():
     assert stress.unaware > found.unaware > found.unaware_fast > 0.0
     alone = measure(crossing(T_S, straight(1.2)))
     assert alone.step_out_unaware is alone.step_out_stress_worst_mps is None
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"speed_mps": 0.0}, "speed_mps"),
-        ({"time_constant_s": math.nan}, "time_constant_s"),
-        ({"noticed_after_s": -0.1}, "noticed_after_s"),
-        ({"start_shares": (0.1, 0.1, 0.1)}, "start_shares must be 4 shares"),
-        ({"start_shares": (0.1, 0.1, 0.1, 1.0)}, "start_shares must be 4 shares"),
-    ],
-)
-def test_constants_that_nobody_has_are_refused(values, message):
-    with pytest.raises(SimError, match=message):
-        StepOut(**values)
-
-
-def test_a_crossing_logs_the_racks_of_its_hall():
-    scenario = ScenarioTemplate.shipped("blind_corner").for_seed(0)
-    result = run_crossing(scenario, policy="scanner", seed=0)
-    np.testing.assert_array_equal(result.obstacle_boxes_odom_m, scenario.layout.obstacle_boxes_odom)

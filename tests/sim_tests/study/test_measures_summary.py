@@ -130,30 +130,6 @@ def test_errors_are_no_success_and_in_no_mean():
     assert "2 of 10 episodes broke off with an error" in summary_text(summary)
 
 
-def test_an_episode_that_goes_astray_is_said():
-    lost = [
-        replace(r, success=False, time_to_goal_s=None, time_lost_s=40.0)
-        if (r.policy, r.seed) == ("balanced", 1)
-        else r
-        for r in RECORDS
-    ]
-    summary = summarise(lost)
-    assert "balanced: 2 of 10 episodes did not reach the goal" in summary_text(summary)
-    assert only(summary.comparisons, variant="balanced", part="").won_back.value < 0.0
-
-
-def test_contacts_show_in_every_table():
-    touched = [
-        replace(r, robot_contacts=1, contact_by="robot", success=False)
-        if (r.policy, r.seed, r.scenario) == ("balanced", 2, "late_glance")
-        else r
-        for r in RECORDS
-    ]
-    text = summary_text(summarise(touched))
-    assert "1 of 10 (≤ 45 %)" in text
-    assert only(summarise(touched).policies, variant="balanced").robot_contact.value == 0.1
-
-
 def test_a_contact_with_a_moving_robot_counts_whoever_caused_it():
     """Also in a table of an earlier version, which has the speed at the contact alone."""
     walked_into = {"contact": True, "contact_by": "person", "contacts": 1, "person_contacts": 1}
@@ -175,18 +151,6 @@ def test_a_contact_with_a_moving_robot_counts_whoever_caused_it():
     safety = summary_text(summarise(touched)).partition("Safety")[2]
     line = next(line for line in safety.splitlines() if line.startswith("balanced"))
     assert line.split()[1:4] == ["2", "of", "10"]
-
-
-def test_step_out_impacts_have_a_table_unless_nobody_measured_them():
-    assert "Step-out impacts" in summary_text(summarise(RECORDS))
-    earlier = [replace(r, step_out_unaware=None) for r in RECORDS]
-    assert "Step-out impacts" not in summary_text(summarise(earlier))
-
-
-def test_no_episodes_are_no_tables():
-    assert summary_text(summarise([])) == "no episodes"
-    alone = summarise(RECORDS[:1])
-    assert "[?]" in summary_text(alone)
 
 
 def test_variants_are_named_by_what_tells_them_apart():
@@ -245,30 +209,6 @@ def test_two_runs_are_compared_with_each_other(run_folder, tmp_path, capsys):
     )
     assert "50 [50, 50]" in line
     assert len(read_records(out)) == 2 * len(RECORDS)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["{run}/absent"], "cannot read the episodes"),
-        (["{run}", "--baseline", "balancd"], "did you mean 'balanced'"),
-        (["{run}", "--level", "95"], "--level must lie in (0, 1), got 95"),
-        (["{run}", "--seed", "-1"], "-1 is not in the range x>=0"),
-        (["{run}", "{run}"], "each run once"),
-        (["{run}", "--out", "table.txt"], "--out must be a .csv or .parquet file"),
-    ],
-)
-def test_bad_input_to_compare_is_one_line(run_folder, capsys, arguments, message):
-    assert main(["compare", *(a.replace("{run}", str(run_folder)) for a in arguments)]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err
-    assert captured.out == ""
-
-
-def test_a_run_without_an_episode_has_nothing_to_compare(run_folder, capsys):
-    write_records(run_folder / "episodes.csv", [])
-    assert main(["compare", str(run_folder)]) == 2
-    assert "no episodes yet" in capsys.readouterr().err
 
 
 def test_an_episode_that_is_there_twice_is_refused():

@@ -69,15 +69,6 @@ def test_a_finished_run_is_not_overwritten_unasked(name, tmp_path, capsys):
     assert results(out) == before
 
 
-def test_a_table_of_another_command_is_not_overwritten(tmp_path, capsys):
-    command, out = words("falsify", tmp_path)
-    out.mkdir()
-    (out / "episodes.csv").write_text("mine\n")
-    assert main(command) == 2
-    assert "episodes.csv" in capsys.readouterr().err
-    assert (out / "episodes.csv").read_text() == "mine\n"
-
-
 def test_a_search_that_another_process_runs_is_not_overwritten(tmp_path, capsys):
     from sim_tests.search import ProcessLock  # noqa: PLC0415 - needs the simulator
 

@@ -14,9 +14,6 @@ class Base:
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
         return 0.0, 0.0
 
-class Bare(Base):
-    pass
-
 class Init(Base):
     def __init__(self):
         self.given = ()
@@ -29,10 +26,6 @@ class AnyName(Base):
     def __init__(self, vehicle, /, gain=2.0):
         self.given = (vehicle, gain)
 
-class Tuned(Base):
-    def __init__(self, gain=2.0, limits=None):
-        self.given = (gain, limits)
-
 class Seed(Base):
     def __init__(self, *, seed):
         self.given = (seed,)
@@ -44,10 +37,6 @@ class Everything(Base):
 class Follows(Base):
     def __init__(self, robot, *, reference_path_odom_m):
         self.given = (reference_path_odom_m,)
-
-class HandsOn(Robot):
-    def __init__(self, *args, **options):
-        super().__init__(*args, **options)
 
 class PositionalOnly(Base):
     def __init__(self, gain=2.0, seed=5, /):
@@ -84,19 +73,13 @@ def signatures(tmp_path_factory):
         ("Init", ()),
         ("Robot", (NOVA_CARTER,)),
         ("AnyName", (NOVA_CARTER, 2.0)),
-        ("Tuned", (2.0, None)),
         ("Seed", (7,)),
-        ("HandsOn", (NOVA_CARTER,)),
         ("PositionalOnly", (2.0, 5)),
         ("function", (7,)),
     ],
 )
 def test_a_planner_is_called_with_what_its_signature_asks_for(signatures, name, given):
     assert make_planner(f"{signatures}:{name}", short().median(), seed=7).given == given
-
-
-def test_a_planner_without_a_constructor_is_made(signatures):
-    assert make_planner(f"{signatures}:Bare", short().median()).plan(None, None, None, 0.1)
 
 
 def test_a_planner_may_ask_for_seed_boxes_and_robot_in_any_order(signatures):

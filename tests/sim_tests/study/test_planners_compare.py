@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import json
-import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from page_reader import PageReader
-from planners_to_compare import READY, Straight
+from planners_to_compare import READY
 
 from awarenav.cli import main
-from sim_tests import SimError
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import Conduct
-from sim_tests.study.report import compare_planners, write_report
+from sim_tests.study.report import compare_planners
 from sim_tests.study.report._compare import plan_comparison
 from sim_tests.study.report._planners import planners_section
 from sim_tests.study.report._results import Results
@@ -153,47 +151,6 @@ def test_a_broken_limit_and_a_late_command_are_marked(folder, changed, column, t
     assert (cell.text, cell.bad) == (text, bad)
 
 
-def test_a_comparison_that_was_killed_continues(folder, tmp_path):
-    (tmp_path / "episodes").mkdir()
-    for name in ("jobs.jsonl", "run.json", *(f"episodes/{n:05d}.json" for n in range(11))):
-        text = (folder / name).read_text().replace('"state": "complete"', '"state": "running"')
-        (tmp_path / name).write_text(text)
-    page = PageReader(write_report(tmp_path, stills=False).read_text(encoding="utf-8"))
-    assert "1 of 12 episodes did not run yet" in page.text
-    compare_planners(NAMES, [scene()], tmp_path, seeds=[1], resume=True)
-    assert (tmp_path / "episodes.csv").read_bytes() == (folder / "episodes.csv").read_bytes()
-    with pytest.raises(SimError, match="holds a finished run"):
-        compare_planners(NAMES, [scene()], tmp_path, seeds=[1])
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["planners_to_compare"], "module:Class, e.g. .* or as one of reference, costmap"),
-        (["planners_to_compare:Absent"], "has no attribute 'Absent'"),
-        (["planners_to_compare:Straight(gain=2)"], "no argument 'gain'; it has 'robot'"),
-        (["planners_to_compare:Straight(2.0)"], r"module:Class\(name=value, …\)"),
-        (["planners_to_compare:Straight(speed_mps=[1])"], "with numbers, strings"),
-        (["straight_on", "--seeds", "4-2"], "the first and the last as 10-19, got '4-2'"),
-        (["straight_on", "--seeds", "0"], "at least 1"),
-        (["straight_on", "--scenario", "paper_encounter"], "drives straight on without a planner"),
-    ],
-)
-def test_bad_input_is_refused_before_anything_runs(words, message, tmp_path, capsys):
-    assert main(["planners", "compare", *words, "--out", str(tmp_path / "out")]) == 2
-    assert re.search(message, capsys.readouterr().err)
-    assert not (tmp_path / "out").exists()
-
-
-def test_other_planners_and_empty_plans_are_refused(tmp_path):
-    with pytest.raises(SimError, match="got <function"):
-        compare_planners([lambda robot: None], [scene()], tmp_path)
-    with pytest.raises(SimError, match="seeds must be at least one"):
-        compare_planners([Straight], [scene()], tmp_path, seeds=())
-    with pytest.raises(SimError, match="scenarios must be at least one"):
-        compare_planners([Straight], [], tmp_path)
-
-
 def test_a_planner_may_be_an_object_or_have_arguments():
     scenario = scene().median()
     made = make_planner("planners_to_compare:READY", scenario)
@@ -233,12 +190,6 @@ def test_robot_and_population_are_those_of_every_episode_and_of_the_command():
         "awarenav planners compare reference --scenario runs_out --policy blind --seeds 0-1 "
         "--perception truth --sensors camera --robot omni --population recorded --out out"
     )
-
-
-def test_the_planners_that_have_a_name_are_listed(capsys):
-    assert main(["planners", "list", "--json"]) == 0
-    names = [each["name"] for each in json.loads(capsys.readouterr().out)]
-    assert names == ["reference", "costmap", "straight_on"]
 
 
 @pytest.mark.full

@@ -16,11 +16,9 @@ import run_planners
 from full_disk import files_up_to
 from run_scenes import short_jobs
 
-from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.study.measures import read_records, read_rows
 from sim_tests.study.runs import (
-    Job,
     RunFiles,
     in_parallel,
     read_attempts,
@@ -80,14 +78,6 @@ def test_a_run_writes_its_table_its_jobs_and_its_settings(serial):
     assert table(serial).count(b"\n") == len(rows) + 1
 
 
-def test_distributions_are_drawn_from_the_seed_and_not_from_the_policy(serial):
-    by_seed = {}
-    for record in read_rows(serial):
-        by_seed.setdefault(record.seed, set()).add(record.min_separation_m)
-    assert all(max(values) - min(values) < 0.2 for values in by_seed.values())
-    assert len({min(values) for values in by_seed.values()}) == 4
-
-
 def test_parquet_holds_the_same_records(serial):
     pytest.importorskip("pyarrow")
     assert read_records(serial / "episodes.parquet") == read_rows(serial)
@@ -113,30 +103,12 @@ def test_failing_episodes_and_processes_affect_no_other(tmp_path, monkeypatch, s
     assert "episode 2: short, seed 0" in log
 
 
-def test_an_invalid_job_gives_a_row_with_an_error():
-    record = run_episode(Job("nonsense: [", 3, "p", "also: nonsense"))
-    assert record.seed == 3
-    assert "SimError" in record.error
-
-
 def test_a_killed_run_has_its_rows_and_is_resumed(serial, killed):
     whole = read_rows(serial)
     assert read_rows(killed) == (whole[1], whole[3], whole[5])
     assert run_jobs(JOBS, killed, workers=1, resume=True) == whole
     assert table(killed) == table(serial)
     assert read_run(killed) == read_run(serial)
-
-
-def test_resuming_a_complete_run_runs_nothing(tmp_path, monkeypatch):
-    marker, folder = tmp_path / "ran", tmp_path / "run"
-    monkeypatch.setenv(run_planners.MARKER, str(marker))
-    jobs = short_jobs(1, planners=["run_planners:Leaves"])
-    records = run_jobs(jobs, folder, workers=1)
-    before = table(folder)
-    marker.unlink()
-    assert run_jobs(jobs, folder, workers=1, resume=True) == records
-    assert table(folder) == before
-    assert not marker.exists()
 
 
 def test_a_full_disk_ends_a_run_between_episodes_and_it_is_resumed(serial, killed, capsys):
@@ -199,23 +171,6 @@ def test_a_run_is_only_overwritten_on_request(serial, killed, tmp_path):
     with pytest.raises(SimError, match=r"a table episodes\.csv that is not of a run"):
         run_jobs(short_jobs(1), tmp_path, workers=1)
     assert (tmp_path / "episodes.csv").read_text() == "mine\n"
-
-
-@pytest.mark.parametrize(
-    ("jobs", "folder", "options", "message"),
-    [
-        (JOBS, "file", {}, "cannot run into"),
-        ([], "out", {}, "at least one episode"),
-        (JOBS, "out", {"workers": 0}, r"workers must lie in \[1"),
-        (JOBS, "out", {"resume": True}, "no run to resume"),
-        (JOBS, "out", {"time_limit_s": 9.0, "scheduler": "local"}, "not on a cluster"),
-        (JOBS, "out", {"time_limit_s": 0.5}, r"time_limit_s must lie in \[1"),
-    ],
-)
-def test_unusable_folders_and_numbers_are_refused(jobs, folder, options, message, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(SimError, match=message):
-        run_jobs(jobs, tmp_path / folder, **{"workers": 1, **options})
 
 
 RUN = """
@@ -284,21 +239,13 @@ def test_items_are_worked_on_in_parallel_and_a_deadly_one_is_given_up():
     assert dict(in_parallel(run_planners.square, [], workers=2)) == {}
 
 
-def test_the_command_says_how_to_go_on(tmp_path, capsys, monkeypatch):
-    from run_scenes import SHORT  # noqa: PLC0415
-
-    (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
-    out = tmp_path / "out"
-    words = ["crossings", "--scenario", str(tmp_path / "short.yaml"), "--policy", "blind"]
-    words += ["--perception", "truth", "--workers", "1", "--no-report", "--out", str(out)]
-    assert main(words) == 0
-    before = table(out)
-    assert main(words) == 2
-    message = capsys.readouterr().err
-    assert all(remedy in message for remedy in ("--resume", "--overwrite", "--out"))
-    assert main([*words, "--seed", "5", "--resume"]) == 2
-    assert "begun with seed 0, and this has 5" in capsys.readouterr().err
-    assert main([*words, "--resume"]) == 0
-    assert table(out) == before
-    assert main([*words, "--seed", "5", "--overwrite"]) == 0
-    assert table(out) != before
+def test_resuming_a_complete_run_runs_nothing(tmp_path, monkeypatch):
+    marker, folder = tmp_path / "ran", tmp_path / "run"
+    monkeypatch.setenv(run_planners.MARKER, str(marker))
+    jobs = short_jobs(1, planners=["run_planners:Leaves"])
+    records = run_jobs(jobs, folder, workers=1)
+    before = table(folder)
+    marker.unlink()
+    assert run_jobs(jobs, folder, workers=1, resume=True) == records
+    assert table(folder) == before
+    assert not marker.exists()

@@ -32,16 +32,6 @@ def test_a_cluster_on_this_computer_gives_the_same_table(tmp_path, capfd):
 
 
 @pytest.mark.full
-def test_an_episode_that_kills_its_worker_affects_no_other(tmp_path):
-    jobs = short_jobs(1) + short_jobs(1, planners=["run_planners:Dies"])[:1]
-    # The scheduler gives the episode up after one dead worker; the run sends it once more.
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        records = run_jobs(jobs, tmp_path / "run", workers=2, scheduler="local")
-    assert [record.success for record in records] == [True, True, False]
-    assert "died, and so did a second one (KilledWorker)" in records[2].error
-
-
-@pytest.mark.full
 def test_a_killed_worker_of_a_cluster_changes_nothing(tmp_path):
     jobs = short_jobs(6)
     run_jobs(jobs, tmp_path / "serial", workers=1)

@@ -3,12 +3,10 @@
 import random
 
 import pytest
-from run_scenes import SHORT, short, short_jobs
+from run_scenes import short_jobs
 
-from awarenav.cli import main
-from sim_tests.search import EpisodeRunner
 from sim_tests.study.measures import read_records, summarise, summary_text
-from sim_tests.study.runs import attempt, in_parallel, plan_jobs, run_episode, run_jobs
+from sim_tests.study.runs import attempt, in_parallel, run_episode, run_jobs
 
 PLANNERS = """
 import random
@@ -76,39 +74,3 @@ def test_a_planner_that_is_not_deterministic_is_found_and_named(drawing, tmp_pat
         "balanced, Unseeded"
     ] == 1
     assert "balanced, Unseeded: the planner is not deterministic" in summary_text(summary)
-
-
-def test_a_planner_of_the_straight_encounter_is_checked_too(drawing):
-    template = short()
-    straight = template.from_text(
-        SHORT.format(name="straight").replace(
-            "goal_x_m: 0.6", "goal_x_m: 0.6, straight_on_speed_mps: 0.3"
-        )
-    )
-    (job,) = plan_jobs(
-        [straight], ["blind"], [0], planners=[f"{drawing}:Unseeded"], perception="truth"
-    )
-    record = run_episode(job)
-    assert not record.error
-    assert record.nondeterministic
-
-
-def test_crossings_and_the_report_say_that_a_planner_is_not_deterministic(
-    drawing, tmp_path, monkeypatch, capfd
-):
-    pytest.importorskip("jinja2")
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
-    arguments = ["crossings", "--scenario", "short.yaml", "--policy", "blind", "--episodes", "2"]
-    arguments += ["--perception", "truth", "--planner", f"{drawing}:Unseeded", "--workers", "1"]
-    assert main([*arguments, "--out", "out"]) == 0
-    said = "Unseeded: the planner is not deterministic. In 2 of 2 episodes"
-    assert said in capfd.readouterr().err
-    assert said in (tmp_path / "out" / "report.html").read_text("utf-8")
-
-
-def test_a_search_says_once_that_a_planner_is_not_deterministic(drawing, capfd):
-    with EpisodeRunner(1, "test") as runner:
-        for _ in range(2):
-            runner.run(short_jobs(1, planners=[f"{drawing}:Unseeded"])[:1])
-    assert capfd.readouterr().err.count("Unseeded: the planner is not deterministic") == 1

@@ -1,11 +1,12 @@
 """Replays: an episode again, with its pictures, and whether its row is the same."""
 
 import pytest
-from run_scenes import short_jobs
+from run_scenes import SHORT, short_jobs
 
 from awarenav.cli import main
+from sim_tests.actors.robot import RobotModel
 from sim_tests.study.report import write_report
-from sim_tests.study.runs import run_jobs
+from sim_tests.study.runs import read_jobs, run_jobs, template_of
 
 
 @pytest.fixture(scope="module")
@@ -56,23 +57,16 @@ def test_the_report_links_to_the_pages_of_replays(tmp_path, capsys):
     assert report.count(">Watch</a>") == 2
 
 
-@pytest.mark.parametrize(
-    ("episode", "message"),
-    [
-        ("4", "the run has 4 episodes, numbered 0 to 3, got 4"),
-        ("short", "SCENARIO:SEED:POLICY"),
-        ("short:7:blind", "one that it has is short:0:blind"),
-        ("short:0:blind", "is 2 episodes of the run, give one's number: 0: short, seed 0"),
-    ],
-)
-def test_unknown_episodes_are_refused(run, episode, message, capsys):
-    assert main(["replay", str(run), episode, "--no-video"]) == 2
-    assert message in capsys.readouterr().err
-
-
-def test_folders_without_a_run_are_refused(tmp_path, capsys):
-    assert main(["replay", str(tmp_path), "0"]) == 2
-    assert "is not the folder of a run" in capsys.readouterr().err
-    (tmp_path / "jobs.jsonl").write_text('{"scenario": "x"}\n')
-    assert main(["replay", str(tmp_path), "0"]) == 2
-    assert "line 1 is not an episode" in capsys.readouterr().err
+def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> None:
+    (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
+    words = ["crossings", "--scenario", str(tmp_path / "short.yaml"), "--policy", "blind"]
+    words += ["--perception", "truth", "--workers", "1", "--no-report", "--out", str(tmp_path)]
+    assert main([*words, "--robot", "delivery", "--population", "recorded"]) == 0
+    (job,) = read_jobs(tmp_path)
+    scenario = template_of(job.scenario).for_seed(job.seed)
+    assert scenario.robot_model == RobotModel.shipped("delivery")
+    assert scenario.population == "recorded"
+    capsys.readouterr()
+    assert main(["replay", str(tmp_path), "0", "--no-video"]) == 0
+    assert "short_delivery" in (text := capsys.readouterr().out)
+    assert "The same row as in" in text

@@ -10,8 +10,7 @@ from run_scenes import short_jobs
 
 from awarenav.cli import main
 from sim_tests.study.runs import run_jobs
-from sim_tests.study.social import FORMATS, SOCIAL_MEASURES
-from sim_tests.study.social.command import FORMAT_NAMES
+from sim_tests.study.social import SOCIAL_MEASURES
 
 
 @pytest.fixture(scope="module")
@@ -76,25 +75,3 @@ def test_an_exported_track_is_measured_as_the_run(run, tmp_path, capsys):
         assert found["means"][name] == pytest.approx(float(measured[name]), abs=1e-5)
     assert main(["export", "episode", str(run), "0"]) == 0
     assert (run / "exports" / "episode_00000.json").is_file()
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["measures", "none.csv"], "cannot read none.csv"),
-        (["measures", "RUN", "--out", "x.json"], "--out must be a .csv file, got x.json"),
-        (["export", "episode", "RUN", "9"], "the run has 2 episodes, numbered 0 to 1, got 9"),
-        (["export", "episode", "RUN", "0", "--format", "socnav"], "did you mean 'socnav3'?"),
-        (
-            ["export", "episode", "RUN", "0", "--format", "navwareset", "--out", "x.json"],
-            "--format navwareset writes files that end in .csv, got x.json",
-        ),
-    ],
-)
-def test_bad_input_is_refused(words, message, run, capsys):
-    assert main([str(run) if word == "RUN" else word for word in words]) == 2
-    assert message in capsys.readouterr().err
-
-
-def test_the_command_line_knows_every_format():
-    assert set(FORMATS) == set(FORMAT_NAMES)

@@ -13,7 +13,7 @@ from social_scenes import formula_episode, random_episode, straight
 
 from sim_tests import SimError
 from sim_tests.study.social import read_track, social_measures, write_episode
-from sim_tests.study.social._episode import headings_of, sides, velocities
+from sim_tests.study.social._episode import sides, velocities
 
 HEADER = "timestamp,x,y,column,robot_x,robot_y,robot_yaw_rad\n"
 
@@ -48,20 +48,6 @@ def test_a_trajectory_has_the_fields_of_the_published_layout(tmp_path):
         assert [person["id"] for person in frame["people"]] == there
         for person in frame["people"]:
             assert [person["x"], person["y"]] == episode.people_m[row, person["id"]].tolist()
-
-
-def test_the_grid_of_a_trajectory_is_occupied_where_the_boxes_are(tmp_path):
-    write_episode(tmp_path / "episode.json", boxed())
-    grid = json.loads((tmp_path / "episode.json").read_text("utf-8"))["grid"]
-    cells = np.array(grid["data"])[::-1]  # the first row has the largest y
-    assert cells.shape == (grid["height"], grid["width"])
-    x = grid["x_orig"] + grid["cell_size"] * (np.arange(grid["width"]) + 0.5)
-    y = grid["y_orig"] + grid["cell_size"] * (np.arange(grid["height"]) + 0.5)
-    inside = np.zeros(cells.shape, dtype=bool)
-    for x0, y0, x1, y1 in boxed().boxes_m:
-        inside |= ((x >= x0) & (x <= x1)) & ((y >= y0) & (y <= y1))[:, None]
-    assert (cells.astype(bool) == inside).all()
-    assert inside.any()
 
 
 def test_a_track_is_read_back_equal(tmp_path):
@@ -133,9 +119,3 @@ def test_velocities_are_known_exactly_where_positions_are(presence):
     for row in np.flatnonzero(~gone):
         near = row > 0 and not gone[row - 1]
         assert not near or found[row] == pytest.approx([2.0, -1.0])
-
-
-def test_a_body_that_stops_keeps_its_heading():
-    velocity = np.array([[0.0, 0.0], [0.0, 1.0], [0.0, 0.01], [-1.0, 0.0]])
-    quarter = math.pi / 2
-    assert headings_of(velocity) == pytest.approx([quarter, quarter, quarter, math.pi])

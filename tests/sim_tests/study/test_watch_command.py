@@ -12,12 +12,16 @@ import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import pytest
 from paths import ROOT
 from run_scenes import SHORT
 
 from awarenav.cli import main
+from sim_tests.actors.robot import RobotModel
+from sim_tests.study.runs import Conditions, plan_jobs, template_of
+from sim_tests.study.watch._watch import WatchOptions, _job
 
 #: Three seconds of a robot on its way, with control at 20 Hz.
 WATCHED = (
@@ -103,20 +107,16 @@ def test_an_interrupted_crossing_ends_with_130(scenario):
         assert "Traceback" not in error
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["nowhere"], "scenario must be one of"),
-        (["all"], "watch shows one crossing"),
-        (["late_glance", "--fault", "scanner_*"], "watch shows one crossing"),
-        (["late_glance", "--policy", "brave"], "preset must be one of"),
-        (["late_glance", "--port", "70000"], "not in the range 0<=x<=65535"),
-        (["late_glance", "--speed", "0"], "not in the range 0.1<=x<=20"),
-        (["late_glance", "--out", "no_such_folder/page.html"], "there is no folder"),
-    ],
-)
-def test_bad_input_is_one_line_and_nothing_runs(arguments, message, capsys):
-    assert main(["watch", *arguments]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err
-    assert "Watch it at" not in captured.out
+def test_a_crossing_is_watched_with_another_robot_and_population() -> None:
+    values = {"scenario": "late_glance", "perception": "truth", "seed": 3}
+    usual = Conditions.taken_from(dict(values))
+    conditions = Conditions.taken_from({**values, "robot": "omni", "population": "recorded"})
+    options = WatchOptions(
+        conditions=conditions, policy="blind", speed=1.0, port=0, wait=0.0, out=None,
+        no_camera=True, no_browser=True,
+    )  # fmt: skip
+    scenario = template_of(_job(options).scenario).for_seed(3)
+    assert scenario.robot_model == RobotModel.shipped("omni")
+    assert scenario.population == "recorded"
+    (own,) = plan_jobs(["late_glance"], ["blind"], [3], perception="truth")
+    assert _job(replace(options, conditions=usual)) == own

@@ -23,11 +23,6 @@ def _frames(timing: CameraTiming, count: int, seed: int = 0) -> list[tuple[float
     return [(stamp, timing.delivery_s(stamp, rng)) for stamp in stamps]
 
 
-def test_a_perfect_camera_delivers_every_frame_at_once() -> None:
-    assert CameraTiming().perfect
-    assert _frames(CameraTiming(rate_hz=25.0), 4) == [(t, t) for t in (5.0, 5.04, 5.08, 5.12)]
-
-
 def test_losses_and_delays_have_the_configured_statistics() -> None:
     timing = CameraTiming(rate_hz=30.0, drop_rate=0.2, latency_s=0.05, latency_jitter_s=0.03)
     count = 5_000

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from sim_tests import CameraRenderer, Scenario, SimError
+from sim_tests import CameraRenderer, Scenario
 from sim_tests.crossing import Stage
 from sim_tests.world.camera import FINE_PX_PER_M, CoarseSceneryRenderer
 
@@ -42,22 +42,3 @@ def test_people_are_as_in_the_full_image_and_depths_are_true(stage: Stage, x_m: 
     same = np.isclose(view.depth_m, full.depth_m, rtol=0.03)
     assert same.mean() > 0.85
     assert not np.array_equal(view.rgb, full.rgb)
-
-
-def test_a_divisor_of_one_changes_nothing(stage: Stage):
-    T = stage.amr.T_odom_camera
-    full = CameraRenderer(stage.warehouse).render(CAMERA, T)
-    view = CoarseSceneryRenderer(stage.warehouse, 1).render(CAMERA, T)
-    np.testing.assert_array_equal(view.rgb, full.rgb)
-    np.testing.assert_array_equal(view.depth_m, full.depth_m)
-
-
-def test_blocks_that_do_not_fill_the_image_are_refused(stage: Stage):
-    with pytest.raises(SimError, match="blocks of 7 pixels must fill the image, got 768 x 480"):
-        CoarseSceneryRenderer(stage.warehouse, 7).render(CAMERA, stage.amr.T_odom_camera)
-    with pytest.raises(SimError, match="divisor"):
-        CoarseSceneryRenderer(stage.warehouse, 0)
-    with pytest.raises(ValueError, match="scenery_divisor must divide"):
-        Scenario.shipped("crossing_attentive").camera.model_validate(
-            {"width_px": 640, "height_px": 480, "scenery_divisor": 7}
-        )

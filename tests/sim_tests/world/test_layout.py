@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
-from sim_tests import SimError
-from sim_tests.world.hall import LAYOUTS, PROP_PARTS, Prop, RackBox, WarehouseLayout
+from sim_tests.world.hall import LAYOUTS, PROP_PARTS, Prop, WarehouseLayout
 
 _HALL = {"x_min_m": 0.0, "y_min_m": 0.0, "x_max_m": 5.0, "y_max_m": 5.0}
 
@@ -63,34 +61,10 @@ def test_every_hall_has_a_free_robot_aisle_and_no_overlapping_things(name: str) 
                     assert min(shared) < 1e-9, (prop, other)
 
 
-def test_unusable_halls_are_refused_by_name_and_others_are_read_back(tmp_path: Path) -> None:
-    with pytest.raises(ValidationError, match=r"the rack at \(5, 2\) m reaches outside the hall"):
-        WarehouseLayout(**_HALL, racks=(RackBox(x_m=5.0, y_m=2.0, length_m=2.0, width_m=1.0),))
-    with pytest.raises(ValidationError, match=r"the bin at \(4\.9, 2\) m reaches outside the hall"):
-        WarehouseLayout(**_HALL, props=(Prop(kind="bin", x_m=4.9, y_m=2.0),))
-    with pytest.raises(ValidationError, match="x_min_m < x_max_m"):
-        WarehouseLayout(**{**_HALL, "x_max_m": -1.0})
-    with pytest.raises(ValidationError, match="did you mean 'racks'"):
-        WarehouseLayout(**_HALL, rack=())
-    with pytest.raises(SimError, match="did you mean 'crossing'"):
-        WarehouseLayout.named("crosing")
+def test_a_hall_survives_its_file(tmp_path: Path) -> None:
     layout = WarehouseLayout.named("staging_hall")
     layout.to_yaml(tmp_path / "hall.yaml")
     assert WarehouseLayout.from_yaml(tmp_path / "hall.yaml") == layout
-    (tmp_path / "hall.yaml").write_text("x_min_m: .nan\n")
-    with pytest.raises(SimError, match=r"hall\.yaml"):
-        WarehouseLayout.from_yaml(tmp_path / "hall.yaml")
-
-
-def test_unusable_props_are_refused_by_name() -> None:
-    with pytest.raises(ValidationError, match="did you mean 'forklift'"):
-        Prop(kind="forklif", x_m=0.0, y_m=0.0)
-    with pytest.raises(ValidationError, match="kind must be one of"):
-        Prop(kind=3, x_m=0.0, y_m=0.0)
-    with pytest.raises(ValidationError, match="yaw_deg"):
-        Prop(kind="bin", x_m=0.0, y_m=0.0, yaw_deg=400.0)
-    with pytest.raises(ValidationError, match="x_m"):
-        Prop(kind="bin", x_m=math.nan, y_m=0.0)
 
 
 @given(

@@ -6,10 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from perception import Camera
-from sim_tests import SimError
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import LIGHTINGS, Lighting, Mesh, WarehouseLayout, quad
@@ -47,16 +45,3 @@ def test_a_lit_face_has_the_colour_of_the_formula(
     cosine = max(0.0, float(face.normals[0] @ towards))
     expected = 255.0 * _COLOUR * light.colour_rgb * (light.ambient + light.diffuse * cosine)
     np.testing.assert_allclose(view.rgb[12, 16], expected, atol=3.0)
-
-
-def test_unusable_light_is_refused_by_name() -> None:
-    with pytest.raises(ValidationError, match="wash out"):
-        Lighting(ambient=0.8, diffuse=0.4)
-    with pytest.raises(ValidationError, match="direction_odom must point towards the light"):
-        Lighting(direction_odom=(0.0, 0.0, 0.0))
-    with pytest.raises(ValidationError, match="colour_rgb"):
-        Lighting(colour_rgb=(1.2, 1.0, 1.0))
-    with pytest.raises(ValidationError, match="did you mean 'ambient'"):
-        Lighting(ambiant=0.5)
-    with pytest.raises(SimError, match="did you mean 'warm_sodium'"):
-        Lighting.preset("warm_sodum")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim_tests.world.hall import BOX_FACES, Mesh, box, merge, quad
+from sim_tests.world.hall import BOX_FACES, box
 
 
 @pytest.mark.parametrize("face", BOX_FACES[:4])
@@ -21,14 +21,3 @@ def test_a_texture_stands_upright_on_each_side_of_a_box(face: str) -> None:
     right = np.cross([0.0, 0.0, 1.0], outward)  # to the right, seen from outside
     np.testing.assert_allclose(side.uv[:, 0], 0.5 + 0.5 * side.vertices_m @ right, atol=1e-12)
     np.testing.assert_allclose(side.uv[:, 1], 0.75 + 0.5 * side.vertices_m[:, 2], atol=1e-12)
-
-
-def test_merging_keeps_every_triangle_and_its_texture() -> None:
-    parts = [box((0, 0, 0), (1, 1, 1)), quad([(0, 0, 2), (1, 0, 2), (1, 1, 2), (0, 1, 2)])]
-    both = merge(parts)
-    assert both.triangles == 14
-    assert both.uv is not None
-    corners = both.vertices_m[both.indices[-6:]]
-    np.testing.assert_array_equal(corners, parts[1].vertices_m[parts[1].indices])
-    plain = Mesh(parts[1].vertices_m, parts[1].normals, parts[1].indices)
-    assert merge([parts[0], plain]).uv is None

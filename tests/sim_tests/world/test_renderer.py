@@ -11,7 +11,6 @@ from camera_poses import level_pose
 from visual_actors import AWAY_M, ShapeActor, ball
 
 from perception import Camera
-from sim_tests import SimError
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 
@@ -96,15 +95,6 @@ def test_a_rectangle_is_that_part_of_the_whole(
         assert close[same].mean() > 0.998
 
 
-def test_a_coarser_grid_samples_the_middle_of_its_cells(renderer: CameraRenderer) -> None:
-    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
-    coarse = renderer.depth(OFF_CENTRE, T, (60.0, 30.0, 180.0, 210.0), (40, 60))
-    assert coarse.shape == (60, 40)
-    fine = renderer.depth(OFF_CENTRE, T)
-    # Cells of 3 by 3 pixels: the middle of a cell is the middle one of its pixels.
-    np.testing.assert_allclose(coarse, fine[31:210:3, 61:180:3], rtol=2e-3)
-
-
 @pytest.mark.parametrize("heading_deg", [90.0, -90.0])
 def test_corners_in_the_cameras_plane_do_no_harm(
     renderer: CameraRenderer, heading_deg: float
@@ -136,21 +126,3 @@ def test_supersampling_averages_the_finer_image(hall: Warehouse, factor: int) ->
         same = smooth.body_ids == plain.body_ids
         assert same.mean() > 0.995
         np.testing.assert_allclose(smooth.depth_m[same], plain.depth_m[same], rtol=2e-3)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"roi_xyxy_px": (10, 10, 10, 20)}, "roi_xyxy_px"),
-        ({"roi_xyxy_px": (0, 0, float("nan"), 20)}, "roi_xyxy_px"),
-        ({"size_px": (0, 10)}, "size_px"),
-        ({"T_odom_camera": np.ones((4, 4))}, "T_odom_camera"),
-        ({"camera": Camera(32, 24, 30, 30, 16, 12, np.array([0.1, 0, 0, 0, 0]))}, "undistorted"),
-    ],
-)
-def test_unusable_requests_are_refused(
-    renderer: CameraRenderer, arguments: dict, message: str
-) -> None:
-    good = {"camera": OFF_CENTRE, "T_odom_camera": np.eye(4)}
-    with pytest.raises(SimError, match=message):
-        renderer.render(**{**good, **arguments})

@@ -77,25 +77,6 @@ def test_a_closed_surface_has_no_gaps_and_hides_only_what_is_behind() -> None:
         assert not surface.blocks(eye, np.array([0.2 * eye, beside - eye + beside])).any()
 
 
-def test_moving_and_scaling_lines_and_surface_together_changes_nothing() -> None:
-    rng = np.random.default_rng(3)
-    pieces = [(rng.normal(size=(60, 3)), np.arange(60).reshape(-1, 3)) for _ in range(3)]
-    triangles = TriangleSet(pieces)
-    assert (triangles.pieces, triangles.triangles) == (3, 60)
-    eye, ends = rng.normal(size=3), rng.normal(size=(40, 3)) * 2.0
-    still = PlacedSurface(triangles, np.tile(np.eye(4), (3, 1, 1))).blocks(eye, ends)
-    assert 0 < still.sum() < 40
-    T = np.tile(np.eye(4), (3, 1, 1))
-    T[:, :3, :3] = Rotation.random(random_state=7).as_matrix()
-    T[:, :3, 3] = (5.0, -2.0, 1.0)
-    moved = PlacedSurface(triangles, T, scale=1.3)
-
-    def to_odom(points: np.ndarray) -> np.ndarray:
-        return 1.3 * points @ T[0, :3, :3].T + T[0, :3, 3]
-
-    np.testing.assert_array_equal(moved.blocks(to_odom(eye), to_odom(ends)), still)
-
-
 def test_a_rack_hides_what_is_behind_it_and_the_aisle_is_free() -> None:
     layout = WarehouseLayout.named("crossing")
     lines = SightLines(layout)

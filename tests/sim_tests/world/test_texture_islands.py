@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_tests.world.hall import WarehouseLayout, scenery, scenery_texture
 from sim_tests.world.render._backend_tiny import cut_texture
 
 
@@ -61,15 +60,3 @@ def test_a_repeated_texture_is_left_alone(uv: list[tuple[float, float]]) -> None
     same_uv, same = cut_texture(coordinates, np.array((0, 1, 2)), texture)
     assert same is texture
     assert same_uv is coordinates
-
-
-def test_racks_look_the_same_with_a_part_of_the_texture() -> None:
-    sizes = []
-    for chunk in scenery(WarehouseLayout.named("crossing")):
-        if chunk.texture is not None and chunk.texture.startswith("goods"):
-            texture = scenery_texture(chunk.texture)
-            share, cut = _same_look(chunk.mesh.uv, chunk.mesh.indices.ravel(), texture)
-            assert share > 0.999
-            sizes.append(cut.size / texture.size)
-    assert len(sizes) > 10
-    assert np.mean(sizes) < 0.6

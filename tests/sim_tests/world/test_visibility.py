@@ -49,13 +49,6 @@ def test_a_line_crosses_a_box_where_one_of_its_points_lies_inside(
         assert not found or (margins > -step_m - 1e-6).any()
 
 
-def test_lines_along_an_axis_and_lines_that_end_before_a_box_are_handled() -> None:
-    box = np.array([[1.0, -1.0, 2.0, 1.0]])
-    ends = [(3.0, 0.0), (0.9, 0.0), (-3.0, 0.0), (0.0, 5.0), (3.0, 3.0)]
-    assert crosses_boxes(box, (0.0, 0.0), ends).tolist() == [True, False, False, False, False]
-    assert not crosses_boxes(np.zeros((0, 4)), (0.0, 0.0), ends).any()
-
-
 def test_a_rack_blocks_the_view_and_a_body_that_does_not_count_does_not() -> None:
     layout = WarehouseLayout.named("crossing")
     with Warehouse(layout) as warehouse:
@@ -87,13 +80,3 @@ def test_a_keypoint_is_visible_up_to_its_tolerance_behind_a_surface(
         points = np.full((row + 1, 3), 2.0 + behind_m)
         pixels = np.full((row + 1, 2), 4.0)
         assert keypoints_in_front(points, pixels, depth)[row] == visible
-
-
-def test_keypoints_outside_the_image_or_behind_the_camera_are_not_visible() -> None:
-    depth = np.full((10, 20), np.inf)
-    pixels = np.array([(-0.6, 4.0), (19.6, 4.0), (4.0, 9.6), (np.nan, np.nan), (-0.4, 9.4)])
-    points = np.array([(0.0, 0.0, z) for z in (2.0, 2.0, 2.0, -1.0, 2.0)])
-    visible = keypoints_in_front(points, pixels, depth)
-    assert visible.tolist() == [False, False, False, False, True]
-    points[4, 2] = 0.05  # nearer to the camera than 0.1 m
-    assert not keypoints_in_front(points, pixels, depth).any()

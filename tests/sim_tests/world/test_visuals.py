@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-import sys
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -13,14 +11,13 @@ from camera_poses import level_pose
 from visual_actors import AWAY_M, CHECKERBOARD, ShapeActor, ball, upright_square
 
 from perception import Camera
-from perception.installation import install_command
 from sim_tests import SimError
 from sim_tests.actors.robot import Amr
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.camera import CameraRenderer
-from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout
-from sim_tests.world.render import RenderView, Visuals, gl_works
+from sim_tests.world.hall import Lighting, Mesh
+from sim_tests.world.render import Visuals
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
@@ -38,16 +35,6 @@ def add_actor(hall: Warehouse) -> Iterator[Callable[[ShapeActor], int]]:
     yield add
     for actor in added:
         actor.position_m = np.array(AWAY_M)
-
-
-@pytest.fixture
-def _no_opengl(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Make moderngl impossible to import; a changed process id makes OpenGL start again."""
-    monkeypatch.setitem(sys.modules, "moderngl", None)
-    monkeypatch.setattr("os.getpid", lambda: -1)
-    gl_works.cache_clear()
-    yield
-    gl_works.cache_clear()
 
 
 def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(
@@ -137,63 +124,3 @@ def test_rendering_never_changes_the_physics() -> None:
             return amr.T_odom_base.tobytes()
 
     assert drive(True) == drive(False)
-
-
-def test_a_closed_warehouse_cannot_be_rendered() -> None:
-    warehouse = Warehouse(WarehouseLayout.named("open"))
-    visuals = warehouse.visuals
-    client = visuals.client
-    warehouse.close()
-    assert not pybullet.isConnected(client)
-    with pytest.raises(SimError, match="closed"):
-        visuals.prepare(RenderView.of_rectangle(CAMERA, AHEAD))
-    never_seen = Warehouse()
-    never_seen.close()
-    with pytest.raises(SimError, match="closed"):
-        _ = never_seen.visuals
-
-
-def test_an_unknown_renderer_is_refused_before_anything_starts() -> None:
-    with pytest.raises(SimError, match="did you mean 'tiny'"):
-        Warehouse(renderer="tinny")  # type: ignore[arg-type]
-
-
-@pytest.mark.usefixtures("_no_opengl")
-def test_where_opengl_does_not_start_auto_is_the_software_renderer() -> None:
-    assert not gl_works()
-    with Visuals(renderer="auto") as visuals:
-        assert visuals.renderer == "tiny"
-
-
-@pytest.mark.usefixtures("_no_opengl")
-def test_opengl_without_moderngl_names_the_extra_and_the_other_renderer() -> None:
-    with pytest.raises(
-        SimError, match=re.escape(f"{install_command('sim')}, or use renderer='tiny'")
-    ):
-        Visuals(renderer="gl")
-
-
-@pytest.mark.parametrize(
-    ("platform", "backend", "need"),
-    [
-        ("linux", {"backend": "egl"}, "libEGL"),
-        ("darwin", {}, "a driver for OpenGL 3.3"),
-        ("win32", {}, "a driver for OpenGL 3.3"),
-    ],
-)
-def test_each_platform_is_asked_for_its_own_context(
-    monkeypatch: pytest.MonkeyPatch, platform: str, backend: dict[str, str], need: str
-) -> None:
-    moderngl = pytest.importorskip("moderngl")
-    options: dict[str, object] = {}
-
-    def refuse(**given: object) -> None:
-        options.update(given)
-        raise RuntimeError("no driver")
-
-    monkeypatch.setattr(moderngl, "create_context", refuse)
-    monkeypatch.setattr("sys.platform", platform)
-    monkeypatch.setattr("os.getpid", lambda: -1)
-    with pytest.raises(SimError, match=rf"no driver.*it needs {need}.*renderer='tiny'"):
-        Visuals(renderer="gl")
-    assert options == {"standalone": True, "require": 330, **backend}
