@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sim_tests import SimError
 from sim_tests.actors.body import load_worker, skeleton, worker_names
 from sim_tests.actors.body._quaternions import axis_angle, multiply, rotate
-from sim_tests.actors.body._skeleton import SoleRoll, TwoBoneLimb
+from sim_tests.actors.body._skeleton import TwoBoneLimb
 
 vectors = st.tuples(*[st.floats(-0.08, 0.08)] * 2, st.floats(-0.5, -0.25))
 
@@ -49,18 +49,6 @@ def test_two_bone_ik_brings_the_tip_to_its_target(
     assert np.cross(hinge, target) @ lateral == pytest.approx(0.0, abs=1e-6)
     across = np.cross(target, lateral)
     assert np.cross(target, hinge) @ across > 0.0
-
-
-def test_a_square_sole_rolls_over_its_edges() -> None:
-    """A sole with square ends turns about its toe edge or its heel edge, which does not move."""
-    corners = np.array([[x, 0.0, z] for x in (-0.06, 0.17) for z in (-0.09, 0.0)])
-    roll = SoleRoll.from_surface(corners)
-    for pitch, edge in ((0.5, (0.17, -0.09)), (-0.4, (-0.06, -0.09))):
-        ahead, height = (float(v[0]) for v in roll.ankle(np.array([pitch])))
-        x = ahead + math.cos(pitch) * edge[0] + math.sin(pitch) * edge[1]
-        z = height + math.cos(pitch) * edge[1] - math.sin(pitch) * edge[0]
-        assert x == pytest.approx(edge[0], abs=1e-3)
-        assert z == pytest.approx(0.0, abs=1e-4)
 
 
 def test_the_look_of_nearest_stature_is_chosen_and_scaled() -> None:

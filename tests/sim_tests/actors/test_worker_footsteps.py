@@ -66,6 +66,10 @@ WALKS = {
 }
 
 
+#: In every run of the tests; the others with --full.
+ALWAYS = ("straight, 1.2 m/s", "a tight curve", "starting and stopping", "about-turn")
+
+
 @pytest.fixture(scope="module")
 def workers(hall: Warehouse) -> dict[str, Worker]:
     return {name: Worker(hall, load_worker(name).stature_m, look=name) for name in worker_names()}
@@ -111,7 +115,10 @@ def _slip_m(shoe: np.ndarray) -> float:
     return worst
 
 
-@pytest.mark.parametrize("name", WALKS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=() if name in ALWAYS else pytest.mark.full) for name in WALKS],
+)
 def test_stance_feet_stay_where_they_landed(workers: dict[str, Worker], name: str) -> None:
     """No sole slides, sinks or floats, the legs reach the feet, and no keypoint jumps."""
     soles, errors, keypoints = _simulate(workers["daniel"], WALKS[name])

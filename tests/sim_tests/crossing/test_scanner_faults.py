@@ -30,6 +30,8 @@ from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 ROUND = ScannerSpec(x_m=0.0, field_of_view_deg=(-180.0, 180.0), resolution_deg=1.0)
 PERIOD_S = 0.04
 SCANNER_FAULTS = tuple(name for name in shipped_faults() if name.startswith("scanner_"))
+#: In every run of the tests; the others with --full.
+ALWAYS = ("scanner_frozen", "scanner_late", "scanner_yawed", "scanner_ghosts")
 
 
 def scan_at(t_s, range_m=5.0, count=360):
@@ -112,7 +114,13 @@ def world_without_fault():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SCANNER_FAULTS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in ALWAYS else pytest.mark.full)
+        for name in SCANNER_FAULTS
+    ],
+)
 def test_a_scan_fault_changes_neither_people_nor_what_the_camera_sees(name, world_without_fault):
     """The robot of the paper drives straight on, so the world may not differ by a bit."""
     (plain, plain_scans), (faulty, scans) = world_without_fault, world(Fault.shipped(name))

@@ -47,7 +47,7 @@ SETS_OFF = scene(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("policy", ["blind", "conservative"])
+@pytest.mark.parametrize("policy", [pytest.param("blind", marks=pytest.mark.full), "conservative"])
 def test_the_robot_does_not_touch_somebody_who_watched_it_and_sets_off(policy):
     result = run_crossing(SETS_OFF, policy=policy, perception="keypoints+scanner", seed=0)
     assert not [contact for contact in result.contacts if contact.by == "robot"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import signal
@@ -24,6 +25,25 @@ class Slow:
 
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
         return 0.5, 0.0
+
+
+class Straight:
+    """Drives straight on, at the speed limit and at most at ``speed_mps``, and stops."""
+
+    def __init__(self, robot, speed_mps=0.6):
+        self.speed_mps = speed_mps
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        left_m = math.dist(robot_state.position_odom_m, goal_odom_m) - 0.1
+        stopping_mps = math.sqrt(max(left_m, 0.0))
+        return min(self.speed_mps, stopping_mps, constraints.speed_limit_mps), 0.0
+
+
+class ReturnsNothing(Slow):
+    """Returns a number that is none."""
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        return math.nan, 0.0
 
 
 class UsesGlobalRandom(Slow):
@@ -115,3 +135,7 @@ def square(number):
     if number < 0:
         os.kill(os.getpid(), signal.SIGKILL)
     return number**2
+
+
+#: A planner that is made already.
+READY = Straight(None, 0.5)

@@ -13,11 +13,8 @@ from measured_scenes import crossing
 from awarenav.cli import main
 from sim_tests import ScenarioTemplate, run_crossing, shipped_scenarios
 from sim_tests.study.measures import (
-    UNCONFIRMED,
-    EpisodeRecord,
     MeasuredAttention,
     Trace,
-    measured_part,
 )
 from sim_tests.study.scenarios import AttentionCheck, check_attention
 
@@ -66,24 +63,6 @@ def test_the_least_attentive_person_decides():
     found = measured([3.0, 4.0], lambda t, i: 0.95 if i == 0 or t < 4.95 else 0.0)
     assert found.least_aware_share == pytest.approx(0.5)
     assert found.looked_s.tolist() == pytest.approx([10.0, 5.0])
-
-
-@pytest.mark.parametrize(
-    ("attention", "share", "part"),
-    [
-        ("attentive", 0.95, "attentive"),
-        ("attentive", 0.8, "attentive"),
-        ("attentive", 0.79, UNCONFIRMED),
-        ("attentive", None, UNCONFIRMED),
-        ("mixed", 0.95, "mixed"),
-        ("unaware", 0.95, "unaware"),
-    ],
-)
-def test_only_measured_attention_counts_as_attentive(attention, share, part):
-    record = EpisodeRecord(
-        "a", 0, "blind", "p", "truth", attention=attention, attentive_share=share
-    )
-    assert measured_part(record) == part
 
 
 def checked(label, awareness):

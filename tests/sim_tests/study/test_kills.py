@@ -70,10 +70,6 @@ def kill(name, kills, tmp_path, *more):
     return found.stdout
 
 
-def test_crossings_killed_twice_end_with_the_same_files(tmp_path):
-    assert kill("crossings", 2, tmp_path, "--policy", "blind").startswith("2 kills")
-
-
 @pytest.mark.full
 @pytest.mark.parametrize("name", COMMANDS)
 def test_ten_kills_at_random_instants_change_no_file(name, tmp_path):

@@ -3,20 +3,11 @@
 from __future__ import annotations
 
 import pytest
+from run_scenes import SHORT
 
 from awarenav.cli import main
 
-# A robot that drives 0.6 m past a person who stands.
-SCENARIO = """
-name: short
-description: Two seconds.
-duration_s: 2.0
-control_hz: 10.0
-layout: {x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}
-robot: {goal_x_m: 0.6}
-workers:
-  - path: [{t_s: 0.0, x_m: {uniform: {low: 3.0, high: 4.0}}, y_m: -1.0}]
-"""
+SCENARIO = SHORT.format(name="short")
 COMMANDS = {
     "tune": ["--trials", "2", "--generation", "2", "--episodes", "1", "--held-out", "1"],
     "falsify": ["--episodes", "4", "--generation", "4", "--worst", "1"],
@@ -45,7 +36,10 @@ def results(folder):
     }
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "name",
+    ["falsify", *(pytest.param(name, marks=pytest.mark.full) for name in ("tune", "render"))],
+)
 def test_a_finished_run_is_not_overwritten_unasked(name, tmp_path, capsys):
     command, out = words(name, tmp_path)
     assert main(command) == 0

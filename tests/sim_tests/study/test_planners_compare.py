@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from page_reader import PageReader
-from planners_to_compare import READY
+from run_planners import READY
 
 from awarenav.cli import main
 from sim_tests.scenario import ScenarioTemplate
@@ -40,7 +40,7 @@ workers:
   - path:
       - {t_s: 0.0, x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}
 """
-NAMES = ["straight_on", "planners_to_compare:Raises", "planners_to_compare:ReturnsNothing"]
+NAMES = ["straight_on", "run_planners:Raises", "run_planners:ReturnsNothing"]
 
 
 def scene():
@@ -153,10 +153,10 @@ def test_a_broken_limit_and_a_late_command_are_marked(folder, changed, column, t
 
 def test_a_planner_may_be_an_object_or_have_arguments():
     scenario = scene().median()
-    made = make_planner("planners_to_compare:READY", scenario)
+    made = make_planner("run_planners:READY", scenario)
     assert made is not READY
     assert made.speed_mps == 0.5
-    assert make_planner("planners_to_compare:Straight(speed_mps=0.3)", scenario).speed_mps == 0.3
+    assert make_planner("run_planners:Straight(speed_mps=0.3)", scenario).speed_mps == 0.3
     assert make_planner("straight_on", scenario).plan
 
 
@@ -195,7 +195,7 @@ def test_robot_and_population_are_those_of_every_episode_and_of_the_command():
 @pytest.mark.full
 def test_a_planner_that_hangs_costs_its_own_episodes_alone(tmp_path, capfd):
     (tmp_path / "beside.yaml").write_text(SCENE, encoding="utf-8")
-    words = ["planners_to_compare:Hangs", "--scenario", str(tmp_path / "beside.yaml")]
+    words = ["run_planners:Hangs", "--scenario", str(tmp_path / "beside.yaml")]
     words += ["--seeds", "1-1", "--workers", "1", "--time-limit", "30", "--json"]
     assert main(["planners", "compare", *words, "--out", str(tmp_path / "out")]) == 1
     printed = capfd.readouterr()

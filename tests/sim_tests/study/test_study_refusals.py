@@ -41,10 +41,10 @@ def run(tmp_path_factory):
             "--format navwareset writes files that end in .csv, got x.json",
         ),
         ("frontier EMPTY/nowhere", "nowhere"),
-        ("planners compare planners_to_compare", "or as one of reference, costmap"),
-        ("planners compare planners_to_compare:Absent", "has no attribute 'Absent'"),
+        ("planners compare run_planners", "or as one of reference, costmap"),
+        ("planners compare run_planners:Absent", "has no attribute 'Absent'"),
         (
-            "planners compare planners_to_compare:Straight(gain=2)",
+            "planners compare run_planners:Straight(gain=2)",
             "no argument 'gain'; it has 'robot'",
         ),
         ("planners compare straight_on --seeds 4-2", "the first and the last as 10-19, got '4-2'"),

@@ -7,69 +7,12 @@ import math
 import numpy as np
 import pytest
 from camera_poses import level_pose
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from perception import Camera
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import WarehouseLayout
-from sim_tests.world.render import RenderView, _visuals, box_corners, in_view, to_camera
-
-CAMERA = Camera(40, 30, 33.0, 31.0, 17.3, 16.1)
-_SIDES = st.floats(0.02, 3.0)
-_PLACES = st.floats(-6.0, 6.0)
-_BOXES = st.lists(
-    st.tuples(_PLACES, _PLACES, _PLACES, _SIDES, _SIDES, _SIDES), min_size=1, max_size=8
-)
-_POSES = st.tuples(
-    _PLACES, _PLACES, st.floats(-2.0, 2.0), st.floats(-3.2, 3.2), st.floats(-1.2, 1.2)
-)
-
-
-def _view(
-    pose: tuple[float, ...], roi: tuple[float, ...] | None = None, **others: object
-) -> RenderView:
-    x, y, z, heading, pitch = pose
-    return RenderView.of_rectangle(CAMERA, level_pose((x, y, z), heading, pitch), roi, **others)
-
-
-def _boxes(numbers: list[tuple[float, ...]]) -> np.ndarray:
-    rows = np.array(numbers)
-    return np.stack([rows[:, :3], rows[:, :3] + rows[:, 3:]], axis=1)
-
-
-def _rays(view: RenderView) -> np.ndarray:
-    """Return rays (h · w, 3) in odom through the samples, one metre deep."""
-    u = view.left + (np.arange(view.width) + 0.5) / view.width * (view.right - view.left)
-    v = view.top + (np.arange(view.height) + 0.5) / view.height * (view.bottom - view.top)
-    grid = np.stack([*np.meshgrid(u, v), np.ones((view.height, view.width))], axis=-1)
-    return grid.reshape(-1, 3) @ view.T_odom_camera[:3, :3].T
-
-
-def _hit_depths(view: RenderView, boxes: np.ndarray) -> np.ndarray:
-    """Return the depths (rays, N) at which each ray enters each box; NaN for a miss."""
-    eye, rays = view.T_odom_camera[:3, 3], _rays(view)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        first = (boxes[None, :, 0] - eye) / rays[:, None]
-        last = (boxes[None, :, 1] - eye) / rays[:, None]
-    enter = np.minimum(first, last).max(axis=-1)
-    leave = np.maximum(first, last).min(axis=-1)
-    missed = ~((enter <= leave) & (leave >= view.near_m) & (enter <= view.far_m))
-    enter = np.maximum(enter, view.near_m)
-    enter[missed] = np.nan
-    return enter
-
-
-@settings(max_examples=60, deadline=None)
-@given(_BOXES, _POSES, st.sampled_from([None, (3.0, 4.0, 9.0, 8.0), (-20.0, 5.0, 60.0, 6.0)]))
-def test_a_box_that_any_ray_meets_is_in_view(
-    numbers: list[tuple[float, ...]], pose: tuple[float, ...], roi: tuple[float, ...] | None
-) -> None:
-    view, boxes = _view(pose, roi), _boxes(numbers)
-    met = ~np.isnan(_hit_depths(view, boxes)).all(axis=0)
-    shown = in_view(view, to_camera(view, box_corners(boxes)))
-    assert (shown | ~met).all()
+from sim_tests.world.render import _visuals
 
 
 def test_images_with_and_without_culling_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

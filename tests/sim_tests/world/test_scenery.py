@@ -19,7 +19,7 @@ from sim_tests.world.hall import (
     scenery,
 )
 
-_VARIANTS = (0, 6)
+_VARIANTS = (0, pytest.param(6, marks=pytest.mark.full))
 _HALL = {"x_min_m": -9.0, "y_min_m": -9.0, "x_max_m": 9.0, "y_max_m": 9.0}
 # A mesh may stick out of its collision box by this much.
 _TOLERANCE_M = 0.03

@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from perception.laser import RobotMotion, scan_points
@@ -19,7 +17,6 @@ from sim_tests.world.scanner import (
     ScannerSpec,
     ScanScene,
     SimulatedScanner,
-    cast_rays,
 )
 from sim_tests.world.sightlines import PlacedSurface, TriangleSet
 from training.hall import tube
@@ -109,33 +106,6 @@ def test_tilted_sweeps_agree_with_a_test_of_every_ray_and_triangle(seed) -> None
     expected = [first_hit(T[:3, 3], T[:3, :3] @ ray, corners) for ray in rays]
     assert 50 < np.isfinite(expected).sum() < 350
     np.testing.assert_allclose(scan.ranges_m, expected, atol=1e-7)
-
-
-@settings(max_examples=40)
-@given(
-    st.integers(0, 10_000),
-    st.floats(-4.0, 4.0),
-    st.sampled_from([0.01, -0.01, math.radians(0.7), math.tau / 500]),
-)
-def test_rays_with_places_and_turns_of_their_own_find_the_nearest_segment(
-    seed, start, step
-) -> None:
-    rng = np.random.default_rng(seed)
-    segments = rng.normal(size=(25, 1, 2)) * 3.0 + rng.normal(size=(25, 2, 2)) * 0.4
-    count = int(math.tau / abs(step)) if seed % 2 else 120
-    origins = 0.05 * rng.random((count, 2))
-    turns = np.linspace(0.0, 0.05, count)
-    ranges, hits = cast_rays(segments, start, step, origins, turns)
-    angles = start + step * np.arange(count) + turns
-    d = np.column_stack((np.cos(angles), np.sin(angles)))
-    to = segments[None, :, 0] - origins[:, None]
-    along = segments[:, 1] - segments[:, 0]
-    across = d[:, :1] * along[:, 1] - d[:, 1:] * along[:, 0]
-    distance = (to[..., 0] * along[:, 1] - to[..., 1] * along[:, 0]) / across
-    share = (to[..., 0] * d[:, 1:] - to[..., 1] * d[:, :1]) / across
-    distance[(distance <= 0.0) | (share < 0.0) | (share > 1.0)] = np.inf
-    np.testing.assert_allclose(ranges, distance.min(axis=1), atol=1e-7)
-    assert (hits == np.where(np.isfinite(ranges), distance.argmin(axis=1), -1)).all()
 
 
 def test_the_diagonal_scanners_see_all_around_and_not_their_robot() -> None:

@@ -1,4 +1,4 @@
-"""People who sit: level thighs on a seat that scanners and the robot meet, and who never move."""
+"""People who sit or kneel: their limbs, what scanners and rays meet of them, and no step."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ from pydantic import ValidationError
 from worker_looks import LOOKS
 
 from perception import layouts as kp
+from sim_tests import SimError
 from sim_tests.actors.behaviour import (
     MovingBody,
     PersonSpec,
     RobotBody,
     Surroundings,
     Walker,
+    WorkerScript,
 )
 from sim_tests.actors.body import (
+    KNEELING_EYE_HEIGHT_SHARE,
     SEATED_EYE_HEIGHT_SHARE,
+    Activity,
     Worker,
     load_worker,
     skin_points,
@@ -31,6 +35,10 @@ from sim_tests.world.sightlines import cut_surfaces
 NO_BOXES = np.empty((0, 4))
 HEADING_RAD = 0.7
 PLACE_M = np.array([1.0, -2.0])
+SHINS = (
+    (kp.LEFT_HIP, kp.LEFT_KNEE, kp.LEFT_ANKLE),
+    (kp.RIGHT_HIP, kp.RIGHT_KNEE, kp.RIGHT_ANKLE),
+)
 
 
 def seated(hall: Warehouse, look: str, stature_m: float | None = None, **seat: str) -> Worker:
@@ -48,16 +56,13 @@ def in_body(points_odom_m: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("stature_m", [None, 1.1])
-def test_thighs_are_level_shanks_upright_and_the_trunk_is_above_the_place(
+def test_seated_thighs_are_level_shanks_upright_and_the_trunk_is_above_the_place(
     hall: Warehouse, look: str, stature_m: float | None
 ) -> None:
     worker = seated(hall, look, stature_m)
     points = in_body(worker.keypoints_odom_m)
     size = worker.stature_m / 1.75
-    for hip, knee, ankle in (
-        (kp.LEFT_HIP, kp.LEFT_KNEE, kp.LEFT_ANKLE),
-        (kp.RIGHT_HIP, kp.RIGHT_KNEE, kp.RIGHT_ANKLE),
-    ):
+    for hip, knee, ankle in SHINS:
         thigh, shank = points[knee] - points[hip], points[ankle] - points[knee]
         assert abs(math.asin(thigh[2] / np.linalg.norm(thigh))) < math.radians(15.0)
         assert -shank[2] / np.linalg.norm(shank) > math.cos(math.radians(15.0))
@@ -111,30 +116,76 @@ def test_a_robot_meets_the_seat_and_it_leaves_with_the_person() -> None:
         assert (met(above), met(behind)) == (-1, -1)
 
 
-def test_a_seated_person_watches_but_never_moves() -> None:
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize("stature_m", [None, 1.1])
+def test_kneeling_thighs_are_upright_and_knees_and_feet_on_the_floor(
+    hall: Warehouse, look: str, stature_m: float | None
+) -> None:
+    worker = Worker(hall, stature_m, look=look)
+    worker.place((0.0, 0.0), 0.0, activity="kneeling")
+    points = worker.keypoints_odom_m
+    for hip, knee, ankle in SHINS:
+        thigh, shank = points[knee] - points[hip], points[ankle] - points[knee]
+        assert -thigh[2] / np.linalg.norm(thigh) > math.cos(math.radians(15.0))
+        assert -shank[0] / np.linalg.norm(shank) > math.cos(math.radians(15.0))
+    assert np.linalg.norm(worker.chest_odom_m[:2]) < 0.05
+    assert worker.eyes_odom_m[2] == pytest.approx(
+        KNEELING_EYE_HEIGHT_SHARE * worker.stature_m, abs=0.03 * worker.stature_m
+    )
+    skin = load_worker(look).levels[1]
+    surface = skin_points(worker.asset.joints_m, worker.pose, skin.vertices_m, skin.weights)
+    assert surface[:, 2].min() == pytest.approx(0.0, abs=0.015)
+    assert worker.held is None
+
+
+@pytest.mark.parametrize("stature_m", [1.8, 1.2])
+def test_rays_meet_the_shanks_behind_and_pass_above_the_head(stature_m: float) -> None:
+    with Warehouse(WarehouseLayout.named("open")) as hall:
+        worker = Worker(hall, stature_m)
+        worker.place((1.0, 2.0), 0.5 * math.pi, activity="kneeling")
+        behind, size = 0.3 * stature_m / 1.75, stature_m / 1.75
+
+        def met(y_m: float, z_m: float) -> bool:
+            ray = [[-1.0, y_m, z_m]], [[3.0, y_m, z_m]]
+            (hit,) = pybullet.rayTestBatch(*ray, physicsClientId=hall.client)
+            return int(hit[0]) == worker.body
+
+        assert met(2.0 - behind, 0.07 * size)  # the shank, where somebody who stands has nothing
+        assert met(2.0, 0.3 * size)
+        assert met(2.0, 0.6 * stature_m)
+        assert not met(2.0 - behind, 0.4 * size)
+        assert not met(2.0, 0.8 * stature_m)
+        worker.place((1.0, 2.0), 0.5 * math.pi)
+        assert met(2.0, 0.8 * stature_m)
+        assert not met(2.0 - behind, 0.07 * size)
+
+
+@pytest.mark.parametrize("activity", ["sitting", "kneeling"])
+def test_low_people_watch_but_never_move(activity: str) -> None:
     here = {"x_m": 0.0, "y_m": 0.0}
-    with pytest.raises(ValidationError, match="route must have one point, got 2"):
-        PersonSpec(name="s", route=[here, {"x_m": 1.0, "y_m": 0.0}], activity="sitting")
-    spec = PersonSpec(
-        name="s", route=[here], activity="sitting", heading_deg=0.0, glances={"watches": True}
-    )
-    person = Walker(spec, np.random.default_rng(0), NO_BOXES)
-    standing = Walker(
-        spec.model_copy(update={"activity": "none"}), np.random.default_rng(0), NO_BOXES
-    )
+    with pytest.raises(ValidationError, match=r"one p.*, got 2"):
+        PersonSpec(name="s", route=[here, {"x_m": 1.0, "y_m": 0.0}], activity=activity)
+    with pytest.raises(SimError, match="stays"):
+        Activity(activity, "none", 0.5)
+    script = {"path": [{"t_s": 0.0, **here}], "activities": [{"t_s": 0.0, "activity": activity}]}
+    assert WorkerScript.model_validate(script).stays
     # A robot before them, and somebody so near that they would step aside.
-    robot = RobotBody(1.2, 0.0, math.pi, 0.0, 0.0, 0.3, 0.25, (0.9, 0.0, 0.6))
+    robot = RobotBody(1.2, 0.0, math.pi, -0.5, 0.0, 0.3, 0.25, (0.9, 0.0, 0.6))
     around = Surroundings(robot, (MovingBody(0.0, 0.4, 0.0, 0.0),), lambda: True)
     pitches = {}
-    for name, walker in (("seated", person), ("standing", standing)):
+    for doing in ("none", activity):
+        spec = PersonSpec(
+            name="s", route=[here], activity=doing, heading_deg=0.0, glances={"watches": True}
+        )
+        person = Walker(spec, np.random.default_rng(0), NO_BOXES)
         for tick in range(60):
-            motion = walker.motion(0.05 * tick, around)
-            if name == "seated":
+            motion = person.motion(0.05 * tick, around)
+            if doing == activity:
                 np.testing.assert_array_equal(motion.position_odom_m, [0.0, 0.0])
                 assert motion.heading_odom_rad == 0.0
-            if tick == 40 and name == "seated":
-                walker.touch(1.0, 0.0)
-        pitches[name] = motion.head_pitch_rad + motion.eye_pitch_rad
-    assert person.noticed_s is not None
+                if tick == 40:
+                    person.touch(1.0, 0.0)
+        assert person.noticed_s is not None
+        pitches[doing] = motion.head_pitch_rad + motion.eye_pitch_rad
     # The eyes of somebody who stands are higher: they look further down.
-    assert pitches["standing"] < pitches["seated"] - 0.1
+    assert pitches["none"] < pitches[activity] - 0.1
