@@ -2,26 +2,11 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-
 import click
 import pytest
 from command_line import COMMANDS, options_of
 
-from awarenav.cli import OneOf, Option, main
-
-# `render` names the people who appear by an option that elsewhere counts processes.
-OTHER_MEANING = {("render", "--workers")}
-SHARED = (
-    "--seed",
-    "--out",
-    "--workers",
-    "--resume",
-    "--overwrite",
-    "--planner",
-    "--policy",
-    "--perception",
-)
+from awarenav.cli import Option, main
 
 
 def parsed(path, *words):
@@ -40,14 +25,6 @@ def test_several_values_after_an_option_equal_the_option_given_several_times():
         ["--episodes", "3", "--policy", "blind", "mine.yaml"],
     ):
         assert parsed(path, *words) == expected
-
-
-def test_no_command_takes_positional_arguments_beside_an_option_of_several_values():
-    """Otherwise the argument behind such an option would become one of its values."""
-    for path, each in COMMANDS.items():
-        many = [one for one in each.params if isinstance(one, Option) and one.many]
-        arguments = [one for one in each.params if isinstance(one, click.Argument)]
-        assert not (many and arguments), path
 
 
 EXCLUSIVE = [
@@ -122,37 +99,6 @@ def test_a_value_that_is_not_valid_is_refused_with_the_help_to_read(words, messa
     assert f"Try 'awarenav {words[0]} --help' for help." in error
     assert error.splitlines()[-1].startswith(f"awarenav {words[0]}: ")
     assert message in error.splitlines()[-1]
-
-
-def first_sentence(text):
-    return text.split(". ")[0].rstrip(".")
-
-
-@pytest.mark.parametrize("name", SHARED)
-def test_a_shared_option_means_the_same_in_every_command(name):
-    found = defaultdict(list)
-    for path, each in COMMANDS.items():
-        shared = options_of(each).get(name)
-        if shared is None or (path[0], name) in OTHER_MEANING:
-            continue
-        # One value or several, a file or a folder: the metavar says which. Beside arguments, an
-        # option with several values is given several times and has no dots.
-        dots = (shared.metavar or "").endswith("...")
-        kind = "DIR" if shared.metavar == "DIR" else (shared.multiple, dots)
-        found[kind].append(shared)
-    assert found
-    assert sum(map(len, found.values())) > 1
-    for alike in found.values():
-        assert len({type(each.type) for each in alike}) == 1
-        assert len({each.is_flag for each in alike}) == 1
-        if name != "--out":  # what is written differs, and so does its help
-            assert len({each.metavar for each in alike}) == 1
-            assert len({first_sentence(each.help) for each in alike}) == 1
-        if isinstance(alike[0].type, OneOf):
-            widest = max((each.type.choices for each in alike), key=len)
-            assert all(set(each.type.choices) <= set(widest) for each in alike)
-        else:
-            assert len({tuple(sorted(vars(each.type).items(), key=str)) for each in alike}) == 1
 
 
 def test_every_seed_is_zero_unless_it_is_given():

@@ -84,14 +84,6 @@ def test_every_output_takes_every_letter(encoding: str, tmp_path: Path, monkeypa
     assert "cannot read" in gone
 
 
-def test_a_process_without_outputs_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A daemon may have none."""
-    monkeypatch.setattr(sys, "stdout", None)
-    monkeypatch.setattr(sys, "stderr", None)
-    assert main(["policy", "show", "balanced", "--out", "none"]) == 0
-    assert main(["policy", "show", "none"]) == 2
-
-
 def test_a_file_name_that_is_not_utf_8_is_only_a_name(tmp_path: Path) -> None:
     folder = tmp_path / os.fsdecode(b"l\xe4ute")
     try:
@@ -176,12 +168,3 @@ def test_words_are_completed_by_their_beginning(words, names):
 )
 def test_paths_are_left_to_the_shell(words, kind):
     assert [item.type for item in offered(*words)] == [kind]
-
-
-def test_a_shell_is_answered_by_the_program(monkeypatch, capsys):
-    monkeypatch.setenv("_AWARENAV_COMPLETE", "zsh_complete")
-    monkeypatch.setenv("COMP_WORDS", "awarenav judg")
-    monkeypatch.setenv("COMP_CWORD", "1")
-    assert main([]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert said == ["plain", "judge", "Compare estimates with the truth."]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from paths import SHARED
 
 from awarenav.cli import main
-from awarenav.doctor import Finding, by_importance, picture_figures, picture_findings
+from awarenav.doctor import Finding, by_importance, picture_figures
 from awarenav.models import ModelStore
 from perception import _manifest
 from perception.shipped import shipped_models
@@ -171,18 +171,3 @@ def test_the_width_of_edges_grows_with_blur_and_not_with_contrast(sigma_px, cont
     assert sharp < blurred < more
     full = picture_figures(cv2.GaussianBlur(SCENE, (0, 0), sigma_px)).edge_px
     assert blurred == pytest.approx(full, rel=0.15)
-
-
-def test_a_repeated_picture_is_told_from_one_with_noise():
-    noisy = SCENE.copy()
-    noisy[0, 0, 0] += 1
-    assert picture_figures(SCENE, SCENE.copy()).repeats
-    assert not picture_figures(noisy, SCENE).repeats
-    assert not picture_figures(SCENE).repeats
-    fresh, again = picture_figures(noisy, SCENE), picture_figures(SCENE, SCENE)
-    (some,) = [
-        each
-        for each in picture_findings([picture_figures(SCENE), fresh, again, fresh])
-        if each.subject == "images"
-    ]
-    assert (some.severity, some.text) == ("warning", "1 of 4 repeat the one before")

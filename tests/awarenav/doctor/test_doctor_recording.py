@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from awarenav.cli import main
-from awarenav.doctor import _recording
 from nav_adapter.ros2.conversions import to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
@@ -137,14 +136,6 @@ def test_a_blind_sector_is_named_in_the_frame_of_the_robot(
     sides_deg = [int(each) for each in re.findall(r"(-?\d+)°", text)[:2]]
     assert sides_deg == pytest.approx([yaw_deg - 45, yaw_deg + 45], abs=1)
     assert "in 'base_link'" in text
-
-
-def test_only_the_beginning_of_a_long_recording_is_read(capsys, tmp_path, drive, monkeypatch):
-    monkeypatch.setattr(_recording, "_LONGEST_S", 10.0 * PERIOD_S)
-    found = findings(capsys, drive.record(tmp_path / "bag"))
-    ((severity, text),) = found["recording"]
-    assert (severity, "for the first" in text) == ("fine", True)
-    assert f"{COUNT} scans" not in found["scanners"][0][1]
 
 
 def test_a_scanner_that_sees_nothing_or_repeats_itself(capsys, tmp_path, drive) -> None:

@@ -252,26 +252,6 @@ def test_missing_estimates_neither_dilute_false_awareness_nor_pass_the_gate():
     assert not asked["α mean absolute error"]
 
 
-def test_people_are_sorted_by_where_they_look_and_how_far_they_are():
-    facing = [0.0, 59.0, 61.0, 119.0, 121.0, 180.0]
-    people = [
-        person(
-            0,
-            position_camera_m=[0.0, 0.0, 1.0 + k],
-            gaze_camera=[math.sin(math.radians(a)), 0.0, -math.cos(math.radians(a))],
-        )
-        for k, a in enumerate(facing)
-    ]
-    truth = frames(*[[each] for each in people])
-    figures = judged(truth, truth)
-    assert {name: group["people"] for name, group in figures["by_facing"].items()} == {
-        "front": 2,
-        "profile": 2,
-        "back": 2,
-    }
-    assert [group["people"] for group in figures["by_range_m"].values()] == [1, 1, 2, 1, 1]
-
-
 def test_people_without_boxes_are_matched_by_where_they_are():
     def at(x):
         return person(0, position_camera_m=[x, 0.0, 3.0]) | {"box_xyxy_px": None}

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from test_judge import files, frames, judged, person
+from test_judge import frames, judged, person
 
-from awarenav.cli import main
 from awarenav.judge import requirements
 from awarenav.judge._intervals import (
     mean_interval,
@@ -162,11 +160,3 @@ def test_precision_of_frames_that_differ_has_an_interval_of_frames():
     assert 0.2 < high - low < 0.45
     again = judged(truth, seen)["intervals"]["detection"]["ap50"]
     assert again == (low, high)
-
-
-def test_json_has_null_for_open_ends(tmp_path, capsys):
-    truth, seen = estimates_of(20, np.random.default_rng(0))
-    assert main(["judge", *files(tmp_path, truth, seen), "--json"]) == 0
-    ends = json.loads(capsys.readouterr().out)["intervals"]["overall"]
-    assert ends["gaze_p90_deg"][1] is None
-    assert ends["recall"] == pytest.approx([0.8316, 1.0], abs=1e-4)

@@ -12,7 +12,6 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from paths import SHARED
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
@@ -26,7 +25,6 @@ from awarenav.models import (
     default_folder,
 )
 
-MODELS = SHARED / "models"
 # Not a network, but enough to tell a complete file from half of it, and an old one from a new one.
 CONTENT = bytes(range(256)) * 4000
 OTHER = CONTENT[::-1]
@@ -188,12 +186,6 @@ def test_catalogue_fetches_only_networks_with_permissive_licences():
     assert {"detector", "pose"} <= {entry.role for entry in catalogue.models}
     with pytest.raises(AwarenavError, match=r"AGPL-3\.0.*not fetched"):
         catalogue["yolov8"]
-
-
-@pytest.mark.skipif(not MODELS.is_dir(), reason="no genuine networks beside the checkout")
-def test_catalogue_knows_the_genuine_detector():
-    content = (MODELS / "rtmdet_nano_person_320_mmpose.onnx").read_bytes()
-    assert Catalogue.shipped()["rtmdet-nano"].sha256 == sha256(content)
 
 
 @pytest.fixture

@@ -16,7 +16,6 @@ from nav_adapter import (
     RobotState,
     max_speed_mps,
 )
-from nav_adapter.policies import AttentionRules
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -79,15 +78,6 @@ def test_what_the_old_file_left_out_keeps_the_old_default(upgrade):
     assert "default of 0.2" in lines["speed.aware_human_speed_mps"][1]
     assert policy.filter.noticed_memory_s == 3.0
     assert lines["filter.noticed_memory_s"][0] == "replaced"
-
-
-@pytest.mark.parametrize(
-    ("text", "asks"), [("", True), ("alerts: {miss_within_m: 0.4}", True), ("alerts: null", False)]
-)
-def test_the_new_requests_are_named_and_off_where_alerts_were(upgrade, text, asks):
-    _, policy, lines = upgrade(ALIKE + text)
-    assert policy.attention == (AttentionRules() if asks else None)
-    assert lines["attention"][0] == "added"
 
 
 def share(shape, below, above):
@@ -201,28 +191,6 @@ def test_what_may_be_less_careful_is_to_be_checked(upgrade, text, key):
     assert [each for each, (what, _) in lines.items() if what == "check"] == [key]
 
 
-def test_settings_that_cost_no_clearance_are_dropped(upgrade):
-    status, _, lines = upgrade(
-        f"{ALIKE}timing: {{shrink_after_s: 0.1, new_clock_after_s: 2.0}}\n"
-        "margins: {maximum_radius_m: 2.0}\n"
-        "alerts: {unaware_below: 0.2, repeat_after_s: 5.0, quiet_s: 2.0, horn_within_s: 1.0}\n"
-        "outline: {longest_ahead_m: 1.0}\n"
-        "rules: {walking: {}, people_turn_deg: 20}\n"
-    )
-    assert status == 0
-    assert lines["alerts.horn_within_s"][0] == "kept"
-    dropped = {key for key, (what, _) in lines.items() if what == "dropped"}
-    assert dropped == {
-        "timing.shrink_after_s",
-        "timing.new_clock_after_s",
-        "margins.maximum_radius_m",
-        "alerts.unaware_below",
-        "alerts.repeat_after_s",
-        "alerts.quiet_s",
-        "outline",
-    }
-
-
 @pytest.mark.parametrize("distance_m", [0.3, 1.0, 2.0, 4.0])
 def test_people_who_turned_at_once_still_do(upgrade, distance_m):
     """Without the rule for walking, 0.2 had speed and separation alone."""
@@ -245,14 +213,6 @@ def test_people_who_turned_at_once_still_do(upgrade, distance_m):
         if velocity == [0.0, 0.0]:
             assert result.speed_limit_mps <= float(old_mps)
         assert result.speed_limit_mps < 1.5
-
-
-def test_a_quicker_person_and_a_longer_delay_are_kept(upgrade):
-    _, policy, _ = upgrade(
-        "rules: {walking: {human_acceleration_mps2: 4.0}, standing: {start_delay_s: 0.5}}\n"
-    )
-    assert policy.reach.time_constant_s == 0.27
-    assert policy.reach.delay_s == 0.5
 
 
 @pytest.mark.parametrize(

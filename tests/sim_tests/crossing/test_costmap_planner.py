@@ -74,6 +74,7 @@ def test_costs_near_obstacles_are_those_of_nav2s_inflation_layer() -> None:
     assert CostmapPlanner(wide).config.person_comfort_m == 0.05
 
 
+@pytest.mark.slow
 def test_its_name_runs_it_beside_the_policy_of_today() -> None:
     (job,) = plan_jobs(
         ["reads_phone"], ["scanner"], [2000], planners=["costmap"], sensors=["scanner"]

@@ -138,18 +138,18 @@ def test_impossible_faults_and_pairs_are_refused(given, message, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["ghosts+scanner_late", "misses_30+scanner_late+scanner_yawed", "FILE+scanner_late"]
+    "names", ["ghosts+scanner_late", "misses_30+scanner_late+scanner_yawed", "FILE+scanner_late"]
 )
-def test_several_faults_are_joined_and_each_keeps_its_own(name, tmp_path):
+def test_several_faults_are_joined_and_each_keeps_its_own(names, tmp_path):
     path = tmp_path / "mine.yaml"
     Fault(name="mine", latency_s=0.1).to_yaml(path)
-    joined = Fault.of(name.replace("FILE", str(path)))
-    parts = [Fault.of(part.replace("FILE", str(path))) for part in name.split("+")]
+    joined = Fault.of(names.replace("FILE", str(path)))
+    parts = [Fault.of(part.replace("FILE", str(path))) for part in names.split("+")]
     for part in parts:
-        own = part.model_dump(exclude_defaults=True, exclude={"name", "description", "scanner"})
-        assert own.items() <= joined.model_dump().items()
+        for name in part.model_fields_set - {"name", "description", "scanner"}:
+            assert getattr(joined, name) == getattr(part, name)
     assert joined.scanner.latency_s == 0.2
-    assert joined.scanner.yaw_error_deg == (3.0 if "yawed" in name else 0.0)
+    assert joined.scanner.yaw_error_deg == (3.0 if "yawed" in names else 0.0)
     assert Fault.model_validate(joined.model_dump()) == joined
 
 
