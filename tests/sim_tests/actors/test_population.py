@@ -1,4 +1,4 @@
-"""Populations: the classic people stay as they are, the fitted ones keep task and figures."""
+"""Populations: the fitted people keep their task, and have the figures they were given."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def short(name: str, duration_s: float = 7.5) -> Scenario:
 
 
 def positions(scenario: Scenario, population: str | None = None) -> np.ndarray:
-    # A robot that drives straight on: neither planner nor policy has a part in the checksum.
+    # A robot that drives straight on: neither planner nor policy has a part in what people do.
     result = run_crossing(
         scenario, policy="blind", planner=StraightOn(0.8), seed=1, population=population
     )

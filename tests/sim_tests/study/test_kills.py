@@ -1,4 +1,4 @@
-"""Every command that resumes is killed at random instants, and ends with the same files."""
+"""What a run leaves: replaced on request only, and the same files after kills at any instant."""
 
 from __future__ import annotations
 
@@ -10,14 +10,94 @@ from pathlib import Path
 
 import pytest
 from paths import ROOT
-from test_overwrite import SCENARIO
+from run_scenes import SHORT
 
 from awarenav.cli import main
+
+SCENARIO = SHORT.format(name="short")
+COMMANDS = {
+    "tune": ["--trials", "2", "--generation", "2", "--episodes", "1", "--held-out", "1"],
+    "falsify": ["--episodes", "4", "--generation", "4", "--worst", "1"],
+    "render": ["--frames", "2", "--scenes", "1", "--size", "64x48", "--processes", "1"],
+}
+# The rest of a study's files depends on the order in which its processes write.
+RESULTS = ("*.csv", "*.png", "*.jsonl", "chosen.json", "summary.json", "worst_*.yaml", "chosen/*")
+
+
+def words(name, tmp_path):
+    out = tmp_path / "out"
+    if name == "render":
+        return [name, *COMMANDS[name], "--out", str(out)], out
+    scenario = tmp_path / "short.yaml"
+    scenario.write_text(SCENARIO)
+    always = ["--scenario", str(scenario), "--perception", "truth", "--workers", "1"]
+    always += ["--out", str(out)]
+    return [name, *COMMANDS[name], *always], out
+
+
+def results(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for pattern in RESULTS
+        for path in folder.glob(pattern)
+    }
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["falsify", *(pytest.param(name, marks=pytest.mark.full) for name in ("tune", "render"))],
+)
+def test_a_finished_run_is_not_overwritten_unasked(name, tmp_path, capsys):
+    command, out = words(name, tmp_path)
+    assert main(command) == 0
+    before = results(out)
+    assert before
+    capsys.readouterr()
+    assert main(command) == 2
+    message = capsys.readouterr().err
+    for remedy in ("--resume", "--overwrite", "--out"):
+        assert remedy in message
+    assert results(out) == before
+    assert main([*command, "--resume"]) == 0
+    assert results(out) == before
+    (out / "mine.txt").write_text("mine")
+    # Another seed: nothing of the first run may be used again.
+    assert main([*command, "--seed", "5", "--overwrite"]) == 0
+    assert results(out).keys() == before.keys()
+    assert results(out) != before
+    assert (out / "mine.txt").read_text() == "mine"
+    assert main([*command, "--overwrite"]) == 0
+    assert results(out) == before
+
+
+def test_a_search_that_another_process_runs_is_not_overwritten(tmp_path, capsys):
+    from sim_tests.search import ProcessLock  # noqa: PLC0415 - needs the simulator
+
+    command, out = words("falsify", tmp_path)
+    assert main(command) == 0
+    before = results(out)
+    with ProcessLock(out / "locks" / "folder.lock"):
+        assert main([*command, "--overwrite"]) == 2
+    assert "another process works on the falsification" in capsys.readouterr().err
+    assert results(out) == before
+
+
+def test_an_interrupted_set_of_images_continues_and_there_must_be_one_to_resume(tmp_path, capsys):
+    command, out = words("render", tmp_path)
+    assert main([*command, "--resume"]) == 2
+    assert "there are no images" in capsys.readouterr().err
+    assert not out.exists()
+    assert main(command) == 0
+    before = results(out)
+    (out / "000001.png").unlink()
+    assert main(command) == 0
+    assert results(out) == before
+
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 
 PROGRAM = Path(__file__).with_name("kill_commands.py")
-COMMANDS = {
+KILLED = {
     "crossings": (
         ["--episodes", "4", "--workers", "1", "--no-report"],
         ["episodes.csv", "episodes.parquet", "jobs.jsonl"],
@@ -40,7 +120,7 @@ COMMANDS = {
 
 def kill(name, kills, tmp_path, *more):
     """Kill a command; return what the program says."""
-    options, results = COMMANDS[name]
+    options, results = KILLED[name]
     words = [name, *options, *more]
     if name == "estimate":
         pictures = tmp_path / "pictures"
@@ -71,7 +151,7 @@ def kill(name, kills, tmp_path, *more):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", KILLED)
 def test_ten_kills_at_random_instants_change_no_file(name, tmp_path):
     said = kill(name, 10, tmp_path)
     print(name, said)

@@ -1,4 +1,4 @@
-"""Scenery fills its collision boxes, stays inside the hall, and is the same every time."""
+"""Scenery fills its collision boxes, stays in the hall, carries its textures, and never changes."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 
 from sim_tests import SimError
 from sim_tests.world.hall import (
+    BOX_FACES,
     LAYOUTS,
     PROP_PARTS,
     TEXTURE_NAMES,
@@ -15,6 +16,7 @@ from sim_tests.world.hall import (
     RackBox,
     SceneryChunk,
     WarehouseLayout,
+    box,
     merge,
     scenery,
 )
@@ -154,8 +156,8 @@ def test_a_prop_fills_its_boxes_and_does_not_stick_out(kind: str, yaw_deg: float
     if yaw_deg == 217.0:  # the axis-aligned box is larger than the rotated prop
         return
     rng = np.random.default_rng(6)
-    for box, height in zip(boxes, heights, strict=True):
-        low, high = np.array([*box[:2], 0.0]), np.array([*box[2:], height])
+    for around, height in zip(boxes, heights, strict=True):
+        low, high = np.array([*around[:2], 0.0]), np.array([*around[2:], height])
         if height < 0.4:  # forks, which are lower than any line of sight
             continue
         starts = rng.uniform(low, high, (120, 3))
@@ -163,4 +165,19 @@ def test_a_prop_fills_its_boxes_and_does_not_stick_out(kind: str, yaw_deg: float
         axis = np.arange(120) % 2
         rows = np.arange(120)
         starts[rows, axis], ends[rows, axis] = low[axis], high[axis]
-        assert _hits(mesh, starts, ends).mean() > 0.8, (kind, box)
+        assert _hits(mesh, starts, ends).mean() > 0.8, (kind, around)
+
+
+@pytest.mark.parametrize("face", BOX_FACES[:4])
+def test_a_texture_stands_upright_on_each_side_of_a_box(face: str) -> None:
+    side = box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), {face: (0.25, 0.5, 0.75, 1.0)})
+    assert side.uv is not None
+    assert side.triangles == 2
+    axis, sign = "xyz".index(face[1]), 1.0 if face[0] == "+" else -1.0
+    outward = np.zeros(3)
+    outward[axis] = sign
+    np.testing.assert_array_equal(side.vertices_m[:, axis], 0.5 * sign)
+    np.testing.assert_array_equal(side.normals, np.tile(outward, (4, 1)))
+    right = np.cross([0.0, 0.0, 1.0], outward)  # to the right, seen from outside
+    np.testing.assert_allclose(side.uv[:, 0], 0.5 + 0.5 * side.vertices_m @ right, atol=1e-12)
+    np.testing.assert_allclose(side.uv[:, 1], 0.75 + 0.5 * side.vertices_m[:, 2], atol=1e-12)

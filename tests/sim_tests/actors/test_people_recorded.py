@@ -1,4 +1,4 @@
-"""Recorded people whom the robot forces off their paths, and people who are away."""
+"""Recorded people: exact at their rows, off their paths where the robot forces them, or away."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim_tests import SimError
 from sim_tests.actors.behaviour import (
     ALONE,
     Displaced,
@@ -20,13 +21,86 @@ from sim_tests.actors.behaviour import (
     replayed_people,
 )
 
+TABLE = """t_s, id, x_m, y_m, heading_rad, head_yaw_rad
+0.0, anna, 0.0, 0.0, 3.0, 0.0
+0.4, anna, 0.5, 0.1, 3.1, 0.2
+0.0, 7, 5.0, 5.0, ,
+0.8, anna, 1.0, 0.1, -3.1, -0.4
+1.0, 7, 5.0, 6.0, ,
+"""
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / "people.csv"
+    path.write_text(TABLE)
+    return path
+
+
+def test_rows_are_met_exactly(table):
+    anna, seven = replayed_people(table)
+    assert (anna.recording.name, seven.recording.name) == ("anna", "7")
+    assert anna.look != seven.look
+    for t, x, y, heading, yaw in (
+        (0.0, 0.0, 0.0, 3.0, 0.0),
+        (0.4, 0.5, 0.1, 3.1, 0.2),
+        (0.8, 1.0, 0.1, -3.1, -0.4),
+    ):
+        motion = anna.motion(t, ALONE)
+        np.testing.assert_allclose(motion.position_odom_m, [x, y], atol=1e-12)
+        assert math.remainder(motion.heading_odom_rad - heading, math.tau) == pytest.approx(0.0)
+        assert motion.head_yaw_rad == pytest.approx(yaw, abs=1e-12)
+
+
+def test_between_rows_velocity_is_the_slope_and_headings_turn_the_short_way(table):
+    anna, seven = replayed_people(table)
+    for t in np.linspace(0.02, 0.78, 20):
+        before, now, after = (anna.motion(t + dt, ALONE) for dt in (-1e-5, 0.0, 1e-5))
+        slope = (after.position_odom_m - before.position_odom_m) / 2e-5
+        np.testing.assert_allclose(now.velocity_odom_mps, slope, atol=1e-3)
+        assert 3.0 <= now.heading_odom_rad <= math.tau - 3.1 + 1e-9
+    # Without headings the body faces along its path; before and after the rows it stands.
+    assert seven.motion(0.5, ALONE).heading_odom_rad == pytest.approx(math.pi / 2)
+    for t, y in ((-1.0, 5.0), (4.0, 6.0)):
+        motion = seven.motion(t, ALONE)
+        np.testing.assert_allclose(motion.position_odom_m, [5.0, y])
+        np.testing.assert_allclose(motion.velocity_odom_mps, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "misses t_s, id, x_m, y_m"),
+        ("t_s,id,x_m\n", "misses y_m"),
+        ("t_s,id,x_m,y_m,speed\n", "unknown columns 'speed'"),
+        ("t_s,id,x_m,y_m,x_m\n", "names x_m twice"),
+        ("t_s,id,x_m,y_m\n", "holds no rows"),
+        ("t_s,id,x_m,y_m\n0,a,1,north\n", "line 2: y_m must be a finite number, got 'north'"),
+        ("t_s,id,x_m,y_m\n0,a,1\n", "line 2: y_m must be a finite number"),
+        ("t_s,id,x_m,y_m\n0,a,nan,1\n", "line 2: x_m must be a finite number"),
+        ("t_s,id,x_m,y_m\n0,,1,1\n", "line 2: id is empty"),
+        ("t_s,id,x_m,y_m\n0,a,1,1\n0,a,2,1\n", "two rows for t_s = 0 s"),
+        ("t_s,id,x_m,y_m\n0,a,1,1\n0.1,a,9,1\n", "line 3: 'a' moves 8 m in 0.1 s"),
+        (
+            "t_s,id,x_m,y_m,heading_rad\n0,a,1,1,0\n1,a,2,1,\n",
+            "line 3: heading_rad of 'a' is empty here",
+        ),
+    ],
+)
+def test_invalid_tables_are_refused(tmp_path, text, message):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(SimError, match=message):
+        read_recordings(path)
+
+
 NO_BOXES = np.empty((0, 4))
 STEP_S = 1.0 / 60.0
 SPEED_MPS = 1.2
 
 
 @pytest.fixture
-def table(tmp_path: Path) -> Path:
+def bend(tmp_path: Path) -> Path:
     """Somebody who walks 12 m along x from 1 s on, with a bend."""
     rows = ["t_s,id,x_m,y_m"]
     for tick in range(101):
@@ -57,9 +131,9 @@ def gap_m(motion: PersonMotion, robot: RobotBody) -> float:
     return math.dist(robot.nearest_point_m(x, y), (x, y))
 
 
-def test_a_far_robot_changes_nothing(table: Path) -> None:
-    (person,) = displaced_people(table, NO_BOXES)
-    (recorded,) = replayed_people(table)
+def test_a_far_robot_changes_nothing(bend: Path) -> None:
+    (person,) = displaced_people(bend, NO_BOXES)
+    (recorded,) = replayed_people(bend)
     for tick, motion in enumerate(walk(person, 1.0, 20.0, 9.0)):
         exact = recorded.motion(tick * STEP_S, ALONE)
         np.testing.assert_array_equal(motion.position_odom_m, exact.position_odom_m)
@@ -70,10 +144,10 @@ def test_a_far_robot_changes_nothing(table: Path) -> None:
 
 @pytest.mark.parametrize("robot_mps", [0.0, 1.2])
 def test_a_person_in_the_way_goes_round_the_robot_and_comes_back_in_time(
-    table: Path, robot_mps: float
+    bend: Path, robot_mps: float
 ) -> None:
-    (person,) = displaced_people(table, NO_BOXES)
-    (recorded,) = replayed_people(table)
+    (person,) = displaced_people(bend, NO_BOXES)
+    (recorded,) = replayed_people(bend)
     start_x_m = 6.0 + robot_mps * 6.0
     motions = walk(person, robot_mps, start_x_m, 0.05)
     off_m = []
@@ -96,16 +170,16 @@ def test_a_person_in_the_way_goes_round_the_robot_and_comes_back_in_time(
     assert np.abs(turns).max() < 0.2
 
 
-def test_a_displaced_person_does_not_walk_through_a_wall(table: Path) -> None:
+def test_a_displaced_person_does_not_walk_through_a_wall(bend: Path) -> None:
     walls = np.array([[-1.0, 0.7, 14.0, 0.9], [-1.0, -0.9, 14.0, -0.7]])
-    (person,) = displaced_people(table, walls)
+    (person,) = displaced_people(bend, walls)
     motions = walk(person, 1.0, 12.0, 0.0)
     assert person.farthest_m > 0.1
     assert max(abs(each.position_odom_m[1]) for each in motions) < 0.46
 
 
-def test_a_touched_person_steps_back_and_a_held_one_stays(table: Path) -> None:
-    (person,) = displaced_people(table, NO_BOXES)
+def test_a_touched_person_steps_back_and_a_held_one_stays(bend: Path) -> None:
+    (person,) = displaced_people(bend, NO_BOXES)
     robot = robot_at(50.0, 0.0)
     around = Surroundings(robot, (), lambda: True)
     before = [person.motion(tick * STEP_S, around) for tick in range(240)][-1]
@@ -118,8 +192,8 @@ def test_a_touched_person_steps_back_and_a_held_one_stays(table: Path) -> None:
     np.testing.assert_allclose(held.position_odom_m, before.position_odom_m, atol=1e-9)
 
 
-def test_people_who_leave_are_away_before_and_after_their_rows(table: Path) -> None:
-    (recording,) = read_recordings(table)
+def test_people_who_leave_are_away_before_and_after_their_rows(bend: Path) -> None:
+    (recording,) = read_recordings(bend)
     person, stays = Replayed(recording, leaves=True), Replayed(recording)
     for t_s, away in ((0.9, True), (1.0, False), (7.3, False), (11.0, False), (11.1, True)):
         assert person.is_away(t_s) == away
@@ -130,7 +204,7 @@ def test_people_who_leave_are_away_before_and_after_their_rows(table: Path) -> N
         np.testing.assert_allclose(moved, [1000.0 if away else 0.0, 0.0])
         feet = np.array(motion.feet.feet)[:, :2] - np.array(here.feet.feet)[:, :2]
         np.testing.assert_allclose(feet, np.repeat([moved], 2, axis=0), atol=1e-9)
-    (reacting,) = displaced_people(table, NO_BOXES, leaves=True)
+    (reacting,) = displaced_people(bend, NO_BOXES, leaves=True)
     motions = walk(reacting, 0.0, 6.0, 0.0)
     assert motions[0].position_odom_m[0] > 900.0
     assert motions[120].position_odom_m[0] < 5.0
