@@ -21,7 +21,6 @@ def run(tmp_path_factory):
     ("words", "message"),
     [
         ("crossings --robot tank", "'delivery', 'forklift', 'nova_carter', 'omni', got 'tank'"),
-        ("crossings --sample 37", "sample must lie in"),
         ("report EMPTY", "holds no episodes.csv"),
         ("replay RUN 4", "the run has 4 episodes, numbered 0 to 3, got 4"),
         ("replay RUN short", "SCENARIO:SEED:POLICY"),
