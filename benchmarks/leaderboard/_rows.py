@@ -22,7 +22,7 @@ _ROOT: Final = Path(__file__).resolve().parents[2]
 #: Folder of the rows and of their results.
 RESULTS: Final = _ROOT / "docs" / "leaderboard"
 #: The page.
-PAGE: Final = _ROOT / "docs" / "leaderboard.md"
+PAGE: Final = _ROOT / "docs" / "what_it_wins.md"
 _ROWS_FILE: Final = "rows.yaml"
 _TRUTH: Final = "truth"
 _REFERENCE: Final = "reference"
