@@ -37,7 +37,7 @@ from sim_tests.search.falsify._falsify import FalsifySettings
 from sim_tests.search.tune._policy_space import read_ranges
 from sim_tests.study.runs import fault_of, policy_of, read_jobs, read_run, template_of
 from sim_tests.study.suite._thresholds import Thresholds
-from tracking import PersonTracker, TrackerConfig, TrackingError
+from tracking import TrackerConfig, TrackingError
 
 BRACKETS = "[" * 100_000
 ALIASES = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
@@ -89,7 +89,6 @@ YAML_READERS = {
     "a recording": (lambda path: open_source(str(path.parent)), AwarenavError),
 }
 JSON_READERS = {
-    "PersonTracker": ("state.json", PersonTracker.load, TrackingError),
     "shipped_models": ("manifest.json", lambda path: shipped_models(path.parent), PerceptionError),
     "ModelStore": (
         "models.lock.json",

@@ -32,8 +32,8 @@ class SensorConfig(TrackingConfig):
     """
 
     view: Any = Field(default=None, exclude=True)
-    """A :class:`~tracking.View` that tells where the sensor can see people; None if unknown. Not
-    part of a saved state, nor of a YAML file."""
+    """A :class:`~tracking.View` that tells where the sensor can see people; None if unknown.
+    It is not part of a YAML file."""
 
     sees_faces: bool = False
     """True if an observation says something about awareness. If not, the frames of this sensor
