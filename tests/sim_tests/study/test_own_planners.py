@@ -18,19 +18,19 @@ from sim_tests.study.runs import make_planner, plan_jobs
 HERE = str(Path(__file__).parent)
 
 
-TUTORIAL = ROOT / "docs" / "tutorials" / "plug-it-into-your-planner.md"
+PAGE = ROOT / "docs" / "planners.md"
 
 
-def tutorial_planner():
-    """Return the Python block of the tutorial that defines a planner."""
-    blocks = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text("utf-8"), re.DOTALL)
+def page_planner():
+    """Return the Python block of the page that defines a planner."""
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
     (block,) = (block for block in blocks if "def plan(" in block)
     return block
 
 
 def run_python(folder, *arguments):
-    """Run a module of Python in a folder that holds the tutorial's planner, warnings as errors."""
-    (folder / "my_robot.py").write_text(tutorial_planner(), encoding="utf-8")
+    """Run a module of Python in a folder that holds the page's planner, warnings as errors."""
+    (folder / "my_robot.py").write_text(page_planner(), encoding="utf-8")
     return subprocess.run(
         [sys.executable, "-W", "error", "-m", *arguments],
         cwd=folder,
@@ -42,7 +42,7 @@ def run_python(folder, *arguments):
     )
 
 
-# The test of the tutorial's page runs the command with another scenario.
+# The test of the page runs the command with another scenario.
 @pytest.mark.full
 def test_the_planner_of_the_tutorial_passes_crossings(tmp_path):
     done = run_python(
