@@ -36,7 +36,6 @@ from sim_tests.search import write_or_check_settings
 from sim_tests.search.falsify._falsify import FalsifySettings
 from sim_tests.search.tune._policy_space import read_ranges
 from sim_tests.study.runs import fault_of, policy_of, read_jobs, read_run, template_of
-from sim_tests.study.suite._thresholds import Thresholds
 from tracking import TrackerConfig, TrackingError
 
 BRACKETS = "[" * 100_000
@@ -84,7 +83,6 @@ YAML_READERS = {
     "camera of a scenario": (lambda path: camera_data(str(path)), SimError),
     "Fault": (lambda path: Fault.of(str(path)), SimError),
     "ranges of a tuning": (read_ranges, SimError),
-    "Thresholds": (Thresholds.from_yaml, SimError),
     "RenderConfig": (RenderConfig.from_yaml, SimError),
     "a recording": (lambda path: open_source(str(path.parent)), AwarenavError),
 }

@@ -10,7 +10,6 @@ from nav_adapter.ros2 import RobotFile
 from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
 from sim_tests.scenario import Scenario
-from sim_tests.study.suite import Thresholds
 from tracking import TrackerConfig
 
 from .api_pages import PACKAGES, front_door_page, package_page
@@ -30,8 +29,8 @@ Everything here is made from the code of this version.
   [sim_tests](sim_tests.md)
 - **[Commands](commands.md)** of `awarenav`, with every option
 - **Files**: keys of a [policy](policy-keys.md), a [scenario](scenario-keys.md), a
-  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md),
-  [thresholds](threshold-keys.md) and [rendered sets](render-keys.md)
+  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md)
+  and [rendered sets](render-keys.md)
 - **[Metrics](metrics.md)** and columns of `episodes.csv`, and their
   [definitions](../metrics.md)
 - **[ROS 2 topics](topics.md)** of the bridge
@@ -66,11 +65,6 @@ CONFIG_PAGES: Final = {
         "Robot file of the bridge",
         f"The file that `awarenav bridge --robot` reads, for [Nav2](../nav2.md). {_KEYS}",
         RobotFile,
-    ),
-    "threshold-keys": ConfigPage(
-        "Thresholds of the test suite",
-        f"The thresholds of [the crossings as a test suite](../test-suite.md). {_KEYS}",
-        Thresholds,
     ),
     "render-keys": ConfigPage(
         "Settings of rendered sets",

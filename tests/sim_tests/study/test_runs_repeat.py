@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 from paths import ROOT
 from run_scenes import SHORT, short, short_jobs
-from test_suite_plugin import SUITE, run_pytest
 
 from awarenav.cli import main
 from sim_tests.search import EpisodeRunner
@@ -205,15 +204,3 @@ def test_a_search_says_once_that_a_planner_is_not_deterministic(drawing, capfd):
         for _ in range(2):
             runner.run(short_jobs(1, planners=[f"{drawing}:Unseeded"])[:1])
     assert capfd.readouterr().err.count("Unseeded: the planner is not deterministic") == 1
-
-
-def test_the_suite_says_that_a_planner_is_not_deterministic_and_fails_nothing(tmp_path):
-    (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
-    (tmp_path / "drawing.py").write_text(PLANNERS.format(torch_at_the_top=""), "utf-8")
-    (tmp_path / "thresholds.yaml").write_text("min_success_rate: 0.0")
-    done = run_pytest(
-        tmp_path, *SUITE, "-W", "error", "--awarenav-planner", "drawing:Unseeded",
-        "--awarenav-thresholds", "thresholds.yaml",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "awarenav: Unseeded: the planner is not deterministic. In 2 of 2" in done.stdout

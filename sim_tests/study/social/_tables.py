@@ -1,4 +1,4 @@
-"""The commands ``awarenav measures`` and ``awarenav export``."""
+"""Runs and files measured, and episodes of runs exported, for the command line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from awarenav.files import csv_number, json_text, write_text
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, Variant, labels, table_text
 from ..runs import Job, RunFiles, attempt, find_episode, one_thread_each, read_jobs
-from ._files import FORMATS, check_episode, format_of, read_episode, write_episode
+from ._files import FORMATS, format_of, read_track, write_episode
 from ._measures import SOCIAL_MEASURES, social_measures
 from ._recorder import episode_of
 
@@ -30,18 +30,8 @@ KEY_COLUMNS: Final = (
     "error",
 )
 _DECIMALS: Final = 3
-# Problems of a file that are printed.
+# Failures that are printed.
 _SHOWN: Final = 20
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MeasuresOptions:
-    """The options of ``awarenav measures``."""
-
-    sources: tuple[Path, ...]
-    workers: int | None
-    out: Path | None
-    as_json: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +49,9 @@ class MeasuredEpisode:
     values: dict[str, float | None]
 
 
-def measures_command(options: MeasuresOptions) -> int:
+def measure_sources(
+    sources: Sequence[Path], *, workers: int | None, out: Path | None, as_json: bool
+) -> int:
     """Measure runs and files, print means, and write a row for each episode.
 
     Returns:
@@ -68,20 +60,19 @@ def measures_command(options: MeasuresOptions) -> int:
     Raises:
         SimError: a source is neither the folder of a run nor a file with an episode.
     """
-    if options.out is not None and options.out.suffix != ".csv":
-        raise SimError(f"--out must be a .csv file, got {options.out}")
-    jobs = {path: read_jobs(path) for path in options.sources if path.is_dir()}
-    rows = [_measured_file(path) for path in options.sources if path not in jobs]
+    if out is not None and out.suffix != ".csv":
+        raise SimError(f"--out must be a .csv file, got {out}")
+    jobs = {path: read_jobs(path) for path in sources if path.is_dir()}
+    rows = [_measured_file(path) for path in sources if path not in jobs]
     for path, planned in jobs.items():
-        rows += _measured_run(path, planned, options.workers)
-    out = options.out
-    if out is None and len(options.sources) == 1 and jobs:
-        out = RunFiles(options.sources[0]).social
+        rows += _measured_run(path, planned, workers)
+    if out is None and len(sources) == 1 and jobs:
+        out = RunFiles(sources[0]).social
     if out is not None:
         write_text(out, social_csv(rows), SimError)
     means = _means(rows)
-    print(json_text(means).rstrip() if options.as_json else _table(means))
-    if out is not None and not options.as_json:
+    print(json_text(means).rstrip() if as_json else _table(means))
+    if out is not None and not as_json:
         print(f"\nWritten: {out} with {counted(len(rows), 'episode')}")
     failures = [row for row in rows if row.key["error"]]
     for row in failures[:_SHOWN]:
@@ -100,71 +91,30 @@ def social_csv(rows: Iterable[MeasuredEpisode]) -> str:
     return text.getvalue()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExportOptions:
-    """The options of ``awarenav export episode``."""
-
-    folder: Path
-    episode: str
-    format: str | None
-    out: Path | None
-
-
-def export_command(options: ExportOptions) -> int:
+def export_episode(folder: Path, episode: str, format: str | None, out: Path | None) -> int:
     """Run an episode of a run again and write it in a format that others read.
 
     Raises:
         SimError: the folder holds no run, the run does not have the episode, or the format is
             unknown.
     """
-    jobs = read_jobs(options.folder)
-    number = find_episode(jobs, options.episode)
-    name = options.format
-    if name is None:
-        name = "socnav3" if options.out is None else format_of(options.out)
-    out = options.out
+    jobs = read_jobs(folder)
+    number = find_episode(jobs, episode)
+    name = format or ("socnav3" if out is None else format_of(out))
     if out is None:
-        out = RunFiles(options.folder).exports / f"episode_{number:05d}{FORMATS[name].suffix}"
-    elif out.suffix != FORMATS[name].suffix:
-        raise SimError(
-            f"--format {name} writes files that end in {FORMATS[name].suffix}, got {out}"
-        )
-    episode, _ = episode_of(jobs[number])
-    write_episode(out, episode, name)
-    people = counted(episode.people, "person", "people")
-    print(f"Episode {number}: {episode.name}")
-    print(f"Written: {out} ({name}, {counted(len(episode.t_s), 'instant')}, {people})")
+        out = RunFiles(folder).exports / f"episode_{number:05d}{FORMATS[name]}"
+    elif out.suffix != FORMATS[name]:
+        raise SimError(f"--format {name} writes files that end in {FORMATS[name]}, got {out}")
+    found, _ = episode_of(jobs[number])
+    write_episode(out, found, name)
+    people = counted(found.people, "person", "people")
+    print(f"Episode {number}: {found.name}")
+    print(f"Written: {out} ({name}, {counted(len(found.t_s), 'instant')}, {people})")
     return 0
 
 
-def check_command(files: Sequence[Path]) -> int:
-    """Check files against the layouts of their formats, and print what is wrong.
-
-    Returns:
-        1 if a file does not follow its layout, else 0.
-
-    Raises:
-        SimError: a file cannot be read, or no format has its end.
-    """
-    status = 0
-    for path in files:
-        name, found = format_of(path), check_episode(path)
-        if not found:
-            episode = read_episode(path)
-            people = counted(episode.people, "person", "people")
-            print(f"{path}: {name}, {counted(len(episode.t_s), 'instant')}, {people}. Correct.")
-            continue
-        status = 1
-        print(f"{path}: {name}, {counted(len(found), 'problem')}")
-        for line in found[:_SHOWN]:
-            print(f"  {line}")
-        if len(found) > _SHOWN:
-            print(f"  and {len(found) - _SHOWN} more")
-    return status
-
-
 def _measured_file(path: Path) -> MeasuredEpisode:
-    episode = read_episode(path)
+    episode = read_track(path)
     key = {**dict.fromkeys(KEY_COLUMNS, ""), "source": str(path), "episode": episode.name}
     return MeasuredEpisode(key, path.name, social_measures(episode))
 
