@@ -17,7 +17,7 @@ def main() -> int:
     """Run the command; return 1 if an episode is another one now, 2 for bad input."""
     parser = make_parser(
         "benchmarks.leaderboard",
-        "Measure the episodes that docs/leaderboard lacks, and write docs/what_it_wins.md. An "
+        "Measure the episodes that docs/leaderboard lacks, and write docs/leaderboard.md. An "
         "interrupted run continues with the same command.",
     )
     parser.add_argument(

@@ -21,6 +21,7 @@ from sim_tests.study.measures import (
 from ._measure import read_about, read_results
 from ._rows import RESULTS, Board, Row
 
+_ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
 _RANKED_DECIMALS: Final = 2
 
@@ -35,6 +36,7 @@ _STEP_OUT_COLUMNS: Final = (
     "faster starts: unaware",
     "worst (m/s)",
 )
+_PARTS_COLUMNS: Final = ("row", *_ATTENTIONS)
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 
 
@@ -67,9 +69,13 @@ class Standing:
         """Share of episodes in which a person and the moving robot touched."""
         return proportion_interval(sum(each.moving_touched for each in self.ran), len(self.ran))
 
-    def mean(self, field: str) -> Interval:
+    def mean(self, field: str, attention: str = "") -> Interval:
         """Return the mean of a field with its interval, resampled within scenarios."""
-        kept = [each for each in self.ran if getattr(each, field) is not None]
+        kept = [
+            each
+            for each in self.ran
+            if getattr(each, field) is not None and attention in ("", each.attention)
+        ]
         return bootstrap_interval(
             [getattr(each, field) for each in kept],
             np.random.default_rng(0),
@@ -124,6 +130,7 @@ def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
         more=_table(_MORE_COLUMNS, [_more_cells(each, baseline, about) for each in shown]),
         step_out=_table(_STEP_OUT_COLUMNS, [_step_out_cells(each) for each in shown]),
         note=textwrap.fill(note, 100, break_long_words=False, break_on_hyphens=False),
+        parts=_table(_PARTS_COLUMNS, [_parts_cells(each) for each in shown]),
         minutes=minutes,
     )
 
@@ -177,6 +184,16 @@ def _step_out_cells(standing: Standing) -> list[str]:
         standing.mean("step_out_stress_unaware").text(1),
         worst("step_out_stress_worst_mps"),
     ]
+
+
+def _parts_cells(standing: Standing) -> list[str]:
+    cells = [_label(standing.row)]
+    for attention in _ATTENTIONS:
+        time_s, violation_s = (
+            standing.mean(field, attention) for field in ("time_lost_s", "violation_time_s")
+        )
+        cells.append(f"{time_s.text(1)} s, {violation_s.text(2)} s" if time_s.known else "–")
+    return cells
 
 
 def _label(row: Row) -> str:

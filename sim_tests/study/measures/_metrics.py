@@ -1,6 +1,6 @@
 """The metrics of an episode in one table, which the terminal tables and the HTML report read.
 
-:class:`EpisodeRecord` has the full definitions.
+docs/metrics.md has the full definitions.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ SHARES: Final = _by_name(
     ),
 )
 
-#: Numbers that are averaged over episodes, in the order of the tables.
+#: Numbers that are averaged over episodes, in the order of docs/metrics.md.
 METRICS: Final = _by_name(
     Metric(
         "time_to_goal_s",

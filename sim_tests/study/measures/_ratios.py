@@ -27,7 +27,7 @@ class Ratio:
     factor: float = 1.0
 
 
-#: Ratios of sums by the name of their figure.
+#: Ratios of sums by the name of their figure, as docs/metrics.md defines them.
 RATIOS: Final = {
     each.metric.name: each
     for each in (

@@ -20,11 +20,9 @@ _STANDING_SPEED_MPS: Final = 0.03
 
 @dataclass(frozen=True, slots=True, repr=False)
 class EpisodeRecord:
-    """The metrics of one episode; the attributes are their definitions.
+    """The metrics of one episode, as docs/metrics.md defines them.
 
-    None means that a metric does not apply to the episode. Figures are measured on the truth of
-    the simulation, once per control cycle, contacts in every step of the physics. The robot's
-    speed is that in its direction of travel; it moves above 0.03 m/s.
+    None means that a metric does not apply to the episode.
 
     Attributes:
         scenario: name of the scenario.
@@ -33,71 +31,54 @@ class EpisodeRecord:
         planner: name of the planner.
         perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are
             scanners too, or ``"scanner"``.
-        success: the robot stands at the goal in time and has moved into no person.
+        success: the goal was reached and the robot touched nobody by its own motion.
         contact: the robot, moving or not, and a person touched.
         contact_by: ``"robot"`` if the robot moved into a person, else ``"person"``, or empty.
-        min_separation_m: smallest distance between the surfaces of robot and person, limbs and
-            carried things included; 0 after a contact.
+        min_separation_m: smallest distance between the surfaces of robot and person.
         time_to_goal_s: None when the goal was not reached.
         max_speed_within_2m_mps: the robot's highest speed with a person's surface within 2 m.
-        min_margin_m: smallest separation margin S − S_p at a moving robot, with S_p = v_h (T + v/a)
-            + v T + v²/2a + 0.10 m (ISO 13855, ISO/TS 15066) and the true speeds towards each other.
+        min_margin_m: smallest separation margin S − S_p at a moving robot.
         violation_time_s: how long the margin was negative at a moving robot.
-        contacts: touches that begin; one that continues is one contact.
+        contacts: number of contacts.
         duration_s: simulated time.
         scenario_version: version of the scenario.
         attention: the scenario's ``attention``: ``"attentive"``, ``"unaware"`` or ``"mixed"``.
         fault: name of the fault, empty for none.
-        time_without_people_s: time to goal of the same task and planner in the empty hall, with
-            true perception, no fault and the policy ``balanced``.
+        time_without_people_s: time to goal of the same task in the empty hall.
         time_lost_s: time over ``time_without_people_s``; an episode that does not reach the goal
-            loses all of its time, since leaving it out would reward a robot that gives up.
+            loses all of its time.
         path_length_m: length of the path that the robot drove.
-        spl: success weighted by path length, S · l / max(p, l) with l of the same planner without
-            people (Anderson et al. 2018); it says nothing about time.
-        speed_at_min_separation_mps: the robot's speed at the smallest separation; after a contact
-            its highest speed at any contact.
-        min_time_to_collision_s: smallest time after which the robot's convex outline and a body
-            disc of 0.30 m would touch if both kept their velocities (Hayward 1972). 0 means that
-            they overlap while they come nearer, which is not yet a contact.
-        post_encroachment_s: smallest time between one leaving a place and the other entering it
-            (Allen, Shin and Cooper 1978); None when no place was used by both.
-        intimate_s: time with a person's surface within 0.45 m (Hall 1966, of people among people).
-        personal_s: time with a person's surface within 1.2 m, the former included.
-        robot_contacts: contacts of a robot that moved towards the person faster than 0.03 m/s.
-        person_contacts: the others: the robot stood, or moved past or away from them.
+        spl: success weighted by path length (Anderson et al. 2018).
+        speed_at_min_separation_mps: the robot's speed at the smallest separation.
+        min_time_to_collision_s: smallest time to collision.
+        post_encroachment_s: smallest time between one leaving a place and the other entering it.
+        intimate_s: time with a person's surface within 0.45 m.
+        personal_s: time with a person's surface within 1.2 m.
+        robot_contacts: contacts of a robot that moved into a person.
+        person_contacts: contacts of people who walked into the robot.
         contact_speed_mps: the robot's highest speed at a contact that it caused.
-        peak_deceleration_mps2: highest deceleration along the motion, of a parabola fitted to the
-            velocity within ±0.25 s (Savitzky and Golay 1964). Of a sine of 0.5, 1 or 2 Hz it keeps
-            93, 74 or 22 %. Turning does not count.
-        peak_jerk_mps3: largest jerk of the same parabola.
-        stops: how often the robot, after more than 0.10 m/s, fell below 0.03 m/s before the goal.
-        human_delay_s: time of all people who react over that of the same walk without robot and
-            other people; of those still on the way the delay so far, at least 0.
-        human_detour_m: path length of people who arrived, over that of their free walks.
+        peak_deceleration_mps2: highest deceleration of the robot.
+        peak_jerk_mps3: largest jerk of the robot.
+        stops: how often the robot came to a stand before the goal.
+        human_delay_s: delay of all people over their free walks, of those on the way so far.
+        human_detour_m: detour of all people, over their free walks.
         warnings: number of warnings of a collision that the robot asked for.
-        awareness_error: mean |α of the track − true α| over the tracked people; the filter's
-            caution counts as error.
-        awareness: whether the person who came nearest (within 3.6 m) was aware of the robot in the
-            last 3 s before the closest approach (true α ≥ 0.5 for at least half of it), and whether
-            the lower bound of the track's α said so: ``aware``, ``missed_aware``,
-            ``falsely_aware`` (the dangerous one) or ``unaware``.
+        awareness_error: mean |α of the track − true α| over the tracked people.
+        awareness: awareness of the person who came nearest, and the robot's judgement of it.
         reaction: reaction of that person, see :class:`PersonOutcome`.
         error: the error that ended the episode, empty for none; with an error, every metric keeps
             its default.
         nondeterministic: the user's planner gave other commands when it drove the task without
             people a second time, with the same seed; the row may differ in another run.
         attentive_share: smallest share of the time for which one of the people had a true α ≥ 0.5,
-            while they had the robot in front of them and in sight within 5 m. An episode counts as
-            attentive from 0.8 on, if its scenario says so.
+            while they could look at the robot within 5 m.
         moving_contacts: contacts with a moving robot, by any cause.
         moving_contact_mps: the robot's highest speed at one of them.
         moving_contacts_unaware: those of them with people who have not looked at the robot for 1 s,
             or never.
         moving_contact_unaware_mps: the robot's highest speed at one of these.
         min_margin_unaware_m: smallest separation margin at a moving robot to such people.
-        step_out_unaware: expected impacts with unaware people who set off, per 1 000 crossings
-            (:class:`StepOut`); an index, not a rate of accidents.
+        step_out_unaware: expected impacts with unaware people who set off, per 1 000 crossings.
         step_out_unaware_fast: those of them at more than 0.25 m/s.
         step_out_aware: the same with aware people who ignore the robot.
         step_out_aware_fast: those of them at more than 0.25 m/s.
@@ -105,9 +86,8 @@ class EpisodeRecord:
         step_out_stress_unaware: ``step_out_unaware`` with faster starts than recorded.
         step_out_stress_worst_mps: ``step_out_worst_mps`` with faster starts than recorded.
         requests: number of requests for attention.
-        requests_answered: those whose person truly looked within 2.5 s, and had not in the 0.5 s
-            before.
-        requests_needless: those to somebody who set no limit a second later and had not looked.
+        requests_answered: those whose person then looked at the robot.
+        requests_needless: those to somebody who was no obstacle a second later and had not looked.
         asked_twice: people who were asked more than once.
         requests_after_answer: requests to a track that had answered before; there should be none.
     """
@@ -271,7 +251,7 @@ def check_columns(columns: Sequence[str], source: str) -> None:
             hint = f"; did you mean {near[0]!r}?" if near else ""
             raise SimError(
                 f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
-                "(sim_tests.study.measures.RECORD_COLUMNS lists all)"
+                "(docs/metrics.md lists all)"
             )
         if list(columns).count(name) > 1:
             raise SimError(f"{source} has the column {name!r} {list(columns).count(name)} times")
