@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._episode_runner import EpisodeRunner
@@ -23,20 +23,4 @@ __all__ = [
     "write_or_check_settings",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._episode_runner": ("EpisodeRunner",),
-        "._files": ("write_or_check_settings",),
-        "._optimizer": (
-            "Optimizer",
-            "Outcome",
-            "ParameterValues",
-            "Range",
-        ),
-        "._shared_study": (
-            "Claim",
-            "SharedStudy",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from head_shape_people import BOUND_95, CAMERA, Sample, calibrate, draw_people
 
-from benchmarks.perception_calibration import BOUND_95, CAMERA, Sample, calibrate, draw_people
 from perception import PerceptionError, PersonKeypoints, PnpHeadPoseEstimator
 from perception.anthropometry import HEAD_SHAPE_FACTOR_M, HEAD_TEMPLATE_M
 

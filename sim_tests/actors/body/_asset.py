@@ -1,7 +1,7 @@
 """The shipped workers: skinned meshes, joints and keypoints of a parametric body model.
 
-``training/workers`` makes the files and this module reads them. At rest a body stands upright with
-hanging arms, straight knees and a level head. Its frame has x forward, y left, z up and its origin
+The NOTICE beside the files says what made them. At rest a body stands upright with hanging arms,
+straight knees and a level head. Its frame has x forward, y left, z up and its origin
 on the floor below the midpoint of the hips. Joint rotations are written in axes parallel to it.
 """
 
@@ -137,7 +137,7 @@ def worker_names() -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def load_worker(name: str) -> WorkerAsset:
-    """Read a shipped worker by name, or one from an ``.npz`` file of ``training/workers``.
+    """Read a shipped worker by name, or one from an ``.npz`` file of the same format.
 
     Raises:
         SimError: for a name that is not shipped or a file that does not exist.

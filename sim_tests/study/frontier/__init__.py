@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._family import SPEEDS_MPS, TODAY, Member, family, sensors_of_today
@@ -27,12 +27,4 @@ __all__ = [
     "sentences",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._family": ("SPEEDS_MPS", "TODAY", "Member", "family", "sensors_of_today"),
-        "._frontier": ("Frontier", "Point", "Worth", "frontier_of"),
-        "._plot": ("draw_frontier",),
-        "._text": ("frontier_text", "sentences"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

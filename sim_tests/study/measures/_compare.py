@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
+from awarenav.errors import not_one_of
 from awarenav.files import json_text
 from perception.documents import read_json
 
@@ -102,9 +102,4 @@ def _check_baseline(baseline: str, policies: Sequence[str]) -> None:
     """Refuse a baseline that is not among the policies, except the default."""
     if baseline in policies or (baseline == BASELINE and len(policies) >= 1):
         return  # without the default baseline, nothing is compared
-    near = difflib.get_close_matches(baseline, policies, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise SimError(
-        f"--baseline must be one of the policies {', '.join(map(repr, policies))}, "
-        f"got {baseline!r}{hint}"
-    )
+    raise SimError(not_one_of("--baseline", baseline, policies))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, Final, Literal, get_args
+
+from awarenav.errors import did_you_mean
 
 from ...world.errors import SimError
 
@@ -247,8 +248,7 @@ def check_columns(columns: Sequence[str], source: str) -> None:
     """
     for name in columns:
         if name not in COLUMN_KINDS:
-            near = difflib.get_close_matches(name, RECORD_COLUMNS, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(name, RECORD_COLUMNS)
             raise SimError(
                 f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
                 "(docs/metrics.md lists all)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._episode import Attempt, attempt, free_run_of, observed_episode, run_episode
@@ -72,51 +72,4 @@ __all__ = [
     "tidy",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._episode": (
-            "Attempt",
-            "attempt",
-            "free_run_of",
-            "observed_episode",
-            "run_episode",
-        ),
-        "._job": ("Job",),
-        "._plan": (
-            "JobKey",
-            "describe",
-            "fault_of",
-            "job_key",
-            "named_templates",
-            "plan_jobs",
-            "policy_of",
-            "policy_text",
-            "template_of",
-        ),
-        "._planner_choice": (
-            "KNOWN_PLANNERS",
-            "make_planner",
-            "planner_label",
-            "planner_parameters",
-            "refuse_unusable_planner",
-        ),
-        "._pool": (
-            "WorkerPool",
-            "one_thread_each",
-            "run_here",
-            "tidy",
-        ),
-        "._process_lock": ("ProcessLock",),
-        "._recording": ("recorder_of",),
-        "._replay": ("find_episode",),
-        "._run": ("run_jobs",),
-        "._run_files": (
-            "RunFiles",
-            "read_jobs",
-            "read_run",
-        ),
-        "._sample": ("sample_jobs",),
-        "._seeded_crossing": ("seeded_crossing",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)
