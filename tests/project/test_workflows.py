@@ -28,8 +28,8 @@ def commands(workflow: str) -> str:
     return "\n".join(step["run"] for step in steps(workflow) if "run" in step)
 
 
-def test_both_workflows_are_there() -> None:
-    assert set(WORKFLOWS) == {"ci.yml", "release.yml"}
+def test_the_workflows_are_there() -> None:
+    assert set(WORKFLOWS) == {"ci.yml", "nightly.yml", "release.yml"}
 
 
 @pytest.mark.parametrize("name", TEXTS)
@@ -41,7 +41,7 @@ def test_actions_are_pinned_to_a_version(name: str) -> None:
         if action.startswith("./"):
             assert (ROOT / action).is_file()
         else:
-            assert re.fullmatch(r"[\w-]+/[\w-]+@v\d+\.\d+\.\d+", action), action
+            assert re.fullmatch(r"[\w-]+(/[\w-]+)+@v\d+\.\d+\.\d+", action), action
 
 
 @pytest.mark.parametrize("name", TEXTS)

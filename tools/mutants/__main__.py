@@ -5,12 +5,14 @@
     python -m tools.mutants --safety              safety code only
     python -m tools.mutants --tree ../other       the code and tests of another checkout
     python -m tools.mutants --list                only print what would be changed
+    python -m tools.mutants --old-map --count 20  a sample that takes a minute or two
 
 A copy of the checkout is changed, never the checkout. One run of the tests with coverage, in that
-copy, says which tests run which lines; its result serves until the code or the tests change. Each
-change then meets the tests that run its line, those that run little else first, up to 40 s of CPU
-time as that run measured them. A change dies if a test fails, if nothing can be imported any more,
-or if the tests take far longer than before. A line that no test runs survives.
+copy, says which tests run which lines; its result serves until the code or the tests change, and
+longer with ``--old-map``. Each change then meets the tests that run its line, those that run little
+else first, up to 40 s of CPU time as that run measured them. A change dies if a test fails, if
+nothing can be imported any more, or if the tests take far longer than before. A line that no test
+runs survives.
 
 Exit status: 0 all of safety code died, 1 a change of safety code survived, 2 tests fail without
 any change.
@@ -69,7 +71,7 @@ def failing(made: Copy, tests: list[str], *, stop: bool = True) -> list[str]:
         return int(status)
 
     planned_s = sum(made.tests[test] for test in tests)
-    status = forked(made.folder, made.store, run, 30.0 + 3.0 * planned_s)
+    status = forked(made, run, 30.0 + 3.0 * planned_s)
     if failures.exists() and (failed := json.loads(failures.read_text())):
         return list(failed)
     if status is None:
@@ -112,13 +114,18 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--tree", type=Path, default=ROOT, help="the checkout (this one)")
     parser.add_argument("--safety", action="store_true", help="only change safety code")
     parser.add_argument("--list", action="store_true", help="print the changes, run nothing")
+    parser.add_argument(
+        "--old-map",
+        action="store_true",
+        help="keep what a run with coverage said about an older state, if there was one",
+    )
     asked = parser.parse_args(arguments)
     tree = asked.tree.resolve()
     drawn = draw(tree, asked.count, asked.seed, only_safety=asked.safety)
     if asked.list:
         print("\n".join(_line("", each) for each in drawn))
         return 0
-    made = Copy(tree)
+    made = Copy(tree, may_be_old=asked.old_map)
     if made.failed:
         print("fail without any change:", *made.failed, sep="\n  ", file=sys.stderr)
         return 2
@@ -128,10 +135,13 @@ def main(arguments: Sequence[str]) -> int:
     noticed: set[str] = set()
     for number, mutant in enumerate(drawn):
         failed, run = killed_by(made, mutant, 1_000_000_000 + number)
+        if made.old and not run:
+            continue  # a new file
         died[mutant] = bool(failed)
         noticed.update(failed[:1])
         by = failed[0].rpartition("/")[2] if failed else f"{run} tests passed"
         print(f"{_line('died' if failed else 'SURVIVED', mutant)}   [{by}]", flush=True)
+    made.keep()
     # What failed must pass in the same way without a change.
     if again := failing(made, [test for test in noticed if test in made.tests], stop=False):
         print("fail without any change:", *again, sep="\n  ", file=sys.stderr)

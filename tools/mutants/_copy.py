@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import difflib
 import functools
 import hashlib
 import importlib
@@ -99,36 +100,51 @@ class Copy:
     """A copy of a checkout, and which tests run which of its lines.
 
     Attributes:
+        store: the folder beside the copy.
         folder: the copy.
-        tests: time in seconds of each test.
+        tests: CPU time in seconds of each test.
         failed: tests that fail without any change.
+        covered: of each file, the number of lines that run, and of all.
+        old: True if the tests ran on an older state of the checkout.
     """
 
-    def __init__(self, tree: Path) -> None:
-        """Read the map that was made before, or run the tests to make one."""
+    def __init__(self, tree: Path, *, may_be_old: bool = False) -> None:
+        """Copy a checkout, and run its tests unless that was done before.
+
+        Args:
+            tree: the checkout.
+            may_be_old: what is known of an older state of the checkout will do.
+        """
         name = hashlib.sha256(str(tree).encode()).hexdigest()[:12]
-        store = Path(tempfile.gettempdir()) / f"awarenav_mutants_{name}"
-        self.folder, self._data, notes = store / "copy", store / "lines", store / "tests.json"
-        state = _state(tree)
-        if not notes.exists() or json.loads(notes.read_text())["state"] != state:
+        self.store = store = Path(tempfile.gettempdir()) / f"awarenav_mutants_{name}"
+        self.folder, self._measured = store / "copy", store / "measured"
+        self._data, notes = store / "lines", store / "tests.json"
+        self._copied, self._state = store / "state", _state(tree)
+        copied, state = self._copied, self._state
+        known = json.loads(notes.read_text()) if notes.exists() else {}
+        if known.get("state") != state and not (known and may_be_old):
             shutil.rmtree(store, ignore_errors=True)
+        if not copied.exists() or copied.read_text() != state:
+            if self.folder.exists() and not self._measured.exists():
+                self.folder.rename(self._measured)
+            shutil.rmtree(self.folder, ignore_errors=True)
             shutil.copytree(tree, self.folder, ignore=shutil.ignore_patterns(*_NOT_COPIED))
+        # A run that is killed may leave a change behind: the next one copies again.
+        copied.unlink(missing_ok=True)
+        if not notes.exists():
             print(f"running the tests with coverage in {self.folder}", file=sys.stderr)
-            tests = [str(path) for each in TESTS for path in sorted(self.folder.glob(each))]
-            forked(self.folder, store, lambda: _record(self.folder, self._data, notes, tests))
-            if not notes.exists():
-                raise SystemExit((store / "log.txt").read_text())
-            written = json.loads(notes.read_text())
-            notes.write_text(json.dumps({"state": state, **written}))
-        noted = json.loads(notes.read_text())
-        self.tests: dict[str, float] = noted["seconds"]
-        self.failed: list[str] = noted["failed"]
-        self.covered: dict[str, list[int]] = noted["covered"]
-        self.store = store
-        for module in noted["loaded"]:
+            forked(self, lambda: _record(self, state, notes))
+        if not notes.exists():
+            raise SystemExit((store / "log.txt").read_text())
+        known = json.loads(notes.read_text())
+        self.old = known["state"] != state
+        self.tests: dict[str, float] = known["seconds"]
+        self.failed: list[str] = known["failed"]
+        self.covered: dict[str, list[int]] = known["covered"]
+        for module in known["loaded"]:
             importlib.import_module(module)
         self._users = defaultdict(list)
-        for test, fixtures in noted["fixtures"].items():
+        for test, fixtures in known["fixtures"].items():
             for fixture in fixtures:
                 self._users[fixture].append(test)
         with contextlib.closing(sqlite3.connect(self._data)) as database:
@@ -138,6 +154,10 @@ class Copy:
             self._lines: Counter[str] = Counter()
             for context, bits in rows:
                 self._lines[context] += int.from_bytes(bits, "little").bit_count()
+
+    def keep(self) -> None:
+        """Say that the copy is as it was: the next run need not copy again."""
+        self._copied.write_text(self._state)
 
     def tests_of(self, mutant: Mutant) -> list[str]:
         """Return the tests that a change has to pass, those that run little else first."""
@@ -162,11 +182,11 @@ class Copy:
         }
         return sorted(cost, key=lambda test: (cost[test], test))
 
-    @functools.cache  # noqa: B019 - one map a run
+    @functools.cache  # noqa: B019 - one copy a run
     def _by_line(self, file: str) -> dict[int, set[str]]:
         data = coverage.CoverageData(str(self._data))
         data.read()
-        return {
+        found = {
             line: {
                 test
                 for context in contexts
@@ -175,6 +195,24 @@ class Copy:
             }
             for line, contexts in data.contexts_by_lineno(str(self.folder / file)).items()
         }
+        return self._moved(file, found) if self.old else found
+
+    def _moved(self, file: str, found: dict[int, set[str]]) -> dict[int, set[str]]:
+        """Return the tests by line of today's file; a new line has those of the line before."""
+        if not (self._measured / file).exists():
+            return {}
+        before, now = (
+            (folder / file).read_text(encoding="utf-8").splitlines()
+            for folder in (self._measured, self.folder)
+        )
+        blocks = difflib.SequenceMatcher(None, before, now, autojunk=False).get_matching_blocks()
+        old = {b + each + 1: a + each + 1 for a, b, size in blocks for each in range(size)}
+        moved: dict[int, set[str]] = {}
+        last: set[str] = set()
+        for line in range(1, len(now) + 1):
+            moved[line] = found.get(old[line], set()) if line in old else last
+            last = moved[line] or last
+        return moved
 
     def _uses(self, name: str) -> Iterator[tuple[str, int]]:
         node: Any
@@ -204,10 +242,12 @@ def _state(tree: Path) -> str:
     return state.hexdigest()
 
 
-def _record(folder: Path, data: Path, notes: Path, tests: list[str]) -> int:
-    """Run tests with coverage, and write which test runs which line."""
+def _record(made: Copy, state: str, notes: Path) -> int:
+    """Run the tests of a copy with coverage, and write which test runs which line."""
+    folder = made.folder
+    tests = [str(path) for each in TESTS for path in sorted(folder.glob(each))]
     measured = coverage.Coverage(
-        data_file=str(data),
+        data_file=str(made.store / "lines"),
         config_file=False,
         source=[str(folder / source) for source in SOURCES],
         messages=False,
@@ -222,22 +262,23 @@ def _record(folder: Path, data: Path, notes: Path, tests: list[str]) -> int:
     for file in source_files(folder):
         _, statements, _, missing, _ = measured.analysis2(str(folder / file))
         covered[file] = [len(statements) - len(missing), len(statements)]
-    noted = {name: getattr(recorder, name) for name in ("seconds", "fixtures", "failed")}
+    known = {name: getattr(recorder, name) for name in ("seconds", "fixtures", "failed")}
     loaded = [name for name in _WARM if name in sys.modules]
-    notes.write_text(json.dumps({**noted, "covered": covered, "loaded": loaded}))
+    known.update(state=state, covered=covered, loaded=loaded)
+    notes.write_text(json.dumps(known))
     return int(status)
 
 
-def forked(folder: Path, store: Path, run: Callable[[], int], most_s: float = 1e6) -> int | None:
+def forked(made: Copy, run: Callable[[], int], most_s: float = 1e6) -> int | None:
     """Run in a process of its own that imports from a copy; None if it took too long."""
     if (child := os.fork()) == 0:
         status = 3
         try:
             os.setsid()
-            log = os.open(store / "log.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+            log = os.open(made.store / "log.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
             os.dup2(log, 1)
             os.dup2(log, 2)
-            os.chdir(folder)
+            os.chdir(folder := made.folder)
             sys.path[:] = [str(folder), *(p for p in sys.path if Path(p or ".").resolve() != ROOT)]
             os.environ.update(PYTHONPATH=str(folder), CI="1")
             resource.setrlimit(resource.RLIMIT_CPU, (int(most_s), int(most_s) + 5))
