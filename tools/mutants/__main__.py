@@ -10,7 +10,7 @@
 A copy of the checkout is changed, never the checkout. One run of the tests with coverage, in that
 copy, says which tests run which lines; its result serves until the code or the tests change, and
 longer with ``--old-map``. Each change then meets the tests that run its line, those that run little
-else first, up to 40 s of CPU time as that run measured them. A change dies if a test fails, if
+else first, up to 10 s of CPU time as that run measured them. A change dies if a test fails, if
 nothing can be imported any more, or if the tests take far longer than before. A line that no test
 runs survives.
 
@@ -34,8 +34,8 @@ import pytest
 from tools.mutants._changes import SOURCES, Mutant, changed_text, draw
 from tools.mutants._copy import ARGUMENTS, ROOT, Copy, forked
 
-_MOST_S: Final = 40.0
-_FIRST_S: Final = 5.0
+_MOST_S: Final = 10.0
+_FIRST_S: Final = 3.0
 
 
 class Chosen:

@@ -281,6 +281,9 @@ def forked(made: Copy, run: Callable[[], int], most_s: float = 1e6) -> int | Non
             os.chdir(folder := made.folder)
             sys.path[:] = [str(folder), *(p for p in sys.path if Path(p or ".").resolve() != ROOT)]
             os.environ.update(PYTHONPATH=str(folder), CI="1")
+            # Without compiled files, each process would compile all that it imports.
+            sys.dont_write_bytecode = False
+            os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
             resource.setrlimit(resource.RLIMIT_CPU, (int(most_s), int(most_s) + 5))
             status = run()
         except BaseException:
