@@ -23,7 +23,19 @@ SAFETY: Final = re.compile(
     r"|perception/\w*(attention|awareness)\w*\.py"
 )
 #: Changes that cannot be noticed: file, what the change says, and why it changes nothing.
-EQUIVALENT: Final[tuple[tuple[str, str, str], ...]] = ()
+EQUIVALENT: Final = (
+    (
+        "perception/awareness.py",
+        "self._axes[:, ::-1] * _TURNING_SIGNS → self._axes[:, ::-1] / _TURNING_SIGNS",
+        "the signs are ±1",
+    ),
+    (
+        "perception/awareness.py",
+        "self._rotation[rows][:, :, ::2] * [-1.0, 1.0] → "
+        "self._rotation[rows][:, :, ::2] / [-1.0, 1.0]",
+        "the signs are ±1",
+    ),
+)
 _BOUNDARY: Final[dict[type, type]] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,
