@@ -43,7 +43,7 @@ class PersonObstacle(_WithOutline):
         awareness_lower: the lower bound of α that was used, in [0, 1]; 0 for people whose α is not
             trusted. When it falls the radius grows at once; when it rises the radius shrinks at a
             bounded rate.
-        polygon: the obstacle as a shapely polygon in odom, which contains the circle.
+        polygon: shapely, in odom: the circle as a polygon that contains it.
         covariance_odom: (4, 4) covariance of the position (m) and the velocity (m/s) of the track,
             predicted to the stamp of the constraints with constant velocity; None if it is not
             known.

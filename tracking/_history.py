@@ -25,9 +25,7 @@ class History:
     Args:
         advance: returns the state after one more frame.
         max_lag_s: ≥ 0, how far the kept frames reach back from the latest one.
-        base: the state before the first of ``frames``.
-        frames: in the order of their stamps.
-        latest: the state after the last frame, if it is known already.
+        base: the state before the first frame.
     """
 
     def __init__(
@@ -35,26 +33,12 @@ class History:
         advance: Callable[[TrackerState, Frame], TrackerState],
         max_lag_s: float,
         base: TrackerState,
-        frames: Sequence[Frame] = (),
-        latest: TrackerState | None = None,
     ) -> None:
         self._advance = advance
         self._max_lag_s = max_lag_s
         self._base = base
-        self._frames: list[Frame] = list(frames)
-        self._states = self._replay(base, frames)
-        if latest is not None and self._states:
-            self._states[-1] = latest
-
-    @property
-    def base(self) -> TrackerState:
-        """The state before the first frame that is kept."""
-        return self._base
-
-    @property
-    def frames(self) -> tuple[Frame, ...]:
-        """The frames that are kept, in the order of their stamps."""
-        return tuple(self._frames)
+        self._frames: list[Frame] = []
+        self._states: list[TrackerState] = []
 
     @property
     def latest(self) -> TrackerState:
@@ -78,7 +62,7 @@ class History:
 
     def copy(self) -> History:
         """Return a history that goes on by itself; it shares the states."""
-        copied = self.restored(self._base, (), None)
+        copied = History(self._advance, self._max_lag_s, self._base)
         copied._frames, copied._states = list(self._frames), list(self._states)
         return copied
 
@@ -91,12 +75,6 @@ class History:
         else:
             copied._base = latest
         return copied
-
-    def restored(
-        self, base: TrackerState, frames: Sequence[Frame], latest: TrackerState | None
-    ) -> History:
-        """Return another history of the same tracker."""
-        return History(self._advance, self._max_lag_s, base, frames, latest)
 
     def insert(self, frame: Frame) -> None:
         """Insert a frame in the order of stamps and compute the states from there on again.

@@ -163,6 +163,6 @@ class TrackTable:
         )
 
 
-TRACK_COLUMNS = tuple(TrackTable.__slots__)
-_COLUMNS_OF = attrgetter(*TRACK_COLUMNS)
-_INDEX = {name: index for index, name in enumerate(TRACK_COLUMNS)}
+_COLUMNS = tuple(TrackTable.__slots__)
+_COLUMNS_OF = attrgetter(*_COLUMNS)
+_INDEX = {name: index for index, name in enumerate(_COLUMNS)}

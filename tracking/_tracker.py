@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping
-from pathlib import Path
+from importlib import import_module
 from typing import Any
 
 from perception import PersonObservation
 from perception.arrays import covariance_matrix, finite_number, rigid_transform
-from perception.documents import read_json
 
 from ._admission import Admission
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._history import History
 from ._measurement import Frame, measurements_of
-from ._saved_records import record_of
-from ._saved_state import history_of, restore_admission, sensors_in, to_plain
 from ._sensors import CAMERA, SensorConfig, sensors_of
 from ._snapshot import snapshots
 from ._step import TrackerState, advance, nobody
@@ -79,6 +75,8 @@ class PersonTracker:
         _check_view(view)
         self._config = config
         self._sensors = sensors_of(config, view, sensors)
+        # Association needs it; no frame of a running robot shall wait for this import.
+        import_module("scipy.optimize")
         self._admission = Admission(config, self._sensors)
         start = nobody(config, self._sensors)
         self._history = History(self._advance, config.max_lag_s, start)
@@ -164,7 +162,7 @@ class PersonTracker:
             sensor: name of the sensor that took the frame. Stamps of all sensors are times of one
                 clock, the robot's.
             view: of this frame alone, for example a :class:`ScannerView` with the points of the
-                scan; None for that of the sensor. A state that is saved does not include it.
+                scan; None for that of the sensor.
 
         Raises:
             TrackingError: for an unknown sensor, for a stamp that is not finite, lies too far back
@@ -214,74 +212,6 @@ class PersonTracker:
                 "and earlier tracks are not kept"
             )
         return self._snapshots(stamp)
-
-    def state(self) -> dict[str, Any]:
-        """Return the whole state of the tracker, config included, as plain JSON values.
-
-        A tracker made by :meth:`from_state` continues bit for bit. The views are not included.
-        """
-        return to_plain(self._sensors, self._history, self._admission)
-
-    @classmethod
-    def from_state(
-        cls,
-        state: dict[str, Any],
-        *,
-        view: View | None = None,
-        sensors: Mapping[str, SensorConfig] | None = None,
-    ) -> PersonTracker:
-        """Make a tracker that continues from a state that :meth:`state` returned.
-
-        Args:
-            state: from :meth:`state`, or from its JSON.
-            view: the view of the first tracker; it is not part of the state.
-            sensors: the other sensors of the first tracker, with their views; None for the settings
-                in the state, without views.
-
-        Raises:
-            TrackingError: for a state that no tracker has written, that has another version, or
-                that has other sensors.
-        """
-        record = record_of(state)
-        tracker = cls(record.config, view=view, sensors=sensors_in(record, sensors))
-        tracker._history = history_of(record, tracker._history, tracker._sensors)
-        restore_admission(tracker._admission, record, tracker._history, tracker._sensors)
-        return tracker
-
-    def save(self, path: str | Path) -> None:
-        """Write :meth:`state` as JSON for :meth:`load`; the file is replaced in one step.
-
-        Raises:
-            TrackingError: naming the file, if it cannot be written.
-        """
-        path = Path(path)
-        text = json.dumps(self.state(), allow_nan=False)
-        partial = path.with_name(path.name + ".part")
-        try:
-            partial.write_text(text, encoding="utf-8")
-            partial.replace(path)
-        except OSError as cause:
-            raise TrackingError(f"cannot write {path}: {cause.strerror or cause}") from cause
-
-    @classmethod
-    def load(
-        cls,
-        path: str | Path,
-        *,
-        view: View | None = None,
-        sensors: Mapping[str, SensorConfig] | None = None,
-    ) -> PersonTracker:
-        """Make a tracker that continues from a file that :meth:`save` wrote.
-
-        Raises:
-            TrackingError: naming the file, if it cannot be read or holds no state of a tracker.
-        """
-        path = Path(path)
-        state = read_json(path, TrackingError)
-        try:
-            return cls.from_state(state, view=view, sensors=sensors)
-        except TrackingError as cause:
-            raise TrackingError(f"{path}: {cause}") from cause
 
     def _advance(self, state: TrackerState, frame: Frame) -> TrackerState:
         return advance(state, frame, self._sensors)

@@ -9,12 +9,13 @@ from functools import partial
 from typing import TypeVar
 
 import numpy as np
+import shapely
+from numpy.typing import NDArray
 
-from nav_adapter import AwarenessPolicy, NavAdapter, circles, paint_costmap
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, circles, paint_costmap
 from nav_adapter.exporters import CostmapPainter
 
 from ._crowd import CELLS, DT_S, ORIGIN_ODOM_M, RESOLUTION_M, ROBOT, crowd, robot_at
-from ._naive import paint_naively
 
 #: Steps whose sum is a cycle. The painter and the naive costmap are alternatives to "costmap".
 CYCLE = ("update", "circles", "costmap")
@@ -61,3 +62,15 @@ def cost_ms(people: int, frames: int, repeats: int, seed: int, naive: bool) -> d
         step: 1e3 * float(np.median(times[settled][np.isfinite(times[settled])]))
         for step, times in least.items()
     }
+
+
+def paint_naively(costmap: NDArray[np.uint8], constraints: NavConstraints) -> None:
+    """Paint like :func:`nav_adapter.paint_costmap`, with polygons instead of circles."""
+    x = ORIGIN_ODOM_M[0] + RESOLUTION_M * (np.arange(CELLS[1]) + 0.5)
+    y = ORIGIN_ODOM_M[1] + RESOLUTION_M * (np.arange(CELLS[0]) + 0.5)
+    cells = shapely.points(*np.meshgrid(x, y))
+    for obstacle in constraints.obstacles:
+        gap_m = shapely.distance(cells, obstacle.polygon)
+        cost = np.where(gap_m <= 0.55, 252.0 * np.exp(-10.0 * gap_m), 0.0)
+        np.maximum(costmap, cost.astype(np.uint8), out=costmap)
+        costmap[gap_m == 0.0] = 254

@@ -5,22 +5,25 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from awarenav.errors import not_one_of
+from nav_adapter import AwarenessPolicy
 from perception.documents import read_yaml
 from sim_tests import SimError
 from sim_tests.crossing import named_policy
 from sim_tests.crossing.eyes import Perception
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.runs import Job, named_templates, plan_jobs, policy_text
-from tracking.config import StrictConfig
+from sim_tests.world.config import SimConfig
 
 _ROOT: Final = Path(__file__).resolve().parents[2]
 #: Folder of the rows and of their results.
 RESULTS: Final = _ROOT / "docs" / "leaderboard"
+#: Folder of the runs that measure them, which git ignores.
+WORK: Final = _ROOT / "build" / "leaderboard"
 #: The page.
 PAGE: Final = _ROOT / "docs" / "leaderboard.md"
 _ROWS_FILE: Final = "rows.yaml"
@@ -28,7 +31,7 @@ _TRUTH: Final = "truth"
 _REFERENCE: Final = "reference"
 
 
-class Row(StrictConfig):
+class Row(SimConfig):
     """One row: a policy with sensors and a planner.
 
     Attributes:
@@ -37,8 +40,6 @@ class Row(StrictConfig):
         sensors: ``"truth"`` knows everybody in all directions; the others perceive.
         planner: ``"reference"``, ``"costmap"`` or ``"module:Class"``.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     name: str = Field(pattern=r"^[\w.+-]+$")
     policy: str
@@ -58,15 +59,14 @@ class Row(StrictConfig):
         return Path(self.policy).stem
 
     @property
-    def policy_yaml(self) -> str:
-        """The whole policy as YAML."""
+    def _policy(self) -> AwarenessPolicy:
         path = _ROOT / self.policy
-        return policy_text(named_policy(path if path.suffix else self.policy)[1])
+        return named_policy(path if path.suffix else self.policy)[1]
 
     @property
     def digest(self) -> str:
         """A digest of policy, perception and planner's name, by which results belong to the row."""
-        text = "\n".join((self.policy_yaml, self.perception, self.planner))
+        text = "\n".join((policy_text(self._policy), self.perception, self.planner))
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def jobs(self, templates: Sequence[ScenarioTemplate], seeds: Sequence[int]) -> tuple[Job, ...]:
@@ -75,26 +75,18 @@ class Row(StrictConfig):
         Raises:
             SimError: its planner cannot be made.
         """
-        return tuple(
-            Job(
-                each.scenario,
-                each.seed,
-                self.policy_name,
-                self.policy_yaml,
-                each.planner,
-                self.perception,
-            )
-            for each in plan_jobs(
-                templates,
-                ["blind"],
-                seeds,
-                planners=["" if self.planner == _REFERENCE else self.planner],
-                perception=_TRUTH,
-            )
+        truth = self.sensors == _TRUTH
+        return plan_jobs(
+            templates,
+            [(self.policy_name, self._policy)],
+            seeds,
+            planners=["" if self.planner == _REFERENCE else self.planner],
+            perception=_TRUTH if truth else "keypoints",
+            sensors=["camera" if truth else self.sensors],
         )
 
 
-class Board(StrictConfig):
+class Board(SimConfig):
     """All rows, and the episodes that each of them runs.
 
     Attributes:
@@ -103,8 +95,6 @@ class Board(StrictConfig):
         baseline: name of the row that others are compared with.
         rows: the rows.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     scenarios: tuple[str, ...]
     seeds: int = Field(ge=1)

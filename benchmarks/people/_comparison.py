@@ -94,63 +94,58 @@ def compare_eyes(simulated: Mapping[str, FloatArray]) -> Compared:
 def table(rows: Sequence[Compared]) -> list[str]:
     """Return the rows as a Markdown table."""
     populations = list(dict.fromkeys(each for row in rows for each in row.simulated))
-    lines = [
-        "| quantity | n | recorded people | "
-        + " | ".join(f"`{each}` | KS" for each in populations)
-        + " |",
-        "| --- " * (3 + 2 * len(populations)) + "|",
-    ]
+    head = [cell for each in populations for cell in (f"`{each}`", "KS")]
+    lines = []
     for row in rows:
         cells = [f"{row.text}, {row.unit}", str(row.samples), _text(row.recorded)]
         for each in populations:
             found = row.simulated.get(each)
             cells += ["–", "–"] if found is None else [_text(found), f"{row.distance[each]:.2f}"]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+        lines.append(cells)
+    return _markdown(["quantity", "n", "recorded people", *head], lines)
 
 
 def displacement_table(simulated: Mapping[str, Sequence[FloatArray]]) -> list[str]:
     """Return the displacements after standing as a Markdown table: 99th percentile, maximum."""
     lines = [
-        f"| after | recorded people | {_names(simulated)} |",
-        "| --- " * (2 + len(simulated)) + "|",
+        [
+            f"{after_s:g} s",
+            f"{high_m:.2f}, {most_m:.2f} m",
+            *(
+                f"{np.percentile(values[row], 99):.2f}, {values[row].max():.2f} m"
+                for values in simulated.values()
+            ),
+        ]
+        for row, (after_s, high_m, most_m) in enumerate(DISPLACEMENTS)
     ]
-    for row, (after_s, high_m, most_m) in enumerate(DISPLACEMENTS):
-        cells = [f"{after_s:g} s", f"{high_m:.2f}, {most_m:.2f} m"]
-        for values in simulated.values():
-            cells.append(f"{np.percentile(values[row], 99):.2f}, {values[row].max():.2f} m")
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+    return _markdown(["after", "recorded people", *_names(simulated)], lines)
 
 
 def start_table(simulated: Mapping[str, Mapping[str, Sequence[tuple[int, int]]]]) -> list[str]:
     """Return the shares of people who start within 1 s as a Markdown table."""
     names = ["now", *_ago(), "longer or never"]
-    lines = [
-        f"| robot | last look | recorded people | {_names(simulated)} |",
-        "| --- " * (3 + len(simulated)) + "|",
-    ]
+    lines = []
     for robot, shares in START_SHARES.items():
         for row, share in enumerate(shares):
             cells = [robot, names[row], f"{100.0 * share:.0f} %"]
             for counts in simulated.values():
                 begun, chances = counts[robot][row]
                 cells.append(f"{100.0 * begun / max(chances, 1):.0f} % of {chances}")
-            lines.append("| " + " | ".join(cells) + " |")
-    return lines
+            lines.append(cells)
+    return _markdown(["robot", "last look", "recorded people", *_names(simulated)], lines)
 
 
 def looked_table(simulated: Mapping[str, Sequence[float]]) -> list[str]:
     """Return the shares of people who had looked as a Markdown table."""
     lines = [
-        f"| looked within | recorded people | {_names(simulated)} |",
-        "| --- " * (2 + len(simulated)) + "|",
+        [
+            f"{within:g} s",
+            f"{100.0 * share:.0f} %",
+            *(f"{100.0 * shares[row]:.0f} %" for shares in simulated.values()),
+        ]
+        for row, (within, share) in enumerate(LOOKED)
     ]
-    for row, (within, share) in enumerate(LOOKED):
-        cells = [f"{within:g} s", f"{100.0 * share:.0f} %"]
-        cells += [f"{100.0 * shares[row]:.0f} %" for shares in simulated.values()]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+    return _markdown(["looked within", "recorded people", *_names(simulated)], lines)
 
 
 def draw(
@@ -200,8 +195,17 @@ def _ago() -> list[str]:
     ]
 
 
-def _names(populations: Iterable[str]) -> str:
-    return " | ".join(f"`{each}`" for each in populations)
+def _names(populations: Iterable[str]) -> list[str]:
+    return [f"`{each}`" for each in populations]
+
+
+def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table."""
+    return [
+        f"| {' | '.join(head)} |",
+        "| --- " * len(head) + "|",
+        *(f"| {' | '.join(row)} |" for row in rows),
+    ]
 
 
 def _percentiles(values: FloatArray) -> tuple[float, ...]:

@@ -101,7 +101,6 @@ def _recorded(walkers: list[Walker], cart: bool) -> Scene:
     frames = round((_BEFORE_S + _SHOWN_S) * RATE_HZ)
     first = round(_BEFORE_S * RATE_HZ)
     shown: FloatArray = np.zeros((len(walkers), frames - first, 2))
-    vehicle: FloatArray = np.zeros((frames - first, 2))
     bodies = [MovingBody(*walker.place_odom_m, 0.0, 0.0) for walker in walkers]
     for frame in range(frames):
         t_s = frame / RATE_HZ
@@ -115,9 +114,7 @@ def _recorded(walkers: list[Walker], cart: bool) -> Scene:
             bodies[index] = MovingBody(x, y, (x - before.x_m) * RATE_HZ, (y - before.y_m) * RATE_HZ)
             if frame >= first:
                 shown[index, frame - first] = x, y
-        if robot is not None and frame >= first:
-            vehicle[frame - first] = robot.x_m, robot.y_m
-    return Scene(shown, vehicle=cart, vehicle_m=vehicle if cart else None)
+    return Scene(shown, vehicle=cart)
 
 
 def _cart(t_s: float) -> RobotBody:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from scipy.stats import kstest
 
 from awarenav.errors import AwarenavError
 from awarenav.files import json_text, write_text
@@ -43,11 +44,13 @@ class Distribution:
         It is the largest difference of the two distribution functions. The recorded one is linear
         between its quantiles.
         """
-        ordered = np.sort(values)
         levels = np.linspace(0.0, 1.0, _POINTS)
-        recorded = np.interp(ordered, self.quantiles, levels, left=0.0, right=1.0)
-        above = np.arange(1, len(ordered) + 1) / len(ordered)
-        return float(max((above - recorded).max(), (recorded - above).max() + 1.0 / len(ordered)))
+        return float(
+            kstest(
+                values,
+                lambda each: np.interp(each, self.quantiles, levels, left=0.0, right=1.0),
+            ).statistic
+        )
 
 
 def summarise(scenes: Sequence[Scene], source: str) -> dict[str, object]:

@@ -40,13 +40,11 @@ class Scene:
 
     Attributes:
         positions_m: (people, frames, 2) positions on the floor at :data:`RATE_HZ`.
-        vehicle: a vehicle or robot drives among them.
-        vehicle_m: (frames, 2) its position; None where it was not recorded.
+        vehicle: a vehicle drives among them.
     """
 
     positions_m: FloatArray
     vehicle: bool = False
-    vehicle_m: FloatArray | None = None
 
     @cached_property
     def velocity_mps(self) -> FloatArray:
@@ -239,15 +237,6 @@ def _start_time(scene: Scene) -> FloatArray:
     return np.array(found)
 
 
-def _vehicle_gap(scene: Scene) -> FloatArray:
-    """Return the least distance of each person to the vehicle's centre."""
-    if scene.vehicle_m is None:
-        return np.zeros(0)
-    half = WINDOW // 2
-    gaps = np.linalg.norm(scene.place_m - scene.vehicle_m[None, half:-half], axis=2)
-    return np.asarray(gaps.min(axis=1))
-
-
 QUANTITIES: Final = (
     Quantity("speed_alone", "m/s", "walking speed, no vehicle", lambda s: _speed(s, False)),
     Quantity("speed_vehicle", "m/s", "walking speed, vehicle near", lambda s: _speed(s, True)),
@@ -263,9 +252,4 @@ QUANTITIES: Final = (
     Quantity("closest", "m", "predicted distance at closest approach", _predicted_closest),
     Quantity("sway", "m", "amplitude of the lateral sway", _sway),
     Quantity("start_time", "s", "from standing to 80 % of walking speed", _start_time),
-)
-
-#: The least distance to the vehicle, which the recordings do not hold.
-VEHICLE_GAP: Final = Quantity(
-    "vehicle_gap", "m", "least distance to the vehicle's centre", _vehicle_gap
 )

@@ -1,4 +1,4 @@
-"""Scores of tracks by two judges, motmetrics and TrackEval, with one gate."""
+"""Scores of tracks: MOTA, IDF1 and switches by motmetrics, HOTA by TrackEval, with one gate."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from ._walkers import FloatArray
 
 #: Largest distance between a person and a track that counts as that person.
 GATE_M = 1.0
-_MAX_MOTA_DIFFERENCE = 0.01
-_MAX_IDF1_DIFFERENCE = 0.001
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,9 +37,6 @@ class TrackingScores:
         misses: people without a track, summed over frames (motmetrics).
         false_positives: tracks without a person, summed over frames (motmetrics).
         hota: higher order tracking accuracy, mean over its thresholds (TrackEval).
-        mota_trackeval: MOTA by TrackEval.
-        idf1_trackeval: IDF1 by TrackEval.
-        switches_trackeval: identity switches by TrackEval.
     """
 
     mota: float
@@ -50,20 +45,6 @@ class TrackingScores:
     misses: float
     false_positives: float
     hota: float
-    mota_trackeval: float
-    idf1_trackeval: float
-    switches_trackeval: float
-
-    def disagreement(self) -> str | None:
-        """Return a message if the judges differ by more than their rules explain, else None.
-
-        Identity is one assignment over the whole run, the same for both. For MOTA each judge keeps
-        the matches of the previous frame in its own way, which may leave a neighbour unmatched.
-        """
-        mota, idf1 = abs(self.mota - self.mota_trackeval), abs(self.idf1 - self.idf1_trackeval)
-        if mota <= _MAX_MOTA_DIFFERENCE and idf1 <= _MAX_IDF1_DIFFERENCE:
-            return None
-        return f"the judges differ by {mota:.4f} in MOTA and {idf1:.4f} in IDF1"
 
 
 def judge(truth: FloatArray, tracked: Sequence[TrackedFrame]) -> TrackingScores:
@@ -73,8 +54,7 @@ def judge(truth: FloatArray, tracked: Sequence[TrackedFrame]) -> TrackingScores:
         for people, frame in zip(truth, tracked, strict=True)
     ]
     clear = _motmetrics(truth, tracked, distances)
-    other = _trackeval(truth, tracked, distances)
-    return TrackingScores(**clear, **other)
+    return TrackingScores(**clear, hota=_hota(truth, tracked, distances))
 
 
 def _motmetrics(
@@ -101,9 +81,9 @@ def _motmetrics(
     }
 
 
-def _trackeval(
+def _hota(
     truth: FloatArray, tracked: Sequence[TrackedFrame], distances: Sequence[FloatArray]
-) -> dict[str, float]:
+) -> float:
     with contextlib.redirect_stdout(io.StringIO()):  # it prints which of its data sets are missing
         import trackeval.metrics  # noqa: PLC0415 - an optional peer
 
@@ -124,14 +104,6 @@ def _trackeval(
         # As in TrackEval's own 3-D sets: 1 at distance 0, the threshold of 0.5 at the gate.
         "similarity_scores": [np.maximum(0.0, 1.0 - 0.5 * d / GATE_M) for d in distances],
     }
-    quiet = {"PRINT_CONFIG": False}
     with contextlib.redirect_stdout(io.StringIO()):
-        clear = trackeval.metrics.CLEAR(quiet).eval_sequence(data)
-        identity = trackeval.metrics.Identity(quiet).eval_sequence(data)
         hota = trackeval.metrics.HOTA().eval_sequence(data)
-    return {
-        "hota": float(np.mean(hota["HOTA"])),
-        "mota_trackeval": float(clear["MOTA"]),
-        "idf1_trackeval": float(identity["IDF1"]),
-        "switches_trackeval": float(clear["IDSW"]),
-    }
+    return float(np.mean(hota["HOTA"]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -25,7 +25,7 @@ _NAMES = ("reference", *_OTHERS)
 _CASES = 4
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the comparison; return 0 if every crossing was good, 1 if not, 2 without a planner."""
     parser = argparse.ArgumentParser(
         prog="python -m examples.planners",
@@ -53,7 +53,7 @@ def main() -> int:
         "speed field; the reference planner is the same",
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="also write the table into a file")
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     if options.seed < 0:
         parser.error(f"--seed must be 0 or more, got {options.seed}")
     if options.out is not None and not options.out.parent.is_dir():

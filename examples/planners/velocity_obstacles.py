@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState, circles
-from nav_adapter.exporters import static_circles
 from perception.arrays import FloatArray
 
 from ._shared import direction_to_goal, no_boxes, obeying
@@ -58,7 +57,7 @@ class VelocityObstaclePlanner:
         self._robot = robot
         self._lookahead_s = lookahead_s
         self._boxes = no_boxes(static_boxes_odom_m)
-        self._walls = static_circles(self._boxes, _WALL_OVERSHOOT_M)
+        self._walls = _circles_over(self._boxes)
         self._use_speed_field = use_speed_field
 
     def plan(
@@ -103,3 +102,27 @@ class VelocityObstaclePlanner:
         ).ravel()
         twist = (float(np.clip(speed, 0.0, limit_mps)), float(yaw_rate))
         return obeying(constraints, robot_state, twist, dt_s)
+
+
+def _circles_over(boxes_odom_m: FloatArray) -> FloatArray:
+    """Return (M, 5) standing circles x, y, 0, 0, radius that cover every box (N, 4).
+
+    A box whose circle would reach farther out than the overshoot is halved, again and again: large
+    circles fill the inside, and small ones line the edge.
+    """
+    rows = []
+    for box in boxes_odom_m.tolist():
+        cells = [box]
+        while cells:
+            x_min, y_min, x_max, y_max = cells.pop()
+            x, y = 0.5 * (x_min + x_max), 0.5 * (y_min + y_max)
+            radius = 0.5 * math.hypot(x_max - x_min, y_max - y_min)
+            # A disc around a point of the box reaches out of it across the nearest edge.
+            to_edge = min(x - box[0], box[2] - x, y - box[1], box[3] - y)
+            if radius - to_edge <= _WALL_OVERSHOOT_M:
+                rows.append((x, y, 0.0, 0.0, radius))
+            elif x_max - x_min >= y_max - y_min:
+                cells += [(x, y_min, x_max, y_max), (x_min, y_min, x, y_max)]
+            else:
+                cells += [(x_min, y, x_max, y_max), (x_min, y_min, x_max, y)]
+    return np.array(rows, dtype=np.float64).reshape(-1, 5)

@@ -1,7 +1,7 @@
 """Exporters: constraints in the forms that planners read, in the odom frame.
 
 Each form has one pure function of :class:`nav_adapter.NavConstraints`; only :class:`CostmapPainter`
-keeps state. The ``static_…`` functions give racks and walls in the forms that people have.
+keeps state.
 ``docs/planners.md`` says which planner reads which form, and what to do with a robot that is inside
 an obstacle already ("Inside a circle").
 """
@@ -15,7 +15,6 @@ from ._horizon import PredictedPeople, predicted_circles, predicted_people
 from ._shapes import boxes, circles, points, polygons
 from ._speed_field import limited_by_at, speed_limit_at, time_cost
 from ._speed_map import SpeedMap
-from ._static import static_circles, static_half_planes, static_points, static_polygons
 from ._velocity import half_planes, velocity_obstacles
 
 __all__ = [
@@ -33,10 +32,6 @@ __all__ = [
     "predicted_circles",
     "predicted_people",
     "speed_limit_at",
-    "static_circles",
-    "static_half_planes",
-    "static_points",
-    "static_polygons",
     "time_cost",
     "velocity_obstacles",
 ]

@@ -36,9 +36,6 @@ def paint_costmap(
     ⌊252·exp(−k(g − r_i))⌋ up to ``ring_m``. A higher cost in the map is kept. Unknown cells (255)
     become lethal within the radius and stay unknown in the ring. Cells farther away do not change.
 
-    An obstacle that the policy stretches along the person's motion is painted as its polygon. Near
-    the polygon's corners distances are too small rather than too large.
-
     The robot may be inside an obstacle. All cells around it are then lethal, and a planner finds no
     way out (``docs/planners.md``, "Inside a circle").
 

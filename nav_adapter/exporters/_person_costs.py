@@ -13,7 +13,7 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._shapes import circles, stretched_outlines
+from ._shapes import circles
 
 Cells = NDArray[np.uint8]
 
@@ -98,10 +98,6 @@ def cost_windows(
     size = np.array(shape[::-1])
     center, radius = rows[:, :2] - origin, rows[:, 4]
     lower, upper = center - radius[:, None], center + radius[:, None]
-    outlines = {i: corners - origin for i, corners in stretched_outlines(constraints).items()}
-    for index, corners in outlines.items():
-        lower[index] = np.minimum(lower[index], corners.min(axis=0))
-        upper[index] = np.maximum(upper[index], corners.max(axis=0))
     # Clipped as floats, since an obstacle far off the map would overflow an integer.
     low = np.clip(np.floor((lower - profile.ring_m) / resolution), 0, size).astype(np.int64)
     high = np.clip(np.ceil((upper + profile.ring_m) / resolution), 0, size).astype(np.int64)
@@ -110,11 +106,9 @@ def cost_windows(
         return
     for group in _groups(low[on_map], high[on_map]):
         people = on_map[group]
-        stretched = {i: outlines[k] for i, k in enumerate(people.tolist()) if k in outlines}
         yield _cost_window(
             center[people],
             radius[people],
-            stretched,
             low[people],
             high[people],
             resolution,
@@ -144,7 +138,6 @@ def _groups(low: NDArray[np.int64], high: NDArray[np.int64]) -> list[slice]:
 def _cost_window(
     center: FloatArray,
     radius: FloatArray,
-    outlines: dict[int, FloatArray],
     low: NDArray[np.int64],
     high: NDArray[np.int64],
     resolution: float,
@@ -156,12 +149,6 @@ def _cost_window(
     gap = np.full((top - bottom, right - left), _FAR_M, dtype=np.float32)
     for batch in _batches((high - low).max(axis=1)):
         _lower_gaps(gap, corner, center[batch], radius[batch], low[batch], high[batch], resolution)
-    for index, corners in outlines.items():
-        (x0, y0), (x1, y1) = (low[index] - corner).tolist(), (high[index] - corner).tolist()
-        view = gap[y0:y1, x0:x1]
-        x = (np.arange(low[index, 0], high[index, 0]) + 0.5) * resolution
-        y = (np.arange(low[index, 1], high[index, 1]) + 0.5) * resolution
-        np.minimum(view, _outside_distance_m(corners, x, y), out=view)
     # The cell with an obstacle's centre counts as inside, so that a coarse grid misses nobody.
     column, row = np.floor(center / resolution).T
     in_window = (column >= left) & (column < right) & (row >= bottom) & (row < top)
@@ -230,27 +217,3 @@ def _costs(gap: NDArray[np.float32], profile: CostProfile, rounding_m: float) ->
     inside = gap <= rounding
     np.maximum(cells, inside.view(np.uint8) * np.uint8(LETHAL), out=cells)
     return cells
-
-
-def _outside_distance_m(corners: FloatArray, x: FloatArray, y: FloatArray) -> NDArray[np.float32]:
-    """Return the distance of cells from a convex outline, negative inside.
-
-    It is the largest signed distance from a side, which is too small near the corners.
-    """
-    edges = np.roll(corners, -1, axis=0) - corners
-    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
-    normals /= np.hypot(edges[:, 0], edges[:, 1])[:, None]
-    # Relative to the middle, so that rounding concerns small numbers only.
-    middle = corners.mean(axis=0)
-    x, y, corners = x - middle[0], y - middle[1], corners - middle
-    offsets = (normals * corners).sum(axis=1)
-    normals[offsets < 0.0] *= -1.0  # the corners may be clockwise
-    offsets = np.abs(offsets)
-    across_x = (normals[:, :1] * x - offsets[:, None]).astype(np.float32)
-    across_y = (normals[:, 1:] * y).astype(np.float32)[:, :, None]
-    distance: NDArray[np.float32] = across_x[0] + across_y[0]
-    side = np.empty_like(distance)
-    for along_x, along_y in zip(across_x[1:], across_y[1:], strict=True):
-        np.add(along_x, along_y, out=side)
-        np.maximum(distance, side, out=distance)
-    return distance

@@ -2,9 +2,6 @@
 
 Pure functions of the constraints, in the odom frame. They have one entry per person, in the order
 of ``constraints.obstacles``, and return an empty array or tuple without people.
-
-A policy may stretch an obstacle along the person's motion. Shapes without a velocity are stretched
-with it. Circles are not: planners that use them move them along the velocity.
 """
 
 from __future__ import annotations
@@ -13,7 +10,6 @@ import math
 from typing import Final
 
 import numpy as np
-import shapely
 from shapely.geometry import Polygon
 
 from perception.arrays import FloatArray, finite_number
@@ -24,9 +20,6 @@ from .._errors import NavError
 # A smaller spacing only costs memory.
 _MINIMUM_SPACING_M: Final = 1e-3
 _MINIMUM_POINTS: Final = 8
-# The 24-sided polygon of a circle is 0.6 % larger than the circle. A polygon larger by 2 % or more
-# is longer than the circle by a fiftieth of the radius or more.
-_STRETCHED_AREA_RATIO: Final = 1.02
 
 
 def circles(constraints: NavConstraints) -> FloatArray:
@@ -58,13 +51,7 @@ def points(constraints: NavConstraints, spacing_m: float) -> FloatArray:
     """
     spacing = finite_number("spacing_m", spacing_m, NavError, minimum=_MINIMUM_SPACING_M)
     rings: list[FloatArray] = [np.empty((0, 2))]
-    outlines = stretched_outlines(constraints)
-    for index, obstacle in enumerate(constraints.obstacles):
-        if index in outlines:
-            ring = shapely.linearrings(outlines[index])
-            step = min(spacing, shapely.length(ring) / _MINIMUM_POINTS)
-            rings.append(shapely.get_coordinates(shapely.segmentize(ring, step))[:-1])
-            continue
+    for obstacle in constraints.obstacles:
         # The arc is longer than the chord between neighbours, so the spacing is kept.
         count = max(_MINIMUM_POINTS, math.ceil(2.0 * math.pi * obstacle.radius_m / spacing))
         angle = np.arange(count) * (2.0 * math.pi / count)
@@ -89,36 +76,10 @@ def boxes(constraints: NavConstraints) -> FloatArray:
 
     A box may contain the robot (``docs/planners.md``, "Inside a circle").
     """
-    outlines = stretched_outlines(constraints)
     rows = []
-    for index, obstacle in enumerate(constraints.obstacles):
+    for obstacle in constraints.obstacles:
         (x, y), (vx, vy) = obstacle.center_odom_m, obstacle.velocity_odom_mps
-        length = width = 2.0 * obstacle.radius_m
+        size = 2.0 * obstacle.radius_m
         yaw, height = math.atan2(vy, vx), obstacle.height_m
-        if index in outlines:
-            c, s = math.cos(yaw), math.sin(yaw)
-            turned = outlines[index] @ np.array([[c, -s], [s, c]])
-            low, high = turned.min(axis=0), turned.max(axis=0)
-            length, width = high - low
-            x, y = np.array([[c, -s], [s, c]]) @ (0.5 * (low + high))
-        rows.append([x, y, 0.5 * height, length, width, height, yaw])
+        rows.append([x, y, 0.5 * height, size, size, height, yaw])
     return np.array(rows, dtype=np.float64).reshape(-1, 7)
-
-
-def stretched_outlines(constraints: NavConstraints) -> dict[int, FloatArray]:
-    """Return the corners (M, 2), in metres, of obstacles that are longer than their circle.
-
-    They are those of the polygons' convex hulls. The keys are indices into
-    ``constraints.obstacles``.
-    """
-    obstacles = constraints.obstacles
-    if not obstacles:
-        return {}
-    polygons = [obstacle.polygon for obstacle in obstacles]
-    # Each polygon contains its circle, so a longer one has a larger area.
-    circles_m2 = math.pi * np.array([obstacle.radius_m for obstacle in obstacles]) ** 2
-    stretched = np.flatnonzero(shapely.area(polygons) > _STRETCHED_AREA_RATIO * circles_m2)
-    return {
-        index: shapely.get_coordinates(shapely.convex_hull(polygons[index]))[:-1]
-        for index in stretched.tolist()
-    }

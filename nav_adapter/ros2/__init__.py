@@ -2,10 +2,9 @@
 
 The messages are plain dataclasses (:mod:`nav_adapter.ros2.messages`), made by pure functions of
 :class:`~nav_adapter.NavConstraints`. Publishing and recording need the extra ``ros2``, which
-:func:`encode`, :func:`decode`, :class:`DdsNode`, :class:`McapRecorder`, :class:`JsonMcapRecorder`
-and :func:`read_json_messages` load at first use. With ROS installed, :mod:`nav_adapter.ros2.node`
-runs the same bridge as an rclpy node. Times, poses and rclpy's messages are converted in
-:mod:`nav_adapter.ros2.conversions`.
+:func:`encode`, :func:`decode`, :class:`DdsNode` and :class:`McapRecorder` load at first use. With
+ROS installed, :mod:`nav_adapter.ros2.node` runs the same bridge as an rclpy node. Times, poses and
+rclpy's messages are converted in :mod:`nav_adapter.ros2.conversions`.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from ._transforms import TransformBuffer
 if TYPE_CHECKING:
     from ._cdr import decode, encode
     from ._dds import DdsNode
-    from ._mcap import JsonMcapRecorder, McapRecorder, read_json_messages
+    from ._mcap import McapRecorder
 
 __all__ = [
     "MASK_TOPICS",
@@ -49,7 +48,6 @@ __all__ = [
     "CameraMount",
     "DdsNode",
     "Frames",
-    "JsonMcapRecorder",
     "McapRecorder",
     "PerceivedFrame",
     "PerceptionThread",
@@ -79,7 +77,6 @@ __all__ = [
     "outgoing",
     "people",
     "picture_of",
-    "read_json_messages",
     "renamed",
     "scanner_inputs",
     "speed_limit",
@@ -99,8 +96,8 @@ def __getattr__(name: str) -> Any:
         from ._dds import DdsNode  # noqa: PLC0415
 
         return DdsNode
-    if name in ("JsonMcapRecorder", "McapRecorder", "read_json_messages"):
-        from . import _mcap  # noqa: PLC0415
+    if name == "McapRecorder":
+        from ._mcap import McapRecorder  # noqa: PLC0415
 
-        return getattr(_mcap, name)
+        return McapRecorder
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

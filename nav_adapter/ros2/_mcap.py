@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
 
 import yaml
 
-from perception.documents import parse_json
 from perception.installation import install_command
 
 from .._errors import NavError
@@ -17,8 +13,6 @@ from ._message import definition, ros_type
 from ._topics import Topic
 
 try:
-    from mcap.exceptions import McapError
-    from mcap.reader import make_reader
     from mcap.writer import Writer
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise NavError(
@@ -27,44 +21,7 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
     ) from cause
 
 
-_FileT = TypeVar("_FileT", bound="_McapFile")
-
-
-class _McapFile:
-    """An MCAP file that is being written; its index is written when it is closed.
-
-    Args:
-        path: of the file; an existing file is replaced.
-        profile: of the messages, as in the MCAP specification.
-
-    Raises:
-        NavError: if the file cannot be written.
-    """
-
-    def __init__(self, path: str | Path, profile: str) -> None:
-        self._path = Path(path)
-        try:
-            self._stream = self._path.open("wb")
-        except OSError as cause:
-            raise NavError(f"cannot write {self._path}: {cause.strerror or cause}") from cause
-        self._writer = Writer(self._stream)
-        self._writer.start(profile=profile, library="awarenav")
-        self._channels: dict[str, int] = {}
-
-    def close(self) -> None:
-        """Write the index and close the file."""
-        if not self._stream.closed:
-            self._writer.finish()
-            self._stream.close()
-
-    def __enter__(self: _FileT) -> _FileT:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-
-class McapRecorder(_McapFile):
+class McapRecorder:
     """Writes CDR messages with their ROS 2 schemas to an MCAP file.
 
     The profile is "ros2", schemas are "ros2msg" and messages "cdr", which Foxglove,
@@ -79,8 +36,26 @@ class McapRecorder(_McapFile):
     """
 
     def __init__(self, path: str | Path) -> None:
-        super().__init__(path, "ros2")
+        try:
+            self._stream = Path(path).open("wb")  # noqa: SIM115 - closed with the index
+        except OSError as cause:
+            raise NavError(f"cannot write {path}: {cause.strerror or cause}") from cause
+        self._writer = Writer(self._stream)
+        self._writer.start(profile="ros2", library="awarenav")
+        self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
+
+    def close(self) -> None:
+        """Write the index and close the file."""
+        if not self._stream.closed:
+            self._writer.finish()
+            self._stream.close()
+
+    def __enter__(self) -> McapRecorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def write(self, topic: Topic, cdr: bytes, stamp_s: float) -> None:
         """Append one message, logged at ``stamp_s``."""
@@ -97,54 +72,6 @@ class McapRecorder(_McapFile):
             text = definition(topic.message).encode()
             self._schemas[name] = self._writer.register_schema(name, "ros2msg", text)
         return self._schemas[name]
-
-
-class JsonMcapRecorder(_McapFile):
-    """Writes JSON messages with their JSON Schemas to an MCAP file, which Foxglove reads.
-
-    Use it as a context manager: the index is written when the file is closed.
-
-    Args:
-        path: of the file; an existing file is replaced.
-
-    Raises:
-        NavError: if the file cannot be written.
-    """
-
-    def __init__(self, path: str | Path) -> None:
-        super().__init__(path, "")
-
-    def add_topic(self, topic: str, schema_name: str, schema: Mapping[str, Any]) -> None:
-        """Open a topic whose messages follow a JSON Schema."""
-        data = json.dumps(schema).encode()
-        number = self._writer.register_schema(schema_name, "jsonschema", data)
-        self._channels[topic] = self._writer.register_channel(topic, "json", number)
-
-    def write(self, topic: str, message: Mapping[str, Any], stamp_s: float) -> None:
-        """Append one message of a topic that is open, logged at ``stamp_s`` ≥ 0."""
-        stamp_ns = round(stamp_s * 1e9)
-        data = json.dumps(message, ensure_ascii=False).encode()
-        self._writer.add_message(self._channels[topic], stamp_ns, data, stamp_ns)
-
-
-def read_json_messages(path: str | Path) -> Iterator[tuple[str, Any]]:
-    """Yield topic and value of the JSON messages of an MCAP file, in the order of their times.
-
-    Messages in other encodings are left out.
-
-    Raises:
-        NavError: the file cannot be read, is no MCAP file, or has a message that is not JSON.
-    """
-    try:
-        with Path(path).open("rb") as stream:
-            for _, channel, message in make_reader(stream).iter_messages():
-                if channel.message_encoding == "json":
-                    source = f"{path}, topic {channel.topic}"
-                    yield channel.topic, parse_json(message.data, source, NavError)
-    except OSError as cause:
-        raise NavError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    except McapError as cause:
-        raise NavError(f"{path} is not an MCAP file: {cause}") from cause
 
 
 def _metadata(topic: Topic) -> dict[str, str]:

@@ -6,11 +6,9 @@ import uuid
 from collections.abc import Iterable
 from typing import Final
 
-import numpy as np
-
 from tracking import PersonTrack
 
-from .._constraints import NavConstraints, PersonObstacle
+from .._constraints import NavConstraints
 from ..exporters import boxes
 from .conversions import header, yaw_quaternion
 from .messages.costmap_converter_msgs import ObstacleArrayMsg, ObstacleMsg
@@ -39,8 +37,6 @@ _OCCUPIED: Final = 100
 # Any fixed namespace, so that a track has the same UUID in every process.
 _NAMESPACE: Final = uuid.UUID("6f1b3f0a-6f53-4d5e-9c0e-5b2f3f8a7c11")
 _RELIABILITY: Final = {"confirmed": 1.0, "coasting": 0.5, "tentative": 0.25}
-# The 24-sided polygon of a circle reaches 0.9 % beyond it; a longer one is stretched.
-_ROUND_REACH_RATIO: Final = 1.02
 
 
 def circle_objects(
@@ -49,14 +45,14 @@ def circle_objects(
     """Return one ``nav2_msgs/CircleObject`` per person, filled and occupied.
 
     A track keeps its UUID, so that the vector-object server replaces its shape instead of adding
-    another. The circle contains the obstacle's polygon.
+    another.
     """
     return tuple(
         CircleObject(
             header(constraints.stamp_s, frame_id),
             UUID(uuid.uuid5(_NAMESPACE, str(each.track_id)).bytes),
             Point32(*each.center_odom_m.tolist()),
-            max(each.radius_m, _reach_m(each) if not _is_round(each) else 0.0),
+            each.radius_m,
             True,
             _OCCUPIED,
         )
@@ -65,21 +61,19 @@ def circle_objects(
 
 
 def teb_obstacles(constraints: NavConstraints, *, frame_id: str = "odom") -> ObstacleArrayMsg:
-    """Return ``costmap_converter_msgs/ObstacleArrayMsg`` for TEB: moving circles or polygons.
+    """Return ``costmap_converter_msgs/ObstacleArrayMsg`` for TEB: moving circles.
 
-    One corner and a radius is a circle. An obstacle that is stretched along the motion has its
-    corners instead. The velocity is in the frame of the header.
+    One corner and a radius is a circle. The velocity is in the frame of the header.
     """
     top = header(constraints.stamp_s, frame_id)
     obstacles = []
     for each in constraints.obstacles:
         (x, y), (vx, vy) = each.center_odom_m.tolist(), each.velocity_odom_mps.tolist()
-        ring = [(x, y)] if _is_round(each) else list(each.polygon.exterior.coords)[:-1]
         obstacles.append(
             ObstacleMsg(
                 top,
-                Polygon(tuple(Point32(u, v, 0.0) for u, v in ring)),
-                each.radius_m if len(ring) == 1 else 0.0,
+                Polygon((Point32(x, y, 0.0),)),
+                each.radius_m,
                 each.track_id,
                 velocities=TwistWithCovariance(Twist(Vector3(vx, vy, 0.0))),
             )
@@ -150,13 +144,3 @@ def detections(constraints: NavConstraints, *, frame_id: str = "odom") -> Detect
             )
         )
     return Detection3DArray(top, tuple(found))
-
-
-def _reach_m(obstacle: PersonObstacle) -> float:
-    """Return the largest distance of a corner of the polygon from the centre."""
-    corners = np.asarray(obstacle.polygon.exterior.coords)[:, :2]
-    return float(np.linalg.norm(corners - obstacle.center_odom_m, axis=1).max())
-
-
-def _is_round(obstacle: PersonObstacle) -> bool:
-    return _reach_m(obstacle) <= _ROUND_REACH_RATIO * obstacle.radius_m

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from perception import Camera
-from tracking.config import StrictConfig, complaints
+from tracking.config import complaints
 
 from ..actors.body import worker_names
 from ..world.camera import SensorConfig
+from ..world.config import SimConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS
 
 _SIZE = re.compile(r"^(\d+)x(\d+)$")
 
 
-class RenderConfig(StrictConfig):
+class RenderConfig(SimConfig):
     """Settings of a set of randomised images; the same settings give the same bytes.
 
     Attributes:
@@ -34,15 +35,13 @@ class RenderConfig(StrictConfig):
         max_range_m: largest distance of a person from the camera.
         supersampling: samples per pixel and side; 2 smooths edges and costs three times as much.
         seed: seed of everything random.
-        sensor: noise and exposure of the camera; the default adds none.
+        sensor: noise of the camera; the default adds none.
         workers: names of shipped workers, or .npz files; None for all shipped workers.
         layouts: names of the halls; None for all.
         variants: first and last number of the variants of a hall's goods and colours.
         eyes: ``"wander"``: the eyes turn in the head, by 7° sideways and 3.4° up and down (standard
             deviations); ``"ahead"``: the gaze is the direction of the head.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     frames: int = Field(default=400, ge=1, le=10_000_000)
     scenes: int | None = Field(default=None, ge=1)

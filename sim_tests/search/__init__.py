@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._episode_runner import EpisodeRunner
     from ._files import write_or_check_settings
     from ._optimizer import Optimizer, Outcome, ParameterValues, Range
+    from ._process_lock import ProcessLock
     from ._shared_study import Claim, SharedStudy
 
 __all__ = [
@@ -18,25 +19,10 @@ __all__ = [
     "Optimizer",
     "Outcome",
     "ParameterValues",
+    "ProcessLock",
     "Range",
     "SharedStudy",
     "write_or_check_settings",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._episode_runner": ("EpisodeRunner",),
-        "._files": ("write_or_check_settings",),
-        "._optimizer": (
-            "Optimizer",
-            "Outcome",
-            "ParameterValues",
-            "Range",
-        ),
-        "._shared_study": (
-            "Claim",
-            "SharedStudy",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
-from tracking.config import StrictConfig
-
+from ..world.config import SimConfig
 from ..world.errors import SimError
 from ._optuna import optuna
 
@@ -34,7 +33,7 @@ class Outcome:
     notes: Mapping[str, object] = field(default_factory=dict)
 
 
-class Range(StrictConfig):
+class Range(SimConfig):
     """The range in which a parameter is searched.
 
     Attributes:
@@ -42,8 +41,6 @@ class Range(StrictConfig):
         high: largest value, above ``low``.
         log: search on a logarithmic scale.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     low: float
     high: float

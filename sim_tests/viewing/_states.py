@@ -23,8 +23,6 @@ _PLAN_MARGIN_M: Final = 3.0
 # Scan points closer together than this are drawn as one.
 _SCAN_CELL_CM: Final = 5
 _MOST_SCAN_POINTS: Final = 400
-# An outline with more than this share of the circle's area reaches beyond the circle.
-_CIRCLE_SHARE: Final = 1.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +84,7 @@ def state_of(
         ``robot_odom`` is x (m), y (m) and heading (rad); each of ``people``, the truth, has
         ``odom`` (x, y and direction of gaze), the true α, distance and margin; each of ``tracks``
         has ``odom`` (x, y, vx, vy), α with its standard deviation and lower bound; each of
-        ``obstacles`` has its radius, and its outline where that is no circle. ``alerts`` are the
+        ``obstacles`` has its radius. ``alerts`` are the
         tracks that are warned of a collision. Each of ``requests`` to look at the robot has the
         track, the means, the time that a look would win and the reason; each of ``answers`` has
         the track and the time since the request. All three are in one state only. A number that
@@ -170,16 +168,11 @@ def _people(frame: CrossingFrame) -> list[dict[str, Any]]:
 
 
 def _obstacle(obstacle: PersonObstacle) -> dict[str, Any]:
-    circle_m2 = math.pi * obstacle.radius_m**2
-    outline: list[float | None] = []
-    if obstacle.polygon.area > _CIRCLE_SHARE * circle_m2:
-        outline = _rounded(np.asarray(obstacle.polygon.exterior.coords)[:, :2].ravel())
     return {
         "id": obstacle.track_id,
         "odom": _rounded(obstacle.center_odom_m),
         "radius_m": _rounded_number(obstacle.radius_m),
         "awareness_lower": _rounded_number(obstacle.awareness_lower),
-        "outline_odom_m": outline,
     }
 
 

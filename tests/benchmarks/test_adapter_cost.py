@@ -5,18 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.adapter import (
-    CELLS,
-    CYCLE,
-    ORIGIN_ODOM_M,
-    RESOLUTION_M,
-    ROBOT,
-    cost_ms,
-    crowd,
-    main,
-    paint_naively,
-    robot_at,
-)
+from benchmarks.adapter.__main__ import main
+from benchmarks.adapter._cost import CYCLE, cost_ms, paint_naively
+from benchmarks.adapter._crowd import CELLS, ORIGIN_ODOM_M, RESOLUTION_M, ROBOT, crowd, robot_at
 from nav_adapter import AwarenessPolicy, NavAdapter, paint_costmap
 
 

@@ -11,31 +11,13 @@ from paths import SHARED
 from scipy.stats import binomtest, kstest
 
 from awarenav.errors import AwarenavError
-from benchmarks.people import (
-    DISPLACEMENTS,
-    LAYOUTS,
-    LOOKED,
-    QUANTITIES,
-    RATE_HZ,
-    RECORDED,
-    VEHICLE_GAP,
-    Distribution,
-    Scene,
-    compare,
-    displacements,
-    looked_within,
-    main,
-    noise_m,
-    read_recorded,
-    read_scene,
-    scene_of,
-    simulate,
-    starts,
-    summarise,
-)
-from sim_tests import run_crossing
+from benchmarks.people.__main__ import main
+from benchmarks.people._comparison import compare
+from benchmarks.people._crowd import LAYOUTS, simulate
+from benchmarks.people._distribution import RECORDED, Distribution, read_recorded, summarise
+from benchmarks.people._motion import QUANTITIES, RATE_HZ, Scene, noise_m, read_scene
+from benchmarks.people._standing import DISPLACEMENTS, LOOKED, displacements, looked_within, starts
 from sim_tests.actors.behaviour import START_SHARES
-from sim_tests.scenario import ScenarioTemplate
 
 CLIPS = SHARED / "data"
 # Quantities of which the recordings hold too few values for a distance of 0.1.
@@ -130,24 +112,6 @@ def test_standing_people_are_displaced_as_recorded_ones() -> None:
     for values, (after_s, high_m, most_m) in zip(found, DISPLACEMENTS, strict=True):
         assert float(np.percentile(values, 99)) == pytest.approx(high_m, rel=0.25), after_s
         assert values.max() < most_m + 0.1
-
-
-def test_an_episode_becomes_a_scene_with_its_robot() -> None:
-    scenario = ScenarioTemplate.shipped("late_glance").for_seed(0)
-    scenario = scenario.model_copy(update={"duration_s": 5.0})
-    result = run_crossing(scenario, policy="blind", population="recorded")
-    scene = scene_of(result)
-    assert scene.vehicle_m is not None
-    last = result.frames[-1]
-    assert scene.vehicle_m[-1] == pytest.approx(last.robot_state.position_odom_m, abs=0.1)
-    assert scene.place_m.shape[:2] == scene.speed_mps.shape == (1, len(scene.vehicle_m) - 14)
-    assert scene.speed_mps.max() == pytest.approx(1.42, abs=0.4)
-    gaps = [
-        np.linalg.norm(frame.truth[0].position_odom_m - frame.robot_state.position_odom_m)
-        for frame in result.frames
-        if 0.25 <= frame.t_s <= last.t_s - 0.25  # half a window of the filter
-    ]
-    assert VEHICLE_GAP.of(scene) == pytest.approx([min(gaps)], abs=0.1)
 
 
 def test_people_have_looked_as_recorded_ones() -> None:

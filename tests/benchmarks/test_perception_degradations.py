@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks._degraded_pictures import CONDITIONS, degraded_picture, picture_sets, pictures
-from benchmarks.perception_degradations import HEADER, main, measure, meets, row_of
+from benchmarks.perception.__main__ import main
+from benchmarks.perception._degradations import HEADER, measure, meets, row_of
+from benchmarks.perception._pictures import CONDITIONS, degraded_picture, picture_sets, pictures
 from sim_tests.dataset import RenderConfig
 from training.networks import Recipe
-
-NAMES = [each.name for each in CONDITIONS]
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +77,7 @@ def test_another_background_keeps_every_pixel_of_people(shots):
         assert record == shot.record
 
 
+@pytest.mark.full
 def test_the_shipped_networks_find_people_and_a_row_says_so():
     wanted = [each for each in CONDITIONS if each.name in ("clean", "motion blur 17 px")]
     metrics = measure(wanted, 3, 2026)
@@ -106,7 +106,7 @@ def test_bounds_are_those_of_every_figure():
 
 def test_an_unknown_condition_is_refused_with_those_there_are(capsys):
     with pytest.raises(SystemExit):
-        main(["--conditions", "fog"])
+        main(["degradations", "--conditions", "fog"])
     message = capsys.readouterr().err
     assert "no condition contains fog" in message
-    assert all(name in message for name in NAMES)
+    assert all(each.name in message for each in CONDITIONS)

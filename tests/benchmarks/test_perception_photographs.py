@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 from paths import SHARED
 
-from benchmarks.perception_photographs import (
+from benchmarks.perception.__main__ import main
+from benchmarks.perception._photographs import (
     LABELS,
     PhotographResult,
     aware_lines,
     figures,
     judge_folder,
-    main,
     matched,
     read_labels,
-    sheet,
 )
 from perception import PersonObservation
 
@@ -73,22 +72,22 @@ def test_bad_folders_are_refused(tmp_path, capsys):
     label["a.jpg"]["people_xyxy_px"] = [[1, 1, 5, 5]]
     (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
     with pytest.raises(SystemExit):
-        main([str(tmp_path)])
+        main(["photographs", str(tmp_path)])
     assert "a.jpg must be a photograph that OpenCV reads" in capsys.readouterr().err
 
 
-def test_a_picture_of_noise_has_nobody_and_gets_a_sheet(tmp_path, capsys):
+def test_a_picture_of_noise_has_nobody(tmp_path, capsys):
     noise = np.random.default_rng(0).integers(100, 156, (120, 160, 3), np.uint8)
     cv2.imwrite(str(tmp_path / "n.png"), noise)
     label = {"n.png": {"size": [160, 120], "people_xyxy_px": [[10, 10, 50, 110]]}}
     (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
-    main([str(tmp_path), "--sheet", str(tmp_path / "sheet.png")])
+    main(["photographs", str(tmp_path)])
     text = capsys.readouterr().out
     assert "1 people in 1 photographs: recall 0.00" in text
     assert "nobody" in text
-    assert cv2.imread(str(tmp_path / "sheet.png")).shape == (480, 1920, 3)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not DEV.is_dir(), reason="the photographs of ../shared are not here")
 def test_the_shipped_networks_on_photographs_are_measured_as_they_are():
     """The networks know renders; keypoints confirm what the detector is unsure of."""
@@ -97,4 +96,3 @@ def test_the_shipped_networks_on_photographs_are_measured_as_they_are():
     assert (found["people"], found["pictures"]) == (19, 14)
     assert found["recall"] > 0.6
     assert found["false_per_picture"] <= 0.3
-    assert sheet(DEV, results).shape == (1920, 1920, 3)

@@ -14,9 +14,7 @@ from benchmarks.tracking import (
     WalkerSettings,
     record,
     walk,
-    white_acceleration_walk,
 )
-from tracking import TrackerConfig
 
 STAMPS_S = np.arange(400) / 20.0
 
@@ -36,13 +34,6 @@ def test_the_same_seed_gives_the_same_people(truth: np.ndarray) -> None:
     assert not np.array_equal(truth, walk(20, STAMPS_S, np.random.default_rng(5)))
 
 
-def test_places_follow_from_velocities(truth: np.ndarray) -> None:
-    steps = np.diff(truth[..., :2], axis=0) / 0.05
-    mean_velocity = 0.5 * (truth[1:, :, 2:] + truth[:-1, :, 2:])
-    # The trapezoidal rule over one frame, with accelerations of a few m/s².
-    assert np.abs(steps - mean_velocity).max() < 0.05
-
-
 def test_people_walk_stand_and_stay_inside_and_apart(truth: np.ndarray) -> None:
     side_m = WalkerSettings().side_m(20)
     speed = np.hypot(truth[..., 2], truth[..., 3])
@@ -55,11 +46,6 @@ def test_people_walk_stand_and_stay_inside_and_apart(truth: np.ndarray) -> None:
     distance = np.hypot(offset[..., 0], offset[..., 1]) + 9.0 * np.eye(20)
     # People drawn at random would have a neighbour within 0.3 m in 7 % of cases.
     assert (distance.min(axis=2) < 0.3).mean() < 0.03
-
-
-def test_the_hall_grows_with_the_crowd() -> None:
-    settings = WalkerSettings()
-    assert settings.side_m(100) ** 2 / 100 == pytest.approx(settings.side_m(5) ** 2 / 5)
 
 
 def test_misses_and_clutter_are_as_frequent_as_set() -> None:
@@ -101,12 +87,3 @@ def test_nobody_is_measured_while_out_of_sight() -> None:
     sensor = replace(OCCLUDED, miss_probability=0.0, clutter_per_m2=0.0)
     recording = record(10, 300, np.random.default_rng(6), sensor)
     assert [len(m) for m in recording.measured_m] == recording.visible.sum(axis=1).tolist()
-
-
-def test_walkers_of_the_trackers_model_spread_as_white_acceleration_does() -> None:
-    config = TrackerConfig(initial_velocity_std_mps=1e-3)
-    rng = np.random.default_rng(7)
-    ends = np.array([white_acceleration_walk(0.1, 21, rng, config)[-1] for _ in range(600)])
-    q, t = config.acceleration_density_m2ps3, 2.0
-    assert ends[:, :2].var() == pytest.approx(q * t**3 / 3.0, rel=0.15)
-    assert ends[:, 2:].var() == pytest.approx(q * t, rel=0.15)

@@ -18,7 +18,7 @@ from tools.docs_site.notebook import NOTEBOOK, code_cells, page, printed, read, 
 _NUMBER = re.compile(r"\d+\.\d+")
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_every_cell_runs_and_prints_what_is_stored(tmp_path: Path) -> None:
     notebook = read()
     results = run_cells(notebook, tmp_path)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from hypothesis import strategies as st
 from nav_scenes import finite
 from shapely.geometry import Point
@@ -41,12 +39,3 @@ def some_circles(
         finite(0.3, 1.5),
     )
     return st.lists(one, min_size=min_size, max_size=max_size)
-
-
-def stretched(circle: Circle, ahead_m: float) -> PersonObstacle:
-    """Return a person whose obstacle reaches ahead along the velocity."""
-    x, y, vx, vy, radius = circle
-    speed_mps = math.hypot(vx, vy)
-    tip = Point(x + ahead_m * vx / speed_mps, y + ahead_m * vy / speed_mps)
-    both = Point(x, y).buffer(1.01 * radius).union(tip.buffer(1.01 * radius))
-    return PersonObstacle(0, (x, y), (vx, vy), radius, 1.7, 0.0, both.convex_hull)

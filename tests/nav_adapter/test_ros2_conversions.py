@@ -169,25 +169,6 @@ def test_circles_contain_their_obstacles_and_keep_their_uuid(tracks) -> None:
     assert [each.uuid for each in circle_objects(constraints)] == [each.uuid for each in circles]
 
 
-def stretched(constraints: NavConstraints) -> NavConstraints:
-    longer = tuple(
-        replace(each, polygon=affinity.scale(each.polygon, 2.0, 1.0))
-        for each in constraints.obstacles
-    )
-    return replace(constraints, obstacles=longer)
-
-
-def test_a_stretched_obstacle_is_not_reduced_to_its_circle() -> None:
-    constraints = stretched(around([person(position=(2.0, 1.0), velocity=(1.0, 0.0))]))
-    (obstacle,) = constraints.obstacles
-    (circle,) = circle_objects(constraints)
-    grown = ShapelyPoint(circle.center.x, circle.center.y).buffer(circle.radius, quad_segs=400)
-    assert grown.buffer(1e-3).contains(obstacle.polygon)
-    (teb,) = teb_obstacles(constraints).obstacles
-    assert shape(teb.polygon).symmetric_difference(obstacle.polygon).area < 1e-9
-    assert teb.radius == 0.0
-
-
 @given(crowds())
 def test_teb_gets_circles_with_velocities(tracks) -> None:
     constraints = around(tracks)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import sysconfig
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,7 +63,8 @@ class Environment:
 
     def borrow_dependencies(self) -> None:
         """Let this environment import what the tests' own has installed (not the checkout)."""
-        (self.site / "borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
+        folders = [path for path in sys.path if Path(path).name == "site-packages"]
+        (self.site / "borrowed.pth").write_text("\n".join(folders) + "\n")
 
     def python(self, code: str, **extra: str) -> subprocess.CompletedProcess[str]:
         return _run(self.bin / "python", "-W", "error", "-c", code, cwd=self.folder, **extra)
@@ -98,3 +98,12 @@ def root() -> Path:
 def environment(tmp_path: Path) -> Environment:
     """An empty virtual environment."""
     return Environment.make(tmp_path / "venv")
+
+
+@pytest.fixture(scope="session")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Environment:
+    """An environment with our wheel; dependencies come from the one that runs the tests."""
+    environment = Environment.make(tmp_path_factory.mktemp("installed") / "venv")
+    environment.borrow_dependencies()
+    environment.pip("install", "--quiet", "--no-deps", wheel)
+    return environment

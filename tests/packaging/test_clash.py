@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import shlex
 import zipfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -49,38 +50,48 @@ def assert_reported(done: Any, package: str, culprit: str = "other-vision 9.9") 
 
 
 @pytest.fixture
-def installed(environment: Any, wheel: Path) -> Any:
-    """An environment with our wheel; dependencies come from the one that runs the tests."""
-    environment.borrow_dependencies()
-    environment.pip("install", "--quiet", "--no-deps", wheel)
-    return environment
+def clash(installed: Any, wheel: Path, tmp_path: Path) -> Iterator[Callable[[str], Any]]:
+    """Return a function that installs the foreign package over ours, as pip would."""
+    written: list[str] = []
+
+    def install(package: str) -> Any:
+        with zipfile.ZipFile(foreign_wheel(tmp_path, package)) as archive:
+            archive.extractall(installed.site)
+            written.extend(archive.namelist())
+        return installed
+
+    yield install
+    for name in written:
+        (installed.site / name).unlink()
+    with zipfile.ZipFile(wheel) as archive:
+        ours = archive.namelist()
+        archive.extractall(installed.site, [name for name in written if name in ours])
 
 
-def test_other_installed_after_ours(installed: Any, tmp_path: Path) -> None:
-    installed.pip("install", "--quiet", foreign_wheel(tmp_path, "perception"))
-
+def test_a_package_installed_over_ours_is_reported(clash: Callable[[str], Any]) -> None:
+    installed = clash("perception")
     for package in ("tracking", "nav_adapter", "sim_tests"):
         assert_reported(installed.python(f"import {package}"), "perception")
     assert_reported(installed.command("awarenav", "--help"), "perception")
 
 
 @pytest.mark.parametrize("package", ["tracking", "nav_adapter"])
-def test_every_name_is_protected(installed: Any, tmp_path: Path, package: str) -> None:
-    installed.pip("install", "--quiet", foreign_wheel(tmp_path, package))
-
+def test_every_name_is_protected(clash: Callable[[str], Any], package: str) -> None:
+    installed = clash(package)
     assert_reported(installed.python("import sim_tests"), package)
     unaffected = installed.python("import perception")
     assert unaffected.returncode == 0, unaffected.stderr
 
 
+@pytest.mark.full
 def test_other_installed_before_ours_and_the_remedy(
     environment: Any, wheel: Path, tmp_path: Path
 ) -> None:
     environment.borrow_dependencies()
     environment.pip("install", "--quiet", foreign_wheel(tmp_path, "perception"))
     environment.pip("install", "--quiet", "--no-deps", wheel)
-    for package in ("perception", "tracking", "nav_adapter"):
-        assert_reported(environment.python(f"import {package}"), "perception")
+    # The other one's modules beside ours do no harm.
+    assert environment.python("import nav_adapter").returncode == 0
 
     # Uninstalling takes away the __init__.py that both had put there.
     environment.pip("uninstall", "--quiet", "--yes", "other-vision")
@@ -106,18 +117,9 @@ def test_stray_package_or_module_ahead_on_the_path_is_named_by_its_path(
     assert_reported(done, "perception", f"unknown distribution at {place}.")
 
 
-def test_good_installation_needs_no_scan_and_users_files_are_welcome(installed: Any) -> None:
+def test_a_good_installation_needs_no_scan(installed: Any) -> None:
     folder = installed.site.relative_to(installed.folder).as_posix()
-    guard = GUARD_ALONE.replace("FOLDER", folder)
-    done = installed.python(guard)
-    assert done.returncode == 0, done.stderr
-
-    (installed.site / "perception" / "my_camera.yaml").write_text("width: 640\n")
-    done = installed.python(guard)
-    assert done.returncode == 0, done.stderr
-
-    (installed.site / "perception" / "my_detector.py").write_text("")
-    done = installed.python("import nav_adapter")
+    done = installed.python(GUARD_ALONE.replace("FOLDER", folder))
     assert done.returncode == 0, done.stderr
 
 

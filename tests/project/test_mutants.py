@@ -121,7 +121,7 @@ def test_draws_are_repeatable_and_at_least_half_of_them_safety_code(tmp_path: Pa
     assert all(each.safety for each in draw(tmp_path, 10, 3, only_safety=True))
 
 
-@pytest.mark.parametrize("word", ["nav_adapter/limit", "tracking/clock", "perception/_attention"])
+@pytest.mark.parametrize("word", ["nav_adapter/limit", "tracking/clock", "perception/awareness"])
 def test_safety_code_is_found(word: str) -> None:
     assert SAFETY.fullmatch(f"{word}.py")
     assert (ROOT / f"{word}.py").exists()

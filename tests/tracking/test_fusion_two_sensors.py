@@ -15,13 +15,11 @@ from fusion_scenes import (
     play,
     seen_by_camera,
     seen_by_laser,
-    sensors,
 )
 from tracking_scenes import camera_at, nearest, white_acceleration
 
 from perception import Camera
 from tracking import (
-    AwarenessFilterConfig,
     CameraView,
     PersonTracker,
     ScannerView,
@@ -360,40 +358,6 @@ def test_unknown_and_wrong_sensors_are_refused_by_name() -> None:
         SensorConfig(view=3)
     with pytest.raises(TrackingError, match="did you mean 'sees_faces'"):
         SensorConfig(sees_face=True)
-
-
-def test_a_tracker_of_two_sensors_is_restored_bit_for_bit(tmp_path) -> None:
-    people = [walks(5.0, -2.0, -0.5, 0.7), stands(4.0, 1.5), stands(-3.0)]
-    look = lambda person, now: 0.9 if person and now < 2.0 else None  # noqa: E731
-    rig = Rig(people, faces=look, camera_latency_s=0.2, ratios=[1.5, 1.0, 1.0])
-    config = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=4.0))
-    tracker, events = both(config), rig.events(4.0)
-    stop = len(events) // 2
-    play(tracker, events[:stop])
-    tracker.save(tmp_path / "tracker.json")
-    view = tracker._sensors.all[0].view
-    restored = PersonTracker.load(tmp_path / "tracker.json", view=view, sensors=sensors())
-    assert restored.state() == tracker.state()
-    assert restored.silences_s == tracker.silences_s
-    for event in events[stop:]:
-        assert everything(play(restored, [event])) == everything(play(tracker, [event]))
-    assert restored.state() == tracker.state()
-
-
-def test_a_state_is_refused_with_other_sensors() -> None:
-    tracker = both()
-    play(tracker, Rig([stands(3.0)]).events(1.0))
-    state = tracker.state()
-    assert list(PersonTracker.from_state(state).silences_s) == ["camera", LASER]
-    for wrong in ({}, sensors(detection_probability=0.5), {**sensors(), "b": SensorConfig()}):
-        with pytest.raises(TrackingError, match="sensors must be those of the saved tracker"):
-            PersonTracker.from_state(state, sensors=wrong)
-    state["frames"][0]["sensor"] = "sonar"
-    with pytest.raises(TrackingError, match=r"frames\[0\]\.sensor must be one of camera, laser"):
-        PersonTracker.from_state(state)
-    del state["latest"]["clocks"][LASER]
-    with pytest.raises(TrackingError, match=r"clocks must be those of the sensors|per sensor"):
-        PersonTracker.from_state(state)
 
 
 def test_the_view_of_a_scanner_has_a_range_and_a_field() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
@@ -135,8 +134,11 @@ def test_an_ambiguous_match_forgets_the_size():
     after_images(tracker, stamps, lasting=0.03, size_ratio=1.6)
     two = [seen(PLACE_M + offset, 1.0, lasting=0.03, size_ratio=1.6) for offset in (-0.05, 0.05)]
     tracker.update(two, 1.0, camera_at())
-    latest = tracker.state()["latest"]["tracks"]
-    assert latest["size_variances"][0] is None or latest["size_variances"][0] > 0.03**2 * 1.5
+    # With its size known, the range would stay within 6 % (the test of hidden feet).
+    first, *_ = after_images(tracker, np.arange(1.05, 3.0, 0.05), ratio=1.6)
+    range_m, std_m = range_and_std(first)
+    assert first.id == 1
+    assert std_m > 0.06 * range_m
 
 
 def test_a_robot_that_drives_makes_the_velocity_of_people_of_unknown_size_less_certain():
@@ -152,19 +154,3 @@ def test_a_robot_that_drives_makes_the_velocity_of_people_of_unknown_size_less_c
 
     still, driving = velocity_std(0.0), velocity_std(1.0)
     assert driving**2 - still**2 == pytest.approx(SIZE_STD**2, rel=0.15)
-
-
-def test_a_saved_tracker_goes_on_with_sizes_to_the_bit():
-    first = both()
-    for tick in range(20):
-        stamp = 0.05 * tick
-        first.update([seen(PLACE_M, stamp, ratio=1.5)], stamp, camera_at())
-        first.update([seen_by_laser(PLACE_M, stamp)], stamp, laser_at(), sensor=LASER)
-    saved = json.loads(json.dumps(first.state()))
-    second = PersonTracker.from_state(saved)
-    for tick in range(20, 60):
-        stamp = 0.05 * tick
-        one = seen(PLACE_M, stamp, ratio=1.5)
-        (ours,), (theirs,) = (each.update([one], stamp, camera_at()) for each in (first, second))
-    assert np.array_equal(ours.position_odom_m, theirs.position_odom_m)
-    assert np.array_equal(ours.covariance_odom, theirs.covariance_odom)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Sequence
+from contextlib import suppress
 
 import pytest
 from hypothesis import given
@@ -118,11 +118,11 @@ def test_a_frame_refused_for_another_reason_is_no_evidence_of_a_new_clock() -> N
     tracker = PersonTracker(TrackerConfig(new_clock_after_s=0.1))
     play(tracker, 0.0, 20)
     play(tracker, 3600.0, 2)
-    state = json.dumps(tracker.state())
+    before = as_bytes(tracker.predict(3600.1))
     mirrored = CAMERA * -1.0
     with pytest.raises(TrackingError, match="T_odom_camera"):
         tracker.update((), 3600.2, mirrored)
-    assert json.dumps(tracker.state()) == state
+    assert as_bytes(tracker.predict(3600.1)) == before
 
 
 STEPS = st.lists(
@@ -131,21 +131,15 @@ STEPS = st.lists(
 
 
 @given(STEPS)
-def test_ids_are_never_used_again_and_a_saved_tracker_goes_on(steps: Sequence[float]) -> None:
+def test_ids_are_never_used_again(steps: Sequence[float]) -> None:
     tracker, now, ever = PersonTracker(), 1e4, 0
     alive: set[int] = set()
     earlier: set[int] = set()
     for step_s in steps:
         now += step_s
         refused = tracker.refused_early_frames
-        restored = PersonTracker.from_state(json.loads(json.dumps(tracker.state())))
-        results = []
-        for each in (tracker, restored):
-            try:
-                results.append(as_bytes(show(each, now)))
-            except TrackingError as error:
-                results.append([(str(error),)])
-        assert results[0] == results[1]
+        with suppress(TrackingError):
+            show(tracker, now)
         if tracker.last_stamp_s is None or now < tracker.last_stamp_s:
             continue
         ids = {track.id for track in tracker.predict(tracker.last_stamp_s)}

@@ -123,13 +123,3 @@ def test_exits_move_with_the_camera() -> None:
     assert people.kept_s() == pytest.approx(CONFIG.max_missed_s, abs=0.11)
     people.walk(3.0, 8.0, y_m=1.0)  # 6 m ahead of the camera now, nobody has left there
     assert people.kept_s() == pytest.approx(CONFIG.max_coast_s, abs=0.11)
-
-
-def test_a_restored_tracker_knows_the_exits() -> None:
-    people = passage(4)
-    for _ in range(4):
-        people.walk(3.0, 8.0)
-        people.kept_s()
-    people.tracker = PersonTracker.from_state(people.tracker.state())
-    people.walk(3.0, 8.0)
-    assert people.kept_s() == pytest.approx(CONFIG.max_missed_s, abs=0.11)

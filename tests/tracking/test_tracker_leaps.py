@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import re
-from collections.abc import Sequence
 
 import pytest
 from fusion_scenes import LASER, everything, laser_at, seen_by_laser, sensors
-from hypothesis import given
 from hypothesis import strategies as st
 from tracking_scenes import CAMERA, PERIOD_S, observe
 
@@ -173,27 +170,6 @@ STEPS = st.lists(
     ),
     max_size=50,
 )
-
-
-@given(STEPS)
-def test_a_saved_tracker_goes_on_through_leaps(steps: Sequence[tuple[float, str]]) -> None:
-    tracker, now = PersonTracker(sensors=sensors()), 100.0
-    for step_s, sensor in steps:
-        now += step_s
-        restored = PersonTracker.from_state(
-            json.loads(json.dumps(tracker.state())), sensors=sensors()
-        )
-        assert restored.state() == tracker.state()
-        results = []
-        for each in (tracker, restored):
-            try:
-                results.append(everything(show(each, now, sensor)))
-            except TrackingError as error:
-                results.append([(str(error),)])
-        assert results[0] == results[1]
-        assert restored.refused_frames == tracker.refused_frames
-        total = tracker.refused_early_frames + tracker.refused_late_frames
-        assert sum(tracker.refused_frames.values()) == total
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -69,12 +68,3 @@ def test_the_threshold_is_a_setting() -> None:
     for frame in range(20):
         (track,) = feed(tracker, frame, 0.01)
     assert track.status == "confirmed"
-
-
-def test_a_weak_detection_survives_saving() -> None:
-    tracker = PersonTracker()
-    for frame in range(20):
-        feed(tracker, frame, 0.9 if frame % 2 else 0.2)
-    state = json.loads(json.dumps(tracker.state()))
-    assert {True, False} == {flag for frame in state["frames"] for flag in frame["weak"]}
-    assert PersonTracker.from_state(state).state() == tracker.state()

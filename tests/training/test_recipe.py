@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from perception.networks.heads._crops import head_crop
-from perception.networks.heads._ray_view import looking_at
+from perception.networks.heads._crops import head_crop, looking_at
 from sim_tests.dataset import RenderConfig
 from sim_tests.world.hall import LAYOUTS
 from training.networks import HeadSample, Recipe, cropped, similarity, warp, with_surroundings
-from training.workers import PEOPLE, random_person
 
 
 def test_evaluation_has_its_own_halls_goods_and_colours():
@@ -23,29 +21,6 @@ def test_evaluation_has_its_own_halls_goods_and_colours():
     assert shipped.variants[1] < recipe.variants[0]
     assert recipe.variants[1] < held_out.variants[0]
     assert held_out.seed != recipe.seed
-
-
-def test_a_random_crowd_is_the_same_for_the_same_seed_and_has_no_shipped_worker():
-    crowd = [random_person(number) for number in range(60)]
-    assert crowd == [random_person(number) for number in range(60)]
-    assert crowd[0] != random_person(0, seed=1)
-    assert not {person.name for person in crowd} & {person.name for person in PEOPLE}
-
-
-def test_a_random_crowd_is_as_varied_as_a_warehouse():
-    crowd = [random_person(number) for number in range(200)]
-    statures = np.array([person.stature_m for person in crowd])
-    assert statures.min() >= 1.48
-    assert statures.max() <= 2.0
-    assert statures.std() > 0.07
-    brightness = np.array([sum(person.skin) for person in crowd])
-    assert brightness.min() < 260
-    assert brightness.max() > 540
-    assert {person.headwear[0] for person in crowd} == {"none", "cap", "helmet"}
-    assert {person.hair for person in crowd} == {"short", "crop", "bob", "bun", "ponytail", "bald"}
-    for person in crowd:
-        colours = (person.skin, person.top_colour, person.trousers, person.hair_colour)
-        assert all(0 <= value <= 255 for colour in colours for value in colour)
 
 
 @pytest.mark.parametrize("side", [20.0, 41.3, 64.0, 97.0, 150.5])

@@ -1,4 +1,4 @@
-"""The documentation site: generated pages, films of the gallery, notebook and checks.
+"""The documentation site: generated pages, films and pictures of the gallery, and the notebook.
 
 ``mkdocs.yml`` names ``hooks.py``, through which MkDocs gets the generated pages.
 """

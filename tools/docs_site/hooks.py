@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import posixpath
+import re
 import sys
 from functools import partial
 from pathlib import Path
@@ -17,12 +19,11 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from awarenav import __version__  # noqa: E402
-from tools.docs_site import notebook, reference  # noqa: E402
-from tools.docs_site.outside_files import FOLDER, OutsideFiles  # noqa: E402
+from tools.docs_site import gallery, notebook, reference  # noqa: E402
 
 #: Pages whose films and code get the full width.
 _WIDE: Final = ("index.md", "gallery.md")
-_outside: OutsideFiles | None = None
+_LINK: Final = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
@@ -30,6 +31,8 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     if config.repo_url:
         config.edit_uri = "edit/main/docs/"
     config.copyright = f"awarenav {__version__} · Apache-2.0"
+    if "mkdocs-click" not in config.markdown_extensions:
+        config.markdown_extensions.append("mkdocs-click")
     if os.environ.get("MIKE_DOCS_VERSION"):
         config.extra["version"] = {"provider": "mike"}
     return config
@@ -37,16 +40,10 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are generated."""
-    global _outside  # noqa: PLW0603  (MkDocs calls functions, and gives them nothing to share)
     add = partial(_add, files, config)
-    _outside = OutsideFiles(
-        ROOT, {page.src_uri: page.content_string for page in files.documentation_pages()}
-    )
-    for name, text in _outside.pages.items():
-        add(name, content=text)
-    for name, path in _outside.pictures.items():
-        add(name, abs_src_path=str(ROOT / path))
-    for name, text in reference.pages().items():
+    written = {file.src_uri for file in files}
+    metrics = "reference/metrics.md" if "metrics.md" in written else "metrics.md"
+    for name, text in (reference.pages(metrics) | {gallery.PAGE: gallery.gallery_page()}).items():
         add(name, content=text)
     stem = notebook.NOTEBOOK.stem
     text, pictures = notebook.page(notebook.read(), stem)
@@ -56,13 +53,36 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
-def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Lead links out of ``docs/`` to pages of the site; give films and code their full width."""
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) -> str:
+    """Lead links out of ``docs/`` to the repository; give films and code their full width."""
     if page.file.src_uri in _WIDE:
         page.meta["hide"] = ["navigation"]
-    elif page.file.src_uri.startswith(f"{FOLDER}/"):
-        page.meta["hide"] = ["navigation", "toc"]
-    return markdown if _outside is None else _outside.links_rewritten(page.file.src_uri, markdown)
+    return links_rewritten(page.file.src_uri, markdown, config.repo_url or "")
+
+
+def links_rewritten(name: str, text: str, repo_url: str) -> str:
+    """Return a page's Markdown with links that work on the site.
+
+    A link to a file outside ``docs/`` leads to the repository; without an address of the
+    repository its text stays. A notebook's link leads to the page that shows it.
+
+    Args:
+        name: path of the page in ``docs/``.
+        text: its Markdown.
+        repo_url: address of the repository, or empty.
+    """
+
+    def rewrite(link: re.Match[str]) -> str:
+        shown, target, anchor = link.group(1), link.group(2), link.group(3) or ""
+        path = posixpath.normpath(posixpath.join("docs", posixpath.dirname(name), target))
+        if path.startswith("docs/"):
+            return f"[{shown}]({target.replace('.ipynb', '.md')}{anchor})"
+        return f"[{shown}]({repo_url}/blob/main/{path}{anchor})" if repo_url else shown
+
+    parts = notebook.FENCED.split(text)
+    return "".join(
+        part if notebook.FENCED.fullmatch(part) else _LINK.sub(rewrite, part) for part in parts
+    )
 
 
 def _add(files: Files, config: MkDocsConfig, name: str, **source: Any) -> None:

@@ -1,23 +1,44 @@
-"""The generated pages of the site's reference."""
+"""The generated pages of the site's reference: Python, commands, settings, metrics, topics.
+
+mkdocstrings documents packages, mkdocs-click the commands and griffe-pydantic the settings; the
+pages here name what they shall show. Metrics and topics are tables of their registries.
+"""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, Final, get_args
+
+from pydantic import BaseModel
 
 from nav_adapter import AwarenessPolicy, InflationPolicy, SpeedPolicy
 from nav_adapter.policies import InterpolatedHumanSpeed, InterpolatedInflation
-from nav_adapter.ros2 import RobotFile
+from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, RobotFile, Topic
+from nav_adapter.ros2.messages import ros_type
 from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
 from sim_tests.scenario import Scenario
-from sim_tests.study.suite import Thresholds
+from sim_tests.study.measures import COLUMNS, METRICS, RATIOS, SHARES, Metric
 from tracking import TrackerConfig
 
-from .api_pages import PACKAGES, front_door_page, package_page
-from .command_page import commands_page
-from .config_pages import ConfigPage
-from .table_pages import metrics_page, topics_page
+from .roles import plain
 
+#: Packages with a page of their own.
+PACKAGES: Final = (
+    "perception",
+    "perception.laser",
+    "perception.surround",
+    "perception.networks",
+    "tracking",
+    "nav_adapter",
+    "nav_adapter.alerts",
+    "nav_adapter.policies",
+    "nav_adapter.exporters",
+    "nav_adapter.ros2",
+    "sim_tests",
+)
 _INDEX: Final = """# Reference
 
 Everything here is made from the code of this version.
@@ -30,64 +51,277 @@ Everything here is made from the code of this version.
   [sim_tests](sim_tests.md)
 - **[Commands](commands.md)** of `awarenav`, with every option
 - **Files**: keys of a [policy](policy-keys.md), a [scenario](scenario-keys.md), a
-  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md),
-  [thresholds](threshold-keys.md) and [rendered sets](render-keys.md)
-- **[Metrics](metrics.md)** and columns of `episodes.csv`, and their
-  [definitions](../metrics.md)
+  [tracker](tracker-keys.md), a [fault](fault-keys.md), the [bridge's robot](robot-keys.md)
+  and [rendered sets](render-keys.md)
+- **[Metrics]({metrics})** and columns of `episodes.csv`
 - **[ROS 2 topics](topics.md)** of the bridge
 """
-_KEYS: Final = """The suffix of a key is its unit. An unknown key is refused with the nearest valid
-one. A key that is left out has its default; "null" stands for nothing in YAML."""
+_COMMANDS: Final = """# Commands
 
-CONFIG_PAGES: Final = {
-    "policy-keys": ConfigPage(
+Each command as `awarenav COMMAND --help` prints it. A mistyped command, option or name gets a
+suggestion. The exit status is 0 for success, 1 when a check failed or part of the work could not
+be done, 2 for bad input, and 130 when interrupted.
+
+::: mkdocs-click
+    :module: awarenav.cli
+    :command: app
+    :prog_name: awarenav
+    :depth: 1
+"""
+_PACKAGE: Final = """# {package}
+
+::: {package}
+    options:
+      members: [{names}]
+"""
+_FRONT_DOOR: Final = """# awarenav
+
+{about}
+
+The main names of three packages, imported when they are first used.
+
+| name | documented on |
+| --- | --- |
+{rows}
+"""
+_KEYS: Final = """The suffix of a key is its unit. An unknown key is refused with the nearest valid
+one. A key that is left out has its default; "null" stands for None in YAML."""
+_MODEL: Final = """::: {path}
+    options:
+      extensions: [griffe_pydantic]
+      heading_level: 3
+      show_bases: false
+      show_if_no_docstring: true
+      inherited_members: true
+      members: [{names}]
+"""
+_METRICS: Final = """# Metrics
+
+The columns that `awarenav crossings` writes and `awarenav compare` prints, from the code that
+defines them. An empty cell means that a figure does not apply, which is never the same as 0."""
+_TOPICS: Final = """# ROS 2 topics
+
+The topics of `awarenav bridge` with their types and quality of service, from the code that opens
+them. [Nav2 and ROS 2](../nav2.md) says who reads which, and how to set up each reader. `--rename`
+and the other options of [`awarenav bridge`](commands.md#awarenav-bridge) change names."""
+_BETTER: Final = {"lower": "lower", "higher": "higher", "neither": "–"}
+#: Suffix of a name, and the unit that it stands for.
+_UNITS: Final = {
+    "m": "m",
+    "mps": "m/s",
+    "mps2": "m/s²",
+    "mps3": "m/s³",
+    "rad": "rad",
+    "deg": "°",
+    "s": "s",
+    "hz": "Hz",
+}
+
+
+@dataclass(frozen=True)
+class SettingsPage:
+    """A page of the keys of a file.
+
+    Attributes:
+        title: heading of the page.
+        intro: Markdown before the first model.
+        model: the model of the whole file.
+        alternatives: for a protocol that a key names, the models that a file can give.
+    """
+
+    title: str
+    intro: str
+    model: type[BaseModel]
+    alternatives: Mapping[type, tuple[type[BaseModel], ...]] = field(default_factory=dict)
+
+    def markdown(self, name: str, homes: dict[type[BaseModel], str]) -> str:
+        """Return the page: each model below the path of the first key that holds it.
+
+        Args:
+            name: of the page.
+            homes: pages of models that other pages show, which get a link here; this page's own
+                are added.
+        """
+        parts = [f"# {self.title}\n\n{self.intro} {_KEYS}\n"]
+        for path, model in self.models():
+            anchor = model.__name__.lower()
+            heading = f"{path}: {model.__name__}" if path else "The file"
+            parts.append(f"## {heading} {{ #{anchor} }}\n")
+            home = homes.setdefault(model, name)
+            if home != name:
+                parts.append(f"See [{model.__name__}]({home}.md#{anchor}).\n")
+                continue
+            dotted = f"{model.__module__}.{model.__qualname__}"
+            parts.append(_MODEL.format(path=dotted, names=", ".join(model.model_fields)))
+        return "\n".join(parts)
+
+    def models(self) -> Iterator[tuple[str, type[BaseModel]]]:
+        """Yield every model once, with the path of the first key that holds it."""
+        seen: set[type[BaseModel]] = set()
+        waiting: list[tuple[str, type[BaseModel]]] = [("", self.model)]
+        while waiting:
+            path, model = waiting.pop(0)
+            if model in seen:
+                continue
+            seen.add(model)
+            yield path, model
+            inside = [
+                (f"{path}.{name}" if path else name, found)
+                for name, info in model.model_fields.items()
+                for found in self._held(info.annotation)
+            ]
+            waiting = inside + waiting
+
+    def _held(self, annotation: Any) -> tuple[type[BaseModel], ...]:
+        """Return the models in an annotation."""
+        if isinstance(annotation, type):
+            if annotation in self.alternatives:
+                return self.alternatives[annotation]
+            if issubclass(annotation, BaseModel):
+                return (annotation,)
+        return tuple(model for part in get_args(annotation) for model in self._held(part))
+
+
+SETTINGS_PAGES: Final = {
+    "policy-keys": SettingsPage(
         "Policy keys",
-        f"The keys of a policy's file, for [policies](../policies.md). {_KEYS}",
+        "The keys of a policy's file, for [policies](../policies.md).",
         AwarenessPolicy,
-        alternatives={
-            InflationPolicy: (InterpolatedInflation,),
-            SpeedPolicy: (InterpolatedHumanSpeed,),
-        },
+        {InflationPolicy: (InterpolatedInflation,), SpeedPolicy: (InterpolatedHumanSpeed,)},
     ),
-    "scenario-keys": ConfigPage(
+    "scenario-keys": SettingsPage(
         "Scenario keys",
-        f"The keys of a scenario's file, for [scenarios](../scenarios.md). {_KEYS} Any number "
-        "under `people`, `workers` and `robot` may be a [distribution](../scenarios.md).",
+        "The keys of a scenario's file. Any number under `people` and `robot` may be a "
+        "distribution.",
         Scenario,
     ),
-    "tracker-keys": ConfigPage(
-        "Tracker keys", f"Settings of the tracker, for [tracking](../tracking.md). {_KEYS}",
-        TrackerConfig,
+    "tracker-keys": SettingsPage(
+        "Tracker keys", "Settings of the tracker, for [tracking](../tracking.md).", TrackerConfig
     ),
-    "fault-keys": ConfigPage(
-        "Fault keys", f"The keys of a fault, for [runs and faults](../runs.md). {_KEYS}", Fault
-    ),
-    "robot-keys": ConfigPage(
+    "fault-keys": SettingsPage("Fault keys", "The keys of a fault.", Fault),
+    "robot-keys": SettingsPage(
         "Robot file of the bridge",
-        f"The file that `awarenav bridge --robot` reads, for [Nav2](../nav2.md). {_KEYS}",
+        "The file that `awarenav bridge --robot` reads, for [Nav2](../nav2.md).",
         RobotFile,
     ),
-    "threshold-keys": ConfigPage(
-        "Thresholds of the test suite",
-        f"The thresholds of [the crossings as a test suite](../test-suite.md). {_KEYS}",
-        Thresholds,
+    "render-keys": SettingsPage(
+        "Settings of rendered sets", "The settings of `awarenav render`.", RenderConfig
     ),
-    "render-keys": ConfigPage(
-        "Settings of rendered sets",
-        f"The settings of `awarenav render`, for [rendered images](../rendering.md). {_KEYS}",
-        RenderConfig,
-    ),
-}  # fmt: skip
+}
 
 
-def pages() -> dict[str, str]:
-    """Return the Markdown of every generated page of the reference, by its path on the site."""
+def pages(metrics: str) -> dict[str, str]:
+    """Return the Markdown of every generated page of the reference, by its path on the site.
+
+    Args:
+        metrics: path of the page of metrics.
+    """
+    homes: dict[type[BaseModel], str] = {}
+    settings = {
+        f"reference/{name}.md": page.markdown(name, homes) for name, page in SETTINGS_PAGES.items()
+    }
+    in_reference = metrics.removeprefix("reference/")
     return {
-        "reference/index.md": _INDEX,
+        "reference/index.md": _INDEX.format(
+            metrics=in_reference if in_reference != metrics else f"../{metrics}"
+        ),
         **{f"reference/{package}.md": package_page(package) for package in PACKAGES},
         "reference/awarenav.md": front_door_page(),
-        "reference/commands.md": commands_page(),
-        **{f"reference/{name}.md": page.markdown() for name, page in CONFIG_PAGES.items()},
-        "reference/metrics.md": metrics_page(),
+        "reference/commands.md": _COMMANDS,
+        **settings,
+        metrics: metrics_page(),
         "reference/topics.md": topics_page(),
     }
+
+
+def package_page(package: str) -> str:
+    """Return the page of a package, with every name of its ``__all__``."""
+    names = import_module(package).__all__
+    return _PACKAGE.format(package=package, names=", ".join(names))
+
+
+def front_door_page() -> str:
+    """Return the page of ``awarenav``, whose names are those of other packages."""
+    front = import_module("awarenav")
+    homes = {
+        name: package for package in reversed(PACKAGES) for name in import_module(package).__all__
+    }
+    rows = []
+    for name in front.__all__:
+        home = homes.get(name)
+        where = f"[{home}]({home}.md#{home}.{name})" if home else "the base of every error"
+        rows.append(f"| `awarenav.{name}` | {where} |")
+    about = (front.__doc__ or "").partition("\n\n")[0]
+    return _FRONT_DOOR.format(about=about, rows="\n".join(rows))
+
+
+def metrics_page() -> str:
+    """Return the page of metrics and columns."""
+    columns = ["| column | unit | meaning |", "| --- | --- | --- |"]
+    columns += [
+        f"| `{name}` | {unit_of(name)} | {_cell(plain(meaning))} |"
+        for name, meaning in COLUMNS.items()
+    ]
+    return "\n\n".join(
+        [
+            _METRICS,
+            "## Shares of episodes",
+            _metric_table(SHARES),
+            "## Means over episodes",
+            _metric_table(METRICS),
+            "## Ratios of sums over episodes",
+            _metric_table({name: ratio.metric for name, ratio in RATIOS.items()}),
+            "## Columns of episodes.csv",
+            "\n".join(columns) + "\n",
+        ]
+    )
+
+
+def topics_page() -> str:
+    """Return the page of topics."""
+    return "\n\n".join(
+        [
+            _TOPICS,
+            "## Published",
+            _topic_table(PUBLISHED.values()),
+            "## Published with `--speed-mask`",
+            _topic_table(MASK_TOPICS.values()),
+            "## Read",
+            _topic_table(READ.values()) + "\n",
+        ]
+    )
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that the suffix of a name stands for; empty for none."""
+    _, underscore, suffix = name.rpartition("_")
+    return _UNITS.get(suffix, "") if underscore else ""
+
+
+def _metric_table(metrics: Mapping[str, Metric]) -> str:
+    rows = ["| metric | title | unit | better | meaning |", "| --- | --- | --- | --- | --- |"]
+    rows += [
+        f"| `{name}` | {_cell(each.title)} | {each.unit} | {_BETTER[each.better]} | "
+        f"{_cell(each.meaning)} |"
+        for name, each in metrics.items()
+    ]
+    return "\n".join(rows)
+
+
+def _topic_table(topics: Iterable[Topic]) -> str:
+    rows = [
+        "| topic | type | reliability | durability | depth |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    rows += [
+        f"| `/{each.name}` | `{ros_type(each.message).replace('/msg/', '/')}` | "
+        f"{'reliable' if each.reliable else 'best effort'} | "
+        f"{'transient local' if each.transient_local else 'volatile'} | {each.depth} |"
+        for each in topics
+    ]
+    return "\n".join(rows)
+
+
+def _cell(text: str) -> str:
+    """Return text for one cell of a table."""
+    return " ".join(text.split()).replace("|", "\\|")

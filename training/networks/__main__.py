@@ -7,8 +7,6 @@ it was interrupted.
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +18,9 @@ import torch
 from torch import nn
 
 from perception import OnnxPoseEstimator
-from perception.shipped import update_manifest
 from sim_tests.actors.body import load_worker
 
+from ..manifest import update_manifest
 from . import _detector_train, _head_train, _pose_train
 from ._calibrate import limb_scale
 from ._detector_data import DetectorData
@@ -32,7 +30,7 @@ from ._export import export_detector, export_head, export_pose
 from ._fit import AUTO, torch_device
 from ._head_data import HeadData
 from ._head_net import HeadNet
-from ._head_shapes import add_head_shapes
+from ._head_shapes import add_head_shapes, bodies
 from ._head_train import calibration, predictions, train_head
 from ._pose_data import PoseData
 from ._pose_net import PoseNet
@@ -43,6 +41,8 @@ from .quantise import quantise
 
 _ROOT: Final = Path(__file__).parents[2]
 _MODELS: Final = _ROOT / "perception" / "models"
+# The last commit with training/workers, which makes random workers.
+_CROWD_COMMIT: Final = "11d37c7"
 _STAGES: Final = ("data", "head", "pose", "detector", "export")
 _TRAINERS: Final[dict[str, Callable[[Run], nn.Module]]] = {
     "head": train_head,
@@ -138,16 +138,11 @@ def main() -> None:
     work: Path = chosen.work
     shards, check = work / "shards", work / "shards_check"
     if "data" in stages:
-        make_shards(
-            recipe, _crowd(recipe, work / "crowd", chosen.processes), shards, chosen.processes
-        )
         held_out = recipe.held_out()
-        make_shards(
-            held_out,
-            _crowd(held_out, work / "crowd_check", chosen.processes),
-            check,
-            chosen.processes,
-        )
+        # Both crowds are asked for before hours of rendering.
+        crowd, others = _crowd(recipe, work / "crowd"), _crowd(held_out, work / "crowd_check")
+        make_shards(recipe, crowd, shards, chosen.processes)
+        make_shards(held_out, others, check, chosen.processes)
     for name, train in _TRAINERS.items():
         if name in stages:
             start = starts.get(name)
@@ -163,11 +158,21 @@ def _starts(folder: Path) -> dict[str, Path]:
     return {stage: path for stage, path in files.items() if path.is_file()}
 
 
-def _crowd(recipe: Recipe, folder: Path, processes: int) -> tuple[str, ...]:
-    """Return the files of the random workers, with heads of other shapes; make what is missing."""
-    command = ["-m", "training.workers", "--random", str(recipe.crowd), "--jobs", str(processes)]
-    command += ["--seed", str(recipe.seed), "--out", str(folder)]
-    subprocess.run([sys.executable, *command], cwd=_ROOT, check=True)
+def _crowd(recipe: Recipe, folder: Path) -> tuple[str, ...]:
+    """Return the files of the random workers, with heads of other shapes that are made here.
+
+    Raises:
+        SystemExit: for a folder with fewer workers than the recipe has.
+    """
+    found = len(bodies(folder))
+    if found < recipe.crowd:
+        raise SystemExit(
+            f"{folder} has {found} of {recipe.crowd} random workers. Commit {_CROWD_COMMIT} makes "
+            "them, with the packages of its training/workers/requirements.txt:\n"
+            f"  git worktree add build/workers {_CROWD_COMMIT} && cd build/workers\n"
+            f"  python -m training.workers --random {recipe.crowd} --seed {recipe.seed} "
+            f"--out {folder.resolve()}"
+        )
     add_head_shapes(folder, recipe.head_shapes, recipe.seed)
     return tuple(str(path) for path in sorted(folder.glob("*.npz")))
 

@@ -84,10 +84,14 @@ class HeadWarp:
         return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-20))
 
 
+def bodies(folder: Path) -> list[Path]:
+    """Return the files of the workers in a folder, without copies that have another head."""
+    return [path for path in sorted(folder.glob("*.npz")) if "_shape" not in path.stem]
+
+
 def add_head_shapes(folder: Path, copies: int, seed: int) -> None:
     """Write the copies that are missing of every worker in a folder."""
-    bodies = [path for path in sorted(folder.glob("*.npz")) if "_shape" not in path.stem]
-    for number, path in enumerate(bodies):
+    for number, path in enumerate(bodies(folder)):
         for copy in range(1, copies + 1):
             out = path.with_name(f"{path.stem}_shape{copy}.npz")
             if not out.exists():

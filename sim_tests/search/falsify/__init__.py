@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._falsify import Budget
@@ -24,18 +24,4 @@ __all__ = [
     "worst_trials",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._falsify": ("Budget",),
-        "._no_floor_planner": ("NoFloorPlanner",),
-        "._restarted_search": (
-            "CONTACT_SCORE",
-            "NO_MARGIN_SCORE",
-            "RestartedSearch",
-            "score",
-        ),
-        "._scenario_space": ("ScenarioSpace",),
-        "._worst_cases": ("worst_trials",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

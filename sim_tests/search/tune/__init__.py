@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._evaluation import Evaluation
@@ -23,17 +23,4 @@ __all__ = [
     "shipped_ranges",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._evaluation": ("Evaluation",),
-        "._policy_space": (
-            "PolicySpace",
-            "read_ranges",
-            "shipped_ranges",
-        ),
-        "._results": ("importances",),
-        "._settings": ("TuneSettings",),
-        "._tune": ("ranked_trials",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import copy
-import difflib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from pydantic import ValidationError
 
+from awarenav.errors import did_you_mean
 from nav_adapter import AwarenessPolicy, NavError
 from perception.anthropometry import BODY_RADIUS_M
 from perception.documents import parse_yaml, read_yaml
@@ -52,8 +52,6 @@ class PolicyRange(Range):
         also: other keys of the policy that get the same value.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     also: tuple[str, ...] = ()
 
 
@@ -90,8 +88,7 @@ class PolicySpace:
                 if _is_off(self._data, place):
                     continue
                 if not isinstance(_get(self._data, place), float | int):
-                    near = difflib.get_close_matches(place, _number_keys(self._data), n=1)
-                    hint = f"; did you mean {near[0]!r}?" if near else ""
+                    hint = did_you_mean(place, _number_keys(self._data))
                     raise SimError(f"the policy has no number {place!r}{hint}")
         for corner in (0.0, 1.0):
             self.policy({p: (1 - corner) * r.low + corner * r.high for p, r in self.ranges.items()})

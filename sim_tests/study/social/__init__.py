@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._episode import Outcome, SocialEpisode
-    from ._files import FORMATS, check_episode, read_episode, write_episode
+    from ._files import FORMATS, read_track, write_episode
     from ._measures import SOCIAL_MEASURES, SocialMeasure, social_measures
     from ._recorder import EpisodeRecorder, episode_of
 
@@ -19,19 +19,10 @@ __all__ = [
     "Outcome",
     "SocialEpisode",
     "SocialMeasure",
-    "check_episode",
     "episode_of",
-    "read_episode",
+    "read_track",
     "social_measures",
     "write_episode",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._episode": ("Outcome", "SocialEpisode"),
-        "._files": ("FORMATS", "check_episode", "read_episode", "write_episode"),
-        "._measures": ("SOCIAL_MEASURES", "SocialMeasure", "social_measures"),
-        "._recorder": ("EpisodeRecorder", "episode_of"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

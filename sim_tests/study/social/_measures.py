@@ -30,7 +30,6 @@ from ._motion import (
 )
 from ._social_force import SocialWork
 from ._spaces import (
-    Zone,
     disc_distance_m,
     group_zone_percent,
     gym_compliance,
@@ -43,8 +42,7 @@ from ._spaces import (
     zone_s,
 )
 
-_ZONES: Final[tuple[Zone, ...]] = ("intimate", "personal", "social")
-
+Better = Literal["lower", "higher", "neither"]
 Source = Literal["general", "HuNavSim", "SocNavGym", "NavWareSet"]
 
 
@@ -63,7 +61,7 @@ class SocialMeasure:
     name: str
     published: str
     source: Source
-    better: Literal["lower", "higher", "neither"]
+    better: Better
     value: Callable[[SocialEpisode], float | None]
 
 
@@ -98,194 +96,121 @@ def _work(name: str, episode: SocialEpisode) -> float | None:
     return float(getattr(SocialWork.of(episode), name))
 
 
-_GENERAL: Final = (
-    SocialMeasure("spl", "SPL", "general", "higher", _spl),
-    SocialMeasure("stl", "STL", "general", "higher", _stl),
-    SocialMeasure(
-        "path_irregularity_rad", "Path Irregularity", "general", "lower", excess_rotation_rad
-    ),
-    SocialMeasure(
-        "path_irregularity_radpm", "path irregularity", "general", "lower", irregularity_radpm
-    ),
-    SocialMeasure(
-        "mean_goal_angle_rad", "path irregularity", "general", "lower", mean_goal_angle_rad
-    ),
-    SocialMeasure("time_to_collision_s", "TTC", "general", "higher", min_disc_ttc_s),
-    *(
-        SocialMeasure(
-            f"{zone}_s",
-            f"time in {zone} distance",
-            "general",
-            "neither",
-            partial(zone_s, zone=zone),
+def _named(
+    source: Source, *measures: tuple[str, str, Better, Callable[[SocialEpisode], float | None]]
+) -> tuple[SocialMeasure, ...]:
+    """Return the measures of one source."""
+    prefix = "" if source == "general" else f"{source.lower().removesuffix('sim')}_"
+    return tuple(
+        SocialMeasure(prefix + name, published, source, better, value)
+        for name, published, better, value in measures
+    )
+
+
+def _zones(
+    suffix: str, published: str, value: Callable[..., float | None], intrusion: bool = True
+) -> tuple[tuple[str, str, Better, Callable[[SocialEpisode], float | None]], ...]:
+    """Return one measure for each of Hall's zones; nearer than social distance is an intrusion."""
+    return tuple(
+        (
+            suffix.format(zone),
+            published.format(zone),
+            "lower" if intrusion and zone != "social" else "neither",
+            partial(value, zone=zone),
         )
-        for zone in _ZONES
-    ),
-    SocialMeasure(
-        "human_delay_s", "human delay", "general", "lower", lambda e: e.outcome.human_delay_s
-    ),
-    SocialMeasure(
+        for zone in ("intimate", "personal", "social")
+    )
+
+
+_GYM_SERIES: Final[tuple[tuple[str, str, Better], ...]] = (
+    ("V", "speed_mps", "neither"),
+    ("A", "acceleration_mps2", "lower"),
+    ("JERK", "jerk_mps3", "lower"),
+)
+_GYM_KINDS: Final = (("min", np.min), ("avg", np.mean), ("max", np.max))
+
+_GENERAL: Final = _named(
+    "general",
+    ("spl", "SPL", "higher", _spl),
+    ("stl", "STL", "higher", _stl),
+    ("path_irregularity_rad", "Path Irregularity", "lower", excess_rotation_rad),
+    ("path_irregularity_radpm", "path irregularity", "lower", irregularity_radpm),
+    ("mean_goal_angle_rad", "path irregularity", "lower", mean_goal_angle_rad),
+    ("time_to_collision_s", "TTC", "higher", min_disc_ttc_s),
+    *_zones("{}_s", "time in {} distance", zone_s, intrusion=False),
+    ("human_delay_s", "human delay", "lower", lambda e: e.outcome.human_delay_s),
+    (
         "people_acceleration_mps2",
         "Aavg, of people",
-        "general",
         "lower",
         lambda e: mean_of(people_tracks(e).acceleration),
     ),
-    SocialMeasure(
-        "people_jerk_mps3",
-        "Javg, of people",
-        "general",
-        "lower",
-        lambda e: mean_of(people_tracks(e).jerk),
-    ),
-    SocialMeasure(
+    ("people_jerk_mps3", "Javg, of people", "lower", lambda e: mean_of(people_tracks(e).jerk)),
+    (
         "people_heading_changes_rad",
         "cumulative heading changes, of people",
-        "general",
         "lower",
         people_heading_changes_rad,
     ),
 )
-
-
-def _hunav(
-    name: str,
-    published: str,
-    better: Literal["lower", "higher", "neither"],
-    value: Callable[[SocialEpisode], float | None],
-) -> SocialMeasure:
-    return SocialMeasure(f"hunav_{name}", published, "HuNavSim", better, value)
-
-
-_HUNAV: Final = (
-    _hunav("time_s", "time_to_reach_goal", "lower", lambda e: float(e.t_s[-1] - e.t_s[0])),
-    _hunav("path_length_m", "path_length", "lower", lambda e: path_length_m(e.robot_m)),
-    _hunav(
+_HUNAV: Final = _named(
+    "HuNavSim",
+    ("time_s", "time_to_reach_goal", "lower", lambda e: float(e.t_s[-1] - e.t_s[0])),
+    ("path_length_m", "path_length", "lower", lambda e: path_length_m(e.robot_m)),
+    (
         "heading_changes_rad",
         "cumulative_heading_changes",
         "lower",
         lambda e: heading_changes_rad(e.robot_heading_rad),
     ),
-    _hunav("mean_closest_m", "avg_distance_to_closest_person", "neither", mean_closest_m),
-    _hunav(
+    ("mean_closest_m", "avg_distance_to_closest_person", "neither", mean_closest_m),
+    (
         "min_distance_m",
         "minimum_distance_to_people",
         "higher",
         lambda e: smallest_m(disc_distance_m(e)),
     ),
-    *(
-        _hunav(
-            f"{zone}_percent",
-            f"{zone}_space_intrusions",
-            "neither" if zone == "social" else "lower",
-            partial(zone_percent, zone=zone),
-        )
-        for zone in _ZONES
-    ),
-    *(
-        _hunav(
-            f"group_{zone}_percent",
-            f"group_{zone}_space_intrusions",
-            "neither" if zone == "social" else "lower",
-            partial(group_zone_percent, zone=zone),
-        )
-        for zone in _ZONES
-    ),
-    _hunav(
-        "speed_mps",
-        "avg_robot_linear_speed",
-        "neither",
-        lambda e: float(e.robot_speed_mps.mean()),
-    ),
-    _hunav("acceleration_mps2", "avg_acceleration", "neither", hunav_acceleration_mps2),
-    _hunav("overacceleration_mps3", "avg_overacceleration", "neither", hunav_overacceleration_mps3),
-    _hunav("people_speed_mps", "avg_pedestrian_velocity", "neither", hunav_people_speed_mps),
-    _hunav("force_on_people_mps2", "social_force_on_agents", "lower", partial(_work, "on_people")),
-    _hunav("force_on_robot_mps2", "social_force_on_robot", "lower", partial(_work, "on_robot")),
-    _hunav(
+    *_zones("{}_percent", "{}_space_intrusions", zone_percent),
+    *_zones("group_{}_percent", "group_{}_space_intrusions", group_zone_percent),
+    ("speed_mps", "avg_robot_linear_speed", "neither", lambda e: float(e.robot_speed_mps.mean())),
+    ("acceleration_mps2", "avg_acceleration", "neither", hunav_acceleration_mps2),
+    ("overacceleration_mps3", "avg_overacceleration", "neither", hunav_overacceleration_mps3),
+    ("people_speed_mps", "avg_pedestrian_velocity", "neither", hunav_people_speed_mps),
+    ("force_on_people_mps2", "social_force_on_agents", "lower", partial(_work, "on_people")),
+    ("force_on_robot_mps2", "social_force_on_robot", "lower", partial(_work, "on_robot")),
+    (
         "obstacle_force_mps2",
         "obstacle_force_on_robot",
         "lower",
         partial(_work, "obstacles_on_robot"),
     ),
-    _hunav("social_work_mps2", "social_work", "lower", partial(_work, "work")),
+    ("social_work_mps2", "social_work", "lower", partial(_work, "work")),
 )
-
-_GYM: Final = (
-    SocialMeasure(
-        "socnavgym_path_length_m",
-        "PATH_LENGTH",
-        "SocNavGym",
-        "lower",
-        lambda e: GymMotion.of(e).path_length_m,
-    ),
+_GYM: Final = _named(
+    "SocNavGym",
+    ("path_length_m", "PATH_LENGTH", "lower", lambda e: GymMotion.of(e).path_length_m),
     *(
-        SocialMeasure(
-            f"socnavgym_{kind}_{series}",
-            f"{letter}_{kind.upper()}",
-            "SocNavGym",
-            "neither" if letter == "V" else "lower",
-            partial(_gym, series, reduce),
-        )
-        for letter, series in (
-            ("V", "speed_mps"),
-            ("A", "acceleration_mps2"),
-            ("JERK", "jerk_mps3"),
-        )
-        for kind, reduce in (("min", np.min), ("avg", np.mean), ("max", np.max))
+        (f"{kind}_{series}", f"{letter}_{kind.upper()}", better, partial(_gym, series, reduce))
+        for letter, series, better in _GYM_SERIES
+        for kind, reduce in _GYM_KINDS
     ),
-    SocialMeasure(
-        "socnavgym_min_distance_m",
+    (
+        "min_distance_m",
         "MINIMUM_DISTANCE_TO_HUMAN",
-        "SocNavGym",
         "higher",
         lambda e: smallest_m(e.centre_distance_m[1:]),
     ),
-    SocialMeasure(
-        "socnavgym_compliance", "PERSONAL_SPACE_COMPLIANCE", "SocNavGym", "higher", gym_compliance
-    ),
+    ("compliance", "PERSONAL_SPACE_COMPLIANCE", "higher", gym_compliance),
 )
-
-_NAVWARE: Final = (
-    SocialMeasure("navwareset_speed_mps", "Vavg", "NavWareSet", "neither", _mean_speed),
-    SocialMeasure(
-        "navwareset_acceleration_mps2",
-        "Aavg",
-        "NavWareSet",
-        "lower",
-        lambda e: mean_of(robot_track(e).acceleration),
-    ),
-    SocialMeasure(
-        "navwareset_jerk_mps3",
-        "Javg",
-        "NavWareSet",
-        "lower",
-        lambda e: mean_of(robot_track(e).jerk),
-    ),
-    SocialMeasure(
-        "navwareset_path_length_m",
-        "PLavg",
-        "NavWareSet",
-        "lower",
-        lambda e: path_length_m(e.robot_m),
-    ),
-    SocialMeasure(
-        "navwareset_psc_percent", "PSC, of the notebook", "NavWareSet", "lower", navware_psc_percent
-    ),
-    SocialMeasure(
-        "navwareset_compliance_percent",
-        "PSC, of the text",
-        "NavWareSet",
-        "higher",
-        navware_compliance_percent,
-    ),
-    SocialMeasure(
-        "navwareset_min_distance_m",
-        "DHmin",
-        "NavWareSet",
-        "higher",
-        lambda e: smallest_m(e.centre_distance_m),
-    ),
+_NAVWARE: Final = _named(
+    "NavWareSet",
+    ("speed_mps", "Vavg", "neither", _mean_speed),
+    ("acceleration_mps2", "Aavg", "lower", lambda e: mean_of(robot_track(e).acceleration)),
+    ("jerk_mps3", "Javg", "lower", lambda e: mean_of(robot_track(e).jerk)),
+    ("path_length_m", "PLavg", "lower", lambda e: path_length_m(e.robot_m)),
+    ("psc_percent", "PSC, of the notebook", "lower", navware_psc_percent),
+    ("compliance_percent", "PSC, of the text", "higher", navware_compliance_percent),
+    ("min_distance_m", "DHmin", "higher", lambda e: smallest_m(e.centre_distance_m)),
 )
 
 #: All measures by their names, in the order of docs/social_measures.md.

@@ -170,13 +170,7 @@ function paths(pen, states, index, x, y) {
 
 function obstacle(pen, each, x, y, scale) {
   pen.beginPath();
-  const outline = each.outline_odom_m;
-  if (outline.length) {
-    for (let at = 0; at < outline.length; at += 2) pen.lineTo(x(outline[at]), y(outline[at + 1]));
-    pen.closePath();
-  } else {
-    pen.arc(x(each.odom[0]), y(each.odom[1]), each.radius_m * scale, 0, 7);
-  }
+  pen.arc(x(each.odom[0]), y(each.odom[1]), each.radius_m * scale, 0, 7);
   pen.fillStyle = awarenessColour(each.awareness_lower, 0.16);
   pen.fill();
   pen.strokeStyle = awarenessColour(each.awareness_lower);

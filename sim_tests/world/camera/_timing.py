@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Final, Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 import numpy as np
 from pydantic import Field
 
 from perception.arrays import finite_number
-from tracking.config import StrictConfig
 
+from ..config import SimConfig
 from ..errors import SimError
 
 FrameT = TypeVar("FrameT")
@@ -20,7 +19,7 @@ FrameT = TypeVar("FrameT")
 _TOLERANCE_S: Final = 1.0e-6
 
 
-class CameraTiming(StrictConfig):
+class CameraTiming(SimConfig):
     """Frame rate, losses and delays of a camera; the default is a perfect camera.
 
     Attributes:
@@ -30,8 +29,6 @@ class CameraTiming(StrictConfig):
         latency_jitter_s: greatest additional delay, uniformly distributed; a frame may overtake
             another.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     rate_hz: float | None = Field(default=None, gt=0.0, le=1000.0)
     drop_rate: float = Field(default=0.0, ge=0.0, le=1.0)
@@ -52,23 +49,6 @@ class CameraTiming(StrictConfig):
         if loss < self.drop_rate:
             return None
         return float(stamp_s + self.latency_s + delay * self.latency_jitter_s)
-
-    def frames(
-        self, rng: np.random.Generator, start_s: float = 0.0
-    ) -> Iterator[tuple[float, float | None]]:
-        """Yield stamp and delivery time (None: lost) of one frame after another, without end.
-
-        Raises:
-            SimError: without a frame rate.
-        """
-        if self.rate_hz is None:
-            raise SimError("rate_hz must be given for a camera that runs on its own, got None")
-        start = finite_number("start_s", start_s, SimError)
-        number = 0
-        while True:
-            stamp_s = start + number / self.rate_hz
-            yield stamp_s, self.delivery_s(stamp_s, rng)
-            number += 1
 
 
 class FrameClock:

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
-from nav_adapter.exporters import static_polygons
 from sim_tests.actors.robot import RobotModel
 from sim_tests.crossing.planner import SamplingPlanner
 
@@ -19,7 +18,7 @@ DT_S = 0.05
 ROUNDING = 1e-9
 FORKLIFT = RobotModel.shipped("forklift").profile
 OMNI = RobotModel.shipped("omni").profile
-OUTLINE = static_polygons(np.array([[0.0, 0.0, 1.0, 1.0]]))[0]  # the planner takes the circle
+OUTLINE = shapely.box(0.0, 0.0, 1.0, 1.0)  # the planner takes the circle
 AISLE = np.array([[-6.0, 2.0, 20.0, 3.0], [-6.0, -3.0, 20.0, -2.0]])
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
-from nav_adapter.exporters import static_polygons
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
 
@@ -45,7 +45,7 @@ people_data = st.lists(
 
 
 def constraints(people: list, limit_mps: float, fastest_mps: float) -> NavConstraints:
-    outline = static_polygons(np.array([[0.0, 0.0, 1.0, 1.0]]))[0]  # the planner takes the circle
+    outline = shapely.box(0.0, 0.0, 1.0, 1.0)  # the planner takes the circle
     obstacles = tuple(
         PersonObstacle(i, center, velocity, radius, 1.75, 0.0, outline)
         for i, (center, velocity, radius) in enumerate(people)

@@ -1,8 +1,0 @@
-"""Entry point of ``python -m benchmarks.how_far``."""
-
-from __future__ import annotations
-
-from ._cli import main
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,1 @@
+"""The shipped networks on held-out renders as real cameras take them, and on photographs."""
