@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from perception import AttentionCone, HeadPose
 from perception.anthropometry import EYES_HEAD_M
 from perception.arrays import FloatArray
-from perception.awareness import awareness_of, estimate_awareness
+from perception.awareness import estimate_awareness
 from perception.eyes import EyeGaze
 
 CONE = AttentionCone()
@@ -90,15 +90,3 @@ def test_awareness_is_the_moments_of_the_score(with_eyes: bool, count: int) -> N
         drawn = by_drawing(rng, head, points, extra[row], seen[row], eyes[row])
         pair = found[row].awareness, found[row].awareness_std
         assert pair == pytest.approx(drawn, abs=0.012), row
-
-
-def test_the_spread_of_repeated_measurements_is_that_of_the_score() -> None:
-    rng = np.random.default_rng(11)
-    for _ in range(8):
-        head, points = some_head(rng), rng.normal(0.0, 0.1, (2, 3))
-        errors = rng.multivariate_normal(np.zeros(6), head.covariance, DRAWS)
-        small = Rotation.from_rotvec(errors[:, :3])
-        arm = small.apply(head.rotation_camera_head @ EYES_HEAD_M)
-        apex = head.position_camera_m + errors[:, 3:] + arm
-        drawn = scores(apex, small.apply(head.rotation_camera_head[:, 1].copy()), points)
-        assert awareness_of(CONE, head, points)[1] == pytest.approx(drawn.std(), abs=0.012)
