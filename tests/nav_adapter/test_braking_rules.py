@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 from nav_scenes import ROBOT, robot_at
 
-from nav_adapter import RobotState
+from nav_adapter import AwarenessPolicy, RobotState
 from nav_adapter._contact import contact_m, reach_at
-from nav_adapter.limit import course_of, in_the_path_mps, stops_in_time, straight_course_of
+from nav_adapter.limit import (
+    course_of,
+    in_the_path_mps,
+    limit_mps,
+    passing_radius_m,
+    stops_in_time,
+    straight_course_of,
+)
 from nav_adapter.reach import Reach
 
 SOFT = replace(ROBOT, max_deceleration_mps2=0.7, reaction_time_s=0.4)
@@ -104,3 +111,24 @@ def test_a_footprint_that_turns_stays_within_the_course(yaw_rate_radps: float) -
     assert max(course.front_m, -course.rear_m, course.half_m) <= radius_m + 1e-9
     straight = straight_course_of(robot, robot_at(speed_mps=0.6))
     assert course.front_m <= straight.front_m + straight.half_m * math.sin(min(turned_rad, 1.5708))
+
+
+@pytest.mark.parametrize("top_mps", [0.5, 1.5])
+def test_beside_the_passing_radius_stands_the_nearest_person_who_lets_the_robot_pass(
+    top_mps: float,
+) -> None:
+    rules = AwarenessPolicy().reach
+    assert rules is not None
+    course = course_of(ROBOT, robot_at(speed_mps=0.3), math.radians(rules.turn_deg))
+
+    def lowest_mps(radius_m: float) -> float:
+        motion = 0.0, 0.0, top_mps, rules.time_constant_s, rules.delay_s
+        beside_m = radius_m + course.half_m
+        return min(
+            limit_mps(Reach(x_m, beside_m, *motion, margin_m=0.4), course)
+            for x_m in np.linspace(course.rear_m - radius_m, course.front_m + 3.0 * radius_m, 16)
+        )
+
+    radius_m = passing_radius_m(top_mps, rules, 0.1, ROBOT)
+    assert lowest_mps(radius_m) >= 0.3
+    assert lowest_mps(0.99 * radius_m) < 0.3
