@@ -102,23 +102,3 @@ def test_strides_and_cadence_grow_with_speed() -> None:
     # Larger people take longer strides.
     tall = Gait(skeleton(None, 1.95))
     assert float(tall.stride_m(1.2) / gait.stride_m(1.2)) == pytest.approx(1.95 / 1.75)
-
-
-@pytest.mark.parametrize("speed_mps", [0.05, *SPEEDS_MPS])
-def test_a_cycle_is_periodic_and_smooth_and_its_halves_mirror_each_other(speed_mps: float) -> None:
-    gait = Gait(skeleton(None, 1.75))
-    stride = float(gait.stride_m(speed_mps))
-    samples = 240
-    feet, hips = _walk(gait, speed_mps, samples)
-    # The right foot repeats the left foot's motion half a cycle later.
-    later = np.roll(feet[:, 1], -samples // 2, axis=0)
-    later[samples // 2 :, 0] += stride
-    np.testing.assert_allclose(later[:, 0] - 0.5 * stride, feet[:, 0, 0], atol=2e-3)
-    np.testing.assert_allclose(later[:, [2, 4]], feet[:, 0][:, [2, 4]], atol=2e-3)
-    np.testing.assert_allclose(later[:, [1, 3]], -feet[:, 0][:, [1, 3]], atol=2e-3)
-    np.testing.assert_allclose(np.roll(hips, samples // 2), hips, atol=2e-3)
-    # The swing moves an ankle at a nearly constant speed; the hips rise by centimetres.
-    swing = 1.0 - float(gait.stance_share(speed_mps))
-    step = np.diff(feet[:, 0, :3], axis=0, append=feet[:1, 0, :3] + [stride, 0.0, 0.0])
-    assert np.linalg.norm(step, axis=1).max() < 1.8 * stride / samples / swing
-    assert np.ptp(hips) < 0.07

@@ -170,14 +170,15 @@ def test_low_people_watch_but_never_move(activity: str) -> None:
     script = {"path": [{"t_s": 0.0, **here}], "activities": [{"t_s": 0.0, "activity": activity}]}
     assert WorkerScript.model_validate(script).stays
     # A robot before them, and somebody so near that they would step aside.
-    robot = RobotBody(1.2, 0.0, math.pi, -0.5, 0.0, 0.3, 0.25, (0.9, 0.0, 0.6))
-    around = Surroundings(robot, (MovingBody(0.0, 0.4, 0.0, 0.0),), lambda: True)
+    robot = RobotBody(1.2, 0.0, math.pi, 0.0, 0.0, 0.3, 0.25, (0.9, 0.0, 0.6))
+    near = (MovingBody(0.0, 0.4, 0.0, 0.0),)
     pitches = {}
     for doing in ("none", activity):
         spec = PersonSpec(
             name="s", route=[here], activity=doing, heading_deg=0.0, glances={"watches": True}
         )
         person = Walker(spec, np.random.default_rng(0), NO_BOXES)
+        around = Surroundings(robot, near if doing == activity else (), lambda: True)
         for tick in range(60):
             motion = person.motion(0.05 * tick, around)
             if doing == activity:

@@ -33,12 +33,6 @@ def outline(robot: KinematicRobot) -> shapely.Polygon:
     return shapely.Polygon(turned + state.position_odom_m)
 
 
-def test_the_shipped_robots_are_of_every_drive() -> None:
-    drives = {RobotModel.shipped(name).profile.drive for name in shipped_robots()}
-    assert drives >= {"differential", "ackermann", "holonomic"}
-    assert RobotModel.shipped("nova_carter").profile is NOVA_CARTER
-
-
 @pytest.mark.parametrize("name", KINEMATIC)
 def test_a_robot_survives_yaml_and_sees_around_itself(name: str, tmp_path) -> None:
     model = RobotModel.shipped(name)

@@ -212,7 +212,7 @@ def test_a_robot_at_a_wall_keeps_enough_distance_to_turn_around() -> None:
     assert again.arrived
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_boxes_are_never_hit(seed: int) -> None:
     rng = np.random.default_rng(seed)
     low = rng.uniform((1.0, -2.5), (7.0, 2.0), (6, 2))

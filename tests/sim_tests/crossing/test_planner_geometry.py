@@ -81,14 +81,6 @@ def test_the_box_gap_is_a_lower_bound_of_the_distance(
     assert float(box_gap_m(rectangles, boxes)) <= polygon.distance(shapely.box(*boxes[0])) + 1e-9
 
 
-@given(pose_data)
-def test_the_box_gap_is_the_distance_along_a_wall(pose: tuple[float, float, float]) -> None:
-    rectangles, polygon = rectangle(*pose)
-    wall = np.array([[-9.0, 3.0, 9.0, 4.0]])
-    gap = float(box_gap_m(rectangles, wall))
-    assert gap == pytest.approx(polygon.distance(shapely.box(*wall[0])), abs=1e-9)
-
-
 @given(coordinate, coordinate, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(0.0, 2.0))
 def test_the_strip_distance_is_the_distance_to_the_path_ahead(
     x: float, y: float, vx: float, vy: float, ahead_s: float

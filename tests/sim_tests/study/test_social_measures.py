@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from paths import ROOT
 from social_reference import reference_measures
 from social_scenes import formula_episode, random_episode, straight
 
@@ -35,15 +33,6 @@ def test_the_random_episodes_reach_every_branch():
         values = {each[name] for each in found}
         assert len(values - {None}) > 1 or name in ("human_delay_s", "stl"), name
     assert {each["time_to_collision_s"] == 0.0 for each in found} == {True, False}
-
-
-def test_the_page_defines_every_column_in_the_order_of_the_table():
-    page = (ROOT / "docs" / "social_measures.md").read_text("utf-8")
-    defined = re.findall(r"^\| (`[^|]*`) \| ([^|]*) \|", page, re.MULTILINE)
-    columns = {name: theirs for ours, theirs in defined for name in re.findall(r"`([^`]*)`", ours)}
-    assert [name for name in columns if name in SOCIAL_MEASURES] == list(SOCIAL_MEASURES)
-    for name, measure in SOCIAL_MEASURES.items():
-        assert measure.published.split(" in ")[-1].split()[0].strip(",") in columns[name], name
 
 
 def test_without_people_their_measures_do_not_apply():
