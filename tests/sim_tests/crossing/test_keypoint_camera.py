@@ -123,3 +123,8 @@ def test_foreign_detections_and_impossible_noise_are_refused():
         camera.estimate(None, (old,))
     with pytest.raises(ValueError, match="miss_rate"):
         KeypointNoise(miss_rate=1.5)
+
+
+def test_a_person_outside_the_field_of_view_is_not_detected():
+    assert look(Body(x_m=-3.0))[0] == ()
+    assert look(Body(x_m=1.0, y_m=4.0))[0] == ()

@@ -159,3 +159,12 @@ def test_a_crossing_runs_with_a_real_detector_on_rendered_images(scenario: Scena
     assert workers == {0, 1}
     first, second = ([frame.command for frame in each.frames] for each in results)
     assert first == second
+
+
+def test_a_worker_is_matched_to_one_observation_only():
+    truth, boxes = (view(0.0, 3.0),), [np.array([100.0, 100, 200, 400])]
+    twice = (
+        observation(0.3, 3.0, (110, 100, 220, 400)),
+        observation(0.0, 3.0, (100, 100, 200, 400)),
+    )
+    assert match_to_workers(twice, truth, boxes) == (NOBODY, 0)

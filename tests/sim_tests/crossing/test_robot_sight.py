@@ -9,7 +9,7 @@ import pytest
 
 from sim_tests.actors.body import Worker
 from sim_tests.actors.robot import Amr
-from sim_tests.crossing._robot_sight import RobotSight
+from sim_tests.crossing._robot_sight import RobotSight, near_robot
 from sim_tests.world import Warehouse, sees
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import WarehouseLayout
@@ -69,3 +69,11 @@ def test_lines_of_sight_are_those_of_bodies_in_place(hall: Warehouse) -> None:
             worker.place_collision_body()
         camera = amr.T_odom_camera[:3, 3]
         assert found == [sees(each, camera, frozenset({amr.body})) for each in left_behind]
+
+
+def test_a_body_left_behind_near_the_robot_counts_as_near(hall: Warehouse) -> None:
+    worker = Worker(hall, position_odom_m=(1.0, 0.0))
+    assert near_robot(worker, (9.0, 0.0), (0.0, 0.0))
+    worker.place((9.0, 0.0), 0.0)
+    assert not near_robot(worker, (9.5, 0.0), (0.0, 0.0))
+    assert near_robot(worker, (3.0, 0.0), (0.0, 0.0))

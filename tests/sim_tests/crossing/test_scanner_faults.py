@@ -21,6 +21,8 @@ from sim_tests.crossing.faults import (
 from sim_tests.crossing.faults._false_returns import (
     Legs,
     Mirror,
+    new_legs,
+    new_mirror,
     with_legs,
     with_mirror,
 )
@@ -285,3 +287,29 @@ def test_a_mirror_shows_a_post_where_its_image_is_and_nowhere_else():
         Mirror(np.array([4.0, 8.0 / 7.0]), np.array([1.0, 0.0])),
     ):
         np.testing.assert_array_equal(with_mirror(scan, other, np.eye(4)).ranges_m, ranges)
+
+
+def test_walking_ghosts_keep_their_velocity():
+    rng = np.random.default_rng(4)
+    ghosts = [new_legs(rng, 1.0, np.array([2.0, 3.0])) for _ in range(400)]
+    speeds = np.array([np.hypot(*each.velocity_odom_mps) for each in ghosts])
+    assert np.mean(speeds == 0.0) == pytest.approx(0.5, abs=4.0 * 0.5 / 20.0)
+    assert speeds.max() <= 1.5
+    ranges = [np.hypot(*(each.middle_odom_m - [2.0, 3.0])) for each in ghosts]
+    assert 0.8 <= min(ranges) <= max(ranges) <= 6.0
+    moving = Legs(np.array([3.0, 0.0]), np.array([0.0, 1.0]), np.array([0.05, 0.0]), 1.0)
+    scan = with_legs(scan_at(3.0, 9.0), moving, 3.0, np.eye(4), np.zeros(360))
+    hit = points(scan)[scan.ranges_m < 8.0].mean(axis=0)
+    np.testing.assert_allclose(hit, [3.0, 2.0], atol=0.1)
+
+
+def test_mirrors_lie_on_surfaces_and_face_the_scanner():
+    rng = np.random.default_rng(1)
+    T = motion_at(0.0, 3.0, 1.0).T_odom_base
+    for _ in range(100):
+        mirror = new_mirror(rng, scan_at(0.0), T)
+        offset = mirror.middle_odom_m - T[:2, 3]
+        assert np.hypot(*offset) == pytest.approx(5.0)
+        cosine = -mirror.normal_odom @ offset / 5.0
+        assert cosine >= math.cos(math.radians(45.0)) - 1e-9
+    assert new_mirror(rng, scan_at(0.0, np.inf), T) is None

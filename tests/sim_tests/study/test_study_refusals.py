@@ -1,12 +1,20 @@
-"""What the commands of runs refuse: one line, exit status 2, and nothing is written."""
+"""What measures, runs and their commands refuse, by name, before anything is written."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
+from measured_scenes import crossing, walking
 from run_scenes import short_jobs
 
 from awarenav.cli import main
-from sim_tests.study.runs import run_jobs
+from sim_tests import SimError
+from sim_tests.study.measures import bootstrap_interval, measure, zero_of_n_upper
+from sim_tests.study.measures._step_out import StepOut
+from sim_tests.study.runs import run_jobs, sample_jobs
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +79,48 @@ def test_bad_input_is_refused_before_anything_runs(words, message, run, tmp_path
     assert "Traceback" not in said.err
     assert sorted(run.iterdir()) == before
     assert not list(tmp_path.iterdir())
+
+
+def still(**values):
+    """One control cycle beside one person, with other values of the result."""
+    result = crossing([0.0], lambda t: (0.0, 0.0, 0.0, 0.0), [walking((3.0, 0.0), (0.0, 0.0))])
+    return replace(result, **values)
+
+
+def bootstrapped(values, **options):
+    return bootstrap_interval(values, np.random.default_rng(0), **options)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda out: StepOut(speed_mps=0.0), "speed_mps"),
+        (lambda out: StepOut(time_constant_s=math.nan), "time_constant_s"),
+        (lambda out: StepOut(start_shares=(0.1, 0.1, 0.1)), "start_shares must be 4 shares"),
+        (lambda out: StepOut(start_shares=(0.1, 0.1, 0.1, 1.0)), "start_shares must be 4 shares"),
+        (lambda out: bootstrapped([1.0, math.nan]), "values must be finite"),
+        (lambda out: bootstrapped([1.0, 2.0], strata=["a"]), "strata must be 2 labels"),
+        (lambda out: bootstrapped([1.0, 2.0], level=1.0), "level must lie in"),
+        (lambda out: zero_of_n_upper(-1), "of 0 to n"),
+        (lambda out: measure(still(frames=())), "without frames"),
+        (
+            lambda out: measure(
+                still(frames=(replace(still().frames[0], separations_m=(1.0, 2.0)),))
+            ),
+            "separation of all 1 people",
+        ),
+        (lambda out: sample_jobs(short_jobs(1), 0), "sample must"),
+        (lambda out: sample_jobs(short_jobs(1), 3), "sample must"),
+        (lambda out: run_jobs([], out), "at least one episode"),
+        (lambda out: run_jobs(short_jobs(1), out, workers=0), r"workers must lie in \[1"),
+        (lambda out: run_jobs(short_jobs(1), out, resume=True), "no run to resume"),
+        (lambda out: run_jobs(short_jobs(1), out, time_limit_s=0.5), r"time_limit_s must lie in"),
+        (
+            lambda out: run_jobs(short_jobs(1), out, time_limit_s=9.0, scheduler="local"),
+            "not on a cluster",
+        ),
+    ],
+)
+def test_what_cannot_be_measured_or_run_is_refused(make, message, tmp_path):
+    with pytest.raises(SimError, match=message):
+        make(tmp_path / "out")
