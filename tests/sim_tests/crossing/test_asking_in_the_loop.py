@@ -45,6 +45,7 @@ def test_where_nobody_answers_or_startles_the_robot_drives_as_one_that_does_not_
     assert deaf.time_to_goal_s == silent.time_to_goal_s
 
 
+@pytest.mark.slow
 def test_a_worker_who_answers_is_passed_seconds_sooner() -> None:
     answered, in_vain = (
         crossing("busy_in_aisle", 0, f"answers={share},startles=0") for share in (1, 0)

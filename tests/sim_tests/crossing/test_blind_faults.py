@@ -51,7 +51,7 @@ def begins(ranges: list[np.ndarray]) -> int:
 
 def test_from_a_drawn_time_on_no_ray_of_any_scanner_has_an_answer():
     starts, forms = [], set()
-    for seed in range(60):
+    for seed in range(30):
         first, second = scans_of(Fault.shipped("scanner_blind"), seed).values()
         start = begins(first)
         assert begins(second) == start
@@ -121,7 +121,7 @@ def test_from_a_drawn_time_on_no_image_arrives():
 MET = Scenario.shipped("head_on_in_aisle")
 
 
-@pytest.mark.parametrize("views_deg", [(0.0, 90.0), pytest.param((0.0,), marks=pytest.mark.full)])
+@pytest.mark.parametrize("views_deg", [(0.0,), pytest.param((0.0, 90.0), marks=pytest.mark.full)])
 def test_a_black_picture_is_no_view_for_the_judgement_of_real_pictures(views_deg):
     camera = MET.camera.model_copy(update={"views_deg": views_deg})
     scenario = MET.model_copy(update={"duration_s": 2.0, "camera": camera})
