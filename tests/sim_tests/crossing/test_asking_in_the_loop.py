@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from nav_adapter import AwarenessPolicy
 from sim_tests import CrossingResult, run_crossing
