@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from awarenav.cli import main
-from awarenav.tracks import track_recording, tracks_figure
-from awarenav.tracks._positions import read_positions
-from awarenav.tracks._smoothed import distances_m, smoothed_path
+from awarenav.tracks import read_positions, track_recording, tracks_figure
+from awarenav.tracks._tracking import distances_m, smoothed_path
 from tracking.prediction import REGION_SHARE, PredictionModel
 
 STD_M = 0.1

@@ -17,7 +17,8 @@ from track_lines import lines, pose, standing, walking
 from awarenav import figures
 from awarenav.cli import main
 from awarenav.records import write_records
-from awarenav.tracks import CSV_COLUMNS, read_recording, track_recording
+from awarenav.tracks import read_recording, track_recording
+from awarenav.tracks._run import CSV_COLUMNS
 from perception import Camera
 from sim_tests import Scenario
 from tracking import AwarenessFilterConfig, TrackerConfig

@@ -11,8 +11,13 @@ from hypothesis import strategies as st
 from track_lines import lines, pose, standing, walking
 
 from awarenav.records import write_records
-from awarenav.tracks import read_recording, track_recording, tracks_in_file
-from awarenav.tracks._positions import read_positions
+from awarenav.tracks import (
+    read_positions,
+    read_recording,
+    track_recording,
+    tracks_figure,
+    tracks_in_file,
+)
 from perception import Camera
 
 pytest.importorskip("matplotlib")
@@ -20,13 +25,12 @@ pytest.importorskip("matplotlib")
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Wedge
 
-from awarenav.tracks import (
+from awarenav.tracks._plot import (
     covariance_ellipse,
     path_arrows,
     plan_limits,
     shown_tracks,
     track_colour,
-    tracks_figure,
     view_edges_rad,
 )
 
@@ -104,6 +108,7 @@ def test_every_track_has_a_panel_its_colour_and_its_number(tmp_path, number, col
     assert len({round(each.get_position().x0, 6) for each in panels}) == columns
     assert {each.get_text() for each in plan.texts} >= {str(k + 1) for k in range(number)}
     assert len({track_colour(k) for k in range(number)}) == number
+    figure.canvas.draw()
     boxes = [each.get_position() for each in figure.axes]
     for index, box in enumerate(boxes):
         assert 0.0 <= box.x0 < box.x1 <= 1.0
@@ -113,7 +118,9 @@ def test_every_track_has_a_panel_its_colour_and_its_number(tmp_path, number, col
 
 def test_a_metre_is_as_long_along_x_as_along_y_and_every_track_is_inside(tmp_path):
     run = track_recording(recorded(tmp_path, lines([walking(2.0, -9.0, 0.1, 4.0)], frames=45)))
-    plan = tracks_figure(run, "tall").axes[0]
+    figure = tracks_figure(run, "tall")
+    figure.canvas.draw()
+    plan = figure.axes[0]
     box = plan.get_position()
     width, height = plan.figure.get_size_inches() * (box.width, box.height)
     (x_min, x_max), (y_min, y_max) = plan.get_xlim(), plan.get_ylim()
@@ -209,4 +216,5 @@ def test_faint_tracks_have_no_ellipses_and_named_ones_have(tmp_path):
 
 def test_limits_span_three_metres_without_any_track(tmp_path):
     run = track_recording(recorded(tmp_path, []))
-    assert plan_limits(run, []) == pytest.approx((-1.5, 1.5, -1.5, 1.5))
+    low, high = plan_limits(run, [])
+    assert (*low, *high) == pytest.approx((-1.5, -1.5, 1.5, 1.5))
