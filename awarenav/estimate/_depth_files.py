@@ -13,16 +13,11 @@ from perception.depth_image import checked_depth
 from perception.errors import DepthImageError
 
 from ..errors import AwarenavError, counted
-from ._exif import decode_upright
-from ._images import read_image
-from ._source import ImageSource
-from ._source_images import ImageFiles, natural_order
+from ._pictures import decode_upright, read_image
+from ._sources import ImageFiles, ImageSource, natural_order, surely_has
 
 #: Suffixes of the names of depth images.
 DEPTH_SUFFIXES: Final = (".png", ".npy", ".tif", ".tiff")
-# Containers may state a few frames more than they have.
-_MISCOUNTED_FRAMES: Final = 2
-_MISCOUNTED_SHARE: Final = 0.01
 
 
 class DepthFiles:
@@ -136,9 +131,8 @@ def _numbered(path: Path, count: int | None, every: int, limit: int | None) -> d
             raise AwarenavError(f"{files[number]} and {file} are of the same frame")
         files[number] = file
     if count is not None:
-        sure = count - max(_MISCOUNTED_FRAMES, int(_MISCOUNTED_SHARE * count))
         for index in list(range(0, count, every))[:limit]:
-            if str(index) not in files and (index < sure or index == 0):
+            if str(index) not in files and surely_has(index, count):
                 raise AwarenavError(
                     f"{path} has no depth image of frame {index}, as {index:06d}.png; frames count "
                     "from 0"

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from track_lines import pose
 
-from awarenav.errors import AwarenavError
 from awarenav.estimate import FrameEstimate, SourceFrame, estimate_record
-from awarenav.records import read_person, write_records
+from awarenav.records import write_records
 from awarenav.tracks import read_recording
 from perception import Camera, PersonObservation
 from tracking import PersonTracker
@@ -133,21 +132,3 @@ def test_a_file_of_before_is_read_as_noise_of_each_image(tmp_path):
     ]
     assert nearest[0] < 0.2
     assert nearest[1] > 0.5
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"range_lasting_relative_std": -0.1}, "range_lasting_relative_std"),
-        ({"size_range_m": 0.0, "size_range_relative_std": 0.1}, "size_range_m"),
-        ({"size_range_m": 3.0}, "must both be given"),
-        ({"size_range_relative_std": 0.1}, "must both be given"),
-        ({"awareness_reason": "face to small"}, "did you mean 'face too small'"),
-        ({"awareness_reason": ["no head pose"]}, "awareness_reason must be one of"),
-        ({"awareness_reason": "no head pose", "awareness": 0.5}, "must be null with an awareness"),
-        ({"eyes_seen": 1}, "eyes_seen must be true or false"),
-    ],
-)
-def test_a_value_that_is_not_valid_is_named(change, message):
-    with pytest.raises(AwarenavError, match=message):
-        read_person(change, "person 0")
