@@ -103,32 +103,3 @@ def test_every_field_of_an_observation_that_was_written_is_read(tmp_path):
                 "size_range_relative_std",
             ):
                 assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-6)
-
-
-def test_a_file_of_before_is_read_as_noise_of_each_image(tmp_path):
-    """Without the fields nothing is known of sizes; the tracks differ, so the fields matter."""
-    new = (
-        "range_lasting_relative_std",
-        "size_range_m",
-        "size_range_relative_std",
-        "awareness_reason",
-        "eyes_seen",
-    )
-    old = written(tmp_path, estimates(), without=new)
-    first = old[0][2][0]
-    assert (first.range_lasting_relative_std, first.size_range_m, first.eyes_seen) == (
-        0,
-        None,
-        False,
-    )
-    child = np.array([4.0, 0.8 - 0.3 * (FRAMES - 1) / RATE_HZ])
-    nearest = [
-        min(
-            np.linalg.norm(track.position_odom_m - child)
-            for track in tracks_of(each)[-1]
-            if track.status == "confirmed"
-        )
-        for each in (written(tmp_path, estimates()), old)
-    ]
-    assert nearest[0] < 0.2
-    assert nearest[1] > 0.5

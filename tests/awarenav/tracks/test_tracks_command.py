@@ -6,48 +6,21 @@ import csv
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from paths import ROOT
-from recorded_crossing import record_crossing
 from track_lines import lines, pose, standing, walking
 
-from awarenav import figures
 from awarenav.cli import main
 from awarenav.records import write_records
 from awarenav.tracks import read_recording, track_recording
 from awarenav.tracks._run import CSV_COLUMNS
 from perception import Camera
-from sim_tests import Scenario
 from tracking import AwarenessFilterConfig, TrackerConfig
 
 WALKERS = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0)]
 HEADS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
-
-# Two people walk past each other in front of the robot; only the first looks at it.
-CROSSING = """
-name: two_workers
-description: Two workers pass each other in front of the robot.
-hearing: {answers: 0.0, startles: 0.0}
-duration_s: 5.5
-layout:
-  x_min_m: -5.0
-  y_min_m: -8.5
-  x_max_m: 17.0
-  y_max_m: 8.5
-  cross_aisle_x_m: 7.5
-  cross_aisle_width_m: 4.6
-robot: {goal_x_m: 13.0}
-camera: {width_px: 1920, height_px: 1200, horizontal_fov_deg: 120.0}
-workers:
-  - path: [{t_s: 0.0, x_m: 8.0, y_m: -3.4}, {t_s: 5.1, x_m: 8.0, y_m: 2.2}]
-    gaze: [{t_s: 0.0, look: robot}]
-  - path: [{t_s: 0.0, x_m: 6.8, y_m: 3.6}, {t_s: 6.5, x_m: 7.0, y_m: -3.6}]
-    heading: [{t_s: 0.0, heading_deg: 270.0}]
-    gaze: [{t_s: 0.0, look: ahead}]
-"""
 
 
 @pytest.fixture
@@ -91,6 +64,19 @@ def test_the_table_has_one_line_per_track_with_its_life_and_awareness(estimates,
         assert float(alpha) == pytest.approx(history.mean("awareness"), abs=0.0051)
         assert float(lower) == pytest.approx(history.mean("awareness_lower"), abs=0.0051)
     assert histories[0].seen_frames == 34
+
+
+def test_the_truth_names_the_person_of_each_track_and_smoothing_adds_no_track(
+    estimates, tmp_path, capsys
+):
+    truth, out = tmp_path / "truth.jsonl", tmp_path / "a.png"
+    write_records(truth, lines(WALKERS, named=True))
+    assert run(estimates, "--truth", truth, "--smooth", "--out", out) == 0
+    header, *body, written = capsys.readouterr().out.splitlines()
+    assert header.split()[-1] == "person"
+    assert [(line.split()[0], line.split()[-1]) for line in body] == [("1", "0"), ("2", "1")]
+    assert written == f"Written to {out}"
+    assert out.read_bytes().startswith(HEADS[".png"])
 
 
 def test_the_csv_file_has_every_track_at_every_frame(estimates, tmp_path):
@@ -181,20 +167,6 @@ def test_bad_input_is_refused_and_nothing_is_written(
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_an_interruption_leaves_the_old_plot_and_no_partial_one(estimates, tmp_path, monkeypatch):
-    out = tmp_path / "out.png"
-    out.write_bytes(b"old")
-
-    def interrupted(figure, file, **options):
-        Path(file).write_bytes(HEADS[".png"])
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(figures.Figure, "savefig", interrupted)
-    assert run(estimates, "--out", out) == 130
-    assert out.read_bytes() == b"old"
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["estimates.jsonl", "out.png"]
-
-
 @pytest.mark.parametrize(
     ("out", "status", "message"), [("none", 0, "id  born"), ("out.png", 2, "needs matplotlib")]
 )
@@ -214,27 +186,6 @@ def test_only_the_plot_needs_matplotlib(estimates, out, status, message):
     )
     assert done.returncode == status, done.stderr
     assert message in done.stdout + done.stderr
-
-
-def test_two_workers_of_a_crossing_are_two_tracks_and_only_one_is_aware(tmp_path, capsys):
-    scenario = tmp_path / "two.yaml"
-    scenario.write_text(CROSSING)
-    record_crossing(Scenario.from_yaml(scenario), tmp_path)
-    path, table = tmp_path / "estimates.jsonl", tmp_path / "tracks.csv"
-    truth = tmp_path / "truth.jsonl"
-    out = tmp_path / "two.png"
-    assert run(path, "--truth", truth, "--out", out, "--csv", table) == 0
-    lines_of_tracks = [
-        line.split()
-        for line in capsys.readouterr().out.splitlines()[1:]
-        if line.strip()[0].isdigit()
-    ]
-    assert sorted(line[-1] for line in lines_of_tracks) == ["0", "1"]
-    lower = {line[-1]: float(line[-2]) for line in lines_of_tracks}
-    assert lower["0"] > 0.2
-    assert lower["1"] < 0.05
-    assert max(float(row["awareness_lower"]) for row in rows(table)) > 0.5
-    assert out.read_bytes().startswith(HEADS[".png"])
 
 
 def test_the_page_about_tracking_shows_code_that_runs():

@@ -28,7 +28,6 @@ from matplotlib.patches import Wedge
 from awarenav.tracks._plot import (
     covariance_ellipse,
     path_arrows,
-    plan_limits,
     shown_tracks,
     track_colour,
     view_edges_rad,
@@ -143,12 +142,6 @@ def test_tracks_without_a_panel_are_counted_in_a_note(tmp_path):
     assert note in texts(tracks_figure(run, "crowd", most=5))
 
 
-def test_an_empty_plot_says_that_there_are_no_people(tmp_path):
-    figure = tracks_figure(track_recording(recorded(tmp_path, lines([], frames=7))), "empty")
-    assert "no people in 7 frames" in texts(figure)
-    assert len(figure.axes) == 1
-
-
 def test_a_file_without_frames_gives_an_empty_plot(tmp_path):
     figure = tracks_figure(track_recording(recorded(tmp_path, [])), "nothing")
     assert "no people in 0 frames" in texts(figure)
@@ -198,9 +191,3 @@ def test_shaded_spans_are_those_in_which_nobody_saw_the_person(tmp_path):
     panel = tracks_figure(run, "gap").axes[1]
     spans = [(each.get_x(), each.get_x() + each.get_width()) for each in panel.patches]
     assert spans == [pytest.approx((1.4, 2.5))]
-
-
-def test_limits_span_three_metres_without_any_track(tmp_path):
-    run = track_recording(recorded(tmp_path, []))
-    low, high = plan_limits(run, [])
-    assert (*low, *high) == pytest.approx((-1.5, -1.5, 1.5, 1.5))
