@@ -104,13 +104,12 @@ class ImageSource(Protocol):
         ...
 
 
-def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0) -> ImageSource:
+def open_source(text: str, *, topic: str | None = None) -> ImageSource:
     """Open an image, a folder of images, a video, a camera, a stream or a recording.
 
     Args:
         text: a path, the number of a camera such as ``0``, or an address such as ``rtsp://…``.
         topic: image topic of a recording; None if it has only one.
-        interval_s: time between the images of a folder without stamps, seconds.
 
     Raises:
         AwarenavError: if there is no such source, or it cannot be read.
@@ -136,7 +135,7 @@ def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0)
     if topic is not None:
         raise AwarenavError(f"--topic is for ROS recordings; {text} is not one")
     if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
-        return ImageFiles(path, interval_s)
+        return ImageFiles(path)
     return _video(text, live=False)
 
 
@@ -160,18 +159,17 @@ class ImageFiles:
 
     ``camera.yaml`` beside them is their camera. ``truth.jsonl`` beside them gives the stamp and the
     camera pose of each image; what it says about people is not read. Without it, the stamps are 0,
-    1, 2 … times ``interval_s``. If ``render.yaml`` is there as well, as ``awarenav render`` leaves
+    1, 2 … s. If ``render.yaml`` is there as well, as ``awarenav render`` leaves
     it, the images in ``truth.jsonl`` are renders.
 
     Args:
         path: of the file or folder.
-        interval_s: time between images without stamps, seconds.
 
     Raises:
         AwarenavError: if there is no image, or the files beside the images cannot be read.
     """
 
-    def __init__(self, path: Path, interval_s: float = 1.0) -> None:
+    def __init__(self, path: Path) -> None:
         folder = path if path.is_dir() else path.parent
         if path.is_dir():
             files = [
@@ -186,7 +184,6 @@ class ImageFiles:
         else:
             files = [path]
         self._files = sorted(files, key=natural_order)
-        self._interval_s = interval_s
         self._known = _stamps_and_poses(folder / _TRUTH)
         self._calibration = folder / _CAMERA
         self.rectified = False
@@ -217,7 +214,7 @@ class ImageFiles:
     def frames(self) -> Iterator[SourceFrame]:
         """Yield every image; one that cannot be read has a ``problem``."""
         for index, path in enumerate(self._files):
-            stamp_s, pose = self._known.get(path.name, (index * self._interval_s, None))
+            stamp_s, pose = self._known.get(path.name, (float(index), None))
             try:
                 image, turned = read_turned_image(path)
                 yield SourceFrame(path.name, stamp_s, image, pose, orientation=turned)

@@ -71,11 +71,11 @@ def test_a_folder_is_read_in_the_order_of_its_numbers(tmp_path):
         save(tmp_path / f"shot{number}.png", numbered(number))
     save(tmp_path / "contact_sheet.png", numbered(0))
     (tmp_path / "notes.txt").write_text("not an image")
-    source = ImageFiles(tmp_path, interval_s=0.5)
+    source = ImageFiles(tmp_path)
     frames = list(source.frames())
     assert [frame.name for frame in frames] == ["shot1.png", "shot9.png", "shot10.png"]
     assert [number_of(frame.image_rgb) for frame in frames] == [1, 9, 10]
-    assert [frame.stamp_s for frame in frames] == [0.0, 0.5, 1.0]
+    assert [frame.stamp_s for frame in frames] == [0.0, 1.0, 2.0]
     assert source.count == 3
     assert source.camera is None
 

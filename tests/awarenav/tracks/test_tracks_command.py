@@ -167,13 +167,11 @@ def test_bad_input_is_refused_and_nothing_is_written(
     assert sorted(tmp_path.iterdir()) == before
 
 
-@pytest.mark.parametrize(
-    ("out", "status", "message"), [("none", 0, "id  born"), ("out.png", 2, "needs matplotlib")]
-)
-def test_only_the_plot_needs_matplotlib(estimates, out, status, message):
+def test_only_the_plot_needs_matplotlib(estimates):
     script = (
         "import sys; sys.modules['matplotlib'] = None; from awarenav.cli import main; "
-        f"sys.exit(main(['tracks', 'estimates.jsonl', '--out', {out!r}]))"
+        "assert main(['tracks', 'estimates.jsonl', '--out', 'none']) == 0; "
+        "sys.exit(main(['tracks', 'estimates.jsonl', '--out', 'out.png']))"
     )
     done = subprocess.run(
         [sys.executable, "-c", script],
@@ -184,8 +182,9 @@ def test_only_the_plot_needs_matplotlib(estimates, out, status, message):
         timeout=120,
         check=False,
     )
-    assert done.returncode == status, done.stderr
-    assert message in done.stdout + done.stderr
+    assert done.returncode == 2, done.stderr
+    assert "id  born" in done.stdout
+    assert "needs matplotlib" in done.stderr
 
 
 def test_the_page_about_tracking_shows_code_that_runs():
