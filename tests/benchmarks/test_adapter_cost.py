@@ -27,13 +27,6 @@ def test_the_naive_costmap_equals_ours() -> None:
     assert ratio[ours[ring] > 30].max() <= 1.15
 
 
-def test_people_walk_and_stay_on_the_map() -> None:
-    frames = crowd(30, 50, np.random.default_rng(0))
-    positions = np.array([[track.position_odom_m for track in frame] for frame in frames])
-    assert np.abs(positions).max() <= 5.0
-    assert (np.abs(positions[1] - positions[0]).sum(axis=1) > 0.0).all()
-
-
 def test_every_step_has_a_cost_of_its_own() -> None:
     cost = cost_ms(3, 8, 1, 0, naive=True)
     assert set(cost) == {*CYCLE, "painter", "naive"}
@@ -56,12 +49,3 @@ def test_bad_input_is_refused(
         main(arguments)
     assert stopped.value.code == 2
     assert message in capsys.readouterr().err
-
-
-def test_a_broken_baseline_is_refused(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
-    broken = tmp_path / "baseline.json"
-    broken.write_text("{}")
-    with pytest.raises(SystemExit) as stopped:
-        main(["--baseline", str(broken)])
-    assert stopped.value.code == 2
-    assert "is not a baseline" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.perception.__main__ import main
-from benchmarks.perception._degradations import HEADER, measure, meets, row_of
+from benchmarks.perception._degradations import HEADER, measure, row_of
 from benchmarks.perception._pictures import CONDITIONS, degraded_picture, picture_sets, pictures
 from sim_tests.dataset import RenderConfig
 from training.networks import Recipe
@@ -27,19 +27,6 @@ def test_pictures_are_held_out_from_training():
         assert config.variants[1] < recipe.variants[0]
     assert picture_sets(20, 0)["far"].max_range_m == 10.0
     assert picture_sets(20, 0)["wide"].horizontal_fov_deg == 110.0
-
-
-def test_every_effect_of_a_camera_has_a_condition():
-    drawn = [each.degradation(number) for each in CONDITIONS for number in range(6)]
-    assert max(each.motion_px for each in drawn) == 17.0
-    assert min(each.light for each in drawn) == 0.1
-    assert min(each.jpeg_quality or 100 for each in drawn) == 20
-    exposures = [each.exposure_ev for each in drawn]
-    assert min(exposures) < -1.0
-    assert max(exposures) > 1.0
-    assert len({each.white_balance for each in drawn}) == 3
-    assert len({np.sign(each.shutter_shear) for each in drawn}) == 3
-    assert {each.set_name for each in CONDITIONS} == set(picture_sets(1, 0))
 
 
 @pytest.mark.parametrize("number", [0, 1])
@@ -88,20 +75,6 @@ def test_the_shipped_networks_find_people_and_a_row_says_so():
     assert metrics["motion blur 17 px"]["overall"]["people"] == clean["people"]
     rows = [row_of(name, each) for name, each in metrics.items()]
     assert all(row.count("|") == HEADER.splitlines()[0].count("|") for row in rows)
-
-
-def test_bounds_are_those_of_every_figure():
-    good = {"head_median_deg": 6.0, "head_p90_deg": 20.0, "recall": 0.95, "false_aware": 0.005}
-    assert meets({"overall": good})
-    assert meets({"overall": {**good, "false_aware": None}})
-    for name, worse in (
-        ("head_median_deg", 6.1),
-        ("head_p90_deg", 20.1),
-        ("recall", 0.94),
-        ("false_aware", 0.006),
-        ("head_median_deg", None),
-    ):
-        assert not meets({"overall": {**good, name: worse}})
 
 
 def test_an_unknown_condition_is_refused_with_those_there_are(capsys):

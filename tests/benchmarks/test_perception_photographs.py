@@ -12,8 +12,6 @@ from paths import SHARED
 from benchmarks.perception.__main__ import main
 from benchmarks.perception._photographs import (
     LABELS,
-    PhotographResult,
-    aware_lines,
     figures,
     judge_folder,
     matched,
@@ -44,22 +42,6 @@ def test_each_box_matches_once_and_the_most_people_count():
     assert matched(truth, np.zeros((0, 4))) == ()
     assert matched(np.zeros((0, 4)), found) == ()
     assert matched(truth[:1], found[:1], min_iou=0.6) == ()
-
-
-def test_figures_count_people_pictures_and_false_positives():
-    truth = np.array([[0.0, 0.0, 10.0, 20.0], [50.0, 0.0, 60.0, 20.0]])
-    results = [
-        PhotographResult("a.jpg", truth, (seen([0, 0, 10, 20]), seen([90, 0, 99, 9])), ((0, 0),)),
-        PhotographResult("b.jpg", np.zeros((0, 4)), (seen([1, 1, 9, 9], 0.7),), ()),
-    ]
-    assert figures(results) == {
-        "people": 2,
-        "pictures": 2,
-        "recall": 0.5,
-        "false_per_picture": 1.0,
-    }
-    (line,) = aware_lines(results)
-    assert line == "b.jpg: α = 0.70 ± 0.10, score 0.80, no labelled person at 1, 1, 9, 9"
 
 
 def test_bad_folders_are_refused(tmp_path, capsys):

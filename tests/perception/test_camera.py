@@ -2,7 +2,6 @@
 
 import math
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,24 +10,6 @@ from hypothesis import strategies as st
 from perception import Camera, PerceptionError
 
 DISTORTION = [-0.28, 0.07, 0.001, -0.0005, 0.01]
-
-
-def test_projection_agrees_with_opencv_with_and_without_distortion():
-    points = np.random.default_rng(0).uniform([-2, -1, 1.5], [2, 1, 8], (200, 3))
-    for distortion in (None, DISTORTION):
-        camera = Camera(640, 480, 500.0, 510.0, 320.0, 238.0, distortion)
-        expected, _ = cv2.projectPoints(
-            points, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion
-        )
-        np.testing.assert_allclose(camera.project(points), expected[:, 0], atol=1e-6)
-
-
-@pytest.mark.parametrize("distortion", [None, DISTORTION])
-def test_normalise_undoes_project(distortion):
-    camera = Camera(640, 480, 500.0, 510.0, 320.0, 238.0, distortion)
-    points = np.random.default_rng(1).uniform([-1, -0.8, 2], [1, 0.8, 6], (100, 3))
-    rays = camera.normalise(camera.project(points))
-    np.testing.assert_allclose(rays, points[:, :2] / points[:, 2:], atol=2e-4)
 
 
 @given(st.floats(0.2, 2.6), st.integers(16, 4000))

@@ -14,7 +14,6 @@ from perception import (
     PerceptionError,
     PersonDetection,
     PersonKeypoints,
-    PnpHeadPoseEstimator,
 )
 from perception._people_finder import SceneChanges
 
@@ -108,12 +107,6 @@ def stander(t_s):
     return 1.2, 4.0, 0.0
 
 
-def test_the_detector_looks_at_every_image_by_default():
-    world = World(walker)
-    world.run(AwarenessPipeline(CAMERA, world, world), 10)
-    assert len(world.looks) == 10
-
-
 def test_between_looks_boxes_follow_and_awareness_is_of_the_same_image():
     often, seldom = World(walker), World(walker)
     wanted = often.run(pipeline(often, 0.0), 25)
@@ -144,48 +137,6 @@ def test_two_looks_are_never_farther_apart_than_asked(rate_hz, every_s):
         assert gaps[:-1].min(initial=np.inf) > every_s - 1.0 / rate_hz - 1e-6
 
 
-@pytest.mark.parametrize("start_s", [0.05, 0.31, 0.449])
-def test_a_newcomer_is_found_in_the_first_image_of_a_camera_that_stands_still(start_s):
-    world = World(stander, lambda t_s: None if t_s < start_s else (-1.2, 4.0, 0.0))
-    seen = world.run(pipeline(world, 0.2), 14)
-    for index, people in enumerate(seen):
-        assert len(people) == (2 if index / RATE_HZ >= start_s else 1)
-    assert len(world.looks) < 14
-
-
-@pytest.mark.parametrize("start_s", [0.05, 0.31, 0.449])
-def test_a_newcomer_is_found_within_the_time_asked_by_a_camera_that_moves(start_s):
-    world = World(
-        stander,
-        lambda t_s: None if t_s < start_s else (-1.2, 4.0, 0.0),
-        camera_px_per_s=300.0,
-    )
-    seen = world.run(pipeline(world, 0.2), 20)
-    assert len(world.looks) < 10
-    late = [i / RATE_HZ for i, people in enumerate(seen) if len(people) < 2]
-    assert max(late) < start_s + 0.2
-
-
-def test_nobody_is_reported_who_is_gone():
-    world = World(stander, lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
-    seen = world.run(pipeline(world, 0.2), 14)
-    assert [len(people) for people in seen] == [2 if i / RATE_HZ < 0.32 else 1 for i in range(14)]
-    assert all(people[0].awareness is not None for people in seen)
-
-
-def test_the_only_person_is_not_reported_when_they_are_gone():
-    world = World(lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
-
-    class Heads(PnpHeadPoseEstimator):
-        def estimate(self, image_rgb, camera, people):
-            assert people, "heads of nobody"
-            return super().estimate(image_rgb, camera, people)
-
-    pipe = AwarenessPipeline(CAMERA, world, world, Heads(), detect_every_s=0.2)
-    seen = world.run(pipe, 10)
-    assert [len(people) for people in seen] == [1] * 7 + [0] * 3
-
-
 def test_without_anybody_the_detector_still_looks():
     world = World(lambda t_s: None)
     assert world.run(pipeline(world, 0.2), 13) == [()] * 13
@@ -206,38 +157,6 @@ def test_somebody_of_whom_too_little_is_seen_is_not_carried():
     world = World(lambda t_s: (0.0, 0.45, 0.0))
     world.run(pipeline(world, 0.2), 8)
     assert len(world.looks) == 8
-
-
-@pytest.mark.parametrize("jump_s", [0.5, 60.0, -0.05, -3.0, 0.0])
-def test_after_a_jump_in_time_the_detector_looks(jump_s):
-    world = World(stander)
-    pipe = pipeline(world, 0.2)
-    world.run(pipe, 2)
-    count = len(world.looks)
-    pipe.process(world.image(), world.t_s + jump_s)
-    assert len(world.looks) == count + 1
-
-
-def test_another_scene_needs_the_detector_at_once():
-    world = World(stander)
-    pipe = pipeline(world, 0.2)
-    world.run(pipe, 2)
-    count = len(world.looks)
-    pipe.process(255 - world.image(), world.t_s + 0.05)
-    assert len(world.looks) == count + 1
-
-
-def test_after_a_failure_the_detector_looks():
-    world = World(stander)
-    pipe = pipeline(world, 0.2)
-    world.run(pipe, 2)
-    count = len(world.looks)
-    world.fails = True
-    with pytest.raises(PerceptionError, match="today"):
-        pipe.process(world.image(), 0.1)
-    world.fails = False
-    assert len(pipe.process(world.image(), 0.15)) == 1
-    assert len(world.looks) == count + 1
 
 
 def changed(image, boxes=(), reference=None):
@@ -265,7 +184,3 @@ def test_a_person_sized_change_counts_unless_it_is_in_a_box(size):
     image[top:bottom, left:right] = 180
     assert changed(image, reference=reference)
     assert not changed(image, [np.array([left, top, right, bottom])], reference)
-
-
-def test_without_a_reference_everything_is_new():
-    assert SceneChanges().found_in(np.zeros((48, 64, 3), np.uint8), [])

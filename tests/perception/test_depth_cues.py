@@ -53,25 +53,6 @@ def test_without_outliers_the_result_is_generalised_least_squares():
     assert std == pytest.approx(1.0 / math.sqrt(weight.sum()), rel=1e-4)
 
 
-def test_a_common_error_of_the_stature_is_not_averaged_out():
-    correlated = [DepthCue(0.0, 0.05, 0.0499, NO_OUTLIER)] * 2
-    assert combined(correlated)[1] == pytest.approx(0.05, rel=0.01)
-    independent = [DepthCue(0.0, 0.05, 0.0, NO_OUTLIER)] * 2
-    assert combined(independent)[1] == pytest.approx(0.05 / math.sqrt(2.0), rel=0.01)
-
-
-@given(st.lists(cue, min_size=1, max_size=4), st.floats(-2.0, 2.0))
-def test_a_common_shift_of_all_cues_shifts_the_result(cues, shift):
-    moved = [
-        DepthCue(one.log_range + shift, one.log_std, one.stature_std, one.outlier_probability)
-        for one in cues
-    ]
-    mean, std = combined(cues)
-    other_mean, other_std = combined(moved)
-    assert other_mean == pytest.approx(mean + shift, abs=1e-9)
-    assert other_std == pytest.approx(std, rel=1e-6)
-
-
 @given(st.floats(0.4, 1.5))
 def test_two_cues_that_agree_outvote_an_outlier(off):
     agreeing = [DepthCue(0.0, 0.06, 0.05, 0.03), DepthCue(0.01, 0.05, 0.016, 0.05)]
@@ -286,13 +267,6 @@ def test_a_single_cue_has_the_standard_deviation_of_the_mixture():
     assert one.lasting_std == pytest.approx(math.sqrt(np.mean(size**2)), rel=0.01)
 
 
-@given(st.lists(cue, min_size=2, max_size=4), st.floats(0.0, 0.3))
-def test_the_lasting_part_is_a_part(cues, unusual):
-    together = combined_range(cues, unusual)
-    assert 0.0 <= together.lasting_std <= together.log_std
-    assert (together.log_range, together.log_std) == combined(cues, unusual)
-
-
 @given(st.floats(0.2, 0.8))
 def test_feet_that_seem_nearer_are_believed_and_feet_that_seem_farther_are_not(off):
     body = DepthCue(0.0, 0.06, 0.05, 0.03, 0.2, 0.3)
@@ -347,19 +321,6 @@ def test_knees_place_people_whose_feet_are_hidden(stature_m):
         position, _ = place(hidden, PersonDetection(box, 0.9), None, FLOOR)
         off.append(np.linalg.norm(position) / np.linalg.norm(person.chest_camera_m) - 1.0)
     assert np.median(np.abs(off)) <= 0.08
-
-
-def test_the_lower_edge_of_a_box_counts_only_where_feet_may_be_in_it():
-    """A skeleton without ankles and without limbs to be placed by: the box ends above the feet."""
-    rng = np.random.default_rng(12)
-    _, shown, detection = seen_person(rng, depth=4.0)
-    scores = np.zeros(17)
-    scores[:2] = 1.0
-    two = PersonKeypoints(shown.keypoints_px, shown.keypoints_root_m, scores, "coco")
-    box = np.array(detection.box_xyxy_px)
-    box[3] = 0.5 * (box[1] + box[3])
-    cut = PersonDetection(box, 0.9)
-    np.testing.assert_array_equal(place(two, cut, None, FLOOR)[0], place(two, cut)[0])
 
 
 def test_agreeing_box_cues_hold_that_the_lower_part_may_be_hidden():

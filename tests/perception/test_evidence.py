@@ -275,21 +275,6 @@ def test_several_people_at_once_equal_people_one_by_one():
         assert (estimate.awareness, estimate.awareness_std) == pytest.approx(alone)
 
 
-@given(st.floats(-math.pi, math.pi), st.floats(-0.5, 0.5), st.floats(0.0, 90.0))
-def test_rotating_the_world_about_the_robot_changes_nothing(about_y, about_x, yaw_deg):
-    head = head_at(yaw_deg, std_rad=0.1)
-    turn = Rotation.from_euler("yx", [about_y, about_x]).as_matrix()
-    both = np.kron(np.eye(2), turn)
-    moved = HeadPose(
-        turn @ head.position_camera_m,
-        turn @ head.rotation_camera_head,
-        both @ head.covariance @ both.T,
-        0.0,
-    )
-    eyes = (0.12, 0.06)
-    assert awareness(moved, eyes=eyes) == pytest.approx(awareness(head, eyes=eyes), abs=1e-6)
-
-
 def test_sideways_eye_movements_matter_for_a_robot_beside_the_gaze_only():
     """They hardly matter for a robot above the gaze."""
     eyes = (math.radians(10.0), 0.0)

@@ -179,17 +179,6 @@ def test_a_measurement_that_says_nothing_never_raises_awareness(yaw_deg, eye_yaw
     assert alpha <= awareness(head, ())[0] + (1e-3 if inside else 0.05)
 
 
-def test_eyes_that_look_away_lower_awareness_and_sure_eyes_do_so_more():
-    head = head_off(0.0)
-    alone, _ = awareness(head, ())
-    alphas = []
-    for std_deg in (20.0, 8.0, 4.0, 1.0):
-        measured = EyeGaze([math.radians(15.0), 0.0], np.eye(2) * math.radians(std_deg) ** 2)
-        alphas.append(awareness(head, known_eyes((measured,), PRIOR))[0])
-    assert alone > alphas[0]
-    assert alphas == sorted(alphas, reverse=True)
-
-
 def test_eyes_on_the_robot_raise_awareness_only_as_far_as_they_are_sure():
     head = head_off(25.0)  # turned to its left, so the robot is to its right
     alone, _ = awareness(head, ())

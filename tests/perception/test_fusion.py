@@ -68,21 +68,6 @@ def test_agreeing_poses_are_combined_in_information_form():
     np.testing.assert_allclose(fused.covariance, np.linalg.inv(information), atol=1e-9)
 
 
-@given(
-    st.lists(st.floats(-0.1, 0.1), min_size=3, max_size=3),
-    st.floats(0.06, 0.3),
-    st.floats(0.06, 0.3),
-)
-def test_the_order_of_agreeing_poses_hardly_matters(turn, one, two):
-    first, second = head(std_rad=one), head(turn, two)
-    forward, reverse = fuse_heads(first, second), fuse_heads(second, first)
-    angle = Rotation.from_matrix(
-        forward.rotation_camera_head @ reverse.rotation_camera_head.T
-    ).magnitude()
-    assert angle < 0.01
-    np.testing.assert_allclose(forward.covariance, reverse.covariance, atol=2e-3)
-
-
 @given(st.floats(0.0, math.pi - 0.05), st.floats(0.0, math.pi - 0.05))
 def test_the_covariance_never_shrinks_with_the_difference(first_turn, second_turn):
     less, more = sorted([first_turn, second_turn])

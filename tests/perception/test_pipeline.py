@@ -14,7 +14,6 @@ from perception import (
     HeadPose,
     PerceptionError,
     PersonDetection,
-    PersonObservation,
 )
 from perception.eyes import EyeGaze
 
@@ -78,15 +77,6 @@ def test_the_position_is_that_of_the_body_and_not_of_the_nose():
     assert np.linalg.norm(seen.position_camera_m - nose) > 0.25
 
 
-def test_a_head_that_is_not_seen_gives_no_evidence():
-    person = person_at((0.0, 0.4, 3.0))
-    hidden = np.r_[np.zeros(5), np.ones(12)]
-    (seen,) = pipeline(KnownPeople([person], seen=hidden)).process(FRAME, 0.0)
-    assert seen.awareness is None
-    assert seen.awareness_std is None
-    assert seen.gaze_camera is None
-
-
 def test_a_person_without_usable_keypoints_still_has_a_position():
     person = person_at((0.5, 0.4, 4.0))
     (seen,) = pipeline(KnownPeople([person], seen=np.zeros(17))).process(FRAME, 0.0)
@@ -143,16 +133,6 @@ def test_a_head_of_unknown_direction_is_no_evidence_unless_it_shows_no_face():
     np.testing.assert_array_equal(face.position_camera_m, back.position_camera_m)
 
 
-def test_eye_movements_increase_the_standard_deviation_and_do_not_change_alpha():
-    person = person_at((0.0, 0.4, 2.5), head_yaw_rad=math.radians(25.0))
-    steady, wandering = (
-        pipeline(KnownPeople([person]), eye_in_head_std_rad=std).process(FRAME, 0.0)[0]
-        for std in (0.0, (math.radians(15.0), math.radians(10.0)))
-    )
-    assert steady.awareness == wandering.awareness
-    assert wandering.awareness_std > 1.5 * steady.awareness_std
-
-
 def test_a_floor_improves_the_range_and_may_be_given_per_frame():
     errors = []
     camera_height_m = 1.25
@@ -184,29 +164,6 @@ def test_an_estimator_with_too_few_results_is_named():
 
     with pytest.raises(PerceptionError, match="pose_estimator"):
         pipeline(LosesOne([person_at((0.0, 0.4, 3.0))])).process(FRAME, 0.0)
-
-
-def observation(**change):
-    fields = {
-        "stamp_s": 0.0,
-        "position_camera_m": [0, 0, 1],
-        "position_covariance_m2": np.eye(3),
-        "gaze_camera": None,
-        "awareness": None,
-        "awareness_std": None,
-        "score": 1.0,
-        "box_xyxy_px": None,
-    }
-    return PersonObservation(**(fields | change))
-
-
-def test_observations_keep_a_read_only_copy_of_arrays():
-    position = np.array([0.0, 0.0, 1.0])
-    seen = observation(position_camera_m=position)
-    position[2] = 9.0
-    assert seen.position_camera_m[2] == 1.0
-    with pytest.raises(ValueError, match="read-only"):
-        seen.position_camera_m[2] = 5.0
 
 
 # --- eyes ---------------------------------------------------------------------------------------

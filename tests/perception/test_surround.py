@@ -8,11 +8,10 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import AwarenessPipeline, Camera, PerceptionError, PersonObservation
+from perception import AwarenessPipeline, Camera, PersonObservation
 from perception.surround import (
     FisheyeLens,
     PanoramaLens,
@@ -87,39 +86,6 @@ def test_a_fisheye_sees_nothing_beyond_its_circle() -> None:
     pixels = lens.project([at(1.6, 2.0) * [1, 0, 1], at(1.7, 2.0), [0.0, 0.0, -1.0]])
     assert np.isfinite(pixels[0]).all()
     assert np.isnan(pixels[1:]).all()
-
-
-def test_a_ros_calibration_of_a_fisheye_is_read(tmp_path) -> None:
-    path = tmp_path / "camera.yaml"
-    info = {
-        "image_width": 1280,
-        "image_height": 960,
-        "camera_matrix": {
-            "rows": 3,
-            "cols": 3,
-            "data": [300.0, 0, 640.0, 0, 310.0, 470.0, 0, 0, 1],
-        },
-        "distortion_model": "equidistant",
-        "distortion_coefficients": {"rows": 1, "cols": 4, "data": list(FISHEYE)},
-    }
-    path.write_text(yaml.safe_dump(info))
-    lens = FisheyeLens.from_yaml(path)
-    assert (lens.width_px, lens.fy_px, lens.cy_px) == (1280, 310.0, 470.0)
-    np.testing.assert_array_equal(lens.coefficients, FISHEYE)
-    with pytest.raises(PerceptionError, match=r"perception\.surround"):
-        Camera.from_yaml(path)
-    path.write_text(yaml.safe_dump({**info, "distortion_model": "plumb_bob"}))
-    with pytest.raises(PerceptionError, match=r"Camera\.from_yaml reads others"):
-        FisheyeLens.from_yaml(path)
-
-
-@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5))
-def test_a_panorama_maps_angles_evenly(heading, down):
-    lens = PanoramaLens(720, 360)
-    ray = [math.sin(heading) * math.cos(down), math.sin(down), math.cos(heading) * math.cos(down)]
-    u, v = lens.project([ray])[0]
-    assert u == pytest.approx(359.5 + math.degrees(heading) * 2.0, abs=1e-6)
-    assert v == pytest.approx(179.5 + math.degrees(down) * 2.0, abs=1e-6)
 
 
 def directions_of(lens, height: int, width: int) -> np.ndarray:

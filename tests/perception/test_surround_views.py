@@ -96,23 +96,6 @@ def test_one_pipeline_for_several_cameras_is_not_shared_either() -> None:
         assert headings_seen(pipeline, index, 0.0, 90.0) == [0, 90]
 
 
-def test_stand_ins_for_a_pipeline_are_made_for_each_view() -> None:
-    class Counting:
-        def __init__(self, camera: Camera) -> None:
-            self.images = 0
-            made.append(self)
-
-        def process(self, image_rgb, stamp_s, floor=None):
-            self.images += 1
-            return ()
-
-    made: list[Counting] = []
-    views = ring_of_views(FLAT, np.radians([0.0, 90.0, 180.0]))
-    pipeline = SurroundPipeline(LENS, views, Counting)
-    assert pipeline.process(panorama(0), 0.0) == ()
-    assert [each.images for each in made] == [1, 1, 1]
-
-
 def test_a_pipeline_for_another_view_shares_networks_and_knows_nobody() -> None:
     networks = Networks()
     first = AwarenessPipeline(FLAT, networks, networks, detect_every_s=0.2)

@@ -13,7 +13,6 @@ from perception.layouts import LEFT_HIP, LEFT_SHOULDER, RIGHT_HIP, RIGHT_SHOULDE
 from sim_tests.actors.body import Worker
 from sim_tests.dataset import RenderConfig
 from sim_tests.world import Warehouse
-from training.networks._clutter import Clutter, random_chair, random_thing
 from training.networks._figures import Figure
 from training.networks._postures import POSTURES, random_posture
 from training.networks._scenes import TrainingScene
@@ -95,28 +94,6 @@ def test_postures_look_like_their_names(figure):
     assert np.median(sitting[:, 0]) == pytest.approx(0.5, abs=0.12)
     assert (kneeling[:, 2] < 0.1).mean() > 0.9
     assert crouching[:, 0].max() < 0.62
-
-
-def test_things_have_a_base_and_chairs_have_a_seat():
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        thing = random_thing(rng)
-        assert thing.vertices_m[:, 2].min() == pytest.approx(0.0, abs=1e-9)
-        assert thing.uv is not None
-        assert np.isfinite(thing.vertices_m).all()
-        assert np.ptp(thing.vertices_m, axis=0).max() < 8.0
-        chair = random_chair(rng)
-        assert chair.vertices_m[:, 2].min() <= -0.99
-
-
-def test_clutter_is_drawn_where_it_is_placed(warehouse):
-    thing = Clutter(warehouse, random_chair(np.random.default_rng(1)), np.random.default_rng(1))
-    assert (thing.bounds_odom_m()[1, 0]) < warehouse.layout.x_min_m
-    thing.place((1.0, 2.0, 0.5), Rotation.from_rotvec([0.0, 0.0, 0.3]))
-    low, high = thing.bounds_odom_m()
-    np.testing.assert_allclose(0.5 * (low + high), [1.0, 2.0, 0.5])
-    assert thing.height_m >= 0.0
-    assert thing.base_m >= 0.99
 
 
 def test_a_training_scene_draws_people_in_their_boxes_and_is_repeatable():

@@ -10,7 +10,7 @@ from perception import Camera
 from perception.networks.heads._crops import head_crop, looking_at
 from sim_tests.dataset import RenderConfig
 from sim_tests.world.hall import LAYOUTS
-from training.networks import HeadSample, Recipe, cropped, similarity, warp, with_surroundings
+from training.networks import HeadSample, Recipe, cropped, similarity, warp
 
 
 def test_evaluation_has_its_own_halls_goods_and_colours():
@@ -61,12 +61,3 @@ def test_the_crops_are_equal_off_the_axis_of_a_wide_lens_too():
     np.testing.assert_allclose(sample["keypoints"], 0.5, atol=1e-9)
     moved = cropped(head, np.array([0.1, 0.0]), 1.0, 0.0, flip=False)
     assert moved["centre"][0] == pytest.approx(0.4, abs=0.02)
-
-
-def test_surroundings_are_grey_outside_the_image_and_repeated_within():
-    patch = np.full((10, 12, 3), 200, np.uint8)
-    larger, origin = with_surroundings(patch, (0, 20), (640, 480), 4)
-    assert larger.shape == (18, 20, 3)
-    assert origin == (-4, 16)
-    assert (larger[4:-4, :4] == 114).all()
-    assert (larger[:, 4:] == 200).all()

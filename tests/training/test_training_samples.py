@@ -16,9 +16,7 @@ from training.networks._augment import (
     emptied_outside,
     moved,
     photographed_layers,
-    reduced,
     sheared,
-    within_rectangle,
 )
 from training.networks._samples import (
     ImageSample,
@@ -63,31 +61,6 @@ def test_the_box_of_an_outline_is_the_box_of_the_pixels_turned_and_sheared_too(s
     matrix = composed(placed, rolling_shutter(float(rng.uniform(-0.2, 0.2)), 60.0))
     drawn = warp(np.dstack([mask.astype(np.uint8) * 255] * 3), matrix, (160, 120), 1, 0)[..., 0]
     np.testing.assert_allclose(box_around(moved(points, matrix)), pixel_box(drawn > 127), atol=1.6)
-
-
-def test_the_part_of_an_outline_in_a_rectangle_is_that_of_its_pixels():
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        mask = np.zeros((120, 160), np.uint8)
-        angle = float(rng.uniform(0.0, 180.0))
-        cv2.ellipse(mask, (80, 60), (50, 20), angle, 0, 360, (1,), -1)
-        low, high = rng.integers(40, 75, 2), rng.integers(80, 118, 2)
-        part = within_rectangle(outline(mask > 0), low, high)
-        mask[: low[1]] = mask[high[1] :] = 0
-        mask[:, : low[0]] = mask[:, high[0] :] = 0
-        assert part is not None
-        # Where the outline crosses the edge at a small angle, its pixels are stairs.
-        np.testing.assert_allclose(box_around(part), pixel_box(mask > 0), atol=2.5)
-    assert within_rectangle(outline(blob()), np.array([0, 0]), np.array([1, 1])) is None
-
-
-def test_a_map_of_a_map_is_the_second_after_the_first():
-    first = rolling_shutter(0.13, 20.0)
-    second = similarity(np.array([30.0, 10.0]), 0.7, 0.3, (50, 40), flip=True)
-    points = np.random.default_rng(0).uniform(0.0, 60.0, (9, 2))
-    np.testing.assert_allclose(
-        moved(points, composed(second, first)), moved(moved(points, first), second), atol=1e-9
-    )
 
 
 def test_a_sheared_picture_agrees_with_its_points():
@@ -145,16 +118,6 @@ def test_outside_the_camera_s_picture_nothing_is_degraded():
     assert (out == OUTSIDE_GREY).all()
     whole = np.array([[-1.0, -1.0], [99.0, -1.0], [99.0, 99.0], [-1.0, 99.0]])
     assert emptied_outside(image, whole) is image
-
-
-def test_a_reduced_picture_scales_its_points():
-    image = np.random.default_rng(0).integers(0, 256, (90, 130, 4), np.uint8)
-    same, factors = reduced(image, 1.3)
-    assert same is image
-    assert factors.tolist() == [1.0, 1.0]
-    small, factors = reduced(image, 0.4)
-    assert small.shape == (36, 52, 4)
-    np.testing.assert_allclose(factors, [0.4, 0.4])
 
 
 def truth(rng, size=(320, 240)):

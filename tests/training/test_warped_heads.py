@@ -58,14 +58,6 @@ def test_eyes_and_keypoints_move_with_the_skin(crowd):
             np.testing.assert_allclose(other - point, moved[near].mean(axis=0), atol=1.5e-3)
 
 
-def test_copies_differ_and_nothing_is_written_twice(crowd):
-    first, second = (load_worker(str(crowd / f"daniel_shape{n}.npz")) for n in (1, 2))
-    assert np.abs(first.joints_m[2] - second.joints_m[2]).max() > 1e-4
-    before = {path: path.stat().st_mtime_ns for path in crowd.iterdir()}
-    add_head_shapes(crowd, 2, seed=3)
-    assert {path: path.stat().st_mtime_ns for path in crowd.iterdir()} == before
-
-
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_warp_is_symmetric_and_its_normals_are_those_of_the_surface(seed):
     rng = np.random.default_rng(seed)

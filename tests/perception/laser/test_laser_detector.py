@@ -98,12 +98,6 @@ def test_two_people_beside_each_other_stay_two() -> None:
     assert sorted(places(found)[:, 1].round(1).tolist()) == pytest.approx([-0.35, 0.35], abs=0.1)
 
 
-def test_a_leg_alone_is_one_leg() -> None:
-    scan = laser_scan([(2.0, 0.0, 0.06)])
-    (found,) = LegDetector(ONCE, classifier=Says(0.9, 0.0)).detect(points_of(scan))
-    assert found.kind == "one_leg"
-
-
 def test_the_threshold_and_the_range_leave_people_out() -> None:
     scan = laser_scan(two_legs(3.0, 0.0))
     says = Says(0.0, 0.6)

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of
-from PIL import Image
 
 from perception import PerceptionError
 from perception.laser import LegDetector, LegDetectorConfig, MapCells, StaticMap
@@ -89,15 +88,6 @@ def test_transparent_pixels_are_unknown(keys: dict[str, object], kind: type, tmp
     np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.65])
 
 
-@pytest.mark.parametrize("mode", ["P", "RGB"])
-def test_the_transparent_colour_of_a_png_is_unknown(mode: str, tmp_path: Path) -> None:
-    """Floor that a drawing program erased: black, and transparent."""
-    drawn = Image.fromarray(np.array([[0, 255], [100, 255]], np.uint8)).convert(mode)
-    drawn.save(tmp_path / "erased.png", transparency=(0, 0, 0) if mode == "RGB" else 0)
-    path = written(tmp_path, (tmp_path / "erased.png").read_bytes(), "erased.png")
-    assert not StaticMap.from_yaml(path, margin_m=0.0).occupied[1].any()
-
-
 @pytest.mark.parametrize("kind", [2, 3, 5, 6])
 def test_netpbm_is_read_as_text_and_as_numbers(kind: int, tmp_path: Path) -> None:
     shades = np.array([[0, 255, 255], [255, 255, 0]])
@@ -108,12 +98,6 @@ def test_netpbm_is_read_as_text_and_as_numbers(kind: int, tmp_path: Path) -> Non
         body = values.astype(np.uint8).tobytes()
     held = StaticMap.from_yaml(written(tmp_path, head + body, "hall.pnm"), margin_m=0.0)
     assert held.occupied[::-1].tolist() == (shades == 0).tolist()
-
-
-def test_bitmaps_of_netpbm_have_ones_for_black(tmp_path: Path) -> None:
-    for name, image in (("a.pbm", b"P1\n3 1\n100\n"), ("b.pbm", b"P4\n3 1\n\x80")):
-        held = StaticMap.from_yaml(written(tmp_path, image, name), margin_m=0.0)
-        assert held.occupied.tolist() == [[True, False, False]]
 
 
 def test_colours_count_by_their_mean(tmp_path: Path) -> None:
@@ -159,16 +143,6 @@ def test_a_turned_map_holds_its_cells_wherever_it_lies(
         away = np.linalg.norm(free[:, None] - places, axis=2).min(axis=1)
         free = free[away > 0.1 * (1.0 + 2.5 * math.sqrt(2.0))]
     assert not held.holds(in_odom(free)).any()
-
-
-def test_a_map_that_is_only_shifted_keeps_its_cells(tmp_path: Path) -> None:
-    pixels = (np.random.default_rng(4).random((7, 9)) * 255).astype(np.uint8)
-    path = written(tmp_path, pixels)
-    T = np.eye(4)
-    T[:2, 3] = 5.0, 6.0
-    here, there = StaticMap.from_yaml(path), StaticMap.from_yaml(path, T)
-    assert np.array_equal(here.occupied, there.occupied)
-    np.testing.assert_allclose(there.origin_odom_m - here.origin_odom_m, [5.0, 6.0])
 
 
 def test_an_empty_map_holds_nothing(tmp_path: Path) -> None:

@@ -53,7 +53,3 @@ def test_candidates_of_two_scans_share_a_stamp_at_the_price_of_certainty() -> No
     np.testing.assert_allclose(older.position_covariance_m2[:2, :2], grown, atol=1e-12)
     tracker = PersonTracker(TrackerConfig())
     assert len(tracker.update((here, older), 5.0, np.eye(4))) == 2
-
-
-def test_nobody_is_nobody() -> None:
-    assert observations_of((), np.eye(4)) == ()

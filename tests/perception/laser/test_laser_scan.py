@@ -42,15 +42,6 @@ def test_special_ranges_mean_what_rep_117_says() -> None:
     assert scan.free_of(scan.measured).tolist() == [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0]
 
 
-def test_a_scan_keeps_its_own_copy() -> None:
-    ranges = np.ones(4)
-    scan = scan_of(ranges)
-    ranges[:] = 7.0
-    assert scan.ranges_m.tolist() == [1.0] * 4
-    with pytest.raises(ValueError, match="read-only"):
-        scan.ranges_m[0] = 2.0
-
-
 def test_a_mounted_scanner_turns_and_lifts_its_points() -> None:
     scanner = Scanner.mounted(0.3, -0.2, 0.25, yaw_rad=math.pi / 2)
     points = scan_points(scan_of([2.0], angle_min_rad=0.0), scanner, HOME)

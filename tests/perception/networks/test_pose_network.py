@@ -94,15 +94,6 @@ def test_metadata_may_give_padding_and_depth_range() -> None:
         OnnxPoseEstimator(wrong)
 
 
-@pytest.mark.parametrize("dtype", ["float16", "uint8"])
-def test_inputs_of_other_number_types_are_supported(dtype: str) -> None:
-    graph, places, _ = network(17, (64, 48), depth=False, dtype=dtype)
-    (person,) = OnnxPoseEstimator(graph).estimate(IMAGE, (MIDDLE,))
-    crops = PersonCrops(MIDDLE.box_xyxy_px[None], 64, 48)
-    wanted = crops.to_image(places[None].transpose(0, 2, 1) / 2.0, np.array([0]))[0]
-    np.testing.assert_allclose(person.keypoints_px, wanted, atol=0.05)
-
-
 @pytest.mark.parametrize(
     "box",
     [

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from perception.networks.poses import simcc_confidence, simcc_depth_m, simcc_peaks
+from perception.networks.poses import simcc_confidence, simcc_peaks
 
 
 def gaussian(place: float, bins: int, sigma: float = 6.0, height: float = 0.8) -> np.ndarray:
@@ -55,15 +55,3 @@ def test_axes_of_different_lengths_are_read_together() -> None:
     # The confidence is that of the weaker of x and y.
     assert simcc_confidence(heights, np.array([[True]]))[0, 0] == pytest.approx(0.5, rel=0.02)
     assert simcc_confidence(heights, np.array([[False]]))[0, 0] == 0.0
-
-
-def test_the_height_along_z_is_no_part_of_the_confidence() -> None:
-    """OpenMMLab's ``get_simcc_maximum`` masks x with y, and takes only the place along z."""
-    heights = np.array([[[0.9, 0.2]], [[0.8, 0.7]], [[0.1, 0.1]]])
-    np.testing.assert_array_equal(simcc_confidence(heights, np.ones((1, 2), bool)), [[0.8, 0.2]])
-
-
-@given(st.floats(0, 576))
-def test_the_depth_follows_rtmw3ds_formula(place: float) -> None:
-    wanted = (place / 2 / 144 - 1) * 2.1744869
-    assert simcc_depth_m(np.array([[place]]), 576)[0, 0] == pytest.approx(wanted, abs=1e-12)
