@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from synthetic_people import FACING, awareness_of
 
 from perception import AttentionCone, Camera, HeadPose
 from perception.anthropometry import EYES_HEAD_M
-from perception.awareness import estimate_awareness
 from perception.eyes import (
     AHEAD_M,
     AHEAD_STD_M,
@@ -28,7 +28,6 @@ from perception.networks.heads import looking_at
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 CONE = AttentionCone()
 PRIOR = (math.radians(7.0), math.radians(3.4))
-FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 NO_ERROR = np.diag([1e-12] * 6)
 angle = st.floats(-0.4, 0.4)
 
@@ -146,16 +145,7 @@ def test_eyes_that_nobody_turns_so_far_are_not_known():
 
 
 def awareness(head, eyes):
-    (estimate,) = estimate_awareness(
-        CONE,
-        (head,),
-        np.zeros((1, 3)),
-        extra_std_rad=np.zeros(1),
-        eye_in_head_std_rad=PRIOR,
-        face_seen=np.ones(1),
-        eyes=eyes,
-    )
-    return estimate.awareness, estimate.awareness_std
+    return awareness_of(head, eye_std_rad=PRIOR, eyes=eyes)
 
 
 def head_off(yaw_deg, std_rad=0.05):

@@ -10,28 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
-from synthetic_people import person_at
+from synthetic_people import awareness_of, person_at
 
 from perception import AttentionCone, Camera, PersonKeypoints, PnpHeadPoseEstimator
 from perception.anthropometry import HEAD_TEMPLATE_M, NECK_TO_NOSE_UP_M
-from perception.awareness import estimate_awareness
 from perception.head_frame import lifted_head_model, printed_head_rotation
 
 CAMERA = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0)
 EAR_TO_NOSE_M = 0.1107
-
-
-def awareness_of(cone, head, robot):
-    """Return α and its standard deviation, for eyes that look where the head points."""
-    (found,) = estimate_awareness(
-        cone,
-        (head,),
-        robot,
-        extra_std_rad=np.zeros(1),
-        eye_in_head_std_rad=(0.0, 0.0),
-        face_seen=np.ones(1),
-    )
-    return found.awareness, found.awareness_std
 
 
 def turned_head(rng, yaw_rad, ear_to_nose_px=55.0):
@@ -100,14 +86,15 @@ def test_the_standard_deviation_of_awareness_agrees_with_monte_carlo(yaw_deg):
     """
     rng = np.random.default_rng(4)
     person = person_at((0.2, 0.3, 2.5), body_yaw_rad=0.3, head_yaw_rad=math.radians(yaw_deg) - 0.3)
-    robot, cone = np.zeros((1, 3)), AttentionCone()
     estimator = PnpHeadPoseEstimator(head_shape_spread=0.0)
     people = tuple(person.keypoints(CAMERA, 1.0, rng) for _ in range(200))
     heads = estimator.estimate(None, CAMERA, people)
-    drawn = np.array([awareness_of(cone, head, robot)[0] for head in heads])
+    drawn = np.array([awareness_of(head)[0] for head in heads])
     (nominal,) = estimator.estimate(None, CAMERA, (person.keypoints(CAMERA, 0.0, rng),))
-    alpha, std = awareness_of(cone, nominal, robot)
-    truth = cone.score(person.eyes_camera_m, person.rotation_camera_head[:, 1], np.zeros(3))
+    alpha, std = awareness_of(nominal)
+    truth = AttentionCone().score(
+        person.eyes_camera_m, person.rotation_camera_head[:, 1], np.zeros(3)
+    )
     assert alpha == pytest.approx(truth, abs=0.01)
     assert std == pytest.approx(drawn.std(), rel=0.25)
 
@@ -139,10 +126,9 @@ def test_turned_heads_with_some_keypoints_hidden(head_yaw_deg, seen, tolerance_d
     ]
     assert len(errors) >= 55
     assert np.median(errors) < tolerance_deg
-    robot = np.zeros((1, 3))
     for head in heads:
         if head is not None and abs(head_yaw_deg) >= 90:
-            alpha, std = awareness_of(AttentionCone(), head, robot)
+            alpha, std = awareness_of(head)
             assert alpha - 1.28 * std < 0.2, "a face turned away was called aware"
 
 

@@ -93,7 +93,7 @@ def test_the_covariance_holds_the_spread_of_head_shapes(profile):
 
 
 def test_near_heads_have_the_uncertainty_of_their_shape_not_of_their_pixels():
-    near = people(1.0, 150, 20, range_m=(1.0, 2.0))
+    near = people(1.0, 200, 20, range_m=(1.0, 2.0))
     exact, honest = (
         nees_of(near, PnpHeadPoseEstimator(head_shape_spread=spread)) for spread in (0.0, 1.0)
     )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic_people import person_at
+from synthetic_people import Given, person_at
 
 from perception import (
     AwarenessPipeline,
@@ -89,7 +88,7 @@ def test_of_two_boxes_with_one_skeleton_that_which_fits_keeps_it():
     assert reasons((person, doubtful), (again, detection)) == [SKELETON, None]
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(range(4))))
+@given(st.permutations(range(4)))
 def test_the_order_of_detections_does_not_matter(order):
     one, other = seen(-0.8), seen(0.8, seed=1)
     thief = (changed(one[0]), shifted(one[1], (50.0, 0.0)))
@@ -179,25 +178,17 @@ def test_people_without_keypoints_lose_nothing():
 # --- in the pipeline ----------------------------------------------------------------------------
 
 
-class Given:
-    """A detector and pose estimator with fixed answers."""
-
-    def __init__(self, *pairs):
-        self._people, self._detections = zip(*pairs, strict=True)
-
-    def detect(self, image_rgb):
-        return self._detections
-
-    def estimate(self, image_rgb, detections):
-        return self._people
+def processed(*pairs):
+    """Return the observations of a pipeline whose networks found these people and boxes."""
+    known = Given(*zip(*pairs, strict=True))
+    return AwarenessPipeline(CAMERA, known, known).process(BLANK, 0.0)
 
 
 def test_only_one_of_two_boxes_has_the_awareness_of_a_skeleton():
     # Yaw π of the test bodies looks at the camera or away; whichever it is, one has an α.
     person, detection = seen()
     neighbour = shifted(detection, (40.0, 0.0))
-    given_ = Given((changed(person), neighbour), (person, detection))
-    second, first = AwarenessPipeline(CAMERA, given_, given_).process(BLANK, 0.0)
+    second, first = processed((changed(person), neighbour), (person, detection))
     assert first.awareness is not None
     assert first.awareness_reason is None
     assert (second.awareness, second.awareness_std, second.gaze_camera) == (None, None, None)
@@ -219,10 +210,6 @@ def test_only_one_of_two_boxes_has_the_awareness_of_a_skeleton():
 )
 def test_an_observation_says_why_there_is_no_awareness(change, reason):
     person, detection = seen()
-    given_ = Given((change(person), detection))
-    (seen_as,) = AwarenessPipeline(CAMERA, given_, given_).process(BLANK, 0.0)
+    (seen_as,) = processed((change(person), detection))
     assert seen_as.awareness is None
     assert seen_as.awareness_reason == reason
-
-
-# --- on photographs -----------------------------------------------------------------------------
