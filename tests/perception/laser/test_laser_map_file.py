@@ -77,8 +77,9 @@ def test_brightness_counts_as_the_mode_says(keys, occupied, tmp_path: Path) -> N
     assert len(MapCells.from_yaml(deep).cells_m) == len(occupied)
 
 
-@pytest.mark.parametrize("keys", [{}, {"mode": "scale"}, {"mode": "raw"}, {"negate": 1}])
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize(
+    ("keys", "kind"), [({}, np.uint8), ({"mode": "raw"}, np.uint8), ({"negate": 1}, np.uint16)]
+)
 def test_transparent_pixels_are_unknown(keys: dict[str, object], kind: type, tmp_path) -> None:
     """As for nav2_map_server since 2025; where somebody stands is then no part of the map."""
     white, dark = np.iinfo(kind).max, {"raw": 90}.get(str(keys.get("mode")), 0)
@@ -172,23 +173,16 @@ WHITE = np.full((2, 2), 255, np.uint8)
     ("keys", "text"),
     [
         ({"resolution": None}, "lacks the key 'resolution'"),
-        ({"negate": None}, "lacks the key 'negate'"),
         ({"occupied_tresh": 0.6}, "unknown key 'occupied_tresh'.*did you mean 'occupied_thresh'"),
-        ({"Mode": "scale"}, "unknown key 'Mode'.*did you mean 'mode'"),
         ({"mode": "binary"}, "mode must be one of trinary, scale, raw, got 'binary'"),
         ({"resolution": 0.0}, r"resolution must lie in \[0.005, 1\]"),
-        ({"resolution": "fine"}, "resolution must be a number"),
         ({"origin": "[0, 0]"}, r"origin must have shape \(3,\)"),
         ({"origin": "[0, 0, .nan]"}, "origin must be finite"),
-        ({"origin": "{x: 1}"}, "origin must be an array of numbers"),
         ({"negate": 2}, "negate must be 0 or 1"),
-        ({"negate": "[1]"}, "negate must be 0 or 1"),
         ({"occupied_thresh": 1.1}, "occupied_thresh must lie in"),
         ({"occupied_thresh": 0.1}, "free_thresh must be below occupied_thresh, got 0.196 and 0.1"),
-        ({"free_thresh": ".nan"}, "free_thresh must be finite"),
         ({"image": "gone.pgm"}, "cannot read the map's image .*gone.pgm: No such file"),
         ({"image": "[]"}, "image must be the path"),
-        ({"image": '"a\\0b"'}, "cannot read the map's image"),
     ],
 )
 def test_a_map_file_that_makes_no_sense_is_refused(keys, text: str, tmp_path: Path) -> None:
@@ -211,14 +205,11 @@ def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog
     ("image", "text"),
     [
         (b"", "damaged, or no PGM"),
-        (b"no image", "damaged, or no PGM"),
         (b"P5 3 1 255\n\x00\x32", "damaged, or no PGM"),
         (b"P5 9999999 9999999 255\n", "damaged, or no PGM"),
         (b"P5 2 1 100\n\x00\x64", "in which white is 100, not 255 or 65535; save it as PGM or PNG"),
-        (b"P2 2 1 255\n0 white\n", "damaged, or no PGM"),
         (b"\x89PNG" + bytes(22) + b"tRNS", "a grey PNG with a transparent grey; save it as"),
         (b"II*\0" + bytes(30), "a TIFF; save it as PGM or PNG"),
-        (b"MM\0*" + bytes(30), "a TIFF; save it as PGM or PNG"),
         (b"P7\nWIDTH 1\nHEIGHT 1\nDEPTH 1\nMAXVAL 15\nENDHDR\n\x0f", r"a PAM \(P7\); save it as"),
     ],
 )

@@ -7,7 +7,6 @@ import math
 import cv2
 import numpy as np
 import pytest
-import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx_graphs import DISC_M, disc_network, full_range_network
@@ -17,7 +16,6 @@ from perception import Camera, PerceptionError, PersonKeypoints
 from perception.anthropometry import HEAD_CENTRE_HEAD_M
 from perception.networks import OnnxModel
 from perception.networks.heads import OnnxHeadPoseEstimator, ray_axes
-from perception.networks.heads._outputs import nearest_rotations
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 WIDE = Camera.from_fov(960, 600, math.radians(120.0))
@@ -160,15 +158,15 @@ def test_what_two_passes_see_differently_joins_the_covariance(monkeypatch):
     px_per_m = CAMERA.fx_px / 2.5
     once, twice = person_about(pixel, px_per_m), person_about(pixel, px_per_m, (9.0, 0.0))
     covariances = []
-    for _ in range(150):
+    for _ in range(60):
         runs.clear()
         (head,) = estimator.estimate(image, CAMERA, (twice,))
         assert len(runs) == 2
         covariances.append(head.covariance[:3, :3])
     known = rotation_std**2 + math.radians(0.5) ** 2
     expected = (known + error_std**2) * np.eye(3)
-    # A standard deviation of √2 relative to the mean, of 150 samples: 12 %.
-    np.testing.assert_allclose(np.mean(covariances, axis=0), expected, atol=0.4 * error_std**2)
+    # A standard deviation of √2 relative to the mean, of 60 samples: 18 %.
+    np.testing.assert_allclose(np.mean(covariances, axis=0), expected, atol=0.6 * error_std**2)
     runs.clear()
     (head,) = estimator.estimate(image, CAMERA, (once,))
     assert len(runs) == 1
@@ -315,17 +313,3 @@ def test_a_full_range_network_gives_no_range_and_no_visibility():
     std = np.sqrt(np.diag(head.covariance))
     assert np.allclose(std[:3], math.radians(10.0), rtol=0.01)
     assert head.position_camera_m[2] == pytest.approx(CAMERA.fx_px / 200.0 - 0.09, rel=0.1)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-7, 1e-3, 0.01]))
-def test_inaccurate_rotations_are_replaced_by_the_nearest_ones(seed, error):
-    model = OnnxModel(full_range_network(np.eye(3)))
-    rng = np.random.default_rng(seed)
-    noise = error * rng.uniform(-1.0, 1.0, (3, 3, 3))
-    output = np.float64(np.float32(Rotation.random(3, rng).as_matrix() + noise))
-    for found, matrix in zip(nearest_rotations(model, output), output, strict=True):
-        assert found == pytest.approx(scipy.linalg.polar(matrix)[0], abs=1e-9)
-    output[1] *= -1.0
-    with pytest.raises(PerceptionError, match="not rotations"):
-        nearest_rotations(model, output)

@@ -101,19 +101,6 @@ def test_weights_in_a_separate_file_are_loaded_only_without_a_sha256(tmp_path: P
         OnnxModel(path, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
 
-def test_a_provider_takes_options_and_either_of_its_names() -> None:
-    shapes = {"trt_profile_max_shapes": "images:1x3x256x320", "trt_fp16_enable": True}
-    settings = OnnxSettings(("cpu", ("TensorrtExecutionProvider", shapes)))  # type: ignore[arg-type]
-    assert settings.provider_names == ("cpu", "tensorrt")
-    assert settings.provider_options("cpu") == {}
-    assert settings.provider_options("tensorrt") == {
-        "trt_profile_max_shapes": "images:1x3x256x320",
-        "trt_fp16_enable": "True",
-    }
-    assert {settings: 1}[OnnxSettings(settings.providers)] == 1
-    assert OnnxModel(content(), settings=OnnxSettings((("cpu", {"any": 1}),))).providers == ("cpu",)
-
-
 @pytest.mark.parametrize("name", sorted(PROVIDERS))
 def test_a_provider_starts_or_the_error_says_which_are_present(name: str) -> None:
     settings = OnnxSettings(((name, {}), "cpu") if name != "cpu" else ("cpu",))

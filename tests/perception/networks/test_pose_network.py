@@ -19,7 +19,6 @@ from perception.networks.poses import (
     PersonCrops,
     lift_keypoints,
     metres_per_pixel,
-    simcc_confidence,
     simcc_peaks,
 )
 
@@ -283,24 +282,6 @@ def test_a_constant_row_has_a_position_and_causes_no_warning(rows: np.ndarray) -
     places, heights = simcc_peaks([rows])
     assert ((places >= 0) & (places <= 8)).all()
     np.testing.assert_array_equal(heights[0], rows[..., 0])
-
-
-@pytest.mark.parametrize("invalid", [np.nan, np.inf])
-def test_a_row_that_is_not_finite_has_height_0_and_does_not_affect_others(invalid: float) -> None:
-    rows = np.concatenate([gaussian(20.3, 64), gaussian(30.6, 64)], axis=1)
-    rows[0, 0, 50] = invalid
-    places, heights = simcc_peaks([rows])
-    assert (places[0, 0, 0], heights[0, 0, 0]) == (0.0, 0.0)
-    assert places[0, 0, 1] == pytest.approx(30.6, abs=1e-3)
-
-
-def test_axes_of_different_lengths_are_read_together() -> None:
-    axes = [gaussian(20.3, 64), gaussian(100.7, 128, height=0.5), gaussian(7.5, 32)]
-    places, heights = simcc_peaks(axes)
-    np.testing.assert_allclose(places[:, 0, 0], [20.3, 100.7, 7.5], atol=1e-3)
-    # The confidence is that of the weaker of x and y.
-    assert simcc_confidence(heights, np.array([[True]]))[0, 0] == pytest.approx(0.5, rel=0.02)
-    assert simcc_confidence(heights, np.array([[False]]))[0, 0] == 0.0
 
 
 # --- lifting to metres ----------------------------------------------------------------------------
