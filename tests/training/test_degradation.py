@@ -17,7 +17,6 @@ from training.networks import (
     degrade,
     motion_kernel,
     random_degradation,
-    rolling_shutter,
 )
 
 
@@ -109,16 +108,6 @@ def test_light_comes_before_clipping_and_jpeg():
     image = smooth()
     both = degrade(image, Degradation(light=0.25, exposure_ev=2.0), np.random.default_rng(0))
     assert np.abs(both.astype(int) - image.astype(int)).max() <= 1
-
-
-@given(st.floats(-0.2, 0.2), st.floats(0.0, 100.0))
-@settings(max_examples=30, deadline=None)
-def test_a_rolling_shutter_keeps_the_middle_row_and_moves_each_row_by_the_shear(shear, middle):
-    matrix = rolling_shutter(shear, middle)
-    points = np.array([[10.0, middle], [10.0, middle + 1.0], [10.0, middle - 20.0]])
-    moved = points @ matrix[:, :2].T + matrix[:, 2]
-    np.testing.assert_allclose(moved[:, 1], points[:, 1], atol=1e-12)
-    np.testing.assert_allclose(moved[:, 0], 10.0 + shear * np.array([0.0, 1.0, -20.0]), atol=1e-9)
 
 
 def test_random_degradations_reach_what_was_asked_and_leave_some_pictures_alone():

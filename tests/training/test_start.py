@@ -14,8 +14,7 @@ from training.networks._detector_net import DetectorExport, DetectorNet  # noqa:
 from training.networks._export import export_detector, export_head, export_pose  # noqa: E402
 from training.networks._head_net import HeadExport, HeadNet  # noqa: E402
 from training.networks._pose_net import PoseExport, PoseNet  # noqa: E402
-from training.networks._recipe import Recipe  # noqa: E402
-from training.networks._start import start_from, unseen  # noqa: E402
+from training.networks._start import start_from  # noqa: E402
 from training.networks.quantise import quantise  # noqa: E402
 
 _NETWORKS = {
@@ -99,31 +98,6 @@ def _folded(layer):
     conv, norm = layer[0], layer[1]
     factor = norm.weight / (norm.running_var + norm.eps).sqrt()
     return (conv.weight * factor[:, None, None, None]).detach().numpy()
-
-
-def test_normalisation_has_the_statistics_of_the_data():
-    """In training mode, batches of such data are normalised to about the same function."""
-    torch.manual_seed(5)
-    net = HeadNet()
-    start_from(net, shipped_model_path(HEAD), [torch.randn(16, 3, 64, 64) for _ in range(2)])
-    x = torch.randn(64, 3, 64, 64)
-    norms = [m for m in net.modules() if isinstance(m, torch.nn.BatchNorm2d)]
-    assert all(float(norm.weight.detach().min()) > 0.0 for norm in norms)
-    net.eval()
-    with torch.no_grad():
-        fixed = net.fine(x)
-        net.train()
-        batch = net.fine(x)
-    spread = float(fixed.std())
-    assert float((fixed - batch).abs().mean()) < 0.1 * spread
-
-
-def test_the_statistics_come_from_batches_that_are_not_trained_on():
-    recipe = Recipe()
-    numbers = [int(batch) for batch in unseen(torch.tensor)]
-    assert len(numbers) == len(set(numbers)) >= 2
-    steps = max(recipe.head_steps, recipe.pose_steps, recipe.detector_steps)
-    assert min(numbers) > steps
 
 
 def test_a_file_of_another_network_is_refused():
