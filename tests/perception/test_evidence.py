@@ -252,16 +252,6 @@ def test_several_people_at_once_equal_people_one_by_one():
         assert (estimate.awareness, estimate.awareness_std) == pytest.approx(alone)
 
 
-def test_sideways_eye_movements_matter_for_a_robot_beside_the_gaze_only():
-    """They hardly matter for a robot above the gaze."""
-    eyes = (math.radians(10.0), 0.0)
-    beside, above = (
-        awareness_of(head_at(yaw, pitch_deg=pitch, std_rad=1e-3), eye_std_rad=eyes)[1]
-        for yaw, pitch in ((30.0, 0.0), (0.0, 30.0))
-    )
-    assert beside > 3.0 * above
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("height_px", [(40.0, 110.0), (110.0, 400.0)], ids=["small", "large"])
 def test_random_keypoints_with_good_scores_are_hardly_ever_aware(height_px):

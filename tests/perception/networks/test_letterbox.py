@@ -86,11 +86,8 @@ def test_padding_is_grey_also_after_an_image_of_another_shape(centred: bool) -> 
     [
         (np.zeros((4, 4), np.uint8), "cvtColor"),
         (np.zeros((4, 4, 4), np.uint8), "fourth channel"),
-        (np.zeros((4, 4, 1), np.uint8), r"got uint8 of shape \(4, 4, 1\)"),
         (np.zeros((4, 4, 3), np.float32), "got float32"),
-        (np.zeros((0, 4, 3), np.uint8), "got 4 x 0"),
         (np.zeros((1, 40000, 3), np.uint8), "got 40000 x 1"),
-        ([[0, 0, 0]], "got list"),
         (None, "got NoneType"),
     ],
 )
