@@ -14,7 +14,6 @@ from synthetic_people import FACING, awareness_of
 
 from perception import AttentionCone, Camera, HeadPose, PersonKeypoints, PnpHeadPoseEstimator
 from perception.anthropometry import EYES_HEAD_M
-from perception.awareness import estimate_awareness
 from perception.evidence import FaceEvidence, judge_face
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -226,30 +225,6 @@ def test_an_uncertain_face_gives_the_moments_of_both_cases(seen, yaw_deg):
     alpha, std = awareness_of(head, seen=seen)
     assert alpha == pytest.approx(seen * score, abs=1e-5)
     assert std == pytest.approx(score * math.sqrt(seen * (1.0 - seen)), abs=1e-3)
-
-
-def test_several_people_at_once_equal_people_one_by_one():
-    rng = np.random.default_rng(2)
-    points = rng.normal(0.0, 0.3, (4, 3))
-    heads = tuple(
-        head_at(yaw, distance, std)
-        for yaw, distance, std in zip(
-            rng.uniform(-90, 90, 6), rng.uniform(1, 5, 6), rng.uniform(0.01, 0.4, 6), strict=True
-        )
-    )
-    together = estimate_awareness(
-        CONE,
-        heads,
-        points,
-        extra_std_rad=np.full(6, 0.02),
-        eye_in_head_std_rad=(0.1, 0.05),
-        face_seen=np.full(6, 0.8),
-    )
-    for head, estimate in zip(heads, together, strict=True):
-        alone = awareness_of(
-            head, seen=0.8, eye_std_rad=(0.1, 0.05), extra_std_rad=0.02, points_m=points
-        )
-        assert (estimate.awareness, estimate.awareness_std) == pytest.approx(alone)
 
 
 @pytest.mark.slow

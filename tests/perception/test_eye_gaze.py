@@ -179,20 +179,3 @@ def test_eyes_on_the_robot_raise_awareness_only_as_far_as_they_are_sure():
         alpha, _ = awareness(head, known_eyes((measured,), PRIOR))
         assert before < alpha <= truth + 1e-3
         before = alpha
-
-
-def test_awareness_is_the_mean_over_head_and_eyes():
-    rng = np.random.default_rng(11)
-    head = head_off(30.0, 0.08)
-    eyes = EyeGaze([-0.1, 0.03], [[0.07**2, 0.001], [0.001, 0.05**2]])
-    alpha, std = awareness(head, (eyes,))
-    count = 20000
-    turns = Rotation.from_rotvec(rng.normal(0.0, 0.08, (count, 3)))
-    yaw, pitch = rng.multivariate_normal(eyes.angles_rad, eyes.covariance_rad2, count).T
-    in_head = np.column_stack(
-        [-np.sin(pitch), np.cos(pitch) * np.cos(yaw), -np.cos(pitch) * np.sin(yaw)]
-    )
-    gazes = turns.apply(in_head @ head.rotation_camera_head.T)
-    scores = CONE.score(np.tile([0.0, 0.0, 1.5], (count, 1)), gazes, np.zeros((count, 3)))
-    assert alpha <= np.mean(scores) + 0.005
-    assert std == pytest.approx(np.sqrt(np.mean((scores - alpha) ** 2)), rel=0.08)
