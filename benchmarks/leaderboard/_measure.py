@@ -18,7 +18,7 @@ from perception.documents import read_json
 from sim_tests import SimError
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import EpisodeRecord, read_records, write_records
-from sim_tests.study.runs import Job, WorkerPool, job_key, run_episode, run_here
+from sim_tests.study.runs import Job, attempt, died, in_parallel, job_key, run_episode
 
 from ._rows import RESULTS, Board, Row
 
@@ -96,17 +96,11 @@ def measure(
         if not _has(records[row.name], job)
     ]
     owners = [row for row, _ in jobs]
-    numbered = [(number, job) for number, (_, job) in enumerate(jobs)]
+    outcomes = in_parallel(attempt, [job for _, job in jobs], workers=workers, on_death=died)
     with tqdm(total=len(jobs), desc="leaderboard", unit="episode", file=sys.stderr) as bar:
-        if workers > 1 and numbered:
-            with WorkerPool(min(workers, len(numbered))) as pool:
-                for number, result in pool.run(numbered):
-                    _keep(owners[number], result.record, records, folder)
-                    bar.update()
-        else:
-            for number, result in run_here(numbered):
-                _keep(owners[number], result.record, records, folder)
-                bar.update()
+        for number, outcome in outcomes:
+            _keep(owners[number], outcome.record, records, folder)
+            bar.update()
 
 
 def remeasured(row: Row, scenario: str, seed: int) -> EpisodeRecord:

@@ -7,11 +7,9 @@ from typing import TypeVar
 
 from awarenav.errors import counted
 
-from ._attention import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
+from ._awareness import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
 from ._interval import Interval, number_text
-from ._metrics import METRICS
-from ._ratios import RATIOS
-from ._record import EpisodeRecord
+from ._record import METRICS, RATIOS, EpisodeRecord
 from ._summary import Comparison, Summary, SummaryRow
 
 _Row = TypeVar("_Row", Comparison, SummaryRow)

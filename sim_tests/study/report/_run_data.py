@@ -11,7 +11,7 @@ from typing import Any
 from perception.documents import parse_json, parse_yaml, read_json, read_lines
 
 from ...world.errors import SimError
-from ..measures import EpisodeRecord, read_record_file
+from ..measures import EpisodeRecord, read_rows
 from ..runs import Job, RunFiles
 from ._arm import Episode
 from ._text import count, plural
@@ -47,18 +47,11 @@ class RunData:
         """
         path = Path(path)
         files = RunFiles(path)
-        if not files.episodes.is_file():
-            raise SimError(
-                f"{path} holds no {files.episodes.name}; give the folder that "
-                "`awarenav crossings --out DIR` wrote"
-            )
         missing: list[str] = []
-        table = read_record_file(files.episodes)
-        if table.torn:
-            missing.append(f"The last row of {files.episodes.name} is unfinished and left out.")
+        rows = read_rows(path)
         jobs = _read_jobs(files.jobs, missing)
         about = _read_about(files.run, missing)
-        records, repeated = _without_repeats(table.records)
+        records, repeated = _without_repeats(rows)
         if repeated:
             missing.append(
                 f"{plural(repeated, 'row repeats', 'rows repeat')} an episode in "

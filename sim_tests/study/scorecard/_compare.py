@@ -19,7 +19,6 @@ from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
 from ..measures import table_text
 from ..runs import RunFiles, run_jobs
-from ._conduct_file import ConductFile
 from ._plan import plan_comparison
 from ._score import Scorecard
 from ._scoring import read_scorecard
@@ -93,18 +92,16 @@ def compare_planners(
         population=population,
     )
     try:
-        with ConductFile(folder, resume=resume) as conducts:
-            run_jobs(
-                jobs,
-                folder,
-                workers=workers,
-                time_limit_s=time_limit_s,
-                resume=resume,
-                overwrite=overwrite,
-                progress=progress,
-                about={**(about or {}), **plan.about()},
-                on_attempt=conducts.add,
-            )
+        run_jobs(
+            jobs,
+            folder,
+            workers=workers,
+            time_limit_s=time_limit_s,
+            resume=resume,
+            overwrite=overwrite,
+            progress=progress,
+            about={**(about or {}), **plan.about()},
+        )
     except KeyboardInterrupt:
         with contextlib.suppress(SimError):  # nothing has run yet
             write_scorecard(folder)

@@ -13,6 +13,7 @@ import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
 
+from ...world.errors import SimError
 from ..measures import (
     BASELINE,
     OVERSHOOT_MPS,
@@ -24,10 +25,8 @@ from ..measures import (
     paired,
     paired_difference,
     proportion_interval,
-    read_records,
 )
-from ..runs import JobKey, RunFiles, job_key, policy_of, read_jobs, read_run
-from ._conduct_file import read_conducts
+from ..runs import job_key, policy_of, read_attempts, read_jobs, read_run
 from ._plan import REFERENCE, ComparisonPlan, Entrant
 from ._score import (
     PARTS,
@@ -71,17 +70,15 @@ def read_scorecard(folder: Path) -> Scorecard:
         SimError: it holds no comparison, or a file of it cannot be read.
     """
     plan, jobs = ComparisonPlan.read(folder), read_jobs(folder)
-    conducts = read_conducts(folder)
-    numbers = {job_key(job): number for number, job in enumerate(jobs)}
     groups: dict[tuple[str, str], list[_Episode]] = {}
-    records = read_records(RunFiles(folder).episodes)
-    for record in records:
-        number = numbers.get(JobKey(*(getattr(record, name) for name in JobKey._fields)))
-        if number is not None:
-            episode = _Episode(number, record, conducts.get(number))
-            groups.setdefault((record.planner, record.policy), []).append(episode)
-    for group in groups.values():
-        group.sort(key=lambda each: each.number)
+    attempts = read_attempts(folder)
+    if not attempts:
+        raise SimError(f"{folder} holds no episode yet")
+    records = [attempts[number].record for number in sorted(attempts)]
+    for number in sorted(attempts):
+        record = attempts[number].record
+        episode = _Episode(number, record, attempts[number].conduct)
+        groups.setdefault((record.planner, record.policy), []).append(episode)
     reference = next(each.label for each in plan.entrants if each.planner == REFERENCE)
     first = [job_key(job) for job in jobs]
     wide = next(job.policy for job in jobs if job.policy_name == plan.wide_policy)

@@ -18,7 +18,7 @@ from sim_tests.study.measures import (
     write_records,
     zero_of_n_upper,
 )
-from sim_tests.study.measures._variants import baselines_of
+from sim_tests.study.measures._summary import baselines_of
 
 ATTENTION = {"late_glance": "attentive", "reads_a_phone": "unaware"}
 LOST_S = {"blind": 6.0, "balanced": 3.0, "oracle": 2.0}
@@ -265,8 +265,8 @@ def test_bad_input_to_compare_is_one_line(run_folder, capsys, arguments, message
     assert captured.out == ""
 
 
-def test_a_run_without_a_whole_row_has_nothing_to_compare(run_folder, capsys):
-    (run_folder / "episodes.csv").write_text("scenario,seed,pol")
+def test_a_run_without_an_episode_has_nothing_to_compare(run_folder, capsys):
+    write_records(run_folder / "episodes.csv", [])
     assert main(["compare", str(run_folder)]) == 2
     assert "no episodes yet" in capsys.readouterr().err
 

@@ -207,17 +207,6 @@ def test_large_run_makes_a_small_page(tmp_path: Path) -> None:
     assert write_report(out, stills=False).stat().st_size < 2e6
 
 
-def test_half_written_table_says_so(run: MadeUpRun, tmp_path: Path) -> None:
-    out = run.write(tmp_path)
-    table = out / "episodes.csv"
-    table.write_bytes(table.read_bytes()[: -len("x,,\n") - 200])
-    lines = table.read_bytes().count(b"\n") - 1
-    page = PageReader(write_report(out, stills=False).read_text("utf-8"))
-    assert "The last row of episodes.csv is unfinished and left out." in page.text
-    assert len(run.jobs) - lines == 1
-    assert f"1 of {len(run.jobs)} episodes has not run yet" in page.text
-
-
 def test_failed_episodes_are_counted_and_shown(run: MadeUpRun, tmp_path: Path) -> None:
     records = list(run.records)
     for index in (0, 5, 10):

@@ -132,6 +132,6 @@ def test_a_table_alone_says_nothing_of_its_people(tmp_path, capsys):
 
 def test_the_default_share_is_that_of_the_simulated_people():
     hearing = pytest.importorskip("sim_tests.actors.behaviour._hearing")
-    from sim_tests.study.measures._answering import DEFAULT_ANSWERS  # noqa: PLC0415
+    from sim_tests.study.measures._compare import DEFAULT_ANSWERS  # noqa: PLC0415
 
     assert hearing.Hearing().answers == DEFAULT_ANSWERS

@@ -8,7 +8,7 @@ from typing import Final
 
 import filelock
 
-from ...world.errors import SimError
+from ..world.errors import SimError
 
 # How often a process that waits for a lock looks again.
 _POLL_S: Final = 0.01

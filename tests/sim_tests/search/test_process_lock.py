@@ -7,12 +7,12 @@ import threading
 import pytest
 
 from sim_tests import SimError
-from sim_tests.study.runs import ProcessLock
+from sim_tests.search import ProcessLock
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from sim_tests.study.runs import ProcessLock
+from sim_tests.search import ProcessLock
 lock = ProcessLock(Path(sys.argv[1]))
 print("held", flush=True)
 time.sleep(600.0)
