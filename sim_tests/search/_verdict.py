@@ -4,71 +4,27 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
 
-from ..crossing.eyes import Perception, PerceptionKind, SensorSet
+from ..crossing.eyes import Perception
 from ..study.measures import FEW_PAIRS, Interval
+from ..study.runs import Conditions
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """The verdict of a search.
-
-    Attributes:
-        text: some sentences; the first is the verdict itself.
-        next_command: the command to run next.
-    """
-
-    text: str
-    next_command: str
-
-    def lines(self) -> list[str]:
-        """Return the verdict as lines of text."""
-        return [f"Verdict: {self.text}", f"Next: {self.next_command}"]
+def print_verdict(text: str, next_command: str) -> None:
+    """Print a verdict in sentences, and the command to run next."""
+    print(f"Verdict: {text}\nNext: {next_command}")
 
 
-class EpisodeOptions(Protocol):
-    """The options that all commands with episodes share."""
-
-    @property
-    def scenario(self) -> tuple[str, ...]:
-        """Names and files, or ``"all"``."""
-
-    @property
-    def perception(self) -> PerceptionKind:
-        """Perception of people."""
-
-    @property
-    def sensors(self) -> SensorSet:
-        """Sensors of the robot."""
-
-    @property
-    def camera(self) -> str:
-        """Another camera; empty for each scenario's own."""
-
-    @property
-    def population(self) -> str | None:
-        """Another population of people; None for each scenario's own."""
-
-    @property
-    def robot(self) -> str:
-        """Another robot; empty for the Nova Carter."""
-
-    @property
-    def planner(self) -> str:
-        """``"module:Class"``, empty for the reference planner."""
-
-
-def episode_words(options: EpisodeOptions) -> list[str]:
+def episode_words(conditions: Conditions) -> list[str]:
     """Return the words of the command line that repeat scenarios, people, sensors and planner."""
-    words = ["--scenario", *options.scenario]
-    words += Perception.of(options.perception, options.sensors).options.split()
+    (planner,), (sensors,) = conditions.planner, conditions.sensors
+    words = ["--scenario", *conditions.scenario]
+    words += Perception.of(conditions.perception, sensors).options.split()
     for name, value in (
-        ("--camera", options.camera),
-        ("--robot", options.robot),
-        ("--population", options.population),
-        ("--planner", options.planner),
+        ("--camera", conditions.camera),
+        ("--robot", conditions.robot),
+        ("--population", conditions.population),
+        ("--planner", planner),
     ):
         if value:
             words += [name, value]

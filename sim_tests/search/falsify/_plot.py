@@ -12,8 +12,7 @@ import numpy as np
 from awarenav.errors import counted
 from awarenav.figures import Circle, Polygon, Rectangle, new_figure, save_figure
 
-from ._falsify import Falsification
-from ._restarted_search import CONTACT_SCORE, NO_MARGIN_SCORE
+from ._search import CONTACT_SCORE, NO_MARGIN_SCORE, Falsification
 from ._worst_cases import WorstCase
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
     next_place = 0
     names = list(falsification.spaces)
     for number, name in enumerate(names):
-        scores = np.array([trial.score for trial in falsification.trials if trial.scenario == name])
+        scores = np.array([each.score for each in falsification.episodes if each.scenario == name])
         places = next_place + np.arange(len(scores))
         next_place += len(scores)
         colour = colours[number % len(colours)]
@@ -85,7 +84,7 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
     settings = falsification.settings
     label = " with its floor taken away (UNSAFE)" if settings.unsafe_no_floor else ""
     axes.set_title(
-        f"{counted(len(falsification.trials), 'episode')} against {settings.policy_name}{label}: "
+        f"{counted(len(falsification.episodes), 'episode')} against {settings.policy_name}{label}: "
         f"{falsification.contacts} with a contact with people who had not looked (crosses)",
         loc="left",
         fontsize=10,
@@ -144,7 +143,7 @@ def _draw_plan(axes: Axes, case: WorstCase) -> None:
     if case.result.contacts:
         speed_mps = case.result.contacts[0].robot_speed_mps
     axes.set_title(
-        f"{case.path.stem}: {case.trial.scenario.replace('_', ' ')}\nmargin {margin}"
+        f"{case.path.stem}: {case.episode.scenario.replace('_', ' ')}\nmargin {margin}"
         f"{touched}, at {frame.t_s:.1f} s, robot {speed_mps:.2f} m/s",
         fontsize=9,
         loc="left",

@@ -15,7 +15,7 @@ from ...actors.behaviour import FASTEST_RECORDED_MPS, PersonSpec, median_person
 from ...actors.robot import NOVA_CARTER
 from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
 from ...world.errors import SimError
-from .._optimizer import Range
+from .._study import Range
 from ._hearing_parameters import changed_hearing, hearing_parameters
 from ._joint_parameters import add_joint, is_joint_possible, joint_parameters
 from ._person_parameters import (

@@ -9,7 +9,7 @@ import shapely
 
 from perception.arrays import FloatArray
 
-from .._optimizer import Range
+from .._study import Range
 
 #: Smallest distance of a person's centre line from racks and walls in a variation.
 RACK_CLEARANCE_M = 0.35
