@@ -39,6 +39,8 @@ ParameterValues = dict[str, float]
 _LOCK_S: Final = 10
 # User attributes of a trial in the journal.
 _NUMBER: Final = "number"
+_FIGURES: Final = "figures"
+# Both are in the figures.
 _CONSTRAINTS: Final = "constraints"
 _NOTES: Final = "notes"
 
@@ -247,8 +249,8 @@ class SharedStudy:
         value = outcome.value
         if value is not None and not math.isfinite(value):
             raise SimError(f"trial {number}: the value must be finite, got {value}")
-        self._storage.set_trial_user_attr(trial_id, _CONSTRAINTS, dict(outcome.constraints))
-        self._storage.set_trial_user_attr(trial_id, _NOTES, dict(outcome.notes))
+        figures = {_CONSTRAINTS: dict(outcome.constraints), _NOTES: dict(outcome.notes)}
+        self._storage.set_trial_user_attr(trial_id, _FIGURES, figures)
         if value is None:
             self._storage.set_trial_state_values(trial_id, TrialState.FAIL)
         else:
@@ -372,5 +374,6 @@ def _cut_torn_line(path: Path, lock: JournalFileOpenLock) -> None:
 
 def _finished_trial(trial: FrozenTrial) -> Trial:
     value = trial.values[0] if trial.values else None
-    outcome = Outcome(value, trial.user_attrs[_CONSTRAINTS], trial.user_attrs[_NOTES])
+    figures = trial.user_attrs[_FIGURES]
+    outcome = Outcome(value, figures[_CONSTRAINTS], figures[_NOTES])
     return Trial(trial.user_attrs[_NUMBER], dict(trial.params), outcome)

@@ -28,7 +28,7 @@ from ._policy_space import PolicyRange, PolicySpace
 
 _SETTINGS_FILE: Final = "tune.json"
 _RESULTS: Final = (
-    *("evaluations/*.csv", "evaluations/*.lock", "trials.csv", "importances.json"),
+    *("evaluations/*.csv", "evaluations/.*.lock", "trials.csv", "importances.json"),
     *("chosen.json", "chosen/*.yaml", "tuning.png"),
 )
 #: Values of ``--hold-out-scenarios`` beside names.
@@ -265,7 +265,7 @@ def tune(
         runner.bar.set_postfix_str("held-out seeds")
         tuning = race.result(done)
         runner.bar.total = runner.bar.n  # some episodes were known before, some trials dropped
-    with filelock.FileLock(folder / "evaluations" / "report.lock"):  # several may end at once
+    with filelock.FileLock(folder / "evaluations" / ".report.lock"):  # several may end at once
         report(tuning)
     return tuning
 
@@ -439,7 +439,7 @@ class _Race:
         """Return the evaluation of a policy, from a file if this or another process has run it."""
         path = self.folder / "evaluations" / f"{name}-{seeds[0]}-{seeds[-1]}.csv"
         path.parent.mkdir(parents=True, exist_ok=True)
-        with filelock.FileLock(path.with_suffix(".lock")):  # free again if its process dies
+        with filelock.FileLock(path.with_name(f".{path.stem}.lock")):  # freed if its process dies
             if path.exists():
                 return Evaluation.of(kept_records(path, name, seeds, len(templates)))
             records = self.runner.run(self.settings.jobs(name, policy, seeds, templates))
