@@ -16,7 +16,7 @@ run_path(str(_CLASH))["require_sole_owner"](__name__)
 
 from typing import TYPE_CHECKING
 
-from .lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from nav_adapter import (
@@ -94,43 +94,4 @@ __all__ = [
     "polygons",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "nav_adapter": (
-            "AwarenessPolicy",
-            "InflationPolicy",
-            "NavAdapter",
-            "NavConstraints",
-            "NavError",
-            "PersonObstacle",
-            "RobotProfile",
-            "RobotState",
-            "SpeedPolicy",
-            "boxes",
-            "circles",
-            "paint_costmap",
-            "points",
-            "polygons",
-        ),
-        "perception": (
-            "AttentionCone",
-            "AwarenessPipeline",
-            "Camera",
-            "HeadPose",
-            "HeadPoseEstimator",
-            "OnnxHeadPoseEstimator",
-            "OnnxPersonDetector",
-            "OnnxPoseEstimator",
-            "PerceptionError",
-            "PersonDetection",
-            "PersonDetector",
-            "PersonKeypoints",
-            "PersonObservation",
-            "PnpHeadPoseEstimator",
-            "PoseEstimator",
-        ),
-        "perception.errors": ("AwarenavError",),
-        "tracking": ("PersonTrack", "PersonTracker", "TrackerConfig", "TrackingError"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from perception.documents import parse_yaml
+from perception.errors import not_one_of
 from tracking import AwarenessFilterConfig
-from tracking.config import StrictConfig
 
+from ._config import NavConfig
 from ._errors import NavError
 from .policies import (
     AlertRules,
@@ -30,7 +30,7 @@ from .policies import (
 
 # Presets are read once per process: they are frozen, and reading takes longer than an episode.
 _PRESETS: dict[str, AwarenessPolicy] = {}
-_SHIPPED: dict[str, type[StrictConfig]] = {
+_SHIPPED: dict[str, type[NavConfig]] = {
     "inflation": InterpolatedInflation,
     "speed": InterpolatedHumanSpeed,
 }
@@ -74,7 +74,7 @@ class _ShippedOrCustom:
         )
 
 
-class AwarenessPolicy(StrictConfig):
+class AwarenessPolicy(NavConfig):
     """All settings between a person's awareness and the planner's constraints.
 
     Attributes:
@@ -95,8 +95,6 @@ class AwarenessPolicy(StrictConfig):
             decide how soon a look at the robot counts and for how long. A ``filter`` of your own
             has no memory of who has noticed the robot unless it sets one.
     """
-
-    error: ClassVar[type[ValueError]] = NavError
 
     inflation: Annotated[InflationPolicy, _ShippedOrCustom("inflation", "radius_m")] = (
         InterpolatedInflation()
@@ -132,11 +130,7 @@ class AwarenessPolicy(StrictConfig):
             if entry.name.endswith(".yaml")
         }
         if name not in files:
-            near = difflib.get_close_matches(str(name), files, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise NavError(
-                f"preset must be one of {', '.join(map(repr, sorted(files)))}, got {name!r}{hint}"
-            )
+            raise NavError(not_one_of("preset", name, sorted(files)))
         policy = cls.model_validate(
             parse_yaml(files[name].read_text(encoding="utf-8"), name, NavError)
         )

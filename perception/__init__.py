@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from . import _clash  # noqa: F401 - first: reports another distribution with these package names
-from ._attention import AttentionCone
-from ._camera import Camera
-from ._detection import PersonDetection
-from ._floor import FloorPlane
-from ._fusion import FusedHeadPoseEstimator
-from ._head_pose import HeadPose
-from ._keypoints import PersonKeypoints
-from ._observation import PersonObservation
-from ._pipeline import AwarenessPipeline
-from ._pnp import PnpHeadPoseEstimator
-from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
-from .errors import PerceptionError
-from .networks import OnnxPersonDetector, OnnxPoseEstimator
-from .networks.heads import OnnxHeadPoseEstimator
+from .lazy import lazy_page
+
+if TYPE_CHECKING:
+    from ._attention import AttentionCone
+    from ._camera import Camera
+    from ._detection import PersonDetection
+    from ._floor import FloorPlane
+    from ._fusion import FusedHeadPoseEstimator
+    from ._head_pose import HeadPose
+    from ._keypoints import PersonKeypoints
+    from ._observation import PersonObservation
+    from ._pipeline import AwarenessPipeline
+    from ._pnp import PnpHeadPoseEstimator
+    from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+    from .errors import PerceptionError
+    from .networks import OnnxPersonDetector, OnnxPoseEstimator
+    from .networks.heads import OnnxHeadPoseEstimator
 
 __all__ = [
     "AttentionCone",
@@ -37,3 +42,5 @@ __all__ = [
     "PnpHeadPoseEstimator",
     "PoseEstimator",
 ]
+
+__getattr__ = lazy_page(__name__, __file__)

@@ -15,7 +15,7 @@ run_path(str(_CLASH))["require_sole_owner"](__name__)
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from .actors.body import Worker
@@ -47,32 +47,4 @@ __all__ = [
     "shipped_scenarios",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        ".crossing": (
-            "CrossingFrame",
-            "CrossingResult",
-            "StraightOn",
-            "run_crossing",
-        ),
-        ".world.errors": ("SimError",),
-        ".crossing.eyes": ("KeypointNoise",),
-        ".scenario": (
-            "Scenario",
-            "ScenarioTemplate",
-            "shipped_scenarios",
-        ),
-        ".world": ("Warehouse",),
-        ".actors.body": ("Worker",),
-        ".world.camera": (
-            "CameraRenderer",
-            "SimulatedCamera",
-        ),
-        ".actors.robot": ("NOVA_CARTER",),
-        ".crossing.planner": (
-            "LocalPlanner",
-            "SamplingPlanner",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

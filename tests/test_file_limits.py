@@ -12,7 +12,6 @@ from awarenav.baseline import read_baseline
 from awarenav.errors import AwarenavError
 from awarenav.estimate._open_source import open_source
 from awarenav.models._catalogue import Catalogue
-from awarenav.models._store import ModelStore
 from awarenav.records import continue_records, read_records
 from nav_adapter import AwarenessPolicy, NavError
 from nav_adapter.ros2 import RobotFile
@@ -91,11 +90,6 @@ YAML_READERS = {
 }
 JSON_READERS = {
     "shipped_models": ("manifest.json", lambda path: shipped_models(path.parent), PerceptionError),
-    "ModelStore": (
-        "models.lock.json",
-        lambda path: ModelStore(path.parent).locked(),
-        AwarenavError,
-    ),
     "baseline": ("baseline.json", read_baseline, AwarenavError),
     "frames": ("truth.jsonl", read_records, AwarenavError),
     "continued frames": ("truth.jsonl", continue_records, AwarenavError),
@@ -172,7 +166,7 @@ def test_no_other_module_parses_yaml_or_json():
     The record of an installer is read by the guard against a clash, which may import nothing.
     """
     own = {
-        "sim_tests/study/runs/_seeded_crossing.py",
+        "sim_tests/study/runs/_episode.py",
         "sim_tests/dataset/_render.py",
         "perception/installation.py",
     }

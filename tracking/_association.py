@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
@@ -218,6 +217,9 @@ def _solve(edges: _Edges, miss_cost: float, partner: IndexArray) -> None:
     costs[rows.searchsorted(rivals.tracks), columns.searchsorted(rivals.measurements)] = (
         rivals.costs
     )
+    # SciPy takes a third of the package's import time, so it is imported when it is needed.
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
+
     chosen_rows, chosen_columns = linear_sum_assignment(costs)
     real = costs[chosen_rows, chosen_columns] < miss_cost
     partner[rows[chosen_rows[real]]] = columns[chosen_columns[real]]

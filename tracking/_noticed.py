@@ -24,7 +24,6 @@ import math
 from typing import Final
 
 import numpy as np
-from scipy.special import ndtr
 
 from perception.arrays import FloatArray
 
@@ -213,7 +212,8 @@ def _looks(
         measured.evidence_means[columns] <= _AVERTED_LOGIT
     )
     sure = tracks.confirmed[rows] & ~found.beyond[rows] & ~measured.weak[columns]
-    certainty = np.maximum(2.0 * ndtr(sigmas) - 1.0, 0.0)
+    # 2 Φ(σ) − 1.
+    certainty = np.array([max(math.erf(each), 0.0) for each in (math.sqrt(0.5) * sigmas).tolist()])
     looks[rows] = np.where(sure & (certainty >= _LOOK), certainty, 0.0)
     if tracks.twins.any():
         # A frame that shows a person and their twin counts as the lower of both.

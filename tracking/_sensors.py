@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from pydantic import Field, field_validator
-from scipy.special import gammaincinv
 
 from perception.arrays import FloatArray
 
@@ -207,8 +207,8 @@ def sensors_of(
 def gates_of(config: TrackerConfig) -> Gates:
     """Return the gates that a config describes."""
     return Gates(
-        # χ² with two degrees of freedom; scipy.stats would take most of the package's import time.
-        mahalanobis2=float(2.0 * gammaincinv(1.0, config.gate_probability)),
+        # χ² with two degrees of freedom.
+        mahalanobis2=-2.0 * math.log1p(-config.gate_probability),
         distance_m=config.gate_distance_m,
         miss_cost=config.miss_cost,
         ambiguity_margin=config.ambiguity_margin,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from importlib import import_module
 from typing import Any
 
 from perception import PersonObservation
@@ -74,6 +75,8 @@ class PersonTracker:
         _check_view(view)
         self._config = config
         self._sensors = sensors_of(config, view, sensors)
+        # Association needs it; no frame of a running robot shall wait for this import.
+        import_module("scipy.optimize")
         self._admission = Admission(config, self._sensors)
         start = nobody(config, self._sensors)
         self._history = History(self._advance, config.max_lag_s, start)

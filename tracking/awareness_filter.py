@@ -17,7 +17,6 @@ from statistics import NormalDist
 from typing import Final, TypeAlias
 
 import numpy as np
-from scipy.special import expit
 
 from perception.arrays import FloatArray
 
@@ -29,6 +28,8 @@ Value: TypeAlias = "float | FloatArray"
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(11)
 _GAUSS_HERMITE_NODES: Final = _NODES
 _GAUSS_HERMITE_WEIGHTS: Final = _WEIGHTS / _WEIGHTS.sum()
+# Below it, exp overflows; the awareness is 0 there.
+_LOWEST_LOGIT: Final = -700.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,8 +71,13 @@ def logit(awareness: Value) -> Value:
 
 def sigmoid(value: Value) -> Value:
     """Return 1 / (1 + exp(−value)), the inverse of :func:`logit`; 0 at −∞."""
-    result: Value = expit(value)
-    return result
+    if isinstance(value, np.ndarray):
+        return np.array([_sigmoid(x) for x in value.ravel().tolist()]).reshape(value.shape)
+    return _sigmoid(value)
+
+
+def _sigmoid(value: float) -> float:
+    return 1.0 / (1.0 + math.exp(-value)) if value > _LOWEST_LOGIT else 0.0
 
 
 def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
@@ -243,8 +249,8 @@ def estimate(belief: AwarenessBelief, config: AwarenessFilterConfig) -> Filtered
     deviation = values - (values * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)[..., None]
     second = (deviation * deviation * _GAUSS_HERMITE_WEIGHTS).sum(axis=-1)
     clip = config.clip_awareness
-    lower = np.maximum((expit(belief.bound) - clip) / (1.0 - clip), 0.0)
-    return FilteredAwareness(expit(belief.mean), 0.5 * np.sqrt(second), lower)
+    lower = np.maximum((sigmoid(belief.bound) - clip) / (1.0 - clip), 0.0)
+    return FilteredAwareness(sigmoid(belief.mean), 0.5 * np.sqrt(second), lower)
 
 
 @lru_cache(maxsize=32)

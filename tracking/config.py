@@ -6,7 +6,6 @@ nearest valid name, values are checked, and a config that is written and read ag
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -16,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from perception.documents import read_yaml, yaml_text
+from perception.errors import did_you_mean
 
 from ._errors import TrackingError
 
@@ -104,9 +104,9 @@ class StrictConfig(BaseModel):
                     "true and false"
                 )
             if key not in valid:
-                near = difflib.get_close_matches(str(key), valid, n=1, cutoff=0.5)
-                hint = f"did you mean {near[0]!r}?" if near else f"valid keys: {', '.join(valid)}"
-                raise ValueError(f"unknown key {key!r} in {cls.__name__}; {hint}")
+                near = did_you_mean(key, valid, cutoff=0.5)
+                hint = near or f"; valid keys: {', '.join(valid)}"
+                raise ValueError(f"unknown key {key!r} in {cls.__name__}{hint}")
         return data
 
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._loop import BridgeInputs, BridgeLoop
@@ -24,17 +24,4 @@ __all__ = [
     "static_transforms",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._loop": ("BridgeInputs", "BridgeLoop"),
-        "._publisher": ("TopicPublisher",),
-        "._replay": (
-            "BagReplay",
-            "ReplayPublisher",
-            "recorded_messages",
-            "static_transforms",
-        ),
-        "._rerun": ("RerunRecorder", "cone_lines"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

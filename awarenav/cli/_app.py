@@ -12,14 +12,23 @@ from importlib import import_module
 from typing import Any, Final, NamedTuple
 
 import click
-from click.shell_completion import CompletionItem, shell_complete
+from click.shell_completion import CompletionItem, get_completion_class, shell_complete
 
 from .. import __version__
-from ._command import BAD_INPUT, INTERRUPTED, CommandGroup
-from ._failure import CommandFailure
+from ._command import (
+    BAD_INPUT,
+    INTERRUPTED,
+    CommandFailure,
+    CommandGroup,
+    argument,
+    command,
+    write_exit_status,
+)
+from ._types import OneOf
 
 _PROGRAM: Final = "awarenav"
 _ESCAPE: Final = "awarenav.escape"
+_SHELLS: Final = ("bash", "zsh", "fish")
 #: The environment variable through which a shell asks for completions.
 COMPLETION_VARIABLE: Final = "_AWARENAV_COMPLETE"
 
@@ -126,13 +135,19 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Measure how fast crossings run.",
         ),
         "completion": _Entry(
-            "awarenav.cli._completion:completion",
+            "awarenav.cli._app:completion",
             "Print the completion script for a shell.",
         ),
     },
 }
 _ENTRIES: Final = {
     name: entry for commands in _COMMANDS.values() for name, entry in commands.items()
+}
+_EXIT_STATUS: Final = {
+    0: "Success.",
+    1: "A check failed, or part of the work could not be done.",
+    2: "Bad input; nothing was done.",
+    130: "Interrupted; partial results are kept.",
 }
 
 
@@ -165,15 +180,7 @@ class _Application(CommandGroup):
                 formatter.write_dl([(name, entry.help) for name, entry in commands.items()])
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Exit status"):
-            formatter.write_dl(
-                [
-                    ("0", "Success."),
-                    ("1", "A check failed, or part of the work could not be done."),
-                    ("2", "Bad input; nothing was done."),
-                    ("130", "Interrupted; partial results are kept."),
-                ]
-            )
+        write_exit_status(formatter, _EXIT_STATUS)
         super().format_epilog(ctx, formatter)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
@@ -194,6 +201,24 @@ class _Application(CommandGroup):
 @click.version_option(__version__, prog_name=_PROGRAM, message="%(prog)s %(version)s")
 def app() -> None:
     """Awareness-aware navigation: estimate who has noticed the robot, and adapt its speed."""
+
+
+@command(
+    "completion",
+    examples=[
+        'eval "$(awarenav completion bash)"    # in ~/.bashrc',
+        'eval "$(awarenav completion zsh)"     # in ~/.zshrc',
+        "awarenav completion fish > ~/.config/fish/completions/awarenav.fish",
+    ],
+    exit_status={0: "Success.", 2: "Bad input."},
+)
+@argument("shell", type=OneOf(_SHELLS), metavar="SHELL", help="One of bash, zsh and fish.")
+def completion(shell: str) -> int:
+    """Print a script that completes commands, options, scenarios and policies in your shell."""
+    kind = get_completion_class(shell)
+    assert kind is not None  # click knows the three
+    print(kind(app, {}, _PROGRAM, COMPLETION_VARIABLE).source())
+    return 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence, Set
-from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
+from typing import Any, Final, Protocol, TypeVar
 
 import click
 from click.core import ParameterSource
-from click.shell_completion import CompletionItem
 
-from ._failure import CommandFailure, user_message
-
-if TYPE_CHECKING:
-    from click.types import OptionHelpExtra
+from perception.errors import AwarenavError
 
 BAD_INPUT: Final = 2
 INTERRUPTED: Final = 130
@@ -22,8 +18,8 @@ _SETTINGS: Final = {
     "max_content_width": 100,
     "show_default": True,
 }
-# Key of a context's ``meta``: the option that a further word on the line belongs to.
-_OPEN_OPTION: Final = "awarenav.open_option"
+# The modules that the extra "sim" installs.
+_SIMULATOR_MODULES: Final = ("av", "joblib", "matplotlib", "moderngl", "pybullet")
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -34,6 +30,21 @@ class Decorator(Protocol):
     def __call__(self, function: _Function, /) -> _Function:
         """Return the function with the parameter."""
         ...
+
+
+class CommandFailure(click.ClickException):
+    """A command that could not do its work, with a message for the user instead of a traceback.
+
+    Args:
+        context: of the command, whose name begins the message.
+        message: one line for the user.
+        status: exit status of the program.
+    """
+
+    def __init__(self, context: click.Context, message: str, status: int) -> None:
+        super().__init__(message)
+        self.command_path = context.command_path
+        self.status = status
 
 
 class Option(click.Option):
@@ -60,13 +71,6 @@ class Option(click.Option):
         self.excludes = excludes
         if excludes is not None:
             self.help = f"{self.help} Not with {excludes}."
-
-    def get_help_extra(self, ctx: click.Context) -> OptionHelpExtra:
-        """Return the remarks after the help; a default in words stands without parentheses."""
-        extra = super().get_help_extra(ctx)
-        if isinstance(self.show_default, str):
-            extra["default"] = self.show_default
-        return extra
 
 
 class Command(click.Command):
@@ -110,12 +114,9 @@ class Command(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments; split the values of options that take several."""
         options = [each for each in self.params if isinstance(each, Option)]
-        many = {name: option for option in options if option.many for name in option.opts}
-        words, open_name = _split_values(args, many.keys())
-        if open_name is not None:
-            ctx.meta[_OPEN_OPTION] = many[open_name]
+        many = {name for option in options if option.many for name in option.opts}
         try:
-            rest = super().parse_args(ctx, words)
+            rest = super().parse_args(ctx, _split_values(args, many))
         except click.UsageError as error:
             error.ctx = error.ctx or ctx  # click gives none where an option lacks its value
             raise
@@ -132,35 +133,18 @@ class Command(click.Command):
                 heading = getattr(parameter, "group", None) or "Options"
                 groups.setdefault(heading, []).append(record)
         for heading, records in groups.items():
-            with formatter.section(heading):
-                formatter.write_dl(records)
+            _write_list(formatter, heading, records)
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the parts, the examples, the exit status and the closing remark."""
-        if self.parts:
-            with formatter.section("Commands"):
-                formatter.write_dl(
-                    [(name, part.get_short_help_str(80)) for name, part in self.parts.items()]
-                )
+        parts = [(name, part.get_short_help_str(80)) for name, part in self.parts.items()]
+        _write_list(formatter, "Commands", parts)
         if self.examples:
             with formatter.section("Examples"):
                 for line in self.examples:
                     formatter.write(f"{'':{formatter.current_indent}}{line}\n")
-        if self.exit_status:
-            with formatter.section("Exit status"):
-                formatter.write_dl([(str(key), text) for key, text in self.exit_status.items()])
+        write_exit_status(formatter, self.exit_status)
         super().format_epilog(ctx, formatter)
-
-    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Complete a further value of an option that takes several, else an option's name."""
-        option = ctx.meta.get(_OPEN_OPTION)
-        parts = [name for name in self.parts if incomplete and name.startswith(incomplete)]
-        if parts:
-            return [*map(CompletionItem, parts), *super().shell_complete(ctx, incomplete)]
-        if option is not None and not incomplete.startswith("-"):
-            items: list[CompletionItem] = option.shell_complete(ctx, incomplete)
-            return items
-        return super().shell_complete(ctx, incomplete)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command.
@@ -172,11 +156,19 @@ class Command(click.Command):
             return super().invoke(ctx)
         except KeyboardInterrupt:
             raise CommandFailure(ctx, "interrupted; partial results kept", INTERRUPTED) from None
-        except (ModuleNotFoundError, ValueError) as error:
-            message = user_message(error)
-            if message is None:
+        except AwarenavError as error:
+            raise CommandFailure(ctx, str(error), BAD_INPUT) from error
+        except ModuleNotFoundError as error:
+            if error.name not in _SIMULATOR_MODULES:
                 raise
-            raise CommandFailure(ctx, message, BAD_INPUT) from error
+            from perception.installation import install_command  # noqa: PLC0415 - for help's sake
+
+            raise CommandFailure(
+                ctx,
+                f"needs {error.name}, which is not installed; it is part of the extra 'sim': "
+                + install_command("sim"),
+                BAD_INPUT,
+            ) from error
 
 
 class CommandGroup(click.Group):
@@ -189,22 +181,32 @@ class CommandGroup(click.Group):
         return list(self.commands)
 
 
-def _split_values(words: Sequence[str], many: Set[str]) -> tuple[list[str], str | None]:
+def write_exit_status(formatter: click.HelpFormatter, meanings: Mapping[int, str]) -> None:
+    """Write the meaning of each exit status into a help."""
+    _write_list(formatter, "Exit status", [(str(key), text) for key, text in meanings.items()])
+
+
+def _write_list(
+    formatter: click.HelpFormatter, heading: str, rows: Sequence[tuple[str, str]]
+) -> None:
+    if rows:
+        with formatter.section(heading):
+            formatter.write_dl(rows)
+
+
+def _split_values(words: Sequence[str], many: Set[str]) -> list[str]:
     """Rewrite ``--policy a b`` as ``--policy a --policy b``.
 
     Args:
         words: of the command line.
         many: names of the options that take several values.
-
-    Returns:
-        The new words, and the name of the option that a further word would belong to.
     """
     split: list[str] = []
     name: str | None = None
     has_value = False
     for index, word in enumerate(words):
         if word == "--":
-            return [*split, *words[index:]], None
+            return [*split, *words[index:]]
         if word.startswith("-") and word != "-":
             stem, equals, _ = word.partition("=")
             name, has_value = (stem if stem in many else None), bool(equals)
@@ -213,7 +215,7 @@ def _split_values(words: Sequence[str], many: Set[str]) -> tuple[list[str], str 
                 split.append(name)
             has_value = True
         split.append(word)
-    return split, name
+    return split
 
 
 def _refuse_excluded(ctx: click.Context, options: Sequence[Option]) -> None:
@@ -251,6 +253,4 @@ def option(*names: str, **settings: Any) -> Decorator:
     return click.option(*names, cls=Option, **settings)
 
 
-def argument(name: str, **settings: Any) -> Decorator:
-    """Return a decorator that adds a positional argument; the settings are click's."""
-    return click.argument(name, **settings)
+argument = click.argument

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._findings import Finding, Severity, by_importance
+    from ._findings import Finding, by_importance
     from ._installation import installation_findings
     from ._pictures import PictureFigures, picture_figures, picture_findings
     from ._run import DoctorOptions, doctor_command
@@ -16,7 +16,6 @@ __all__ = [
     "DoctorOptions",
     "Finding",
     "PictureFigures",
-    "Severity",
     "by_importance",
     "doctor_command",
     "installation_findings",
@@ -24,12 +23,4 @@ __all__ = [
     "picture_findings",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._findings": ("Finding", "Severity", "by_importance"),
-        "._installation": ("installation_findings",),
-        "._pictures": ("PictureFigures", "picture_figures", "picture_findings"),
-        "._run": ("DoctorOptions", "doctor_command"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

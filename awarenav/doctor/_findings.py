@@ -5,11 +5,11 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 Severity = Literal["error", "warning", "fine"]
 #: Subjects, the most important first: what makes results wrong, then what makes them poor.
-SUBJECTS: Final = (
+Subject = Literal[
     "packages",
     "shipped networks",
     "networks",
@@ -22,9 +22,11 @@ SUBJECTS: Final = (
     "sharpness",
     "resolution",
     "people",
+    "recording",
     "fetched networks",
     "extras",
-)
+]
+_SUBJECTS: Final[tuple[str, ...]] = get_args(Subject)
 _SEVERITIES: Final = ("error", "warning", "fine")
 _WIDTH: Final = 100
 _INDENT: Final = 27
@@ -37,22 +39,36 @@ class Finding:
     Attributes:
         severity: ``"error"``: results cannot be trusted or do not come; ``"warning"``: they are
             worse than need be; ``"fine"``.
-        subject: one of :data:`SUBJECTS`.
+        subject: what it is about.
         text: what was found.
         remedy: what mends it; empty if nothing is wrong.
     """
 
     severity: Severity
-    subject: str
+    subject: Subject
     text: str
     remedy: str = ""
+
+    @classmethod
+    def error(cls, subject: Subject, text: str, remedy: str = "") -> Finding:
+        """Return an error."""
+        return cls("error", subject, text, remedy)
+
+    @classmethod
+    def warning(cls, subject: Subject, text: str, remedy: str = "") -> Finding:
+        """Return a warning."""
+        return cls("warning", subject, text, remedy)
+
+    @classmethod
+    def fine(cls, subject: Subject, text: str) -> Finding:
+        """Return that nothing is wrong."""
+        return cls("fine", subject, text)
 
 
 def by_importance(findings: Iterable[Finding]) -> list[Finding]:
     """Return errors before warnings before the rest, each in the order of the subjects."""
     return sorted(
-        findings,
-        key=lambda each: (_SEVERITIES.index(each.severity), SUBJECTS.index(each.subject)),
+        findings, key=lambda each: (_SEVERITIES.index(each.severity), _SUBJECTS.index(each.subject))
     )
 
 

@@ -46,8 +46,7 @@ def _packages() -> list[Finding]:
         name.removesuffix("ExecutionProvider") for name in onnxruntime.get_available_providers()
     )
     found = [
-        Finding(
-            "fine",
+        Finding.fine(
             "packages",
             f"awarenav {__version__}, Python {platform.python_version()}, onnxruntime "
             f"{onnxruntime.__version__} ({providers})",
@@ -56,8 +55,7 @@ def _packages() -> list[Finding]:
     several = [name for name in _OPENCV if _is_installed(name)]
     if len(several) > 1:
         found.append(
-            Finding(
-                "warning",
+            Finding.warning(
                 "packages",
                 f"{' and '.join(several)} overwrite each other's files",
                 f"pip uninstall {' '.join(several)}, then pip install opencv-python-headless",
@@ -80,15 +78,8 @@ def _shipped() -> list[Finding]:
         for name in names:
             verify_shipped_model(name)
     except PerceptionError as error:
-        return [
-            Finding(
-                "error",
-                "shipped networks",
-                str(error),
-                reinstall_command(),
-            )
-        ]
-    return [Finding("fine", "shipped networks", f"{', '.join(names)}: unaltered, for renders only")]
+        return [Finding.error("shipped networks", str(error), reinstall_command())]
+    return [Finding.fine("shipped networks", f"{', '.join(names)}: unaltered, for renders only")]
 
 
 def _fetched() -> list[Finding]:
@@ -96,21 +87,20 @@ def _fetched() -> list[Finding]:
         store = ModelStore()
         here = [each.name for each in store.catalogue.models if store.is_fetched(each.name)]
     except AwarenavError as error:
-        return [Finding("error", "fetched networks", str(error))]
+        return [Finding.error("fetched networks", str(error))]
     found = []
     for name in here:
         try:
             store.path(name)
         except AwarenavError as error:
             remedy = f"awarenav models fetch {name}"
-            found.append(Finding("error", "fetched networks", str(error), remedy))
+            found.append(Finding.error("fetched networks", str(error), remedy))
     if found:
         return found
     if here:
-        return [Finding("fine", "fetched networks", f"{', '.join(here)}: unaltered")]
+        return [Finding.fine("fetched networks", f"{', '.join(here)}: unaltered")]
     return [
-        Finding(
-            "warning",
+        Finding.warning(
             "fetched networks",
             "none, so that there is no network for photographs",
             "awarenav models fetch robot",
@@ -123,4 +113,4 @@ def _extras() -> Finding:
         f"{extra} {'is there' if find_spec(module) else f'is not installed ({use})'}"
         for extra, module, use in _EXTRAS
     ]
-    return Finding("fine", "extras", "; ".join(words))
+    return Finding.fine("extras", "; ".join(words))

@@ -77,8 +77,7 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
     repeats = sum(each.repeats for each in figures)
     if levels < _EMPTY_LEVELS:
         return [
-            Finding(
-                "error",
+            Finding.error(
                 "images",
                 f"they show nothing: {levels:.0f} grey levels between dark and bright",
                 "take the cap off the lens, look at the exposure and the cable",
@@ -87,8 +86,7 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
     found = []
     if repeats and repeats == len(figures) - 1:
         found.append(
-            Finding(
-                "error",
+            Finding.error(
                 "images",
                 f"all {len(figures)} are the same, to the bit: the camera is frozen",
                 "restart the driver; a live camera has noise",
@@ -96,8 +94,7 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
         )
     elif repeats:
         found.append(
-            Finding(
-                "warning",
+            Finding.warning(
                 "images",
                 f"{repeats} of {len(figures)} repeat the one before",
                 "look at the driver's frame rate and the load of the computer",
@@ -106,32 +103,29 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
     found.append(_exposure(burnt, black))
     if edge_px > _WIDE_EDGE_PX:
         found.append(
-            Finding(
-                "warning",
+            Finding.warning(
                 "sharpness",
                 f"the sharpest edges are {edge_px:.1f} pixels wide: out of focus, or in motion",
                 "focus, clean the lens, or expose for a shorter time",
             )
         )
     else:
-        found.append(Finding("fine", "sharpness", f"edges {edge_px:.1f} pixels wide; 2 is sharp"))
+        found.append(Finding.fine("sharpness", f"edges {edge_px:.1f} pixels wide; 2 is sharp"))
     return found
 
 
 def _exposure(burnt: float, black: float) -> Finding:
     if burnt > _BURNT_SHARE:
-        return Finding(
-            "warning",
+        return Finding.warning(
             "exposure",
             f"{100.0 * burnt:.0f} % of the pixels are burnt out",
             "expose for a shorter time; faces before a window need it most",
         )
     if black > _BLACK_SHARE:
-        return Finding(
-            "warning",
+        return Finding.warning(
             "exposure",
             f"{100.0 * black:.0f} % of the pixels are black",
             "more light, or a longer exposure",
         )
     shares = f"{100.0 * burnt:.0f} % burnt out, {100.0 * black:.0f} % black"
-    return Finding("fine", "exposure", shares)
+    return Finding.fine("exposure", shares)

@@ -11,12 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import (
-    Frames,
-    ScanMessages,
-    TransformBuffer,
-    odometry_problems,
-)
+from nav_adapter.ros2 import Frames, ScanMessages, TransformBuffer, odometry_problems
 from nav_adapter.ros2.conversions import from_ros
 from nav_adapter.ros2.messages import ros_type
 from nav_adapter.ros2.messages.nav_msgs import Odometry
@@ -117,9 +112,9 @@ def recording_findings(path: Path) -> tuple[list[Finding], bool]:
         found += _odometry_findings(topic, odometry, recording)
     if not recording.whole:
         text = f"scanners and odometry were looked at for the first {_LONGEST_S:g} s"
-        found.append(Finding("fine", "recording", text))
+        found.append(Finding.fine("recording", text))
     if not recording.has_images:
-        found.append(Finding("warning", "images", "the recording has none"))
+        found.append(Finding.warning("images", "the recording has none"))
     return found, recording.has_images
 
 
@@ -150,7 +145,7 @@ def _scanner_findings(
         sight = sight_of(scan, mounting)
         if sight.blind_text:
             blind[sight.blind_text] += 1
-    found = [Finding("warning", "scanners", text) for text in said]
+    found = [Finding.warning("scanners", text) for text in said]
     for reasons, words, remedy in (
         (refused, "refused: {}", "look at its driver"),
         (blind, "the scanner is {} (0° is ahead, " + where + ")", _REMEDY_BLIND),
@@ -164,7 +159,7 @@ def _scanner_findings(
             found.append(Finding(severity, "scanners", text, remedy))
     few = refused.total() + blind.total() + frozen.total()
     text = f"{topic}: {counted(len(scans), 'scan')}, {few or 'none'} blind, frozen or refused"
-    return found or [Finding("fine", "scanners", text)]
+    return found or [Finding.fine("scanners", text)]
 
 
 def _odometry_findings(
@@ -175,8 +170,8 @@ def _odometry_findings(
     problems = odometry_problems(odometry, recording.transforms, recording.static, frames=frames)
     if problems:
         return [
-            Finding("error", "odometry", f"{topic}: {text.removeprefix('odometry: ')}")
+            Finding.error("odometry", f"{topic}: {text.removeprefix('odometry: ')}")
             for text in problems
         ]
     text = f"{topic}: {counted(len(odometry), 'message')} that contradict neither tf nor themselves"
-    return [Finding("fine", "odometry", text)]
+    return [Finding.fine("odometry", text)]

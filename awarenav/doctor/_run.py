@@ -122,7 +122,7 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
         return findings + _image_findings(options)
     except (AwarenavError, PerceptionError) as problem:
         # What has been found of scanners and odometry is told all the same.
-        return [*findings, Finding("error", "images", str(problem))]
+        return [*findings, Finding.error("images", str(problem))]
 
 
 def _image_findings(options: DoctorOptions) -> list[Finding]:
@@ -136,7 +136,7 @@ def _image_findings(options: DoctorOptions) -> list[Finding]:
         seen = _examine(source, estimator, options.frames)
         findings = [
             _domain_finding(unfit, networks.training_domains, rendered=source.rendered),
-            *(Finding("error", "images", note) for note in source.notes),
+            *(Finding.error("images", note) for note in source.notes),
         ]
         if seen.problems:
             text = f"{counted(len(seen.problems), 'image')} of {options.frames}: {seen.problems[0]}"
@@ -153,7 +153,7 @@ def _image_findings(options: DoctorOptions) -> list[Finding]:
         ]
         if str(options.out) != "none":
             _draw(options.out, seen.best)
-            findings.append(Finding("fine", "people", f"test picture: {options.out}"))
+            findings.append(Finding.fine("people", f"test picture: {options.out}"))
         return findings
 
 
@@ -202,17 +202,16 @@ def _domain_finding(
 ) -> Finding:
     if unfit:
         text = simulator_networks_warning(unfit)
-        return Finding("error", "networks", text, _REMEDY_NETWORKS)
+        return Finding.error("networks", text, _REMEDY_NETWORKS)
     told = ", ".join(f"{role} {domain or 'not known'}" for role, domain in domains.items())
     kind = "renders" if rendered else "pictures that no renderer of this package made"
     if None in domains.values():
-        return Finding(
-            "warning",
+        return Finding.warning(
             "networks",
             f"trained on: {told}; the images are {kind}",
             "a network says it under 'training_domain' in its metadata",
         )
-    return Finding("fine", "networks", f"trained on: {told}; the images are {kind}")
+    return Finding.fine("networks", f"trained on: {told}; the images are {kind}")
 
 
 def _calibration_finding(
@@ -220,16 +219,14 @@ def _calibration_finding(
 ) -> Finding:
     fov_deg = options.fov_deg
     if camera is None and fov_deg is None:
-        return Finding(
-            "error",
+        return Finding.error(
             "calibration",
             "there is none; a horizontal field of view of 60 degrees is assumed, and distances are "
             "wrong by as much as that is",
             "--camera camera.yaml (ROS camera_calibration makes it), or at least --fov-deg",
         )
     if camera is None:
-        return Finding(
-            "warning",
+        return Finding.warning(
             "calibration",
             f"a horizontal field of view of {fov_deg:g} degrees, without lens distortion",
             "--camera camera.yaml (ROS camera_calibration makes it)",
@@ -243,13 +240,12 @@ def _calibration_finding(
         text += "; by the topic's name the images are raw: K and the distortion count, and P is not"
         text += " used"
     if off > _OFF_CENTRE:
-        return Finding(
-            "warning",
+        return Finding.warning(
             "calibration",
             f"{text}; its principal point lies {100.0 * off:.0f} % of the width off the middle",
             "was the picture cropped after the calibration?",
         )
-    return Finding("fine", "calibration", text)
+    return Finding.fine("calibration", text)
 
 
 def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
@@ -260,7 +256,7 @@ def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
         found.append(_rate_finding(1.0 / float(np.median(steps_s)), "the images come at"))
         if (steps_s <= 0.0).any():
             text = "stamps stand still or go back"
-            found.append(Finding("error", "frame rate", text, "look at the driver's clock"))
+            found.append(Finding.error("frame rate", text, "look at the driver's clock"))
     warm = seen.times_s[_WARM_UP:] or seen.times_s
     rate = _rate_finding(1.0 / float(np.median(warm)), "perception manages")
     return [*found, rate]
@@ -269,20 +265,18 @@ def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
 def _rate_finding(rate_hz: float, words: str) -> Finding:
     text = f"{words} {rate_hz:.1f} images per second"
     if rate_hz < _LEAST_HZ:
-        return Finding(
-            "error",
+        return Finding.error(
             "frame rate",
             f"{text}: nobody counts as aware below {_LEAST_HZ:g}",
             "smaller networks, a smaller picture, or another computer",
         )
     if rate_hz < _WANTED_HZ:
-        return Finding(
-            "warning",
+        return Finding.warning(
             "frame rate",
             f"{text}; the method's paper has {_WANTED_HZ:g}",
             "smaller networks (rtmdet-nano, rtmpose-s), or a GPU (--provider of estimate)",
         )
-    return Finding("fine", "frame rate", text)
+    return Finding.fine("frame rate", text)
 
 
 def _resolution_finding(camera: Camera) -> Finding:
@@ -290,16 +284,15 @@ def _resolution_finding(camera: Camera) -> Finding:
     text = f"faces have {_FACE_PX:g} pixels up to {range_m:.1f} m, and less beyond"
     if range_m < _FACE_RANGE_M:
         remedy = "a larger picture, or a narrower lens: awareness is uncertain beyond"
-        return Finding("warning", "resolution", text, remedy)
-    return Finding("fine", "resolution", text)
+        return Finding.warning("resolution", text, remedy)
+    return Finding.fine("resolution", text)
 
 
 def _people_findings(seen: _Examined) -> list[Finding]:
     total, images = sum(seen.people), len(seen.people)
     if not total:
         return [
-            Finding(
-                "warning",
+            Finding.warning(
                 "people",
                 f"nobody in {counted(images, 'image')}",
                 "stand before the camera, 2 to 5 m away, and run it again",
@@ -313,12 +306,11 @@ def _people_findings(seen: _Examined) -> list[Finding]:
     )
     if reasons:
         text += f" ({', '.join(f'{reason}: {n}' for reason, n in reasons.most_common())})"
-    found = [Finding("fine", "people", text)]
+    found = [Finding.fine("people", text)]
     unknown = reasons[_UNKNOWN]
     if unknown > _UNKNOWN_SHARE * total:
         found.append(
-            Finding(
-                "warning",
+            Finding.warning(
                 "people",
                 f"{unknown} of {total} heads show no direction: motion blurs them, or noise",
                 "expose for a shorter time, with more light",

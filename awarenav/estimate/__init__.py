@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._bag import BagMessages
@@ -60,28 +60,4 @@ __all__ = [
     "track_record",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._bag": ("BagMessages",),
-        "._camera": ("CameraChoice", "fixed_camera_pose", "scaled_camera"),
-        "._estimator": (
-            "FrameEstimate",
-            "Networks",
-            "PeopleEstimator",
-            "RecordingPoseEstimator",
-            "ids_of_tracks",
-        ),
-        "._images": ("as_rgb", "read_image"),
-        "._networks": ("NetworkChoice", "admit_networks", "choose_networks"),
-        "._open_source": ("is_recording", "open_source"),
-        "._overlay": ("draw_overlay",),
-        "._overlay_writer": ("OverlayWriter", "fit_image"),
-        "._results": ("estimate_record", "track_record"),
-        "._run": ("EstimateOptions", "estimate_command"),
-        "._source": ("ImageSource", "SourceFrame"),
-        "._source_images": ("ImageFiles",),
-        "._source_video": ("VideoSource",),
-        "._threads": ("BackgroundWorker", "FramePrefetcher"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -4,30 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._judge import JudgeConfig, JudgeLimits, judge_files, judge_frames
-    from ._precision import average_precision
+    from ._judge import JudgeConfig, judge_files, judge_frames
     from ._report import markdown_report
     from ._requirements import requirements
 
 __all__ = [
     "JudgeConfig",
-    "JudgeLimits",
-    "average_precision",
     "judge_files",
     "judge_frames",
     "markdown_report",
     "requirements",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._judge": ("JudgeConfig", "JudgeLimits", "judge_files", "judge_frames"),
-        "._precision": ("average_precision",),
-        "._report": ("markdown_report",),
-        "._requirements": ("requirements",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

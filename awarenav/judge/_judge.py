@@ -7,16 +7,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from tracking.config import StrictConfig, complaints
+from tracking.config import StrictConfig
 
 from ..errors import AwarenavError
 from ..records import PersonRecord, people_by_frame, read_records
+from ._detection import DetectionFrame, match_frame, precision_with_interval
 from ._intervals import LEVEL, Metrics
-from ._matching import match_frame
 from ._metrics import PersonFrame, person_metrics
-from ._precision import DetectionFrame, precision_with_interval
 
 #: The people of every frame, by the frame's name.
 Frames = dict[str, list[PersonRecord]]
@@ -43,45 +42,6 @@ class JudgeConfig(StrictConfig):
     min_height_px: float = Field(default=40.0, ge=0.0)
     max_occlusion: float = Field(default=0.5, gt=0.0, le=1.0)
     max_truncation: float = Field(default=0.5, gt=0.0, le=1.0)
-
-    @classmethod
-    def checked(cls, **values: Any) -> JudgeConfig:
-        """Make a config.
-
-        Raises:
-            AwarenavError: for values that are not valid; the message names each of them.
-        """
-        try:
-            return cls(**values)
-        except ValidationError as cause:
-            raise AwarenavError(complaints(cause)) from cause
-
-
-class JudgeLimits(StrictConfig):
-    """The project's requirements for its own networks on rendered people; ``--gate`` checks them.
-
-    Attributes:
-        min_ap50: average precision of detection at IoU ≥ 0.5.
-        max_gaze_median_deg: median error of the head's direction.
-        max_gaze_p90_deg: its 90th percentile.
-        max_position_median: median error of position as a share of range.
-        max_awareness_mae: mean absolute error of α.
-        max_false_aware: share of α ≥ 0.5 among the estimated α whose true α is 0.
-        within_1sigma: share of α errors within one reported standard deviation (0.68 for a normal
-            distribution), where the true or the estimated α is strictly between 0 and 1.
-        within_1sigma_tolerance: largest difference from it.
-    """
-
-    error: ClassVar[type[ValueError]] = AwarenavError
-
-    min_ap50: float = 0.97
-    max_gaze_median_deg: float = 5.0
-    max_gaze_p90_deg: float = 15.0
-    max_position_median: float = 0.04
-    max_awareness_mae: float = 0.08
-    max_false_aware: float = 0.005
-    within_1sigma: float = 0.68
-    within_1sigma_tolerance: float = 0.08
 
 
 def judge_files(

@@ -1,14 +1,20 @@
-"""The metrics of ``awarenav judge`` as Markdown tables."""
+"""The work of ``awarenav judge``, and its metrics as Markdown tables."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final
 
-from ..errors import counted
+from pydantic import ValidationError
+
+from tracking.config import complaints
+
+from ..errors import AwarenavError, counted
+from ..files import json_text, write_text
 from ._intervals import Ends
-from ._judge import JudgeLimits
-from ._requirements import Requirement, interval_text, requirements, value_text
+from ._judge import JudgeConfig, judge_files
+from ._requirements import interval_text, requirements, value_text
 
 # Rows of the table by group: title, key, unit.
 _GROUP_ROWS: Final = (
@@ -34,14 +40,69 @@ _GROUP_ROWS: Final = (
 )
 
 
-def markdown_report(metrics: dict[str, Any], limits: JudgeLimits | None = None) -> str:
+# Rows of the table of what the groups do not show: title, group, key, unit.
+_OTHER_ROWS: Final = (
+    (
+        "reported where nobody is, or twice, per frame",
+        "detection",
+        "false_positives_per_frame",
+        "",
+    ),
+    ("α mean absolute error, no α counted as 0", "overall", "awareness_mae_none_as_0", ""),
+    (
+        "α ≥ 0.5 where the truth is 0, hidden and small people too",
+        "hidden_and_small_too",
+        "false_aware",
+        "%",
+    ),
+)
+
+
+def judge_command(
+    truth: Path,
+    estimates: Path,
+    *,
+    out: Path | None,
+    as_json: bool,
+    common: bool,
+    gate: bool,
+    **settings: float,
+) -> int:
+    """Run the command; return the exit status.
+
+    Args:
+        truth: JSON Lines.
+        estimates: JSON Lines.
+        out: a file for the report (.md) or all metrics (.json).
+        as_json: prints all metrics instead of the report.
+        common: leaves out frames without an estimate.
+        gate: makes a requirement that is not met the status 1.
+        settings: of :class:`JudgeConfig`.
+
+    Raises:
+        AwarenavError: for files or options that cannot be used.
+    """
+    if out is not None and out.suffix not in (".json", ".md"):
+        raise AwarenavError(f"--out must end in .json or .md, got {out}")
+    try:
+        config = JudgeConfig(**settings)
+    except ValidationError as cause:
+        raise AwarenavError(complaints(cause)) from cause
+    metrics = judge_files(truth, estimates, config, common=common)
+    report = markdown_report(metrics)
+    print(json_text(metrics) if as_json else report, end="")
+    if out is not None:
+        write_text(out, report if out.suffix == ".md" else json_text(metrics))
+    return 1 if gate and not all(each.met for each in requirements(metrics)) else 0
+
+
+def markdown_report(metrics: dict[str, Any]) -> str:
     """Return the report as Markdown."""
     settings, frames, overall = metrics["settings"], metrics["frames"], metrics["overall"]
-    detection, others = metrics["detection"], metrics["hidden_and_small_too"]
     height, hidden, outside = (
         settings[name] for name in ("min_height_px", "max_occlusion", "max_truncation")
     )
-    ignored = others["people"] - overall["people"]
+    ignored = metrics["hidden_and_small_too"]["people"] - overall["people"]
     lines = [
         f"{counted(frames['judged'], 'frame')}, {counted(overall['people'], 'person', 'people')} "
         f"to be found (at least {height:g} px tall, less than {hidden:.0%} hidden and less than "
@@ -54,66 +115,8 @@ def markdown_report(metrics: dict[str, Any], limits: JudgeLimits | None = None) 
     if frames["unknown"]:
         unknown = counted(frames["unknown"], "estimated frame is", "estimated frames are")
         lines.append(f"{unknown} not in the truth and left out.")
-    asked = requirements(metrics, limits)
-    lines += ["", *_table(("figure", "value", "95 % interval", "asked", "met"), _rows(asked))]
-    if any(each.verdict == "too few to tell" for each in asked):
-        lines += [
-            "",
-            "Too few to tell: the interval holds values that meet what is asked, and others.",
-        ]
+    asked = requirements(metrics)
     rows = [
-        (
-            "found",
-            f"{overall['found']} of {overall['people']} ({value_text(overall['recall'], '%')})",
-            _interval(metrics, "overall", "recall", "%"),
-        ),
-        (
-            "people reported where nobody is, or twice",
-            f"{detection['false_positives']} "
-            f"({value_text(detection['false_positives_per_frame'], '')} per frame)",
-            _interval(metrics, "detection", "false_positives_per_frame", ""),
-        ),
-        (
-            "found people without a gaze",
-            value_text(overall["gaze_none"], "%"),
-            _interval(metrics, "overall", "gaze_none", "%"),
-        ),
-        (
-            "found people without an α",
-            value_text(overall["awareness_none"], "%"),
-            _interval(metrics, "overall", "awareness_none", "%"),
-        ),
-        (
-            "α mean absolute error, no α counted as 0",
-            value_text(overall["awareness_mae_none_as_0"], ""),
-            _interval(metrics, "overall", "awareness_mae_none_as_0", ""),
-        ),
-        (
-            "α ≥ 0.5 where the truth is 0",
-            f"{overall['false_aware_count']} of "
-            f"{counted(overall['unaware_judged'], 'estimate')} "
-            f"({counted(overall['unaware_people'], 'such person', 'such people')})",
-            _interval(metrics, "overall", "false_aware", "%"),
-        ),
-        (
-            "the same, hidden and small people too",
-            f"{others['false_aware_count']} of {others['unaware_judged']} "
-            f"({value_text(others['false_aware'], '%')})",
-            _interval(metrics, "hidden_and_small_too", "false_aware", "%"),
-        ),
-        (
-            "people with true α ≥ 0.5 recognised",
-            f"{value_text(overall['aware_recognised'], '%')} of {overall['aware_people']}",
-            _interval(metrics, "overall", "aware_recognised", "%"),
-        ),
-    ]
-    lines += ["", *_table(("beside that", "", "95 % interval"), rows), "", *_group_table(metrics)]
-    return "\n".join(lines) + "\n"
-
-
-def _rows(asked: Sequence[Requirement]) -> list[tuple[str, ...]]:
-    """Return a row for each requirement."""
-    return [
         (
             each.name,
             value_text(each.value, each.unit),
@@ -123,11 +126,19 @@ def _rows(asked: Sequence[Requirement]) -> list[tuple[str, ...]]:
         )
         for each in asked
     ]
-
-
-def _interval(metrics: dict[str, Any], group: str, key: str, unit: str) -> str:
-    ends = metrics["intervals"][group].get(key)
-    return "–" if ends is None else interval_text(ends, unit)
+    lines += ["", *_table(("figure", "value", "95 % interval", "asked", "met"), rows)]
+    if any(each.verdict == "too few to tell" for each in asked):
+        lines += [
+            "",
+            "Too few to tell: the interval holds values that meet what is asked, and others.",
+        ]
+    beside = []
+    for title, group, key, unit in _OTHER_ROWS:
+        ends = metrics["intervals"][group].get(key)
+        interval = "–" if ends is None else interval_text(ends, unit)
+        beside.append((title, value_text(metrics[group][key], unit), interval))
+    lines += ["", *_table(("beside that", "value", "95 % interval"), beside)]
+    return "\n".join([*lines, "", *_group_table(metrics)]) + "\n"
 
 
 def _group_table(metrics: dict[str, Any]) -> list[str]:

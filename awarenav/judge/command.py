@@ -60,6 +60,6 @@ def judge(**values: Any) -> int:
     Every figure has its 95 % interval. A requirement is met (yes), not met (no), or there are too
     few people to tell: the interval holds what is asked and other values too.
     """
-    from ._run import JudgeOptions, judge_command  # noqa: PLC0415 - help needs no arrays
+    from ._report import judge_command  # noqa: PLC0415 - help needs no arrays
 
-    return judge_command(JudgeOptions(**values))
+    return judge_command(**values)

@@ -26,7 +26,7 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
     """Print the shipped networks and those for a real robot; return the exit status.
 
     Raises:
-        AwarenavError: for a catalogue or a lock file that cannot be read.
+        AwarenavError: for a catalogue that cannot be read.
     """
     store = ModelStore(folder)
     if as_json:
@@ -81,15 +81,14 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
     """Check every sha256; return the exit status.
 
     Raises:
-        AwarenavError: for a catalogue or a lock file that cannot be read.
+        AwarenavError: for a catalogue that cannot be read.
     """
     store = ModelStore(folder)
     states = [(model.name, _shipped_state(model.name)) for model in shipped_models()]
-    locked = store.locked()
     states += [
         (real.name, _real_state(store, real))
         for real in store.catalogue.models
-        if store.is_fetched(real.name) or real.name in locked
+        if store.is_fetched(real.name)
     ]
     wrong = [name for name, state in states if not state.startswith("verified")]
     if as_json:
@@ -171,7 +170,7 @@ def _shipped_state(name: str) -> str:
 
 
 def _real_state(store: ModelStore, model: RealModel) -> str:
-    if not store.is_fetched(model.name) and model.name not in store.locked():
+    if not store.is_fetched(model.name):
         return "not fetched"
     try:
         store.path(model.name)

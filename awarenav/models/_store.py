@@ -3,52 +3,28 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+import tempfile
 from pathlib import Path
 from typing import Final
 
-import filelock
-
-from perception import PerceptionError
-from perception.documents import read_json
 from perception.networks import OnnxModel, OnnxSettings
 
 from ..errors import AwarenavError
 from ..files import write_text
-from ._archive import extract_member
 from ._catalogue import Catalogue, RealModel
-from ._download import download
 
 #: The environment variable with the folder of fetched networks.
 ENVIRONMENT: Final = "AWARENAV_MODELS"
 
-_LOCK_FILE: Final = "models.lock.json"
 _CHUNK_BYTES: Final = 1 << 20
 
 
-@dataclass(frozen=True, slots=True)
-class LockedModel:
-    """A fetched network, as the folder's lock file keeps it.
-
-    Attributes:
-        sha256: of the ONNX file.
-        size_bytes: of the ONNX file.
-        url: where it came from.
-        pinned: whether its sha256 was known before the first download, which was trusted otherwise.
-    """
-
-    sha256: str
-    size_bytes: int
-    url: str
-    pinned: bool
-
-
 class ModelStore:
-    """Fetched networks in a folder, each held to the sha256 of the catalogue or the lock file.
+    """Fetched networks in a folder, each held to its sha256.
+
+    It is that of the catalogue. For a network without one there, the first fetch is trusted, and
+    its sha256 is kept beside the network, in the format of ``sha256sum``.
 
     Args:
         folder: default ``$AWARENAV_MODELS``, or ``awarenav/models`` in the user's cache folder
@@ -66,11 +42,20 @@ class ModelStore:
         Raises:
             AwarenavError: for an unknown name, a network that is not fetched, or an altered file.
         """
-        model = self.catalogue[name]
-        path = self.folder / model.file
+        path = self._file(name)
         if not path.is_file():
             raise AwarenavError(f"{name} is not in {self.folder}: awarenav models fetch {name}")
-        self._check_sha256(model, path)
+        expected, found = self.expected_sha256(name), _sha256(path)
+        if expected is None:
+            raise AwarenavError(
+                f"{path} was not put there by awarenav models fetch, and its sha256 is not known; "
+                "move it away and fetch it"
+            )
+        if found != expected:
+            raise AwarenavError(
+                f"{path} has been altered: its sha256 is {found}, expected {expected}; "
+                f"awarenav models fetch {name} replaces it"
+            )
         return path
 
     def load(self, name: str, settings: OnnxSettings | None = None) -> OnnxModel:
@@ -84,23 +69,26 @@ class ModelStore:
 
     def is_fetched(self, name: str) -> bool:
         """Return whether the file exists; its contents are not checked."""
-        return (self.folder / self.catalogue[name].file).is_file()
+        return self._file(name).is_file()
 
     def expected_sha256(self, name: str) -> str | None:
         """Return the sha256 that the file must have.
 
         None before the first fetch of a network whose sha256 the catalogue does not have.
+
+        Raises:
+            AwarenavError: for a record of the first fetch that cannot be read.
         """
-        locked = self.locked().get(name)
-        return self.catalogue[name].sha256 or (None if locked is None else locked.sha256)
+        if pinned := self.catalogue[name].sha256:
+            return pinned
+        record = self._record(name)
+        try:
+            return record.read_text(encoding="utf-8")[:64] if record.exists() else None
+        except (OSError, UnicodeError) as cause:
+            raise AwarenavError(f"cannot read {record}: {cause}") from cause
 
     def fetch(
-        self,
-        name: str,
-        *,
-        sha256: str | None = None,
-        progress: bool = True,
-        pause_s: float = 1.0,
+        self, name: str, *, sha256: str | None = None, progress: bool = True
     ) -> tuple[Path, bool]:
         """Fetch a network, unless it is there and unaltered.
 
@@ -110,127 +98,58 @@ class ModelStore:
             name: of the catalogue.
             sha256: that the ONNX file must have, from a source that the caller trusts.
             progress: shows a progress bar on standard error.
-            pause_s: pause before the second attempt at a broken download, seconds.
 
         Returns:
             The path, and whether anything was downloaded.
 
         Raises:
-            AwarenavError: for an unknown name; a download that fails; a file whose sha256 is not
-                the given one, the catalogue's or the lock file's (an existing file then stays); and
-                a first download that is not a network.
+            AwarenavError: for an unknown name, a folder that cannot be written, a download that
+                fails, and a file whose sha256 is not the given one, the catalogue's or that of the
+                first fetch; an existing file then stays.
         """
-        model = self.catalogue[name]
-        self._make_folder()
-        with self._fetch_lock(model):
-            known = self.expected_sha256(name)
-            if sha256 is not None and known is not None and sha256 != known:
-                source = "the catalogue" if model.sha256 else "the first fetch"
-                raise AwarenavError(f"{name}: --sha256 is {sha256}, {source} says {known}")
-            wanted = sha256 or known
-            path = self.folder / model.file
-            if path.is_file() and wanted is not None and _sha256(path) == wanted:
-                return path, False
-            fresh = path.with_name(path.name + ".new")
-            try:
-                self._download(model, fresh, progress, pause_s)
-                found = _sha256(fresh)
-                if wanted is not None and found != wanted:
-                    raise AwarenavError(
-                        f"{name}: the file of {model.url} has sha256 {found}, expected {wanted}; "
-                        "it is not kept"
-                    )
-                if wanted is None:
-                    _require_network(fresh, model)
-                size_bytes = fresh.stat().st_size
-                fresh.replace(path)
-            finally:
-                fresh.unlink(missing_ok=True)
-            self._add_to_lock_file(
-                name, LockedModel(found, size_bytes, model.url, pinned=wanted is not None)
-            )
-        return path, True
-
-    def locked(self) -> dict[str, LockedModel]:
-        """Return the contents of the folder's lock file: the fetched networks by name.
-
-        Raises:
-            AwarenavError: for a lock file that cannot be read; the networks cannot be verified
-                without it.
-        """
-        path = self.folder / _LOCK_FILE
-        try:
-            if not path.exists():
-                return {}
-            entries = read_json(path, AwarenavError)["models"]
-            return {name: LockedModel(**entry) for name, entry in entries.items()}
-        except (ValueError, KeyError, TypeError, AttributeError) as cause:
-            raise AwarenavError(
-                f"{path} cannot be read ({cause}): it has the sha256 of each fetched network; "
-                "remove it and the networks beside it, and fetch them again"
-            ) from cause
-
-    def _check_sha256(self, model: RealModel, path: Path) -> None:
-        expected = self.expected_sha256(model.name)
-        if expected is None:
-            raise AwarenavError(
-                f"{path} was not put there by awarenav models fetch, and its sha256 is not known; "
-                "move it away and fetch it"
-            )
-        found = _sha256(path)
-        if found != expected:
-            raise AwarenavError(
-                f"{path} has been altered: its sha256 is {found}, expected {expected}; "
-                f"awarenav models fetch {model.name} replaces it"
-            )
-
-    def _download(self, model: RealModel, fresh: Path, progress: bool, pause_s: float) -> None:
-        """Download the ONNX file to ``fresh``, from its archive if it comes in one."""
-        # The size in the catalogue is approximate, and an archive holds more than the network.
-        max_bytes = int(1e6 * (2.0 * model.size_mb + 64.0))
-
-        def fetch_to(path: Path) -> None:
-            download(model.url, path, pause_s=pause_s, max_bytes=max_bytes, progress=progress)
-
-        if model.member is None:
-            fetch_to(fresh)
-            return
-        archive = fresh.with_name(model.name + ".zip")
-        try:
-            fetch_to(archive)
-            extract_member(archive, model.member, fresh)
-        finally:
-            archive.unlink(missing_ok=True)
-
-    def _make_folder(self) -> None:
+        model, path = self.catalogue[name], self._file(name)
+        known = self.expected_sha256(name)
+        if sha256 is not None and known is not None and sha256 != known:
+            source = "the catalogue" if model.sha256 else "the first fetch"
+            raise AwarenavError(f"{name}: --sha256 is {sha256}, {source} says {known}")
+        wanted = sha256 or known
+        if path.is_file() and wanted is not None and _sha256(path) == wanted:
+            return path, False
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as cause:
-            raise AwarenavError(f"cannot make {self.folder}: {cause.strerror or cause}") from cause
-
-    @contextmanager
-    def _fetch_lock(self, model: RealModel) -> Iterator[None]:
-        """Refuse a second fetch of the same network into the folder at the same time."""
-        lock = filelock.FileLock(self.folder / f".{model.name}.lock")
-        try:
-            lock.acquire(timeout=0)
-        except filelock.Timeout:
-            raise AwarenavError(f"{model.name} is being fetched to {self.folder} already") from None
+            with tempfile.TemporaryDirectory(prefix=".fetch-", dir=self.folder) as scratch:
+                self._download(model, Path(scratch), wanted, progress)
         except OSError as cause:
             raise AwarenavError(
                 f"cannot write to {self.folder}: {cause.strerror or cause}"
             ) from cause
-        try:
-            yield
-        finally:
-            lock.release()
+        return path, True
 
-    def _add_to_lock_file(self, name: str, entry: LockedModel) -> None:
-        # Fetches of two networks may end at the same time.
-        with filelock.FileLock(self.folder / ".lock"):
-            entries = self.locked() | {name: entry}
-            text = json.dumps({"models": {key: asdict(value) for key, value in entries.items()}})
-            write_text(self.folder / _LOCK_FILE, text + "\n")
+    def _download(
+        self, model: RealModel, scratch: Path, wanted: str | None, progress: bool
+    ) -> None:
+        """Download a network, check its sha256 and move it to its place."""
+        # Only a fetch needs the modules of a client of the web.
+        from ._download import download  # noqa: PLC0415
+
+        fresh = download(model, scratch, progress=progress)
+        found = _sha256(fresh)
+        if wanted is not None and found != wanted:
+            raise AwarenavError(
+                f"{model.name}: the file of {model.url} has sha256 {found}, expected {wanted}; it "
+                "is not kept"
+            )
+        if model.sha256 is None:
+            write_text(self._record(model.name), f"{found}  {model.file}\n")
+        fresh.chmod(0o644)  # a temporary file is its owner's alone; other users may read networks
+        fresh.replace(self._file(model.name))
+
+    def _file(self, name: str) -> Path:
+        return self.folder / self.catalogue[name].file
+
+    def _record(self, name: str) -> Path:
+        """Return the path of the sha256 of a first fetch."""
+        return self._file(name).with_suffix(".sha256")
 
 
 def default_folder() -> Path:
@@ -251,13 +170,3 @@ def _sha256(path: Path) -> str:
     except OSError as cause:
         raise AwarenavError(f"cannot read {path}: {cause.strerror or cause}") from cause
     return digest.hexdigest()
-
-
-def _require_network(path: Path, model: RealModel) -> None:
-    """Refuse a file that is not a network, such as the login page of a proxy."""
-    try:
-        OnnxModel(path)
-    except PerceptionError as cause:
-        raise AwarenavError(
-            f"{model.name}: the file of {model.url} is not a network: {cause}"
-        ) from cause

@@ -62,7 +62,7 @@ def list_models(out: Path | None, *, as_json: bool) -> int:
     "verify",
     short_help="Check the sha256 of every network.",
     examples=["awarenav models verify"],
-    exit_status={0: "All are unaltered.", 1: "A file is missing or altered.", 2: "Bad input."},
+    exit_status={0: "All are unaltered.", 1: "A file is altered.", 2: "Bad input."},
 )
 @_models_folder()
 @options.as_json()
@@ -77,7 +77,7 @@ def verify(out: Path | None, *, as_json: bool) -> int:
     "fetch",
     short_help="Download networks for a real robot.",
     examples=["awarenav models fetch robot", "awarenav models fetch yolox-tiny rtmpose-m"],
-    exit_status={0: "Success.", 2: "Bad input, or a download failed; run it again to continue."},
+    exit_status={0: "Success.", 2: "Bad input, or a download failed."},
 )
 @argument(
     "names",
@@ -100,8 +100,8 @@ def fetch(names: tuple[str, ...], sha256: str | None, out: Path | None) -> int:
     current folder, which --networks of `awarenav estimate` and `awarenav bridge` takes.
 
     A file appears when it is complete and its sha256 is verified. If the catalogue has no sha256 of
-    a network, the first download is trusted: its sha256 is kept in models.lock.json, and later
-    downloads must match it.
+    a network, the first download is trusted: its sha256 is kept beside it, and later downloads must
+    match it.
     """
     from ._run import fetch_command  # noqa: PLC0415 - help needs no networks
 

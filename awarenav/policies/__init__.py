@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._show import read_policy
 
-__all__ = [
-    "read_policy",
-]
+__all__ = ["read_policy"]
 
-__getattr__ = lazy_names(__name__, {"._show": ("read_policy",)})
+__getattr__ = lazy_page(__name__, __file__)

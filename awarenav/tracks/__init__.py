@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._file_tracks import tracks_in_file
@@ -56,35 +56,4 @@ __all__ = [
     "view_edges_rad",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._file_tracks": ("tracks_in_file",),
-        "._history": ("HistoryBuilder", "TrackHistory", "TrackSample", "TrackedRecording"),
-        "._page": ("track_colour",),
-        "._people_table": (
-            "PeopleTable",
-            "PersonRow",
-            "person_id",
-            "read_people_table",
-        ),
-        "._plan_view": ("covariance_ellipse", "path_arrows", "plan_limits", "view_edges_rad"),
-        "._plot": ("shown_tracks", "tracks_figure"),
-        "._recording": (
-            "ASSUMED_POSITION_STD_M",
-            "RecordedFrame",
-            "Recording",
-            "read_recording",
-        ),
-        "._tables": ("CSV_COLUMNS",),
-        "._tracking": ("track_recording",),
-        "._truth": (
-            "Truth",
-            "TruthMatch",
-            "match_truth",
-            "person_ids_text",
-            "true_people",
-            "truth_beside_tracks",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

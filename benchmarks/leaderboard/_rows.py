@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -16,7 +16,7 @@ from sim_tests.crossing import named_policy
 from sim_tests.crossing.eyes import Perception
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.runs import Job, named_templates, plan_jobs, policy_text
-from tracking.config import StrictConfig
+from sim_tests.world.config import SimConfig
 
 _ROOT: Final = Path(__file__).resolve().parents[2]
 #: Folder of the rows and of their results.
@@ -28,7 +28,7 @@ _TRUTH: Final = "truth"
 _REFERENCE: Final = "reference"
 
 
-class Row(StrictConfig):
+class Row(SimConfig):
     """One row: a policy with sensors and a planner.
 
     Attributes:
@@ -37,8 +37,6 @@ class Row(StrictConfig):
         sensors: ``"truth"`` knows everybody in all directions; the others perceive.
         planner: ``"reference"``, ``"costmap"`` or ``"module:Class"``.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     name: str = Field(pattern=r"^[\w.+-]+$")
     policy: str
@@ -94,7 +92,7 @@ class Row(StrictConfig):
         )
 
 
-class Board(StrictConfig):
+class Board(SimConfig):
     """All rows, and the episodes that each of them runs.
 
     Attributes:
@@ -103,8 +101,6 @@ class Board(StrictConfig):
         baseline: name of the row that others are compared with.
         rows: the rows.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     scenarios: tuple[str, ...]
     seeds: int = Field(ge=1)

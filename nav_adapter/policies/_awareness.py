@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 from pydantic import Field, model_validator
 
-from tracking.config import StrictConfig
-
-from .._errors import NavError
+from .._config import NavConfig
 
 
 class InflationPolicy(Protocol):
@@ -38,7 +36,7 @@ class SpeedPolicy(Protocol):
         ...
 
 
-class _AwarenessRamp(StrictConfig):
+class _AwarenessRamp(NavConfig):
     """A blend over the lower bound of α: 0 is "unaware", 1 is "aware", a smoothstep in between.
 
     Attributes:
@@ -46,8 +44,6 @@ class _AwarenessRamp(StrictConfig):
         aware_above: α from which a person counts as fully aware, in (0, 1]. With the default
             attention cone of 60°, the robot is 35° off the gaze at α = 0.6.
     """
-
-    error: ClassVar[type[ValueError]] = NavError
 
     unaware_below: float = Field(default=0.1, ge=0.0, lt=1.0)
     aware_above: float = Field(default=0.6, gt=0.0, le=1.0)

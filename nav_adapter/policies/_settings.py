@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
 from perception.anthropometry import BODY_RADIUS_M
-from tracking.config import StrictConfig
 
-from .._errors import NavError
+from .._config import NavConfig
 
 
-class ReachRules(StrictConfig):
+class ReachRules(NavConfig):
     """Rules of how people change their motion, and how far the robot may turn while it stops.
 
     Attributes:
@@ -22,14 +21,12 @@ class ReachRules(StrictConfig):
         turn_deg: the robot may turn by this much off its course, either way, while it stops.
     """
 
-    error: ClassVar[type[ValueError]] = NavError
-
     time_constant_s: float = Field(default=0.54, ge=0.05, le=5.0)
     delay_s: float = Field(default=0.15, ge=0.0, le=2.0)
     turn_deg: float = Field(default=30.0, ge=0.0, le=180.0)
 
 
-class SafetyMargins(StrictConfig):
+class SafetyMargins(NavConfig):
     """Margins that hold for every α.
 
     Attributes:
@@ -43,8 +40,6 @@ class SafetyMargins(StrictConfig):
             prediction of an unseen person.
     """
 
-    error: ClassVar[type[ValueError]] = NavError
-
     clearance_m: float = Field(default=0.10, ge=0.10, le=2.0)
     uncertainty_sigmas: float = Field(default=2.0, ge=0.0, le=5.0)
     unseen_sigmas: float = Field(default=2.5, ge=0.0, le=5.0)
@@ -55,7 +50,7 @@ class SafetyMargins(StrictConfig):
         return BODY_RADIUS_M + self.clearance_m
 
 
-class TimeBehaviour(StrictConfig):
+class TimeBehaviour(NavConfig):
     """Time behaviour of the adapter. Growth needs no setting: obstacles grow at once.
 
     Attributes:
@@ -69,8 +64,6 @@ class TimeBehaviour(StrictConfig):
         stale_after_s: if perception or the robot's state is older, everyone counts as unaware.
         stop_after_s: if either is older than this, the speed limit is 0.
     """
-
-    error: ClassVar[type[ValueError]] = NavError
 
     shrink_rate_mps: float = Field(default=0.5, gt=0.0, le=5.0)
     fresh_within_s: float = Field(default=0.25, gt=0.0, le=1.0)
@@ -89,7 +82,7 @@ class TimeBehaviour(StrictConfig):
         return self
 
 
-class AlertRules(StrictConfig):
+class AlertRules(NavConfig):
     """Rules for alerts: whom to warn, how, and how often at most.
 
     A person is warned if the lower bound of α is below 0.3 and the moving robot passes within
@@ -105,15 +98,13 @@ class AlertRules(StrictConfig):
         horn_within_s: the same for the horn.
     """
 
-    error: ClassVar[type[ValueError]] = NavError
-
     miss_within_m: float = Field(default=0.5, ge=0.0, le=5.0)
     light_within_s: float = Field(default=5.0, ge=0.0, le=30.0)
     voice_within_s: float = Field(default=3.5, ge=0.0, le=30.0)
     horn_within_s: float = Field(default=2.0, ge=0.0, le=30.0)
 
 
-class AttentionRules(StrictConfig):
+class AttentionRules(NavConfig):
     """Rules for requests for attention: whom to ask to look at the robot, and how often at most.
 
     A person is asked who sets the speed limit and has not noticed the robot, if the robot would
@@ -129,8 +120,6 @@ class AttentionRules(StrictConfig):
         means: what the robot has to ask with, the quietest first: ``"light"``, ``"voice"``. Light
             is left out for somebody who looks far past the robot (an α of at most 0.1).
     """
-
-    error: ClassVar[type[ValueError]] = NavError
 
     min_gain_s: float = Field(default=0.5, ge=0.0, le=10.0)
     pause_s: float = Field(default=2.0, ge=1.0, le=60.0)

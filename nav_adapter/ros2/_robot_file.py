@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from perception.arrays import FloatArray
 from perception.laser import Scanner
-from tracking.config import StrictConfig
 
-from .._errors import NavError
+from .._config import NavConfig
 from .._robot import RobotProfile
 
 # No sensor is mounted further from the base origin.
@@ -32,7 +31,7 @@ _Position = Annotated[list[float], Field(min_length=3, max_length=3), AfterValid
 _Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class CameraMount(StrictConfig):
+class CameraMount(NavConfig):
     """Position and direction of a fixed camera.
 
     Attributes:
@@ -41,8 +40,6 @@ class CameraMount(StrictConfig):
         yaw_deg: angle to the left of straight ahead.
         pitch_down_deg: angle below the horizontal.
     """
-
-    error: ClassVar[type[ValueError]] = NavError
 
     position_base_m: _Position
     yaw_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
@@ -71,7 +68,7 @@ class CameraMount(StrictConfig):
         return T
 
 
-class ScannerMount(StrictConfig):
+class ScannerMount(NavConfig):
     """Position and direction of a level laser scanner.
 
     Attributes:
@@ -81,8 +78,6 @@ class ScannerMount(StrictConfig):
         upside_down: its z axis points down.
         field_of_view_deg: lowest and highest angle about its z axis that is used; None for all.
     """
-
-    error: ClassVar[type[ValueError]] = NavError
 
     position_base_m: _Position
     yaw_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
@@ -113,7 +108,7 @@ class ScannerMount(StrictConfig):
         return mounted.T_base_scanner
 
 
-class RobotFile(StrictConfig):
+class RobotFile(NavConfig):
     """The file that ``awarenav bridge --robot`` reads.
 
     The bounds of :class:`~nav_adapter.RobotProfile` hold.
@@ -138,8 +133,6 @@ class RobotFile(StrictConfig):
         scanners: mounts of the laser scanners, in the order of their topics; without it the poses
             are read from tf.
     """
-
-    error: ClassVar[type[ValueError]] = NavError
 
     footprint_m: list[_Corner]
     max_speed_mps: float = Field(gt=0.01)

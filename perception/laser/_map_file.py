@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import logging
 import re
 import warnings
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import FloatArray, finite_array, finite_number
 from ..documents import read_yaml
-from ..errors import PerceptionError
+from ..errors import PerceptionError, did_you_mean
 
 _REQUIRED: Final = (
     "image",
@@ -64,11 +63,9 @@ def read_map_file(path: Path) -> MapImage:
     valid = (*_REQUIRED, "mode")
     unknown = [key for key in data if key not in valid]
     for key in unknown:
-        near = difflib.get_close_matches(str(key).lower(), valid, n=1, cutoff=0.8)
-        if near:
+        if near := did_you_mean(str(key).lower(), valid, cutoff=0.8):
             raise PerceptionError(
-                f"{path} has the unknown key {key!r}, valid are {', '.join(valid)}; did you mean "
-                f"{near[0]!r}?"
+                f"{path} has the unknown key {key!r}, valid are {', '.join(valid)}{near}"
             )
     if unknown:  # such as those of tools that draw maps; map_server leaves them out as well
         _LOG.warning("%s: not read: %s", path, ", ".join(map(repr, unknown)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._config import RenderConfig, parse_image_size
@@ -19,17 +19,4 @@ __all__ = [
     "render",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._config": (
-            "RenderConfig",
-            "parse_image_size",
-        ),
-        "._render": ("render",),
-        "._scene": (
-            "RenderScene",
-            "random_pose",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from perception import Camera
-from tracking.config import StrictConfig, complaints
+from tracking.config import complaints
 
 from ..actors.body import worker_names
 from ..world.camera import SensorConfig
+from ..world.config import SimConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS
 
 _SIZE = re.compile(r"^(\d+)x(\d+)$")
 
 
-class RenderConfig(StrictConfig):
+class RenderConfig(SimConfig):
     """Settings of a set of randomised images; the same settings give the same bytes.
 
     Attributes:
@@ -41,8 +42,6 @@ class RenderConfig(StrictConfig):
         eyes: ``"wander"``: the eyes turn in the head, by 7° sideways and 3.4° up and down (standard
             deviations); ``"ahead"``: the gaze is the direction of the head.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     frames: int = Field(default=400, ge=1, le=10_000_000)
     scenes: int | None = Field(default=None, ge=1)

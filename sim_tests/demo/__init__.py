@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._cases import CASES, EncounterCase, case_values
@@ -32,31 +32,4 @@ __all__ = [
     "write_crossing_film",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._cases": (
-            "CASES",
-            "EncounterCase",
-            "case_values",
-        ),
-        "._demo": (
-            "compare_policies",
-            "film_runs",
-            "run_demo",
-        ),
-        "._encounter": ("run_encounter",),
-        "._film": ("write_crossing_film",),
-        "._film_values": (
-            "FilmRun",
-            "FilmValues",
-            "film_values",
-        ),
-        "._tables": (
-            "ENCOUNTER_COLUMNS",
-            "EPISODE_COLUMNS",
-            "EpisodeTable",
-            "episode_row",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._actions import command_of
@@ -35,13 +35,4 @@ if find_spec("gymnasium") is not None:
 
     register(_ENVIRONMENT_ID, entry_point="sim_tests.learning:CrossingEnv")
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._actions": ("command_of",),
-        "._environment": ("CrossingEnv",),
-        "._observations": ("ObservationEncoder",),
-        "._policy_planner": ("PolicyPlanner",),
-        "._reward": ("RewardWeights",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

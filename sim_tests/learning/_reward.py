@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from pydantic import Field
 
 from nav_adapter import NavConstraints
-from tracking.config import StrictConfig
 
-from ..world.errors import SimError
+from ..world.config import SimConfig
 
 
-class RewardWeights(StrictConfig):
+class RewardWeights(SimConfig):
     """The weights of the reward; the reward of a step is the sum of its parts.
 
     Attributes:
@@ -24,8 +21,6 @@ class RewardWeights(StrictConfig):
         negative_margin_per_s: for each second with a negative separation margin of a moving robot.
         contact: once for each contact that the robot caused.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     progress_per_m: float = 1.0
     goal: float = Field(default=5.0)

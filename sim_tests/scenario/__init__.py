@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._distributions import Choice, Distribution, Integers, read_distribution
@@ -28,28 +28,4 @@ __all__ = [
     "shipped_templates",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._distributions": (
-            "Choice",
-            "Distribution",
-            "Integers",
-            "read_distribution",
-        ),
-        "._files": (
-            "SCENARIO_SETS",
-            "shipped_scenarios",
-        ),
-        "._for_robot": ("scenario_for_robot",),
-        "._scenario": (
-            "CameraSpec",
-            "RobotTask",
-            "Scenario",
-        ),
-        "._template": (
-            "ScenarioTemplate",
-            "shipped_templates",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

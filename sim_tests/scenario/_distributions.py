@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import Any, ClassVar, Final, Protocol
+from typing import Any, Final, Protocol
 
 from pydantic import Field, ValidationError, model_validator
 from scipy.special import ndtr, ndtri
 
 from awarenav.errors import not_one_of
 from perception.arrays import finite_number
-from tracking.config import StrictConfig, complaint
+from tracking.config import complaint
 
+from ..world.config import SimConfig
 from ..world.errors import SimError
 
 # Third quartile of a standard normal distribution.
@@ -39,10 +40,8 @@ class Distribution(Protocol):
         ...
 
 
-class _Limited(StrictConfig):
+class _Limited(SimConfig):
     """Base of the distributions that always have the limits ``low`` and ``high``."""
-
-    error: ClassVar[type[ValueError]] = SimError
 
     low: float
     high: float
@@ -95,14 +94,12 @@ class Normal(_Limited):
         return _truncated_normal_quantile(share, self.mean, self.std, self.low, self.high)
 
 
-class LogNormal(StrictConfig):
+class LogNormal(SimConfig):
     """A lognormal distribution by its median and quartiles, cut off at ``low`` and ``high``.
 
     The spread is that of the two quartiles on a logarithmic scale; they need not be symmetric about
     the median. Without limits the distribution ends at its 0.5 % and 99.5 % quantiles.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     #: Before the cut.
     median: float = Field(gt=0.0)
@@ -156,10 +153,8 @@ class Integers(_Limited):
         return self.low + min(int(_checked_share(share) * count), count - 1)
 
 
-class Choice(StrictConfig):
+class Choice(SimConfig):
     """A choice among listed numbers, equally likely; one listed twice is twice as likely."""
-
-    error: ClassVar[type[ValueError]] = SimError
 
     values: tuple[float, ...] = Field(min_length=1)
 
@@ -179,7 +174,7 @@ class Choice(StrictConfig):
         return sorted(self.values)[min(int(_checked_share(share) * count), count - 1)]
 
 
-_KINDS: Final[dict[str, type[StrictConfig]]] = {
+_KINDS: Final[dict[str, type[SimConfig]]] = {
     "uniform": Uniform,
     "normal": Normal,
     "lognormal": LogNormal,

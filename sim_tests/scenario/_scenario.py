@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
@@ -16,7 +16,6 @@ from perception import Camera
 from perception.arrays import FloatArray
 from perception.documents import yaml_text
 from perception.surround import FlatView, ring_of_views
-from tracking.config import StrictConfig
 
 from ..actors.behaviour import (
     DEFAULT_POPULATION,
@@ -28,6 +27,7 @@ from ..actors.behaviour import (
 )
 from ..actors.robot import NOVA_CARTER, RobotModel
 from ..world.camera import CameraTiming, SensorConfig
+from ..world.config import SimConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
 from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
@@ -40,7 +40,7 @@ from ._population import person_of_script
 _PATH_SPACING_M: Final = 0.25
 
 
-class CameraSpec(StrictConfig):
+class CameraSpec(SimConfig):
     """The robot's camera: image size, field of view, sensor and timing.
 
     A camera that sees more than a pinhole can, a fisheye or a panorama, has several flat views cut
@@ -61,8 +61,6 @@ class CameraSpec(StrictConfig):
         timing: frame rate, losses and delays; the default is one frame per control cycle, without
             delay.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     width_px: int = Field(default=1280, ge=16, le=8192)
     height_px: int = Field(default=960, ge=16, le=8192)
@@ -110,7 +108,7 @@ class CameraSpec(StrictConfig):
         )
 
 
-class RobotTask(StrictConfig):
+class RobotTask(SimConfig):
     """The robot's start and goal, in odom.
 
     Attributes:
@@ -127,8 +125,6 @@ class RobotTask(StrictConfig):
             beyond as a wall; without it a local planner would follow people into the aisles. People
             ignore the lane. None for no lane.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     start_x_m: float = 0.0
     start_y_m: float = 0.0
@@ -177,7 +173,7 @@ def _layout(value: Any) -> Any:
     return LAYOUTS[value]()
 
 
-class Scenario(StrictConfig):
+class Scenario(SimConfig):
     """One crossing.
 
     Attributes:
@@ -209,8 +205,6 @@ class Scenario(StrictConfig):
         start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
             from the seed.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     name: str = Field(min_length=1)
     version: int = Field(default=1, ge=1)

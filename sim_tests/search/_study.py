@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, Final, Literal
 
 from pydantic import model_validator
 
 from perception.installation import install_command
-from tracking.config import StrictConfig
 
+from ..world.config import SimConfig
 from ..world.errors import SimError
 
 try:
@@ -45,7 +45,7 @@ _CONSTRAINTS: Final = "constraints"
 _NOTES: Final = "notes"
 
 
-class Range(StrictConfig):
+class Range(SimConfig):
     """The range in which a parameter is searched.
 
     Attributes:
@@ -53,8 +53,6 @@ class Range(StrictConfig):
         high: largest value, above ``low``.
         log: search on a logarithmic scale.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     low: float
     high: float

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._live import LivePage
@@ -27,13 +27,4 @@ __all__ = [
     "write_page",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._live": ("LivePage",),
-        "._page": ("live_page", "page_text", "show_page", "write_page"),
-        "._pictures": ("CameraPictures",),
-        "._recorder": ("CrossingRecorder",),
-        "._states": ("Episode", "begin_of", "outcome_text", "state_of"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._visibility import (
@@ -31,23 +31,4 @@ __all__ = [
     "sees",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._visibility": (
-            "FACE_DEPTH_M",
-            "FACE_KEYPOINTS",
-            "JOINT_DEPTH_M",
-            "crosses_boxes",
-            "keypoints_in_front",
-            "sees",
-        ),
-        "._warehouse": (
-            "GRAVITY_MPS2",
-            "PERSON_GROUP",
-            "RAY_GROUP",
-            "ROBOT_GROUP",
-            "Warehouse",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

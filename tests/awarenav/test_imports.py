@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import json
 import os
 import subprocess
 import sys
 
+import pytest
 from paths import ROOT
 
 import awarenav
 import nav_adapter
 import perception
 import tracking
+from awarenav.errors import MissingExtraError
 
 LIGHT = """
 import json, sys
@@ -70,7 +74,7 @@ def test_importing_awarenav_imports_no_array_no_network_and_no_command_line():
 
 def test_no_module_of_awarenav_imports_the_simulator():
     imported, missing = json.loads(python(WITHOUT_SIMULATOR))
-    for tool in ("bridge._run", "estimate._run", "judge._run", "models._run", "tracks._run"):
+    for tool in ("bridge._run", "estimate._run", "judge._judge", "models._run", "tracks._run"):
         assert f"awarenav.{tool}" in imported
     assert "awarenav.policies.command" in imported
     assert len(missing) <= 4, missing  # av, matplotlib, rerun, rosbags
@@ -84,3 +88,21 @@ def test_names_of_awarenav_are_those_of_their_packages():
         homes = [each for each in (perception, tracking, nav_adapter) if name in each.__all__]
         assert all(getattr(each, name) is getattr(awarenav, name) for each in homes)
         assert homes or name == "AwarenavError"
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        ".".join(path.parent.relative_to(ROOT).parts)
+        for package in ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests")
+        for path in sorted((ROOT / package).rglob("__init__.py"))
+        if "lazy_page(" in path.read_text("utf-8")
+    ],
+)
+def test_every_name_of_a_lazy_page_is_found_and_others_are_refused(page):
+    module = importlib.import_module(page)
+    for name in module.__all__:
+        with contextlib.suppress(MissingExtraError):
+            assert getattr(module, name) is not None
+    with pytest.raises(AttributeError, match=rf"module '{page}' has no attribute 'Nope'"):
+        _ = module.Nope

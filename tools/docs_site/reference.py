@@ -20,13 +20,7 @@ from nav_adapter.ros2.messages import ros_type
 from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
 from sim_tests.scenario import Scenario
-from sim_tests.study.measures import (
-    COLUMNS,
-    METRICS,
-    RATIOS,
-    SHARES,
-    Metric,
-)
+from sim_tests.study.measures import COLUMNS, METRICS, RATIOS, SHARES, Metric
 from tracking import TrackerConfig
 
 from .roles import plain

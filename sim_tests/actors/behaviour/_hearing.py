@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from tracking.config import StrictConfig, complaints
+from tracking.config import complaints
 
+from ...world.config import SimConfig
 from ...world.errors import SimError
 from ._duration import UPPER_QUARTILE
 
@@ -25,7 +26,7 @@ _MEMORY_S: Final = 60.0
 FIELD_RAD: Final = math.radians(100.0)
 
 
-class Hearing(StrictConfig):
+class Hearing(SimConfig):
     """The hearing of people: figures of how they hear a request for attention and answer it.
 
     A request is heard with a probability: the product of the factors of distance, activity,
@@ -54,8 +55,6 @@ class Hearing(StrictConfig):
         look_median_s: median duration of the look, from the moment that it meets the robot.
         look_spread: as ``delay_spread``.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     answers: float = Field(default=0.5, ge=0.0, le=1.0)
     startles: float = Field(default=0.05, ge=0.0, le=1.0)

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import uniform_filter1d
 
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
-from ...world.errors import SimError
+from ...world.config import SimConfig
 from ..body import Gait, GaitPose, plan_footsteps, skeleton
 
 # Below this speed the direction of walking is noise and the body keeps its heading.
@@ -26,7 +25,7 @@ _TURN_SMOOTHING_S: Final = 0.4
 _MARGIN_S: Final = 1.5
 
 
-class Waypoint(StrictConfig):
+class Waypoint(SimConfig):
     """Position of the body at a time, in odom.
 
     Attributes:
@@ -35,22 +34,18 @@ class Waypoint(StrictConfig):
         y_m: position.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     t_s: float
     x_m: float
     y_m: float
 
 
-class HeadingKey(StrictConfig):
+class HeadingKey(SimConfig):
     """Heading of the body at a time, degrees counter-clockwise from odom x.
 
     Attributes:
         t_s: time from the start of the episode.
         heading_deg: heading, counter-clockwise from odom x.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     t_s: float
     heading_deg: float

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable
 from typing import Any, ClassVar, Final, Literal, get_args
 
 import numpy as np
+
+from awarenav.errors import did_you_mean
 
 from ...world.errors import SimError
 from ._gait_variation import GaitVariation, VariationFigures
@@ -90,11 +91,9 @@ def population_of(text: str) -> tuple[PopulationName | None, dict[str, float]]:
     for pair in pairs:
         key, equals, value = (part.strip() for part in pair.partition("="))
         if not equals or key not in valid:
-            near = difflib.get_close_matches(key, valid, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
             raise SimError(
                 f"population may be followed by KEY=VALUE of how people hear a request, with the "
-                f"keys {', '.join(valid)}, got {pair!r} in {text!r}{hint}"
+                f"keys {', '.join(valid)}, got {pair!r} in {text!r}{did_you_mean(key, valid)}"
             )
         if key in numbers:
             raise SimError(f"population names {key} twice, got {text!r}")

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 from pydantic import Field, model_validator
 
-from tracking.config import StrictConfig
-
-from ...world.errors import SimError
+from ...world.config import SimConfig
 from ..body import (
     MAX_HEAD_PITCH_RAD,
     MAX_HEAD_YAW_RAD,
@@ -30,7 +28,7 @@ _CHANGE_S: Final = 0.6
 _IDLE: Final = Activity()
 
 
-class GazeKey(StrictConfig):
+class GazeKey(SimConfig):
     """Direction of head and eyes at a time.
 
     ``look: ahead`` is the heading of the body, ``look: robot`` the direction to the robot's camera.
@@ -46,8 +44,6 @@ class GazeKey(StrictConfig):
         eye_pitch_deg: pitch of the eyes in the head, up positive.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     t_s: float
     look: Literal["ahead", "robot"] = "ahead"
     yaw_deg: float = 0.0
@@ -56,7 +52,7 @@ class GazeKey(StrictConfig):
     eye_pitch_deg: float = Field(default=0.0, ge=-25.0, le=25.0)
 
 
-class ActivityKey(StrictConfig):
+class ActivityKey(SimConfig):
     """Activity of the hands from a time on; the change takes 0.6 s. Or sitting or kneeling.
 
     Attributes:
@@ -64,13 +60,11 @@ class ActivityKey(StrictConfig):
         activity: the activity.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     t_s: float
     activity: ActivityName
 
 
-class WorkerScript(StrictConfig):
+class WorkerScript(SimConfig):
     """The script of a worker.
 
     Attributes:
@@ -87,8 +81,6 @@ class WorkerScript(StrictConfig):
             whole body for the whole script, of a worker who stays at one place with one heading.
         hearing: how the worker hears a request for attention; None as the scenario says.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     stature_m: float = Field(default=1.75, ge=MIN_STATURE_M, le=MAX_STATURE_M)
     look: str | None = None

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import Field, model_validator
 
-from tracking.config import StrictConfig
-
-from ...world.errors import SimError
+from ...world.config import SimConfig
 from ..body import MAX_STATURE_M, MIN_STATURE_M, STAYING, ActivityName
 from ._hearing import Hearing
 
 
-class RoutePoint(StrictConfig):
+class RoutePoint(SimConfig):
     """A corner of a route in odom.
 
     Attributes:
@@ -21,13 +19,11 @@ class RoutePoint(StrictConfig):
         y_m: position.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     x_m: float
     y_m: float
 
 
-class Pause(StrictConfig):
+class Pause(SimConfig):
     """A stop after a length of route, and its duration.
 
     Attributes:
@@ -35,13 +31,11 @@ class Pause(StrictConfig):
         for_s: duration of the stop.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     at_m: float = Field(ge=0.0)
     for_s: float = Field(ge=0.0)
 
 
-class Glances(StrictConfig):
+class Glances(SimConfig):
     """Glances at the robot: an alternating renewal process with lognormal durations.
 
     The defaults were fitted to 686 annotated pedestrians in front of approaching vehicles.
@@ -61,8 +55,6 @@ class Glances(StrictConfig):
         away_yaw_deg: yaw of the head between glances, left of the body's heading.
         away_pitch_deg: pitch of the head between glances, up; about −40 reads a phone.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     notices_within_m: float = Field(default=12.0, ge=0.0)
     first_glance_delay_s: float = Field(default=0.3, ge=0.0)
@@ -89,7 +81,7 @@ class Glances(StrictConfig):
         return self
 
 
-class Reactions(StrictConfig):
+class Reactions(SimConfig):
     """Shares of the reactions of a person who has seen the robot on a conflicting course.
 
     A reaction that a mapping does not name has share 0: ``{wait: 1}`` always waits. The shares are
@@ -102,8 +94,6 @@ class Reactions(StrictConfig):
         pass_behind: pass behind the robot.
         claim: go first a little faster, and expect the robot to yield.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     walk_on: float = Field(default=0.3, ge=0.0, le=1.0)
     wait: float = Field(default=0.25, ge=0.0, le=1.0)
@@ -126,7 +116,7 @@ class Reactions(StrictConfig):
         return self
 
 
-class Lapse(StrictConfig):
+class Lapse(SimConfig):
     """The end of a person's attention, some time after the first look at the robot.
 
     From then on the person walks as if no robot were there, until it touches them.
@@ -138,14 +128,12 @@ class Lapse(StrictConfig):
             ``start_s`` or a pause would come later.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     after_look_s: float = Field(default=2.0, ge=0.0)
     looks_away: bool = True
     halts: bool = False
 
 
-class PersonSpec(StrictConfig):
+class PersonSpec(SimConfig):
     """A person who walks a route, glances at the robot and reacts to it.
 
     Attributes:
@@ -174,8 +162,6 @@ class PersonSpec(StrictConfig):
         hearing: how this person hears a request for attention; None as the scenario says.
         as_written: a population that draws speeds and glances keeps those of this person.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     name: str = Field(min_length=1)
     stature_m: float = Field(default=1.75, ge=MIN_STATURE_M, le=MAX_STATURE_M)

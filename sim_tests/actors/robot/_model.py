@@ -6,7 +6,7 @@ from dataclasses import fields
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -15,8 +15,8 @@ from shapely.geometry import MultiPoint
 from awarenav.errors import not_one_of
 from nav_adapter import NavError, RobotProfile
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
+from ...world.config import SimConfig
 from ...world.errors import SimError
 from ...world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._amr import CAMERA_FORWARD_M, CAMERA_HEIGHT_M, NOVA_CARTER
@@ -28,7 +28,7 @@ NOVA_CARTER_NAME: Final = "nova_carter"
 Point = tuple[float, float]
 
 
-class BodyPart(StrictConfig):
+class BodyPart(SimConfig):
     """A box of a robot's body in the base frame, and its colour.
 
     Attributes:
@@ -36,8 +36,6 @@ class BodyPart(StrictConfig):
         high_m: (x, y, z) of the high corner.
         colour: red, green and blue, from 0 to 1.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     low_m: tuple[float, float, float]
     high_m: tuple[float, float, float]
@@ -50,7 +48,7 @@ class BodyPart(StrictConfig):
         return self
 
 
-class RobotModel(StrictConfig):
+class RobotModel(SimConfig):
     """A robot for crossings: any convex outline, with the limits and the drive of its profile.
 
     Attributes:
@@ -75,8 +73,6 @@ class RobotModel(StrictConfig):
         camera_m: (x, y, z) of the camera in the base frame; it looks ahead.
         scanners: laser scanners.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     name: str = Field(min_length=1)
     description: str = ""

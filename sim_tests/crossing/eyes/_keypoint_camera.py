@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,9 @@ from pydantic import Field
 from perception import Camera, PersonDetection, PersonKeypoints
 from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
 from ...world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M
+from ...world.config import SimConfig
 from ...world.errors import SimError
 
 _LAYOUT: Final = "coco_wholebody"
@@ -33,7 +33,7 @@ _MIN_VISIBLE: Final = 5
 _NEAR_M: Final = 0.1
 
 
-class KeypointNoise(StrictConfig):
+class KeypointNoise(SimConfig):
     """Noise of the keypoints.
 
     Attributes:
@@ -42,8 +42,6 @@ class KeypointNoise(StrictConfig):
             is typical of a current whole-body network.
         miss_rate: share of the frames in which a visible person is not detected.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     pixel_std_px: float = Field(default=1.0, ge=0.0)
     lift_std_m: float = Field(default=0.045, ge=0.0)

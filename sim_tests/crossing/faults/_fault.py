@@ -5,14 +5,14 @@ from __future__ import annotations
 from functools import reduce
 from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from pydantic import Field
 
 from awarenav.errors import not_one_of
 from perception.documents import parse_yaml, yaml_text
-from tracking.config import StrictConfig
 
+from ...world.config import SimConfig
 from ...world.errors import SimError
 from ._outage import Onset, Outage
 from ._scanner_fault import ScannerFault
@@ -20,7 +20,7 @@ from ._scanner_fault import ScannerFault
 _JOINT: Final = "+"
 
 
-class Bursts(StrictConfig):
+class Bursts(SimConfig):
     """Periods in which the detector misses a person, independent for each person.
 
     Attributes:
@@ -28,13 +28,11 @@ class Bursts(StrictConfig):
         every_s: mean time between two of them, exponentially distributed.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     for_s: float = Field(default=0.0, ge=0.0, le=600.0)
     every_s: float = Field(default=3.0, gt=0.0, le=3600.0)
 
 
-class Ghosts(StrictConfig):
+class Ghosts(SimConfig):
     """False detections of people.
 
     A ghost stands where it appeared in the camera's view, 1 m to 8 m away. Half of them have a
@@ -45,13 +43,11 @@ class Ghosts(StrictConfig):
         for_s: mean lifetime, exponentially distributed.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     rate_hz: float = Field(default=0.0, ge=0.0, le=100.0)
     for_s: float = Field(default=0.5, gt=0.0, le=600.0)
 
 
-class Fault(StrictConfig):
+class Fault(SimConfig):
     """A fault of camera, detections, odometry or scanners; the default changes nothing at all.
 
     Sensors and odometry follow the scenario; the fault is added to them. It draws from random
@@ -80,8 +76,6 @@ class Fault(StrictConfig):
             over-confident.
         scanner: fault of the laser scanners.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     name: str = Field(default="none", min_length=1, pattern=r"^[A-Za-z0-9_.+-]+$")
     description: str = ""

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from pydantic import Field, model_validator
 
-from tracking.config import StrictConfig
-
-from ...world.errors import SimError
+from ...world.config import SimConfig
 
 
-class Onset(StrictConfig):
+class Onset(SimConfig):
     """The time from which something holds until the end; the default is the start of the episode.
 
     Attributes:
@@ -19,8 +15,6 @@ class Onset(StrictConfig):
         within_s: and at most this much later, evenly distributed over the episodes; 0 for exactly
             then.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     after_s: float = Field(default=0.0, ge=0.0, le=600.0)
     within_s: float = Field(default=0.0, ge=0.0, le=600.0)
@@ -30,7 +24,7 @@ class Onset(StrictConfig):
         return self.after_s + draw * self.within_s
 
 
-class Outage(StrictConfig):
+class Outage(SimConfig):
     """A repeated outage; the default has none.
 
     In each episode the first outage begins at a random time within the first ``every_s``, uniformly
@@ -42,8 +36,6 @@ class Outage(StrictConfig):
         fresh_stamps: the last message is repeated as if it were new, which no receiver can tell;
             False repeats it with its old stamp.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     for_s: float = Field(default=0.0, ge=0.0, le=600.0)
     every_s: float = Field(default=10.0, gt=0.0, le=3600.0)

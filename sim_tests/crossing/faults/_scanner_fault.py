@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final, Literal
+from typing import Final, Literal
 
 from pydantic import Field
 
-from tracking.config import StrictConfig
-
-from ...world.errors import SimError
+from ...world.config import SimConfig
 from ._outage import Onset, Outage
 
 #: What a driver publishes for a ray without an answer.
@@ -38,7 +36,7 @@ class BlindSector(Onset):
     )
 
 
-class Appearances(StrictConfig):
+class Appearances(SimConfig):
     """False returns that appear as a Poisson process; the default has none.
 
     Attributes:
@@ -46,13 +44,11 @@ class Appearances(StrictConfig):
         for_s: mean lifetime, exponentially distributed.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     rate_hz: float = Field(default=0.0, ge=0.0, le=100.0)
     for_s: float = Field(default=1.0, gt=0.0, le=600.0)
 
 
-class ScannerFault(StrictConfig):
+class ScannerFault(SimConfig):
     """A fault of the laser scanners; the default changes nothing, bit for bit.
 
     Attributes:
@@ -74,8 +70,6 @@ class ScannerFault(StrictConfig):
         ghosts: pairs of legs that do not exist, 0.8 m to 6 m away. Half of them stand; the others
             walk at up to 1.5 m/s. They hide what is behind them.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     only: int | None = Field(default=None, ge=1)
     frozen: Outage = Outage()

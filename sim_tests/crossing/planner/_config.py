@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Final
+from typing import Final
 
 from pydantic import Field, model_validator
 
 from nav_adapter import RobotProfile
-from tracking.config import StrictConfig
 
-from ...world.errors import SimError
+from ...world.config import SimConfig
 
 _LONGEST_HORIZON_S: Final = 7.5
 
 
-class PlannerConfig(StrictConfig):
+class PlannerConfig(SimConfig):
     """Settings of :class:`SamplingPlanner`: sampling, horizon, clearances and cost weights.
 
     The weights multiply dimensionless costs. One unit is the gain of driving straight to a far goal
     at the robot's maximum speed over standing still.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     horizon_s: float = Field(default=3.0, ge=1.0, le=10.0)
     """Horizon of roll-outs and predictions of people, in seconds."""

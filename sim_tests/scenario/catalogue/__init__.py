@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._checks import CHECKED_DRAWS, scenario_problems, template_problems
@@ -26,26 +26,4 @@ __all__ = [
     "template_problems",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._checks": (
-            "CHECKED_DRAWS",
-            "scenario_problems",
-            "template_problems",
-        ),
-        "._plans": (
-            "CONFLICT_M",
-            "approach_statistics",
-            "closest_approaches",
-            "person_plan",
-            "robot_plan",
-        ),
-        "._show": (
-            "draw_command",
-            "list_command",
-            "names_of_sets",
-            "show_command",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

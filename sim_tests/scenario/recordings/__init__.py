@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._convert import ConvertedRecording, RecordingOptions, scenario_from_recording
@@ -20,19 +20,4 @@ __all__ = [
     "scenario_from_recording",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._convert": (
-            "ConvertedRecording",
-            "RecordingOptions",
-            "scenario_from_recording",
-        ),
-        "._table": (
-            "LONGEST_GAP_S",
-            "RecordedTable",
-            "RecordedTrack",
-            "read_table",
-        ),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._no_floor_planner import NoFloorPlanner
 
 __all__ = ["NoFloorPlanner"]
 
-__getattr__ = lazy_names(__name__, {"._no_floor_planner": ("NoFloorPlanner",)})
+__getattr__ = lazy_page(__name__, __file__)

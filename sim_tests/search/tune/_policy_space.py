@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from pydantic import ValidationError
 
+from awarenav.errors import did_you_mean
 from nav_adapter import AwarenessPolicy, NavError
 from perception.anthropometry import BODY_RADIUS_M
 from perception.documents import parse_yaml, read_yaml
@@ -51,8 +51,6 @@ class PolicyRange(Range):
         also: other keys of the policy that get the same value.
     """
 
-    error: ClassVar[type[ValueError]] = SimError
-
     also: tuple[str, ...] = ()
 
 
@@ -88,8 +86,7 @@ class PolicySpace:
                     )
                 if not self._is_off(place) and not _is_number(self._base.get(place)):
                     numbers = [name for name, value in self._base.items() if _is_number(value)]
-                    near = difflib.get_close_matches(place, numbers, n=1)
-                    hint = f"; did you mean {near[0]!r}?" if near else ""
+                    hint = did_you_mean(place, numbers)
                     raise SimError(f"the policy has no number {place!r}{hint}")
         for corner in (0.0, 1.0):
             self.policy({p: (1 - corner) * r.low + corner * r.high for p, r in self.ranges.items()})

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._family import TODAY, sensors_of_today
 
 __all__ = ["TODAY", "sensors_of_today"]
 
-__getattr__ = lazy_names(__name__, {"._family": ("TODAY", "sensors_of_today")})
+__getattr__ = lazy_page(__name__, __file__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._awareness import (
@@ -101,76 +101,4 @@ __all__ = [
     "zero_of_n_upper",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._compare": ("answering_note",),
-        "._awareness": (
-            "ATTENTION_WITHIN_M",
-            "ATTENTIVE_FROM",
-            "UNAWARE_UP_TO",
-            "UNCONFIRMED",
-            "MeasuredAttention",
-            "measured_part",
-        ),
-        "._bootstrap": (
-            "bootstrap_interval",
-            "ratio_interval",
-            "resampled_interval",
-            "resampled_means",
-        ),
-        "._conduct": (
-            "OVERSHOOT_MPS",
-            "Conduct",
-            "fastest_point_excess_mps",
-            "limit_excess_mps",
-        ),
-        "._driving": ("path_length_m",),
-        "._interval": (
-            "FEW_PAIRS",
-            "Interval",
-            "proportion_interval",
-            "zero_of_n_upper",
-        ),
-        "._measure": ("measure",),
-        "._pairs": (
-            "paired",
-            "paired_difference",
-            "violates_more",
-            "violation_excess",
-            "violation_excess_of_time",
-            "won_back",
-        ),
-        "._record": (
-            "COLUMNS",
-            "METRICS",
-            "RATIOS",
-            "SHARES",
-            "EpisodeRecord",
-            "Metric",
-        ),
-        "._record_file": (
-            "RECORD_COLUMNS",
-            "read_records",
-            "read_rows",
-            "record_row",
-            "write_records",
-        ),
-        "._step_out": ("StepOut", "step_out_impacts"),
-        "._summary": (
-            "BASELINE",
-            "Comparison",
-            "Summary",
-            "SummaryRow",
-            "Variant",
-            "labels",
-            "summarise",
-        ),
-        "._summary_text": (
-            "nondeterminism_notes",
-            "summary_text",
-            "table_text",
-        ),
-        "._trace": ("Trace",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

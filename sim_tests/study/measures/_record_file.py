@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import difflib
 import io
 import math
 from collections.abc import Iterable, Sequence
@@ -11,6 +10,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
+from awarenav.errors import did_you_mean
 from awarenav.files import atomic_path
 from perception.documents import read_json
 from perception.installation import install_command
@@ -217,8 +217,7 @@ def check_columns(columns: Sequence[str], source: str) -> None:
     """
     for name in columns:
         if name not in COLUMN_KINDS:
-            near = difflib.get_close_matches(name, RECORD_COLUMNS, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(name, RECORD_COLUMNS)
             raise SimError(
                 f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
                 "(docs/metrics.md lists all)"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._page import write_page
@@ -24,21 +24,4 @@ __all__ = [
     "write_report",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._page": ("write_page",),
-        "._panel": (
-            "Panel",
-            "panel",
-        ),
-        "._text": (
-            "NOTHING",
-            "count",
-            "number",
-            "percent",
-            "plural",
-        ),
-        "._write": ("write_report",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

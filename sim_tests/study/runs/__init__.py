@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._conditions import Conditions
@@ -75,39 +75,4 @@ __all__ = [
     "tidy",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._conditions": ("Conditions",),
-        "._episode": (
-            "attempt",
-            "died",
-            "free_run_of",
-            "observed_episode",
-            "run_episode",
-            "seeded_crossing",
-        ),
-        "._job": ("Attempt", "Job", "JobKey", "describe"),
-        "._parallel": ("in_parallel", "tidy"),
-        "._plan": (
-            "fault_of",
-            "job_key",
-            "named_templates",
-            "plan_jobs",
-            "policy_of",
-            "policy_text",
-            "sample_jobs",
-            "template_of",
-        ),
-        "._planner_choice": (
-            "KNOWN_PLANNERS",
-            "make_planner",
-            "planner_label",
-            "planner_parameters",
-            "refuse_unusable_planner",
-        ),
-        "._replay": ("find_episode", "recorder_of"),
-        "._run": ("run_jobs",),
-        "._run_files": ("RunFiles", "read_attempts", "read_jobs", "read_run"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

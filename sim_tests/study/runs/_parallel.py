@@ -83,7 +83,8 @@ def in_parallel(
     if scheduler is None and count == 1 and not own_process:
         yield from ((number, function(item)) for number, item in numbered)
     elif numbered and scheduler is None:
-        processes = min(int(count), len(numbered))
+        # Another number would end the processes that the call before has kept.
+        processes = int(count) if keep else min(int(count), len(numbered))
         try:
             yield from _on(
                 lambda: _processes(processes), lambda: processes, function, numbered, on_death

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._compare import compare_planners, write_scorecard
@@ -32,22 +32,4 @@ __all__ = [
     "write_scorecard",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._compare": (
-            "compare_planners",
-            "write_scorecard",
-        ),
-        "._score": (
-            "FieldUse",
-            "Obedience",
-            "PlanTime",
-            "PlannerScore",
-            "RadiiUse",
-            "Score",
-            "Scorecard",
-        ),
-        "._scoring": ("read_scorecard",),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

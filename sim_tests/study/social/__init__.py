@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from awarenav.lazy import lazy_names
+from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._episode import Outcome, SocialEpisode
@@ -25,12 +25,4 @@ __all__ = [
     "write_episode",
 ]
 
-__getattr__ = lazy_names(
-    __name__,
-    {
-        "._episode": ("Outcome", "SocialEpisode"),
-        "._files": ("FORMATS", "read_track", "write_episode"),
-        "._measures": ("SOCIAL_MEASURES", "SocialMeasure", "social_measures"),
-        "._recorder": ("EpisodeRecorder", "episode_of"),
-    },
-)
+__getattr__ = lazy_page(__name__, __file__)

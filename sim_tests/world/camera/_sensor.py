@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
+from ..config import SimConfig
 from ..errors import SimError
 
 # From this number of electrons on, the Poisson distribution is replaced by a normal one.
@@ -20,7 +20,7 @@ _MANY_ELECTRONS: Final = 60.0
 _LIGHT_STEPS: Final = 65536
 
 
-class SensorConfig(StrictConfig):
+class SensorConfig(SimConfig):
     """The settings of an image sensor; the default leaves the image unchanged.
 
     Noise follows the photon transfer curve of EMVA 1288: a pixel with N electrons has the variance
@@ -37,8 +37,6 @@ class SensorConfig(StrictConfig):
         vignetting: share of the light lost in the corners; the falloff follows cos⁴.
         motion_blur: whether things that move during the exposure smear.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     exposure_s: float = Field(default=0.01, gt=0.0, le=1.0)
     exposure_ev: float = Field(default=0.0, ge=-8.0, le=8.0)

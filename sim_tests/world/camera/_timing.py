@@ -5,14 +5,14 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Final, Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
 import numpy as np
 from pydantic import Field
 
 from perception.arrays import finite_number
-from tracking.config import StrictConfig
 
+from ..config import SimConfig
 from ..errors import SimError
 
 FrameT = TypeVar("FrameT")
@@ -20,7 +20,7 @@ FrameT = TypeVar("FrameT")
 _TOLERANCE_S: Final = 1.0e-6
 
 
-class CameraTiming(StrictConfig):
+class CameraTiming(SimConfig):
     """Frame rate, losses and delays of a camera; the default is a perfect camera.
 
     Attributes:
@@ -30,8 +30,6 @@ class CameraTiming(StrictConfig):
         latency_jitter_s: greatest additional delay, uniformly distributed; a frame may overtake
             another.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     rate_hz: float | None = Field(default=None, gt=0.0, le=1000.0)
     drop_rate: float = Field(default=0.0, ge=0.0, le=1.0)

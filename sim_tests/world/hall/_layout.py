@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
+from ..config import SimConfig
 from ..errors import SimError
 from ._props import Prop
 
@@ -20,7 +20,7 @@ _Positive = Annotated[float, Field(gt=0.0)]
 _RACK_DEPTH_M: Final = 1.1
 
 
-class RackBox(StrictConfig):
+class RackBox(SimConfig):
     """A pallet rack as the box that it fills; it stands on the floor, its sides along the axes.
 
     Attributes:
@@ -30,8 +30,6 @@ class RackBox(StrictConfig):
         width_m: extent along odom y.
         height_m: height above the floor.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     x_m: float
     y_m: float
@@ -46,7 +44,7 @@ class RackBox(StrictConfig):
         return self.x_m - half_x, self.y_m - half_y, self.x_m + half_x, self.y_m + half_y
 
 
-class WarehouseLayout(StrictConfig):
+class WarehouseLayout(SimConfig):
     """A walled hall; the robot's aisle runs along odom x, centred on y = 0.
 
     Attributes:
@@ -65,8 +63,6 @@ class WarehouseLayout(StrictConfig):
 
     Raises pydantic's ``ValidationError`` (a ``ValueError``) or, from a file, :class:`SimError`.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     x_min_m: float
     y_min_m: float

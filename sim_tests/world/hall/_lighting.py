@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Final
 
 from pydantic import Field, model_validator
 
 from awarenav.errors import not_one_of
-from tracking.config import StrictConfig
 
+from ..config import SimConfig
 from ..errors import SimError
 
 _Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -17,14 +17,12 @@ _Share = Annotated[float, Field(ge=0.0, le=1.0)]
 _MAX_BRIGHTNESS: Final = 1.06
 
 
-class Lighting(StrictConfig):
+class Lighting(SimConfig):
     """A directional light and an ambient light of the same colour.
 
     A face of colour c whose normal makes the angle φ with the direction to the light shows
     ``c * colour_rgb * (ambient + diffuse * max(0, cos φ))``.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     #: From the scene towards the light, in odom; any length > 0.
     direction_odom: tuple[float, float, float] = (-3.0, 4.0, 8.0)

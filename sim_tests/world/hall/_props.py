@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
-from tracking.config import StrictConfig
 
-from ..errors import SimError
+from ..config import SimConfig
 
 
 class PropPart(NamedTuple):
@@ -65,7 +64,7 @@ PROP_PARTS: Final[dict[str, tuple[PropPart, ...]]] = {
 _UNIT_CORNERS: Final = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 
-class Prop(StrictConfig):
+class Prop(SimConfig):
     """A thing on the floor: its kind and its place.
 
     Its frame has x forward (forks point along −x for pallet truck and stacker, along +x for the
@@ -78,8 +77,6 @@ class Prop(StrictConfig):
         y_m: place of the origin in odom.
         yaw_deg: heading, counter-clockwise from odom x.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     kind: str
     x_m: float

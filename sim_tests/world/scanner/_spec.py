@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import ClassVar, Final
+from typing import Final
 
 from pydantic import Field, model_validator
 
 from perception.arrays import FloatArray
 from perception.laser import Scanner
-from tracking.config import StrictConfig
 
 from ..camera import CameraTiming
-from ..errors import SimError
+from ..config import SimConfig
 
 
-class ScannerSpec(StrictConfig):
+class ScannerSpec(SimConfig):
     """A 2-D laser scanner on a robot; the defaults are those of a common safety scanner.
 
     Attributes:
@@ -36,8 +35,6 @@ class ScannerSpec(StrictConfig):
         scan_share: share of a turn's time that the mirror needs for a turn; 0 measures all rays at
             one instant, 1 is a mirror that turns at the rate of the sweeps.
     """
-
-    error: ClassVar[type[ValueError]] = SimError
 
     x_m: float = 0.375
     y_m: float = 0.0

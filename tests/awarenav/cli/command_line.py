@@ -11,15 +11,6 @@ from paths import ROOT
 
 from awarenav.cli import Command, app
 
-#: The commands under the headings of the list.
-GROUPS = {
-    "On a robot": ["estimate", "judge", "tracks", "bridge", "models", "doctor", "policy"],
-    "Simulation": [
-        *("demo", "crossings", "watch", "replay", "compare", "measures", "export", "report"),
-        *("planners", "scenario", "render", "frontier", "tune", "falsify"),
-    ],
-    "Development": ["bench", "completion"],
-}
 SHORT_SCENARIO = """
 name: short
 description: Half a second.

@@ -67,7 +67,6 @@ def test_no_command_takes_positional_arguments_beside_an_option_of_several_value
         assert not (many and arguments), path
 
 
-RUNS = ("crossings", "estimate", "falsify", "frontier", "planners", "render", "tune")
 EXCLUSIVE = [
     (path, name, each.excludes)
     for path, one in COMMANDS.items()
@@ -91,23 +90,6 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
     assert f"awarenav {' '.join(path)}: {name} and {other} exclude each other" in error
 
 
-def test_exclusions_are_those_that_are_known():
-    assert {(path[0], name, other) for path, name, other in EXCLUSIVE} == {
-        *((name, "--overwrite", "--resume") for name in RUNS),
-        *((name, "--fov-deg", "--camera") for name in ("doctor", "estimate")),
-        *(
-            (name, option, "--networks")
-            for name in ("bridge", "doctor", "estimate")
-            for option in ("--detector", "--pose", "--head", "--eyes")
-        ),
-        *((name, "--frame-budget-s", "--detect-every-s") for name in ("bridge", "estimate")),
-        ("replay", "--view", "--no-video"),
-        ("tracks", "--ids", "--config"),
-        ("tracks", "--smooth", "--ids"),
-        ("falsify", "--unsafe-no-floor", "--planner"),
-    }
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -116,12 +98,10 @@ def test_exclusions_are_those_that_are_known():
         (["crossings", "--workrs", "x"], "No such option '--workrs'. Did you mean '--workers'?"),
         (["--versio"], "No such option '--versio'. Did you mean '--version'?"),
         (["demo", "--perception", "pixel"], "got 'pixel'; did you mean 'pixels'?"),
-        (["tune", "--sampler", "nsga"], "got 'nsga'; did you mean 'nsga2'?"),
         (["completion", "bsh"], "got 'bsh'; did you mean 'bash'?"),
         (["crossings", "--scenario", "blind_corne"], "did you mean 'blind_corner'?"),
         (["crossings", "--policy", "balancd"], "did you mean 'balanced'?"),
         (["crossings", "--fault", "ghost"], "did you mean 'ghosts'?"),
-        (["scenario", "show", "blind_corne"], "did you mean 'blind_corner'?"),
         (["policy", "show", "balancd"], "did you mean 'balanced'?"),
         (["models", "fetch", "yolox-tny"], "did you mean 'yolox-tiny'?"),
     ],
@@ -138,12 +118,11 @@ def test_a_wrong_word_is_refused_with_the_nearest_right_one(words, message, tmp_
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["crossings", "--episodes", "0"], "must be a whole number of at least 1, got '0'"),
-        (["crossings", "--episodes", "2.5"], "must be a whole number of at least 1, got '2.5'"),
-        (["crossings", "--seed", "-1"], "must be a whole number of at least 0, got '-1'"),
-        (["bridge", "--robot", "x", "--domain", "300"], "must be a whole number from 0 to 232"),
-        (["estimate", "x", "--min-score", "2"], "must be a number from 0 to 1, got '2'"),
-        (["judge", "a", "b", "--max-occlusion", "half"], "must be a number, got 'half'"),
+        (["crossings", "--episodes", "0"], "'--episodes': 0 is not in the range x>=1"),
+        (["crossings", "--episodes", "2.5"], "'2.5' is not a valid integer"),
+        (["bridge", "--robot", "x", "--domain", "300"], "300 is not in the range 0<=x<=232"),
+        (["estimate", "x", "--min-score", "2"], "2.0 is not in the range 0.0<=x<=1.0"),
+        (["judge", "a", "b", "--max-occlusion", "half"], "'half' is not a valid float"),
         (["crossings", "--policy"], "Option '--policy' requires an argument"),
         (["estimate"], "Missing argument 'SOURCE'"),
         (["bridge"], "Missing option '--robot'"),

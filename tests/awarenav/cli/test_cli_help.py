@@ -8,18 +8,18 @@ import shlex
 
 import click
 import pytest
-from command_line import COMMANDS, GROUPS, options_of, run_python
+from command_line import COMMANDS, options_of, run_python
 
 import awarenav
-from awarenav.cli import Command, app, main
+from awarenav.cli import Command, main
 
 HEAVY = ("cv2", "matplotlib", "numpy", "onnxruntime", "pybullet", "pydantic", "scipy", "shapely")
 PRINT_MODULES = """
 import json, sys
 from awarenav.cli import main
-status = main(sys.argv[1:])
+for line in sys.argv[1:]:
+    assert main(line.split()) == 0
 print(json.dumps(sorted(sys.modules)), file=sys.stderr)
-sys.exit(status)
 """
 
 
@@ -34,7 +34,10 @@ def test_the_list_of_commands_is_grouped(capsys):
         heading: re.findall(r"^  (\w+)  ", text, re.MULTILINE)
         for heading, text in zip(sections[1::2], sections[2::2], strict=True)
     }
-    assert {heading: listed[heading] for heading in GROUPS} == GROUPS
+    on_a_robot = ["estimate", "judge", "tracks", "bridge", "models", "doctor", "policy"]
+    assert listed["On a robot"] == on_a_robot
+    assert {"demo", "crossings", "replay"} < set(listed["Simulation"])
+    assert "completion" in listed["Development"]
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
@@ -66,43 +69,27 @@ def test_the_examples_in_the_help_can_be_parsed(path):
             pass
 
 
-def imported(*arguments):
-    """Return the modules that are loaded after a command line."""
-    done = run_python(PRINT_MODULES, *arguments)
+def imported(*lines):
+    """Return the modules that are loaded after command lines in one process."""
+    done = run_python(PRINT_MODULES, *lines)
     assert done.returncode == 0, done.stderr
     return set(json.loads(done.stderr.splitlines()[-1]))
 
 
-def ours(modules):
-    return {each for each in modules if each.split(".")[0] in ("awarenav", "sim_tests")}
-
-
-@pytest.fixture(scope="module")
-def light():
-    """The modules that the list of commands needs."""
-    modules = imported("--help")
+def test_the_list_of_commands_and_the_version_import_no_command():
+    modules = imported("--help", "--version")
     assert modules.isdisjoint(HEAVY)
     assert not [each for each in modules if each.endswith(".command")]
     assert not [each for each in modules if each.split(".")[0] == "sim_tests"]
-    return ours(modules)
 
 
-@pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
-def test_help_of_a_command_imports_that_command_and_no_other(path, light):
-    modules = imported(*path, "--help")
-    assert modules.isdisjoint(HEAVY)
-    home = COMMANDS[path].callback.__module__
-    parents = {home.rsplit(".", depth)[0] for depth in range(home.count(".") + 1)}
-    # A page may use the function that makes it lazy, and the check for a foreign package.
-    assert ours(modules) - light <= parents
+def test_help_of_commands_imports_neither_arrays_nor_networks_nor_the_simulator():
+    assert imported(*(f"{' '.join(path)} --help" for path in COMMANDS)).isdisjoint(HEAVY)
 
 
-def test_the_version_is_printed_and_imports_no_command(capsys, light):
+def test_the_version_is_printed(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"awarenav {awarenav.__version__}\n"
-    modules = imported("--version")
-    assert modules.isdisjoint(HEAVY)
-    assert ours(modules) <= light
 
 
 @pytest.mark.parametrize("words", [[], ["models"], ["policy"], ["scenario"]], ids=str)
@@ -113,12 +100,6 @@ def test_no_arguments_print_the_help_and_are_bad_input(words, capsys):
     assert printed == capsys.readouterr().out
 
 
-def test_nested_commands_are_listed_in_a_useful_order(capsys):
-    text = help_of(["models"], capsys)
-    assert re.findall(r"^  (list|verify|fetch) ", text, re.MULTILINE) == ["list", "verify", "fetch"]
-
-
 def test_options_that_exclude_each_other_are_named_in_the_help():
     text = options_of(COMMANDS["estimate",])["--overwrite"].help
     assert text == "Replace the work in --out. Not with --resume."
-    assert app.name == "awarenav"

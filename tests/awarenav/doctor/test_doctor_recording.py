@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from awarenav.cli import main
+from awarenav.doctor import _recording
 from nav_adapter.ros2.conversions import to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
@@ -121,8 +122,9 @@ def test_a_good_recording_without_images(capsys, tmp_path, drive) -> None:
     assert found["images"] == [("warning", "the recording has none")]
 
 
-@pytest.mark.parametrize("nothing", [math.nan, 0.0, -math.inf, 65.535])
-@pytest.mark.parametrize("yaw_deg", [0, 40])
+@pytest.mark.parametrize(
+    ("nothing", "yaw_deg"), [(math.nan, 0), (0.0, 40), (-math.inf, 0), (65.535, 40)]
+)
 def test_a_blind_sector_is_named_in_the_frame_of_the_robot(
     capsys, tmp_path, drive, nothing, yaw_deg
 ) -> None:
@@ -135,6 +137,14 @@ def test_a_blind_sector_is_named_in_the_frame_of_the_robot(
     sides_deg = [int(each) for each in re.findall(r"(-?\d+)°", text)[:2]]
     assert sides_deg == pytest.approx([yaw_deg - 45, yaw_deg + 45], abs=1)
     assert "in 'base_link'" in text
+
+
+def test_only_the_beginning_of_a_long_recording_is_read(capsys, tmp_path, drive, monkeypatch):
+    monkeypatch.setattr(_recording, "_LONGEST_S", 10.0 * PERIOD_S)
+    found = findings(capsys, drive.record(tmp_path / "bag"))
+    ((severity, text),) = found["recording"]
+    assert (severity, "for the first" in text) == ("fine", True)
+    assert f"{COUNT} scans" not in found["scanners"][0][1]
 
 
 def test_few_blind_scans_are_counted(capsys, tmp_path, drive) -> None:

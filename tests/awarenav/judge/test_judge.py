@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -15,12 +16,12 @@ from awarenav.cli import main
 from awarenav.errors import AwarenavError
 from awarenav.judge import (
     JudgeConfig,
-    average_precision,
+    _detection,
     judge_files,
     judge_frames,
-    markdown_report,
     requirements,
 )
+from awarenav.judge._detection import precision_with_interval
 from awarenav.records import people_by_frame, read_person, write_records
 
 COUNT = 40
@@ -201,7 +202,7 @@ def test_the_share_within_one_sigma_is_that_of_a_normal_distribution(believed, s
     rng = np.random.default_rng(1)
     sigma = 0.05
     truth, guess = [], []
-    for _ in range(3000):
+    for _ in range(1000):
         truth.append([person(0, awareness=0.5)])
         place = np.array([0.2, 0.1, 3.0]) + rng.normal(0.0, sigma, 3)
         guess.append(
@@ -216,9 +217,9 @@ def test_the_share_within_one_sigma_is_that_of_a_normal_distribution(believed, s
             ]
         )
     overall = judged(frames(*truth), frames(*guess))["overall"]
-    assert overall["awareness_within_1sigma"] == pytest.approx(share, abs=0.03)
-    assert overall["position_nees"] == pytest.approx(3.0, abs=0.15)
-    assert overall["position_within_1sigma"] == pytest.approx(0.683, abs=0.03)
+    assert overall["awareness_within_1sigma"] == pytest.approx(share, abs=0.045)
+    assert overall["position_nees"] == pytest.approx(3.0, abs=0.25)
+    assert overall["position_within_1sigma"] == pytest.approx(0.683, abs=0.045)
 
 
 def test_trivial_zeros_do_not_flatter_calibration():
@@ -243,17 +244,13 @@ def test_missing_estimates_neither_dilute_false_awareness_nor_pass_the_gate():
     assert overall["false_aware"] == 1.0
     assert overall["false_aware_of_everyone"] == 0.05
     assert overall["awareness_none"] == 0.95
+    assert overall["aware_recognised"] is None
+    zeros = frames(*[[{**r["people"][0], "awareness": 0.0}] for r in TRUTH])
+    assert judged(TRUTH, zeros)["overall"]["aware_recognised"] == 0.0
     mute = frames(*[[person(0, awareness=None, std=None)] for _ in range(20)])
     asked = {each.name: each.met for each in requirements(judged(truth, mute))}
     assert not asked["α ≥ 0.5 where the truth is 0"]
     assert not asked["α mean absolute error"]
-
-
-def test_an_estimator_of_zeros_recognises_nobody():
-    zeros = frames(*[[{**r["people"][0], "awareness": 0.0}] for r in TRUTH])
-    overall = judged(TRUTH, zeros)["overall"]
-    assert overall["false_aware"] == 0.0
-    assert overall["aware_recognised"] == 0.0
 
 
 def test_people_are_sorted_by_where_they_look_and_how_far_they_are():
@@ -306,7 +303,8 @@ def test_average_precision_is_cocos(scored, missed):
         detection_frames.append(([everyone] if hit else [], [True] if hit else [], [guess]))
     detection_frames += [([everyone], [True], [])] * missed
     wanted = sum(hit for _, hit in scored) + missed
-    ap = average_precision(detection_frames)
+    with patch.object(_detection, "_RESAMPLES", 2):  # the interval is not what is tested here
+        ap, _ = precision_with_interval(detection_frames)
     if wanted == 0:
         assert ap is None
         return
@@ -321,15 +319,8 @@ def test_average_precision_is_cocos(scored, missed):
     assert ap == pytest.approx(expected)
     # One more ghost never helps.
     worse = [*detection_frames, ([], [], [ghost])]
-    assert average_precision(worse) <= ap + 1e-12
-
-
-def test_the_report_is_a_table_that_markdown_reads(tmp_path):
-    text = markdown_report(judged(TRUTH, TRUTH))
-    tables = [block for block in text.split("\n\n") if block.startswith("|")]
-    assert len(tables) == 3
-    for table in tables:
-        assert len({line.count("|") for line in table.splitlines()}) == 1
+    with patch.object(_detection, "_RESAMPLES", 2):
+        assert precision_with_interval(worse)[0] <= ap + 1e-12
 
 
 def files(tmp_path: Path, truth, estimates):
@@ -343,6 +334,10 @@ def test_the_command_prints_the_table_and_writes_figures(tmp_path, capsys):
     paths = files(tmp_path, TRUTH, TRUTH)
     assert main(["judge", *paths, "--out", str(tmp_path / "new" / "report.json")]) == 0
     printed = capsys.readouterr().out
+    tables = [block for block in printed.split("\n\n") if block.startswith("|")]
+    assert len(tables) == 3
+    for table in tables:
+        assert len({line.count("|") for line in table.splitlines()}) == 1
     figures = json.loads((tmp_path / "new" / "report.json").read_text("utf-8"))
     assert figures["detection"]["ap50"] == 1.0
     assert main(["judge", *paths, "--out", str(tmp_path / "report.md")]) == 0
@@ -375,7 +370,6 @@ def test_the_gate_fails_for_estimates_that_are_not_good_enough(tmp_path, capsys)
     ("change", "message"),
     [
         ({"box_xyxy_px": [0, 0, 1]}, "person 0: box_xyxy_px must have shape"),
-        ({"gaze_camera": [0, 0, 2]}, "unit vector"),
         ({"awareness": 1.5}, r"awareness must lie in \[0, 1\]"),
         ({"position_covariance_m2": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, "symmetric"),
     ],

@@ -253,7 +253,7 @@ def test_two_runs_are_compared_with_each_other(run_folder, tmp_path, capsys):
         (["{run}/absent"], "cannot read the episodes"),
         (["{run}", "--baseline", "balancd"], "did you mean 'balanced'"),
         (["{run}", "--level", "95"], "--level must lie in (0, 1), got 95"),
-        (["{run}", "--seed", "-1"], "must be a whole number of at least 0, got '-1'"),
+        (["{run}", "--seed", "-1"], "-1 is not in the range x>=0"),
         (["{run}", "{run}"], "each run once"),
         (["{run}", "--out", "table.txt"], "--out must be a .csv or .parquet file"),
     ],

@@ -229,6 +229,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_a_killed_process_leaves_its_episodes_and_no_workers(tmp_path):
     jobs = short_jobs(4, planners=["run_planners:Sleeps"])
     program, out = tmp_path / "run.py", tmp_path / "killed"
