@@ -1,10 +1,11 @@
-"""The settings of a search, which a resumed search must repeat."""
+"""The settings of a search, which a resumed search must repeat, and the command to run next."""
 
 from __future__ import annotations
 
 import csv
 import json
 import os
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -141,6 +142,32 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)
+
+
+def print_verdict(text: str, next_command: str) -> None:
+    """Print a verdict in sentences, and the command to run next."""
+    print(f"Verdict: {text}\nNext: {next_command}")
+
+
+def episode_words(conditions: Conditions) -> list[str]:
+    """Return the words of the command line that repeat scenarios, people, sensors and planner."""
+    (planner,), (sensors,) = conditions.planner, conditions.sensors
+    words = ["--scenario", *conditions.scenario]
+    words += Perception.of(conditions.perception, sensors).options.split()
+    for name, value in (
+        ("--camera", conditions.camera),
+        ("--robot", conditions.robot),
+        ("--population", conditions.population),
+        ("--planner", planner),
+    ):
+        if value:
+            words += [name, value]
+    return words
+
+
+def command_text(*words: object) -> str:
+    """Return a command that a shell reads as these words."""
+    return shlex.join(["awarenav", *map(str, words)])
 
 
 def _compare(path: Path, now: dict[str, Any], may_grow: Sequence[str]) -> None:

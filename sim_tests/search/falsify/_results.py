@@ -16,7 +16,6 @@ from ...study.measures import EpisodeRecord
 from ...study.runs import policy_of, policy_text, run_episode
 from ...world.errors import SimError
 from .._settings import write_csv
-from .._verdict import listed
 from ._search import CONTACT_SCORE, Falsification, FalsifySettings
 from ._worst_cases import WorstCase
 
@@ -231,9 +230,14 @@ def _comparison(
             f"falls to {deepest[1]:.2f} m at worst ({name} to {deepest[0]:.2f} m)",
         ]
     return [
-        f"In the {counted(len(pairs), 'worst case')} of this search, {other} {listed(parts)}.",
+        f"In the {counted(len(pairs), 'worst case')} of this search, {other} {_listed(parts)}.",
         f"They were searched for {name}, so they show where it does worse, not how often.",
     ]
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Return words as ``"a, b and c"``."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def _two_decimals(value: float | None) -> str:

@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...study.runs import Conditions
-from .._settings import common_settings
-from .._verdict import command_text, episode_words, print_verdict
+from .._settings import command_text, common_settings, episode_words, print_verdict
 from ._plot import draw_falsification
 from ._results import (
     policy_against,

@@ -225,12 +225,7 @@ def falsify(
 ) -> Falsification:
     """Search until all episodes have run.
 
-    Args:
-        settings: settings of the search.
-        folder: made when missing; holds the studies.
-        workers: number of processes that run episodes; the result does not depend on it.
-        resume: continue the search in the folder.
-        overwrite: replace the search in the folder.
+    The folder is made when missing. The result does not depend on the number of workers.
 
     Raises:
         SimError: settings that do not fit together, or another process that works in the folder.

@@ -15,7 +15,6 @@ from ...study.runs import policy_text
 from ...world.errors import SimError
 from .._settings import write_csv
 from .._study import importances
-from .._verdict import change_text, is_shown
 from ._evaluation import FIGURES, OBJECTIVE, RISK
 from ._finalists import BEATS_BASE, REASONS, Candidate, level_of
 from ._plot import draw_tuning
@@ -176,7 +175,7 @@ def _reason(tuning: Tuning, candidate: Candidate) -> str:
     change = tuning.minus_base(candidate)
     if change.n < FEW_PAIRS:
         return f"fewer than {FEW_PAIRS} pairs of held-out episodes show nothing"
-    if not is_shown(change):
+    if change.low <= 0.0 <= change.high:
         return "a difference is not shown"
     if change.low > 0.0:
         return "it is shown to lose more time"
@@ -189,13 +188,13 @@ def _comparison(tuning: Tuning, candidate: Candidate) -> str:
     level = level_of(len(tuning.chosen))
     held_out = candidate.held_out
     text = f"On {counted(len(held_out.records), 'held-out episode')} it " + change_text(
-        tuning.minus_base(candidate), 2, "loses"
+        tuning.minus_base(candidate)
     )
     if settings.hold_out_scenarios:
         alone = held_out.within(settings.hold_out_scenarios)
         where = counted(len(settings.hold_out_scenarios), "held-out scenario")
         text += f"; in the {where} alone it " + change_text(
-            alone.minus(base.held_out, OBJECTIVE, level), 2, "loses"
+            alone.minus(base.held_out, OBJECTIVE, level)
         )
     else:
         text += "; no scenario was held out"
@@ -217,6 +216,19 @@ def _comparison(tuning: Tuning, candidate: Candidate) -> str:
             f"{base.held_out.requests:.2f}{most}."
         )
     return f"{text} ({100.0 * level:.4g} % intervals). {risk} {touched}"
+
+
+def change_text(change: Interval) -> str:
+    """Return a paired difference in time lost in words, such as ``"loses 0.30 s less (…)"``."""
+    if not change.known:
+        return "loses ? (no pair)"
+    amount = f"{abs(change.value):.2f}"
+    text = f"loses {amount} s {'less' if change.value < 0.0 else 'more'}"
+    if not float(amount):
+        text = "loses neither less nor more"
+    if not change.bounded:
+        return f"{text} (too few pairs for an interval)"
+    return f"{text} ({change.low:+.2f} to {change.high:+.2f} s)"
 
 
 def _write_trials(tuning: Tuning, path: Path) -> None:

@@ -8,8 +8,7 @@ from typing import Any
 
 from ...scenario import ScenarioTemplate
 from ...study.runs import Conditions
-from .._settings import common_settings
-from .._verdict import command_text, episode_words, print_verdict
+from .._settings import command_text, common_settings, episode_words, print_verdict
 from ._finalists import BEATS_BASE
 from ._policy_space import read_ranges, shipped_ranges
 from ._results import is_undecided, table_lines, verdict_text, write_tuning
@@ -27,21 +26,11 @@ def run_tune(
     resume: bool,
     overwrite: bool,
     as_json: bool,
-    **others: Any,
+    **fields: Any,
 ) -> int:
-    """Run the command and return its exit status.
+    """Run the command, whose options these are, and return its exit status.
 
-    Args:
-        conditions: of the episodes.
-        policy: name or file of the base policy.
-        ranges: file of the ranges; None for the shipped ones.
-        hold_out_scenarios: as for :func:`held_out_scenarios`.
-        workers: number of processes.
-        out: folder of the tuning.
-        resume: continue the tuning there.
-        overwrite: replace it.
-        as_json: print the figures as JSON.
-        others: the other options, which are settings of the tuning by their names.
+    The other options are fields of :class:`TuneSettings`, by their names.
 
     Raises:
         SimError: an unusable option.
@@ -52,7 +41,7 @@ def run_tune(
     searched = shipped_ranges() if ranges is None else read_ranges(ranges)
     settings = TuneSettings(
         **common,
-        **others,
+        **fields,
         ranges={key: each.model_dump(mode="json") for key, each in searched.items()},
         hold_out_scenarios=held_out_scenarios(hold_out_scenarios, templates),
     )

@@ -220,13 +220,8 @@ def tune(
 ) -> Tuning:
     """Search until all trials are finished, by this or other processes.
 
-    Args:
-        settings: settings of the search.
-        folder: made when missing; holds the study.
-        workers: number of processes that run episodes.
-        resume: continue the search in the folder.
-        overwrite: replace the search in the folder.
-        report: called with the result while no other process calls it.
+    The folder is made when missing. The result does not depend on the number of workers. It is
+    given to ``report`` while no other process reports in the folder.
 
     Raises:
         SimError: settings that do not fit together, a preset with an episode without a result, or

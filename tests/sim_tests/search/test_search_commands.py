@@ -21,8 +21,8 @@ from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from sim_tests import Scenario, SimError
 from sim_tests.actors.robot import RobotModel
+from sim_tests.search._settings import command_text, episode_words
 from sim_tests.search._study import Outcome, Range, Trial
-from sim_tests.search._verdict import change_text, command_text, episode_words, is_shown, listed
 from sim_tests.search.falsify._results import policy_against, verdict_text
 from sim_tests.search.falsify._search import (
     CONTACT_SCORE,
@@ -35,7 +35,7 @@ from sim_tests.search.falsify._search import (
     search,
 )
 from sim_tests.search.falsify._worst_cases import WorstCase, worst_episodes
-from sim_tests.study.measures import EpisodeRecord, Interval
+from sim_tests.study.measures import EpisodeRecord
 from sim_tests.study.runs import Conditions, policy_text
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
@@ -385,17 +385,6 @@ def test_a_policy_is_compared_with_another_one(given_name, policy, expected):
     other = policy_against(given_name, settings)
     assert other == (expected, policy_text(AwarenessPolicy.preset(expected)))
     assert policy_against(given_name, replace(settings, unsafe_no_floor=True)) is None
-
-
-def test_changes_are_words_and_shown_only_by_enough_pairs():
-    change = Interval(-0.31, -0.5, -0.1, 80)
-    assert change_text(change, 2, "loses") == "loses 0.31 s less (-0.50 to -0.10 s)"
-    assert change_text(replace(change, value=0.2), 1, "loses").startswith("loses 0.2 s more")
-    same = change_text(Interval(0.0, -0.01, 0.01, 80), 2, "loses")
-    assert same == "loses neither less nor more (-0.01 to +0.01 s)"
-    shown = [is_shown(each) for each in (change, replace(change, n=19), replace(change, high=0.1))]
-    assert shown == [True, False, False]
-    assert listed(["a", "b", "c"]) == "a, b and c"
 
 
 def test_the_next_command_repeats_the_sensors_and_is_safe_for_a_shell():

@@ -26,7 +26,13 @@ from sim_tests.search.tune._finalists import (
     named_winner,
 )
 from sim_tests.search.tune._policy_space import PolicySpace, read_ranges, shipped_ranges
-from sim_tests.search.tune._results import _header, is_undecided, table_lines, verdict_text
+from sim_tests.search.tune._results import (
+    _header,
+    change_text,
+    is_undecided,
+    table_lines,
+    verdict_text,
+)
 from sim_tests.search.tune._tune import (
     TuneSettings,
     Tuning,
@@ -34,7 +40,7 @@ from sim_tests.search.tune._tune import (
     kept_records,
     ranked_trials,
 )
-from sim_tests.study.measures import EpisodeRecord, write_records
+from sim_tests.study.measures import EpisodeRecord, Interval, write_records
 from sim_tests.study.runs import Conditions
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
@@ -382,6 +388,19 @@ def test_the_verdict_keeps_the_base_policy_and_says_why(values, reason, undecide
     text = verdict_text(tuning)
     assert text.startswith(f"keep balanced. The nearest is second (trial 7): {reason}")
     assert is_undecided(tuning) == undecided
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ((-0.31, -0.5, -0.1), "loses 0.31 s less (-0.50 to -0.10 s)"),
+        ((0.2, -0.5, 0.9), "loses 0.20 s more (-0.50 to +0.90 s)"),
+        ((0.001, -0.01, 0.01), "loses neither less nor more (-0.01 to +0.01 s)"),
+        ((0.5, -np.inf, np.inf), "loses 0.50 s more (too few pairs for an interval)"),
+    ],
+)
+def test_a_difference_is_said_in_words(change, words):
+    assert change_text(Interval(*change, 80)) == words
 
 
 def test_requests_per_crossing_are_said_where_somebody_asked():
