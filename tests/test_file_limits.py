@@ -31,8 +31,8 @@ from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
 from sim_tests.scenario import Scenario, ScenarioTemplate
 from sim_tests.scenario._files import camera_data
-from sim_tests.search import write_or_check_settings
-from sim_tests.search.falsify._falsify import FalsifySettings
+from sim_tests.search._settings import write_or_check_settings
+from sim_tests.search.falsify._search import FalsifySettings
 from sim_tests.search.tune._policy_space import read_ranges
 from sim_tests.study.runs import fault_of, policy_of, read_jobs, read_run, template_of
 from tracking import TrackerConfig, TrackingError
@@ -59,11 +59,14 @@ HOSTILE = {
     "braces in JSON": (parse_json, '{"a":' * 100_000, "nested too deeply"),
     "a long number in JSON": (parse_json, "9" * 5000, "not valid JSON"),
 }
-SETTINGS = FalsifySettings("p", "{}", ("name: a",), 4, 1, "truth", "", 0, 4)
+SETTINGS = FalsifySettings(
+    **{"policy_name": "p", "policy": "{}", "scenarios": ("name: a",), "episodes": 4, "people": 1},
+    **{"perception": "truth", "planner": "", "seed": 0, "generation": 4},
+)
 
 
 def search_settings(path):
-    write_or_check_settings(SETTINGS, path.parent, path.name, "falsification", resume=True)
+    write_or_check_settings(SETTINGS, path, "falsification", resume=True)
 
 
 YAML_READERS = {

@@ -8,8 +8,8 @@ from awarenav.policies import read_policy
 from nav_adapter import AwarenessPolicy, NavError
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing import named_policy
-from sim_tests.search._files import common_settings
-from sim_tests.study.runs import plan_jobs, policy_of
+from sim_tests.search._settings import common_settings
+from sim_tests.study.runs import Conditions, plan_jobs, policy_of
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 
@@ -52,7 +52,7 @@ def test_every_entry_to_the_simulator_knows_the_scanner():
     _, scanner = named_policy("scanner")
     (job,) = plan_jobs(["blind_corner"], ["scanner"], [0], sensors=["scanner"])
     assert (job.policy_name, policy_of(job.policy)) == ("scanner", scanner)
-    searched = common_settings("scanner", ["blind_corner"], "")
+    searched = common_settings("scanner", Conditions(scenario=["blind_corner"]))
     assert searched["policy_name"] == "scanner"
     assert policy_of(searched["policy"]) == scanner
     short = Scenario.shipped("crossing_attentive").model_copy(update={"duration_s": 0.5})

@@ -6,7 +6,7 @@ import pytest
 from run_scenes import SHORT, short, short_jobs
 
 from awarenav.cli import main
-from sim_tests.search import EpisodeRunner
+from sim_tests.search._episodes import EpisodeRunner
 from sim_tests.study.measures import read_records, summarise, summary_text
 from sim_tests.study.runs import attempt, in_parallel, plan_jobs, run_episode, run_jobs
 

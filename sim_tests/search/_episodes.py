@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 
 from tqdm import tqdm
 
@@ -12,7 +11,7 @@ from ..study.measures import EpisodeRecord, nondeterminism_notes
 from ..study.runs import Job, attempt, died, in_parallel
 
 
-class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
+class EpisodeRunner:
     """Runs batches of episodes; the records come in the order of the jobs.
 
     Args:
@@ -29,28 +28,26 @@ class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
         self._unrepeatable: set[str] = set()
         self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __enter__(self) -> EpisodeRunner:
+        return self
 
-    def close(self) -> None:
-        """End the progress bar; idle processes end by themselves."""
+    def __exit__(self, *_: object) -> None:
         self.bar.close()
 
     def run(self, jobs: Sequence[Job]) -> tuple[EpisodeRecord, ...]:
-        """Run the jobs; ``error`` of a record says why an episode failed."""
+        """Run the jobs; ``error`` of a record says why an episode failed.
+
+        A planner that is not deterministic is named once on standard error.
+        """
         records: dict[int, EpisodeRecord] = {}
         for number, outcome in in_parallel(
             attempt, jobs, workers=self._workers, keep=True, on_death=died
         ):
             records[number] = outcome.record
             self.bar.update()
-        self._say_unrepeatable(records.values())
-        return tuple(records[number] for number in range(len(jobs)))
-
-    def _say_unrepeatable(self, records: Iterable[EpisodeRecord]) -> None:
-        """Say once on standard error that a planner is not deterministic."""
-        differing = [record for record in records if record.nondeterministic]
+        differing = [each for each in records.values() if each.nondeterministic]
         new = {record.planner for record in differing} - self._unrepeatable
         self._unrepeatable |= new
         for note in nondeterminism_notes(each for each in differing if each.planner in new):
             self.bar.write(note, file=sys.stderr)
+        return tuple(records[number] for number in range(len(jobs)))
