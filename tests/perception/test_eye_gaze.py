@@ -179,3 +179,15 @@ def test_eyes_on_the_robot_raise_awareness_only_as_far_as_they_are_sure():
         alpha, _ = awareness(head, known_eyes((measured,), PRIOR))
         assert before < alpha <= truth + 1e-3
         before = alpha
+
+
+def test_eyes_that_look_away_lower_awareness_and_sure_eyes_do_so_more():
+    head = head_at()
+    alone, _ = awareness_of(head, eye_std_rad=PRIOR)
+    alphas = []
+    for std_deg in (20.0, 8.0, 4.0, 1.0):
+        measured = EyeGaze([math.radians(15.0), 0.0], np.eye(2) * math.radians(std_deg) ** 2)
+        eyes = known_eyes((measured,), PRIOR)
+        alphas.append(awareness_of(head, eye_std_rad=PRIOR, eyes=eyes)[0])
+    assert alone > alphas[0]
+    assert alphas == sorted(alphas, reverse=True)
