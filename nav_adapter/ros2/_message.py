@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 
 # The second argument is the ROS name of the type.
@@ -60,6 +61,7 @@ def ros_type(message: type[Message]) -> str:
     return f"{message.__module__.rsplit('.', 1)[1]}/msg/{message.__name__}"
 
 
+@cache
 def field_types(message: type[Message]) -> dict[str, FieldType]:
     """Return name and type of each field, in the order of the wire."""
     hints = get_type_hints(message, include_extras=True)
