@@ -33,7 +33,7 @@ from perception.laser import (
 from sim_tests.actors.body import Worker, worker_names
 from sim_tests.actors.robot import Amr, AmrLook
 from sim_tests.world import Warehouse
-from sim_tests.world.hall import LAYOUTS
+from sim_tests.world.hall import LAYOUTS, WarehouseLayout
 from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScanScene, SimulatedScanner
 from tracking import PersonTracker, TrackerConfig
 from training.legs import TRAINING_WORKERS
@@ -129,7 +129,7 @@ def drive(
         spec.model_copy(update={"noise_std_m": config.range_noise_m}) for spec in DIAGONAL_SCANNERS
     ]
     rng = np.random.default_rng([seed, 60])
-    with Warehouse(LAYOUTS[layout](), variant=variant) as warehouse:
+    with Warehouse(WarehouseLayout.named(layout), variant=variant) as warehouse:
         people = [Worker(warehouse, look=name) for name in workers]
         amr = Amr(warehouse)
         pose = [np.eye(4)]

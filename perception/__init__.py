@@ -8,17 +8,21 @@ from . import _clash  # noqa: F401 - first: reports another distribution with th
 from .lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._attention import AttentionCone
     from ._camera import Camera
-    from ._detection import PersonDetection
     from ._floor import FloorPlane
     from ._fusion import FusedHeadPoseEstimator
-    from ._head_pose import HeadPose
-    from ._keypoints import PersonKeypoints
     from ._observation import PersonObservation
     from ._pipeline import AwarenessPipeline
     from ._pnp import PnpHeadPoseEstimator
-    from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+    from ._stages import (
+        HeadPose,
+        HeadPoseEstimator,
+        PersonDetection,
+        PersonDetector,
+        PersonKeypoints,
+        PoseEstimator,
+    )
+    from .awareness import AttentionCone
     from .errors import PerceptionError
     from .networks import OnnxPersonDetector, OnnxPoseEstimator
     from .networks.heads import OnnxHeadPoseEstimator

@@ -7,7 +7,6 @@ import line also marks an ``__init__.py`` as ours, so that it can be recognised 
 
 from __future__ import annotations
 
-from importlib.machinery import all_suffixes
 from importlib.util import find_spec
 from pathlib import Path
 from runpy import run_path
@@ -19,11 +18,9 @@ _SITE = Path(__file__).parents[1]
 
 
 def require_sole_owner(package: str) -> None:
-    """Check that ``package``, and each of our packages that it needs, has no foreign files.
+    """Check that ``package``, and each of our packages that it needs, is ours.
 
-    Without a clash only our own metadata are read. A checkout or an editable install has no list of
-    its files; there, only a foreign ``__init__.py`` is found. A foreign package that consisted of
-    nothing but an ``__init__.py`` which ours overwrote cannot be found.
+    A foreign package is recognised by its ``__init__.py``; its other files do no harm.
 
     Raises:
         ImportError: for a clash; the message names the other distribution, or the path if no
@@ -43,23 +40,11 @@ def require_sole_owner(package: str) -> None:
             ours = _MARKER in init.read_bytes()
         except OSError:  # in a zip file or a frozen program, which no installer changes
             continue
-        place = init.parent if init.stem == "__init__" else init  # or a module perception.py
-        owners = _other_owners(place) if not ours or _has_strange_modules(place) else []
-        if not ours or owners:
-            raise ImportError(_message(name, place, owners), name=name, path=spec.origin)
-
-
-def _has_strange_modules(folder: Path) -> bool:
-    """Return True if ``folder`` has modules that our own installation record does not list."""
-    records = list(_SITE.glob("awarenav-*.dist-info/RECORD"))
-    if folder.parent != _SITE or not records:
-        return False
-    lines = [line for path in records for line in path.read_text(encoding="utf-8").splitlines()]
-    ours = [line.split(",")[0].split("/") for line in lines if line.startswith(f"{folder.name}/")]
-    known = {"__pycache__", *(parts[1] for parts in ours)}
-    importable = ("", *all_suffixes())  # folders and modules; data files do no harm
-    strange = (entry for entry in folder.iterdir() if entry.name not in known)
-    return any("".join(entry.suffixes) in importable for entry in strange)
+        if not ours:
+            place = init.parent if init.stem == "__init__" else init  # or a module perception.py
+            raise ImportError(
+                _message(name, place, _other_owners(place)), name=name, path=spec.origin
+            )
 
 
 def _other_owners(folder: Path) -> list[str]:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Final, NamedTuple
 
+from .arrays import median_of
+
 # Density of an outlier, and prior density of the range, over the logarithm of the range: uniform
 # within a factor of e up or down.
 _UNIFORM_DENSITY: Final = 0.5
@@ -90,11 +92,6 @@ class _Terms(NamedTuple):
     as_outlier: float
 
 
-def combine_cues(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -> tuple[float, float]:
-    """Return the logarithm of the range and its standard deviation, as :func:`combined_range`."""
-    return combined_range(cues, unusual_probability)[:2]
-
-
 def combined_range(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -> CombinedRange:
     """Combine the cues for the range of one person.
 
@@ -120,7 +117,7 @@ def combined_range(cues: Sequence[DepthCue], unusual_probability: float = 0.0) -
         for cue in cues
     ]
     # If every cue is an outlier, only the prior density of the range is left to integrate.
-    middle = _median([cue.log_range for cue in cues])
+    middle = median_of(cue.log_range for cue in cues)
     all_outliers = sum(one.as_outlier for one in usual) - math.log(_UNIFORM_DENSITY)
     found = [(middle, _ALL_OUTLIERS_LOG_STD**2, 0.0, all_outliers)]
     hypotheses = [(usual, math.log1p(-unusual_probability))]
@@ -241,9 +238,3 @@ def _least_squares(
     fit -= 0.5 * (chi2 + math.log(information / (shared * 2.0 * math.pi)))
     variance, lasting = 1.0 / information, (s * shared / information) ** 2
     return mean, max(variance - lasting, 0.0), lasting, fit
-
-
-def _median(values: list[float]) -> float:
-    values.sort()
-    last = len(values) - 1
-    return 0.5 * (values[last // 2] + values[(last + 1) // 2])

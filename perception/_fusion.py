@@ -7,12 +7,10 @@ from typing import Final
 import numpy as np
 
 from ._camera import Camera
-from ._head_pose import HeadPose
-from ._keypoints import PersonKeypoints
-from ._protocols import HeadPoseEstimator
-from ._rotations import rotation_exp, rotation_log
+from ._stages import HeadPose, HeadPoseEstimator, PersonKeypoints
 from .arrays import FloatArray, ImageRgb
 from .errors import PerceptionError
+from .matrices import rotation_exp, rotation_log
 
 # Limits that chance exceeds in 1 % of cases: χ² of three degrees of freedom for the rotation, of
 # six for the whole pose.

@@ -5,28 +5,29 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ._attention import AttentionCone
 from ._camera import Camera
-from ._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ._floor import FloorPlane
-from ._frame_time import StageClock, StageTimings
-from ._head_pose import HeadPose
-from ._keypoints import PersonKeypoints
-from ._metric_scale import DEFAULT_MIN_SCORE
 from ._observation import PersonObservation
 from ._people_finder import PeopleFinder, check_count
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
-from ._protocols import HeadPoseEstimator, PersonDetector, PoseEstimator
+from ._stages import (
+    DEFAULT_SCORE_THRESHOLD,
+    HeadPose,
+    HeadPoseEstimator,
+    PersonDetection,
+    PersonDetector,
+    PoseEstimator,
+)
 from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, finite_array, finite_number
-from .awareness import AwarenessEstimate, estimate_awareness
-from .body import middle_of_shanks, place_bodies
-from .confirmation import KeypointConfirmation
+from .awareness import AttentionCone, AwarenessEstimate, estimate_awareness
+from .body import DEFAULT_MIN_SCORE
+from .confirmation import FoundPerson, KeypointConfirmation
 from .depth_image import checked_depth
 from .errors import PerceptionError
 from .evidence import AwarenessReason, FaceEvidence, judge_face
@@ -40,6 +41,22 @@ _CAMERA_CENTRE: Final = np.zeros((1, 3))
 #: far they turn their eyes before they turn their head (Thumser and Stahl 2009,
 #: doi:10.1007/s00221-009-1803-8); replace them if you know better values.
 DEFAULT_EYE_IN_HEAD_STD_RAD: Final = (math.radians(11.3), math.radians(3.4))
+
+
+class _Look(NamedTuple):
+    """What the face tells of one person.
+
+    Attributes:
+        estimate: their awareness; None without evidence.
+        gaze_camera: (3,) unit vector; None where the head's direction says nothing.
+        missing: why there is no evidence; None with an estimate.
+        eyes_seen: True if the eyes were measured.
+    """
+
+    estimate: AwarenessEstimate | None = None
+    gaze_camera: FloatArray | None = None
+    missing: AwarenessReason | None = None
+    eyes_seen: bool = False
 
 
 class AwarenessPipeline:
@@ -69,9 +86,6 @@ class AwarenessPipeline:
             people overlap, and at once where the pose network finds a person no more. Images must
             then follow each other; a jump in time needs the detector. Each camera needs a
             pipeline of its own (:meth:`for_another_view`): one for two may find nobody.
-        frame_budget_s: time for a frame, in place of ``detect_every_s``: the detector looks at
-            every image while frames take less than that, else less often, down to every 0.2 s, and
-            then with a smaller input, if its network takes one.
         eye_estimator: measures the eyes of near people, for instance
             :class:`~perception.networks.MediaPipeEyeEstimator`; default none, then the gaze is the
             head's direction.
@@ -101,7 +115,6 @@ class AwarenessPipeline:
         eye_in_head_std_rad: Any = DEFAULT_EYE_IN_HEAD_STD_RAD,
         onnx_settings: OnnxSettings | None = None,
         detect_every_s: float = 0.0,
-        frame_budget_s: float | None = None,
         unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
         eye_estimator: EyeEstimator | None = None,
         confirmation: KeypointConfirmation | None = None,
@@ -144,7 +157,6 @@ class AwarenessPipeline:
             self._min_score,
             confirmation,
             detect_every_s,
-            frame_budget_s,
         )
         self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator
         if eye_estimator is not None and not isinstance(eye_estimator, EyeEstimator):
@@ -153,24 +165,17 @@ class AwarenessPipeline:
                 f"{type(eye_estimator).__name__}"
             )
         self._eye_estimator = eye_estimator
-        self._timings = StageTimings()
 
     def for_another_view(self) -> AwarenessPipeline:
         """Return a pipeline with the same camera, networks and settings that has seen no image.
 
-        With ``detect_every_s`` or ``frame_budget_s``, a pipeline keeps people from one image to the
+        With ``detect_every_s``, a pipeline keeps people from one image to the
         next. Each of several cameras, or views of one, therefore needs its own; this one shares
         the networks.
         """
         other = copy.copy(self)
         other._people = self._people.for_another_view()
-        other._timings = StageTimings()
         return other
-
-    @property
-    def last_timings(self) -> StageTimings:
-        """Times of the stages of the last processed frame; zeros before the first."""
-        return self._timings
 
     def process(
         self,
@@ -205,7 +210,6 @@ class AwarenessPipeline:
             PerceptionError: for an image of another size or type, a non-finite stamp, and an
                 estimator that does not return one result per person.
         """
-        clock = StageClock()
         stamp_s = finite_number("stamp_s", stamp_s)
         floor = self._floor if floor is None else _checked_floor(floor)
         self._check_image(image_rgb)
@@ -214,17 +218,16 @@ class AwarenessPipeline:
             depth_m = checked_depth(depth_m, shape, stamp_s, depth_stamp_s)
         elif depth_stamp_s is not None:
             raise PerceptionError("depth_stamp_s needs depth_m, got None")
-        clock.count("rest")
-        detections, people, disowned = self._people.find(image_rgb, stamp_s, clock)
+        found = self._people.find(image_rgb, stamp_s)
         observations: tuple[PersonObservation, ...] = ()
-        if detections:
+        if found:
+            people = tuple(one.keypoints for one in found)
             heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
             check_count("head_pose_estimator", len(heads), len(people))
             eyes = self._eyes(image_rgb, heads)
-            clock.count("head_pose")
             places = place_people(
                 self.camera,
-                detections,
+                tuple(one.detection for one in found),
                 people,
                 heads,
                 floor,
@@ -233,49 +236,30 @@ class AwarenessPipeline:
                 depth_m,
                 self._unusual_size,
             )
-            estimates, gazes, reasons = self._awareness(people, heads, eyes, disowned)
-            observations = self._observations(
-                stamp_s, detections, people, places, eyes, estimates, gazes, reasons
+            looks = self._looks(found, heads, eyes)
+            observations = tuple(
+                self._observation(stamp_s, one.detection, place, look)
+                for one, place, look in zip(found, places, looks, strict=True)
+                if place is not None
             )
-            clock.count("rest")
-        self._timings = self._people.note(clock.timings())
         return observations
 
-    def _observations(
-        self,
-        stamp_s: float,
-        detections: tuple[PersonDetection, ...],
-        people: tuple[PersonKeypoints, ...],
-        places: Sequence[PersonPlace | None],
-        eyes: tuple[EyeGaze | None, ...],
-        estimates: Sequence[AwarenessEstimate | None],
-        gazes: Sequence[FloatArray | None],
-        reasons: Sequence[AwarenessReason | None],
-    ) -> tuple[PersonObservation, ...]:
-        """Return the observation of everybody who has a place."""
-        # The same call as for the places, which is remembered.
-        bodies = place_bodies(self.camera, people, self._std_px, self._min_score)
-        return tuple(
-            PersonObservation(
-                stamp_s=stamp_s,
-                position_camera_m=place.position_camera_m,
-                position_covariance_m2=place.covariance_m2,
-                gaze_camera=gaze,
-                awareness=None if estimate is None else estimate.awareness,
-                awareness_std=None if estimate is None else estimate.awareness_std,
-                score=detection.score,
-                box_xyxy_px=detection.box_xyxy_px,
-                legs_camera_m=middle_of_shanks(
-                    person, body, place.position_camera_m, self._min_score
-                ),
-                awareness_reason=reason,
-                **self._sizes(place),
-                eyes_seen=estimate is not None and turn is not None,
-            )
-            for detection, place, turn, estimate, gaze, reason, person, body in zip(
-                detections, places, eyes, estimates, gazes, reasons, people, bodies, strict=True
-            )
-            if place is not None
+    def _observation(
+        self, stamp_s: float, detection: PersonDetection, place: PersonPlace, look: _Look
+    ) -> PersonObservation:
+        estimate = look.estimate
+        return PersonObservation(
+            stamp_s=stamp_s,
+            position_camera_m=place.position_camera_m,
+            position_covariance_m2=place.covariance_m2,
+            gaze_camera=look.gaze_camera,
+            awareness=None if estimate is None else estimate.awareness,
+            awareness_std=None if estimate is None else estimate.awareness_std,
+            score=detection.score,
+            box_xyxy_px=detection.box_xyxy_px,
+            awareness_reason=look.missing,
+            **self._sizes(place),
+            eyes_seen=look.eyes_seen,
         )
 
     def _sizes(self, place: PersonPlace) -> dict[str, Any]:
@@ -298,35 +282,27 @@ class AwarenessPipeline:
         check_count("eye_estimator", len(measured), len(heads))
         return known_eyes(measured, self._eye_std_rad)
 
-    def _awareness(
+    def _looks(
         self,
-        people: tuple[PersonKeypoints, ...],
-        heads: tuple[HeadPose | None, ...],
-        eyes: tuple[EyeGaze | None, ...],
-        reasons: Sequence[AwarenessReason | None],
-    ) -> tuple[
-        list[AwarenessEstimate | None], list[FloatArray | None], list[AwarenessReason | None]
-    ]:
-        """Return awareness and gaze of each person, or None and why there is no evidence.
+        found: Sequence[FoundPerson],
+        heads: Sequence[HeadPose | None],
+        eyes: Sequence[EyeGaze | None],
+    ) -> list[_Look]:
+        """Return awareness and gaze of each person, or why there is no evidence.
 
-        There is none of somebody whose keypoints or head are not their own, for a reason.
+        There is none of somebody whose keypoints or head are not their own.
         """
-        gazes: list[FloatArray | None] = [None] * len(people)
-        estimates: list[AwarenessEstimate | None] = [None] * len(people)
-        missing = list(reasons)
+        looks = [_Look(missing=one.disowned or "no head pose") for one in found]
         faces = []
-        for row, (person, head) in enumerate(zip(people, heads, strict=True)):
-            if missing[row] is not None:
+        for row, (one, head) in enumerate(zip(found, heads, strict=True)):
+            if one.disowned is not None or head is None:
                 continue
-            if head is None:
-                missing[row] = "no head pose"
-                continue
-            evidence = judge_face(self.camera, person, head, self._min_score, self._std_px)
+            evidence = judge_face(self.camera, one.keypoints, head, self._min_score, self._std_px)
             if isinstance(evidence, FaceEvidence):
                 faces.append((row, head, evidence))
             else:
-                missing[row] = evidence
-        face_estimates = estimate_awareness(
+                looks[row] = _Look(missing=evidence)
+        estimates = estimate_awareness(
             self.cone,
             [head for _, head, _ in faces],
             self._robot_points,
@@ -335,11 +311,10 @@ class AwarenessPipeline:
             face_seen=np.array([evidence.seen for *_, evidence in faces]),
             eyes=[eyes[row] for row, *_ in faces],
         )
-        for (row, head, evidence), estimate in zip(faces, face_estimates, strict=True):
-            estimates[row] = estimate
-            if evidence.direction_known:
-                gazes[row] = _gaze(head, eyes[row])
-        return estimates, gazes, missing
+        for (row, head, evidence), estimate in zip(faces, estimates, strict=True):
+            gaze = _gaze(head, eyes[row]) if evidence.direction_known else None
+            looks[row] = _Look(estimate, gaze, eyes_seen=eyes[row] is not None)
+        return looks
 
     def _check_image(self, image_rgb: Any) -> None:
         wanted = (self.camera.height_px, self.camera.width_px, 3)

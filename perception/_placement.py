@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 from . import layouts as kp
 from ._camera import Camera
 from ._depth_cues import HIDDEN_OFFSET, CombinedRange, DepthCue, combined_range
-from ._detection import PersonDetection
 from ._floor import FloorPlane
-from ._head_pose import HeadPose
-from ._keypoints import PersonKeypoints
+from ._stages import HeadPose, PersonDetection, PersonKeypoints
 from .anthropometry import (
     HEAD_CENTRE_HEAD_M,
     MEAN_STATURE_M,

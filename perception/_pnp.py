@@ -12,21 +12,26 @@ from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
-from ._head_pose import HeadPose
-from ._head_prior import UPRIGHT_STD_RAD, HeadPrior, body_prior, prior_starts, upright_prior
-from ._keypoints import PersonKeypoints
-from ._metric_scale import DEFAULT_MIN_SCORE, metric_scale
-from ._pose_refinement import RefinedPose, refine
-from ._rotations import rotation_exp, rotation_log, skew
+from ._pose_refinement import (
+    UPRIGHT_STD_RAD,
+    HeadPrior,
+    RefinedPose,
+    body_prior,
+    prior_starts,
+    refine,
+    upright_prior,
+)
+from ._stages import HeadPose, PersonKeypoints
 from .anthropometry import (
     HEAD_KEYPOINTS,
     HEAD_SHAPE_FACTOR_M,
     HEAD_TEMPLATE_M,
 )
 from .arrays import FloatArray, finite_number
-from .body import BodyPlacement, place_bodies
+from .body import DEFAULT_MIN_SCORE, BodyPlacement, metric_scale, place_bodies
 from .errors import PerceptionError
 from .head_frame import lifted_head_model
+from .matrices import rotation_exp, rotation_log, skew
 
 HeadModel = Literal["template", "lifted"]
 

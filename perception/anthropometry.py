@@ -168,9 +168,8 @@ HEAD_CENTRE_HEAD_M.setflags(write=False)
 #: (3,) midpoint of the eyes in the head frame: the apex of the attention cone.
 EYES_HEAD_M: Final[FloatArray] = HEAD_TEMPLATE_M[1:3].mean(axis=0)
 
-#: From the shoulder midpoint (neck) to the nose of an upright adult who looks straight ahead:
-#: forward and up, mean of the same bodies.
-NECK_TO_NOSE_FORWARD_M: Final = 0.144
+#: From the shoulder midpoint (neck) up to the nose of an upright adult who looks straight ahead,
+#: mean of the same bodies.
 NECK_TO_NOSE_UP_M: Final = 0.198
 
 #: Radius of a circle around the body's vertical centre line that contains an adult with arms down:

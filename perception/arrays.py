@@ -7,14 +7,16 @@ what is valid, and the unit. A caller passes the error class of its own package.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from operator import mul
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import PerceptionError
+
+_T = TypeVar("_T")
 
 FloatArray = NDArray[np.float64]
 #: (H, W, 3) uint8 in the order red, green, blue.
@@ -145,26 +147,6 @@ def covariance_matrix(
     return array
 
 
-def covariance_matrices(
-    name: str, value: Any, size: int, error: type[ValueError] = PerceptionError
-) -> FloatArray:
-    """Return read-only (N, size, size) covariances, checked as :func:`covariance_matrix` does."""
-    array = finite_array(name, value, ("N", size, size), error)
-    if not len(array):
-        return array
-    transposed = array.transpose(0, 2, 1)
-    if np.array_equal(array, transposed):
-        try:
-            np.linalg.cholesky(array)
-        except np.linalg.LinAlgError:
-            pass
-        else:
-            return array
-    for row, matrix in enumerate(array):
-        covariance_matrix(f"{name}[{row}]", matrix, size, error)
-    return array
-
-
 def _has_cholesky_factor(rows: list[list[float]]) -> bool:
     """Return True for an exactly symmetric, positive definite matrix.
 
@@ -236,32 +218,24 @@ def unit_vector(name: str, value: Any, error: type[ValueError] = PerceptionError
     return unit
 
 
-def unit_vectors(
-    name: str,
-    array: FloatArray,
-    known: NDArray[np.bool_],
-    error: type[ValueError] = PerceptionError,
-) -> FloatArray:
-    """Return (N, 3) unit vectors, read-only and checked as :func:`unit_vector` does.
-
-    Rows that are not ``known`` (N,) are left as they are.
-    """
-    lengths = np.sqrt((array * array).sum(axis=1))
-    wrong = known & (np.abs(lengths - 1.0) > 1e-3)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise error(f"{name}[{row}] must be a unit vector, got length {lengths[row]:g}")
-    units = np.asarray(array / np.where(known, lengths, 1.0)[:, None])
-    units.setflags(write=False)
-    return units
-
-
 def pixel_count(name: str, value: Any) -> int:
     """Return a width or height: a whole number ≥ 1."""
     number = finite_number(name, value, minimum=1.0)
     if number != int(number):
         raise PerceptionError(f"{name} must be a whole number of pixels, got {number:g}")
     return int(number)
+
+
+def median_of(values: Iterable[float]) -> float:
+    """Return the median of a few numbers, at least one; ``np.median`` takes ten times as long."""
+    ordered = sorted(values)
+    last = len(ordered) - 1
+    return 0.5 * (ordered[last // 2] + ordered[(last + 1) // 2])
+
+
+def given(check: Callable[..., _T], name: str, value: Any, *args: Any, **bounds: Any) -> _T | None:
+    """Return None for None, and else what a check of this module returns for the value."""
+    return None if value is None else check(name, value, *args, **bounds)
 
 
 def set_fields(instance: object, **values: Any) -> None:

@@ -1,11 +1,13 @@
-"""Position of bodies in the camera frame: metric keypoints, and the chest for the planner."""
+"""Bodies in the camera frame: metric scale of skeletons, their keypoints, and the chest."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import compress
+from operator import mul
 from typing import Final
 
 import numpy as np
@@ -13,10 +15,135 @@ from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
-from ._keypoints import PersonKeypoints
-from ._metric_scale import DEFAULT_MIN_SCORE, metric_scales
+from ._stages import PersonKeypoints
 from .anthropometry import LIMBS, MEAN_STATURE_M, STATURE_RELATIVE_STD
-from .arrays import FloatArray
+from .arrays import FloatArray, median_of
+
+#: Keypoints scored below this count as not seen.
+DEFAULT_MIN_SCORE: Final = 0.3
+
+# If the scale is within this limit (logarithm) of 1, the skeleton's unit is taken to be the metre;
+# otherwise only its proportions are used.
+_METRIC_UNIT_LIMIT: Final = 0.15
+# Relative standard deviation of the person's size in a skeleton in metres.
+_METRIC_UNIT_STD: Final = 0.03
+# Relative standard deviations to add if no limb is seen, and for the foreshortening in a flat
+# skeleton: 3–5 % for people who stand, 6–16 % for those who sit or bend, the more the less of them
+# is seen.
+_UNSEEN_RELATIVE_STD: Final = 0.10
+_FLAT_RELATIVE_STD: Final = 0.125
+
+_LOG_LENGTHS: Final[FloatArray] = np.log([limb.length_m for limb in LIMBS])
+_INFORMATION: Final = tuple(limb.relative_std**-2 for limb in LIMBS)
+# Inverse of the Huber limit: a vote counts less beyond 1.5 standard deviations.
+_INVERSE_HUBER: Final = tuple(1.0 / (1.5 * limb.relative_std) for limb in LIMBS)
+
+
+def _midpoint_matrix(ends: Sequence[tuple[int, ...]]) -> FloatArray:
+    matrix = np.zeros((len(ends), 17))
+    for row, columns in enumerate(ends):
+        matrix[row, list(columns)] = 1.0 / len(columns)
+    return matrix
+
+
+# A row takes the keypoint, or the mean of the two keypoints, at one end of a limb.
+_START_MATRIX: Final = _midpoint_matrix([limb.start for limb in LIMBS])
+_END_MATRIX: Final = _midpoint_matrix([limb.end for limb in LIMBS])
+#: (limbs, 17) end minus start of each limb of :data:`~perception.anthropometry.LIMBS`.
+LIMB_DIFFERENCE: Final = _END_MATRIX - _START_MATRIX
+#: (17, limbs) 1 where a limb uses a keypoint, else 0.
+LIMB_KEYPOINTS: Final = ((_START_MATRIX + _END_MATRIX) > 0.0).T.astype(np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class MetricScale:
+    """Factor from a skeleton's unit to metres.
+
+    Attributes:
+        factor: the factor, > 0.
+        relative_std: its relative standard deviation, mostly the spread of adult stature.
+    """
+
+    factor: float
+    relative_std: float
+
+
+def metric_scale(
+    person: PersonKeypoints, min_score: float = DEFAULT_MIN_SCORE
+) -> MetricScale | None:
+    """Estimate the scale of ``person.keypoints_root_m`` from its limb lengths.
+
+    Each limb with both ends seen votes with the logarithm of (average length / lifted length). Its
+    weight depends on how much the limb varies between adults of one stature, and Huber's weights
+    limit the effect of a badly lifted limb. If the result is close to 1, the unit of the skeleton
+    counts as metre and draws the scale towards 1. Without seen limbs all limbs vote, and the
+    standard deviation is larger.
+
+    In a flat skeleton (``lifted`` False) a limb that points at the camera looks short, and none
+    looks long. There the limb with the second smallest vote gives the scale, and the unit does not
+    count.
+
+    Returns:
+        The scale; None for a skeleton without any limb.
+    """
+    return metric_scales((person,), min_score)[0]
+
+
+def metric_scales(
+    people: Sequence[PersonKeypoints], min_score: float = DEFAULT_MIN_SCORE
+) -> tuple[MetricScale | None, ...]:
+    """Estimate the scales of several people at once, each as :func:`metric_scale` does."""
+    return _metric_scales(tuple(people), min_score)
+
+
+# Head poses and positions of a frame need the scales of the same people, so they are cached, for as
+# many cameras as work side by side.
+@lru_cache(maxsize=8)
+def _metric_scales(
+    people: tuple[PersonKeypoints, ...], min_score: float
+) -> tuple[MetricScale | None, ...]:
+    if not people:
+        return ()
+    hidden = np.array([person.scores[kp.BODY] for person in people]) < min_score
+    ends = LIMB_DIFFERENCE @ np.array([person.keypoints_root_m[kp.BODY] for person in people])
+    lengths = np.sqrt((ends * ends).sum(axis=2))
+    present = lengths > 1e-9
+    usable = present & (hidden @ LIMB_KEYPOINTS == 0.0)
+    votes = _LOG_LENGTHS - np.log(np.maximum(lengths, 1e-9))
+    return tuple(
+        _scale(*row)
+        for row in zip(people, votes.tolist(), usable.tolist(), present.tolist(), strict=True)
+    )
+
+
+def _scale(
+    person: PersonKeypoints, votes: list[float], usable: list[bool], present: list[bool]
+) -> MetricScale | None:
+    """Return the scale of one person from the votes of the limbs on its logarithm."""
+    measured = any(usable)
+    counted = usable if measured else present
+    votes = list(compress(votes, counted))
+    if not votes:
+        return None
+    information = list(compress(_INFORMATION, counted))
+    inverse_huber = list(compress(_INVERSE_HUBER, counted))
+    middle, total = median_of(votes), 0.0
+    for _ in range(4):
+        weights = [
+            part / max(1.0, abs(vote - middle) * scale)
+            for vote, part, scale in zip(votes, information, inverse_huber, strict=True)
+        ]
+        total = sum(weights)
+        middle = sum(map(mul, weights, votes)) / total
+    variance = 1.0 / total + STATURE_RELATIVE_STD**2 + person.scale_relative_std**2
+    spread = math.sqrt(variance + (0.0 if measured else _UNSEEN_RELATIVE_STD**2))
+    if not person.lifted:
+        middle = sorted(votes)[1 if len(votes) >= 3 else 0]
+        spread = math.hypot(spread, _FLAT_RELATIVE_STD)
+    elif abs(middle) <= _METRIC_UNIT_LIMIT:
+        middle *= _METRIC_UNIT_STD**2 / (_METRIC_UNIT_STD**2 + spread**2)
+    return MetricScale(math.exp(middle), spread)
+
 
 _TORSO_M: Final = LIMBS[0].length_m
 #: Distance of the chest below the shoulders, as a fraction of the torso.
@@ -54,14 +181,6 @@ _BOX_LATERAL_M2: Final = (0.15 * MEAN_STATURE_M) ** 2 * _IDENTITY
 BOX_LEAST_TRACE_M2: Final = 3.0 * (0.15 * MEAN_STATURE_M) ** 2
 
 
-# Hip of each leg, and the keypoints that tell where its shank is: the knee if the image ends above
-# the foot.
-_LEG_ROWS: Final = (
-    (kp.LEFT_HIP, kp.LEFT_ANKLE, kp.LEFT_KNEE),
-    (kp.RIGHT_HIP, kp.RIGHT_ANKLE, kp.RIGHT_KNEE),
-)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPlacement:
     """A person's metric keypoints in the camera frame.
@@ -83,38 +202,28 @@ class BodyPlacement:
     keypoints_camera_m: FloatArray
 
 
-def place_body(
-    camera: Camera,
-    person: PersonKeypoints,
-    keypoint_std_px: float,
-    min_score: float = DEFAULT_MIN_SCORE,
-) -> BodyPlacement | None:
-    """Place a body: find the translation that projects its metric skeleton onto the pixels.
-
-    Linear least squares in the three unknowns of the translation, iterated with Huber's weights on
-    the reprojection error. The covariance includes the pixel noise (at least as large as the
-    residuals) and the uncertainty of the scale, which acts along the ray.
-
-    Args:
-        camera: camera of the image.
-        person: the keypoints.
-        keypoint_std_px: standard deviation of the pixel noise.
-        min_score: keypoints with a lower score count as not seen.
-
-    Returns:
-        The placement; None if fewer than three keypoints are seen, the skeleton has no limb, or
-        the body would lie behind the camera.
-    """
-    return place_bodies(camera, (person,), keypoint_std_px, min_score)[0]
-
-
 def place_bodies(
     camera: Camera,
     people: Sequence[PersonKeypoints],
     keypoint_std_px: float,
     min_score: float = DEFAULT_MIN_SCORE,
 ) -> tuple[BodyPlacement | None, ...]:
-    """Place the bodies of several people at once, each as :func:`place_body` does."""
+    """Place bodies: find the translations that project metric skeletons onto the pixels.
+
+    Linear least squares in the three unknowns of each translation, iterated with Huber's weights on
+    the reprojection error. The covariance includes the pixel noise (at least as large as the
+    residuals) and the uncertainty of the scale, which acts along the ray.
+
+    Args:
+        camera: camera of the image.
+        people: keypoints of each person.
+        keypoint_std_px: standard deviation of the pixel noise.
+        min_score: keypoints with a lower score count as not seen.
+
+    Returns:
+        A placement per person; None if fewer than three keypoints are seen, the skeleton has no
+        limb, or the body would lie behind the camera.
+    """
     return _place_bodies(camera, tuple(people), keypoint_std_px, min_score)
 
 
@@ -241,12 +350,8 @@ def _has_changed(values: FloatArray, previous: FloatArray) -> bool:
 
 def _masked_median(values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
     """Return (P,) medians of the seen values of each row; 0 for a row without seen values."""
-    medians = []
-    for row, counts in zip(values.tolist(), seen.tolist(), strict=True):
-        ordered = sorted(compress(row, counts))
-        last = len(ordered) - 1
-        medians.append(0.5 * (ordered[last // 2] + ordered[(last + 1) // 2]) if ordered else 0.0)
-    return np.array(medians)
+    rows = zip(values.tolist(), seen.tolist(), strict=True)
+    return np.array([median_of(compress(*row)) if any(row[1]) else 0.0 for row in rows])
 
 
 def _trunks(
@@ -275,8 +380,10 @@ def _trunks(
     return shoulders, usable, hips, (1.0 - CHEST_FRACTION) * neck + CHEST_FRACTION * hips
 
 
-def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Estimate a position from a box, as that of a standing adult.
+def place_boxes(
+    camera: Camera, boxes_xyxy_px: Sequence[FloatArray]
+) -> list[tuple[FloatArray, FloatArray] | None]:
+    """Estimate positions from boxes, as those of standing adults.
 
     It is for people whose keypoints cannot place the body. Of a box that ends at the upper or lower
     border of the image only a part of the height is seen: it is taken from the width, if that
@@ -285,13 +392,6 @@ def place_box(camera: Camera, box_xyxy_px: FloatArray) -> tuple[FloatArray, Floa
     Returns:
         Position (3,) and covariance (3, 3) in the camera frame; None for a box without extent.
     """
-    return place_boxes(camera, [box_xyxy_px])[0]
-
-
-def place_boxes(
-    camera: Camera, boxes_xyxy_px: Sequence[FloatArray]
-) -> list[tuple[FloatArray, FloatArray] | None]:
-    """Estimate positions from several boxes at once, each as :func:`place_box` does."""
     pixels = np.reshape(boxes_xyxy_px, (-1, 2))
     edges = camera.normalise(pixels, nearest=True).reshape(-1, 4)
     low, extent = edges[:, :2], edges[:, 2:] - edges[:, :2]
@@ -320,26 +420,3 @@ def cut_by_border(
     """Return (N,) True for boxes (N, 4) that end at the upper, and at the lower border."""
     margin = _BORDER * camera.height_px
     return boxes_xyxy_px[:, 1] < margin, boxes_xyxy_px[:, 3] > camera.height_px - margin
-
-
-def middle_of_shanks(
-    person: PersonKeypoints, body: BodyPlacement | None, position_m: FloatArray, min_score: float
-) -> FloatArray | None:
-    """Return the middle (3,) of the shanks, from the body moved along its ray to its place.
-
-    Each leg that is seen counts as far from the middle of the hips as its ankle, or its knee, is
-    from its own hip.
-    """
-    if body is None or not person.lifted:
-        return None
-    points = body.keypoints_camera_m
-    reaches = []
-    for hip, *rows in _LEG_ROWS:
-        seen = [row for row in rows if person.scores[row] >= min_score]
-        if seen:
-            reaches.append(points[seen[0]] - points[hip])
-    if not reaches:
-        return None
-    legs = body.hips_camera_m + np.mean(reaches, axis=0)
-    scale = float(np.linalg.norm(position_m) / np.linalg.norm(body.position_camera_m))
-    return np.asarray(scale * legs)

@@ -9,8 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from . import layouts as kp
-from ._detection import PersonDetection
-from ._keypoints import PersonKeypoints
+from ._stages import PersonDetection, PersonKeypoints
 from .arrays import FloatArray, finite_number
 from .errors import DepthImageError
 

@@ -5,7 +5,7 @@ package. A hostile or damaged file is refused before it costs much time, memory 
 C overflows the stack on 100 000 nested brackets, and 236 bytes of nested aliases stand for 10⁹
 values.
 
-A key that a mapping has twice is refused with both lines: parsers take the last without a word.
+A key that a mapping has twice is refused: parsers take the last without a word.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ MAX_YAML_VALUES: Final = 200_000
 MAX_JSON_BYTES: Final = 64 << 20
 #: Longest line of a JSON Lines file.
 MAX_LINE_BYTES: Final = 16 << 20
-#: Most lists and mappings within each other.
+#: Most lists and mappings within each other in YAML.
 MAX_DEPTH: Final = 64
+_DEPTH: Final = f"more than {MAX_DEPTH} lists and mappings in each other"
 
 # Numbers such as 5e-2 and 1E5, which ROS reads as numbers and YAML 1.1 as texts.
 _FLOAT: Final = "tag:yaml.org,2002:float"
@@ -42,8 +43,6 @@ _EXPONENT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+
 _STARTS: Final = list("-+.0123456789")
 _MERGE: Final = "tag:yaml.org,2002:merge"
 _NAMES: Final = (_MERGE, "tag:yaml.org,2002:value")  # << and =, which PyYAML cannot construct
-# Of the scanner of JSON that finds the lines of a repeated key.
-_JSON_TOKEN: Final = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"|[{}:]', re.DOTALL)
 # PyYAML needs quadratic time for numbers to the base 60, such as 1:00:00.
 _LONG_NUMBER: Final = re.compile(r"[-+0-9_:.]{65,}")
 # Styles of scalars that are texts, whatever they look like.
@@ -54,15 +53,6 @@ _WRONG_SCALARS: Final = (ValueError, TypeError, LookupError, AttributeError, Ari
 
 class _RepeatedKeyError(Exception):
     """A mapping has a key twice, of which a parser would take the last."""
-
-    def __init__(self, key: Any, first_line: int, second_line: int) -> None:
-        self.key = key
-        self.lines = first_line, second_line
-
-    def message(self, source: str, text: str) -> str:
-        first, second = self.lines
-        where = f", in lines {first} and {second}" if first != second else f" in line {first}"
-        return f"{source} has the key {self.key!r} twice" + (where if "\n" in text.strip() else "")
 
 
 class _Loader(_SafeLoader):
@@ -84,7 +74,9 @@ class _Loader(_SafeLoader):
                 key = key_node.value if named else self.construct_object(key_node)
                 line = key_node.start_mark.line + 1
                 if key in lines:
-                    raise _RepeatedKeyError(key, lines[key], line)
+                    raise _RepeatedKeyError(
+                        f"the key {key!r} twice, in lines {lines[key]} and {line}"
+                    )
                 lines[key] = line
         super().flatten_mapping(node)
 
@@ -145,7 +137,7 @@ def parse_yaml(
     except error:
         raise
     except _RepeatedKeyError as cause:
-        raise error(cause.message(source, text)) from None
+        raise error(f"{source} has {cause}") from None
     except (yaml.YAMLError, RecursionError, *_WRONG_SCALARS) as cause:
         raise error(f"{source} is not valid YAML: {cause}") from cause
 
@@ -195,16 +187,13 @@ def parse_json(
         if isinstance(text, bytes):
             text = text.decode("utf-8")
         constant = _refuse_constant if finite else None
-        value = json.loads(text, parse_constant=constant, object_pairs_hook=_unique)
-    except _RepeatedKeyError:
-        raise error(_repeated_in(str(text)).message(source, str(text))) from None
+        return json.loads(text, parse_constant=constant, object_pairs_hook=_unique)
+    except _RepeatedKeyError as cause:
+        raise error(f"{source} has {cause}") from None
     except RecursionError as cause:
-        raise error(_too_deep(source)) from cause
+        raise error(f"{source} is nested too deeply") from cause
     except ValueError as cause:
         raise error(f"{source} is not valid JSON: {cause}") from cause
-    if _is_deeper(value, MAX_DEPTH):
-        raise error(_too_deep(source))
-    return value
 
 
 def read_lines(path: Path, error: type[ValueError] = PerceptionError) -> Iterator[bytes]:
@@ -246,109 +235,53 @@ def _excess(text: str) -> str:
 
     Events come one by one, so that the work ends at the limit.
     """
-    extent = _Extent()
+    values = 0
+    sizes: dict[str | None, int] = {}  # values of what each anchor stands for
+    opened: list[tuple[str | None, int]] = []  # anchor of a collection, and the values before it
     for event in yaml.parse(text, _SafeLoader):
         if isinstance(event, yaml.DocumentEndEvent):
             break
-        excess = extent.add(event) or extent.excess
-        if excess:
-            return excess
-    return ""
-
-
-class _Extent:
-    """The number of values and their depth in a YAML document, from its events."""
-
-    def __init__(self) -> None:
-        self._values = 0
-        self._anchors: dict[str | None, int | None] = {}  # number of values; None while open
-        self._open: list[tuple[str | None, int]] = []  # anchor, and the values before it
-
-    @property
-    def excess(self) -> str:
-        """Return the limit that is exceeded; empty for none."""
-        if len(self._open) > MAX_DEPTH:
-            return _too_deep("").strip()
-        if self._values > MAX_YAML_VALUES:
+        if isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = opened.pop()
+            sizes[anchor] = values - before
+        elif isinstance(event, yaml.AliasEvent):
+            if any(anchor == event.anchor for anchor, _ in opened):
+                return f"has an alias *{event.anchor} within the value that it stands for"
+            values += sizes.get(event.anchor, 0)  # an unknown name is an error of the loader
+        elif isinstance(event, yaml.NodeEvent):
+            sizes[event.anchor] = 1
+            if isinstance(event, yaml.CollectionStartEvent):
+                opened.append((event.anchor, values))
+            elif isinstance(event, yaml.ScalarEvent) and _is_long_number(event):
+                return f"has a number of {len(event.value)} characters; at most 64 are allowed"
+            values += 1
+        if len(opened) > MAX_DEPTH:
+            return f"is nested too deeply: {_DEPTH}"
+        if values > MAX_YAML_VALUES:
             return (
                 f"has more than {MAX_YAML_VALUES} values, each alias (*name) counted as what it "
                 "stands for"
             )
-        return ""
+    return ""
 
-    def add(self, event: yaml.Event) -> str:
-        """Count an event; return why it is refused, empty if it is not."""
-        if isinstance(event, yaml.AliasEvent):
-            size = self._anchors.get(event.anchor, 0)  # an unknown name is an error of the loader
-            if size is None:
-                return f"has an alias *{event.anchor} within the value that it stands for"
-            self._values += size
-        elif isinstance(event, yaml.CollectionStartEvent):
-            self._open.append((event.anchor, self._values))
-            self._anchors[event.anchor] = None
-            self._values += 1
-        elif isinstance(event, yaml.CollectionEndEvent):
-            anchor, before = self._open.pop()
-            self._anchors[anchor] = self._values - before
-        elif isinstance(event, yaml.ScalarEvent):
-            self._anchors[event.anchor] = 1
-            self._values += 1
-            quoted = event.style in _QUOTES and event.tag is None
-            if not quoted and _LONG_NUMBER.fullmatch(event.value):
-                return f"has a number of {len(event.value)} characters; at most 64 are allowed"
-        return ""
+
+def _is_long_number(scalar: yaml.ScalarEvent) -> bool:
+    is_text = scalar.style in _QUOTES and scalar.tag is None
+    return not is_text and _LONG_NUMBER.fullmatch(scalar.value) is not None
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return the object of JSON that has these pairs."""
-    value = dict(pairs)
-    if len(value) < len(pairs):
-        raise _RepeatedKeyError("", 0, 0)  # the parser does not tell lines
+    value: dict[str, Any] = {}
+    for key, content in pairs:
+        if key in value:
+            raise _RepeatedKeyError(f"the key {key!r} twice")
+        value[key] = content
     return value
-
-
-def _repeated_in(text: str) -> _RepeatedKeyError:
-    """Return the first repeated key of a JSON text that has one."""
-    objects: list[dict[str, int]] = []
-    line, read = 1, 0
-    before = ""
-    for token in _JSON_TOKEN.finditer(text):
-        line += text.count("\n", read, token.start())
-        read = token.start()
-        if token[0] == "{":
-            objects.append({})
-        elif token[0] == "}":
-            objects.pop()
-        elif token[0] == ":":
-            key = json.loads(before)
-            if key in objects[-1]:
-                return _RepeatedKeyError(key, objects[-1][key], line)
-            objects[-1][key] = line
-        before = token[0]
-    raise AssertionError("no key is repeated")
-
-
-def _is_deeper(value: Any, depth: int) -> bool:
-    """Return True if lists and mappings lie more than ``depth`` deep within each other."""
-    level = [value] if isinstance(value, dict | list) else []
-    for _ in range(depth):
-        level = [
-            inner
-            for outer in level
-            for inner in (outer.values() if isinstance(outer, dict) else outer)
-            if isinstance(inner, dict | list)
-        ]
-        if not level:
-            return False
-    return True
 
 
 def _refuse_constant(name: str) -> None:
     raise ValueError(f"{name} is not a finite number")
-
-
-def _too_deep(source: str) -> str:
-    return f"{source} is nested too deeply: more than {MAX_DEPTH} lists and mappings in each other"
 
 
 def _too_large(source: str, most_bytes: int) -> str:

@@ -10,8 +10,7 @@ import numpy as np
 
 from . import layouts as kp
 from ._camera import Camera
-from ._head_pose import HeadPose
-from ._keypoints import PersonKeypoints
+from ._stages import HeadPose, PersonKeypoints
 from .anthropometry import HEAD_TEMPLATE_M, HEAD_WIDTH_M
 
 #: Why there is no evidence of awareness.
@@ -49,10 +48,6 @@ _ERROR_SCALE: Final = 0.5
 # No head is wider than this share of the extent of its own body, even if no more than the shoulders
 # is seen of it: those of photographs have up to 0.21.
 _LARGEST_SHARE: Final = 0.7
-# Root mean square errors of keypoints above this, in standard deviations of the noise together with
-# this share of the face's width for the head's own shape, are those of no head.
-_MISFIT_STD: Final = 4.5
-_MISFIT_SHARE: Final = 0.06
 # Probability of a face without evidence for or against it.
 _UNKNOWN: Final = 0.5
 # The same if a network that looks for faces found none: on labelled photographs it misses a quarter

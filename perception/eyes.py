@@ -15,9 +15,10 @@ from typing import Final, Protocol, runtime_checkable
 import numpy as np
 
 from ._camera import Camera
-from ._head_pose import HeadPose
-from .arrays import FloatArray, ImageRgb, covariance_matrix, finite_array, finite_number, set_fields
+from ._stages import HeadPose
+from .arrays import FloatArray, ImageRgb, covariance_matrix, finite_array, set_fields
 from .errors import PerceptionError
+from .matrices import mahalanobis2
 
 #: Distance of the iris ahead of the eye's centre of rotation. The centre lies 13.5 mm behind the
 #: front of the cornea (Fry and Hill 1962), the iris 3.6 mm.
@@ -86,16 +87,16 @@ def eyes_from_irises(
     head: HeadPose,
     *,
     iris_std_m: tuple[float, float],
-    arm_m: float = IRIS_ARM_M,
 ) -> EyeGaze | None:
     """Return the rotation of the eyes from where the irises lie between the eyes' corners.
 
-    A gaze g in head axes moves the iris by ``arm_m`` times g. Seen along a ray, its offset from the
-    midpoint of the corners is P (a + arm_m · (g − y)): P are the first two rows of the rotation
-    from head to ray axes, and a is the offset of eyes that look along the head's axis y. The gaze
+    A gaze g in head axes moves the iris by g times :data:`IRIS_ARM_M`. Seen along a ray, its offset
+    from the midpoint of the corners is P (a + arm · (g − y)): P are the first two rows of the
+    rotation from head to ray axes, and a is the offset of eyes that look along the head's axis y.
+    The gaze
     is the unit vector towards the camera that fulfils this exactly.
 
-    The covariance holds the errors of the irises' place, the spread of a and of ``arm_m`` between
+    The covariance holds the errors of the irises' place, the spread of a and of the arm between
     people, and the error of the head's direction as far as it moves the expected iris.
 
     Args:
@@ -103,17 +104,16 @@ def eyes_from_irises(
         rotation_camera_ray: (3, 3) from ray axes (z from the camera to the face) to camera axes.
         head: pose of the head.
         iris_std_m: standard deviations of the offset, across the head and along its height.
-        arm_m: distance of the iris from the eye's centre of rotation.
 
     Returns:
         The rotation, or None if no eye turns so far.
 
     Raises:
-        PerceptionError: for an offset that is not finite, and a distance or a standard deviation
-            that is not positive.
+        PerceptionError: for an offset that is not finite, or a standard deviation that is not
+            positive.
     """
     offset = finite_array("offset_m", offset_m, (2,))
-    arm = finite_number("arm_m", arm_m, minimum=0.0, exclusive_minimum=True)
+    arm = IRIS_ARM_M
     stds = finite_array("iris_std_m", iris_std_m, (2,))
     if stds.min() <= 0.0:
         raise PerceptionError(f"iris_std_m must be positive, got {stds.tolist()}")
@@ -173,7 +173,7 @@ def fuse_with_prior(eyes: EyeGaze, eye_in_head_std_rad: tuple[float, float]) -> 
     """
     prior = np.diag(np.square(eye_in_head_std_rad))
     both = prior + eyes.covariance_rad2
-    if float(eyes.angles_rad @ np.linalg.solve(both, eyes.angles_rad)) > _LIMIT_CHI2:
+    if mahalanobis2(eyes.angles_rad, both) > _LIMIT_CHI2:
         return None
     gain = prior @ np.linalg.inv(both)
     keep = np.eye(2) - gain

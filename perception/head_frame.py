@@ -1,4 +1,4 @@
-"""The head frame from 3-D head keypoints: by the paper's printed formula, or by anatomy.
+"""The head frame from 3-D head keypoints, by the paper's printed formula.
 
 The frame is the paper's: origin at the nose, y forward (gaze), z to the right ear, x = y × z
 (downwards).
@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .anthropometry import HEAD_TEMPLATE_M
 from .arrays import FloatArray, finite_array
 from .errors import PerceptionError
 
@@ -24,7 +23,7 @@ def printed_head_rotation(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatA
 
     The gaze is (left ear − right ear) × (nose − neck), normalised. It is perpendicular to the line
     from neck to nose, so for an average adult who looks straight ahead it points about 36° below
-    the horizontal. :func:`anatomical_head_rotation` does not have this bias.
+    the horizontal.
 
     Args:
         head_points_m: (5, 3) nose, left eye, right eye, left ear, right ear in any frame F.
@@ -50,40 +49,6 @@ def printed_head_rotation(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatA
     forward = gaze / length
     right = -ears / np.linalg.norm(ears)
     return np.stack([np.cross(forward, right), forward, right], axis=1)
-
-
-def anatomical_head_rotation(
-    head_points_m: ArrayLike, weights: ArrayLike | None = None
-) -> FloatArray:
-    """Return the head frame by fitting the anatomical template to the head keypoints.
-
-    The template's forward axis is the Frankfurt horizontal. The fit is least squares over rotation,
-    translation and scale (Kabsch 1976, Umeyama 1991).
-
-    Args:
-        head_points_m: (5, 3) nose, left eye, right eye, left ear, right ear in any frame F.
-        weights: (5,) ≥ 0, 0 for a point that was not seen; default 1 for all.
-
-    Returns:
-        (3, 3) rotation from the head frame to F.
-
-    Raises:
-        PerceptionError: if fewer than three points count, or they lie on one line.
-    """
-    points = finite_array("head_points_m", head_points_m, (5, 3))
-    weight = np.ones(5) if weights is None else finite_array("weights", weights, (5,))
-    if np.any(weight < 0.0) or np.count_nonzero(weight) < 3:
-        raise PerceptionError(
-            f"weights must be >= 0 with at least 3 above 0, got {weight.tolist()}"
-        )
-    share = (weight / weight.sum())[:, None]
-    template = HEAD_TEMPLATE_M - np.sum(share * HEAD_TEMPLATE_M, axis=0)
-    centred = points - np.sum(share * points, axis=0)
-    left, singular, right = np.linalg.svd((share * centred).T @ template)
-    if singular[1] <= _PARALLEL_SINE * singular[0]:
-        raise PerceptionError("head points must not lie on one line")
-    reflection = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    return np.asarray(left @ reflection @ right, dtype=np.float64)
 
 
 def lifted_head_model(head_points_m: ArrayLike, neck_m: ArrayLike) -> FloatArray:

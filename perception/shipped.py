@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Final
 
 from ._camera import Camera
-from ._detection import DEFAULT_SCORE_THRESHOLD
 from ._manifest import (
     DETECTOR,
     HEAD,
@@ -19,11 +18,11 @@ from ._manifest import (
     shipped_model,
     shipped_model_path,
     shipped_models,
-    update_manifest,
+    simulator_networks,
+    simulator_networks_warning,
     verify_shipped_model,
-    write_manifest,
 )
-from ._training_domain import simulator_networks, simulator_networks_warning
+from ._stages import DEFAULT_SCORE_THRESHOLD
 from .networks import OnnxModel, OnnxPersonDetector, OnnxPoseEstimator, OnnxSettings
 from .networks.heads import OnnxHeadPoseEstimator
 
@@ -45,9 +44,7 @@ __all__ = [
     "shipped_pose_estimator",
     "simulator_networks",
     "simulator_networks_warning",
-    "update_manifest",
     "verify_shipped_model",
-    "write_manifest",
 ]
 
 # Size of the detector's training images, and the focal length of its input in use: that of a 60°

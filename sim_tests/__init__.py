@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .crossing.planner import LocalPlanner, SamplingPlanner
     from .scenario import Scenario, ScenarioTemplate, shipped_scenarios
     from .world import Warehouse
-    from .world.camera import CameraRenderer, SimulatedCamera
+    from .world.camera import CameraRenderer
     from .world.errors import SimError
 
 __all__ = [
@@ -39,7 +39,6 @@ __all__ = [
     "Scenario",
     "ScenarioTemplate",
     "SimError",
-    "SimulatedCamera",
     "StraightOn",
     "Warehouse",
     "Worker",

@@ -73,7 +73,6 @@ class BridgeOptions:
     provider: str
     provider_options: str
     detect_every_s: float
-    frame_budget_s: float | None
     image: str
     compressed: bool
     depth: str | None = None
@@ -201,7 +200,6 @@ def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
         provider=options.provider,
         provider_options=options.provider_options.split(),
         detect_every_s=options.detect_every_s,
-        frame_budget_s=options.frame_budget_s,
     )
     if options.no_camera:
         return networks, ()

@@ -105,7 +105,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Write a run's report as one HTML page.",
         ),
         "planners": _Entry(
-            "sim_tests.study.scorecard.command:planners",
+            "sim_tests.study.report.command:planners",
             "List local planners, and compare yours on one page.",
         ),
         "scenario": _Entry(

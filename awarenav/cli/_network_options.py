@@ -115,15 +115,6 @@ _RUNNING_OPTIONS: Final = (
         help="Longest time between two looks of the detector; boxes follow the keypoints in "
         "between. 0 looks at every image.",
     ),
-    option(
-        "--frame-budget-s",
-        group=_NETWORKS,
-        type=Number(0.001, 10.0),
-        excludes="--detect-every-s",
-        show_default="none",
-        metavar="S",
-        help="Time for a frame: the detector looks as often as it allows, at least every 0.2 s.",
-    ),
 )
 
 

@@ -124,7 +124,6 @@ def choose_networks(
     provider: str = "cpu",
     provider_options: Sequence[str] = (),
     detect_every_s: float = 0.0,
-    frame_budget_s: float | None = None,
 ) -> Networks:
     """Load the networks.
 
@@ -148,7 +147,6 @@ def choose_networks(
         provider: one of :data:`~perception.networks.PROVIDERS`.
         provider_options: its options, as ``KEY=VALUE``.
         detect_every_s: as :class:`~perception.AwarenessPipeline` takes it.
-        frame_budget_s: the same.
 
     Raises:
         PerceptionError: for a file that is missing, damaged or of an unknown layout.
@@ -161,7 +159,7 @@ def choose_networks(
     if head == "auto":
         head = "network" if pose == SHIPPED else _WITHOUT_NETWORK
     settings = OnnxSettings(((provider, parse_provider_options(provider_options)),), threads)
-    options: dict[str, Any] = {"detect_every_s": detect_every_s, "frame_budget_s": frame_budget_s}
+    options: dict[str, Any] = {"detect_every_s": detect_every_s}
     if (detector, pose) == (SHIPPED, SHIPPED):
         confirmation = KeypointConfirmation(score_threshold=min_score)
         options["confirmation"] = confirmation

@@ -73,7 +73,6 @@ class EstimateOptions:
     provider: str
     provider_options: str = ""
     detect_every_s: float = 0.0
-    frame_budget_s: float | None = None
     camera: Path | None
     fov_deg: float | None
     camera_height_m: float | None
@@ -144,7 +143,6 @@ def estimate_command(options: EstimateOptions, networks: Networks | None = None)
                 provider=options.provider,
                 provider_options=options.provider_options.split(),
                 detect_every_s=options.detect_every_s,
-                frame_budget_s=options.frame_budget_s,
             )
         unfit = admit_networks(
             networks, rendered=source.rendered, allowed=options.allow_simulator_networks
@@ -266,10 +264,10 @@ def _check(options: EstimateOptions) -> None:
         raise AwarenavError(
             "--resume cannot continue --tracks: the state of the tracker is not in the file"
         )
-    if options.resume and (options.detect_every_s or options.frame_budget_s is not None):
+    if options.resume and options.detect_every_s:
         raise AwarenavError(
-            "--resume cannot continue --detect-every-s or --frame-budget-s: the boxes of the last "
-            "image are not in the file"
+            "--resume cannot continue --detect-every-s: the boxes of the last image are not in "
+            "the file"
         )
     if options.resume and draws_video:
         raise AwarenavError("--resume cannot continue a video; draw into a folder (--overlay DIR)")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ._measure import differences, measure, read_results, remeasured
-from ._page import leaderboard_page, ranked
+from ._measure import measure, read_results
+from ._page import leaderboard_page, ranked, write_leaderboard
 from ._rows import PAGE, RESULTS, Board, Row
 
 __all__ = [
@@ -11,10 +11,9 @@ __all__ = [
     "RESULTS",
     "Board",
     "Row",
-    "differences",
     "leaderboard_page",
     "measure",
     "ranked",
     "read_results",
-    "remeasured",
+    "write_leaderboard",
 ]

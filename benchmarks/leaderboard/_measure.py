@@ -1,31 +1,25 @@
-"""Measures rows of the leaderboard; results are kept episode by episode, a file per row."""
+"""Measures rows of the leaderboard as runs of crossings; the table of a run is a row's file."""
 
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
-import sys
 from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
-from typing import Any, Final
-
-from tqdm import tqdm
+from typing import Final
 
 import awarenav
 from awarenav.files import write_text
 from perception.documents import read_json
 from sim_tests import SimError
-from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import EpisodeRecord, read_records, write_records
-from sim_tests.study.runs import Job, WorkerPool, job_key, run_episode, run_here
+from sim_tests.study.runs import RunFiles, run_jobs
 
-from ._rows import RESULTS, Board, Row
+from ._rows import RESULTS, WORK, Board, Row
 
 _ABOUT_FILE: Final = "about.json"
-# Differences that another kind of processor makes by rounding.
-_SAME_TIME_S: Final = 0.25
-_SAME_VIOLATION_S: Final = 0.15
 
 
 def read_results(board: Board, row: Row, folder: Path = RESULTS) -> tuple[EpisodeRecord, ...]:
@@ -58,17 +52,17 @@ def measure(
     rows: Sequence[Row],
     folder: Path = RESULTS,
     *,
+    work: Path = WORK,
     workers: int = 1,
     again: bool = False,
 ) -> None:
-    """Run the episodes that are missing, the first seed of every row before the second.
-
-    The files are written after every episode, so an interrupted run goes on where it stopped.
+    """Run the rows whose results are missing or not whole; an interrupted run goes on.
 
     Args:
         board: the board.
         rows: the rows to measure.
         folder: folder of the results.
+        work: folder of the runs, one folder a row.
         workers: number of processes.
         again: measure from the beginning.
 
@@ -76,94 +70,35 @@ def measure(
         SimError: results of another policy, other sensors or another planner are in the way, or a
             planner cannot be made.
     """
-    about = read_about(folder)
-    records: dict[str, list[EpisodeRecord]] = {}
     for row in rows:
         path = folder / f"{row.name}.csv"
         if again:
             path.unlink(missing_ok=True)
-        elif path.exists() and about.get(row.name, {}).get("digest") != row.digest:
+        elif path.exists() and read_about(folder).get(row.name, {}).get("digest") != row.digest:
             raise SimError(
                 f"the results of {row.name!r} belong to another policy, other sensors or "
                 "another planner; give --again to measure the row from the beginning"
             )
-        records[row.name] = list(read_results(board, row, folder))
-    jobs = [
-        (row, job)
-        for seed in range(board.seeds)
-        for row in rows
-        for job in row.jobs(board.templates, [seed])
-        if not _has(records[row.name], job)
-    ]
-    owners = [row for row, _ in jobs]
-    numbered = [(number, job) for number, (_, job) in enumerate(jobs)]
-    with tqdm(total=len(jobs), desc="leaderboard", unit="episode", file=sys.stderr) as bar:
-        if workers > 1 and numbered:
-            with WorkerPool(min(workers, len(numbered))) as pool:
-                for number, result in pool.run(numbered):
-                    _keep(owners[number], result.record, records, folder)
-                    bar.update()
-        else:
-            for number, result in run_here(numbered):
-                _keep(owners[number], result.record, records, folder)
-                bar.update()
+        jobs = row.jobs(board.templates, range(board.seeds))
+        if len(read_results(board, row, folder)) == len(jobs):
+            continue
+        run = work / row.name
+        begun = RunFiles(run).jobs.exists() and not again
+        records = run_jobs(jobs, run, workers=workers, resume=begun, overwrite=again, progress=True)
+        about = {**read_about(folder), row.name: _about(row)}
+        text = json.dumps(about, indent=1, sort_keys=True) + "\n"
+        write_text(folder / _ABOUT_FILE, text, SimError)
+        write_records(path, sorted(records, key=lambda each: (each.scenario, each.seed)))
+        shutil.rmtree(run)  # what is measured later is another run
 
 
-def remeasured(row: Row, scenario: str, seed: int) -> EpisodeRecord:
-    """Return one episode of a row, measured now."""
-    (job,) = row.jobs([ScenarioTemplate.shipped(scenario)], [seed])
-    return run_episode(job)
-
-
-def differences(committed: EpisodeRecord, now: EpisodeRecord) -> list[str]:
-    """Return in what an episode differs from the committed one by more than rounding."""
-    found = [
-        f"{name}: committed {getattr(committed, name)}, now {getattr(now, name)}"
-        for name in ("robot_contacts", "person_contacts", "success", "error")
-        if getattr(committed, name) != getattr(now, name)
-    ]
-    for name, same_s in (("time_lost_s", _SAME_TIME_S), ("violation_time_s", _SAME_VIOLATION_S)):
-        was, is_now = (getattr(each, name) for each in (committed, now))
-        if (was is None) != (is_now is None) or (was is not None and abs(was - is_now) > same_s):
-            found.append(f"{name}: committed {was} s, now {is_now} s")
-    return found
-
-
-def _has(records: Sequence[EpisodeRecord], job: Job) -> bool:
-    key = job_key(job)
-    return any((each.scenario, each.seed) == (key.scenario, key.seed) for each in records)
-
-
-def _keep(
-    row: Row,
-    record: EpisodeRecord,
-    records: dict[str, list[EpisodeRecord]],
-    folder: Path,
-) -> None:
-    """Add an episode to the results of its row."""
-    rows = records[row.name]
-    earlier = read_about(folder)  # another process may measure other rows
-    begun = earlier.get(row.name, {}) if rows else {}
-    rows.append(record)
-    rows.sort(key=lambda each: (each.scenario, each.seed))
-    about = {**earlier, row.name: _about(row, begun)}
-    write_text(folder / _ABOUT_FILE, _json(about), SimError)
-    write_records(folder / f"{row.name}.csv", rows)
-
-
-def _about(row: Row, begun: dict[str, str]) -> dict[str, str]:
-    """Return what the results of a row were measured with.
-
-    Args:
-        row: the row.
-        begun: the same of its earlier episodes, empty for the first.
-    """
-    commits = dict.fromkeys([*begun.get("commit", "").split(), _commit()])
+def _about(row: Row) -> dict[str, str]:
+    """Return what the results of a row were measured with."""
     return {
-        "version": awarenav.__version__,
-        "commit": " ".join(commits),
+        "commit": _commit(),
         "date": date.today().isoformat(),
         "digest": row.digest,
+        "version": awarenav.__version__,
     }
 
 
@@ -177,7 +112,3 @@ def _commit() -> str:
     except OSError:
         return ""
     return found.stdout.strip() if found.returncode == 0 else ""
-
-
-def _json(data: Any) -> str:
-    return json.dumps(dict(sorted(data.items())), indent=1) + "\n"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -17,6 +18,7 @@ from sim_tests.study.measures import (
     paired_difference,
     proportion_interval,
 )
+from sim_tests.study.report import NOTHING, Section, Table, write_page
 
 from ._measure import read_about, read_results
 from ._rows import RESULTS, Board, Row
@@ -24,19 +26,8 @@ from ._rows import RESULTS, Board, Row
 _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
 _RANKED_DECIMALS: Final = 2
-
-_COLUMNS: Final = ("rank, row", "contacts, moving", "violation (s)", "time lost (s)")
-_MORE_COLUMNS: Final = ("row", "against today's AMR (s)", "goals; walked into", "measured")
-_STEP_OUT_COLUMNS: Final = (
-    "row",
-    "unaware",
-    "above 0.25 m/s",
-    "worst (m/s)",
-    "aware",
-    "faster starts: unaware",
-    "worst (m/s)",
-)
-_PARTS_COLUMNS: Final = ("row", *_ATTENTIONS)
+# Marks of Markdown, and the address of a link.
+_MARKUP: Final = re.compile(r"[`*]|\[(\w+)\]\(\S+\)")
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 
 
@@ -107,102 +98,129 @@ def ranked(rows: Sequence[Standing]) -> list[Standing]:
 def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
     """Return the Markdown of the page."""
     rows = standings(board, folder)
-    about = read_about(folder)
-    first = ranked(rows)
-    others = [each for each in rows if not each.is_complete]
-    baseline = next(each for each in rows if each.row.name == board.baseline)
-    ranks = {each.row.name: number for number, each in enumerate(first, start=1)}
-    scenarios = len(board.templates)
-    missing = [each.row.name for each in others]
+    tables = leaderboard_tables(board, rows, read_about(folder))
+    missing = ", ".join(f"`{each.row.name}`" for each in rows if not each.is_complete)
     note = "Means have 95 % intervals."
     if missing:
-        names = ", ".join(f"`{name}`" for name in missing)
-        note += f" Not complete, and so without a rank: {names}."
-    shown = [each for each in (*first, *others) if each.ran]
-    # About 2.5 s of a core per episode with camera and scanners.
-    minutes = max(round(scenarios * board.seeds * 2.5 / 60.0), 1)
+        note += f" Not complete, and so without a rank: {missing}."
+    scenarios = len(board.templates)
     return _TEMPLATE.read_text(encoding="utf-8").format(
+        **{name: table.markdown() for name, table in tables.items()},
         episodes=scenarios * board.seeds,
         scenarios=scenarios,
         sets=", ".join(f"`{each}`" for each in board.scenarios),
         seeds=f"the seeds 0 to {board.seeds - 1}" if board.seeds > 1 else "the seed 0",
-        table=_table(_COLUMNS, [_cells(each, ranks, baseline) for each in shown]),
-        more=_table(_MORE_COLUMNS, [_more_cells(each, baseline, about) for each in shown]),
-        step_out=_table(_STEP_OUT_COLUMNS, [_step_out_cells(each) for each in shown]),
         note=textwrap.fill(note, 100, break_long_words=False, break_on_hyphens=False),
-        parts=_table(_PARTS_COLUMNS, [_parts_cells(each) for each in shown]),
-        minutes=minutes,
+        # About 2.5 s of a core per episode with camera and scanners.
+        minutes=max(round(scenarios * board.seeds * 2.5 / 60.0), 1),
     )
 
 
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table."""
-    lines = [" | ".join(cells) for cells in (columns, ["---"] * len(columns), *rows)]
-    return "\n".join(f"| {line} |" for line in lines)
+def write_leaderboard(board: Board, path: Path, folder: Path = RESULTS) -> None:
+    """Write the tables as one HTML page without other files, like the report of a run."""
+    tables = leaderboard_tables(board, standings(board, folder), read_about(folder))
+    titles = {
+        "table": "Ranking",
+        "more": "More about each row",
+        "step_out": "Step-out impacts",
+        "parts": "By what people look at",
+    }
+    sections = []
+    for name, each in tables.items():
+        plain = [[_MARKUP.sub(r"\1", cell.text) for cell in row] for row in each.cells]
+        sections.append(Section(name, titles[name], tables=(Table(each.columns, plain),)))
+    lead = "Rows are policies with sensors and a planner; docs/what_it_wins.md has the definitions."
+    write_page(path, "Leaderboard", sections, lead=lead)
 
 
-def _cells(standing: Standing, ranks: Mapping[str, int], baseline: Standing) -> list[str]:
-    """Return the cells of the ranking; a row without a rank has a dash, today's AMR is marked."""
-    row, ran, contacts = standing.row, standing.ran, standing.contacts
-    hits = sum(each.moving_touched for each in ran)
-    rank = f"{ranks[row.name]}. " if row.name in ranks else "– "
-    policy = f"**`{row.policy_name}`, today's AMR**" if standing is baseline else _policy(row)
-    return [
-        f"{rank}{policy}, {row.sensors}, {_planner(row)}",
-        f"{hits} of {len(ran)} (≤ {100.0 * contacts.high:.1f} %)",
-        standing.mean("violation_time_s").text(2),
-        standing.mean("time_lost_s").text(1),
-    ]
+def leaderboard_tables(
+    board: Board, rows: Sequence[Standing], about: Mapping[str, Mapping[str, str]]
+) -> dict[str, Table]:
+    """Return the tables of the page, by their names in ``page.txt``."""
+    first = ranked(rows)
+    baseline = next(each for each in rows if each.row.name == board.baseline)
+    ranks = {each.row.name: f"{number}. " for number, each in enumerate(first, start=1)}
+    shown = [each for each in (*first, *(r for r in rows if not r.is_complete)) if each.ran]
+
+    def table(*columns: tuple[str, Callable[[Standing], str]]) -> Table:
+        lines = [[cell(each) for _, cell in columns] for each in shown]
+        return Table(dict.fromkeys((name for name, _ in columns), ""), lines)
+
+    def ranking(each: Standing) -> str:
+        policy = f"`{each.row.policy_name}`"
+        if each is baseline:
+            policy = f"**{policy}, today's AMR**"
+        return f"{ranks.get(each.row.name, '– ')}{policy}, {each.row.sensors}, {_planner(each.row)}"
+
+    def against(each: Standing) -> str:
+        if each is baseline:
+            return ""
+        return _signed(paired_difference(baseline.ran, each.ran, "time_lost_s"))
+
+    def measured(each: Standing) -> str:
+        of = about.get(each.row.name, {})
+        return ", ".join(of[name] for name in ("version", "commit", "date") if of.get(name))
+
+    def goals(each: Standing) -> str:
+        arrived = sum(record.time_to_goal_s is not None for record in each.ran)
+        touched = sum(record.person_touched for record in each.ran)
+        return f"{arrived} of {len(each.ran)}; {touched} of {len(each.ran)}"
+
+    def mean(field: str, decimals: int = 1) -> Callable[[Standing], str]:
+        return lambda each: each.mean(field).text(decimals)
+
+    return {
+        "table": table(
+            ("rank, row", ranking),
+            ("contacts, moving", _contacts),
+            ("violation (s)", mean("violation_time_s", 2)),
+            ("time lost (s)", mean("time_lost_s")),
+        ),
+        "more": table(
+            ("row", _label),
+            ("against today's AMR (s)", against),
+            ("goals; walked into", goals),
+            ("measured", measured),
+        ),
+        "step_out": table(
+            ("row", _label),
+            ("unaware", mean("step_out_unaware")),
+            ("above 0.25 m/s", mean("step_out_unaware_fast")),
+            ("worst (m/s)", _worst("step_out_worst_mps")),
+            ("aware", mean("step_out_aware")),
+            ("faster starts: unaware", mean("step_out_stress_unaware")),
+            ("their worst (m/s)", _worst("step_out_stress_worst_mps")),
+        ),
+        "parts": table(("row", _label), *((name, _part(name)) for name in _ATTENTIONS)),
+    }
 
 
-def _more_cells(
-    standing: Standing, baseline: Standing, about: Mapping[str, Mapping[str, str]]
-) -> list[str]:
-    ran, measured = standing.ran, about.get(standing.row.name, {})
-    change = paired_difference(baseline.ran, ran, "time_lost_s")
-    arrived = sum(each.time_to_goal_s is not None for each in ran)
-    touched = sum(each.person_touched for each in ran)
-    return [
-        _label(standing.row),
-        "" if standing is baseline else _signed(change),
-        f"{arrived} of {len(ran)}; {touched} of {len(ran)}",
-        ", ".join(filter(None, (measured.get(name, "") for name in ("version", "commit", "date")))),
-    ]
+def _contacts(each: Standing) -> str:
+    hits = sum(record.moving_touched for record in each.ran)
+    return f"{hits} of {len(each.ran)} (≤ {100.0 * each.contacts.high:.1f} %)"
 
 
-def _step_out_cells(standing: Standing) -> list[str]:
-    def worst(field: str) -> str:
-        values = [value for each in standing.ran if (value := getattr(each, field)) is not None]
-        return f"{max(values):.2f}" if values else "–"
+def _worst(field: str) -> Callable[[Standing], str]:
+    def cell(each: Standing) -> str:
+        values = [value for r in each.ran if (value := getattr(r, field)) is not None]
+        return f"{max(values):.2f}" if values else NOTHING
 
-    return [
-        _label(standing.row),
-        standing.mean("step_out_unaware").text(1),
-        standing.mean("step_out_unaware_fast").text(1),
-        worst("step_out_worst_mps"),
-        standing.mean("step_out_aware").text(1),
-        standing.mean("step_out_stress_unaware").text(1),
-        worst("step_out_stress_worst_mps"),
-    ]
+    return cell
 
 
-def _parts_cells(standing: Standing) -> list[str]:
-    cells = [_label(standing.row)]
-    for attention in _ATTENTIONS:
-        time_s, violation_s = (
-            standing.mean(field, attention) for field in ("time_lost_s", "violation_time_s")
-        )
-        cells.append(f"{time_s.text(1)} s, {violation_s.text(2)} s" if time_s.known else "–")
-    return cells
+def _part(attention: str) -> Callable[[Standing], str]:
+    def cell(each: Standing) -> str:
+        time_s = each.mean("time_lost_s", attention)
+        violation_s = each.mean("violation_time_s", attention)
+        return f"{time_s.text(1)} s, {violation_s.text(2)} s" if time_s.known else NOTHING
+
+    return cell
 
 
-def _label(row: Row) -> str:
+def _label(each: Standing) -> str:
     """Return a row in one cell."""
-    return f"{_policy(row)}, {row.sensors}, {row.planner.rpartition(':')[2]}"
-
-
-def _policy(row: Row) -> str:
-    return f"`{row.policy_name}`"
+    row = each.row
+    return f"`{row.policy_name}`, {row.sensors}, {row.planner.rpartition(':')[2]}"
 
 
 def _planner(row: Row) -> str:
@@ -216,7 +234,7 @@ def _planner(row: Row) -> str:
 def _signed(change: Interval) -> str:
     """Return a difference with its interval and signs."""
     if not change.known:
-        return "–"
+        return NOTHING
     if not change.bounded:
         return f"{change.value:+.1f} [?]"
     return f"{change.value:+.1f} [{change.low:+.1f}, {change.high:+.1f}]"

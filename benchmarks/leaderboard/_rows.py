@@ -10,6 +10,7 @@ from typing import Final, Literal
 from pydantic import Field, ValidationError, model_validator
 
 from awarenav.errors import not_one_of
+from nav_adapter import AwarenessPolicy
 from perception.documents import read_yaml
 from sim_tests import SimError
 from sim_tests.crossing import named_policy
@@ -21,8 +22,10 @@ from sim_tests.world.config import SimConfig
 _ROOT: Final = Path(__file__).resolve().parents[2]
 #: Folder of the rows and of their results.
 RESULTS: Final = _ROOT / "docs" / "leaderboard"
+#: Folder of the runs that measure them, which git ignores.
+WORK: Final = _ROOT / "build" / "leaderboard"
 #: The page.
-PAGE: Final = _ROOT / "docs" / "leaderboard.md"
+PAGE: Final = _ROOT / "docs" / "what_it_wins.md"
 _ROWS_FILE: Final = "rows.yaml"
 _TRUTH: Final = "truth"
 _REFERENCE: Final = "reference"
@@ -56,15 +59,14 @@ class Row(SimConfig):
         return Path(self.policy).stem
 
     @property
-    def policy_yaml(self) -> str:
-        """The whole policy as YAML."""
+    def _policy(self) -> AwarenessPolicy:
         path = _ROOT / self.policy
-        return policy_text(named_policy(path if path.suffix else self.policy)[1])
+        return named_policy(path if path.suffix else self.policy)[1]
 
     @property
     def digest(self) -> str:
         """A digest of policy, perception and planner's name, by which results belong to the row."""
-        text = "\n".join((self.policy_yaml, self.perception, self.planner))
+        text = "\n".join((policy_text(self._policy), self.perception, self.planner))
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def jobs(self, templates: Sequence[ScenarioTemplate], seeds: Sequence[int]) -> tuple[Job, ...]:
@@ -73,22 +75,14 @@ class Row(SimConfig):
         Raises:
             SimError: its planner cannot be made.
         """
-        return tuple(
-            Job(
-                each.scenario,
-                each.seed,
-                self.policy_name,
-                self.policy_yaml,
-                each.planner,
-                self.perception,
-            )
-            for each in plan_jobs(
-                templates,
-                ["blind"],
-                seeds,
-                planners=["" if self.planner == _REFERENCE else self.planner],
-                perception=_TRUTH,
-            )
+        truth = self.sensors == _TRUTH
+        return plan_jobs(
+            templates,
+            [(self.policy_name, self._policy)],
+            seeds,
+            planners=["" if self.planner == _REFERENCE else self.planner],
+            perception=_TRUTH if truth else "keypoints",
+            sensors=["camera" if truth else self.sensors],
         )
 
 

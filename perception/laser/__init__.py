@@ -10,24 +10,25 @@ The order of use, for every scan of every scanner::
 
 With several scanners each scan is detected with its own number, ``detector.detect(points, 1)``, and
 :func:`merge_candidates` reports every person once. :func:`observations_of` makes the observations
-that ``tracking.PersonTracker`` takes. :class:`SeatedPeople` puts the candidates of people whom a
-camera saw sitting where their trunk is.
+that ``tracking.PersonTracker`` takes.
 """
 
 from __future__ import annotations
 
-from ._candidate import CandidateKind, PersonCandidate
-from ._classifier import LegClassifier, OnnxLegClassifier
+from ._candidates import CandidateKind, PersonCandidate, merge_candidates, observations_of
 from ._clusters import Clusters, clusters_of
 from ._detector import LegDetector, LegDetectorConfig
-from ._hypotheses import CUTOUT, HYPOTHESIS_FEATURES, Hypotheses, hypotheses_of
+from ._hypotheses import (
+    CUTOUT,
+    HYPOTHESIS_FEATURES,
+    Hypotheses,
+    LegClassifier,
+    OnnxLegClassifier,
+    hypotheses_of,
+)
 from ._memory import OccupancyMemory
-from ._merging import merge_candidates
-from ._observations import observations_of
 from ._points import RobotMotion, ScanPoints, scan_points
-from ._scan import LaserScan
-from ._scanner import Scanner
-from ._seated import SeatedPeople
+from ._scan import LaserScan, Scanner
 from ._sight import AHEAD_RAD, ScannerSight, SeenDirections, sight_of
 from ._static_map import MapCells, StaticMap
 
@@ -50,7 +51,6 @@ __all__ = [
     "ScanPoints",
     "Scanner",
     "ScannerSight",
-    "SeatedPeople",
     "SeenDirections",
     "StaticMap",
     "clusters_of",

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ..arrays import FloatArray, finite_number, set_fields
 from ..errors import PerceptionError
-from ._candidate import CandidateKind, PersonCandidate
-from ._classifier import LegClassifier, OnnxLegClassifier
+from ._candidates import CandidateKind, PersonCandidate
 from ._clusters import Clusters, clusters_of
-from ._hypotheses import Hypotheses, hypotheses_of
+from ._hypotheses import Hypotheses, LegClassifier, OnnxLegClassifier, hypotheses_of
 from ._memory import OccupancyMemory
 from ._points import ScanPoints
 from ._static_map import StaticMap
@@ -64,8 +63,6 @@ _TROLLEY_APART_M: Final = 1.2
 _TROLLEY_BEHIND_M: Final = 0.3
 _TROLLEY_STD_M: Final = 0.6
 _SURELY_M: Final = 1e-3
-# The axis of a leg lies this far behind the middle of the points that were met.
-_LEG_RADIUS_M: Final = 0.045
 
 
 @dataclass(frozen=True, slots=True)
@@ -330,16 +327,15 @@ def _candidates(
     if not chosen:
         return []
     rays = hypotheses.rays[chosen]
-    legs = hypotheses.centres_m[chosen] + _LEG_RADIUS_M * rays
     one_leg = hypotheses.second[chosen] < 0
     one_leg &= clusters.widths_m[hypotheses.first[chosen]] < _TWO_LEGS_M
     kinds: list[CandidateKind] = ["one_leg" if one else "two_legs" for one in one_leg.tolist()]
     candidates = []
-    rows = zip(judged[chosen].tolist(), rays.tolist(), places_m, kinds, legs, strict=True)
-    for (score, _, _, along, aside), ray, place, kind, leg in rows:
+    rows = zip(judged[chosen].tolist(), rays.tolist(), places_m, kinds, strict=True)
+    for (score, _, _, along, aside), ray, place, kind in rows:
         covariance = _covariance(ray, max(along, _SURELY_M), max(aside, _SURELY_M))
         person = min(max(score, 0.0), 1.0)
-        candidates.append(PersonCandidate(stamp_s, place, covariance, person, kind, leg))
+        candidates.append(PersonCandidate(stamp_s, place, covariance, person, kind))
     return candidates
 
 

@@ -99,17 +99,6 @@ class OccupancyMemory:
         known[maybe[(around >= _CAME_S).sum(axis=1) >= _CAME_CELLS]] = 1
         return known
 
-    def is_static(self, points_m: FloatArray) -> NDArray[np.bool_]:
-        """Return (N,) whether points (N, 2) in odom lie in cells that are static."""
-        return np.asarray(self.known(points_m) < 0)
-
-    def has_come(self, points_m: FloatArray) -> NDArray[np.bool_]:
-        """Return (N,) whether points (N, 2) in odom lie where the floor was free at first.
-
-        So must have been most cells around: beside a rack or in its openings nothing has come.
-        """
-        return np.asarray(self.known(points_m) > 0)
-
     def is_due(self, stamp_s: float, scanner: int = 0) -> bool:
         """Return whether a scan of this time is needed; :meth:`update` takes no other."""
         since = stamp_s - self._updated_s.get(scanner, -math.inf)

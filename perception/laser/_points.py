@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, set_fields
 from ..errors import PerceptionError
-from ._scan import LaserScan
-from ._scanner import BODY_MARGIN_M, Scanner
+from ._scan import BODY_MARGIN_M, LaserScan, Scanner
 
 # Below this turn an arc is computed as its series, which is exact to rounding.
 _STRAIGHT_RAD: Final = 1e-4

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import FloatArray
 from ._points import RobotMotion, ScanPoints, scan_points
-from ._scan import LaserScan
-from ._scanner import Scanner
+from ._scan import LaserScan, Scanner
 
 #: A return this near to the scanner is of a cover: behind it the ray sees nothing.
 COVER_M: Final = 0.10

@@ -1,18 +1,178 @@
-"""The part of the surroundings that stands still, as a given map."""
+"""The part of the surroundings that stands still: a given map, also from a map_server file."""
 
 from __future__ import annotations
 
+import logging
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, set_fields
-from ..errors import PerceptionError
-from ._map_file import MapImage, read_map_file
+from ..documents import read_yaml
+from ..errors import PerceptionError, did_you_mean
+
+_REQUIRED: Final = (
+    "image",
+    "resolution",
+    "origin",
+    "negate",
+    "occupied_thresh",
+    "free_thresh",
+)
+_MODES: Final = ("trinary", "scale", "raw")
+# Cells of an OccupancyGrid that count as occupied, in per cent.
+_OCCUPIED: Final = (65, 100)
+# Side of a cell, as for maps that come as messages.
+_SIDE_M: Final = (0.005, 1.0)
+_MAX_IMAGE_BYTES: Final = 256 << 20
+# The head of a PGM or PPM file: kind, width, height, the value of white; "#" begins a comment.
+_NETPBM_HEAD: Final = re.compile(rb"P[2356]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)" + rb"\s")
+# A PNG names its transparent grey before its pixels.
+_PNG_HEAD_BYTES: Final = 4096
+_LOG: Final = logging.getLogger("perception")
+
+
+class MapImage(NamedTuple):
+    """A map as its file has it.
+
+    Attributes:
+        occupied: (H, W) whether a cell is occupied; row 0 has the lowest y of the map.
+        origin: x and y of the lower left corner in metres, and the map's yaw in radians.
+        resolution_m: side of a cell.
+    """
+
+    occupied: NDArray[np.bool_]
+    origin: tuple[float, float, float]
+    resolution_m: float
+
+
+def read_map_file(path: Path) -> MapImage:
+    """Return the map of a file, as ``nav2_map_server`` reads it.
+
+    Raises:
+        PerceptionError: the message names the file, says what it has and what is valid.
+    """
+    data = read_yaml(path)
+    if not isinstance(data, dict):
+        raise PerceptionError(f"{path} must hold the keys {', '.join(_REQUIRED)}")
+    valid = (*_REQUIRED, "mode")
+    unknown = [key for key in data if key not in valid]
+    for key in unknown:
+        if near := did_you_mean(str(key).lower(), valid, cutoff=0.8):
+            raise PerceptionError(
+                f"{path} has the unknown key {key!r}, valid are {', '.join(valid)}{near}"
+            )
+    if unknown:  # such as those of tools that draw maps; map_server leaves them out as well
+        _LOG.warning("%s: not read: %s", path, ", ".join(map(repr, unknown)))
+    missing = [key for key in _REQUIRED if key not in data]
+    if missing:
+        raise PerceptionError(f"{path} lacks the key {missing[0]!r} of a map_server file")
+    try:
+        side_m = _between("resolution", data["resolution"], *_SIDE_M)
+        x, y, yaw = finite_array("origin", data["origin"], (3,)).tolist()
+        occupied = _between("occupied_thresh", data["occupied_thresh"], 0.0, 1.0)
+        free = _between("free_thresh", data["free_thresh"], 0.0, 1.0)
+        if free >= occupied:
+            raise PerceptionError(
+                f"free_thresh must be below occupied_thresh, got {free:g} and {occupied:g}"
+            )
+        negate = data["negate"]
+        if negate not in (0, 1):  # False and True as well
+            raise PerceptionError(f"negate must be 0 or 1, got {negate!r}")
+        mode = data.get("mode", _MODES[0])
+        if mode not in _MODES:
+            raise PerceptionError(f"mode must be one of {', '.join(_MODES)}, got {mode!r}")
+        image = data["image"]
+        if not isinstance(image, str) or not image:
+            raise PerceptionError(f"image must be the path of an image, got {image!r}")
+    except PerceptionError as cause:
+        raise PerceptionError(f"{path}: {cause}") from cause
+    shade, opaque = _shades(path.parent / image)
+    percent = _percent(shade, mode, bool(negate), occupied, free)
+    if opaque is not None:
+        percent[~opaque] = -1.0  # as nav2_map_server since 2025, in every mode
+    cells = (percent >= _OCCUPIED[0]) & (percent <= _OCCUPIED[1])
+    # The first row of an image is the highest of the map.
+    return MapImage(cells[::-1], (x, y, yaw), side_m)
+
+
+def _between(name: str, value: Any, low: float, high: float) -> float:
+    if isinstance(value, str):  # float() takes it
+        raise PerceptionError(f"{name} must be a number, got {value!r}")
+    return finite_number(name, value, minimum=low, maximum=high)
+
+
+def _shades(path: Path) -> tuple[FloatArray, NDArray[np.bool_] | None]:
+    """Return the brightness (H, W) of an image in [0, 1], and which pixels are opaque.
+
+    Without an alpha channel the second value is None.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(_MAX_IMAGE_BYTES + 1)
+    except (OSError, ValueError) as cause:  # ValueError: a path with a zero byte
+        reason = getattr(cause, "strerror", None) or cause
+        raise PerceptionError(f"cannot read the map's image {path}: {reason}") from cause
+    if len(data) > _MAX_IMAGE_BYTES:
+        limit = _MAX_IMAGE_BYTES >> 20
+        raise PerceptionError(f"the map's image {path} is too large: at most {limit} MiB are read")
+    _check_kind(path, data)
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+    except cv2.error:
+        image = None
+    if image is None or image.dtype not in (np.uint8, np.uint16):
+        raise PerceptionError(
+            f"the map's image {path} is damaged, or no PGM, PPM, PBM, PNG or BMP of 8 or 16 bits"
+        )
+    white = 255.0 if image.dtype == np.uint8 else 65535.0
+    channels = image.reshape(*image.shape[:2], -1)
+    colours = channels[..., :3]
+    shade = np.asarray(colours.sum(axis=2, dtype=np.float64) / (white * colours.shape[2]))
+    return shade, np.asarray(channels[..., 3] == white) if channels.shape[2] == 4 else None
+
+
+def _check_kind(path: Path, data: bytes) -> None:
+    """Refuse images of which OpenCV would return other values than the file has."""
+    netpbm = _NETPBM_HEAD.match(data)
+    if netpbm is not None and int(netpbm[3]) not in (255, 65535):
+        kind = f"PGM or PPM in which white is {int(netpbm[3])}, not 255 or 65535"
+    elif data.startswith(b"P7"):
+        kind = "PAM (P7)"
+    elif data.startswith((b"II*\0", b"MM\0*")):
+        kind = "TIFF"
+    elif data.startswith(b"\x89PNG") and data[25:26] == b"\0" and b"tRNS" in data[:_PNG_HEAD_BYTES]:
+        kind = "grey PNG with a transparent grey"
+    else:
+        return
+    raise PerceptionError(f"the map's image {path} is a {kind}; save it as PGM or PNG")
+
+
+def _percent(
+    shade: FloatArray,
+    mode: str,
+    negate: bool,
+    occupied: float,
+    free: float,
+) -> FloatArray:
+    """Return the occupancy (H, W) in per cent as an OccupancyGrid has it, −1 for unknown cells."""
+    if mode == "raw":
+        value = np.round(255.0 * shade)
+        return np.where(value <= 100.0, value, -1.0)
+    share = shade if negate else 1.0 - shade
+    percent = np.full(share.shape, -1.0)
+    if mode == "scale":
+        percent = np.rint((share - free) / (occupied - free) * 100.0)
+    percent[share < free] = 0.0
+    percent[share > occupied] = 100.0
+    return percent
+
 
 # The z axis of a level pose differs from that of odom by no more than its rounding.
 _LEVEL: Final = 1e-6

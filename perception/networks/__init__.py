@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from ._image import rgb_image
+from ._images import PixelFormat, rgb_image
 from ._model import NETWORK_TIME, OnnxModel
-from ._pixels import PixelFormat
 from ._settings import PROVIDERS, OnnxSettings, Provider, parse_provider_options
 from .detectors import OnnxPersonDetector
 from .poses import MediaPipeEyeEstimator, MediaPipePoseEstimator, OnnxPoseEstimator

@@ -14,8 +14,12 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .._manifest import shipped_model, shipped_model_path, verify_shipped_model
-from .._training_domain import training_domain_of
+from .._manifest import (
+    shipped_model,
+    shipped_model_path,
+    training_domain_of,
+    verify_shipped_model,
+)
 from ..errors import PerceptionError
 from ._part_names import part_names
 from ._settings import PROVIDERS, OnnxSettings, short_name

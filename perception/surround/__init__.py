@@ -16,10 +16,8 @@ reported once, in the camera frame::
 
 from __future__ import annotations
 
-from ._lenses import FisheyeLens, PanoramaLens, WideLens
-from ._merging import SeenInView, merge_views
-from ._pipeline import SurroundPipeline
-from ._views import FlatView, ring_of_views
+from ._lenses import FisheyeLens, FlatView, PanoramaLens, WideLens, ring_of_views
+from ._pipeline import SeenInView, SurroundPipeline, merge_views
 
 __all__ = [
     "FisheyeLens",

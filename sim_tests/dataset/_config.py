@@ -35,7 +35,7 @@ class RenderConfig(SimConfig):
         max_range_m: largest distance of a person from the camera.
         supersampling: samples per pixel and side; 2 smooths edges and costs three times as much.
         seed: seed of everything random.
-        sensor: noise and exposure of the camera; the default adds none.
+        sensor: noise of the camera; the default adds none.
         workers: names of shipped workers, or .npz files; None for all shipped workers.
         layouts: names of the halls; None for all.
         variants: first and last number of the variants of a hall's goods and colours.

@@ -77,7 +77,7 @@ def _factor(name: str, run: tuple[float, float]) -> MeasuredValue:
 
 def _time_bare_physics() -> float:
     """Return the wall seconds per simulated second of the empty hall."""
-    with Warehouse(WarehouseLayout.crossing()) as warehouse:
+    with Warehouse(WarehouseLayout.named("crossing")) as warehouse:
         steps = round(5.0 / warehouse.physics_dt_s)
         start = time.perf_counter()
         for _ in range(steps):

@@ -57,7 +57,7 @@ class CameraSpec(SimConfig):
             height; half the width and height render four times as fast.
         scenery_divisor: these images take one sample of the scenery per block of this many pixels a
             side; people get full resolution.
-        sensor: exposure, noise and blur of rendered images; the default adds none.
+        sensor: noise of rendered images; the default adds none.
         timing: frame rate, losses and delays; the default is one frame per control cycle, without
             delay.
     """
@@ -170,7 +170,7 @@ def _layout(value: Any) -> Any:
         raise ValueError(
             f"layout must be one of {', '.join(map(repr, LAYOUTS))} or a mapping, got {value!r}"
         )
-    return LAYOUTS[value]()
+    return WarehouseLayout.named(value)
 
 
 class Scenario(SimConfig):
@@ -212,7 +212,7 @@ class Scenario(SimConfig):
     attention: Literal["attentive", "unaware", "mixed"] = "mixed"
     duration_s: float = Field(gt=0.0, le=600.0)
     control_hz: float = Field(default=20.0, gt=0.0, le=240.0)
-    layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.crossing()
+    layout: Annotated[WarehouseLayout, BeforeValidator(_layout)] = WarehouseLayout.named("crossing")
     robot: RobotTask
     robot_model: Annotated[RobotModel | None, BeforeValidator(_robot_model)] = None
     camera: CameraSpec = CameraSpec()

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from ._episode_runner import EpisodeRunner
     from ._files import write_or_check_settings
     from ._optimizer import Optimizer, Outcome, ParameterValues, Range
+    from ._process_lock import ProcessLock
     from ._shared_study import Claim, SharedStudy
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Optimizer",
     "Outcome",
     "ParameterValues",
+    "ProcessLock",
     "Range",
     "SharedStudy",
     "write_or_check_settings",

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from tqdm import tqdm
 
 from ..study.measures import EpisodeRecord, nondeterminism_notes
-from ..study.runs import Job, WorkerPool, run_here
+from ..study.runs import Job, attempt, died, in_parallel
 
 
 class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
@@ -25,7 +25,7 @@ class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
     """
 
     def __init__(self, workers: int, label: str, total: int | None = None) -> None:
-        self._pool = WorkerPool(workers) if workers > 1 else None
+        self._workers = workers
         self._unrepeatable: set[str] = set()
         self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
 
@@ -33,21 +33,19 @@ class EpisodeRunner(AbstractContextManager["EpisodeRunner"]):
         self.close()
 
     def close(self) -> None:
-        """End the processes and the progress bar."""
-        if self._pool is not None:
-            self._pool.close()
+        """End the progress bar; idle processes end by themselves."""
         self.bar.close()
 
     def run(self, jobs: Sequence[Job]) -> tuple[EpisodeRecord, ...]:
         """Run the jobs; ``error`` of a record says why an episode failed."""
-        numbered = list(enumerate(jobs))
         records: dict[int, EpisodeRecord] = {}
-        results = run_here(numbered) if self._pool is None else self._pool.run(numbered)
-        for number, result in results:
-            records[number] = result.record
+        for number, outcome in in_parallel(
+            attempt, jobs, workers=self._workers, keep=True, on_death=died
+        ):
+            records[number] = outcome.record
             self.bar.update()
         self._say_unrepeatable(records.values())
-        return tuple(records[number] for number, _ in numbered)
+        return tuple(records[number] for number in range(len(jobs)))
 
     def _say_unrepeatable(self, records: Iterable[EpisodeRecord]) -> None:
         """Say once on standard error that a planner is not deterministic."""

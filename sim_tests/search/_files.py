@@ -15,8 +15,9 @@ from perception.documents import parse_json, read_json
 
 from ..crossing import named_policy
 from ..scenario import ScenarioTemplate
-from ..study.runs import ProcessLock, named_templates, policy_text
+from ..study.runs import named_templates, policy_text
 from ..world.errors import SimError
+from ._process_lock import ProcessLock
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..study.runs import ProcessLock
 from ..world.errors import SimError
 from ._optimizer import Optimizer, Outcome, ParameterValues
 from ._optuna import DATABASE_ERRORS, event, optuna
+from ._process_lock import ProcessLock
 
 #: User attribute of a trial with the notes of its outcome.
 NOTES = "notes"

@@ -2,42 +2,27 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
 
 from awarenav.errors import counted
 from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
-from ..crossing.eyes import PerceptionKind, SensorSet
 from ..world.errors import SimError
 from .measures import EpisodeRecord, nondeterminism_notes, summarise, table_text
-from .runs import RunFiles, plan_jobs, run_jobs, sample_jobs
-
-# The name of the reference planner on the command line.
-_REFERENCE: Final = "reference"
+from .runs import Conditions, RunFiles, run_jobs, sample_jobs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrossingsOptions:
     """The options of ``awarenav crossings``."""
 
-    scenario: tuple[str, ...]
+    conditions: Conditions
     policy: tuple[str, ...]
-    planner: tuple[str, ...]
-    perception: PerceptionKind
-    sensors: tuple[SensorSet, ...]
-    camera: str
-    robot: str
-    population: str | None
-    fault: tuple[str, ...]
-    episodes: int
     sample: int | None
-    seed: int
     workers: int | None
     scheduler: str | None
     time_limit: float | None
@@ -58,23 +43,13 @@ def crossings_command(options: CrossingsOptions) -> int:
         NavError: an unknown preset or unusable policy file.
         PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
-    jobs = plan_jobs(
-        options.scenario,
-        options.policy,
-        range(options.seed, options.seed + options.episodes),
-        planners=options.planner,
-        perception=options.perception,
-        sensors=options.sensors,
-        camera=options.camera,
-        robot=options.robot,
-        population=options.population or "",
-        faults=options.fault,
-    )
-    if options.perception == "pixels" and set(options.sensors) != {"scanner"}:
+    conditions = options.conditions
+    jobs = conditions.jobs(options.policy)
+    if conditions.perception == "pixels" and set(conditions.sensors) != {"scanner"}:
         # Refuses missing networks before anything runs.
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
     if options.sample is not None:
-        jobs = sample_jobs(jobs, options.sample, options.seed)
+        jobs = sample_jobs(jobs, options.sample, conditions.seed)
     records = run_jobs(
         jobs,
         options.out,
@@ -84,7 +59,9 @@ def crossings_command(options: CrossingsOptions) -> int:
         resume=options.resume,
         overwrite=options.overwrite,
         progress=True,
-        about=_about(options),
+        about=conditions.about(
+            "crossings", options.out, policy=options.policy, sample=options.sample
+        ),
     )
     if options.as_json:
         print(json_text([asdict(row) for row in summarise(records).policies]), end="")
@@ -137,34 +114,6 @@ def _short_table(records: Iterable[EpisodeRecord]) -> str:
             )
         )
     return table_text(header, rows)
-
-
-def _about(options: CrossingsOptions) -> dict[str, Any]:
-    """Return the command and its settings for run.json; resuming a run gives the same."""
-    settings: dict[str, Any] = {
-        "scenario": list(options.scenario),
-        "policy": list(options.policy),
-        "planner": [each or _REFERENCE for each in options.planner],
-        "perception": options.perception,
-        "fault": list(options.fault),
-        "episodes": options.episodes,
-        "seed": options.seed,
-    }
-    if options.sensors != ("camera",):
-        settings["sensors"] = list(options.sensors)
-    if options.sample is not None:
-        settings["sample"] = options.sample
-    if options.camera:
-        settings["camera"] = options.camera
-    if options.robot:
-        settings["robot"] = options.robot
-    if options.population:
-        settings["population"] = options.population
-    words = ["awarenav", "crossings"]
-    for name, value in settings.items():
-        values = value if isinstance(value, list) else [value]
-        words += [f"--{name}", *map(str, values)]
-    return {"command": shlex.join([*words, "--out", str(options.out)]), "settings": settings}
 
 
 def _write_report(out: Path, *, as_json: bool) -> None:

@@ -74,5 +74,6 @@ def crossings(**values: Any) -> int:
         CrossingsOptions,
         crossings_command,
     )
+    from .runs import Conditions  # noqa: PLC0415
 
-    return crossings_command(CrossingsOptions(**values))
+    return crossings_command(CrossingsOptions(conditions=Conditions.taken_from(values), **values))

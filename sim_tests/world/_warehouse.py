@@ -33,7 +33,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
     second world, :attr:`visuals`, so that rendering never changes the physics.
 
     Args:
-        layout: the hall; None is :meth:`WarehouseLayout.crossing`.
+        layout: the hall; None is the shipped layout ``"crossing"``.
         physics_dt_s: length of one step, in (0, 1/60].
         renderer: ``"tiny"``, ``"gl"`` or ``"auto"``, the renderer of :attr:`visuals`.
         variant: number of the scenery's variant (goods, colours, wear).
@@ -66,7 +66,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         )
         if renderer not in RENDERERS:
             raise SimError(not_one_of("renderer", renderer, RENDERERS))
-        self.layout = WarehouseLayout.crossing() if layout is None else layout
+        self.layout = WarehouseLayout.named("crossing") if layout is None else layout
         self._renderer: RendererName = renderer
         self._variant = variant
         self._visuals: Visuals | None = None
@@ -85,7 +85,8 @@ class Warehouse(AbstractContextManager["Warehouse"]):
             enableConeFriction=0,
             physicsClientId=self.client,
         )
-        self._static_bodies = frozenset({self._add_floor(), *self._add_boxes()})
+        self._add_floor()
+        self._add_boxes()
 
     @property
     def visuals(self) -> Visuals:
@@ -144,11 +145,6 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         """The simulated time since the start, a whole number of steps."""
         return self._steps * self.physics_dt_s
 
-    @property
-    def static_bodies(self) -> frozenset[int]:
-        """PyBullet's ids of the floor, the racks, the walls and the props."""
-        return self._static_bodies
-
     def step(self) -> None:
         """Advance the physics by ``physics_dt_s``."""
         if self.client < 0:
@@ -156,7 +152,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         pybullet.stepSimulation(physicsClientId=self.client)
         self._steps += 1
 
-    def _add_floor(self) -> int:
+    def _add_floor(self) -> None:
         shape = pybullet.createCollisionShape(
             pybullet.GEOM_PLANE, planeNormal=[0.0, 0.0, 1.0], physicsClientId=self.client
         )
@@ -173,10 +169,8 @@ class Warehouse(AbstractContextManager["Warehouse"]):
             physicsClientId=self.client,
         )
         self._make_static(body)
-        return body
 
-    def _add_boxes(self) -> list[int]:
-        bodies = []
+    def _add_boxes(self) -> None:
         for (x_min, y_min, x_max, y_max), height in zip(
             self.obstacle_boxes_odom.tolist(), self.layout.obstacle_heights_m.tolist(), strict=True
         ):
@@ -193,8 +187,6 @@ class Warehouse(AbstractContextManager["Warehouse"]):
                 physicsClientId=self.client,
             )
             self._make_static(body)
-            bodies.append(int(body))
-        return bodies
 
     def _make_static(self, body: int) -> None:
         pybullet.setCollisionFilterGroupMask(

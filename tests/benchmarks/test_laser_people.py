@@ -10,7 +10,7 @@ from benchmarks.laser_trolley import TROLLEY_SIZE_M, Trolley
 from benchmarks.laser_wanderer import Wanderer
 from perception.laser import LegDetectorConfig
 from sim_tests.actors.body import worker_names
-from sim_tests.world.hall import LAYOUTS
+from sim_tests.world.hall import LAYOUTS, WarehouseLayout
 from sim_tests.world.sightlines import cut_surfaces
 from training.legs import TRAINING_HALLS, TRAINING_WORKERS
 
@@ -92,7 +92,7 @@ def test_every_hall_keeps_its_figures() -> None:
 
 
 def test_a_wanderer_keeps_clear_of_boxes_and_moves() -> None:
-    boxes = LAYOUTS["staging_hall"]().obstacle_boxes_odom
+    boxes = WarehouseLayout.named("staging_hall").obstacle_boxes_odom
     wanderer = Wanderer(boxes, np.random.default_rng(3), 0.35, (0.6, 1.7), 0.2)
     places = []
     for tick in range(500):

@@ -90,8 +90,8 @@ def test_other_installed_before_ours_and_the_remedy(
     environment.borrow_dependencies()
     environment.pip("install", "--quiet", foreign_wheel(tmp_path, "perception"))
     environment.pip("install", "--quiet", "--no-deps", wheel)
-    for package in ("perception", "tracking", "nav_adapter"):
-        assert_reported(environment.python(f"import {package}"), "perception")
+    # The other one's modules beside ours do no harm.
+    assert environment.python("import nav_adapter").returncode == 0
 
     # Uninstalling takes away the __init__.py that both had put there.
     environment.pip("uninstall", "--quiet", "--yes", "other-vision")
@@ -117,22 +117,10 @@ def test_stray_package_or_module_ahead_on_the_path_is_named_by_its_path(
     assert_reported(done, "perception", f"unknown distribution at {place}.")
 
 
-def test_good_installation_needs_no_scan_and_users_files_are_welcome(installed: Any) -> None:
+def test_a_good_installation_needs_no_scan(installed: Any) -> None:
     folder = installed.site.relative_to(installed.folder).as_posix()
-    guard = GUARD_ALONE.replace("FOLDER", folder)
-    done = installed.python(guard)
+    done = installed.python(GUARD_ALONE.replace("FOLDER", folder))
     assert done.returncode == 0, done.stderr
-
-    own = [installed.site / "perception" / name for name in ("my_camera.yaml", "my_detector.py")]
-    own[0].write_text("width: 640\n")
-    done = installed.python(guard)
-    assert done.returncode == 0, done.stderr
-
-    own[1].write_text("")
-    done = installed.python("import nav_adapter")
-    assert done.returncode == 0, done.stderr
-    for path in own:
-        path.unlink()
 
 
 def test_checkout_imports_without_a_scan(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, PerceptionError
+from perception import AttentionCone
 
 coordinate = st.floats(-10.0, 10.0, allow_nan=False)
 point = st.tuples(coordinate, coordinate, coordinate).map(np.array)
@@ -88,27 +88,3 @@ def test_the_highest_score_of_several_points_of_the_robot_counts():
     parts = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert cone.score([0, 0, 0], [0, 1, 0], parts) == 1.0
     assert cone.score([0, 0, 0], [0, 0, 1], parts) == 0.0
-
-
-def test_a_target_at_the_apex_has_score_0():
-    assert AttentionCone().score([1, 2, 3], [1, 0, 0], [1, 2, 3]) == 0.0
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (([0, 0, 0], [0, 0, 0], [1, 0, 0]), "gaze"),
-        (([0, 0], [1, 0, 0], [1, 0, 0]), "apex_m"),
-        (([0, 0, 0], [1, 0, 0], [math.nan, 0, 0]), "target_m"),
-        ((np.zeros((3, 3)), np.ones((3, 3)), np.ones((4, 3))), "equal lengths"),
-    ],
-)
-def test_invalid_input_is_refused_by_name(arguments, message):
-    with pytest.raises(PerceptionError, match=message):
-        AttentionCone().score(*arguments)
-
-
-@pytest.mark.parametrize("angle", [0.0, -1.0, math.pi / 2, math.nan])
-def test_invalid_half_angles_are_refused(angle):
-    with pytest.raises(PerceptionError, match="half_angle_rad"):
-        AttentionCone(angle)

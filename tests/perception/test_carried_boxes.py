@@ -16,8 +16,7 @@ from perception import (
     PersonKeypoints,
     PnpHeadPoseEstimator,
 )
-from perception._frame_time import FrameBudget
-from perception._scene_changes import SceneChanges
+from perception._people_finder import SceneChanges
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 HALL = np.random.default_rng(3).integers(90, 130, (480, 640, 1)).astype(np.uint8)
@@ -132,7 +131,7 @@ def test_between_looks_boxes_follow_and_awareness_is_of_the_same_image():
     assert len({round(each.awareness, 3) for (each,) in found}) > 15
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(rate_hz=st.floats(5.0, 100.0), every_s=st.floats(0.01, 0.2))
 def test_two_looks_are_never_farther_apart_than_asked(rate_hz, every_s):
     world = World(stander)
@@ -145,7 +144,7 @@ def test_two_looks_are_never_farther_apart_than_asked(rate_hz, every_s):
         assert gaps[:-1].min(initial=np.inf) > every_s - 1.0 / rate_hz - 1e-6
 
 
-@pytest.mark.parametrize("start_s", [0.05, 0.1, 0.31, 0.4, 0.449])
+@pytest.mark.parametrize("start_s", [0.05, 0.31, 0.449])
 def test_a_newcomer_is_found_in_the_first_image_of_a_camera_that_stands_still(start_s):
     world = World(stander, lambda t_s: None if t_s < start_s else (-1.2, 4.0, 0.0))
     seen = world.run(pipeline(world, 0.2), 14)
@@ -154,7 +153,7 @@ def test_a_newcomer_is_found_in_the_first_image_of_a_camera_that_stands_still(st
     assert len(world.looks) < 14
 
 
-@pytest.mark.parametrize("start_s", [0.05, 0.1, 0.31, 0.4, 0.449])
+@pytest.mark.parametrize("start_s", [0.05, 0.31, 0.449])
 def test_a_newcomer_is_found_within_the_time_asked_by_a_camera_that_moves(start_s):
     world = World(
         stander,
@@ -241,12 +240,6 @@ def test_after_a_failure_the_detector_looks():
     assert len(world.looks) == count + 1
 
 
-@pytest.mark.parametrize("every_s", [-0.01, 0.21, math.nan, "often"])
-def test_an_interval_beyond_its_limits_is_refused(every_s):
-    with pytest.raises(PerceptionError, match="detect_every_s"):
-        pipeline(World(stander), every_s)
-
-
 def changed(image, boxes=(), reference=None):
     changes = SceneChanges()
     changes.refer_to(np.repeat(HALL, 3, axis=2) if reference is None else reference)
@@ -276,124 +269,3 @@ def test_a_person_sized_change_counts_unless_it_is_in_a_box(size):
 
 def test_without_a_reference_everything_is_new():
     assert SceneChanges().found_in(np.zeros((48, 64, 3), np.uint8), [])
-
-
-class SlowWorld(World):
-    """A world whose detector and pose network take a given time of an injected clock."""
-
-    detector_s, pose_s, clock_s = 0.0, 0.0, 0.0
-
-    def detect(self, image_rgb):
-        self.clock_s += self.detector_s
-        return super().detect(image_rgb)
-
-    def estimate(self, image_rgb, detections):
-        self.clock_s += self.pose_s
-        return super().estimate(image_rgb, detections)
-
-    def run_on_clock(self, pipe, seconds):
-        """Process frames as a live camera gives them; return the period of each in seconds."""
-        periods = []
-        end_s = self.t_s + seconds
-        while self.t_s < end_s:
-            before_s = self.clock_s
-            pipe.process(self.image(), self.t_s)
-            periods.append(max(self.clock_s - before_s, 1.0 / RATE_HZ))
-            self.t_s += periods[-1]
-        return periods
-
-
-@pytest.mark.parametrize("slow", [1.0, 2.0, 3.0])
-def test_a_budget_holds_20_frames_per_second_on_cores_three_times_slower(slow, monkeypatch):
-    world = SlowWorld(stander)
-    # Of one image on the faster core; every image would take 69 ms on the slowest.
-    world.detector_s, world.pose_s = 0.013 * slow, 0.010 * slow
-    monkeypatch.setattr("perception._frame_time.perf_counter", lambda: world.clock_s)
-    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
-    world.run_on_clock(pipe, 1.0)
-    world.looks.clear()
-    periods = world.run_on_clock(pipe, 2.0)
-    if slow == 1.0:
-        assert len(world.looks) == len(periods)
-    if slow == 3.0:
-        # Images with a look take 69 ms and the others 30; a camera's queue of one evens it out.
-        assert 0.1 < max(np.diff(world.looks)) <= 0.2 + 1e-6
-        busy_s = len(world.looks) * world.detector_s + len(periods) * world.pose_s
-        assert busy_s / len(periods) < 0.05
-
-
-def test_a_budget_lets_the_detector_look_more_often_again(monkeypatch):
-    world = SlowWorld(stander)
-    world.detector_s, world.pose_s = 0.05, 0.03
-    monkeypatch.setattr("perception._frame_time.perf_counter", lambda: world.clock_s)
-    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
-    world.run_on_clock(pipe, 1.5)
-    assert pipe._people._carrier.every_s > 0.1
-    world.detector_s, world.pose_s = 0.01, 0.01
-    world.run_on_clock(pipe, 6.0)
-    assert pipe._people._carrier.every_s == 0.0
-
-
-def test_a_budget_between_two_intervals_does_not_swing():
-    for rest_ms in np.arange(1.0, 60.0, 1.0):
-        budget = FrameBudget(0.05)
-        chosen = []
-        for _ in range(300):
-            budget.record(0.02, 1e-3 * rest_ms)
-            chosen.append(budget.every_s)
-        assert len(set(chosen[150:])) == 1
-
-
-class SmallerWorld(SlowWorld):
-    """A slow world whose detector also comes with half of the pixels, and then half the time."""
-
-    def smaller(self):
-        world = self
-
-        class Half:
-            def detect(self, image_rgb):
-                world.clock_s += 0.5 * world.detector_s
-                return World.detect(world, image_rgb)
-
-        return ((Half(), 0.5),)
-
-
-def test_where_seldom_looks_are_not_enough_the_input_gets_smaller(monkeypatch):
-    world = SmallerWorld(stander)
-    # 0.03 + 0.12 / 4 = 60 ms with the longest interval, 45 with half of the pixels.
-    world.detector_s, world.pose_s = 0.12, 0.03
-    monkeypatch.setattr("perception._frame_time.perf_counter", lambda: world.clock_s)
-    pipe = AwarenessPipeline(CAMERA, world, world, frame_budget_s=0.05)
-    assert pipe.last_timings.detector_share == 1.0
-    world.run_on_clock(pipe, 2.0)
-    assert pipe._people._carrier.every_s == 0.2
-    assert pipe.last_timings.detector_share == 0.5
-    world.detector_s, world.pose_s = 0.04, 0.02
-    world.run_on_clock(pipe, 6.0)
-    assert pipe.last_timings.detector_share == 1.0
-    assert pipe._people._carrier.every_s > 0.0
-
-
-def test_the_input_gets_no_smaller_while_the_interval_can_grow():
-    for rest_ms in np.arange(1.0, 60.0, 1.0):
-        budget = FrameBudget(0.05, (1.0, 0.7, 0.5))
-        chosen = []
-        for _ in range(300):
-            budget.record(0.04 * budget.share, 1e-3 * rest_ms)
-            chosen.append((budget.every_s, budget.share))
-        assert len(set(chosen[150:])) == 1
-        assert all(every_s == 0.2 or share == 1.0 for every_s, share in chosen)
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"frame_budget_s": 0.0}, "frame_budget_s"),
-        ({"frame_budget_s": math.nan}, "frame_budget_s"),
-        ({"frame_budget_s": 0.05, "detect_every_s": 0.1}, "got both"),
-    ],
-)
-def test_a_budget_that_cannot_be_is_refused(options, words):
-    world = World(stander)
-    with pytest.raises(PerceptionError, match=words):
-        AwarenessPipeline(CAMERA, world, world, **options)

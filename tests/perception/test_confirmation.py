@@ -11,17 +11,16 @@ from synthetic_people import person_at
 from perception import (
     AwarenessPipeline,
     Camera,
-    PerceptionError,
     PersonDetection,
     PersonKeypoints,
     PnpHeadPoseEstimator,
 )
-from perception.confirmation import KeypointConfirmation
-from perception.shipped import shipped_detector, shipped_pose_estimator
+from perception.confirmation import FoundPerson, KeypointConfirmation
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 FRAME = np.zeros((480, 640, 3), np.uint8)
 RULE = KeypointConfirmation()
+NEUTRAL, CERTAIN, WEIGHT, MOST = 0.4, 0.4, 3.0, 8
 probabilities = st.floats(0.0, 1.0)
 
 
@@ -37,7 +36,7 @@ def keypoints(*scores):
 
 @given(probabilities)
 def test_neutral_keypoints_leave_the_score_as_it_is(score):
-    assert RULE.score(detection(score), keypoints(RULE.neutral)) == pytest.approx(score, abs=2e-4)
+    assert RULE.score(detection(score), keypoints(NEUTRAL)) == pytest.approx(score, abs=2e-4)
 
 
 @given(probabilities, probabilities, probabilities, probabilities)
@@ -49,15 +48,14 @@ def test_the_score_grows_with_the_detectors_and_with_the_keypoints(first, second
     assert least <= RULE.score(detection(first), keypoints(high))
 
 
-@given(probabilities, st.floats(0.01, 0.99), st.floats(0.0, 6.0))
-def test_the_odds_are_multiplied(score, seen, weight):
-    rule = KeypointConfirmation(certain_score=1.0, weight=weight)
-    found = rule.score(detection(min(max(score, 0.01), 0.99)), keypoints(seen))
+@given(st.floats(0.01, CERTAIN - 1e-6), st.floats(0.01, 0.99))
+def test_the_odds_are_multiplied(score, seen):
+    found = RULE.score(detection(score), keypoints(seen))
 
     def odds(probability):
         return probability / (1.0 - probability)
 
-    wanted = odds(min(max(score, 0.01), 0.99)) * (odds(seen) / odds(rule.neutral)) ** weight
+    wanted = odds(score) * (odds(seen) / odds(NEUTRAL)) ** WEIGHT
     assert found == pytest.approx(wanted / (1.0 + wanted), rel=1e-6, abs=1e-9)
 
 
@@ -66,66 +64,54 @@ def test_four_hidden_keypoints_do_not_count():
     assert RULE.score(detection(0.3), half) == RULE.score(detection(0.3), keypoints(0.8))
 
 
-@given(st.floats(RULE.certain_score, 1.0), probabilities)
+@given(st.floats(CERTAIN, 1.0), probabilities)
 def test_a_certain_detection_is_kept_whatever_the_keypoints_say(score, seen):
-    pair = [detection(score)], [keypoints(seen)]
-    rows, (kept,) = RULE.confirmed(*pair, [None])
-    assert rows == [0]
-    assert kept.score >= RULE.score_threshold
+    (kept,) = RULE.confirmed([FoundPerson(detection(score), keypoints(seen), None)])
+    assert kept.detection.score >= RULE.score_threshold
+
+
+def kept_rows(detections, people, reasons):
+    """Return the rows of the detections that are people."""
+    found = [FoundPerson(*each) for each in zip(detections, people, reasons, strict=True)]
+    kept = [one.keypoints for one in RULE.confirmed(found)]
+    return [row for row, person in enumerate(people) if any(person is each for each in kept)]
 
 
 def test_candidates_of_the_detector_need_good_keypoints_of_their_own():
     found = [detection(0.1, (100.0 * k, 0.0, 100.0 * k + 50.0, 200.0)) for k in range(3)]
     people = [keypoints(0.8), keypoints(0.3), keypoints(0.8)]
-    rows, kept = RULE.confirmed(found, people, [None, None, "no body has such limbs"])
-    assert rows == [0]
-    assert kept[0].score == RULE.score(found[0], people[0]) > 0.5
+    assert kept_rows(found, people, [None, None, "no body has such limbs"]) == [0]
+    assert RULE.score(found[0], people[0]) > 0.5
     # What the detector reports by itself stays without an owner of its skeleton, as before.
     strong = [detection(0.3)]
-    assert RULE.confirmed(strong, [keypoints(0.8)], ["no body has such limbs"])[0] == [0]
+    assert kept_rows(strong, [keypoints(0.8)], ["no body has such limbs"]) == [0]
 
 
 def test_a_part_of_a_better_person_is_nobody_of_its_own():
     whole = detection(0.6, (100.0, 100.0, 200.0, 400.0))
     trunk = (120.0, 110.0, 190.0, 250.0)
     good = [keypoints(0.7), keypoints(0.7)]
-    assert RULE.confirmed([detection(0.1, trunk), whole], good, [None, None])[0] == [1]
-    assert RULE.confirmed([whole, detection(0.3, trunk)], good, [None, None])[0] == [0, 1]
+    assert kept_rows([detection(0.1, trunk), whole], good, [None, None]) == [1]
+    assert kept_rows([whole, detection(0.3, trunk)], good, [None, None]) == [0, 1]
     shared = [None, "head of another person"]
-    assert RULE.confirmed([whole, detection(0.3, trunk)], good, shared)[0] == [0]
-    assert RULE.confirmed([whole, detection(0.5, trunk)], good, shared)[0] == [0, 1]
+    assert kept_rows([whole, detection(0.3, trunk)], good, shared) == [0]
+    assert kept_rows([whole, detection(0.5, trunk)], good, shared) == [0, 1]
     beside = detection(0.1, (180.0, 100.0, 280.0, 400.0))
-    assert RULE.confirmed([whole, beside], good, [None, None])[0] == [0, 1]
+    assert kept_rows([whole, beside], good, [None, None]) == [0, 1]
 
 
-@given(st.lists(probabilities, max_size=30), st.integers(0, 10))
-def test_only_the_best_candidates_cost_a_run(scores, most):
-    rule = KeypointConfirmation(most=most)
+@given(st.lists(probabilities, max_size=30))
+def test_only_the_best_candidates_cost_a_run(scores):
     found = [detection(score) for score in scores]
-    looked_at = [each.score for each in rule.candidates(found)]
-    strong = [score for score in scores if score >= rule.score_threshold]
-    weak = sorted((s for s in scores if s < rule.score_threshold), reverse=True)
-    assert [score for score in looked_at if score >= rule.score_threshold] == strong
-    kept = sorted((s for s in looked_at if s < rule.score_threshold), reverse=True)
+    looked_at = [each.score for each in RULE.candidates(found)]
+    strong = [score for score in scores if score >= RULE.score_threshold]
+    weak = sorted((s for s in scores if s < RULE.score_threshold), reverse=True)
+    assert [score for score in looked_at if score >= RULE.score_threshold] == strong
+    kept = sorted((s for s in looked_at if s < RULE.score_threshold), reverse=True)
     assert kept == weak[: len(kept)]
-    assert len(kept) >= min(most, len(weak))
+    assert len(kept) >= min(MOST, len(weak))
     # Equal scores are all looked at.
-    assert len(kept) <= most or kept[-1] == weak[most - 1]
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"score_threshold": 1.5}, "score_threshold"),
-        ({"candidate_score": float("nan")}, "candidate_score"),
-        ({"weight": -1.0}, "weight"),
-        ({"neutral": 0.0}, "neutral"),
-        ({"most": -1}, "most"),
-    ],
-)
-def test_bad_values_are_refused(values, message):
-    with pytest.raises(PerceptionError, match=message):
-        KeypointConfirmation(**values)
+    assert len(kept) <= MOST or kept[-1] == weak[MOST - 1]
 
 
 class Weak:
@@ -264,12 +250,3 @@ def test_a_carried_box_is_not_judged_again():
     scores = [pipe.process(FRAME, 0.05 * step)[0].score for step in range(8)]
     assert world.looks < 8
     assert scores == pytest.approx([scores[0]] * 8)
-
-
-def test_the_shipped_detector_is_confirmed_by_the_shipped_pose_network_only():
-    whole = AwarenessPipeline(CAMERA)
-    assert whole._people._confirmation == RULE
-    own_pose = AwarenessPipeline(CAMERA, pose_estimator=shipped_pose_estimator())
-    assert own_pose._people._confirmation is None
-    own_detector = AwarenessPipeline(CAMERA, shipped_detector())
-    assert own_detector._people._confirmation is None

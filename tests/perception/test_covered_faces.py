@@ -93,8 +93,8 @@ def found(shown, noise_px=1.0):
 
 @pytest.mark.parametrize(
     ("torso", "noise_px", "head_yaw"),
-    [(False, 1.0, 0.6), (False, 2.0, 1.2), (True, 1.0, 1.2)],
-    ids=["no torso", "no torso, turned, 2 px", "torso, turned"],
+    [(False, 2.0, 1.2), (True, 1.0, 1.2)],
+    ids=["no torso, 2 px", "torso"],
 )
 @pytest.mark.parametrize("covered", COVERED)
 def test_a_covered_face_is_never_surely_turned_away(covered, torso, noise_px, head_yaw):
@@ -115,12 +115,11 @@ def test_a_covered_face_is_never_surely_turned_away(covered, torso, noise_px, he
     [(0, 1, 1, 1, 1), (0, 0.4, 0.4, 1, 1), (0, 1, 0, 1, 1), (1, 0, 1, 1, 1), (1, 1, 1, 1, 1)],
     ids=["eyes", "weak eyes", "one eye", "nose and an eye", "the whole face"],
 )
-@pytest.mark.parametrize("moved", [False, True], ids=["in place", "on the hair"])
-def test_backs_of_heads_with_guessed_faces_are_not_aware(guessed, moved, torso):
+def test_backs_of_heads_with_guessed_faces_are_not_aware(guessed, torso):
     rng = np.random.default_rng(7300)
     shown = people(7301, guessed, head_yaw=0.5, body_yaw=math.pi, torso=torso)
-    if moved:
-        shown = [(person, _face_on_the_hair(keypoints, rng)) for person, keypoints in shown]
+    # The network places the face on the hair.
+    shown = [(person, _face_on_the_hair(keypoints, rng)) for person, keypoints in shown]
     *_, alpha, std, truth = found(shown).T
     assert truth.max(initial=0.0) < 0.05
     assert (alpha >= 0.5).sum() <= 0.005 * COUNT

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from perception import AttentionCone, Camera, HeadPose, PersonKeypoints, PnpHeadPoseEstimator
 from perception.anthropometry import EYES_HEAD_M
-from perception.awareness import awareness_of, cone_scores, estimate_awareness
+from perception.awareness import estimate_awareness
 from perception.evidence import FaceEvidence, judge_face
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -214,15 +214,8 @@ def test_a_face_of_twelve_pixels_is_a_weak_measurement():
 # --- α and its standard deviation ----------------------------------------------------------------
 
 
-@given(st.floats(0.0, math.pi))
-def test_scores_from_angles_equal_scores_from_positions(angle):
-    target = np.array([math.sin(angle), 0.0, math.cos(angle)])
-    direct = CONE.score(np.zeros(3), [0.0, 0.0, 1.0], target)
-    assert cone_scores(CONE, np.array([math.cos(angle)]))[0] == pytest.approx(direct, abs=1e-6)
-
-
-@pytest.mark.parametrize("yaw_deg", [0, 15, 30, 50, 58, 63, 75])
-@pytest.mark.parametrize("std_deg", [2.0, 8.0, 20.0])
+@pytest.mark.parametrize("yaw_deg", [0, 30, 58, 63])
+@pytest.mark.parametrize("std_deg", [2.0, 20.0])
 def test_the_standard_deviation_is_the_rms_difference_of_alpha_and_truth(yaw_deg, std_deg):
     """Monte Carlo with random errors of the gaze and random directions of the eyes."""
     head = head_at(yaw_deg, std_rad=math.radians(std_deg))
@@ -238,29 +231,6 @@ def test_the_standard_deviation_is_the_rms_difference_of_alpha_and_truth(yaw_deg
     apex = np.array([0.0, 0.0, 2.0])
     truth = CONE.score(np.tile(apex, (count, 1)), rotations[:, :, 1], np.zeros((count, 3)))
     assert std == pytest.approx(math.sqrt(np.mean((truth - alpha) ** 2)), rel=0.08, abs=0.004)
-
-
-def test_the_standard_deviation_is_calibrated_with_eye_movements():
-    """For heads on the cone's flank, the true α lies within one σ in about 68 % of cases."""
-    rng = np.random.default_rng(1)
-    eyes = (math.radians(7.0), math.radians(3.4))
-    within = []
-    for _ in range(1500):
-        true_yaw, std = rng.uniform(10.0, 45.0), math.radians(rng.uniform(2.0, 8.0))
-        error = Rotation.from_rotvec(rng.normal(0.0, std, 3)).as_matrix()
-        true = head_at(true_yaw)
-        measured = HeadPose(
-            true.position_camera_m,
-            error @ true.rotation_camera_head,
-            np.diag([std**2] * 3 + [1e-10] * 3),
-            0.0,
-        )
-        turn = Rotation.from_rotvec(rng.normal(0.0, [eyes[0], 0.0, eyes[1]])).as_matrix()
-        gaze = (true.rotation_camera_head @ turn)[:, 1]
-        eyes_at = true.position_camera_m + true.rotation_camera_head @ EYES_HEAD_M
-        alpha, sigma = awareness(measured, eyes=eyes)
-        within.append(abs(CONE.score(eyes_at, gaze, np.zeros(3)) - alpha) < sigma)
-    assert 0.60 <= np.mean(within) <= 0.76
 
 
 @given(st.floats(0.0, 180.0), st.floats(0.01, 1.0), st.floats(0.0, 0.5), st.floats(0.0, 1.0))
@@ -330,20 +300,12 @@ def test_sideways_eye_movements_matter_for_a_robot_beside_the_gaze_only():
     assert beside > 3.0 * above
 
 
-def test_awareness_of_does_not_include_eye_movements():
-    head = head_at(30.0, std_rad=0.05)
-    alpha, std = awareness_of(CONE, head, ROBOT)
-    estimate, estimate_std = awareness(head)
-    assert estimate == pytest.approx(alpha, abs=0.01)
-    assert estimate_std == pytest.approx(std, rel=0.05)
-    assert awareness(head, eyes=(0.12, 0.06))[1] > 1.5 * std
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("height_px", [(40.0, 110.0), (110.0, 400.0)], ids=["small", "large"])
 def test_random_keypoints_with_good_scores_are_hardly_ever_aware(height_px):
     """Keypoints drawn evenly in a box, all with a score of at least 0.5."""
     rng = np.random.default_rng(77)
-    estimator, aware, count = PnpHeadPoseEstimator(), 0, 600
+    estimator, aware, count = PnpHeadPoseEstimator(), 0, 200
     for _ in range(count):
         height = rng.uniform(*height_px)
         size = np.array([height * rng.uniform(0.3, 0.6), height])

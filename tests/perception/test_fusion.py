@@ -14,7 +14,6 @@ from perception import (
     AttentionCone,
     FusedHeadPoseEstimator,
     HeadPose,
-    PerceptionError,
     PersonKeypoints,
 )
 from perception.awareness import estimate_awareness
@@ -106,7 +105,7 @@ def test_contradicting_poses_give_no_confident_awareness(turn, one, two, swap):
 
 def test_fused_poses_are_consistent_over_a_population():
     rng = np.random.default_rng(0)
-    count, stds = 2000, (0.08, 0.15)
+    count, stds = 500, (0.08, 0.15)
     poses = [
         [head(rng.normal(0.0, std, 3), std, shift=rng.normal(0.0, 0.05, 3)) for std in stds]
         for _ in range(count)
@@ -147,12 +146,3 @@ def test_a_pose_of_only_one_estimator_is_kept():
     three = FusedHeadPoseEstimator(*(FixedEstimator(first) for _ in range(3)))
     (combined,) = three.estimate(None, None, (PERSON,))
     np.testing.assert_allclose(combined.covariance, first.covariance / 3.0, rtol=1e-6)
-
-
-def test_invalid_estimators_are_refused():
-    with pytest.raises(PerceptionError, match="two or more"):
-        FusedHeadPoseEstimator(FixedEstimator())
-    with pytest.raises(PerceptionError, match="estimate"):
-        FusedHeadPoseEstimator(FixedEstimator(), 5)
-    with pytest.raises(PerceptionError, match="one result per person"):
-        FusedHeadPoseEstimator(FixedEstimator(), FixedEstimator()).estimate(None, None, (PERSON,))

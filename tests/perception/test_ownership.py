@@ -20,9 +20,9 @@ from perception import (
     PersonDetection,
     PersonKeypoints,
 )
+from perception.confirmation import DISOWNED, disowned_keypoints, without_disowned
 from perception.layouts import HEAD
 from perception.networks import MediaPipePoseEstimator
-from perception.ownership import DISOWNED, disowned_keypoints, without_disowned
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 WIDE = Camera.from_fov(1920, 1200, math.radians(120.0))
@@ -232,38 +232,6 @@ def test_an_observation_says_why_there_is_no_awareness(change, reason):
 # --- on photographs -----------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(not (SHARED / "images").is_dir(), reason="no photographs beside the checkout")
-@pytest.mark.parametrize("overlap", [0.0, 0.2, 0.4, 0.5, 0.6])
-def test_people_pasted_side_by_side_never_share_a_skeleton(overlap):
-    """Of every pair of neighbours in a list of people, cut out of photographs."""
-    pytest.importorskip("mediapipe", reason="mediapipe is not installed (the extra 'mediapipe')")
-    detector = OnnxPersonDetector(
-        SHARED / "models" / "rtmdet_nano_person_320_mmpose.onnx", score_threshold=0.3
-    )
-    camera = Camera.from_fov(700, 400, math.radians(60.0))
-    cut = list(_cut_people(detector))
-    assert len(cut) >= 6
-    with MediaPipePoseEstimator() as poses:
-        for left, right in itertools.pairwise(cut):
-            image = np.full((400, 700, 3), 120, np.uint8)
-            image[50:350, 100 : 100 + left.shape[1]] = left
-            start = 100 + round(left.shape[1] - overlap * min(left.shape[1], right.shape[1]))
-            image[50:350, start : start + right.shape[1]] = right
-            detections = detector.detect(image)
-            people = poses.estimate(image, detections)
-            found = disowned_keypoints(camera, detections, people, 0.3)
-            own = [
-                person
-                for person, reason in zip(people, found, strict=True)
-                if reason in (None, SHARED_HEAD) and (person.scores >= 0.3).sum() >= 5
-            ]
-            for one, other in itertools.combinations(own, 2):
-                both = (one.scores >= 0.3) & (other.scores >= 0.3)
-                away = np.linalg.norm(one.keypoints_px - other.keypoints_px, axis=1)
-                assert both.sum() < 5 or np.median(away[both]) > 10.0
-
-
 # People whose head is turned away by more than 90 degrees, by eye: photograph and box.
 TURNED_AWAY = [
     ("coco_000000196141", (455, 204, 633, 415)),
@@ -324,15 +292,3 @@ def _overlap(first, second):
     sides = np.minimum(first[2:], second[2:]) - np.maximum(first[:2], second[:2])
     both = float(np.prod(np.maximum(sides, 0.0)))
     return both / (float(np.prod(first[2:] - first[:2]) + np.prod(second[2:] - second[:2])) - both)
-
-
-def _cut_people(detector):
-    """Yield people who fill most of their box, as pictures 300 pixels high."""
-    for path in sorted((SHARED / "images").glob("*.jpg")):
-        image = cv2.imread(str(path))[..., ::-1]
-        for each in detector.detect(np.ascontiguousarray(image)):
-            limits = [image.shape[1], image.shape[0]] * 2
-            left, top, right, bottom = np.clip(np.rint(each.box_xyxy_px), 0, limits).astype(int)
-            if each.score > 0.6 and bottom - top > 150:
-                crop = np.ascontiguousarray(image[top:bottom, left:right])
-                yield cv2.resize(crop, (round(300 * (right - left) / (bottom - top)), 300))

@@ -12,10 +12,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import AwarenessPipeline, Camera, FloorPlane, PerceptionError, PersonObservation
+from perception import AwarenessPipeline, Camera, PerceptionError, PersonObservation
 from perception.surround import (
     FisheyeLens,
-    FlatView,
     PanoramaLens,
     SurroundPipeline,
     merge_views,
@@ -88,13 +87,6 @@ def test_a_fisheye_sees_nothing_beyond_its_circle() -> None:
     pixels = lens.project([at(1.6, 2.0) * [1, 0, 1], at(1.7, 2.0), [0.0, 0.0, -1.0]])
     assert np.isfinite(pixels[0]).all()
     assert np.isnan(pixels[1:]).all()
-
-
-def test_a_fisheye_polynomial_that_decreases_is_refused() -> None:
-    with pytest.raises(PerceptionError, match=r"must grow up to max_angle_rad = 1\.7"):
-        FisheyeLens(1000, 1000, 250.0, 250.0, 500.0, 500.0, np.array([-0.5, 0, 0, 0]))
-    with pytest.raises(PerceptionError, match=r"max_angle_rad must lie in \(0, pi\], got 4 rad"):
-        FisheyeLens(1000, 1000, 250.0, 250.0, 500.0, 500.0, max_angle_rad=4.0)
 
 
 def test_a_ros_calibration_of_a_fisheye_is_read(tmp_path) -> None:
@@ -181,8 +173,6 @@ def test_each_view_shows_its_directions(lens) -> None:
 
 def test_in_camera_rotates_position_covariance_and_gaze() -> None:
     seen = person(np.array([0.3, 0.2, 2.0]), gaze_camera=np.array([0.6, 0.0, -0.8]))
-    assert RING[1].in_camera(seen).legs_camera_m is None
-    seen = replace(seen, legs_camera_m=np.array([0.3, 1.0, 1.6]))
     for view, place, gaze in zip(
         RING,
         [(0.3, 0.2, 2.0), (-2.0, 0.2, 0.3), (-0.3, 0.2, -2.0), (2.0, 0.2, -0.3)],
@@ -192,11 +182,6 @@ def test_in_camera_rotates_position_covariance_and_gaze() -> None:
         turned = view.in_camera(seen)
         np.testing.assert_allclose(turned.position_camera_m, place, atol=1e-12)
         np.testing.assert_allclose(turned.gaze_camera, gaze, atol=1e-12)
-        np.testing.assert_allclose(
-            turned.legs_camera_m - turned.position_camera_m,
-            view.rotation_camera_view @ [0.0, 0.8, -0.4],
-            atol=1e-12,
-        )
         np.testing.assert_allclose(
             np.linalg.eigvalsh(turned.position_covariance_m2),
             np.linalg.eigvalsh(seen.position_covariance_m2),
@@ -285,28 +270,3 @@ def test_a_box_of_a_view_is_mapped_to_the_image_of_the_lens() -> None:
         assert (pixels <= box[2:] + 0.5).all()
     narrow = FisheyeLens(400, 400, 100.0, 100.0, 200.0, 200.0, max_angle_rad=1.0)
     assert RING[1].box_in(narrow, corners) is None
-
-
-def test_invalid_arguments_are_refused() -> None:
-    lens = PanoramaLens(360, 180)
-    with pytest.raises(PerceptionError, match="at least one view"):
-        SurroundPipeline(lens, ())
-    pipeline = SurroundPipeline(lens, RING)
-    with pytest.raises(PerceptionError, match=r"\(180, 360, 3\), got \(90, 360, 3\)"):
-        pipeline.process(np.zeros((90, 360, 3), np.uint8), 0.0)
-    with pytest.raises(PerceptionError, match="uint8"):
-        pipeline.process(np.zeros((180, 360, 3)), 0.0)
-    with pytest.raises(PerceptionError, match=r"one list of observations per view \(4\), got 1"):
-        merge_views(RING, [[]])
-    with pytest.raises(PerceptionError, match="at least one heading"):
-        ring_of_views(FLAT, [])
-    with pytest.raises(PerceptionError, match="rotation"):
-        FlatView(FLAT, np.diag([1.0, 1.0, -1.0]))
-    with pytest.raises(PerceptionError, match="whole number of pixels"):
-        PanoramaLens(3.5, 2)  # type: ignore[arg-type]
-
-
-def test_a_black_panorama_has_no_people() -> None:
-    pipeline = SurroundPipeline(PanoramaLens(360, 180), RING)
-    floor = FloorPlane(np.array([0.0, -1.0, 0.0]), 1.5)
-    assert pipeline.process(np.zeros((180, 360, 3), np.uint8), 0.0, floor) == ()

@@ -63,14 +63,13 @@ def headings_seen(pipeline: SurroundPipeline, index: int, *headings_deg: float) 
     return sorted(round(math.degrees(math.atan2(-place[0], place[2]))) for place in places)
 
 
-@pytest.mark.parametrize("settings", [{"detect_every_s": 0.2}, {"frame_budget_s": 1e-6}])
 @pytest.mark.parametrize("cameras", ["one", "each"])
-def test_everybody_is_seen_in_every_image(settings, cameras) -> None:
+def test_everybody_is_seen_in_every_image(cameras) -> None:
     networks, made = Networks(), []
 
     def make(camera: Camera) -> AwarenessPipeline:
         made.append(camera)
-        return AwarenessPipeline(camera, networks, networks, **settings)
+        return AwarenessPipeline(camera, networks, networks, detect_every_s=0.2)
 
     flats = [FLAT] * 3 if cameras == "one" else [Camera.from_fov(320, 240, 1.7) for _ in range(3)]
     views = tuple(

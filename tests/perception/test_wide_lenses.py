@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import Camera, PerceptionError
-from perception.body import place_box
+from perception import Camera
+from perception.body import place_boxes
 from tracking import CameraView
 
 # Calibrations as they are published for such cameras, and siblings with other coefficients.
@@ -93,15 +93,10 @@ def test_beyond_the_end_of_the_model_is_no_image() -> None:
 
 
 def test_somebody_beyond_the_end_is_still_placed_and_tracked() -> None:
-    placed = place_box(BARREL, np.array([560.0, 100.0, 630.0, 380.0]))
+    placed = place_boxes(BARREL, [np.array([560.0, 100.0, 630.0, 380.0])])[0]
     assert placed is not None
     assert math.degrees(math.atan2(placed[0][0], placed[0][2])) > 35.0
     level = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.2], [0, 0, 0, 1]])
     seen = CameraView(BARREL).visibility([[3.0, 0.0], [3.0, 2.0], [1.0, 3.0]], level)
     assert (seen[:2] > 0.0).all()
     assert seen[2] == 0.0
-
-
-def test_pixels_that_are_not_finite_are_refused() -> None:
-    with pytest.raises(PerceptionError, match="pixels_px must be finite"):
-        BARREL.normalise([[math.nan, 1.0]])

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from perception import Camera
-from perception.networks.heads._crops import head_crop
-from perception.networks.heads._ray_view import looking_at
+from perception.networks.heads._crops import head_crop, looking_at
 from sim_tests.dataset import RenderConfig
 from sim_tests.world.hall import LAYOUTS
 from training.networks import HeadSample, Recipe, cropped, similarity, warp, with_surroundings

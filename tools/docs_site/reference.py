@@ -6,13 +6,11 @@ pages here name what they shall show. Metrics and topics are tables of their reg
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, Final, get_args
 
-import griffe
 from pydantic import BaseModel
 
 from nav_adapter import AwarenessPolicy, InflationPolicy, SpeedPolicy
@@ -22,14 +20,7 @@ from nav_adapter.ros2.messages import ros_type
 from sim_tests.crossing.faults import Fault
 from sim_tests.dataset import RenderConfig
 from sim_tests.scenario import Scenario
-from sim_tests.study.measures import (
-    METRICS,
-    RATIOS,
-    RECORD_COLUMNS,
-    SHARES,
-    EpisodeRecord,
-    Metric,
-)
+from sim_tests.study.measures import COLUMNS, METRICS, RATIOS, SHARES, Metric
 from tracking import TrackerConfig
 
 from .roles import plain
@@ -267,8 +258,10 @@ def front_door_page() -> str:
 def metrics_page() -> str:
     """Return the page of metrics and columns."""
     columns = ["| column | unit | meaning |", "| --- | --- | --- |"]
-    meanings = _attributes(EpisodeRecord)
-    columns += [f"| `{name}` | {unit_of(name)} | {meanings[name]} |" for name in RECORD_COLUMNS]
+    columns += [
+        f"| `{name}` | {unit_of(name)} | {_cell(plain(meaning))} |"
+        for name, meaning in COLUMNS.items()
+    ]
     return "\n\n".join(
         [
             _METRICS,
@@ -327,17 +320,6 @@ def _topic_table(topics: Iterable[Topic]) -> str:
         for each in topics
     ]
     return "\n".join(rows)
-
-
-def _attributes(record: type) -> dict[str, str]:
-    """Return the meaning of each attribute in a docstring."""
-    parts = griffe.Docstring(record.__doc__ or "", lineno=1).parse("google", warnings=False)
-    return {
-        one.name: _cell(re.sub(r"\bNone\b", "empty", plain(one.description)))
-        for part in parts
-        if part.kind is griffe.DocstringSectionKind.attributes
-        for one in part.value
-    }
 
 
 def _cell(text: str) -> str:

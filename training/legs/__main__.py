@@ -13,8 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from perception.shipped import update_manifest
-
+from ..manifest import update_manifest
 from ._net import export
 from ._train import Recipe, deviation_factors, joined, make_shard, read_shard, train
 

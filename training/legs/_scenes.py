@@ -15,7 +15,7 @@ from perception.arrays import FloatArray
 from perception.laser import LaserScan, RobotMotion, Scanner, ScanPoints, scan_points
 from sim_tests.actors.body import SeatKind, Worker
 from sim_tests.world import Warehouse, crosses_boxes
-from sim_tests.world.hall import LAYOUTS, PROP_PARTS, Prop, WarehouseLayout
+from sim_tests.world.hall import PROP_PARTS, Prop, WarehouseLayout
 from sim_tests.world.scanner import ScannerSpec, ScanScene, SimulatedScanner
 
 #: Halls and people of the training; all others are held out.
@@ -90,7 +90,7 @@ class LabelledScan:
 
 def random_hall(name: str, rng: np.random.Generator) -> WarehouseLayout:
     """Return a shipped hall with more props at random places and angles."""
-    hall = LAYOUTS[name]()
+    hall = WarehouseLayout.named(name)
     kinds = [*rng.choice(list(PROP_PARTS), _PROPS).tolist(), *["post"] * _POSTS]
     for kind in kinds:
         for _ in range(_TRIES):

@@ -18,9 +18,9 @@ import torch
 from torch import nn
 
 from perception import OnnxPoseEstimator
-from perception.shipped import update_manifest
 from sim_tests.actors.body import load_worker
 
+from ..manifest import update_manifest
 from . import _detector_train, _head_train, _pose_train
 from ._calibrate import limb_scale
 from ._detector_data import DetectorData

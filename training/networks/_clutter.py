@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 from perception.arrays import FloatArray
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
-from sim_tests.world.hall import Mesh, box, ellipsoid, merge, tube
+from sim_tests.world.hall import Mesh, box, merge
 from sim_tests.world.render import RenderView, Visuals
+from training.hall import ellipsoid, tube
 
 from ._textures import random_texture
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ._box_format import BoxFormatVote
 from ._detector import OnnxPersonDetector
 from ._letterbox import Letterbox, LetterboxGeometry
 
-__all__ = ["BoxFormatVote", "Letterbox", "LetterboxGeometry", "OnnxPersonDetector"]
+__all__ = ["Letterbox", "LetterboxGeometry", "OnnxPersonDetector"]

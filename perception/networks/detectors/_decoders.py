@@ -1,4 +1,4 @@
-"""Decoders: from the outputs of a detector to boxes of people, one class per known layout.
+"""Decoders: from the outputs of a detector to boxes of people, one function per known layout.
 
 Boxes are x1, y1, x2, y2 in pixels of the network's input, before the removal of overlaps. Rows are
 selected by their scores before their boxes are computed: of some thousand cells a few dozen remain,
@@ -7,27 +7,20 @@ and the comparison drops scores that are NaN.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Final, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ._box_format import BoxFormatVote, centre_to_corners
 
 STRIDES: Final = (8, 16, 32)
 
 Floats = NDArray[np.float32]
 
 
-class Decoder(Protocol):
-    """Interface of the decoders: finds the people in a detector's outputs for one image."""
-
-    def decode(
-        self, outputs: Sequence[NDArray[Any]], score_threshold: float
-    ) -> tuple[Floats, Floats]:
-        """Return boxes (N, 4) and scores (N,) of the people with scores ≥ the threshold."""
-        ...
+#: Finds the people in a detector's outputs for one image: from outputs and score threshold to boxes
+#: (N, 4) and scores (N,) of the people with scores ≥ the threshold.
+Decoder: TypeAlias = Callable[[Sequence[NDArray[Any]], float], tuple[Floats, Floats]]
 
 
 def cell_count(height_px: int, width_px: int, strides: tuple[int, ...] = STRIDES) -> int:
@@ -35,95 +28,65 @@ def cell_count(height_px: int, width_px: int, strides: tuple[int, ...] = STRIDES
     return sum((height_px // stride) * (width_px // stride) for stride in strides)
 
 
-class YoloV8Decoder:
+def decode_yolov8(
+    outputs: Sequence[NDArray[Any]], score_threshold: float, *, person_class: int
+) -> tuple[Floats, Floats]:
     """YOLOv8: output (1, 4 + C, N) of centre x, y, width, height and one score per class."""
-
-    def __init__(self, person_class: int) -> None:
-        self._score_row = 4 + person_class
-
-    def decode(
-        self, outputs: Sequence[NDArray[Any]], score_threshold: float
-    ) -> tuple[Floats, Floats]:
-        """See :class:`Decoder`."""
-        columns = outputs[0][0]
-        scores = columns[self._score_row]
-        selected = (scores >= score_threshold).nonzero()[0]
-        boxes = _float32(columns[:4, selected]).T
-        return centre_to_corners(boxes[:, :2], boxes[:, 2:]), _float32(scores[selected])
+    columns = outputs[0][0]
+    scores = columns[4 + person_class]
+    selected = (scores >= score_threshold).nonzero()[0]
+    boxes = _float32(columns[:4, selected]).T
+    return centre_to_corners(boxes[:, :2], boxes[:, 2:]), _float32(scores[selected])
 
 
-class RowsDecoder:
-    """Output (1, M, 6) of a box (4 numbers), score and class; the network removes overlaps.
-
-    Args:
-        person_class: number of the class that counts.
-        vote: finds out whether the boxes are corners or centre and size.
-        input_px: width and height of the network's input.
-    """
-
-    def __init__(self, person_class: int, vote: BoxFormatVote, input_px: tuple[int, int]) -> None:
-        self._person_class = person_class
-        self._vote = vote
-        self._input_px = input_px
-
-    def decode(
-        self, outputs: Sequence[NDArray[Any]], score_threshold: float
-    ) -> tuple[Floats, Floats]:
-        """See :class:`Decoder`."""
-        rows = _float32(outputs[0][0])
-        rows = rows[rows[:, 4] >= score_threshold]
-        self._vote.update(rows[:, :4], rows[:, 4], self._input_px)
-        rows = rows[np.rint(rows[:, 5]) == self._person_class]
-        return self._vote.corners(rows[:, :4]), rows[:, 4]
+def decode_rows(
+    outputs: Sequence[NDArray[Any]], score_threshold: float, *, person_class: int
+) -> tuple[Floats, Floats]:
+    """Output (1, M, 6) of x1, y1, x2, y2, score and class; the network removes overlaps."""
+    rows = _float32(outputs[0][0])
+    rows = rows[(rows[:, 4] >= score_threshold) & (np.rint(rows[:, 5]) == person_class)]
+    return rows[:, :4], rows[:, 4]
 
 
-class YoloxDecoder:
+def decode_yolox(
+    outputs: Sequence[NDArray[Any]],
+    score_threshold: float,
+    *,
+    person_class: int,
+    grid: tuple[Floats, Floats],
+) -> tuple[Floats, Floats]:
     """YOLOX's raw head: output (1, N, 5 + C) of offset, log size, objectness and class scores.
 
-    Offsets and sizes are in cells: the centre is (offset + cell) · stride, the size
-    exp(log size) · stride. The score is objectness times class score.
+    Offsets and sizes are in cells, of which ``grid`` has places and strides (:func:`cells`): the
+    centre is (offset + cell) · stride, the size exp(log size) · stride. The score is objectness
+    times class score.
     """
-
-    def __init__(self, person_class: int, height_px: int, width_px: int) -> None:
-        self._class_column = 5 + person_class
-        self._cells, self._strides = cells(height_px, width_px)
-
-    def decode(
-        self, outputs: Sequence[NDArray[Any]], score_threshold: float
-    ) -> tuple[Floats, Floats]:
-        """See :class:`Decoder`."""
-        rows = outputs[0][0]
-        scores = _float32(rows[:, 4]) * _float32(rows[:, self._class_column])
-        selected = (scores >= score_threshold).nonzero()[0]
-        found, stride = _float32(rows[selected, :4]), self._strides[selected]
-        centre = (found[:, :2] + self._cells[selected]) * stride
-        size = np.exp(found[:, 2:]) * stride
-        return centre_to_corners(centre, size), scores[selected]
+    rows = outputs[0][0]
+    scores = _float32(rows[:, 4]) * _float32(rows[:, 5 + person_class])
+    selected = (scores >= score_threshold).nonzero()[0]
+    found, (place, stride) = _float32(rows[selected, :4]), (each[selected] for each in grid)
+    centre = (found[:, :2] + place) * stride
+    size = np.exp(found[:, 2:]) * stride
+    return centre_to_corners(centre, size), scores[selected]
 
 
-class DetsDecoder:
+def decode_dets(
+    outputs: Sequence[NDArray[Any]],
+    score_threshold: float,
+    *,
+    person_class: int,
+    dets: int,
+    labels: int,
+) -> tuple[Floats, Floats]:
     """RTMDet, or YOLOX with its own NMS: outputs ``dets`` (1, N, 5) and ``labels`` (1, N).
 
-    A row of ``dets`` is x1, y1, x2, y2, score.
-
-    Args:
-        person_class: number of the class that counts.
-        dets: index of the output ``dets``.
-        labels: index of the output ``labels``.
+    A row of ``dets`` is x1, y1, x2, y2, score. ``dets`` and ``labels`` are the numbers of the
+    outputs.
     """
-
-    def __init__(self, person_class: int, dets: int, labels: int) -> None:
-        self._person_class = person_class
-        self._dets, self._labels = dets, labels
-
-    def decode(
-        self, outputs: Sequence[NDArray[Any]], score_threshold: float
-    ) -> tuple[Floats, Floats]:
-        """See :class:`Decoder`."""
-        rows = _float32(outputs[self._dets][0])
-        people = outputs[self._labels][0] == self._person_class
-        rows = rows[people & (rows[:, 4] >= score_threshold)]
-        return rows[:, :4], rows[:, 4]
+    rows = _float32(outputs[dets][0])
+    people = outputs[labels][0] == person_class
+    rows = rows[people & (rows[:, 4] >= score_threshold)]
+    return rows[:, :4], rows[:, 4]
 
 
 def cells(height_px: int, width_px: int) -> tuple[Floats, Floats]:
@@ -137,6 +100,11 @@ def cells(height_px: int, width_px: int) -> tuple[Floats, Floats]:
         places.append(np.stack([columns.ravel(), rows.ravel()], axis=1))
         strides.append(np.full((columns.size, 1), stride))
     return _float32(np.concatenate(places)), _float32(np.concatenate(strides))
+
+
+def centre_to_corners(centre: NDArray[Any], size: NDArray[Any]) -> NDArray[Any]:
+    """Return the corners x1, y1, x2, y2 (N, 4) of boxes with centres (N, 2) and sizes (N, 2)."""
+    return np.concatenate([centre - 0.5 * size, centre + 0.5 * size], axis=1)
 
 
 def _float32(values: NDArray[Any]) -> Floats:

@@ -10,11 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._detection import DEFAULT_SCORE_THRESHOLD, PersonDetection
+from ..._stages import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ...arrays import ImageRgb, finite_number
 from ...errors import PerceptionError
-from .._image import rgb_image
-from .._image_input import input_batch, input_dtype, input_size, run_on_images
+from .._images import input_batch, input_dtype, input_size, rgb_image, run_on_images
 from .._model import ModelSource, OnnxModel, as_onnx_model
 from .._settings import OnnxSettings
 from ._decoders import Floats
@@ -33,9 +32,9 @@ _RTMDET_HW_PX: Final = (320, 320)
 # Most boxes that enter the removal of overlaps; no scene has so many people.
 _MAX_CANDIDATES: Final = 1000
 _MIN_SIDE_PX: Final = 1.0
-# Sides of smaller inputs, as shares of the whole one's, and of what they must be multiples.
-_SMALLER: Final = (0.8, 0.65)
-_STRIDE_PX: Final = 32
+# Of two boxes that overlap more than this, only the one with the higher score stays. One person may
+# hide half of another, and both are reported.
+_SAME_PERSON_IOU: Final = 0.5
 
 
 class OnnxPersonDetector:
@@ -43,20 +42,17 @@ class OnnxPersonDetector:
 
     Known layouts: YOLOv8, YOLO11 and relatives; networks that need no NMS or contain it, with
     output (1, M, 6); YOLOX with its raw head or its own NMS; RTMDet. The class "person" of the
-    metadata counts; without class names the first class counts, as in COCO. Boxes of (1, M, 6) may
-    be corners or centre and size: see :class:`~perception.networks.detectors.BoxFormatVote`.
+    metadata counts; without class names the first class counts, as in COCO. Boxes of (1, M, 6) are
+    x1, y1, x2, y2, as all known exporters write them.
 
     Several threads may share a detector; their calls run one after another.
 
     Args:
         path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`.
         score_threshold: detections with a lower score are dropped, in [0, 1].
-        iou_threshold: of two boxes that overlap more than this, only the one with the higher score
-            stays, in [0, 1]. At 0.5 one person may hide half of another and both are reported.
         input_size_hw_px: (height, width) for a network that leaves its input size free; default
             the metadata's ``imgsz``, and 320 × 320 for RTMDet.
         person_class: number of the class that counts, where the metadata do not name it.
-        box_format: ``"xyxy"`` or ``"cxcywh"`` for (1, M, 6); None finds it out from the boxes.
         family: ``"rtmdet"`` or ``"yolox"`` for a network with the outputs ``dets`` and ``labels``,
             these or ``"ultralytics"`` for one with output (1, M, 6). They want different pixels.
             None takes it from the names of weights and nodes and, for Ultralytics, from the
@@ -74,10 +70,8 @@ class OnnxPersonDetector:
         path: ModelSource,
         *,
         score_threshold: float = DEFAULT_SCORE_THRESHOLD,
-        iou_threshold: float = 0.5,
         input_size_hw_px: tuple[int, int] | None = None,
         person_class: int | None = None,
-        box_format: str | None = None,
         family: str | None = None,
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
@@ -85,21 +79,13 @@ class OnnxPersonDetector:
         self._score_threshold = finite_number(
             "score_threshold", score_threshold, minimum=0.0, maximum=1.0
         )
-        self._iou_threshold = finite_number(
-            "iou_threshold", iou_threshold, minimum=0.0, maximum=1.0
-        )
         if person_class is not None and (not isinstance(person_class, int) or person_class < 0):
             raise PerceptionError(
                 f"person_class must be a whole number of at least 0 or None, got {person_class!r}"
             )
         self.model = as_onnx_model(path, settings, sha256)
-        self._told: dict[str, Any] = {
-            "person_class": person_class,
-            "box_format": box_format,
-            "family": checked_family(family),
-        }
         self.input_size_hw_px = _detector_input_size(self.model, input_size_hw_px, family)
-        self._layout = self._recognise()
+        self._layout = self._recognise(person_class, checked_family(family))
         self._letterbox = Letterbox(
             *self.input_size_hw_px, self._layout.pixels, centred=self._layout.centred
         )
@@ -112,37 +98,6 @@ class OnnxPersonDetector:
     def layout(self) -> str:
         """Name of the recognised layout."""
         return self._layout.name
-
-    def smaller(self) -> tuple[tuple[OnnxPersonDetector, float], ...]:
-        """Return detectors of the same network with smaller inputs, largest first.
-
-        Each comes with its pixels as a share of this one's. Empty for a network whose input size
-        is fixed. They find people who are so much nearer as their input is smaller.
-        """
-        if None not in self.model.inputs[0].shape[2:]:
-            return ()
-        found: list[tuple[OnnxPersonDetector, float]] = []
-        for share in _SMALLER:
-            size = tuple(
-                math.ceil(round(share * side / _STRIDE_PX, 6)) * _STRIDE_PX
-                for side in self.input_size_hw_px
-            )
-            pixels = math.prod(size) / math.prod(self.input_size_hw_px)
-            if pixels < (found[-1][1] if found else 1.0):
-                try:
-                    found.append((self._with_input(*size), pixels))
-                except PerceptionError:
-                    break  # the network declares a free size, and takes one only
-        return tuple(found)
-
-    def _with_input(self, height_px: int, width_px: int) -> OnnxPersonDetector:
-        return OnnxPersonDetector(
-            self.model,
-            score_threshold=self._score_threshold,
-            iou_threshold=self._iou_threshold,
-            input_size_hw_px=(height_px, width_px),
-            **self._told,
-        )
 
     def detect(self, image_rgb: ImageRgb) -> tuple[PersonDetection, ...]:
         """Return the people in an image, highest score first.
@@ -163,7 +118,7 @@ class OnnxPersonDetector:
             outputs = run_on_images(self.model, blob)
             # Non-finite numbers are dropped below; they need no warning here.
             with np.errstate(all="ignore"):
-                boxes, scores = self._layout.decoder.decode(outputs, self._score_threshold)
+                boxes, scores = self._layout.decoder(outputs, self._score_threshold)
                 sizes = boxes[:, 2:] - boxes[:, :2]
                 # One sum shows that all numbers are finite, but for those too large to add.
                 finite = math.isfinite(float(boxes.sum()) + float(scores.sum()))
@@ -197,18 +152,20 @@ class OnnxPersonDetector:
             corners_and_sizes.tolist(),
             scores.tolist(),
             0.0,  # boxes below the score threshold are already dropped
-            self._iou_threshold,
+            _SAME_PERSON_IOU,
             top_k=_MAX_CANDIDATES,
         )
         return np.asarray(kept, dtype=np.intp).reshape(-1)
 
-    def _recognise(self) -> DetectorLayout:
+    def _recognise(self, person_class: int | None, family: str | None) -> DetectorLayout:
         height, width = self.input_size_hw_px
         dtype = input_dtype(self.model)
         # Some exports declare fixed extents as free. A run on an empty input shows all of them.
         outputs = run_on_images(self.model, np.zeros((1, 3, height, width), dtype))
         with np.errstate(all="ignore"):
-            return recognise(TrialRun(self.model, outputs, height, width, dtype, **self._told))
+            return recognise(
+                TrialRun(self.model, outputs, height, width, dtype, person_class, family)
+            )
 
 
 def _detector_input_size(

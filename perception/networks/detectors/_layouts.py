@@ -5,24 +5,24 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import PerceptionError
+from .._images import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
 from .._model import OnnxModel, output_shapes
-from .._pixels import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
-from ._box_format import BoxFormatVote
 from ._decoders import (
     STRIDES,
     Decoder,
-    DetsDecoder,
-    RowsDecoder,
-    YoloV8Decoder,
-    YoloxDecoder,
     cell_count,
     cells,
+    decode_dets,
+    decode_rows,
+    decode_yolov8,
+    decode_yolox,
 )
 
 _KNOWN: Final = (
@@ -88,7 +88,6 @@ class TrialRun:
         width_px: width of the input.
         dtype: number type of the input.
         person_class: class number given by the caller, or None.
-        box_format: box format given by the caller, or None.
         family: family given by the caller, or None.
     """
 
@@ -98,7 +97,6 @@ class TrialRun:
     width_px: int
     dtype: str
     person_class: int | None = None
-    box_format: str | None = None
     family: str | None = None
 
     def refusal(self, reason: str) -> PerceptionError:
@@ -134,34 +132,41 @@ def recognise(trial: TrialRun) -> DetectorLayout:
 def _single_output(trial: TrialRun, first: int, second: int) -> DetectorLayout:
     """Recognise a detector with one output (1, first, second)."""
     size = trial.height_px, trial.width_px
-    counts = {cell_count(*size, strides) for strides in _PYRAMIDS}
     names = class_names(trial.model)
-    candidates: dict[str, Any] = {}
-    if second in counts and first >= 5 and (names is None or first == 4 + len(names)):
-        candidates["YOLOv8"] = lambda: _yolov8(trial, first - 4)
+    found: list[str] = []
+    if (
+        second in {cell_count(*size, strides) for strides in _PYRAMIDS}
+        and first >= 5
+        and (names is None or first == 4 + len(names))
+    ):
+        found.append("YOLOv8")
     in_cells = first == cell_count(*size)
     if second == _ROW_LENGTH and (not in_cells or _are_boxes(trial)):
-        candidates["rows"] = lambda: _rows(trial)
-    elif in_cells:
-        if second >= 6 and (names is None or second == 5 + len(names)):
-            candidates["YOLOX raw"] = lambda: _yolox(trial, second - 5)
-        # Without class names, a transposed YOLOv8 is recognised only with 1 or COCO's 80 classes.
-        classes = second - 4
-        if classes in ((1, _COCO_CLASSES) if names is None else (len(names),)):
-            candidates["YOLOv8 with its axes swapped"] = None
-    if len(candidates) > 1:
-        raise trial.refusal(f"it could be {' or '.join(candidates)}")
-    make = next(iter(candidates.values()), None)
-    if make is None:
-        raise trial.refusal(_refusal_reason(trial, first, second, candidates))
-    layout: DetectorLayout = make()
-    return layout
+        found.append("rows")
+    elif in_cells and second >= 6 and second == 5 + _class_count(names, second):
+        found.append("YOLOX raw")
+    if len(found) > 1:
+        raise trial.refusal(f"it could be {' or '.join(found)}")
+    if not found:
+        wanted = cell_count(*size)
+        raise trial.refusal(f"an input of this size has {wanted} cells of strides 8, 16 and 32")
+    if found == ["YOLOv8"]:
+        return _yolov8(trial, first - 4)
+    return _rows(trial) if found == ["rows"] else _yolox(trial, second - 5)
+
+
+def _class_count(names: dict[int, str] | None, row_length: int) -> int:
+    """Return the number of classes of a raw YOLOX with rows of this length.
+
+    Without class names, rows of 84 numbers are those of a transposed YOLOv8 of COCO.
+    """
+    if names is not None:
+        return len(names)
+    return _COCO_CLASSES if row_length == 4 + _COCO_CLASSES else row_length - 5
 
 
 def _are_boxes(trial: TrialRun) -> bool:
     """Return whether (1, cells, 6) are boxes in pixels with a class, not YOLOX's raw numbers."""
-    if trial.box_format is not None:
-        return True
     numbers = trial.outputs[0][0].astype(np.float32)
     classes = numbers[:, 5]
     whole = bool((classes == np.rint(classes)).all())
@@ -169,29 +174,15 @@ def _are_boxes(trial: TrialRun) -> bool:
     return whole and (not numbers.any() or float(np.abs(numbers[:, :4]).max()) > _LARGEST_RAW)
 
 
-def _refusal_reason(trial: TrialRun, first: int, second: int, candidates: dict[str, Any]) -> str:
-    wanted = cell_count(trial.height_px, trial.width_px)
-    if candidates:
-        return f"it looks like {next(iter(candidates))}; export it as (1, {second}, {first})"
-    if 3 * wanted in (first, second):
-        return "it has three outputs per cell, as YOLOv5 and YOLOv7 have with their anchors"
-    if wanted in (first, second):
-        extent = second if first == wanted else first
-        return f"{extent} numbers per cell do not agree with the classes that its metadata names"
-    return f"an input of this size has {wanted} cells of strides 8, 16 and 32"
-
-
 def _yolov8(trial: TrialRun, classes: int) -> DetectorLayout:
     person = _person_class(trial, classes)
-    return DetectorLayout("YOLOv8", _pixels(trial, _ULTRALYTICS), True, YoloV8Decoder(person))
+    return DetectorLayout(
+        "YOLOv8", _pixels(trial, _ULTRALYTICS), True, partial(decode_yolov8, person_class=person)
+    )
 
 
 def _rows(trial: TrialRun) -> DetectorLayout:
-    input_px = (trial.width_px, trial.height_px)
-    vote = BoxFormatVote(trial.box_format)
-    rows = trial.outputs[0][0].astype(np.float32)
-    vote.update(rows[:, :4], rows[:, 4], input_px)
-    decoder = RowsDecoder(_person_class(trial, None), vote, input_px)
+    decoder = partial(decode_rows, person_class=_person_class(trial, None))
     family = trial.family or family_of(trial.model)
     if family is None:
         if not any(key in trial.model.metadata for key in _ULTRALYTICS_KEYS):
@@ -213,7 +204,7 @@ def _yolox(trial: TrialRun, classes: int) -> DetectorLayout:
             "it looks like YOLOX with boxes decoded in the network; export it with "
             "decode_in_inference=False"
         )
-    decoder = YoloxDecoder(_person_class(trial, classes), *size)
+    decoder = partial(decode_yolox, person_class=_person_class(trial, classes), grid=cells(*size))
     return DetectorLayout("YOLOX raw", _pixels(trial, _YOLOX), False, decoder)
 
 
@@ -241,7 +232,9 @@ def _dets(trial: TrialRun) -> DetectorLayout:
                     "is; say it with family='rtmdet' or family='yolox' (--detector rtmdet:FILE "
                     "or yolox:FILE on the command line)"
                 )
-            decoder = DetsDecoder(_person_class(trial, None), dets, labels)
+            decoder = partial(
+                decode_dets, person_class=_person_class(trial, None), dets=dets, labels=labels
+            )
             pixels = _pixels(trial, _FAMILIES[family])
             return DetectorLayout(_WITH_DETS[family], pixels, False, decoder)
     raise trial.refusal("of the known detectors only RTMDet and YOLOX with NMS have two outputs")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import FloatArray, ImageRgb
-from .._pixels import PixelFormat
+from .._images import PixelFormat
 
 _PADDING_GREY: Final = 114
 
@@ -53,11 +53,6 @@ class LetterboxGeometry:
         factor = np.divide(self.image_px, self.scaled_px)
         boxes = (boxes_xyxy.astype(np.float64) - self.corner_px * 2) * np.tile(factor, 2)
         return np.asarray(np.clip(boxes, 0.0, self.image_px * 2))
-
-    def to_input(self, boxes_xyxy_px: NDArray[Any]) -> FloatArray:
-        """Map boxes (N, 4) from the image to the input."""
-        factor = np.divide(self.scaled_px, self.image_px)
-        return np.asarray(boxes_xyxy_px * np.tile(factor, 2) + self.corner_px * 2)
 
 
 class Letterbox:

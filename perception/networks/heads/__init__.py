@@ -7,9 +7,16 @@ camera towards a head, so that a crop looks the same anywhere in a wide image.
 
 from __future__ import annotations
 
-from ._crops import OUTSIDE_GREY, crop_to_image, head_crop
+from ._crops import (
+    OUTSIDE_GREY,
+    crop_to_image,
+    head_crop,
+    looking_at,
+    ray_axes,
+    ray_focal_px,
+    ray_stretch,
+)
 from ._estimator import OnnxHeadPoseEstimator
-from ._ray_view import looking_at, ray_axes, ray_focal_px, ray_stretch
 
 __all__ = [
     "OUTSIDE_GREY",

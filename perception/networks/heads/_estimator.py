@@ -10,23 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..._camera import Camera
-from ..._head_pose import HeadPose
-from ..._keypoints import PersonKeypoints
 from ..._manifest import HEAD
-from ..._metric_scale import DEFAULT_MIN_SCORE
-from ..._rotations import rotation_log, skew
+from ..._stages import HeadPose, PersonKeypoints
 from ...anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M
 from ...arrays import FloatArray, ImageRgb, finite_number
+from ...body import DEFAULT_MIN_SCORE
 from ...errors import PerceptionError
-from .._image import rgb_image
-from .._image_input import run_on_images
+from ...matrices import rotation_log, skew
+from .._images import rgb_image, run_on_images
 from .._model import ModelSource, OnnxModel, as_onnx_model
 from .._settings import OnnxSettings
-from ._blur import uncertainty_factors
-from ._crops import HeadCrops
-from ._layouts import recognise
+from ._crops import HeadCrops, uncertainty_factors
 from ._locate import locate_heads
-from ._outputs import HeadOutputs, read_outputs, read_placement, read_rotations, read_rows
+from ._outputs import (
+    HeadOutputs,
+    read_outputs,
+    read_placement,
+    read_rotations,
+    read_rows,
+    recognise,
+)
 
 # A smaller crop shows nothing of a head.
 _MIN_SIDE_PX: Final = 8.0
@@ -45,7 +48,8 @@ _MAX_ROTATION_COVARIANCE: Final = _MAX_ROTATION_STD_RAD**2 * _IDENTITY
 # logarithm of its distance, which then comes from the body's scale.
 _CENTRE_STD_M: Final = 0.04
 _BODY_LOG_STD: Final = 0.12
-_MAX_PASSES: Final = 5
+# A crop with a lower probability of a head gives no pose.
+_MIN_HEAD: Final = 0.5
 
 
 class OnnxHeadPoseEstimator:
@@ -65,14 +69,15 @@ class OnnxHeadPoseEstimator:
             for the shipped network.
         settings: providers and threads, for a model that is not loaded yet.
         sha256: expected SHA-256 of the file, for a model that is not loaded yet.
-        passes: largest number of times that a crop is cut, 1 to 5. A centred crop is not cut again.
         min_score: keypoints with a lower score are not used to find the head.
-        min_head: crops with a lower probability of a head give no pose, in [0, 1].
 
     Raises:
         PerceptionError: for a file that cannot be loaded, an unknown layout (the message says what
             was found and what is known), and an invalid value.
     """
+
+    # A crop is cut at most so often; one that is centred is not cut again.
+    _passes = 2
 
     def __init__(
         self,
@@ -80,17 +85,9 @@ class OnnxHeadPoseEstimator:
         *,
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
-        passes: int = 2,
         min_score: float = DEFAULT_MIN_SCORE,
-        min_head: float = 0.5,
     ) -> None:
-        if isinstance(passes, bool) or passes not in range(1, _MAX_PASSES + 1):
-            raise PerceptionError(
-                f"passes must be a whole number from 1 to {_MAX_PASSES}, got {passes!r}"
-            )
-        self._passes = passes
         self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
-        self._min_head = finite_number("min_head", min_head, minimum=0.0, maximum=1.0)
         if path is None:
             path = OnnxModel.shipped(HEAD, settings)
             settings = None
@@ -132,7 +129,7 @@ class OnnxHeadPoseEstimator:
         outputs = replace(outputs, covariance_ray=covariance)
         found_poses = _poses(outputs, crops, self.layout.crop_side_m)
         for index, row in enumerate(rows):
-            if outputs.head is None or outputs.head[index] >= self._min_head:
+            if outputs.head is None or outputs.head[index] >= _MIN_HEAD:
                 poses[row] = found_poses[index]
         return tuple(poses)
 
@@ -163,7 +160,7 @@ class OnnxHeadPoseEstimator:
             larger = side_m / self.layout.crop_side_m
             off = np.abs(centre - 0.5).max(axis=1) > _MAX_OFFSET
             off |= np.abs(np.log(larger)) > _MAX_LOG_FACTOR
-            again = (off & (head >= 0.5 * self._min_head)).nonzero()[0]
+            again = (off & (head >= 0.5 * _MIN_HEAD)).nonzero()[0]
             if not len(again):
                 break
             before = crops.axes[again] @ read_rotations(self.model, rows[again])

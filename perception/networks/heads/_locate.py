@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import layouts as kp
-from ..._keypoints import PersonKeypoints
-from ..._metric_scale import metric_scales
+from ..._stages import PersonKeypoints
 from ...anthropometry import HEAD_CENTRE_HEAD_M, HEAD_TEMPLATE_M, LIMBS, NECK_TO_NOSE_UP_M
 from ...arrays import FloatArray
+from ...body import metric_scales
 
 # Distance of each head keypoint and the neck below the head's centre, along the upright body.
 _BELOW_CENTRE_M: Final = np.append(

@@ -8,20 +8,32 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..._detection import PersonDetection
-from ..._keypoints import PersonKeypoints
-from ...arrays import FloatArray, ImageRgb, finite_number
+from ..._stages import PersonDetection, PersonKeypoints
+from ...arrays import FloatArray, ImageRgb
 from ...errors import PerceptionError
-from ...layouts import keypoint_layout
-from .._image import rgb_image
-from .._image_input import input_batch, input_dtype, input_size, run_on_images
+from ...layouts import keypoint_count
+from .._images import (
+    IMAGENET_MEAN_RGB,
+    IMAGENET_STD_RGB,
+    PixelFormat,
+    input_batch,
+    input_dtype,
+    input_size,
+    rgb_image,
+    run_on_images,
+)
 from .._model import ModelSource, as_onnx_model
-from .._pixels import IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, PixelFormat
 from .._settings import OnnxSettings
 from ._crops import BOX_PADDING, PersonCrops
-from ._layouts import PoseLayout, metadata_number, recognise
 from ._lift import lift_keypoints
-from ._simcc import simcc_confidence, simcc_depth_m, simcc_peaks
+from ._simcc import (
+    PoseLayout,
+    metadata_number,
+    recognise,
+    simcc_confidence,
+    simcc_depth_m,
+    simcc_peaks,
+)
 
 # Larger batches need more memory and are not faster per person.
 _MAX_BATCH: Final = 16
@@ -40,8 +52,6 @@ class OnnxPoseEstimator:
 
     Args:
         path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`.
-        box_padding: size of the crop relative to the box, > 0; default the metadata's
-            ``box_padding``, else 1.25.
         input_size_hw_px: (height, width) for a network that leaves its input size free.
         settings: providers and threads, for a model that is not loaded yet.
         sha256: expected SHA-256 of the file, for a model that is not loaded yet.
@@ -55,21 +65,12 @@ class OnnxPoseEstimator:
         self,
         path: ModelSource,
         *,
-        box_padding: float | None = None,
         input_size_hw_px: tuple[int, int] | None = None,
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
     ) -> None:
-        if box_padding is not None:
-            box_padding = finite_number(
-                "box_padding", box_padding, minimum=0.0, exclusive_minimum=True
-            )
         self.model = as_onnx_model(path, settings, sha256)
-        self._padding = (
-            metadata_number(self.model, "box_padding", BOX_PADDING)
-            if box_padding is None
-            else box_padding
-        )
+        self._padding = metadata_number(self.model, "box_padding", BOX_PADDING)
         # Data sets place keypoints differently on the body, so limbs differ in length.
         self._limb_scale = metadata_number(self.model, "limb_scale", 1.0)
         self._scale_std = metadata_number(self.model, "scale_relative_std", 0.0)
@@ -118,7 +119,7 @@ class OnnxPoseEstimator:
         boxes = np.array([detection.box_xyxy_px for detection in detections])
         crops = PersonCrops(boxes, *self.input_size_hw_px, self._padding)
         visible = crops.inside(image).nonzero()[0]
-        size = keypoint_layout(self.layout).size
+        size = keypoint_count(self.layout)
         # The keypoints of people outside the image lie in the middle of the box, with scores of 0.
         middle = 0.5 * (boxes[:, :2] + boxes[:, 2:]) - 0.5
         pixels = np.empty((len(boxes), size, 2))

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from ... import layouts as kp
-from ..._metric_scale import DEFAULT_MIN_SCORE, LIMB_DIFFERENCE, LIMB_KEYPOINTS
 from ...anthropometry import LIMBS
 from ...arrays import FloatArray
+from ...body import DEFAULT_MIN_SCORE, LIMB_DIFFERENCE, LIMB_KEYPOINTS
 
 # Quantile of the votes that counts without depths. A limb that points at the camera looks short
 # and votes for too large a scale; the quarter with the smallest votes lies across the view.

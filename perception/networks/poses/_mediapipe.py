@@ -12,17 +12,88 @@ al., "Real-time Facial Surface Geometry from Monocular Video on Mobile GPUs", 20
 
 from __future__ import annotations
 
-from typing import Any, Final
+import warnings
+from abc import abstractmethod
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any, Final, TypeVar
 
 import cv2
 import numpy as np
 
 from ... import layouts as kp
-from ..._detection import PersonDetection
-from ..._keypoints import PersonKeypoints
+from ..._stages import PersonDetection, PersonKeypoints
 from ...arrays import FloatArray, ImageRgb
-from .._image import rgb_image
-from ._mediapipe_solutions import MediaPipeEstimator, without_protobuf_warnings
+from ...errors import PerceptionError
+from ...installation import install_command
+from .._images import rgb_image
+
+#: Smallest confidence of a person in a box, and of a face in a square about a head.
+CONFIDENCE: Final = 0.4
+
+_E = TypeVar("_E", bound="MediaPipeEstimator")
+
+
+class MediaPipeEstimator(AbstractContextManager[Any]):
+    """Base of the estimators that own solutions of MediaPipe, and release them when closed.
+
+    A class makes its solutions in ``_made``. An estimator serves one thread.
+
+    Raises:
+        PerceptionError: if MediaPipe is not installed; the message names the extra.
+    """
+
+    def __init__(self) -> None:
+        face_mesh, pose = mediapipe_solutions(type(self).__name__)
+        with without_protobuf_warnings():
+            self._solutions = self._made(face_mesh, pose)
+
+    @abstractmethod
+    def _made(self, face_mesh: Any, pose: Any) -> tuple[Any, ...]:
+        """Return the solutions, from MediaPipe's modules ``face_mesh`` and ``pose``."""
+
+    def __enter__(self: _E) -> _E:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release MediaPipe's memory; the estimator cannot be used afterwards."""
+        solutions, self._solutions = self._solutions, ()
+        for solution in solutions:
+            solution.close()
+
+    def _require_open(self) -> None:
+        if not self._solutions:
+            raise PerceptionError(f"the {type(self).__name__} has been closed")
+
+
+def mediapipe_solutions(asker: str) -> tuple[Any, Any]:
+    """Return MediaPipe's modules ``face_mesh`` and ``pose``, for the class ``asker``.
+
+    Raises:
+        PerceptionError: if MediaPipe is not installed; the message names the extra.
+    """
+    try:
+        with without_protobuf_warnings():
+            from mediapipe.python.solutions import face_mesh, pose  # noqa: PLC0415
+    except ImportError as cause:
+        raise PerceptionError(
+            f"{asker} needs mediapipe 0.10.14, which cannot be imported ({cause}); "
+            f"it is the extra 'mediapipe': {install_command('mediapipe')}"
+        ) from cause
+    return face_mesh, pose
+
+
+@contextmanager
+def without_protobuf_warnings() -> Iterator[None]:
+    """Silence protobuf: MediaPipe 0.10.14 calls deprecated functions of it for each result."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module=r"google\.protobuf\..*")
+        warnings.filterwarnings("ignore", message=r"SymbolDatabase\.GetPrototype")
+        yield
+
 
 # MediaPipe's landmark of each COCO keypoint.
 _LANDMARKS: Final = (0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28)
@@ -52,22 +123,17 @@ class MediaPipePoseEstimator(MediaPipeEstimator):
 
     An estimator serves one thread. Close it, or use it in a ``with`` block, to release its memory.
 
-    Args:
-        min_detection_confidence: smallest confidence of a person in the box and of a face in the
-            head's square, in [0, 1].
-
     Raises:
-        PerceptionError: if MediaPipe is not installed (the message names the extra), and for an
-            invalid value.
+        PerceptionError: if MediaPipe is not installed; the message names the extra.
     """
 
-    def _made(self, face_mesh: Any, pose: Any, confidence: float) -> tuple[Any, ...]:
+    def _made(self, face_mesh: Any, pose: Any) -> tuple[Any, ...]:
         # The package contains the network of complexity 1 only; others would be downloaded.
         self._pose = pose.Pose(
-            static_image_mode=True, model_complexity=1, min_detection_confidence=confidence
+            static_image_mode=True, model_complexity=1, min_detection_confidence=CONFIDENCE
         )
         self._mesh = face_mesh.FaceMesh(
-            static_image_mode=True, max_num_faces=1, min_detection_confidence=confidence
+            static_image_mode=True, max_num_faces=1, min_detection_confidence=CONFIDENCE
         )
         return self._pose, self._mesh
 

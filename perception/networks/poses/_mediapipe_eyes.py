@@ -14,13 +14,13 @@ from typing import Any, Final
 import numpy as np
 
 from ..._camera import Camera
-from ..._head_pose import HeadPose
+from ..._stages import HeadPose
 from ...anthropometry import EYES_HEAD_M, HEAD_CENTRE_HEAD_M
 from ...arrays import FloatArray, ImageRgb
 from ...eyes import EyeGaze, eyes_from_irises
-from .._image import rgb_image
+from .._images import rgb_image
 from ..heads import head_crop, looking_at, ray_focal_px
-from ._mediapipe_solutions import MediaPipeEstimator, without_protobuf_warnings
+from ._mediapipe import CONFIDENCE, MediaPipeEstimator, without_protobuf_warnings
 
 # Landmarks of the left and of the right eye: iris, corners, upper and lower lid.
 _IRISES: Final = (473, 468)
@@ -54,20 +54,16 @@ class MediaPipeEyeEstimator(MediaPipeEstimator):
 
     An estimator serves one thread. Close it, or use it in a ``with`` block, to release its memory.
 
-    Args:
-        min_detection_confidence: smallest confidence of a face, in [0, 1].
-
     Raises:
-        PerceptionError: if MediaPipe is not installed (the message names the extra), and for an
-            invalid value.
+        PerceptionError: if MediaPipe is not installed; the message names the extra.
     """
 
-    def _made(self, face_mesh: Any, pose: Any, confidence: float) -> tuple[Any, ...]:
+    def _made(self, face_mesh: Any, pose: Any) -> tuple[Any, ...]:
         self._mesh = face_mesh.FaceMesh(
             static_image_mode=True,
             max_num_faces=1,
             refine_landmarks=True,
-            min_detection_confidence=confidence,
+            min_detection_confidence=CONFIDENCE,
         )
         return (self._mesh,)
 

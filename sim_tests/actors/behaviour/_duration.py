@@ -50,12 +50,3 @@ class LogNormalDuration:
     def draw_s(self, rng: np.random.Generator) -> float:
         """Draw a duration."""
         return self.median_s * math.exp(self.sigma * rng.standard_normal())
-
-    def residual_s(self, rng: np.random.Generator) -> float:
-        """Draw the rest of the duration that a random instant falls into.
-
-        A random instant falls into a duration with a probability proportional to its length. A
-        lognormal weighted by its length is a lognormal of median · exp(σ²).
-        """
-        hit_s = self.median_s * math.exp(self.sigma**2 + self.sigma * rng.standard_normal())
-        return hit_s * rng.random()

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ...world.errors import SimError
-from ._irises import with_human_irises
 
 #: Joints in the order of every array; parents come before their children.
 JOINTS: Final = (
@@ -53,6 +52,11 @@ MESH_UNITS: Final = MappingProxyType(
 )
 
 
+_FOLDER: Final = resources.files("sim_tests.actors.body") / "workers"
+# Name of the file with the irises of all workers.
+_IRISES: Final = "irises"
+
+
 @dataclass(frozen=True, eq=False)
 class SkinMesh:
     """One level of detail of a body's surface at rest.
@@ -65,9 +69,9 @@ class SkinMesh:
         weights: (V, 16) in [0, 1]: the share of each joint's rotation that a vertex follows. It is
             1 beyond the joint and between 0 and 1 where the skin bends.
         texture_file: image of the texture.
-        eyes: centre (3,) of each eye, and which of the (V,) vertices belong to it, where irises
-            are painted anew: on the finest level only, as the others are for people too far away
-            to show any.
+        irises: rows and columns (2, N) of the texture's texels that show irises, and their (N, 3)
+            colours, which replace those of the file; None on the coarser levels, whose people are
+            too far away to show any.
     """
 
     vertices_m: FloatArray
@@ -76,7 +80,7 @@ class SkinMesh:
     triangles: NDArray[np.int64]
     weights: FloatArray
     texture_file: Path
-    eyes: tuple[tuple[FloatArray, NDArray[np.bool_]], ...] = ()
+    irises: tuple[NDArray[np.uint16], NDArray[np.uint8]] | None = None
 
     @cached_property
     def texture_rgb(self) -> NDArray[np.uint8]:
@@ -84,7 +88,10 @@ class SkinMesh:
         data = np.frombuffer(self.texture_file.read_bytes(), np.uint8)
         bgr = cv2.imdecode(data, cv2.IMREAD_COLOR)
         rgb = np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
-        return with_human_irises(rgb, self.vertices_m, self.uv, self.triangles, self.eyes)
+        if self.irises is not None:
+            (rows, columns), colours = self.irises
+            rgb[rows, columns] = colours
+        return rgb
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,14 +132,9 @@ class WorkerAsset:
 
 def worker_names() -> tuple[str, ...]:
     """Return the names of the shipped workers, sorted."""
-    folder = resources.files("sim_tests.actors.body") / "workers"
-    return tuple(
-        sorted(
-            entry.name.removesuffix(".npz")
-            for entry in folder.iterdir()
-            if entry.name.endswith(".npz")
-        )
-    )
+    files = (entry.name for entry in _FOLDER.iterdir())
+    found = (name.removesuffix(".npz") for name in files if name.endswith(".npz"))
+    return tuple(sorted(set(found) - {_IRISES}))
 
 
 @lru_cache(maxsize=64)
@@ -147,7 +149,7 @@ def load_worker(name: str) -> WorkerAsset:
         arrays = {key: data[key] for key in data.files}
     joints_m = _read_only_copy(arrays["joints_m"])
     levels = tuple(
-        _skin_mesh(arrays, level, path.with_name(f"{path.stem}_lod{level}.jpg"), joints_m)
+        _skin_mesh(arrays, level, path.with_name(f"{path.stem}_lod{level}.jpg"))
         for level in range(DETAIL_LEVELS)
     )
     capsules = tuple(
@@ -188,12 +190,23 @@ def _file_of(name: str) -> Path:
         raise SimError(
             f"worker must be one of {', '.join(worker_names())} or an .npz file, got {name!r}"
         )
-    return Path(str(resources.files("sim_tests.actors.body"))) / "workers" / f"{name}.npz"
+    return Path(str(_FOLDER)) / f"{name}.npz"
 
 
-def _skin_mesh(
-    arrays: dict[str, NDArray[np.generic]], level: int, texture: Path, joints_m: FloatArray
-) -> SkinMesh:
+@lru_cache(maxsize=64)
+def _irises(name: str) -> tuple[NDArray[np.uint16], NDArray[np.uint8]] | None:
+    """Return the irises of a shipped worker, see :class:`SkinMesh`; None for others.
+
+    The body model's eyeballs are larger than human ones, and so are the irises on the textures,
+    which fill the gap between the lids. These have the 11.7 mm of human ones.
+    """
+    with (_FOLDER / f"{_IRISES}.npz").open("rb") as file, np.load(file, allow_pickle=False) as data:
+        if f"{name}_texels" not in data:
+            return None
+        return data[f"{name}_texels"], data[f"{name}_rgb"]
+
+
+def _skin_mesh(arrays: dict[str, NDArray[np.generic]], level: int, texture: Path) -> SkinMesh:
     """Undo the quantisation of one level of detail."""
 
     def dequantised(key: str) -> FloatArray:
@@ -202,20 +215,14 @@ def _skin_mesh(
 
     normals = dequantised("normals")
     lengths = np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-    weights = dequantised("weights")
-    eyes = tuple(
-        (joints_m[row], weights[:, row] > 0.5)
-        for row, joint in enumerate(JOINTS)
-        if level == 0 and joint.endswith("_eye")
-    )
     return SkinMesh(
         vertices_m=dequantised("vertices"),
         normals=_read_only_copy(normals / lengths),
         uv=dequantised("uv"),
         triangles=arrays[f"lod{level}_triangles"].astype(np.int64),
-        weights=weights,
-        eyes=eyes,
+        weights=dequantised("weights"),
         texture_file=texture,
+        irises=_irises(texture.name.split("_")[0]) if level == 0 else None,
     )
 
 

@@ -17,7 +17,7 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from perception.arrays import FloatArray, finite_number
 
 from ...world.errors import SimError
-from ._gait_parameters import (
+from ._gait_pose import (
     ARM_SWING_RAD,
     FOOT_LIFT_M,
     LOADING_S,
@@ -34,10 +34,10 @@ from ._gait_parameters import (
     SWING_CLEARANCE_M,
     THORAX_YAW_RAD,
     USED_REACH,
+    GaitPose,
     landing_pitch_rad,
     lift_off_pitch_rad,
 )
-from ._gait_pose import GaitPose
 from ._skeleton import LEFT, RIGHT, SIDES, SIGNS, Skeleton
 
 # Stride at the comfortable speed as a share of stature. Step length grows with speed to about this

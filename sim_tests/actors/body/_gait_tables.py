@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from ._gait import Gait
-from ._gait_parameters import (
+from ._gait_pose import (
     BACKWARD_STRIDE_SHARE,
     MAX_CADENCE_HZ,
     SIDE_STRIDE_SHARE,

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from ._gait import Gait
-from ._gait_parameters import (
+from ._gait_pose import (
     ARM_SWING_RAD,
     FOOT_LIFT_M,
     LOADING_S,
@@ -31,10 +31,10 @@ from ._gait_parameters import (
     THORAX_YAW_RAD,
     TWIST_FROM_MPS,
     TWIST_RAD,
+    GaitPose,
     landing_pitch_rad,
     lift_off_pitch_rad,
 )
-from ._gait_pose import GaitPose
 from ._gait_tables import GaitTables, PlanarPose
 from ._skeleton import LEFT, RIGHT, SIGNS
 

@@ -12,8 +12,9 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from perception.arrays import FloatArray
 
 from ._gait import Gait
-from ._gait_parameters import (
+from ._gait_pose import (
     BACKWARD_STRIDE_SHARE,
+    HIP_HEIGHT_COLUMN,
     LONGEST_SWING_S,
     MAX_CADENCE_HZ,
     SIDE_STRIDE_SHARE,
@@ -21,7 +22,6 @@ from ._gait_parameters import (
     TWIST_FROM_MPS,
     TWIST_RAD,
 )
-from ._gait_pose import HIP_HEIGHT_COLUMN
 from ._skeleton import LEFT, RIGHT
 
 # Below both of these the body stands.

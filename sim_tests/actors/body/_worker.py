@@ -115,9 +115,7 @@ class Worker:
             subtract(bones.shoulders_m, bones.joint_m(_SPINE)),
             subtract(bones.hip_keypoints_m, bones.hips_m),
         )
-        self._face = tuple(
-            subtract(point, bones.joint_m(_NECK)) for point in (bones.nose_m, bones.eyes_m)
-        )
+        self._eyes_from_neck = subtract(bones.eyes_m, bones.joint_m(_NECK))
         self.seat: Seat = fitting_seat(bones, seat)
         self._body = WorkerBody(warehouse, bones, self.seat)
         self.client: int = warehouse.client
@@ -303,14 +301,9 @@ class Worker:
         )
 
     @property
-    def position_nose_odom_m(self) -> FloatArray:
-        """(3,) tip of the nose, the origin of the head frame."""
-        return np.array(add(self._neck_odom_m, rotate(self._head, self._face[0])))
-
-    @property
     def eyes_odom_m(self) -> FloatArray:
         """(3,) midpoint of the eyes."""
-        return np.array(add(self._neck_odom_m, rotate(self._head, self._face[1])))
+        return np.array(add(self._neck_odom_m, rotate(self._head, self._eyes_from_neck)))
 
     @property
     def T_odom_eyes(self) -> FloatArray:  # noqa: N802

@@ -11,10 +11,8 @@ from ._amr import (
     WHEEL_RADIUS_M,
     Amr,
 )
-from ._kinematic_look import KinematicLook, model_meshes
 from ._kinematic_robot import KinematicRobot
-from ._look import AmrLook
-from ._meshes import amr_meshes
+from ._look import AmrLook, KinematicLook, amr_meshes, model_meshes
 from ._model import BodyPart, RobotModel, shipped_robots
 
 __all__ = [

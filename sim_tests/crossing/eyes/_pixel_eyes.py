@@ -13,7 +13,7 @@ from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 from perception.no_view import why_no_view
 
-from ...world.camera import CameraTiming, ImageRenderer, SensorConfig, SimulatedCamera
+from ...world.camera import CameraTiming, CoarseSceneryRenderer, SensorConfig, expose
 from ...world.errors import SimError
 from .._stage import Stage, TrueView
 from ._eyes import NOBODY, WorkerObservations
@@ -37,10 +37,10 @@ class PixelEyes:
     Args:
         stage: the stage of the crossing.
         camera: camera model.
-        sensor: noise, exposure and blur.
+        sensor: the noise of the images.
         rng: random generator of the sensor's noise.
         pipeline: pipeline for the images.
-        renderer: renderer of the images; None for a :class:`~sim_tests.CameraRenderer`.
+        renderer: renderer of the images; None renders the scenery as finely as the people.
         T_camera_assumed: (4, 4) pose of the camera as the robot assumes it, in the true camera's
             frame; None where they are the same.
         change: a fault of the pictures; None for none.
@@ -56,7 +56,7 @@ class PixelEyes:
         sensor: SensorConfig,
         rng: np.random.Generator,
         pipeline: AwarenessPipeline,
-        renderer: ImageRenderer | None = None,
+        renderer: CoarseSceneryRenderer | None = None,
         T_camera_assumed: FloatArray | None = None,
         change: PictureChange | None = None,
     ) -> None:
@@ -74,13 +74,9 @@ class PixelEyes:
             )
         self._T_camera_assumed = T_camera_assumed
         self._change = change
-        self._camera = SimulatedCamera(
-            stage.warehouse,
-            camera,
-            sensor=sensor,
-            rng=rng,
-            renderer=renderer,
-        )
+        self._camera, self._sensor = camera, sensor
+        (self._noise_rng,) = rng.spawn(1)
+        self._renderer = CoarseSceneryRenderer(stage.warehouse, 1) if renderer is None else renderer
 
     def observe(
         self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
@@ -89,16 +85,18 @@ class PixelEyes:
 
         None for an image that is no view, such as a black one.
         """
-        frame = self._camera.capture(stamp_s, T_odom_camera)
-        rgb = frame.rgb if self._change is None else self._change(frame.rgb, stamp_s)
+        view = self._renderer.render(self._camera, T_odom_camera)
+        rgb = expose(view.rgb, self._sensor, self._noise_rng)
+        if self._change is not None:
+            rgb = self._change(rgb, stamp_s)
         # Not compared with the image before: a sensor without noise sees the same thing twice.
         if why_no_view(rgb) is not None:
             return None
-        assumed = frame.T_odom_camera
+        assumed = T_odom_camera
         if self._T_camera_assumed is not None:
             assumed = assumed @ self._T_camera_assumed
         observations = self._pipeline.process(rgb, stamp_s, floor=FloorPlane.from_pose(assumed))
-        boxes = [_box_of(frame.actors == worker.actor) for worker in self._stage.workers]
+        boxes = [_box_of(view.actors == worker.actor) for worker in self._stage.workers]
         workers = match_to_workers(observations, truth, boxes)
         return tuple(zip(observations, workers, strict=True))
 

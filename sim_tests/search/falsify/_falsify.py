@@ -12,11 +12,12 @@ from perception.documents import yaml_text
 
 from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
-from ...study.runs import Job, ProcessLock, policy_of, refuse_unusable_planner
+from ...study.runs import Job, policy_of, refuse_unusable_planner
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from .._files import templates_of, write_or_check_settings
 from .._optimizer import Outcome, ParameterValues
+from .._process_lock import ProcessLock
 from ._no_floor_planner import LABEL, PLANNER
 from ._restarted_search import CONTACT_SCORE, EvaluatedTrial, RestartedSearch, score
 from ._scenario_space import ScenarioSpace

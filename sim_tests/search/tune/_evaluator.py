@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -11,10 +10,10 @@ from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
 from ...scenario import ScenarioTemplate
-from ...study.measures import EpisodeRecord, salvage_record_file, write_records
-from ...study.runs import ProcessLock
+from ...study.measures import EpisodeRecord, read_records, write_records
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
+from .._process_lock import ProcessLock
 from ._evaluation import Evaluation
 from ._race import stages
 from ._settings import TuneSettings
@@ -54,9 +53,7 @@ class PolicyEvaluator:
         path = self._folder / _FOLDER / f"{name}-{seeds[0]}-{seeds[-1]}.csv"
         with ProcessLock(self._folder / "locks" / f"{path.stem}.lock"):
             if path.exists():
-                kept = self._kept_records(path, name, seeds, len(templates))
-                if kept is not None:
-                    return Evaluation.of(kept)
+                return Evaluation.of(self._kept_records(path, name, seeds, len(templates)))
             records = self._run(name, policy, seeds, templates)
             if not any(record.error for record in records):
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -86,27 +83,17 @@ class PolicyEvaluator:
 
     def _kept_records(
         self, path: Path, name: str, seeds: Sequence[int], scenarios: int
-    ) -> tuple[EpisodeRecord, ...] | None:
-        """Return the records of a file; None for a damaged file, which is set aside."""
-        found = salvage_record_file(path)
-        records = tuple(record for _, _, record in found.rows)
+    ) -> tuple[EpisodeRecord, ...]:
+        """Return the records of a file; raise SimError for one of other episodes."""
+        records = read_records(path)
         episodes = {(record.scenario, record.seed) for record in records}
-        if (
-            not found.damaged
-            and not found.torn
-            and len(records) == len(episodes) == len(seeds) * scenarios
-            and all(record.policy == name and record.seed in seeds for record in records)
+        if len(records) == len(episodes) == len(seeds) * scenarios and all(
+            record.policy == name and record.seed in seeds for record in records
         ):
             return records
-        reason = found.damaged[0].reason if found.damaged else "episodes are missing in it"
-        aside = path.with_name(path.name + ".damaged")
-        path.replace(aside)
-        print(
-            f"{path} is damaged: {reason}; it is set aside as {aside.name}, and its episodes run "
-            "again",
-            file=sys.stderr,
+        raise SimError(
+            f"{path} holds other episodes than those of {name}: move it away, and they run again"
         )
-        return None
 
     def _run(
         self,

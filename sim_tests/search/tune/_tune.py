@@ -14,12 +14,13 @@ from nav_adapter import AwarenessPolicy
 from ...crossing import named_policy
 from ...study.frontier import TODAY
 from ...study.measures import Interval
-from ...study.runs import ProcessLock, policy_of
+from ...study.runs import policy_of
 from ...world.errors import SimError
 from .._episode_runner import EpisodeRunner
 from .._files import write_or_check_settings
 from .._optimizer import Optimizer, Outcome, SamplerName
 from .._optuna import optuna
+from .._process_lock import ProcessLock
 from .._shared_study import NOTES, Claim, SharedStudy
 from ._evaluation import OBJECTIVE, RISK, Evaluation
 from ._evaluator import PolicyEvaluator

@@ -21,7 +21,7 @@ from awarenav.cli import POSITIVE, FolderPath, argument, command, option, option
         130: "Interrupted; the episodes so far are kept.",
     },
     epilog="A killed or interrupted run continues with the same command and --resume. "
-    "docs/frontier.md explains the picture. Needs the extra 'plot'.",
+    "docs/what_it_wins.md explains the picture. Needs the extra 'plot'.",
 )
 @argument(
     "folder",
@@ -53,6 +53,7 @@ def frontier(**values: Any) -> int:
     They say what awareness wins at equal risk and at equal time, with 95 % intervals. With DIR,
     the folder of such episodes, it runs nothing and draws them again.
     """
-    from ._run import FrontierOptions, frontier_command  # noqa: PLC0415 - help needs no simulator
+    from ..runs import Conditions  # noqa: PLC0415 - help needs no simulator
+    from ._run import FrontierOptions, frontier_command  # noqa: PLC0415
 
-    return frontier_command(FrontierOptions(**values))
+    return frontier_command(FrontierOptions(conditions=Conditions.taken_from(values), **values))

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._answering import answering_note
-    from ._attention import (
+    from ._awareness import (
         ATTENTION_WITHIN_M,
         ATTENTIVE_FROM,
         UNAWARE_UP_TO,
@@ -22,11 +21,11 @@ if TYPE_CHECKING:
         resampled_interval,
         resampled_means,
     )
+    from ._compare import answering_note
     from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
     from ._driving import path_length_m
     from ._interval import FEW_PAIRS, Interval, proportion_interval, zero_of_n_upper
     from ._measure import measure
-    from ._metrics import METRICS, SHARES, Metric
     from ._pairs import (
         paired,
         paired_difference,
@@ -35,38 +34,30 @@ if TYPE_CHECKING:
         violation_excess_of_time,
         won_back,
     )
-    from ._ratios import RATIOS, Ratio
-    from ._record import RECORD_COLUMNS, EpisodeRecord, record_row
+    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric
     from ._record_file import (
-        read_record_file,
+        RECORD_COLUMNS,
         read_records,
-        salvage_record_file,
+        read_rows,
+        record_row,
         write_records,
     )
-    from ._step_out import (
-        FASTER_STEP_OUT,
-        STEP_OUT,
-        StepOut,
-        StepOutImpacts,
-        step_out_impacts,
-    )
-    from ._summary import BASELINE, Comparison, Summary, SummaryRow, summarise
+    from ._step_out import StepOut, step_out_impacts
+    from ._summary import BASELINE, Comparison, Summary, SummaryRow, Variant, labels, summarise
     from ._summary_text import nondeterminism_notes, summary_text, table_text
     from ._trace import Trace
-    from ._variants import Variant, labels
 
 __all__ = [
     "ATTENTION_WITHIN_M",
     "ATTENTIVE_FROM",
     "BASELINE",
-    "FASTER_STEP_OUT",
+    "COLUMNS",
     "FEW_PAIRS",
     "METRICS",
     "OVERSHOOT_MPS",
     "RATIOS",
     "RECORD_COLUMNS",
     "SHARES",
-    "STEP_OUT",
     "UNAWARE_UP_TO",
     "UNCONFIRMED",
     "Comparison",
@@ -75,9 +66,7 @@ __all__ = [
     "Interval",
     "MeasuredAttention",
     "Metric",
-    "Ratio",
     "StepOut",
-    "StepOutImpacts",
     "Summary",
     "SummaryRow",
     "Trace",
@@ -95,12 +84,11 @@ __all__ = [
     "path_length_m",
     "proportion_interval",
     "ratio_interval",
-    "read_record_file",
     "read_records",
+    "read_rows",
     "record_row",
     "resampled_interval",
     "resampled_means",
-    "salvage_record_file",
     "step_out_impacts",
     "summarise",
     "summary_text",

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from awarenav.errors import not_one_of
 from awarenav.files import json_text
 from perception.documents import read_json
 
 from ...world.errors import SimError
-from ._answering import answering_note
-from ._record_file import read_records, write_records
+from ._record_file import read_rows, write_records
 from ._summary import BASELINE, summarise_sources
 from ._summary_text import summary_text
 
-_EPISODES: Final = "episodes.csv"
 _RUN: Final = "run.json"
+# Hearing.answers of sim_tests.actors.behaviour, whose import needs the simulator.
+DEFAULT_ANSWERS: Final = 0.5
+_SETTING: Final = re.compile(r"(?:^|,)\s*answers\s*=\s*([^,\s]+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,10 +47,7 @@ def compare_command(options: CompareOptions) -> int:
         raise SimError(f"--level must lie in (0, 1), got {options.level:g}")
     if options.out is not None and options.out.suffix not in (".csv", ".parquet"):
         raise SimError(f"--out must be a .csv or .parquet file, got {options.out}")
-    sources = {
-        name: read_records(_episodes_file(path))
-        for name, path in zip(names, options.runs, strict=True)
-    }
+    sources = {name: read_rows(path) for name, path in zip(names, options.runs, strict=True)}
     records = [record for table in sources.values() for record in table]
     if not records:
         raise SimError(f"no episodes yet in {', '.join(map(str, options.runs))}")
@@ -64,10 +63,6 @@ def compare_command(options: CompareOptions) -> int:
     if options.out is not None:
         write_records(options.out, records)
     return 0
-
-
-def _episodes_file(path: Path) -> Path:
-    return path / _EPISODES if path.is_dir() else path
 
 
 def _answering(runs: Sequence[Path]) -> list[str]:
@@ -103,3 +98,24 @@ def _check_baseline(baseline: str, policies: Sequence[str]) -> None:
     if baseline in policies or (baseline == BASELINE and len(policies) >= 1):
         return  # without the default baseline, nothing is compared
     raise SimError(not_one_of("--baseline", baseline, policies))
+
+
+def answering_note(about: Any) -> str:
+    """Return a sentence on the probability with which simulated people answer a request.
+
+    Args:
+        about: content of ``run.json``.
+
+    Returns:
+        The sentence; empty where the settings of the run are not known.
+    """
+    settings = about.get("settings") if isinstance(about, Mapping) else None
+    if not isinstance(settings, Mapping):
+        return ""
+    population = str(settings.get("population") or "")
+    found = _SETTING.search(population)
+    if found is not None:
+        share, source = found[1], f"population {population}"
+    else:
+        share, source = f"{DEFAULT_ANSWERS:g}", "the default, unless a scenario has its own"
+    return f"Simulated people answer a request that they hear with probability {share} ({source})."

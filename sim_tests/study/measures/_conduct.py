@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from perception.arrays import finite_number
-
 from ...world.errors import SimError
 
 if TYPE_CHECKING:
@@ -44,14 +42,6 @@ class Conduct:
     plan_median_s: float
     plan_p99_s: float
     cycle_s: float
-
-    def __post_init__(self) -> None:
-        for name in ("limit_excess_mps", "fastest_point_excess_mps"):
-            value = getattr(self, name)
-            if value is not None:
-                finite_number(name, value, SimError)
-        for name in ("plan_calls", "plan_median_s", "plan_p99_s", "cycle_s"):
-            finite_number(name, getattr(self, name), SimError, minimum=0.0)
 
     @classmethod
     def of(cls, result: CrossingResult) -> Conduct:

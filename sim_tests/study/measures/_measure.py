@@ -1,4 +1,4 @@
-"""The record of a crossing: every metric of docs/metrics.md."""
+"""The record of a crossing: every metric of docs/simulation.md."""
 
 from __future__ import annotations
 
@@ -11,8 +11,13 @@ import numpy as np
 from perception.arrays import FloatArray
 
 from ...crossing import STANDING_SPEED_MPS
-from ._attention import MeasuredAttention
-from ._awareness import awareness_class, awareness_error, nearest_person, track_awareness
+from ._awareness import (
+    MeasuredAttention,
+    awareness_class,
+    awareness_error,
+    nearest_person,
+    track_awareness,
+)
 from ._conflict import Outline, min_time_to_collision_s, post_encroachment_s
 from ._driving import (
     count_stops,
@@ -20,7 +25,8 @@ from ._driving import (
     peak_deceleration_and_jerk,
     success_weighted_path_length,
 )
-from ._record import Awareness, EpisodeRecord, rounded
+from ._record import Awareness, EpisodeRecord
+from ._record_file import rounded
 from ._requests import Requests
 from ._step_out import FASTER_STEP_OUT, is_unaware, since_look_of, step_out_impacts
 from ._trace import Trace
@@ -43,7 +49,7 @@ def measure(
     attention: str = "mixed",
     fault: str = "",
 ) -> EpisodeRecord:
-    """Return all metrics of a crossing, as docs/metrics.md defines them.
+    """Return all metrics of a crossing, as docs/simulation.md defines them.
 
     Numbers are rounded to the six decimals that files keep, so that a record read from a file is
     equal.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
@@ -12,7 +11,8 @@ import numpy as np
 from ...world.errors import SimError
 from ._bootstrap import bootstrap_interval, ratio_interval
 from ._interval import Interval, proportion_interval
-from ._record import COLUMN_KINDS, EpisodeRecord
+from ._record import EpisodeRecord
+from ._record_file import COLUMN_KINDS
 
 Pair = tuple[EpisodeRecord, EpisodeRecord]
 
@@ -58,9 +58,7 @@ def paired_difference(
         raise SimError(f"field must be a number of an episode, got {field!r}")
     pairs = paired(base, other)
     kept = _with_numbers(pairs, field)
-    differences = [
-        _finite_value(second, field) - _finite_value(first, field) for first, second in kept
-    ]
+    differences = [getattr(second, field) - getattr(first, field) for first, second in kept]
     interval = bootstrap_interval(differences, _rng(rng), level, strata=_scenarios(kept))
     return replace(interval, left_out=len(pairs) - len(kept))
 
@@ -131,8 +129,7 @@ def violates_more(
     """
     pairs = _with_numbers(paired(blind, policy), "violation_time_s")
     more = sum(
-        _finite_value(second, "violation_time_s")
-        > _finite_value(first, "violation_time_s") + _SAME_TIME_S
+        (second.violation_time_s or 0.0) > (first.violation_time_s or 0.0) + _SAME_TIME_S
         for first, second in pairs
     )
     return proportion_interval(more, len(pairs), level)
@@ -149,11 +146,8 @@ def _ratio_of_sums(
     """Return Σ sign · (policy − blind) of ``field``, divided by Σ of ``over`` of blind."""
     kept = _with_numbers(_with_numbers(pairs, field), over)
     interval = ratio_interval(
-        [
-            sign * (_finite_value(second, field) - _finite_value(first, field))
-            for first, second in kept
-        ],
-        [_finite_value(first, over) for first, _ in kept],
+        [sign * (getattr(second, field) - getattr(first, field)) for first, second in kept],
+        [getattr(first, over) for first, _ in kept],
         _rng(rng),
         level,
         strata=_scenarios(kept),
@@ -167,13 +161,6 @@ def _with_numbers(pairs: Sequence[Pair], field: str) -> tuple[Pair, ...]:
         for pair in pairs
         if all(not record.error and getattr(record, field) is not None for record in pair)
     )
-
-
-def _finite_value(record: EpisodeRecord, field: str) -> float:
-    value = float(getattr(record, field))
-    if not math.isfinite(value):
-        raise SimError(f"{field} of {record.scenario}, seed {record.seed} is not finite: {value}")
-    return value
 
 
 def _scenarios(pairs: Sequence[Pair]) -> list[tuple[str, int]]:

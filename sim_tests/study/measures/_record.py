@@ -1,15 +1,14 @@
-"""The record of one episode, and its row in a table: one schema for all files and tables."""
+"""The measures of an episode: the columns of ``episodes.csv``, each defined where it stands.
+
+A measure is a field here with its title, its better direction and its definition, and a function
+that :func:`~sim_tests.study.measures.measure` calls. Tables, files, statistics and the reference
+page of the documentation read it from here.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import MISSING, dataclass, fields
-from typing import Any, Final, Literal, get_args
-
-from awarenav.errors import did_you_mean
-
-from ...world.errors import SimError
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, Final, Literal
 
 #: Awareness of the person who came nearest, before the encounter, and the robot's error about it if
 #: there is one; empty if nobody came near.
@@ -17,141 +16,288 @@ Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
 # That of sim_tests.crossing, whose import needs the simulator.
 _STANDING_SPEED_MPS: Final = 0.03
+# Units by the end of a name.
+_UNITS: Final = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³"}
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A number of an episode: its name, its unit and its better direction.
+
+    Attributes:
+        name: column of ``episodes.csv``.
+        title: for headings.
+        unit: empty for a count or a ratio.
+        better: the better direction.
+        meaning: one sentence.
+        decimals: to print.
+        share: a share of episodes, printed in per cent.
+        from_zero: the axis of a plot includes 0.
+        says_better: a plot says which direction is better.
+    """
+
+    name: str
+    title: str
+    unit: str
+    better: Literal["lower", "higher", "neither"]
+    meaning: str
+    decimals: int = 2
+    share: bool = False
+    from_zero: bool = True
+    says_better: bool = True
+
+
+def _column(meaning: str, default: Any = MISSING) -> Any:
+    """Return a field of a record that is a column, but no measure."""
+    return field(default=default, metadata={"meaning": meaning})
+
+
+def _measure(
+    title: str,
+    meaning: str,
+    *,
+    better: Literal["lower", "higher", "neither"] = "lower",
+    default: int | None = None,
+    decimals: int = 2,
+    says_better: bool = True,
+) -> Any:
+    """Return a field of a record that is a measure; :class:`Metric` describes the arguments.
+
+    Its unit is the end of its name. Without an episode to which it applies, it has the default.
+    """
+    about = {
+        "title": title,
+        "meaning": meaning,
+        "better": better,
+        "decimals": decimals,
+        "says_better": says_better,
+    }
+    return field(default=default, metadata=about)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class EpisodeRecord:
-    """The metrics of one episode, as docs/metrics.md defines them.
+    """The measures of one episode, as docs/simulation.md defines them.
 
-    None means that a metric does not apply to the episode.
-
-    Attributes:
-        scenario: name of the scenario.
-        seed: of the episode.
-        policy: name of the policy.
-        planner: name of the planner.
-        perception: ``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are
-            scanners too, or ``"scanner"``.
-        success: the goal was reached and the robot touched nobody by its own motion.
-        contact: the robot, moving or not, and a person touched.
-        contact_by: ``"robot"`` if the robot moved into a person, else ``"person"``, or empty.
-        min_separation_m: smallest distance between the surfaces of robot and person.
-        time_to_goal_s: None when the goal was not reached.
-        max_speed_within_2m_mps: the robot's highest speed with a person's surface within 2 m.
-        min_margin_m: smallest separation margin S − S_p at a moving robot.
-        violation_time_s: how long the margin was negative at a moving robot.
-        contacts: number of contacts.
-        duration_s: simulated time.
-        scenario_version: version of the scenario.
-        attention: the scenario's ``attention``: ``"attentive"``, ``"unaware"`` or ``"mixed"``.
-        fault: name of the fault, empty for none.
-        time_without_people_s: time to goal of the same task in the empty hall.
-        time_lost_s: time over ``time_without_people_s``; an episode that does not reach the goal
-            loses all of its time.
-        path_length_m: length of the path that the robot drove.
-        spl: success weighted by path length (Anderson et al. 2018).
-        speed_at_min_separation_mps: the robot's speed at the smallest separation.
-        min_time_to_collision_s: smallest time to collision.
-        post_encroachment_s: smallest time between one leaving a place and the other entering it.
-        intimate_s: time with a person's surface within 0.45 m.
-        personal_s: time with a person's surface within 1.2 m.
-        robot_contacts: contacts of a robot that moved into a person.
-        person_contacts: contacts of people who walked into the robot.
-        contact_speed_mps: the robot's highest speed at a contact that it caused.
-        peak_deceleration_mps2: highest deceleration of the robot.
-        peak_jerk_mps3: largest jerk of the robot.
-        stops: how often the robot came to a stand before the goal.
-        human_delay_s: delay of all people over their free walks, of those on the way so far.
-        human_detour_m: detour of all people, over their free walks.
-        warnings: number of warnings of a collision that the robot asked for.
-        awareness_error: mean |α of the track − true α| over the tracked people.
-        awareness: awareness of the person who came nearest, and the robot's judgement of it.
-        reaction: reaction of that person, see :class:`PersonOutcome`.
-        error: the error that ended the episode, empty for none; with an error, every metric keeps
-            its default.
-        nondeterministic: the user's planner gave other commands when it drove the task without
-            people a second time, with the same seed; the row may differ in another run.
-        attentive_share: smallest share of the time for which one of the people had a true α ≥ 0.5,
-            while they could look at the robot within 5 m.
-        moving_contacts: contacts with a moving robot, by any cause.
-        moving_contact_mps: the robot's highest speed at one of them.
-        moving_contacts_unaware: those of them with people who have not looked at the robot for 1 s,
-            or never.
-        moving_contact_unaware_mps: the robot's highest speed at one of these.
-        min_margin_unaware_m: smallest separation margin at a moving robot to such people.
-        step_out_unaware: expected impacts with unaware people who set off, per 1 000 crossings.
-        step_out_unaware_fast: those of them at more than 0.25 m/s.
-        step_out_aware: the same with aware people who ignore the robot.
-        step_out_aware_fast: those of them at more than 0.25 m/s.
-        step_out_worst_mps: the robot's highest closing speed in an impact with an unaware person.
-        step_out_stress_unaware: ``step_out_unaware`` with faster starts than recorded.
-        step_out_stress_worst_mps: ``step_out_worst_mps`` with faster starts than recorded.
-        requests: number of requests for attention.
-        requests_answered: those whose person then looked at the robot.
-        requests_needless: those to somebody who was no obstacle a second later and had not looked.
-        asked_twice: people who were asked more than once.
-        requests_after_answer: requests to a track that had answered before; there should be none.
+    None means that a measure does not apply to the episode. With an ``error``, every measure keeps
+    its default. :data:`COLUMNS` has the meaning of each field.
     """
 
-    scenario: str
-    seed: int
-    policy: str
-    planner: str
-    perception: str
-    success: bool = False
-    contact: bool = False
-    contact_by: str = ""
-    min_separation_m: float | None = None
-    time_to_goal_s: float | None = None
-    max_speed_within_2m_mps: float | None = None
-    min_margin_m: float | None = None
-    violation_time_s: float | None = None
-    contacts: int = 0
-    duration_s: float | None = None
-    scenario_version: int = 1
-    attention: str = "mixed"
-    fault: str = ""
-    time_without_people_s: float | None = None
-    time_lost_s: float | None = None
-    path_length_m: float | None = None
-    spl: float | None = None
-    speed_at_min_separation_mps: float | None = None
-    min_time_to_collision_s: float | None = None
-    post_encroachment_s: float | None = None
-    intimate_s: float | None = None
-    personal_s: float | None = None
-    robot_contacts: int = 0
-    person_contacts: int = 0
-    contact_speed_mps: float | None = None
-    peak_deceleration_mps2: float | None = None
-    peak_jerk_mps3: float | None = None
-    stops: int = 0
-    human_delay_s: float | None = None
-    human_detour_m: float | None = None
-    warnings: int = 0
-    awareness_error: float | None = None
-    awareness: Awareness = ""
-    reaction: str = ""
-    error: str = ""
-    nondeterministic: bool = False
-    attentive_share: float | None = None
-    moving_contacts: int = 0
-    moving_contact_mps: float | None = None
-    step_out_unaware: float | None = None
-    step_out_unaware_fast: float | None = None
-    step_out_aware: float | None = None
-    step_out_aware_fast: float | None = None
-    step_out_worst_mps: float | None = None
-    step_out_stress_unaware: float | None = None
-    step_out_stress_worst_mps: float | None = None
-    moving_contacts_unaware: int = 0
-    moving_contact_unaware_mps: float | None = None
-    min_margin_unaware_m: float | None = None
-    requests: int = 0
-    requests_answered: int = 0
-    requests_needless: int = 0
-    asked_twice: int = 0
-    requests_after_answer: int = 0
+    scenario: str = _column("Name of the scenario.")
+    seed: int = _column("Of the episode.")
+    policy: str = _column("Name of the policy.")
+    planner: str = _column("Name of the planner.")
+    perception: str = _column(
+        '``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are '
+        'scanners too, or ``"scanner"``.'
+    )
+    success: bool = _column(
+        "The goal was reached and the robot touched nobody by its own motion.", False
+    )
+    contact: bool = _column("The robot, moving or not, and a person touched.", False)
+    contact_by: str = _column(
+        '``"robot"`` if the robot moved into a person, else ``"person"``, or empty.', ""
+    )
+    min_separation_m: float | None = _measure(
+        "Smallest separation",
+        "Smallest distance between the surfaces of robot and person.",
+        better="higher",
+        says_better=False,
+    )
+    time_to_goal_s: float | None = _measure("Time to goal", "Time until the goal was reached.")
+    max_speed_within_2m_mps: float | None = _measure(
+        "Highest speed within 2 m", "The robot's highest speed with a person's surface within 2 m."
+    )
+    min_margin_m: float | None = _measure(
+        "Smallest margin",
+        "Smallest separation margin S − S_p at a moving robot: surface distance less the "
+        "protective separation of ISO 13855 and ISO/TS 15066.",
+        better="higher",
+    )
+    violation_time_s: float | None = _measure(
+        "Margin violated",
+        "Seconds an episode with the separation margin S − S_p below 0 at a moving robot.",
+        decimals=3,
+    )
+    contacts: int = _column("Number of contacts.", 0)
+    duration_s: float | None = _column("Simulated time.", None)
+    scenario_version: int = _column("Version of the scenario.", 1)
+    attention: str = _column(
+        'The scenario\'s ``attention``: ``"attentive"``, ``"unaware"`` or ``"mixed"``.', "mixed"
+    )
+    fault: str = _column("Name of the fault, empty for none.", "")
+    time_without_people_s: float | None = _column(
+        "Time to goal of the same task in the empty hall.", None
+    )
+    time_lost_s: float | None = _measure(
+        "Time lost to people",
+        "Time over that of the same task in the empty hall; one that never arrives lost all "
+        "its time.",
+    )
+    path_length_m: float | None = _measure(
+        "Path length", "Length of the path that the robot drove."
+    )
+    spl: float | None = _measure(
+        "Success weighted by path length",
+        "1 for every goal reached on the shortest way (Anderson et al. 2018).",
+        better="higher",
+        decimals=3,
+    )
+    speed_at_min_separation_mps: float | None = _measure(
+        "Speed when nearest", "The robot's speed at the instant of smallest separation."
+    )
+    min_time_to_collision_s: float | None = _measure(
+        "Smallest time to collision",
+        "Time until robot and person would touch if both went straight on, at its smallest.",
+        better="higher",
+    )
+    post_encroachment_s: float | None = _measure(
+        "Post-encroachment time",
+        "Smallest time between one leaving a place and the other entering it.",
+        better="higher",
+    )
+    intimate_s: float | None = _measure(
+        "Time within 0.45 m", "Seconds an episode with a person's surface in the intimate zone."
+    )
+    personal_s: float | None = _measure(
+        "Time within 1.2 m", "Seconds an episode with a person's surface in the personal zone."
+    )
+    robot_contacts: int = _measure(
+        "Contacts by the robot",
+        "Contacts of a robot that moved into a person.",
+        default=0,
+        decimals=3,
+    )
+    person_contacts: int = _measure(
+        "Contacts by people", "Contacts of people who walked into the robot.", default=0, decimals=3
+    )
+    contact_speed_mps: float | None = _measure(
+        "Speed at contact", "The robot's highest speed at a contact that it caused."
+    )
+    peak_deceleration_mps2: float | None = _measure(
+        "Peak deceleration", "The robot's strongest braking."
+    )
+    peak_jerk_mps3: float | None = _measure("Peak jerk", "The robot's largest jerk.", decimals=1)
+    stops: int = _measure(
+        "Stops", "How often the robot came to a stand before the goal.", default=0
+    )
+    human_delay_s: float | None = _measure(
+        "Delay of people",
+        "Time that people took over their free walks, all people of an episode together.",
+    )
+    human_detour_m: float | None = _measure(
+        "Detour of people",
+        "Way that people walked over their free ways, all people of an episode together.",
+    )
+    warnings: int = _measure(
+        "Warnings", "Warnings of a collision that the robot asked for.", better="neither", default=0
+    )
+    awareness_error: float | None = _measure(
+        "Error of α", "Mean |α of the track − true α| over the people tracked.", decimals=3
+    )
+    awareness: Awareness = _column(  # noqa: RUF009 - a field, as the others
+        "Awareness of the person who came nearest, and the robot's judgement of it.", ""
+    )
+    reaction: str = _column("Reaction of that person, see :class:`PersonOutcome`.", "")
+    error: str = _column(
+        "The error that ended the episode, empty for none; with an error, every metric keeps "
+        "its default.",
+        "",
+    )
+    nondeterministic: bool = _column(
+        "The user's planner gave other commands when it drove the task without people a "
+        "second time, with the same seed; the row may differ in another run.",
+        False,
+    )
+    attentive_share: float | None = _measure(
+        "Least attentive person",
+        "Smallest share of the time for which one of the people had a true α ≥ 0.5, while the"
+        " robot was in front of them, in sight and within 5 m.",
+        better="neither",
+    )
+    moving_contacts: int = _measure(
+        "Contacts with a moving robot",
+        "Contacts of a person and a moving robot, by any cause.",
+        default=0,
+        decimals=3,
+    )
+    moving_contact_mps: float | None = _measure(
+        "Speed at contact, any cause",
+        "The robot's highest speed at a contact with a person, by any cause.",
+    )
+    step_out_unaware: float | None = _measure(
+        "Step-out impacts, unaware",
+        "Expected impacts per 1 000 crossings with people who have not looked for 1 s or "
+        "never, set off at any time and ignore the robot. An index, not a rate of accidents.",
+    )
+    step_out_unaware_fast: float | None = _measure(
+        "Step-out impacts above 0.25 m/s, unaware",
+        "Those step-out impacts with unaware people in which the robot closes at more than "
+        "0.25 m/s.",
+    )
+    step_out_aware: float | None = _measure(
+        "Step-out impacts, aware",
+        "Expected impacts per 1 000 crossings with people who have looked within 1 s, if "
+        "every one who sets off ignores the robot. Few do: an upper bound.",
+    )
+    step_out_aware_fast: float | None = _measure(
+        "Step-out impacts above 0.25 m/s, aware",
+        "Those step-out impacts with aware people in which the robot closes at more than 0.25 m/s.",
+    )
+    step_out_worst_mps: float | None = _measure(
+        "Worst step-out impact, unaware",
+        "The robot's highest closing speed in a step-out impact with an unaware person.",
+    )
+    step_out_stress_unaware: float | None = _measure(
+        "Step-out impacts of faster starts, unaware",
+        "Step-out impacts with unaware people who start faster than recorded: to 1.6 m/s with"
+        " a time constant of 0.35 s.",
+    )
+    step_out_stress_worst_mps: float | None = _measure(
+        "Worst step-out impact of faster starts, unaware",
+        "The robot's highest closing speed in a step-out impact with an unaware person who "
+        "starts faster than recorded.",
+    )
+    moving_contacts_unaware: int = _measure(
+        "Contacts with a moving robot, unaware",
+        "Contacts of a moving robot and a person who has not looked for 1 s, or never.",
+        default=0,
+        decimals=3,
+    )
+    moving_contact_unaware_mps: float | None = _measure(
+        "Speed at contact, unaware",
+        "The robot's highest speed at a contact with such a person, by any cause.",
+    )
+    min_margin_unaware_m: float | None = _measure(
+        "Smallest margin, unaware",
+        "Smallest separation margin at a moving robot to people who have not looked for 1 s, "
+        "or never.",
+        better="higher",
+    )
+    requests: int = _measure(
+        "Requests for attention",
+        "How often an episode's robot asked somebody to look at it.",
+        default=0,
+    )
+    requests_answered: int = _measure(
+        "Requests answered",
+        "Requests whose person began to look at the robot within 2.5 s.",
+        better="higher",
+        default=0,
+    )
+    requests_needless: int = _measure(
+        "Needless requests",
+        "Requests to somebody who, a second later, neither set the speed limit nor had looked.",
+        default=0,
+    )
+    asked_twice: int = _measure(
+        "People asked twice", "People of an episode who were asked more than once.", default=0
+    )
+    requests_after_answer: int = _measure(
+        "Requests after an answer",
+        "Requests to a track that had answered before; there should be none.",
+        default=0,
+    )
 
     def __repr__(self) -> str:
         """Return the fields that do not have their default."""
@@ -192,122 +338,120 @@ class EpisodeRecord:
         return self.person_contacts > 0 or self.contact_by == "person"
 
 
-Kind = Literal["text", "flag", "count", "number"]
+#: The meaning of each column of ``episodes.csv``, in their order.
+COLUMNS: Final = {each.name: str(each.metadata["meaning"]) for each in fields(EpisodeRecord)}
 
-#: Decimals of numbers in files: micrometres.
-DECIMALS: Final = 6
+#: Numbers that are averaged over episodes.
+METRICS: Final = {
+    each.name: Metric(
+        name=each.name, unit=_UNITS.get(each.name.rpartition("_")[2], ""), **each.metadata
+    )
+    for each in fields(EpisodeRecord)
+    if "title" in each.metadata
+}
 
-_KINDS: Final[dict[str, Kind]] = {
-    "str": "text",
-    "Awareness": "text",
-    "bool": "flag",
-    "int": "count",
-    "float | None": "number",
-}
-#: Columns of ``episodes.csv`` in their order, and the kind of each.
-COLUMN_KINDS: Final[dict[str, Kind]] = {
-    field.name: _KINDS[str(field.type)] for field in fields(EpisodeRecord)
-}
-RECORD_COLUMNS: Final = tuple(COLUMN_KINDS)
-#: Columns that every table must have; others take their defaults.
-REQUIRED_COLUMNS: Final = tuple(
-    field.name for field in fields(EpisodeRecord) if field.default is MISSING
+
+def _by_name(*metrics: Metric) -> dict[str, Metric]:
+    return {metric.name: metric for metric in metrics}
+
+
+#: Shares of episodes, in per cent.
+SHARES: Final = _by_name(
+    Metric(
+        "success",
+        "Arrived, touching nobody",
+        "%",
+        "higher",
+        "Share of episodes in which the goal was reached and the robot moved into nobody; one "
+        "that failed counts as not reached.",
+        share=True,
+        from_zero=False,
+    ),
+    Metric(
+        "moving_contacts",
+        "Contacts with a moving robot",
+        "%",
+        "lower",
+        "Share of episodes in which a moving robot and a person touched, by any cause.",
+        share=True,
+    ),
+    Metric(
+        "robot_contacts",
+        "Contacts caused by the robot",
+        "%",
+        "lower",
+        "Share of episodes in which the robot moved into a person.",
+        share=True,
+    ),
+    Metric(
+        "person_contacts",
+        "People who walked into the robot",
+        "%",
+        "lower",
+        "Share of episodes in which a person walked into the robot.",
+        share=True,
+    ),
 )
 
 
-def rounded(value: float | None) -> float | None:
-    """Return a number as it is read back from a file; None for None, NaN and infinity.
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """A ratio of two columns of ``episodes.csv``, each summed over the episodes.
 
-    A record in memory therefore equals the same record read from a file, and a resumed run gives
-    the same records as an uninterrupted one.
+    Attributes:
+        metric: name, title and direction of the figure.
+        column: the column that is summed.
+        over: the column whose sum it is divided by; an episode without a number is left out.
+        factor: multiplies the ratio.
     """
-    if value is None or not math.isfinite(value):
-        return None
-    return float(f"{value:.{DECIMALS}f}") + 0.0  # no negative zero
+
+    metric: Metric
+    column: str
+    over: str
+    factor: float = 1.0
 
 
-def record_row(record: EpisodeRecord) -> list[str]:
-    """Return the cells of one episode in the order of :data:`RECORD_COLUMNS`.
-
-    Numbers have six decimals, and None is an empty cell. Line breaks in texts become spaces, so
-    that an episode is always one line.
-    """
-    return [_cell_text(kind, getattr(record, name)) for name, kind in COLUMN_KINDS.items()]
-
-
-def one_line(text: str) -> str:
-    """Return a text on one line and without NUL, which the csv module of Python 3.10 refuses."""
-    return " ".join(text.replace("\0", "").splitlines())
-
-
-def check_columns(columns: Sequence[str], source: str) -> None:
-    """Check the header of a table of episodes.
-
-    Raises:
-        SimError: a column is unknown or there twice, or a required one is missing.
-    """
-    for name in columns:
-        if name not in COLUMN_KINDS:
-            hint = did_you_mean(name, RECORD_COLUMNS)
-            raise SimError(
-                f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
-                "(docs/metrics.md lists all)"
-            )
-        if list(columns).count(name) > 1:
-            raise SimError(f"{source} has the column {name!r} {list(columns).count(name)} times")
-    missing = [name for name in REQUIRED_COLUMNS if name not in columns]
-    if missing:
-        raise SimError(f"{source} is not a table of episodes: it has no column {missing[0]!r}")
-
-
-def parse_row(columns: Sequence[str], cells: Sequence[str], source: str) -> EpisodeRecord:
-    """Return the episode of a row.
-
-    Args:
-        columns: the header, already checked.
-        cells: one text per column.
-        source: file and line, for messages.
-
-    Raises:
-        SimError: a cell does not fit its column, or there are more or fewer cells than columns.
-    """
-    if len(cells) != len(columns):
-        raise SimError(f"{source} has {len(cells)} cells, its header {len(columns)}")
-    values: dict[str, Any] = {
-        name: _parse_cell(name, cell, source) for name, cell in zip(columns, cells, strict=True)
-    }
-    return EpisodeRecord(**values)
-
-
-def _cell_text(kind: Kind, value: Any) -> str:
-    if kind == "number":
-        number = rounded(value)
-        return "" if number is None else f"{number:.{DECIMALS}f}"
-    if kind == "flag":
-        return str(bool(value)).lower()
-    if kind == "count":
-        return str(int(value))
-    return one_line(str(value))
-
-
-def _parse_cell(name: str, cell: str, source: str) -> Any:
-    kind = COLUMN_KINDS[name]
-    if kind == "flag":
-        if cell not in ("true", "false"):
-            raise SimError(f"{source}: {name} must be true or false, got {cell[:80]!r}")
-        return cell == "true"
-    if kind == "text":
-        if name == "awareness" and cell not in get_args(Awareness):
-            known = ", ".join(map(repr, get_args(Awareness)))
-            raise SimError(f"{source}: awareness must be one of {known}, got {cell[:80]!r}")
-        return cell
-    if kind == "number" and not cell:
-        return None
-    try:
-        number = int(cell) if kind == "count" else float(cell)
-    except ValueError as cause:
-        what = "a whole number" if kind == "count" else "a number or empty"
-        raise SimError(f"{source}: {name} must be {what}, got {cell[:80]!r}") from cause
-    if not math.isfinite(number):
-        raise SimError(f"{source}: {name} must be finite or empty, got {cell[:80]!r}")
-    return number
+#: Ratios of sums by the name of their figure, as docs/simulation.md defines them.
+RATIOS: Final = {
+    each.metric.name: each
+    for each in (
+        Ratio(
+            Metric(
+                "requests_per_hour",
+                "Requests per hour",
+                "",
+                "lower",
+                "Requests for attention, divided by the simulated time.",
+                decimals=1,
+            ),
+            "requests",
+            "duration_s",
+            3600.0,
+        ),
+        Ratio(
+            Metric(
+                "answered_share",
+                "Share of requests answered",
+                "%",
+                "higher",
+                "Share of requests whose person began to look at the robot within 2.5 s.",
+                share=True,
+            ),
+            "requests_answered",
+            "requests",
+        ),
+        Ratio(
+            Metric(
+                "needless_share",
+                "Share of needless requests",
+                "%",
+                "lower",
+                "Share of requests to somebody who, a second later, neither set the speed limit "
+                "nor had looked.",
+                share=True,
+            ),
+            "requests_needless",
+            "requests",
+        ),
+    )
+}

@@ -7,11 +7,9 @@ from typing import TypeVar
 
 from awarenav.errors import counted
 
-from ._attention import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
+from ._awareness import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
 from ._interval import Interval, number_text
-from ._metrics import METRICS
-from ._ratios import RATIOS
-from ._record import EpisodeRecord
+from ._record import METRICS, RATIOS, EpisodeRecord
 from ._summary import Comparison, Summary, SummaryRow
 
 _Row = TypeVar("_Row", Comparison, SummaryRow)
@@ -238,7 +236,7 @@ def _notes(summary: Summary) -> list[str]:
         "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
         "person and the moving robot touched, by any cause. step-out: step-out impacts\n"
         "with unaware people. (≤ x %): upper end of the exact interval. [?]: too few for an\n"
-        "interval. docs/metrics.md defines all figures."
+        "interval. docs/simulation.md defines all figures."
     ]
     if any(row.part == UNCONFIRMED for row in summary.attentions):
         notes.append(

@@ -1,53 +1,221 @@
-"""Pages from templates, with one style sheet and one script; the only module that imports Jinja."""
+"""One HTML page of sections with tables and charts, which needs no other file and no network."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from awarenav.files import write_text
 from perception.installation import install_command
 
 from ...world.errors import SimError
+from ..measures import Interval
 
-try:
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise SimError(
-        "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
-        + install_command("bench")
-    ) from cause
-
-_HOME: Final = "sim_tests.study.report"
+#: What stands in a cell without a value.
+NOTHING: Final = "–"
+#: A narrow space that breaks no line, before a sign of per cent.
+THIN: Final = "\N{NARROW NO-BREAK SPACE}"
+# Shares this near to 0 or 1 are 0 or 1.
+_ROUNDING: Final = 1e-12
 
 
-def write_page(path: Path, template: str, *, package: str = _HOME, **parts: Any) -> None:
-    """Write an HTML page without other files; it appears whole or not at all.
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A cell of a table.
 
-    A template has the variables ``style`` and ``script`` of the report, beside its parts, and may
-    import the macros of ``parts.html``.
+    Attributes:
+        text: what it shows.
+        sort: its sort key; None sorts last. Cells of text sort by their text.
+        bad: whether it is bad news.
+        href: address that it links to; empty for none.
+        is_command: whether it is a command to copy.
+    """
+
+    text: str
+    sort: float | None = None
+    bad: bool = False
+    href: str = ""
+    is_command: bool = False
+
+
+#: A row of a table: cells, or texts.
+Row = Sequence[Cell | str]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table whose columns sort.
+
+    Attributes:
+        columns: heading and meaning of each column; a meaning may be empty.
+        rows: cells, or texts.
+        text_columns: number of first columns that hold text.
+        caption: a line above it.
+    """
+
+    columns: Mapping[str, str]
+    rows: Sequence[Row]
+    text_columns: int = 1
+    caption: str = ""
+
+    @property
+    def cells(self) -> list[list[Cell]]:
+        """The rows as cells."""
+        return [
+            [Cell(each) if isinstance(each, str) else each for each in row] for row in self.rows
+        ]
+
+    def values(self) -> list[dict[str, float | str]]:
+        """Return the rows as values by column: numbers where cells have one, else texts."""
+        return [
+            {
+                name: cell.text if cell.sort is None else cell.sort
+                for name, cell in zip(self.columns, row, strict=True)
+            }
+            for row in self.cells
+        ]
+
+    def markdown(self) -> str:
+        """Return the table as Markdown."""
+        rows = [[cell.text.replace("|", r"\|") for cell in row] for row in self.cells]
+        lines = [list(self.columns), ["---"] * len(self.columns), *rows]
+        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Still:
+    """An episode with its pictures.
+
+    Attributes:
+        title: of the episode.
+        text: its figures, or why there is no picture.
+        command: the command that shows it.
+        pictures: ``data:`` addresses, each with a description.
+    """
+
+    title: str
+    text: str
+    command: str
+    pictures: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A section of a page; its parts are shown in the order of the attributes.
+
+    Attributes:
+        anchor: its address on the page.
+        title: its heading.
+        lead: one or two sentences below it.
+        charts: SVG texts, each with a caption.
+        stills: episodes with pictures.
+        commands: commands to copy.
+        tables: tables.
+        texts: names and texts that are folded away.
+        folded: the section is folded away.
+    """
+
+    anchor: str
+    title: str
+    lead: str = ""
+    charts: Sequence[tuple[str, str]] = ()
+    stills: Sequence[Still] = ()
+    commands: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    texts: Sequence[tuple[str, str]] = ()
+    folded: bool = False
+
+
+def write_page(
+    path: Path,
+    title: str,
+    sections: Sequence[Section],
+    *,
+    lead: str = "",
+    verdicts: Sequence[tuple[str, str]] = (),
+    notices: Sequence[str] = (),
+) -> None:
+    """Write a page; it appears whole or not at all, and equal content gives equal bytes.
 
     Args:
         path: of the page.
-        template: name of the template in the folder ``templates`` of its package.
-        package: the package that holds it.
-        parts: variables of the template; every text of them is escaped.
+        title: its heading.
+        sections: what stands on it; every text of them is escaped but the charts.
+        lead: a line below the heading.
+        verdicts: names, and the sentences that are read first.
+        notices: what is missing.
 
     Raises:
-        SimError: the page cannot be written.
+        SimError: the page cannot be written, or the extra ``bench`` is missing.
     """
+    try:
+        from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - an optional dependency
+        from markupsafe import Markup  # noqa: PLC0415
+    except ImportError as cause:  # pragma: no cover - depends on the installation
+        raise SimError(
+            "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
+            + install_command("bench")
+        ) from cause
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader(each) for each in dict.fromkeys((package, _HOME))]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    folder = resources.files(_HOME) / "templates"
-    assets = {
-        name: Markup((folder / f"report.{ending}").read_text("utf-8"))
-        for name, ending in (("style", "css"), ("script", "js"))
-    }
-    write_text(path, environment.get_template(template).render(**assets, **parts), SimError)
+    template = resources.files("sim_tests.study.report") / "page.html"
+    page = environment.from_string(template.read_text("utf-8")).render(
+        title=title,
+        sections=sections,
+        lead=lead,
+        verdicts=verdicts,
+        notices=notices,
+        svg=Markup,
+    )
+    write_text(path, page, SimError)
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent, with more decimals near 0 and 1: 0.9975 is no 100 %."""
+    if not math.isfinite(share):
+        return NOTHING
+    rest = min(abs(share), abs(1.0 - abs(share)))
+    decimals = 0 if rest >= 0.1 or rest < _ROUNDING else 1 if rest >= 0.01 else 2
+    return f"{100.0 * share:.{decimals}f}{THIN}%"
+
+
+def number_cell(value: float | None, decimals: int = 2, *, bad: bool = False) -> Cell:
+    """Return the cell of a number; a dash for None, NaN and infinity."""
+    if value is None or not math.isfinite(value):
+        return Cell(NOTHING)
+    rounded = round(value, decimals) + 0.0  # a negative zero loses its sign
+    return Cell(f"{rounded:.{decimals}f}", value, bad)
+
+
+def interval_cell(interval: Interval, decimals: int = 2, scale: float = 1.0) -> Cell:
+    """Return the cell of an estimate with its 95 % interval; ``scale`` 100 is per cent."""
+    return Cell(interval.text(decimals, scale), interval.value if interval.known else None)
+
+
+def share_cell(share: Interval, *, bad_from: float = math.inf, bad_below: float = 0.0) -> Cell:
+    """Return the cell of a share of episodes, as ``"0 of 23 (≤ 12 %)"``.
+
+    Args:
+        share: the share.
+        bad_from: a share of at least so much is bad news.
+        bad_below: so is one below this.
+    """
+    if not share.n:
+        return Cell(NOTHING)
+    ends = f"{100.0 * share.low:.1f}–{100.0 * share.high:.1f}{THIN}%"
+    if share.value == 0.0:
+        ends = f"≤ {percent(share.high)}"
+    elif share.value == 1.0:
+        ends = f"≥ {percent(share.low)}"
+    bad = share.value >= bad_from or share.value < bad_below
+    return Cell(f"{hits(share)} of {share.n} ({ends})", share.value, bad)
+
+
+def hits(share: Interval) -> int:
+    """Return the number of episodes behind a share."""
+    return round(share.value * share.n) if share.n else 0

@@ -5,20 +5,26 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from ..measures import answering_note, nondeterminism_notes
-from ._awareness_split import split_by_awareness
-from ._comparison import FURTHER, MAIN, PAIRED_ONLY, REQUESTS, comparison_section
-from ._episode_list import failures, list_episodes
-from ._fault_table import fault_rows
+from awarenav.errors import counted
+
+from ..measures import nondeterminism_notes
 from ._page import write_page
-from ._reproduction import reproduction, title_of
-from ._run_data import RunData
-from ._scatter import scatter
-from ._scenario_table import recorded_people, scenario_table
-from ._statistics import RunStatistics
-from ._still import make_stills
-from ._text import plural
-from ._verdict import verdicts
+from ._planners import planners_section
+from ._results import Results
+from ._run import Run
+from ._sections import (
+    arms_section,
+    awareness_section,
+    charts_section,
+    episodes_section,
+    failures_section,
+    faults_section,
+    metrics_section,
+    reproduction_section,
+    requests_section,
+    scenarios_section,
+)
+from ._stills import stills_section
 
 _REPORT: Final = "report.html"
 
@@ -32,7 +38,7 @@ def write_report(
     in the folder.
 
     Args:
-        out_dir: folder with ``episodes.csv``, ``jobs.jsonl`` and ``run.json``.
+        out_dir: folder of a run (:class:`~sim_tests.study.runs.RunFiles`).
         stills: run the worst episodes again for pictures.
         path: the file; default ``report.html`` in the folder.
         progress: show progress on standard error.
@@ -40,37 +46,51 @@ def write_report(
     Raises:
         SimError: there is no ``episodes.csv``, it is not a table of episodes, or the page cannot
             be written.
+        MissingExtraError: matplotlib is not installed.
     """
-    run = RunData.read(out_dir)
-    statistics = RunStatistics.of(run.episodes)
-    arms = statistics.arms
+    run = Run.read(out_dir)
+    results = Results.of(run)
     path = run.path / _REPORT if path is None else path
-    comparison = comparison_section(statistics)
-    listed = list_episodes(run, arms, path.parent)
-    errors = sum(len(arm.errors) for arm in arms)
+    failures = failures_section(run)
+    notices = [*run.missing, *nondeterminism_notes(each.record for each in run.episodes)]
+    if failures is not None:
+        failed = sum(bool(each.record.error) for each in run.episodes)
+        notices.append(f"{counted(failed, 'episode')} failed; see “{failures.title}”.")
+    if not run.episodes:
+        notices.append("No episode has finished yet.")
+    sections = [
+        arms_section(results),
+        charts_section(results),
+        planners_section(results, run),
+        scenarios_section(results, run.jobs),
+        awareness_section(results),
+        requests_section(results, run),
+        faults_section(results),
+        stills_section(run, results, pictures=stills, progress=progress),
+        failures,
+        metrics_section(results),
+        reproduction_section(run),
+        episodes_section(run, results, path.parent),
+    ]
     write_page(
         path,
-        "report.html",
-        plural=plural,
-        title=title_of(run, len(arms)),
-        run=run,
-        condition=f"under the fault {statistics.fault}" if statistics.fault else "without faults",
-        arms=arms,
-        verdicts=verdicts(statistics),
-        comparison=comparison,
-        answering=answering_note(run.about),
-        groups=split_by_awareness(statistics),
-        scatter=scatter(arms, listed.episodes, run.replay_prefix),
-        table=scenario_table(statistics),
-        recorded=recorded_people(run.jobs),
-        stills=make_stills(run, arms, pictures=stills, progress=progress),
-        pictured=stills,
-        faults=fault_rows(statistics),
-        failures=failures(run),
-        unrepeatable=nondeterminism_notes(each.record for each in run.episodes),
-        failed=f"{plural(errors, 'episode')} failed",
-        episodes=listed,
-        reproduction=reproduction(run),
-        metrics=(*MAIN, *FURTHER, *(REQUESTS if comparison.requests else ()), *PAIRED_ONLY),
+        _title(run),
+        [section for section in sections if section is not None],
+        lead=f"Under the fault {results.fault}." if results.fault else "",
+        verdicts=[(arm.name, results.verdict(arm)) for arm in results.judged],
+        notices=notices,
     )
     return path
+
+
+def _title(run: Run) -> str:
+    """Return the numbers of crossings, scenarios, policies, planners and seeds."""
+    records = [each.record for each in run.episodes if each.record.policy != run.wide_policy]
+    planners = len({each.planner for each in records})
+    parts = [
+        counted(len({each.versioned_scenario for each in records}), "scenario"),
+        counted(len({each.policy for each in records}), "policy", "policies"),
+        *([counted(planners, "planner")] if planners > 1 else []),
+        counted(len({each.seed for each in records}), "seed"),
+    ]
+    return f"{counted(len(records), 'crossing')}: {', '.join(parts)}"

@@ -1,17 +1,21 @@
-"""The command ``awarenav report``."""
+"""The commands ``awarenav report`` and ``awarenav planners``."""
 
 from __future__ import annotations
 
+import shlex
+import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from awarenav.cli import FolderPath, argument, command, option, options
+from awarenav.cli import FolderPath, Number, Seeds, argument, command, group, option, options
 
 
 @command(
     "report",
     examples=["awarenav report crossings"],
     exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="docs/bench.md explains the page. Needs the extra 'bench'; the images of the worst "
+    epilog="docs/simulation.md explains the page. Needs the extra 'bench'; the images of the worst "
     "episodes also need the extra 'sim'.",
 )
 @argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")
@@ -29,3 +33,134 @@ def report(folder: Path, out: Path | None, *, no_stills: bool) -> int:
     path = write_report(folder, stills=not no_stills, path=out, progress=True)
     print(f"Written: {path} ({path.stat().st_size / 1e6:.1f} MB); open it in a browser")
     return 0
+
+
+@group("planners")
+def planners() -> None:
+    """List local planners, and compare yours with the reference planner."""
+
+
+@command(
+    "list",
+    short_help="List the planners that have a name.",
+    examples=["awarenav planners list --json"],
+    exit_status={0: "Success."},
+)
+@options.as_json("the list")
+def list_planners(*, as_json: bool) -> int:
+    """List the planners that have a name; any other is given as module:NAME."""
+    from awarenav.files import json_text  # noqa: PLC0415 - help needs no planners
+
+    from ..measures import table_text  # noqa: PLC0415
+    from ._compare import known_planners  # noqa: PLC0415
+
+    known = known_planners()
+    if as_json:
+        print(json_text([{"name": name, "about": about} for name, about in known.items()]), end="")
+        return 0
+    print(table_text(("planner", "about"), known.items(), left=2))
+    print("\nA planner of yours: module:NAME, a class, a function that returns one, or an object.")
+    return 0
+
+
+@command(
+    "compare",
+    short_help="Compare planners: goals, seconds, margins, and whether they obey the limits.",
+    examples=[
+        "awarenav planners compare my_robot:MyPlanner --scenario busy_in_aisle",
+        "awarenav planners compare my_robot:Dwa 'my_robot:Mppi(samples=500)' --seeds 20",
+        "awarenav planners compare straight_on --scenario blind_corner --policy balanced --seeds 3",
+    ],
+    exit_status={
+        0: "Success, whatever the figures.",
+        1: "Some episodes failed; the page and DIR/errors.log say why.",
+        2: "Bad input; nothing was run.",
+        130: "Interrupted; the page shows the episodes so far.",
+    },
+    epilog="Writes report.html beside the files of a run of crossings. A killed or interrupted "
+    "comparison continues with the same command and --resume. The page needs the extra 'bench'.",
+)
+@argument(
+    "planners",
+    nargs=-1,
+    required=True,
+    metavar="MODULE:NAME...",
+    help="Classes, functions that return a planner, planners, or 'reference', 'costmap' and "
+    "'straight_on'.",
+)
+@options.scenarios("that have a planner", repeated=True)
+@options.policies(["balanced"], repeated=True)
+@option(
+    "--seeds",
+    type=Seeds(),
+    default="5",
+    metavar="N|A-B",
+    help="Seeds of the episodes of each scenario: 0 to N − 1, or A to B.",
+)
+@options.perception(default="truth")
+@options.sensors()
+@options.camera()
+@options.robot()
+@options.population()
+@options.workers()
+@option(
+    "--time-limit",
+    type=Number(1.0, 1e6),
+    default=300.0,
+    metavar="S",
+    help="End an episode that takes longer than this in real time, for example because its planner "
+    "hangs.",
+)
+@options.out_folder("planners")
+@options.resume()
+@options.overwrite()
+@options.as_json("the figures")
+def compare(
+    planners: tuple[str, ...], out: Path, *, time_limit: float, as_json: bool, **settings: Any
+) -> int:
+    """Compare local planners on the same crossings, and write one page about them.
+
+    Each planner runs with every policy and with 'blind', and so does the reference planner. A probe
+    with wider radii follows.
+    """
+    from awarenav.errors import counted  # noqa: PLC0415 - help needs no simulator
+
+    from ..runs import RunFiles  # noqa: PLC0415
+    from ._compare import compare_planners, print_comparison  # noqa: PLC0415
+
+    words = command_line(planners, out, settings)
+    settings["population"] = settings["population"] or ""
+    records = compare_planners(
+        planners,
+        settings.pop("scenario"),
+        out,
+        policies=settings.pop("policy"),
+        time_limit_s=time_limit,
+        progress=True,
+        about={"command": words},
+        **settings,
+    )
+    print_comparison(out, as_json=as_json)
+    failed = sum(bool(each.error) for each in records)
+    if failed:
+        print(
+            f"{failed} of {counted(len(records), 'episode')} failed; {RunFiles(out).errors} has "
+            "the tracebacks",
+            file=sys.stderr,
+        )
+    return 1 if failed else 0
+
+
+def command_line(planners: tuple[str, ...], out: Path, settings: Mapping[str, Any]) -> str:
+    """Return the command line that makes the same comparison."""
+    words = ["awarenav", "planners", "compare", *planners]
+    for name in ("scenario", "policy"):
+        words += [word for each in settings[name] for word in (f"--{name}", each)]
+    words += ["--seeds", f"{settings['seeds'][0]}-{settings['seeds'][-1]}"]
+    for name in ("perception", "sensors", "camera", "robot", "population"):
+        words += [f"--{name}", settings[name]] if settings[name] else []
+    return shlex.join([*words, "--out", str(out)])
+
+
+for _command in (list_planners, compare):
+    planners.add_command(_command)

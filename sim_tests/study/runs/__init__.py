@@ -7,17 +7,25 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._episode import Attempt, attempt, free_run_of, observed_episode, run_episode
-    from ._job import Job
+    from ._conditions import Conditions
+    from ._episode import (
+        attempt,
+        died,
+        free_run_of,
+        observed_episode,
+        run_episode,
+        seeded_crossing,
+    )
+    from ._job import Attempt, Job, JobKey, describe
+    from ._parallel import in_parallel, tidy
     from ._plan import (
-        JobKey,
-        describe,
         fault_of,
         job_key,
         named_templates,
         plan_jobs,
         policy_of,
         policy_text,
+        sample_jobs,
         template_of,
     )
     from ._planner_choice import (
@@ -27,44 +35,39 @@ if TYPE_CHECKING:
         planner_parameters,
         refuse_unusable_planner,
     )
-    from ._pool import WorkerPool, one_thread_each, run_here, tidy
-    from ._process_lock import ProcessLock
-    from ._recording import recorder_of
-    from ._replay import find_episode
+    from ._replay import find_episode, recorder_of
     from ._run import run_jobs
-    from ._run_files import RunFiles, read_jobs, read_run
-    from ._sample import sample_jobs
-    from ._seeded_crossing import seeded_crossing
+    from ._run_files import RunFiles, read_attempts, read_jobs, read_run
 
 __all__ = [
     "KNOWN_PLANNERS",
     "Attempt",
+    "Conditions",
     "Job",
     "JobKey",
-    "ProcessLock",
     "RunFiles",
-    "WorkerPool",
     "attempt",
     "describe",
+    "died",
     "fault_of",
     "find_episode",
     "free_run_of",
+    "in_parallel",
     "job_key",
     "make_planner",
     "named_templates",
     "observed_episode",
-    "one_thread_each",
     "plan_jobs",
     "planner_label",
     "planner_parameters",
     "policy_of",
     "policy_text",
+    "read_attempts",
     "read_jobs",
     "read_run",
     "recorder_of",
     "refuse_unusable_planner",
     "run_episode",
-    "run_here",
     "run_jobs",
     "sample_jobs",
     "seeded_crossing",

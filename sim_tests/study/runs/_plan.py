@@ -1,15 +1,17 @@
-"""The plan of a run: every combination of scenario, seed, fault, planner and policy."""
+"""The plan of a run: every combination of what it varies, or a random sample of them."""
 
 from __future__ import annotations
 
 import fnmatch
 import itertools
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, TypeVar
 
+import numpy as np
 import yaml
 from pydantic import ValidationError
 
@@ -23,7 +25,7 @@ from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault, shipped_faults
 from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
-from ._job import Job
+from ._job import Job, JobKey, describe
 from ._planner_choice import planner_label, refuse_unusable_planner
 
 _ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
@@ -31,17 +33,8 @@ _ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
 # The name that stands for "without a fault".
 _NO_FAULT: Final = "none"
 _PATTERN: Final = re.compile(r"[*?\[]")
-
-
-class JobKey(NamedTuple):
-    """The key of an episode, unique in its run; its row in the table holds the same values."""
-
-    scenario: str
-    seed: int
-    policy: str
-    planner: str
-    perception: str
-    fault: str
+# Makes the draw of a sample independent of the episodes, whose generators have the seed alone.
+_STREAM: Final = 83
 
 
 def plan_jobs(
@@ -142,15 +135,6 @@ def job_key(job: Job) -> JobKey:
     return JobKey(scenario.name, job.seed, job.policy_name, label, job.perception, job.fault_name)
 
 
-def describe(key: JobKey) -> str:
-    """Return an episode in words."""
-    fault = f", fault {key.fault}" if key.fault else ""
-    return (
-        f"{key.scenario}, seed {key.seed}, policy {key.policy}, {key.planner}, "
-        f"perception {key.perception}{fault}"
-    )
-
-
 @lru_cache(maxsize=256)
 def template_of(text: str) -> ScenarioTemplate:
     """Return the scenario of a job; raise SimError for YAML that holds none."""
@@ -166,9 +150,7 @@ def policy_of(text: str) -> AwarenessPolicy:
 @lru_cache(maxsize=256)
 def fault_of(text: str) -> Fault | None:
     """Return the fault of a job, None without one; raise SimError for YAML that holds none."""
-    if not text:
-        return None
-    return _of_text("fault", Fault, text)
+    return _of_text("fault", Fault, text) if text else None
 
 
 def _of_text(name: str, kind: type[_ConfigT], text: str) -> _ConfigT:
@@ -183,8 +165,7 @@ def _of_text(name: str, kind: type[_ConfigT], text: str) -> _ConfigT:
 def policy_text(policy: AwarenessPolicy) -> str:
     """Return a policy as YAML; raise SimError for one with objects that YAML cannot hold."""
     try:
-        data = policy.model_dump(mode="json")
-        return yaml_text(data)
+        return yaml_text(policy.model_dump(mode="json"))
     except (TypeError, ValueError, yaml.YAMLError) as cause:
         raise SimError(
             f"a policy must be one that YAML can hold, without objects of your own: {cause}"
@@ -252,3 +233,49 @@ def _checked_seed(seed: int) -> int:
     if number != int(seed):
         raise SimError(f"seed must be a whole number, got {seed!r}")
     return int(seed)
+
+
+def sample_jobs(jobs: Sequence[Job], count: int, seed: int = 0) -> tuple[Job, ...]:
+    """Return some of the jobs, drawn at random and in the order of the plan.
+
+    Faults are drawn in rounds: each once, in random order, before any is drawn again. Within the
+    jobs of a fault, those come first whose scenario, then whose policy, planner and perception,
+    were drawn least. Otherwise chance decides. A smaller sample with the same seed is part of a
+    larger one.
+
+    Args:
+        jobs: the plan, for example of :func:`plan_jobs`.
+        count: number of jobs to draw.
+        seed: of the draw.
+
+    Raises:
+        SimError: for a count that is no whole number of jobs of the plan, at least 1.
+    """
+    number = finite_number("sample", count, SimError, minimum=1, maximum=len(jobs))
+    if number != int(number):
+        raise SimError(f"sample must be a whole number of episodes, got {count!r}")
+    rng = np.random.default_rng([seed, _STREAM])
+    left: dict[str, list[int]] = {}
+    for row in rng.permutation(len(jobs)).tolist():
+        left.setdefault(jobs[row].fault_name, []).append(row)
+    faults = sorted(left)
+    scenarios: Counter[str] = Counter()
+    variants: Counter[tuple[str, str, str]] = Counter()
+    drawn: list[int] = []
+    while len(drawn) < number:
+        for place in rng.permutation(len(faults)).tolist():
+            rows = left[faults[place]]
+            if not rows:
+                continue
+            row = min(
+                rows, key=lambda r: (scenarios[jobs[r].scenario], variants[_variant(jobs[r])])
+            )
+            rows.remove(row)
+            scenarios[jobs[row].scenario] += 1
+            variants[_variant(jobs[row])] += 1
+            drawn.append(row)
+    return tuple(jobs[row] for row in sorted(drawn[: int(number)]))
+
+
+def _variant(job: Job) -> tuple[str, str, str]:
+    return job.policy_name, job.planner, job.perception

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import copy
 import inspect
+import random
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from nav_adapter import RobotProfile
 
 from ...crossing.planner import CostmapPlanner, LocalPlanner, SamplingPlanner, StraightOn
 from ...scenario import Scenario
 from ...world.errors import SimError
-from ._seeding import FRESH_TORCH_SEED, seeded_generators
 
 # Names in tables of the reference planner, and of the driver of scenarios without a planner.
 _REFERENCE: Final = "SamplingPlanner"
@@ -57,6 +60,19 @@ def straight_to_goal(robot: RobotProfile) -> StraightOn:
 KNOWN_PLANNERS: Final[Mapping[str, Callable[..., LocalPlanner]]] = MappingProxyType(
     {"costmap": CostmapPlanner, "straight_on": straight_to_goal}
 )
+
+
+@contextlib.contextmanager
+def seeded_generators(seed: int) -> Iterator[None]:
+    """Seed the global generators of ``random`` and ``numpy``, and restore them afterwards."""
+    python_state, numpy_state = random.getstate(), np.random.get_state()  # noqa: NPY002 - planners use it
+    random.seed(seed)
+    np.random.seed(seed % 2**32)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        random.setstate(python_state)
+        np.random.set_state(numpy_state)  # noqa: NPY002
 
 
 def planner_label(planner: str, scenario: Scenario) -> str:
@@ -232,8 +248,8 @@ def _found(planner: str, module_name: str, name: str) -> Any:
     ):  # python -m adds it to the path, a script does not
         sys.path.append(here)
     try:
-        # A module may draw while it is imported: the same in every process, with torch or without.
-        with seeded_generators(0, torch_seed=FRESH_TORCH_SEED):
+        # A module may draw while it is imported: the same in every process.
+        with seeded_generators(0):
             found: Any = import_module(module_name)
         for part in name.split("."):
             found = getattr(found, part)

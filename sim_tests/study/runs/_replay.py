@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 import cv2
 import numpy as np
@@ -18,23 +18,36 @@ from awarenav.errors import counted
 from awarenav.video import VideoWriter
 from perception import AttentionCone
 
-from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
-from ...viewing import outcome_text, show_page, write_page
+from ...crossing import (
+    CrossingFrame,
+    CrossingResult,
+    Observer,
+    Stage,
+    TopView,
+    draw_camera_view,
+)
+from ...crossing.eyes import Perception
+from ...viewing import (
+    CameraPictures,
+    CrossingRecorder,
+    Episode,
+    outcome_text,
+    show_page,
+    write_page,
+)
 from ...world.camera import CameraRenderer
 from ...world.errors import SimError
 from ..measures import (
     RECORD_COLUMNS,
     EpisodeRecord,
     nondeterminism_notes,
-    read_record_file,
+    read_rows,
     record_row,
 )
 from ._episode import observed_episode
-from ._job import Job
-from ._plan import describe, job_key, template_of
-from ._recording import recorder_of
+from ._job import Job, describe, record_key
+from ._plan import job_key, template_of
 from ._run_files import RunFiles, read_jobs
-from ._run_folder import record_key
 
 Image = NDArray[np.uint8]
 
@@ -163,48 +176,60 @@ def replay_command(options: ReplayOptions) -> int:
 def _replay(options: ReplayOptions, number: int, job: Job, out: Path) -> tuple[Sequence[Path], int]:
     """Run one episode again; return the files written, and 1 if its row is another, else 0."""
     print(f"Episode {number}: {describe(job_key(job))}")
-    name = f"episode_{number:05d}"
     scenario = template_of(job.scenario).for_seed(job.seed)
     total = round(scenario.duration_s * scenario.control_hz)
+    path = out / RunFiles(options.folder).page(number).name
     with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
         if options.view:
-            page_path = out / RunFiles(options.folder).page(number).name
-            record, written = _write_view(job, page_path, bar)
+            recorder = recorder_of(job)
+            result, record = _observed(job, recorder, bar)
+            write_page(path, recorder.begin, recorder.states, outcome_text(result), recorder.note)
+            written = [path]
         else:
-            video_path = None if options.no_video else out / f"{name}.mp4"
-            record, written = _write_pictures(job, out / f"{name}.png", video_path, bar)
-    for path in written:
-        print(f"Written: {path}")
-    print(_description(record))
+            video = None if options.no_video else path.with_suffix(".mp4")
+            with ReplayPictures(path.with_suffix(".png"), video) as pictures:
+                result, record = _observed(job, pictures.add, bar)
+                pictures.finish()
+            written = pictures.written
+    for each in written:
+        print(f"Written: {each}")
+    print(outcome_text(result))
     return written, _compare_row(options.folder, job, record)
 
 
-def _write_pictures(
-    job: Job, map_path: Path, video_path: Path | None, bar: tqdm[NoReturn]
-) -> tuple[EpisodeRecord, list[Path]]:
-    """Run an episode and write its map and video; return its row and the paths."""
-    with ReplayPictures(map_path, video_path) as pictures:
-
-        def observe(frame: CrossingFrame, stage: Stage) -> None:
-            pictures.add(frame, stage)
-            bar.update()
-
-        record = observed_episode(job, observe)[1]
-        pictures.finish()
-    return record, pictures.written
-
-
-def _write_view(job: Job, path: Path, bar: tqdm[NoReturn]) -> tuple[EpisodeRecord, list[Path]]:
-    """Run an episode and write its page; return its row and the path."""
-    recorder = recorder_of(job)
+def _observed(
+    job: Job, observer: Observer, bar: tqdm[NoReturn]
+) -> tuple[CrossingResult, EpisodeRecord]:
+    """Run and measure an episode, watched by an observer and a progress bar."""
 
     def observe(frame: CrossingFrame, stage: Stage) -> None:
-        recorder(frame, stage)
+        observer(frame, stage)
         bar.update()
 
-    result, record = observed_episode(job, observe)
-    write_page(path, recorder.begin, recorder.states, outcome_text(result), recorder.note)
-    return record, [path]
+    return observed_episode(job, observe)
+
+
+def recorder_of(
+    job: Job,
+    *,
+    camera: bool = True,
+    share: float = 1.0,
+    on_begin: Callable[[dict[str, Any]], None] | None = None,
+    on_state: Callable[[dict[str, Any]], None] | None = None,
+) -> CrossingRecorder:
+    """Return an observer that records a job's crossing.
+
+    Args:
+        job: the episode.
+        camera: whether to render the robot's camera.
+        share: most of the elapsed time that rendering may take; 1 for no limit.
+        on_begin: as for :class:`~sim_tests.viewing.CrossingRecorder`.
+        on_state: likewise.
+    """
+    episode = Episode(**job_key(job)._asdict())
+    scaled = Perception.named(job.perception).kind == "pixels"
+    pictures = CameraPictures(boxes_are_scaled=scaled, share=share) if camera else None
+    return CrossingRecorder(episode, pictures=pictures, on_begin=on_begin, on_state=on_state)
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:
@@ -246,19 +271,18 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
 
 def _compare_row(folder: Path, job: Job, record: EpisodeRecord) -> int:
     """Print the difference to the row of the run; return 0 for the same row, else 1."""
-    path = RunFiles(folder).episodes
     key = job_key(job)
-    before = [each for each in read_record_file(path).records if record_key(each) == key]
+    before = [each for each in read_rows(folder) if record_key(each) == key]
     if not before:
-        print(f"{path} has no row of this episode yet")
+        print(f"{folder} has no row of this episode yet")
         return 0
     pairs = zip(RECORD_COLUMNS, record_row(before[0]), record_row(record), strict=True)
     changed = [(name, was, now) for name, was, now in pairs if was != now]
     if not changed:
-        print(f"The same row as in {path}.")
+        print(f"The same row as in {folder}.")
         return 0
     print(
-        f"Not the row in {path}: "
+        f"Not the row in {folder}: "
         + "; ".join(
             f"{name} was {was or 'empty'}, is {now or 'empty'}" for name, was, now in changed
         )
@@ -266,18 +290,3 @@ def _compare_row(folder: Path, job: Job, record: EpisodeRecord) -> int:
     for note in nondeterminism_notes([record]):
         print(note)
     return 1
-
-
-def _description(record: EpisodeRecord) -> str:
-    goal = "goal not reached"
-    if record.time_to_goal_s is not None:
-        goal = f"goal after {record.time_to_goal_s:.2f} s"
-    parts = [goal]
-    if record.min_separation_m is not None:
-        parts.append(f"least separation {record.min_separation_m:.2f} m")
-    if record.min_margin_m is not None:
-        parts.append(f"least margin {record.min_margin_m:.2f} m")
-    if record.contact:
-        robot = "moving" if record.moving_touched else "standing"
-        parts.append(f"contact with the {robot} robot, caused by the {record.contact_by}")
-    return ", ".join(parts)

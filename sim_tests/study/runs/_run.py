@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import os
+import contextlib
+import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +17,9 @@ from perception.arrays import finite_number
 
 from ...world.errors import SimError
 from ..measures import EpisodeRecord
-from ._episode import Attempt
-from ._job import Job, versions
-from ._pool import NumberedJob, run_here, run_in_processes
+from ._episode import attempt, attempt_within, died, failed
+from ._job import Attempt, Job, versions
+from ._parallel import in_parallel
 from ._run_folder import RunFolder
 
 
@@ -31,13 +34,12 @@ def run_jobs(
     overwrite: bool = False,
     progress: bool = False,
     about: Mapping[str, Any] | None = None,
-    on_attempt: Callable[[int, Attempt], None] | None = None,
 ) -> tuple[EpisodeRecord, ...]:
     """Run episodes and write their table; the result does not depend on where they run.
 
-    :class:`RunFiles` lists the files in ``out_dir``. While episodes run, the rows of
-    ``episodes.csv`` are in the order in which episodes end; at the end they are in the order of
-    the jobs. ``episodes.parquet`` needs the extra ``bench``.
+    :class:`RunFiles` lists the files in ``out_dir``. Each episode that ends has a file at once. The
+    tables are written at the end, and after an interruption (Ctrl-C, SIGTERM).
+    ``episodes.parquet`` needs the extra ``bench``.
 
     Args:
         jobs: the episodes, e.g. from :func:`plan_jobs`.
@@ -51,7 +53,6 @@ def run_jobs(
         overwrite: replace the run in ``out_dir``, which is refused otherwise.
         progress: show progress and the time left on standard error.
         about: command and settings, kept in ``run.json``.
-        on_attempt: called with the number of a job and its outcome, before its row is written.
 
     Returns:
         The records in the order of the jobs; ``error`` of a record says why an episode failed.
@@ -62,12 +63,16 @@ def run_jobs(
     """
     if not jobs:
         raise SimError("jobs must be at least one episode, got none")
-    count = _cores() if workers is None else finite_number("workers", workers, SimError, minimum=1)
-    limit_s = time_limit_s
-    if limit_s is not None:
-        limit_s = finite_number("time_limit_s", limit_s, SimError, minimum=1.0)
+    if workers is not None:
+        finite_number("workers", workers, SimError, minimum=1)
+    function = attempt
+    if time_limit_s is not None:
+        limit_s = finite_number("time_limit_s", time_limit_s, SimError, minimum=1.0)
+        function = partial(attempt_within, limit_s)
         if scheduler is not None:
             raise SimError("a time limit works in processes of this computer, not on a cluster")
+    if scheduler is not None:
+        function = partial(_attempt_with, versions())
     folder = RunFolder(
         Path(out_dir),
         jobs,
@@ -75,40 +80,57 @@ def run_jobs(
         resume=resume,
         overwrite=overwrite,
     )
-    with folder:
-        remaining = [(number, job) for number, job in enumerate(jobs) if number not in folder.done]
-        with tqdm(
-            total=len(jobs),
-            initial=len(folder.done),
-            desc="crossings",
-            unit="episode",
-            smoothing=0.05,
-            file=sys.stderr,
-            disable=not progress,
-        ) as bar:
-            for number, result in _results(remaining, int(count), scheduler, limit_s):
-                if on_attempt is not None:
-                    on_attempt(number, result)
-                folder.add(number, result.record, result.traceback)
-                bar.update()
-        return folder.finish()
+    with folder, _terminated_as_interrupted():
+        remaining = [number for number in range(len(jobs)) if number not in folder.done]
+        outcomes = in_parallel(
+            function,
+            [jobs[number] for number in remaining],
+            workers=workers,
+            scheduler=scheduler,
+            own_process=time_limit_s is not None,
+            on_death=died,
+        )
+        try:
+            with (
+                contextlib.closing(outcomes),
+                tqdm(
+                    total=len(jobs),
+                    initial=len(folder.done),
+                    desc="crossings",
+                    unit="episode",
+                    smoothing=0.05,
+                    file=sys.stderr,
+                    disable=not progress,
+                ) as bar,
+            ):
+                for place, outcome in outcomes:
+                    folder.add(remaining[place], outcome)
+                    bar.update()
+        except BaseException:
+            with contextlib.suppress(SimError):  # the first error says more
+                folder.write_tables()
+            raise
+        return folder.write_tables()
 
 
-def _cores() -> int:
-    """Return the number of cores that this process may use."""
+def _attempt_with(needed: Mapping[str, str], job: Job) -> Attempt:
+    """Run one episode on a worker of a cluster; refuse it there if a version differs."""
+    own = versions()
+    for name, version in needed.items():
+        if own.get(name) != version:
+            text = f"a worker has {name} {own.get(name)}, and the run was begun with {version}"
+            return failed(job, f"SimError: {text}", text)
+    return attempt(job)
+
+
+@contextlib.contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Let SIGTERM interrupt the block as Ctrl-C does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # pragma: no cover - macOS and Windows
-        return os.cpu_count() or 1
-
-
-def _results(
-    jobs: Sequence[NumberedJob], workers: int, scheduler: str | None, time_limit_s: float | None
-) -> Iterator[tuple[int, Attempt]]:
-    if scheduler is not None:
-        from ._cluster import run_on_cluster  # noqa: PLC0415 - an optional dependency
-
-        return run_on_cluster(jobs, scheduler, workers, versions())
-    if workers == 1 and time_limit_s is None:
-        return run_here(jobs)
-    return run_in_processes(jobs, workers, time_limit_s)
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,89 +1,71 @@
-"""The files in the folder of a run, and how its jobs and its ``run.json`` are read."""
+"""The files in the folder of a run, read without the simulator."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from perception.documents import parse_json, read_json, read_lines
 
 from ...world.errors import SimError
-from ._job import Job
-
-#: Names of the fields of a job, the keys of each line of ``jobs.jsonl``.
-JOB_FIELDS: Final = tuple(field.name for field in fields(Job))
+from ..measures import Conduct, EpisodeRecord
+from ._job import JOB_FIELDS, Attempt, Job
 
 
-@dataclass(frozen=True, slots=True)
 class RunFiles:
-    """The paths of the files in the folder of a run."""
+    """The paths of the files in the folder of a run.
 
-    folder: Path
+    Args:
+        folder: of the run.
 
-    @property
-    def jobs(self) -> Path:
-        """The planned episodes, one job per line."""
-        return self.folder / "jobs.jsonl"
+    Attributes:
+        folder: of the run.
+        run: state, versions, command and settings of the run.
+        jobs: the planned episodes, one job per line.
+        ended: the folder with one file for each episode that has ended.
+        episodes: the table of these episodes, one row per episode.
+        parquet: the same table as Parquet, of a complete run.
+        errors: tracebacks of failed episodes; absent if none failed.
+        replays: the folder of videos, maps and pages of episodes that were replayed.
+        social: the table of ``awarenav measures``, one row per episode.
+        exports: the folder of episodes in the formats of other projects.
+        lock: the lock file of the process that runs episodes into the folder.
+    """
 
-    @property
-    def episodes(self) -> Path:
-        """The table of finished episodes, one row per episode."""
-        return self.folder / "episodes.csv"
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.run = folder / "run.json"
+        self.jobs = folder / "jobs.jsonl"
+        self.ended = folder / "episodes"
+        self.episodes = folder / "episodes.csv"
+        self.parquet = folder / "episodes.parquet"
+        self.errors = folder / "errors.log"
+        self.replays = folder / "replays"
+        self.social = folder / "social.csv"
+        self.exports = folder / "exports"
+        self.lock = folder / ".lock"
 
-    @property
-    def parquet(self) -> Path:
-        """The same table as Parquet, of a complete run."""
-        return self.folder / "episodes.parquet"
-
-    @property
-    def run(self) -> Path:
-        """State, versions, command and settings of the run."""
-        return self.folder / "run.json"
-
-    @property
-    def errors(self) -> Path:
-        """Tracebacks of failed episodes; absent if none failed."""
-        return self.folder / "errors.log"
-
-    @property
-    def damaged(self) -> tuple[Path, ...]:
-        """Lines of the table and of the plan that were damaged; absent if none was."""
-        return tuple(path.with_name(path.name + ".damaged") for path in (self.episodes, self.jobs))
-
-    @property
-    def replays(self) -> Path:
-        """The folder of videos, maps and pages of episodes that were replayed."""
-        return self.folder / "replays"
-
-    @property
-    def social(self) -> Path:
-        """The table of ``awarenav measures``, one row per episode."""
-        return self.folder / "social.csv"
-
-    @property
-    def exports(self) -> Path:
-        """The folder of episodes in the formats of other projects."""
-        return self.folder / "exports"
+    def episode(self, number: int) -> Path:
+        """Return the path of the file of an episode."""
+        return self.ended / f"{number:05d}.json"
 
     def page(self, number: int) -> Path:
         """Return the path of the replay page of an episode."""
         return self.replays / f"episode_{number:05d}.html"
 
-    @property
-    def lock(self) -> Path:
-        """The lock file of the process that runs episodes into the folder."""
-        return self.folder / ".lock"
+
+def read_jobs(folder: Path) -> tuple[Job, ...]:
+    """Return the jobs of a run; raise SimError for a folder that holds none."""
+    path = RunFiles(folder).jobs
+    if not path.is_file():
+        raise SimError(f"{folder} is not the folder of a run: no {path.name} in it")
+    return tuple(
+        _parse_job(line, f"{path}, line {number}")
+        for number, line in enumerate(read_lines(path, SimError), start=1)
+    )
 
 
-def job_line(job: Job) -> str:
-    """Return a job as a line of ``jobs.jsonl``."""
-    return json.dumps(asdict(job), ensure_ascii=False) + "\n"
-
-
-def parse_job(line: str | bytes, source: str) -> Job:
-    """Return the job of a line; raise SimError, naming the source, for a line that is none."""
+def _parse_job(line: str | bytes, source: str) -> Job:
     try:
         return Job(**parse_json(line, source, SimError))
     except (ValueError, TypeError) as cause:
@@ -93,17 +75,6 @@ def parse_job(line: str | bytes, source: str) -> Job:
         ) from cause
 
 
-def read_jobs(folder: Path) -> tuple[Job, ...]:
-    """Return the jobs of a run; raise SimError for a folder that holds none."""
-    path = RunFiles(folder).jobs
-    if not path.is_file():
-        raise SimError(f"{folder} is not the folder of a run: no {path.name} in it")
-    return tuple(
-        parse_job(line, f"{path}, line {number}")
-        for number, line in enumerate(read_lines(path, SimError), start=1)
-    )
-
-
 def read_run(folder: Path) -> dict[str, Any]:
     """Return the content of ``run.json``; empty without one."""
     try:
@@ -111,3 +82,38 @@ def read_run(folder: Path) -> dict[str, Any]:
     except SimError:
         return {}
     return content if isinstance(content, dict) else {}
+
+
+def read_attempts(folder: Path) -> dict[int, Attempt]:
+    """Return the outcome of every episode that has ended, by its number.
+
+    Raises:
+        SimError: a file that is not of an episode of this run; the message names it.
+    """
+    files = RunFiles(folder)
+    paths = sorted(files.ended.glob("*.json")) if files.ended.is_dir() else []
+    if not paths:
+        return {}
+    found = {}
+    for path in paths:
+        try:
+            number = int(path.stem)
+            content = read_json(path, SimError)
+            conduct = content["conduct"]
+            attempt = Attempt(
+                EpisodeRecord(**content["record"]),
+                content["traceback"],
+                None if conduct is None else Conduct(**conduct),
+            )
+        except (ValueError, TypeError, KeyError) as cause:
+            raise not_of_this_run(path, str(cause)) from cause
+        found[number] = attempt
+    return found
+
+
+def not_of_this_run(path: Path, reason: str) -> SimError:
+    """Return the error about a file that is not of an episode of its run."""
+    return SimError(
+        f"{path} is not the file of an episode of this run ({reason}): move it away, and "
+        "--resume runs its episode again"
+    )

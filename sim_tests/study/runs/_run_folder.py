@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+import filelock
 
 from awarenav.errors import counted
-from awarenav.files import atomic_path, write_text
-from awarenav.line_files import DamagedLine, LineFile, set_aside
+from awarenav.files import write_text
 
 from ...world.errors import SimError
-from ..measures import RECORD_COLUMNS, EpisodeRecord, record_row, salvage_record_file, write_records
-from ._job import Job
-from ._plan import JobKey, describe, job_key
-from ._process_lock import ProcessLock
-from ._resumed_plan import ResumedPlan, read_plan
-from ._run_files import RunFiles, job_line, read_run
+from ..measures import EpisodeRecord, write_records
+from ._job import JOB_FIELDS, Attempt, Job, describe, record_key
+from ._plan import job_key
+from ._run_files import RunFiles, not_of_this_run, read_attempts, read_jobs, read_run
+
+_OTHER_WAY: Final = (
+    "resume with the arguments that began it, which run.json holds, or run into another folder"
+)
 
 
 class RunFolder(AbstractContextManager["RunFolder"]):
-    """The folder of a run, open for writing; a row is in the file as soon as it is added.
+    """The folder of a run, open for writing.
 
-    A process that is killed at any moment leaves whole rows and at most one unfinished row.
-    Resuming cuts that row off and runs its episode again. A damaged line of ``episodes.csv`` or
-    ``jobs.jsonl`` is set aside in a file ``.damaged``, and its episode runs again, too.
+    The file of an episode appears whole when the episode has ended, so a process that is killed at
+    any moment leaves whole files alone. Resuming runs the episodes that have none.
 
     Args:
         path: the folder, made when missing.
@@ -38,12 +39,12 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         overwrite: replace the run that the folder holds.
 
     Attributes:
-        done: records of the episodes that are finished, by the number of their job.
+        done: outcomes of the episodes that have ended, by the number of their job.
 
     Raises:
-        SimError: the folder cannot be written; another process runs into it; it holds other
-            episodes than these (with ``resume``); or it holds a run, finished or not, or another
-            program's ``episodes.csv`` (with neither ``resume`` nor ``overwrite``).
+        SimError: the folder cannot be written; another process runs into it; it holds another run
+            than this (with ``resume``); or it holds a run, finished or not, or another program's
+            ``episodes.csv`` (with neither ``resume`` nor ``overwrite``).
     """
 
     def __init__(
@@ -56,202 +57,154 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         overwrite: bool = False,
     ) -> None:
         self._files = RunFiles(path)
-        self._keys = {job_key(job): number for number, job in enumerate(jobs)}
-        self._about = dict(about)
-        self._total = len(jobs)
-        self._table: LineFile | None = None
-        self._process_lock: ProcessLock | None = None
-        self.done: dict[int, EpisodeRecord] = {}
+        self._jobs = jobs
+        self._about = about
+        self.done: dict[int, Attempt] = {}
         try:
             path.mkdir(parents=True, exist_ok=True)
-            self._table = LineFile(self._files.episodes, SimError)
-            self._lock()
+            # Any thread of this process may release the lock; a process that dies releases it.
+            self._lock = filelock.FileLock(self._files.lock, thread_local=False)
+            self._lock.acquire(blocking=False)
+        except filelock.Timeout as cause:
+            raise SimError(f"another process is running episodes into {path}") from cause
+        except OSError as cause:
+            raise SimError(f"cannot run into {path}: {cause.strerror or cause}") from cause
+        try:
             if resume:
-                plan = self._check_plan(jobs)
-                self._continue(plan.doubtful)
-                if plan.damaged:
-                    self._write_jobs(jobs)
+                self._refuse_another_run()
+                self.done = self._own_attempts()
+                self._write_run("running")
             else:
                 if not overwrite:
                     self._refuse_occupied()
-                self._start(jobs)
-        except OSError as cause:
-            self.close()
-            raise SimError(f"cannot run into {path}: {cause.strerror or cause}") from cause
+                self._write_run("running")
+                self._start()
         except BaseException:
-            self.close()
+            self._lock.release()
             raise
 
     def __exit__(self, *_: object) -> None:
-        self.close()
+        self._lock.release()
 
-    def close(self) -> None:
-        """Release the folder; every row is already in it."""
-        self._close_table()
-        if self._process_lock is not None:
-            self._process_lock.close()
-            self._process_lock = None
+    def add(self, number: int, attempt: Attempt) -> None:
+        """Write the file of an episode."""
+        text = json.dumps(asdict(attempt), ensure_ascii=False) + "\n"
+        write_text(self._files.episode(number), text, SimError)
+        self.done[number] = attempt
 
-    def add(self, number: int, record: EpisodeRecord, traceback: str = "") -> None:
-        """Write the row of a job, and the traceback of its error."""
-        self._append(record_row(record))
-        self.done[number] = record
-        if traceback:
-            head = f"== episode {number}: {describe(record_key(record))}\n"
-            with LineFile(self._files.errors, SimError) as file:
-                file.add(f"{head}{traceback.rstrip()}\n\n")
+    def write_tables(self) -> tuple[EpisodeRecord, ...]:
+        """Write the tables of the episodes that have ended; return their records.
 
-    def finish(self) -> tuple[EpisodeRecord, ...]:
-        """Write the rows in the order of the jobs and mark the run as complete.
-
-        Returns:
-            Every record, in that order.
+        Both are in the order of the jobs. The run is complete if no job is left.
         """
-        records = tuple(self.done[number] for number in range(self._total))
-        self._close_table()  # Windows replaces no file that is open
+        ended = sorted(self.done.items())
+        records = tuple(attempt.record for _, attempt in ended)
         write_records(self._files.episodes, records)
-        try:
-            write_records(self._files.parquet, records)
-        except SimError:  # without pyarrow there is no Parquet, and the table is complete
-            self._files.parquet.unlink(missing_ok=True)
-        self._write_run("complete")
+        self._files.errors.unlink(missing_ok=True)
+        log = "".join(
+            f"== episode {number}: {describe(record_key(attempt.record))}\n"
+            f"{attempt.traceback.rstrip()}\n\n"
+            for number, attempt in ended
+            if attempt.traceback
+        )
+        if log:
+            write_text(self._files.errors, log, SimError)
+        if len(ended) == len(self._jobs):
+            try:
+                write_records(self._files.parquet, records)
+            except SimError:  # without pyarrow there is no Parquet, and the table is complete
+                self._files.parquet.unlink(missing_ok=True)
+            self._write_run("complete")
         return records
-
-    def _lock(self) -> None:
-        self._process_lock = ProcessLock(self._files.lock, wait=False)
-        if not self._process_lock.held:
-            raise SimError(f"another process is running episodes into {self._files.folder}")
-
-    def _close_table(self) -> None:
-        if self._table is not None:
-            self._table.close()
-            self._table = None
 
     def _refuse_occupied(self) -> None:
         """Refuse a finished run, an unfinished one with episodes, and another program's table."""
-        folder, about = self._files.folder, read_run(self._files.folder)
-        done = self._files.episodes.read_bytes().count(b"\n") - 1  # the header is no episode
+        files, about = self._files, read_run(self._files.folder)
+        total = about.get("episodes", "?")
+        done = len(list(files.ended.glob("*.json")))
         if about.get("state") == "running" and done > 0:
             raise SimError(
-                f"{folder} holds an unfinished run, with {done} of {about.get('episodes', '?')} "
-                "episodes done: go on with --resume, replace it with --overwrite, or choose "
-                "another --out"
+                f"{files.folder} holds an unfinished run, with {done} of {total} episodes done: "
+                "go on with --resume, replace it with --overwrite, or choose another --out"
             )
         if about.get("state") == "complete":
+            episodes = counted(total, "episode") if isinstance(total, int) else f"{total} episodes"
             raise SimError(
-                f"{folder} holds a finished run of {_episodes(about.get('episodes', '?'))}: "
-                "replace it with --overwrite, choose another --out, or read its table again with "
-                "--resume"
+                f"{files.folder} holds a finished run of {episodes}: replace it with --overwrite, "
+                "choose another --out, or read its table again with --resume"
             )
-        if about.get("state") != "running" and done >= 0:
+        if about.get("state") != "running" and files.episodes.exists():
             raise SimError(
-                f"{folder} holds a table {self._files.episodes.name} that is not of a run: there "
-                f"is no {self._files.run.name} beside it; choose another --out, or replace it "
-                "with --overwrite"
+                f"{files.folder} holds a table {files.episodes.name} that is not of a run: there "
+                f"is no {files.run.name} beside it; choose another --out, or replace it with "
+                "--overwrite"
             )
 
-    def _start(self, jobs: Sequence[Job]) -> None:
-        # The old table goes first, so that its rows can never be taken for those of the new jobs.
-        self._open_table.cut(0)
+    def _start(self) -> None:
         files = self._files
-        for path in (files.parquet, files.social, files.errors, *files.damaged):
+        # The old episodes go first, so that they are never taken for those of the new jobs.
+        old = sorted(files.ended.glob("*.json"))
+        for path in (*old, files.episodes, files.parquet, files.social, files.errors):
             path.unlink(missing_ok=True)
-        self._write_run("running")
-        self._write_jobs(jobs)
-        self._append(RECORD_COLUMNS)
+        lines = (json.dumps(asdict(job), ensure_ascii=False) + "\n" for job in self._jobs)
+        write_text(files.jobs, "".join(lines), SimError)
 
-    def _check_plan(self, jobs: Sequence[Job]) -> ResumedPlan:
-        """Return the plan in the folder after checking that it holds these jobs."""
-        path, folder = self._files.jobs, self._files.folder
-        if not path.exists():
-            raise SimError(f"{folder} holds no run to resume: there is no {path.name} in it")
-        about = read_run(folder)
-        for name, version in self._about.get("versions", {}).items():
-            before = about.get("versions", {}).get(name, version)
-            if before != version:
-                raise SimError(
-                    f"the run in {folder} was begun with {name} {before}, and this is {version}:"
-                    " their results do not belong into one table; run into another folder"
-                )
-        plan = read_plan(path, jobs)
-        set_aside(path, plan.damaged, "their episodes run again", SimError)
-        count = about.get("episodes", len(jobs)) if plan.damaged else plan.lines
-        if count != len(jobs):
+    def _own_attempts(self) -> dict[int, Attempt]:
+        """Return the outcomes in the folder; refuse a file of another episode by its name."""
+        found = read_attempts(self._files.folder)
+        for number, attempt in found.items():
+            key = record_key(attempt.record)
+            if number >= len(self._jobs) or key != job_key(self._jobs[number]):
+                raise not_of_this_run(self._files.episode(number), f"it is {describe(key)}")
+        return found
+
+    def _refuse_another_run(self) -> None:
+        """Raise SimError, saying what differs, unless the folder holds this run."""
+        folder = self._files.folder
+        if not self._files.jobs.exists():
             raise SimError(
-                f"the run in {folder} has {_episodes(count)}, and {len(jobs)} were asked "
-                "for: resume with the arguments that began it, which run.json holds, or run into "
-                "another folder"
+                f"{folder} holds no run to resume: there is no {self._files.jobs.name} in it"
             )
-        return plan
-
-    def _continue(self, doubtful: Set[int]) -> None:
-        """Take over the rows of the table; set aside what is damaged, and rows of doubtful jobs."""
-        path = self._files.episodes
-        found = salvage_record_file(path)
-        damaged = list(found.damaged)
-        versions: dict[JobKey, set[EpisodeRecord]] = {}
-        for _, _, record in found.rows:
-            versions.setdefault(record_key(record), set()).add(record)
-        for line_number, line, record in found.rows:
-            key = record_key(record)
-            number = self._keys.get(key)
-            if number is None:
-                reason = f"no line of {self._files.jobs.name} has this episode: {describe(key)}"
-            elif number in doubtful:
-                reason = f"the line of its episode in {self._files.jobs.name} is damaged"
-            elif len(versions[key]) > 1:  # nothing says which of them is right
-                reason = f"another row has this episode: {describe(key)}"
-            else:
-                self.done[number] = record
-                continue
-            damaged.append(DamagedLine(line_number, line, reason))
-        set_aside(path, damaged, "their episodes run again", SimError)
-        if damaged or not found.appendable:
-            self._close_table()
-            write_records(path, self.done.values())
-            self._table = LineFile(path, SimError)
-        else:
-            self._open_table.cut(found.whole_bytes)
-            if found.whole_bytes == 0:
-                self._append(RECORD_COLUMNS)
-        self._write_run("running")
-
-    @property
-    def _open_table(self) -> LineFile:
-        if self._table is None:
-            raise SimError(f"the folder {self._files.folder} of a run is closed")
-        return self._table
-
-    def _append(self, cells: Iterable[str]) -> None:
-        line = io.StringIO()
-        csv.writer(line, lineterminator="\n").writerow(cells)
-        self._open_table.add(line.getvalue())
-
-    def _write_jobs(self, jobs: Iterable[Job]) -> None:
-        with (
-            atomic_path(self._files.jobs, SimError) as part,
-            part.open("w", encoding="utf-8") as file,
-        ):
-            file.writelines(job_line(job) for job in jobs)
+        before = read_run(folder)
+        old_versions = before.get("versions", {})
+        for name, version in self._about.get("versions", {}).items():
+            if old_versions.get(name, version) != version:
+                raise SimError(
+                    f"the run in {folder} was begun with {name} {old_versions[name]}, and this is "
+                    f"{version}: their results do not belong into one table; run into another "
+                    "folder"
+                )
+        old, new = before.get("settings", {}), self._about.get("settings", {})
+        for name in {**old, **new} if old and new else ():
+            if old.get(name) != new.get(name):
+                raise SimError(
+                    f"the run in {folder} was begun with {name} {old.get(name)!r}, and this has "
+                    f"{new.get(name)!r}: {_OTHER_WAY}"
+                )
+        old_jobs = read_jobs(folder)
+        if len(old_jobs) != len(self._jobs):
+            raise SimError(
+                f"the run in {folder} has {counted(len(old_jobs), 'episode')}, and "
+                f"{len(self._jobs)} were asked for: {_OTHER_WAY}"
+            )
+        for number, (was, job) in enumerate(zip(old_jobs, self._jobs, strict=True)):
+            if was != job:
+                _refuse_other_job(folder, number, was, job)
 
     def _write_run(self, state: str) -> None:
-        content = {"state": state, "episodes": self._total, **self._about}
+        content = {"state": state, "episodes": len(self._jobs), **self._about}
         text = json.dumps(content, indent=2, ensure_ascii=False)
         write_text(self._files.run, text + "\n", SimError)
 
 
-def record_key(record: EpisodeRecord) -> JobKey:
-    """Return the key of a record, which is unique in its run."""
-    return JobKey(
-        record.scenario,
-        record.seed,
-        record.policy,
-        record.planner,
-        record.perception,
-        record.fault,
+def _refuse_other_job(folder: Path, number: int, was: Job, job: Job) -> None:
+    """Raise SimError, naming the first field in which an episode of the folder differs."""
+    before, now = asdict(was), asdict(job)
+    name = next(each for each in JOB_FIELDS if before[each] != now[each])
+    values = ""
+    if "\n" not in f"{before[name]}{now[name]}":
+        values = f" ({before[name]!r}, now {now[name]!r})"
+    raise SimError(
+        f"the run in {folder} has other episodes than these: episode {number} has another "
+        f"{name}{values}; {_OTHER_WAY}"
     )
-
-
-def _episodes(count: int | str) -> str:
-    """Return a number of episodes, which an unreadable ``run.json`` leaves unknown, as text."""
-    return counted(count, "episode") if isinstance(count, int) else f"{count} episodes"

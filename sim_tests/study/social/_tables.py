@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-import multiprocessing
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -19,7 +17,7 @@ from awarenav.files import csv_number, json_text, write_text
 
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, Variant, labels, table_text
-from ..runs import Job, RunFiles, attempt, find_episode, one_thread_each, read_jobs
+from ..runs import Job, RunFiles, attempt, find_episode, in_parallel, read_jobs
 from ._files import FORMATS, format_of, read_track, write_episode
 from ._measures import SOCIAL_MEASURES, social_measures
 from ._recorder import episode_of
@@ -121,11 +119,12 @@ def _measured_file(path: Path) -> MeasuredEpisode:
 
 def _measured_run(folder: Path, jobs: Sequence[Job], workers: int | None) -> list[MeasuredEpisode]:
     """Run all episodes of a run again and measure them."""
-    measured = []
+    by_number: dict[int, tuple[EpisodeRecord, dict[str, float | None]]] = {}
     with tqdm(total=len(jobs), desc="measures", unit="episode", file=sys.stderr) as bar:
-        for each in _in_processes(jobs, workers):
-            measured.append(each)
+        for number, each in in_parallel(_measured_job, jobs, workers=workers):
+            by_number[number] = each
             bar.update()
+    measured = [by_number[number] for number in range(len(jobs))]
     label = labels(Variant.of(record) for record, _ in measured)
     return [
         MeasuredEpisode(
@@ -139,18 +138,6 @@ def _measured_run(folder: Path, jobs: Sequence[Job], workers: int | None) -> lis
         )
         for number, (record, values) in enumerate(measured)
     ]
-
-
-def _in_processes(
-    jobs: Sequence[Job], workers: int | None
-) -> Iterator[tuple[EpisodeRecord, dict[str, float | None]]]:
-    """Yield record and measures of each job, in their order."""
-    if workers == 1 or len(jobs) == 1:
-        yield from map(_measured_job, jobs)
-        return
-    context = multiprocessing.get_context("spawn")  # a forked process would share the physics
-    with one_thread_each(), ProcessPoolExecutor(workers, mp_context=context) as pool:
-        yield from pool.map(_measured_job, jobs)
 
 
 def _measured_job(job: Job) -> tuple[EpisodeRecord, dict[str, float | None]]:

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from ...crossing.eyes import PerceptionKind, SensorSet
 from ...viewing import LivePage, live_page, outcome_text, show_page, write_page
 from ...world.errors import SimError
 from ..runs import (
+    Conditions,
     Job,
     describe,
     fault_of,
     job_key,
-    plan_jobs,
     policy_of,
     recorder_of,
     seeded_crossing,
@@ -32,16 +31,8 @@ _CATCH_UP_S: Final = 0.3
 class WatchOptions:
     """The options of ``awarenav watch``."""
 
-    scenario: str
+    conditions: Conditions
     policy: str
-    planner: str
-    perception: PerceptionKind
-    sensors: SensorSet
-    camera: str
-    robot: str
-    population: str | None
-    fault: str
-    seed: int
     speed: float
     port: int
     wait: float
@@ -127,21 +118,11 @@ class _Pace:
 
 def _job(options: WatchOptions) -> Job:
     """Return the job of the options, as a run of ``awarenav crossings`` would plan it."""
-    jobs = plan_jobs(
-        [options.scenario],
-        [options.policy],
-        [options.seed],
-        planners=[options.planner],
-        perception=options.perception,
-        sensors=[options.sensors],
-        faults=[options.fault],
-        camera=options.camera,
-        robot=options.robot,
-        population=options.population or "",
-    )
+    jobs = options.conditions.jobs([options.policy])
     if len(jobs) != 1:
+        scenario, fault = options.conditions.scenario[0], options.conditions.fault[0]
         raise SimError(
-            f"watch shows one crossing, but scenario {options.scenario!r} with fault "
-            f"{options.fault!r} stands for {len(jobs)}; give one of each"
+            f"watch shows one crossing, but scenario {scenario!r} with fault {fault!r} stands for "
+            f"{len(jobs)}; give one of each"
         )
     return jobs[0]

@@ -80,6 +80,7 @@ def watch(**values: Any) -> int:
     Shows the hall from above and the robot's camera, with attention cones, tracks, scans and radii;
     and over time each person's α with its bound, the speed limit and what sets it.
     """
-    from ._watch import WatchOptions, watch_command  # noqa: PLC0415 - help needs no simulator
+    from ..runs import Conditions  # noqa: PLC0415 - help needs no simulator
+    from ._watch import WatchOptions, watch_command  # noqa: PLC0415
 
-    return watch_command(WatchOptions(**values))
+    return watch_command(WatchOptions(conditions=Conditions.taken_from(values), **values))

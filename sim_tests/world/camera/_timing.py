@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
@@ -50,23 +49,6 @@ class CameraTiming(SimConfig):
         if loss < self.drop_rate:
             return None
         return float(stamp_s + self.latency_s + delay * self.latency_jitter_s)
-
-    def frames(
-        self, rng: np.random.Generator, start_s: float = 0.0
-    ) -> Iterator[tuple[float, float | None]]:
-        """Yield stamp and delivery time (None: lost) of one frame after another, without end.
-
-        Raises:
-            SimError: without a frame rate.
-        """
-        if self.rate_hz is None:
-            raise SimError("rate_hz must be given for a camera that runs on its own, got None")
-        start = finite_number("start_s", start_s, SimError)
-        number = 0
-        while True:
-            stamp_s = start + number / self.rate_hz
-            yield stamp_s, self.delivery_s(stamp_s, rng)
-            number += 1
 
 
 class FrameClock:

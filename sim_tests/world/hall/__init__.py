@@ -11,22 +11,21 @@ from ._meshes import (
     Region,
     SceneryChunk,
     box,
-    ellipsoid,
     merge,
     quad,
-    tube,
+    read_meshes,
 )
 from ._props import PROP_PARTS, Prop
-from ._scenery import TEXTURE_NAMES, scenery, scenery_texture
-from ._texture_amr import AMR_ATLAS
+from ._scenery import scenery
+from ._textures import TEXTURE_NAMES, Atlas, scenery_texture
 
 __all__ = [
-    "AMR_ATLAS",
     "BOX_FACES",
     "LAYOUTS",
     "LIGHTINGS",
     "PROP_PARTS",
     "TEXTURE_NAMES",
+    "Atlas",
     "Colour",
     "Lighting",
     "Mesh",
@@ -36,10 +35,9 @@ __all__ = [
     "SceneryChunk",
     "WarehouseLayout",
     "box",
-    "ellipsoid",
     "merge",
     "quad",
+    "read_meshes",
     "scenery",
     "scenery_texture",
-    "tube",
 ]

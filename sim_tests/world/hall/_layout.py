@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from functools import cache
+from importlib import resources
 from typing import Annotated, Final
 
 import numpy as np
@@ -16,8 +17,8 @@ from ..errors import SimError
 from ._props import Prop
 
 _Positive = Annotated[float, Field(gt=0.0)]
-# Depth of the racks of every shipped layout.
-_RACK_DEPTH_M: Final = 1.1
+#: Names of the shipped layouts.
+LAYOUTS: Final = ("crossing", "open", "blind_corner", "aisles", "staging_hall")
 
 
 class RackBox(SimConfig):
@@ -107,139 +108,11 @@ class WarehouseLayout(SimConfig):
             )
 
     @classmethod
-    def crossing(cls) -> WarehouseLayout:
-        """Return a 3 m aisle along x between racks, crossed at x = 6 m by a 3 m aisle along y."""
-        return cls(
-            x_min_m=-5.0,
-            y_min_m=-8.5,
-            x_max_m=17.0,
-            y_max_m=8.5,
-            cross_aisle_x_m=6.0,
-            racks=_racks_on_both_sides((2.15, 5.65), (0.6, 11.4), 7.8),
-        )
-
-    @classmethod
-    def open_floor(cls) -> WarehouseLayout:
-        """Return a wide free floor with racks along its sides, as in the paper's encounter."""
-        return cls(
-            x_min_m=-5.0,
-            y_min_m=-7.0,
-            x_max_m=14.0,
-            y_max_m=7.0,
-            aisle_width_m=4.0,
-            racks=_racks_on_both_sides((5.2,), (5.0,), 13.5),
-        )
-
-    @classmethod
-    def blind_corner(cls) -> WarehouseLayout:
-        """Return a 3 m aisle along x that turns left at x = 6 m, behind racks that hide it."""
-        return cls(
-            x_min_m=-4.5,
-            y_min_m=-4.5,
-            x_max_m=10.5,
-            y_max_m=12.5,
-            cross_aisle_x_m=6.0,
-            racks=(
-                _rack(2.75, -2.15, 11.7),
-                _rack(0.6, 2.15, 7.8),
-                RackBox(x_m=3.95, y_m=6.65, length_m=_RACK_DEPTH_M, width_m=7.9),
-                RackBox(x_m=8.05, y_m=4.5, length_m=_RACK_DEPTH_M, width_m=12.2),
-            ),
-            props=(
-                Prop(kind="pallet_truck", x_m=7.0, y_m=8.6, yaw_deg=90.0),
-                Prop(kind="pallet_wrapped", x_m=1.6, y_m=5.2, yaw_deg=90.0),
-                Prop(kind="pallet_goods", x_m=0.2, y_m=5.2, yaw_deg=90.0),
-                Prop(kind="roller_container", x_m=-3.6, y_m=3.4),
-                Prop(kind="bin", x_m=-4.0, y_m=-3.2, yaw_deg=90.0),
-                Prop(kind="barrier", x_m=9.55, y_m=-3.0, yaw_deg=90.0),
-                Prop(kind="post", x_m=4.6, y_m=1.35),
-            ),
-        )
-
-    @classmethod
-    def aisles(cls) -> WarehouseLayout:
-        """Return five aisles along x between six rows of racks; a 3 m aisle along y crosses all."""
-        return cls(
-            x_min_m=-5.0,
-            y_min_m=-10.5,
-            x_max_m=21.0,
-            y_max_m=10.5,
-            wall_height_m=7.0,
-            cross_aisle_x_m=7.8,
-            racks=_racks_on_both_sides((2.15, 5.85, 7.0), (1.75, 13.85), 9.1),
-            props=(
-                Prop(kind="stacker", x_m=-3.95, y_m=6.4, yaw_deg=180.0),
-                Prop(kind="pallet_truck", x_m=12.4, y_m=4.85, yaw_deg=180.0),
-                Prop(kind="pallet_goods", x_m=4.4, y_m=-4.85),
-                Prop(kind="pallet_stack", x_m=-4.3, y_m=-3.4, yaw_deg=90.0),
-                Prop(kind="pallet_stack", x_m=-4.3, y_m=-4.9, yaw_deg=90.0),
-                Prop(kind="roller_container", x_m=20.3, y_m=3.6, yaw_deg=90.0),
-                Prop(kind="roller_container", x_m=20.3, y_m=4.6, yaw_deg=90.0),
-                Prop(kind="bin", x_m=20.4, y_m=-3.0),
-                Prop(kind="crates", x_m=20.4, y_m=-4.2, yaw_deg=90.0),
-                *(Prop(kind="post", x_m=x, y_m=y) for x in (6.4, 9.2) for y in (1.4, -1.4)),
-            ),
-        )
-
-    @classmethod
-    def staging_hall(cls) -> WarehouseLayout:
-        """Return a wide hall: racks on its left, waiting pallets and parked trucks on its right.
-
-        The robot's aisle is 4 m wide; people step out between the pallets.
-        """
-        pallets = [
-            Prop(kind=kind, x_m=x, y_m=y, yaw_deg=90.0)
-            for x, kinds in (
-                (-2.4, ("pallet_wrapped", "pallet_wrapped", "pallet_goods")),
-                (-1.3, ("pallet_wrapped", "pallet_goods", "pallet")),
-                (2.6, ("pallet_goods", "pallet_drums", "pallet_sacks")),
-                (3.7, ("pallet_goods", "pallet_sacks", "pallet_stack")),
-                (9.4, ("pallet_wrapped", "pallet_goods", "pallet_goods")),
-                (13.0, ("pallet_wrapped", "pallet_wrapped", "pallet_stack")),
-                (14.1, ("pallet_wrapped", "pallet_drums", "pallet")),
-            )
-            for y, kind in zip((-6.1, -4.8, -3.5), kinds, strict=True)
-        ]
-        return cls(
-            x_min_m=-6.0,
-            y_min_m=-9.5,
-            x_max_m=18.0,
-            y_max_m=9.0,
-            wall_height_m=7.0,
-            aisle_width_m=4.0,
-            cross_aisle_x_m=6.5,
-            cross_aisle_width_m=2.6,
-            racks=(
-                _rack(0.9, 4.3, 7.8),
-                _rack(12.1, 4.3, 7.8),
-                _rack(0.9, 5.45, 7.8),
-                _rack(12.1, 5.45, 7.8),
-            ),
-            props=(
-                *pallets,
-                Prop(kind="forklift", x_m=11.2, y_m=-5.0, yaw_deg=-90.0),
-                Prop(kind="pallet_truck", x_m=0.6, y_m=-4.4, yaw_deg=90.0),
-                Prop(kind="stacker", x_m=16.6, y_m=2.2, yaw_deg=-90.0),
-                Prop(kind="roller_container", x_m=-5.4, y_m=2.9, yaw_deg=90.0),
-                Prop(kind="roller_container", x_m=-5.4, y_m=3.9, yaw_deg=90.0),
-                Prop(kind="roller_container", x_m=-5.4, y_m=-3.6, yaw_deg=90.0),
-                Prop(kind="shelf", x_m=-5.7, y_m=6.4, yaw_deg=90.0),
-                Prop(kind="shelf", x_m=-5.7, y_m=7.7, yaw_deg=90.0),
-                Prop(kind="crates", x_m=-4.9, y_m=-6.4, yaw_deg=90.0),
-                Prop(kind="crates", x_m=-4.4, y_m=-6.4, yaw_deg=90.0),
-                Prop(kind="bin", x_m=17.4, y_m=-3.0, yaw_deg=180.0),
-                Prop(kind="bin", x_m=17.4, y_m=-3.8, yaw_deg=180.0),
-                *(Prop(kind="barrier", x_m=x, y_m=3.2) for x in (-1.4, 0.8, 3.0)),
-                *(Prop(kind="post", x_m=x, y_m=-2.5) for x in (5.0, 8.0)),
-            ),
-        )
-
-    @classmethod
     def named(cls, name: str) -> WarehouseLayout:
         """Return one of :data:`LAYOUTS` by its name; raises SimError for other names."""
         if name not in LAYOUTS:
             raise SimError(not_one_of("layout", name, LAYOUTS))
-        return LAYOUTS[name]()
+        return _shipped(name)
 
     @property
     def obstacle_boxes_odom(self) -> FloatArray:
@@ -272,23 +145,7 @@ class WarehouseLayout(SimConfig):
         return 0.2
 
 
-def _rack(x_m: float, y_m: float, length_m: float) -> RackBox:
-    """Return a rack along x."""
-    return RackBox(x_m=x_m, y_m=y_m, length_m=length_m, width_m=_RACK_DEPTH_M)
-
-
-def _racks_on_both_sides(
-    y_m: Sequence[float], x_m: Sequence[float], length_m: float
-) -> tuple[RackBox, ...]:
-    """Return racks along x at every distance ``y_m`` and every ``x_m``: the left side's first."""
-    return tuple(_rack(x, side * y, length_m) for side in (1.0, -1.0) for y in y_m for x in x_m)
-
-
-#: The shipped layouts by name.
-LAYOUTS: Final[dict[str, Callable[[], WarehouseLayout]]] = {
-    "crossing": WarehouseLayout.crossing,
-    "open": WarehouseLayout.open_floor,
-    "blind_corner": WarehouseLayout.blind_corner,
-    "aisles": WarehouseLayout.aisles,
-    "staging_hall": WarehouseLayout.staging_hall,
-}
+@cache
+def _shipped(name: str) -> WarehouseLayout:
+    with resources.as_file(resources.files(__package__) / "layouts" / f"{name}.yaml") as path:
+        return WarehouseLayout.from_yaml(path)

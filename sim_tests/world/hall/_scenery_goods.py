@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 
 from ._meshes import Mesh, box
-from ._texture_goods import CARTONS, CRATES, GOODS_ATLAS, STACKS, WRAPS
+from ._textures import GOODS_ATLAS
 
 #: The load of a pallet: ``"cartons"`` are of one kind, ``"heaps"`` are two stacks of different
 #: cartons, ``"pallets"`` is a stack of empty pallets, and ``"nothing"`` has not even a pallet.
@@ -20,15 +20,15 @@ PALLET_M: Final = 0.148
 _WOOD_M: Final = 0.144
 _MAX_STACK_M: Final = 1.06
 _MAX_DRUM_M: Final = 0.9
-# Cells of the goods atlas for the tops of loads, and the cells for the sides with their number.
+# Cells of the goods atlas for the tops of loads, and the kinds of cells for their sides.
 _TOPS: Final = {"wrapped": "wrap_top", "crates": "crates_top", "sacks": "wrap_top", "drums": "dark"}
-_SIDE_CELLS: Final[dict[str, tuple[str, int]]] = {
-    "cartons": ("stack", STACKS),
-    "heaps": ("stack", STACKS),
-    "wrapped": ("wrap", WRAPS),
-    "crates": ("crates", CRATES),
-    "sacks": ("sacks", 2),
-    "drums": ("drums", 2),
+_SIDES_OF: Final[dict[str, str]] = {
+    "cartons": "stack",
+    "heaps": "stack",
+    "wrapped": "wrap",
+    "crates": "crates",
+    "sacks": "sacks",
+    "drums": "drums",
 }
 # The least share of the free height that a load fills.
 _MIN_FILL: Final = {"wrapped": 0.8, "crates": 0.6, "sacks": 0.45, "drums": 0.8}
@@ -65,21 +65,20 @@ def pallet_load(
     width, depth = size_m[0] - 0.04, size_m[1] - 0.04
     if load == "cartons":
         height = free * float(rng.uniform(0.55, 1.0))
-        number = int(rng.integers(STACKS))
+        side = GOODS_ATLAS.drawn("stack", rng)
         size = (width, depth, height)
-        yield goods_box((x, y, base), size, f"stack{number}", f"top{number % 4}")
+        yield goods_box((x, y, base), size, side, f"top{int(side[5:]) % 4}")
         if height < 0.72 * free:  # one more carton on top
             edge = min(0.42, free - height, 0.5 * width)
             aside = float(rng.choice((-1.0, 1.0))) * (0.5 * (width - edge) - 0.02)
-            carton = f"carton{rng.integers(CARTONS)}"
+            carton = GOODS_ATLAS.drawn("carton", rng)
             size = (edge, 0.86 * depth, edge * float(rng.uniform(0.7, 1.0)))
             yield goods_box((x + aside, y, base + height), size, carton, "top0")
     elif load == "heaps":
         split = float(rng.uniform(0.42, 0.58))
         for share, middle in ((split, 0.5 * (split - 1.0)), (1.0 - split, 0.5 * split)):
             height = free * float(rng.uniform(0.45, 0.95))
-            several = height >= 0.7
-            side = f"stack{rng.integers(STACKS)}" if several else f"carton{rng.integers(CARTONS)}"
+            side = GOODS_ATLAS.drawn("stack" if height >= 0.7 else "carton", rng)
             size = (share * width - 0.015, depth, height)
             yield goods_box((x + middle * width, y, base), size, side, "top1")
     else:
@@ -91,8 +90,7 @@ def pallet_load(
 
 def side_cell(load: Load, rng: np.random.Generator) -> str:
     """Return the name of an atlas cell that shows a load from the side."""
-    name, count = _SIDE_CELLS[load]
-    return f"{name}{rng.integers(count)}"
+    return GOODS_ATLAS.drawn(_SIDES_OF[load], rng)
 
 
 def pallets(

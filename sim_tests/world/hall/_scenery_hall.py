@@ -11,8 +11,7 @@ from perception.arrays import FloatArray
 
 from ._layout import WarehouseLayout
 from ._meshes import WHOLE, Colour, Mesh, Region, SceneryChunk, box, merge, quad
-from ._texture_goods import GOODS_ATLAS
-from ._texture_hall import FIXTURE_ATLAS, TILE_M
+from ._textures import FIXTURE_ATLAS, GOODS_ATLAS, TILE_M
 
 # Width and height of each wall fixture, and the height of its lower edge, metres.
 _FIXTURES: Final[dict[str, tuple[float, float, float]]] = {

@@ -13,7 +13,7 @@ from perception.arrays import FloatArray
 from ._layout import WarehouseLayout
 from ._meshes import Mesh, SceneryChunk, merge, quad
 from ._scenery_hall import hall_tones, tiles
-from ._texture_hall import MARKING_ATLAS, TILE_M
+from ._textures import MARKING_ATLAS, TILE_M
 
 # Heights above the slab: enough for the depth buffer, too little to see. Lines lie over shades.
 _SHADE_Z_M: Final = 0.002

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
+from functools import cache
+from importlib import resources
 from typing import Final
 
 import numpy as np
 
-from ._meshes import Mesh, Region, SceneryChunk, box, merge, tube
+from ._meshes import Mesh, SceneryChunk, merge, read_meshes
 from ._props import PROP_PARTS, Prop
 from ._scenery_goods import PALLET_M, Load, goods_box, pallets, side_cell
-from ._texture_goods import CARTONS, CRATES, GOODS_ATLAS, GOODS_SETS
+from ._textures import GOODS_ATLAS, GOODS_SETS
 
 _Maker = Callable[[np.random.Generator], Iterator[Mesh]]
-_SIDES: Final = ("-x", "+x", "-y", "+y")
-_FACES: Final = {
-    "front": "+x",
-    "back": "-x",
-    "left": "+y",
-    "right": "-y",
-    "top": "+z",
-    "under": "-z",
-}
 _EURO_PALLET_M: Final = (1.2, 0.8)
-_region = GOODS_ATLAS.region
 
 
 def prop_chunk(prop: Prop, number: int, variant: int) -> SceneryChunk:
@@ -32,29 +23,26 @@ def prop_chunk(prop: Prop, number: int, variant: int) -> SceneryChunk:
     rng = np.random.default_rng((60, variant, number))
     cos, sin = prop.turn
     rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    mesh = merge(_MAKERS[prop.kind](rng)).transformed(rotation, (prop.x_m, prop.y_m, 0.0))
+    maker = _LOADED.get(prop.kind)
+    mesh = _shipped(prop.kind, rng) if maker is None else merge(maker(rng))
     tone = float(rng.uniform(0.92, 1.0))
-    return SceneryChunk(mesh, (tone, tone, tone), f"goods{variant % GOODS_SETS}")
+    return SceneryChunk(
+        mesh.transformed(rotation, (prop.x_m, prop.y_m, 0.0)),
+        (tone, tone, tone),
+        f"goods{variant % GOODS_SETS}",
+    )
 
 
-def _solid(
-    center: tuple[float, float, float], size: tuple[float, float, float], side: str, top: str = ""
-) -> Mesh:
-    """Return a box with one atlas cell on its sides and another on top (none: the same)."""
-    regions: dict[str, Region] = dict.fromkeys(_SIDES, _region(side))
-    return box(center, size, {**regions, "+z": _region(top or side)})
+@cache
+def _meshes() -> dict[str, Mesh]:
+    """Return the meshes of all props without goods: ``forklift0``, ``bin0`` and so on."""
+    return read_meshes((resources.files(__package__) / "props.npz").read_bytes())
 
 
-def _faces(
-    center: tuple[float, float, float], size: tuple[float, float, float], **names: str
-) -> Mesh:
-    """Return a box with the atlas cells given by face (``front``, ``back``, ``left``, …) only."""
-    return box(center, size, {_FACES[key]: _region(name) for key, name in names.items()})
-
-
-def _around(name: str) -> dict[str, str]:
-    """Return arguments of :func:`_faces` for one cell on all four sides."""
-    return dict.fromkeys(("front", "back", "left", "right"), name)
+def _shipped(kind: str, rng: np.random.Generator) -> Mesh:
+    """Return a mesh of this kind of prop, by chance where it has several."""
+    looks = [name for name in _meshes() if name.rstrip("0123456789") == kind]
+    return _meshes()[looks[int(rng.integers(len(looks))) if len(looks) > 1 else 0]]
 
 
 def _loaded_pallet(load: Load) -> _Maker:
@@ -71,7 +59,7 @@ def _loaded_pallet(load: Load) -> _Maker:
         if load == "cartons":  # the last layer: two stacks of other cartons
             for x, length in ((-0.3, 0.56), (0.3, 0.58)):
                 upper = (free - height) * float(rng.uniform(0.85, 1.0))
-                carton = f"carton{rng.integers(CARTONS)}"
+                carton = GOODS_ATLAS.drawn("carton", rng)
                 size = (length, 0.76, upper)
                 yield goods_box((x, 0.0, PALLET_M + height), size, carton, "top1")
 
@@ -85,129 +73,11 @@ def _empty_pallets(count: int) -> _Maker:
     return make
 
 
-def _pallet_truck(_: np.random.Generator) -> Iterator[Mesh]:
-    for y in (-0.19, 0.19):
-        yield _solid((-0.2, y, 0.12), (1.15, 0.16, 0.10), "red")
-        yield _solid((-0.7, y, 0.045), (0.1, 0.1, 0.09), "rubber")
-    yield _solid((0.33, 0.0, 0.12), (0.1, 0.5, 0.14), "red")
-    yield _solid((0.48, 0.0, 0.34), (0.2, 0.38, 0.36), "red", "dark")
-    yield _solid((0.49, 0.0, 0.09), (0.18, 0.34, 0.18), "rubber")
-    yield _solid((0.64, 0.0, 0.55), (0.1, 0.1, 1.08), "dark")
-    yield _solid((0.64, 0.0, 1.13), (0.08, 0.15, 0.17), "red", "dark")
-
-
-def _stacker(_: np.random.Generator) -> Iterator[Mesh]:
-    for y in (-0.19, 0.19):
-        yield _solid((-0.55, y, 0.07), (1.1, 0.18, 0.08), "dark")
-    yield _faces((0.1, 0.0, 1.02), (0.18, 0.76, 1.96), **_around("mast"), top="dark")
-    yield _faces(
-        (0.5, 0.0, 0.6),
-        (0.58, 0.76, 1.06),
-        front="yellow",
-        left="yellow",
-        right="yellow",
-        top="dark",
-    )
-    yield _faces((0.79, 0.0, 0.42), (0.012, 0.5, 0.3), front="grille")
-    yield _faces((0.5, 0.0, 0.12), (0.6, 0.77, 0.2), **_around("dark"))
-    yield _faces((0.66, 0.0, 1.12), (0.2, 0.3, 0.05), **_around("dark"), top="dark")
-
-
-def _forklift(_: np.random.Generator) -> Iterator[Mesh]:
-    for y in (-0.3, 0.3):
-        yield _solid((1.35, y, 0.08), (1.0, 0.14, 0.05), "dark")
-    yield _faces((0.74, 0.0, 1.1), (0.2, 0.94, 2.1), **_around("mast"), top="dark")
-    yield _faces((0.86, 0.0, 0.35), (0.03, 0.9, 0.5), **_around("dark"), top="dark")
-    yield _faces((-0.06, 0.0, 0.62), (1.36, 1.04, 0.9), **_around("orange"), top="dark")
-    yield _faces((-0.06, 0.0, 1.54), (1.32, 0.98, 0.96), **_around("window"))
-    for x in (-0.7, 0.58):  # pillars of the cab
-        for y in (-0.49, 0.49):
-            yield _solid((x, y, 1.54), (0.08, 0.08, 0.98), "dark")
-    yield _solid((-0.06, 0.0, 2.06), (1.38, 1.06, 0.08), "dark")
-    yield _faces((-1.0, 0.0, 0.62), (0.5, 1.04, 0.84), **_around("orange"), top="dark")
-    yield _faces((-1.255, 0.0, 0.5), (0.012, 0.8, 0.3), back="hazard")
-    for x, radius in ((0.34, 0.3), (-0.9, 0.24)):
-        for side in (-1.0, 1.0):
-            wheel = tube(
-                [(0, 0, 0.09, radius, radius), (0, 0, -0.09, radius, radius)], 12, _region("rubber")
-            )
-            turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-            yield wheel.transformed(turn, (x, side * 0.45, radius))
-    yield _faces((-0.06, 0.0, 0.1), (1.3, 0.9, 0.18), **_around("dark"))
-    yield _faces((-0.95, 0.0, 0.12), (0.4, 0.9, 0.2), **_around("dark"))
-
-
-def _roller_container(rng: np.random.Generator) -> Iterator[Mesh]:
-    cage = f"cage{rng.integers(2)}"
-    yield _solid((0.0, 0.0, 0.92), (0.79, 0.69, 1.54), cage, "top2")
-    yield _solid((0.0, 0.0, 0.14), (0.8, 0.7, 0.04), "steel")
-    for x in (-0.33, 0.33):
-        for y in (-0.28, 0.28):
-            yield _solid((x, y, 0.06), (0.12, 0.05, 0.12), "rubber")
-
-
-def _shelf(_: np.random.Generator) -> Iterator[Mesh]:
-    yield _faces(
-        (0.0, 0.0, 1.0),
-        (1.19, 0.44, 2.0),
-        left="parts",
-        right="parts",
-        front="steel",
-        back="steel",
-        top="steel",
-    )
-
-
-def _crates(rng: np.random.Generator) -> Iterator[Mesh]:
-    yield _solid(
-        (0.0, 0.0, 0.625), (0.59, 0.39, 1.25), f"crates{rng.integers(CRATES)}", "crates_top"
-    )
-
-
-def _bin(rng: np.random.Generator) -> Iterator[Mesh]:
-    colour = ("green", "blue", "dark", "grey")[int(rng.integers(4))]
-    body = tube(
-        [(0, 0, 0.95, 0.41, 0.37), (0, 0, 0.1, 0.33, 0.31)], 4, _region(colour), _region("dark")
-    )
-    half = math.sqrt(0.5)
-    eighth = np.array([[half, -half, 0.0], [half, half, 0.0], [0.0, 0.0, 1.0]])
-    yield body.transformed(eighth)
-    yield _solid((0.0, 0.0, 1.0), (0.6, 0.55, 0.11), colour)
-    for y in (-0.22, 0.22):
-        yield _solid((-0.22, y, 0.1), (0.2, 0.06, 0.2), "rubber")
-
-
-def _barrier(_: np.random.Generator) -> Iterator[Mesh]:
-    yield _faces((0.0, 0.0, 0.25), (2.0, 0.08, 0.3), **{**_around("yellow"), "top": "yellow"})
-    yield _faces((0.0, 0.0, 0.25), (1.99, 0.086, 0.1), left="hazard", right="hazard")
-    for x in (-0.94, 0.0, 0.94):
-        yield _solid((x, 0.0, 0.21), (0.11, 0.11, 0.42), "dark", "yellow")
-
-
-def _post(_: np.random.Generator) -> Iterator[Mesh]:
-    yield tube(
-        [(0, 0, 1.0, 0.07, 0.07), (0, 0, 0.05, 0.075, 0.075)],
-        8,
-        _region("hazard"),
-        _region("yellow"),
-    )
-    yield _solid((0.0, 0.0, 0.025), (0.16, 0.16, 0.05), "dark")
-
-
-_MAKERS: Final[dict[str, _Maker]] = {
+_LOADED: Final[dict[str, _Maker]] = {
     "pallet": _empty_pallets(1),
     "pallet_stack": _empty_pallets(7),
     "pallet_goods": _loaded_pallet("cartons"),
     "pallet_wrapped": _loaded_pallet("wrapped"),
     "pallet_sacks": _loaded_pallet("sacks"),
     "pallet_drums": _loaded_pallet("drums"),
-    "pallet_truck": _pallet_truck,
-    "stacker": _stacker,
-    "forklift": _forklift,
-    "roller_container": _roller_container,
-    "shelf": _shelf,
-    "crates": _crates,
-    "bin": _bin,
-    "barrier": _barrier,
-    "post": _post,
 }

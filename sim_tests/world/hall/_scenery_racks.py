@@ -14,7 +14,7 @@ import numpy as np
 from ._layout import RackBox
 from ._meshes import Mesh, SceneryChunk, box, merge, quad
 from ._scenery_goods import Load, pallet_load
-from ._texture_goods import GOODS_ATLAS, GOODS_SETS, SIGNS
+from ._textures import GOODS_ATLAS, GOODS_SETS
 
 _POST_M: Final = 0.10
 _BEAM_M: Final = 0.12
@@ -122,7 +122,7 @@ def _ends(
         yield quad(sheet, _region("end"))
         # Inner side of the sheet, visible past the goods.
         yield quad([(x - 0.005 * out, -y, z) for x, y, z in sheet], _region("ladder"))
-        sign = _region(f"sign{number % SIGNS}")
+        sign = _region(f"sign{number % GOODS_ATLAS.count('sign')}")
         y, z = 0.36 * half * out, min(2.1, 0.75 * height)
         plate = [(-1, -0.5), (1, -0.5), (1, 0.5), (-1, 0.5)]
         yield quad([(s + 0.01 * out, u * y, z + v * 0.36 * half) for u, v in plate], sign)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ._backend import RENDERERS, Drawing, RendererName
 from ._backend_gl import gl_works
-from ._culling import box_corners, hidden_behind, in_view, to_camera
+from ._culling import box_corners, in_view, to_camera
 from ._view import RenderView
 from ._visuals import VisualActor, Visuals
 
@@ -17,7 +17,6 @@ __all__ = [
     "Visuals",
     "box_corners",
     "gl_works",
-    "hidden_behind",
     "in_view",
     "to_camera",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from typing import Final, Literal, Protocol
 
@@ -33,15 +34,18 @@ class Drawing:
     body_ids: NDArray[np.int32]
 
 
-class RenderBackend(Protocol):
-    """A PyBullet client without physics, and a renderer for its bodies.
+def texture_key(rgb: NDArray[np.uint8]) -> bytes:
+    """Return a hash of a texture's shape and texels."""
+    return hashlib.blake2b(
+        np.ascontiguousarray(rgb).data, digest_size=16, salt=str(rgb.shape).encode()[:16]
+    ).digest()
 
-    ``shares_textures`` says whether shapes with the same texture share one copy of it.
-    """
+
+class RenderBackend(Protocol):
+    """A PyBullet client without physics, and a renderer for its bodies."""
 
     name: BackendName
     client: int
-    shares_textures: bool
 
     def close(self) -> None:
         """End the client; a second call does nothing."""
@@ -52,11 +56,11 @@ class RenderBackend(Protocol):
         ...
 
     def shape(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
-        """Register a visual shape; return PyBullet's id of it."""
+        """Register a visual shape, with uv if it has a texture; return PyBullet's id of it."""
         ...
 
-    def attach(self, body: int, link: int, shape: int, texture: int | None) -> None:
-        """Draw a shape on a link (−1: base), with the texture that it was registered with."""
+    def attach(self, body: int, link: int, shape: int) -> None:
+        """Draw a shape on a link (−1: base)."""
         ...
 
     def hide(self, body: int) -> None:

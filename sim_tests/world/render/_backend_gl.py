@@ -90,7 +90,6 @@ class GlBackend:
     """
 
     name: BackendName = "gl"
-    shares_textures = True
 
     def __init__(self) -> None:
         self.client = -1
@@ -148,7 +147,7 @@ class GlBackend:
         self._shapes[number] = _Shape(array, buffers, colour, self._textures[texture or 0])
         return number
 
-    def attach(self, body: int, link: int, shape: int, texture: int | None) -> None:
+    def attach(self, body: int, link: int, shape: int) -> None:
         """Draw a shape on a link."""
         self._bodies.setdefault(body, []).append((link, self._shapes[shape]))
 

@@ -20,7 +20,6 @@ BoolArray = NDArray[np.bool_]
 _SLACK_SAMPLES: Final = 0.05
 _SLACK_TANGENT: Final = 1e-4
 _SLACK_M: Final = 1e-3
-_TINY: Final = 1e-12
 _UNIT_CORNERS: Final = np.array(
     [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
 )
@@ -77,41 +76,3 @@ def _between_planes(view: RenderView, x: FloatArray, y: FloatArray, z: FloatArra
         & (y - view.top * z > -slack).any(axis=1)
         & (y - view.bottom * z < slack).any(axis=1)
     )
-
-
-def hidden_behind(
-    view: RenderView, corners_odom_m: FloatArray, occluders_odom_m: FloatArray
-) -> BoolArray:
-    """Return (N,) True for a box (N, 8, 3) wholly behind one of the solid occluders (M, 2, 3).
-
-    The shadow of a convex body from a point is convex, so a box lies in it if its eight corners
-    do. A corner lies in it if the segment from the camera to the corner meets the occluder. An
-    occluder that the near plane may cut open hides nothing.
-    """
-    hidden = np.zeros(len(corners_odom_m), dtype=bool)
-    eye = view.T_odom_camera[:3, 3]
-    nearest = np.clip(eye, occluders_odom_m[:, 0], occluders_odom_m[:, 1])
-    slant = np.sqrt(
-        1.0 + max(abs(view.left), abs(view.right)) ** 2 + max(abs(view.top), abs(view.bottom)) ** 2
-    )
-    whole = np.linalg.norm(nearest - eye, axis=1) > slant * view.near_m + _SLACK_M
-    solids = occluders_odom_m[whole]
-    if not len(solids) or not len(corners_odom_m):
-        return hidden
-    # A hidden box has a hidden centre: the corners are tested for these few boxes only.
-    centres = corners_odom_m.mean(axis=1)
-    box, solid = np.nonzero(_meets(eye, centres[:, None, :], solids[None]))
-    behind = _meets(eye, corners_odom_m[box], solids[solid][:, None]).all(axis=1)
-    hidden[box[behind]] = True
-    return hidden
-
-
-def _meets(eye: FloatArray, ends: FloatArray, boxes: FloatArray) -> BoolArray:
-    """Return whether segments from ``eye`` to ``ends`` (…, 3) meet boxes (…, 2, 3), by slabs."""
-    along = ends - eye
-    along = np.where(np.abs(along) < _TINY, _TINY, along)
-    first = (boxes[..., 0, :] - eye) / along
-    last = (boxes[..., 1, :] - eye) / along
-    enter = np.minimum(first, last).max(axis=-1)
-    leave = np.maximum(first, last).min(axis=-1)
-    return np.asarray((enter <= leave) & (leave >= 0.0) & (enter <= 1.0))

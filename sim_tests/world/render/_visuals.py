@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Set as AbstractSet
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from types import TracebackType
 from typing import Final, Protocol
 
@@ -18,17 +16,13 @@ from perception.arrays import FloatArray
 from ..bullet import pybullet
 from ..errors import SimError
 from ..hall import Colour, Lighting, Mesh, WarehouseLayout, scenery, scenery_texture
-from ._backend import RENDERERS, Drawing, RenderBackend, RendererName
+from ._backend import RENDERERS, Drawing, RenderBackend, RendererName, texture_key
 from ._backend_gl import GlBackend, gl_works
 from ._backend_tiny import TinyBackend
-from ._culling import box_corners, hidden_behind, in_view, to_camera
-from ._texture_islands import cut_texture
+from ._culling import box_corners, in_view, to_camera
 from ._view import RenderView
 
 _WHITE: Final[Colour] = (1.0, 1.0, 1.0)
-# A rack is closed at its ends, on top and along its middle, so it hides what is behind its box.
-# The box used for hiding is smaller by this on every side.
-_RACK_MARGIN_M: Final = 0.05
 
 
 class VisualActor(Protocol):
@@ -50,7 +44,7 @@ class VisualActor(Protocol):
     def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
         """Pose its bodies for the next image at this level of detail; None: hide them.
 
-        An actor of many bodies may hide those outside ``view``; None shows them all.
+        An actor of many bodies may hide those outside ``view``.
         """
         ...
 
@@ -63,7 +57,7 @@ class Visuals(AbstractContextManager["Visuals"]):
     """The render world, a PyBullet client of its own without physics; use it in a ``with`` block.
 
     Scenery stands still; actors move. Before each image, :meth:`prepare` hides the bodies that the
-    image cannot show: those outside the frustum, between the samples, or behind a rack.
+    image cannot show: those outside the frustum or between the samples. It never changes the image.
 
     Args:
         layout: the hall whose scenery is built; None leaves the world empty.
@@ -73,8 +67,6 @@ class Visuals(AbstractContextManager["Visuals"]):
 
     Attributes:
         renderer: ``"tiny"`` or ``"gl"``, the one in use.
-        culling: whether :meth:`prepare` hides bodies that the image cannot show; it never changes
-            the image.
 
     Raises:
         SimError: for an unknown renderer, and for ``"gl"`` where OpenGL does not start.
@@ -86,21 +78,16 @@ class Visuals(AbstractContextManager["Visuals"]):
         renderer: RendererName = "tiny",
         variant: int = 0,
     ) -> None:
-        self.culling = True
         self._backend: RenderBackend = _start_backend(renderer)
         self.renderer = self._backend.name
-        # Textures as registered, with their numbers by content; the backend's numbers by content.
-        self._textures: list[NDArray[np.uint8]] = []
-        self._texture_numbers: dict[bytes, int] = {}
-        self._backend_textures: dict[bytes, int] = {}
-        self._backend_texture_of_shape: dict[int, int] = {}
+        # Numbers of the textures by content.
+        self._textures: dict[bytes, int] = {}
         self._actors: list[VisualActor] = []
         self._built: set[int] = set()
         self._shown_actors: set[int] = set()
         self._static_bodies: list[int] = []
         self._static_corners: FloatArray = np.zeros((0, 8, 3))
         self._static_shown: NDArray[np.bool_] = np.zeros(0, dtype=bool)
-        self._occluders: FloatArray = np.zeros((0, 2, 3))
         self._actor_numbers = np.full(1, -1, dtype=np.int32)
         try:
             if layout is not None:
@@ -133,33 +120,19 @@ class Visuals(AbstractContextManager["Visuals"]):
             raise SimError(
                 f"a texture must be uint8 of shape (H, W, 3), got {image.dtype} {image.shape}"
             )
-        key = _key(image)
-        if key not in self._texture_numbers:
-            self._texture_numbers[key] = len(self._textures)
-            self._textures.append(image)
-        return self._texture_numbers[key]
+        key = texture_key(image)
+        if key not in self._textures:
+            self._textures[key] = self._backend.texture(image)
+        return self._textures[key]
 
     def shape(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
         """Register a visual shape for :meth:`add_body`; return PyBullet's id of it.
 
         The texture is multiplied by the colour.
         """
-        if texture is None:
-            return self._backend.shape(mesh, colour, None)
-        if mesh.uv is None:
+        if texture is not None and mesh.uv is None:
             raise SimError("a mesh with a texture needs uv coordinates")
-        uv, rgb = mesh.uv, self._textures[texture]
-        if self._backend.shares_textures:
-            key = texture.to_bytes(8, "little")
-        else:
-            uv, rgb = cut_texture(uv, mesh.indices.ravel(), rgb)
-            key = _key(rgb)
-        if key not in self._backend_textures:
-            self._backend_textures[key] = self._backend.texture(rgb)
-        number = self._backend_textures[key]
-        shape = self._backend.shape(replace(mesh, uv=uv), colour, number)
-        self._backend_texture_of_shape[shape] = number
-        return shape
+        return self._backend.shape(mesh, colour, texture)
 
     def add_body(
         self,
@@ -206,8 +179,7 @@ class Visuals(AbstractContextManager["Visuals"]):
         )
         for link, link_shape in enumerate((shape, *link_shapes), start=-1):
             if link_shape >= 0:
-                texture = self._backend_texture_of_shape.get(link_shape)
-                self._backend.attach(body, link, link_shape, texture)
+                self._backend.attach(body, link, link_shape)
         return body
 
     def add_static(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
@@ -228,16 +200,6 @@ class Visuals(AbstractContextManager["Visuals"]):
     def actors(self) -> tuple[VisualActor, ...]:
         """The actors in the order of their numbers."""
         return tuple(self._actors)
-
-    @property
-    def statics(self) -> int:
-        """The number of pieces of scenery."""
-        return len(self._static_bodies)
-
-    @property
-    def shown_statics(self) -> int:
-        """The number of pieces of scenery that the last :meth:`prepare` did not hide."""
-        return int(np.count_nonzero(self._static_shown))
 
     def hide(self, body: int) -> None:
         """Stop drawing a body, in every buffer."""
@@ -262,13 +224,7 @@ class Visuals(AbstractContextManager["Visuals"]):
             bounds = np.array([actor.bounds_odom_m() for actor in self._actors], dtype=np.float64)
             corners = np.concatenate([corners, box_corners(bounds)])
         in_camera = to_camera(view, corners)
-        if self.culling:
-            shown = in_view(view, in_camera)
-            if only is None:
-                rows = np.flatnonzero(shown)
-                shown[rows] &= ~hidden_behind(view, corners[rows], self._occluders)
-        else:
-            shown = np.ones(len(corners), dtype=bool)
+        shown = in_view(view, in_camera)
         self._show_statics(
             shown[:statics] if only is None else np.zeros(len(self._static_bodies), dtype=bool)
         )
@@ -305,7 +261,7 @@ class Visuals(AbstractContextManager["Visuals"]):
                     actor.build(self)
                     self._built.add(number)
                 depth = max(float(corners_camera_m[number, :, 2].mean()), view.near_m)
-                actor.show(view.samples_per_m / depth, view if self.culling else None)
+                actor.show(view.samples_per_m / depth, view)
                 self._shown_actors.add(number)
                 self._register_bodies(number, actor.bodies())
             elif number in self._shown_actors:
@@ -333,7 +289,6 @@ class Visuals(AbstractContextManager["Visuals"]):
         }
         for chunk in chunks:
             self.add_static(chunk.mesh, chunk.colour, textures[chunk.texture])
-        self._occluders = _solid_racks(layout)
 
 
 def _start_backend(renderer: str) -> RenderBackend:
@@ -343,23 +298,3 @@ def _start_backend(renderer: str) -> RenderBackend:
     if renderer == "gl" or (renderer == "auto" and gl_works()):
         return GlBackend()
     return TinyBackend()
-
-
-def _key(texture: NDArray[np.uint8]) -> bytes:
-    """Return a hash of a texture's shape and texels."""
-    return hashlib.blake2b(
-        np.ascontiguousarray(texture).data, digest_size=16, salt=str(texture.shape).encode()[:16]
-    ).digest()
-
-
-def _solid_racks(layout: WarehouseLayout) -> FloatArray:
-    """Return the boxes (M, 2, 3) just inside the racks, which hide everything behind them."""
-    boxes = [
-        ((x_min, y_min, -_RACK_MARGIN_M), (x_max, y_max, rack.height_m))
-        for rack in layout.racks
-        for x_min, y_min, x_max, y_max in (rack.box_odom_m,)
-    ]
-    solid = np.array(boxes, dtype=np.float64).reshape(-1, 2, 3)
-    solid[:, 0] += _RACK_MARGIN_M
-    solid[:, 1] -= _RACK_MARGIN_M
-    return solid

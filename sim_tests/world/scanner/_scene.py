@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ..hall import WarehouseLayout
-from ..sightlines import Occluder, PlacedSurface, TriangleSet, cut_surfaces, scenery_triangles
-from ._merging import merged_segments
+from ..sightlines import Occluder, PlacedSurface, TriangleSet, cut_surfaces, scenery_surface
 
 #: Number of the scenery in :meth:`ScanScene.cut`; actors count from 0.
 SCENERY: Final = -1
@@ -29,6 +28,9 @@ _BRIGHT: Final = 1.0
 # cuts are kept. 20 m away the difference in height is 1 mm.
 _LEVEL_RAD: Final = 5e-5
 _HEIGHT_DIGITS: Final = 4
+# Segments whose lines differ by less than this, in radians and metres, are on one line, and so are
+# those with a smaller gap between them.
+_SAME: Final = 1e-9
 
 
 @runtime_checkable
@@ -193,6 +195,52 @@ def _own_cut(triangles: TriangleSet, plane: _Plane) -> FloatArray:
 
 @lru_cache(maxsize=32)  # a robot that stands level scans the same plane again and again
 def _scenery_cut(layout: WarehouseLayout, variant: int, plane: _Plane) -> FloatArray:
-    surface = PlacedSurface(scenery_triangles(layout, variant), _HOME)
+    surface = scenery_surface(layout, variant)
     segments, _ = cut_surfaces([surface], np.array(plane.normal), plane.offset_m)
-    return merged_segments(segments) if plane.normal[:2] == (0.0, 0.0) else segments
+    return _merged(segments) if plane.normal[:2] == (0.0, 0.0) else segments
+
+
+def _merged(segments_m: FloatArray) -> FloatArray:
+    """Return segments that cover the same points as those given, but do not overlap on a line.
+
+    A rack's side is many triangles, and so as many segments on one line.
+
+    Args:
+        segments_m: (S, 2, 3) in one plane of constant z.
+
+    Returns:
+        (R, 2, 3), R ≤ S; segments of no length are left out.
+    """
+    along = segments_m[:, 1, :2] - segments_m[:, 0, :2]
+    length = np.sqrt((along * along).sum(axis=1))
+    kept = np.flatnonzero(length > _SAME)
+    if not kept.size:
+        return np.empty((0, 2, 3))
+    points = segments_m[kept, :, :2]
+    unit = along[kept] / length[kept, None]
+    # Both directions of a line are one.
+    back = (unit[:, 0] < -_SAME) | ((np.abs(unit[:, 0]) <= _SAME) & (unit[:, 1] < 0.0))
+    unit[back] *= -1.0
+    normal = np.column_stack((-unit[:, 1], unit[:, 0]))
+    offset = (normal * points[:, 0]).sum(axis=1)
+    ends = np.sort((points * unit[:, None]).sum(axis=2), axis=1)
+    direction = np.round(np.arctan2(unit[:, 1], unit[:, 0]) / _SAME)
+    line = np.round(offset / _SAME)
+    order = np.lexsort((ends[:, 0], line, direction))
+    direction, line, ends = direction[order], line[order], ends[order]
+    same = (np.diff(direction) == 0.0) & (np.diff(line) == 0.0)
+    rows: list[int] = []
+    reached: list[float] = []
+    for row, (low, high) in enumerate(ends.tolist()):
+        if row and same[row - 1] and low <= reached[-1] + _SAME:
+            reached[-1] = max(reached[-1], high)
+        else:
+            rows.append(row)
+            reached.append(high)
+    first = order[rows]
+    out = np.empty((len(rows), 2, 3))
+    foot = normal[first] * offset[first, None]
+    out[:, 0, :2] = foot + ends[rows, :1] * unit[first]
+    out[:, 1, :2] = foot + np.array(reached)[:, None] * unit[first]
+    out[..., 2] = segments_m[0, 0, 2]
+    return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ._plane_cuts import cut_surfaces
-from ._sight_lines import Occluder, PlacedSurface, SightLines, scenery_triangles
+from ._sight_lines import Occluder, PlacedSurface, SightLines, scenery_surface
 from ._triangles import TriangleSet
 
 __all__ = [
@@ -12,5 +12,5 @@ __all__ = [
     "SightLines",
     "TriangleSet",
     "cut_surfaces",
-    "scenery_triangles",
+    "scenery_surface",
 ]

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
-from ._joined_sets import joined_sets
 from ._sight_lines import PlacedSurface
-from ._triangles import CLUSTER, TriangleSet
+from ._triangles import CLUSTER, TriangleSet, joined_sets
 
 
 def cut_surfaces(

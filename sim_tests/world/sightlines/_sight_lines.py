@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ..hall import WarehouseLayout, scenery
-from ._joined_sets import joined_sets
 from ._triangles import (
     CLUSTER,
     SIDES,
     TriangleSet,
     inverse_of,
+    joined_sets,
     meet_boxes,
     meet_own_boxes,
     meet_triangles,
@@ -73,7 +73,7 @@ class SightLines:
     def __init__(
         self, layout: WarehouseLayout, variant: int = 0, actors: Iterable[object] = ()
     ) -> None:
-        self._scenery = scenery_triangles(layout, variant)
+        self._scenery = scenery_surface(layout, variant)
         self._occluders = [actor for actor in actors if isinstance(actor, Occluder)]
 
     def blocked(
@@ -87,16 +87,11 @@ class SightLines:
             detail: (K,) level of detail of the bodies tested against each line: 0 is the finest,
                 2 the coarsest.
         """
-        blocked = self._scenery.blocks(eye_odom_m[None], ends_odom_m[None])
-        if not self._occluders:
-            return blocked
+        surfaces = [self._scenery]
+        tested: list[NDArray[np.bool_]] = [np.ones(len(ends_odom_m), dtype=bool)]
         boxes = np.array([occluder.reach_odom_m() for occluder in self._occluders])
-        eyes = np.broadcast_to(eye_odom_m, (len(boxes), 3))
-        along = np.broadcast_to(ends_odom_m - eye_odom_m, (len(boxes), *ends_odom_m.shape))
-        near = meet_boxes(eyes, along, boxes) & ~blocked
+        near = meet_boxes(eye_odom_m, ends_odom_m - eye_odom_m, boxes.reshape(-1, 2, 3))
         levels = [(level, detail == level) for level in sorted(set(detail.tolist()))]
-        surfaces: list[PlacedSurface] = []
-        tested: list[NDArray[np.bool_]] = []
         for number in np.flatnonzero(near.any(axis=1)).tolist():
             previous: TriangleSet | None = None
             for level, of_level in levels:
@@ -112,9 +107,7 @@ class SightLines:
                 previous = surface.triangles
                 surfaces.append(surface)
                 tested.append(lines)
-        if surfaces:
-            blocked |= _blocked_by(surfaces, eye_odom_m, ends_odom_m, np.array(tested))
-        return blocked
+        return _blocked_by(surfaces, eye_odom_m, ends_odom_m, np.array(tested))
 
 
 def _blocked_by(
@@ -187,8 +180,8 @@ def _near(points_m: FloatArray, radii_m: FloatArray, along_m: FloatArray) -> NDA
 
 
 @lru_cache(maxsize=8)  # many episodes use the same hall
-def scenery_triangles(layout: WarehouseLayout, variant: int) -> TriangleSet:
-    """Return the triangles of a hall's scenery in odom, as one rigid piece."""
+def scenery_surface(layout: WarehouseLayout, variant: int) -> PlacedSurface:
+    """Return the triangles of a hall's scenery in odom, one piece a chunk."""
     meshes = [chunk.mesh for chunk in scenery(layout, variant)]
-    surfaces = [(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes]
-    return TriangleSet(surfaces, together=True)
+    triangles = TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh in meshes])
+    return PlacedSurface(triangles, np.broadcast_to(np.eye(4), (triangles.pieces, 4, 4)))

@@ -11,6 +11,8 @@ their common edge, so no line passes through a seam.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -34,7 +36,6 @@ class TriangleSet:
 
     Args:
         pieces: surface of each piece, in the piece's own frame.
-        together: all pieces are in one frame instead and count as one rigid piece.
 
     Attributes:
         pieces: P.
@@ -49,23 +50,23 @@ class TriangleSet:
             unused ones are 0.
     """
 
-    def __init__(self, pieces: Sequence[Surface], *, together: bool = False) -> None:
+    def __init__(self, pieces: Sequence[Surface]) -> None:
         corners = [vertices[triangles] for vertices, triangles in pieces]
         clusters = [
-            (0 if together else number, piece[rows])
+            (number, piece[rows])
             for number, piece in enumerate(corners)
             for rows in _clusters(piece.mean(axis=1))
         ]
         count = len(clusters)
         self.clusters = count
-        self.pieces = 1 if together else len(pieces)
-        self._piece = np.array([number for number, _ in clusters], dtype=np.int64)
-        self._boxes = np.array(
+        self.pieces = len(pieces)
+        piece_of = np.array([number for number, _ in clusters], dtype=np.int64)
+        boxes = np.array(
             [(part.min(axis=(0, 1)), part.max(axis=(0, 1))) for _, part in clusters]
         ).reshape(count, 2, 3)
-        self.starts = np.searchsorted(self._piece, np.arange(self.pieces))
-        self.counts = np.bincount(self._piece, minlength=self.pieces)
-        self.boxes_m = np.ascontiguousarray(self._boxes.transpose(1, 2, 0))
+        self.starts = np.searchsorted(piece_of, np.arange(self.pieces))
+        self.counts = np.bincount(piece_of, minlength=self.pieces)
+        self.boxes_m = np.ascontiguousarray(boxes.transpose(1, 2, 0))
         self.piece_boxes_m = _boxes_of_pieces(self.boxes_m, self.starts, self.counts)
         # Unused rows of a cluster hold triangles without area, which no line meets.
         packed = np.zeros((count, CLUSTER, 3, 3))
@@ -93,39 +94,6 @@ class TriangleSet:
     def triangles(self) -> int:
         """The number of triangles."""
         return int(np.count_nonzero(self.planes[:, :3].any(axis=1)))
-
-    def blocks(self, eye_m: FloatArray, ends_m: FloatArray) -> NDArray[np.bool_]:
-        """Return (K,) whether a triangle lies between the eye and each of K points.
-
-        A line that starts or ends on a triangle is not blocked by it.
-
-        Args:
-            eye_m: (P, 3) the eye in the frame of every piece.
-            ends_m: (P, K, 3) the points in the frame of every piece.
-        """
-        blocked = np.zeros(ends_m.shape[1], dtype=bool)
-        low = np.minimum(ends_m.min(axis=1), eye_m)
-        high = np.maximum(ends_m.max(axis=1), eye_m)
-        reached = np.flatnonzero(
-            (
-                (self._boxes[:, 0] <= high[self._piece]) & (self._boxes[:, 1] >= low[self._piece])
-            ).all(axis=1)
-        )
-        if not reached.size:
-            return blocked
-        piece = self._piece[reached]
-        along = ends_m - eye_m[:, None]
-        eye = eye_m[piece]
-        # Few lines come near any one cluster, so each pair of line and cluster is tested alone.
-        near, line = _slabs(eye, _inverse(along)[:, piece], self._boxes[reached]).nonzero()
-        if not near.size:
-            return blocked
-        cluster = reached[near]
-        met = meet_triangles(
-            self.edges[cluster], self.planes[cluster], eye[near], along[piece[near], line]
-        )
-        blocked[line[met]] = True
-        return blocked
 
 
 def meet_triangles(
@@ -188,8 +156,12 @@ def _clusters(centres_m: FloatArray) -> list[NDArray[np.int64]]:
 
 
 def meet_boxes(eye_m: FloatArray, along_m: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
-    """Return (C, K) whether segments from eyes (C, 3) along (C, K, 3) meet boxes (C, 2, 3)."""
-    return _slabs(eye_m, _inverse(along_m), boxes_m)
+    """Return (N, K) whether segments from an eye (3,) along (K, 3) meet boxes (N, 2, 3)."""
+    inverse = inverse_of(along_m)
+    first = (boxes_m[:, None, 0] - eye_m) * inverse
+    last = (boxes_m[:, None, 1] - eye_m) * inverse
+    enter, leave = np.minimum(first, last).max(axis=2), np.maximum(first, last).min(axis=2)
+    return np.asarray(np.maximum(enter, 0.0) <= np.minimum(leave, 1.0))
 
 
 def meet_own_boxes(
@@ -216,18 +188,41 @@ def inverse_of(along_m: FloatArray) -> FloatArray:
     return np.asarray(1.0 / np.where(np.abs(along_m) < _TINY_M, _TINY_M, along_m))
 
 
-def _inverse(along_m: FloatArray) -> FloatArray:
-    """Return (3, C, K) one over each component of directions (C, K, 3), axis by axis."""
-    return inverse_of(np.ascontiguousarray(along_m.transpose(2, 0, 1)))
+@dataclass(frozen=True, slots=True, eq=False)
+class JoinedSets:
+    """The bounds of S sets of triangles, P pieces and C clusters, in common tables.
+
+    Attributes:
+        pieces: (S,) number of pieces of each set.
+        middles_m: (P, 3) centre of each piece's bounding sphere, in the piece's frame.
+        radii_m: (P,) its radius.
+        piece_boxes_m: (2, 3, P) bounding box of each piece.
+        starts: (P,) first cluster of each piece.
+        counts: (P,) number of its clusters.
+        boxes_m: (2, 3, C) bounding box of each cluster.
+    """
+
+    pieces: NDArray[np.int64]
+    middles_m: FloatArray
+    radii_m: FloatArray
+    piece_boxes_m: FloatArray
+    starts: NDArray[np.int64]
+    counts: NDArray[np.int64]
+    boxes_m: FloatArray
 
 
-def _slabs(eye_m: FloatArray, inverse: FloatArray, boxes_m: FloatArray) -> NDArray[np.bool_]:
-    """Return :func:`meet_boxes` by the slab method, from the inverse (3, C, K) of directions."""
-    enter: FloatArray | float = 0.0
-    leave: FloatArray | float = 1.0
-    for axis in range(3):
-        first = (boxes_m[:, 0, axis] - eye_m[:, axis])[:, None] * inverse[axis]
-        last = (boxes_m[:, 1, axis] - eye_m[:, axis])[:, None] * inverse[axis]
-        enter = np.maximum(enter, np.minimum(first, last))
-        leave = np.minimum(leave, np.maximum(first, last))
-    return np.asarray(enter <= leave)
+@lru_cache(maxsize=128)  # the same few bodies are near each other for many frames
+def joined_sets(sets: tuple[TriangleSet, ...]) -> JoinedSets:
+    """Return the bounds of several sets in common tables."""
+    piece_boxes = np.concatenate([triangles.piece_boxes_m for triangles in sets], axis=2)
+    counts = np.concatenate([triangles.counts for triangles in sets])
+    halves = 0.5 * (piece_boxes[1] - piece_boxes[0])
+    return JoinedSets(
+        np.array([triangles.pieces for triangles in sets]),
+        (0.5 * (piece_boxes[0] + piece_boxes[1])).T,
+        np.sqrt((halves * halves).sum(axis=0)),
+        piece_boxes,
+        np.cumsum(counts) - counts,
+        counts,
+        np.concatenate([triangles.boxes_m for triangles in sets], axis=2),
+    )

@@ -76,16 +76,6 @@ def test_somebody_who_came_to_a_wall_is_apart_from_it() -> None:
     assert len(divided(points, np.minimum(known, 0)).starts) == len(whole.starts)
 
 
-def test_returns_that_are_missing_do_not_divide_a_leg_nor_join_it() -> None:
-    scan = laser_scan(two_legs(2.0, 0.5, 0.25))
-    ranges = scan.ranges_m.copy()
-    ranges[::3] = np.inf
-    lost = LaserScan(0.0, scan.angle_min_rad, scan.angle_increment_rad, ranges, 0.05, 20.0)
-    whole, holed = divided(points_of(scan)), divided(points_of(lost))
-    assert len(holed.starts) == len(whole.starts)
-    np.testing.assert_allclose(holed.centres_m, whole.centres_m, atol=0.05)
-
-
 @pytest.mark.parametrize("ranges", [[np.nan] * 5, [1.0] + [np.nan] * 4, [np.inf] * 5])
 def test_scans_of_nothing_give_no_hypothesis(ranges) -> None:
     points = points_of(LaserScan(0.0, 0.0, 0.01, ranges, 0.05, 20.0))

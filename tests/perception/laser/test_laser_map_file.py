@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of
 from PIL import Image
-from PIL.PngImagePlugin import PngInfo
 
 from perception import PerceptionError
 from perception.laser import LegDetector, LegDetectorConfig, MapCells, StaticMap
@@ -90,45 +89,23 @@ def test_transparent_pixels_are_unknown(keys: dict[str, object], kind: type, tmp
     np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.65])
 
 
-@pytest.mark.parametrize("mode", ["P", "L", "1", "RGB", "LA", "I;16"])
+@pytest.mark.parametrize("mode", ["P", "RGB"])
 def test_the_transparent_colour_of_a_png_is_unknown(mode: str, tmp_path: Path) -> None:
     """Floor that a drawing program erased: black, and transparent."""
-    grey = np.array([[0, 255], [100, 100]], np.uint8)
-    if mode == "LA":
-        drawn = Image.fromarray(np.dstack((grey, np.where(grey == 0, 0, 255).astype(np.uint8))))
-        drawn.save(tmp_path / "erased.png")
-    else:
-        wide = Image.fromarray(grey.astype(np.uint16) * 257)
-        drawn = wide if mode == "I;16" else Image.fromarray(grey).convert(mode)
-        clear = (0, 0, 0) if mode == "RGB" else 0
-        drawn.save(tmp_path / "erased.png", transparency=clear)
+    drawn = Image.fromarray(np.array([[0, 255], [100, 255]], np.uint8)).convert(mode)
+    drawn.save(tmp_path / "erased.png", transparency=(0, 0, 0) if mode == "RGB" else 0)
     path = written(tmp_path, (tmp_path / "erased.png").read_bytes(), "erased.png")
-    assert not StaticMap.from_yaml(path, margin_m=0.0).occupied.any()
-    drawn.save(tmp_path / "drawn.png", **({} if mode == "LA" else {"transparency": None}))
-    drawn = written(tmp_path, (tmp_path / "drawn.png").read_bytes(), "drawn.png")
-    assert StaticMap.from_yaml(drawn, margin_m=0.0).occupied.any() == (mode != "LA")
+    assert not StaticMap.from_yaml(path, margin_m=0.0).occupied[1].any()
 
 
-def test_a_comment_of_a_png_is_no_transparent_colour(tmp_path: Path) -> None:
-    about = PngInfo()
-    about.add_text("Comment", "no tRNS\0\0 here")
-    drawn = Image.fromarray(np.array([[0, 255]], np.uint8))
-    drawn.save(tmp_path / "about.png", pnginfo=about)
-    path = written(tmp_path, (tmp_path / "about.png").read_bytes(), "about.png")
-    assert StaticMap.from_yaml(path, margin_m=0.0).occupied.tolist() == [[True, False]]
-
-
-@pytest.mark.parametrize("white", [1, 15, 100, 255, 256, 1023, 4095, 65535])
 @pytest.mark.parametrize("kind", [2, 3, 5, 6])
-def test_netpbm_counts_up_to_its_own_white(kind: int, white: int, tmp_path: Path) -> None:
-    """Free floor of a map with another white is not occupied."""
-    shades = np.array([[0, white, white], [white, white, 0]])
+def test_netpbm_is_read_as_text_and_as_numbers(kind: int, tmp_path: Path) -> None:
+    shades = np.array([[0, 255, 255], [255, 255, 0]])
     values = np.repeat(shades, 3, axis=1) if kind in (3, 6) else shades
-    head = b"P%d\n# by hand\n3 # wide\n2\n%d\n" % (kind, white)
-    if kind in (2, 3):
-        body = b"# rows\n" + b"\n".join(b" ".join(b"%d" % v for v in row) for row in values)
-    else:
-        body = values.astype(np.uint8 if white < 256 else ">u2").tobytes()
+    head = b"P%d\n# by hand\n3 # wide\n2\n255\n" % kind
+    body = b"\n".join(b" ".join(b"%d" % v for v in row) for row in values) + b"\n"
+    if kind in (5, 6):
+        body = values.astype(np.uint8).tobytes()
     held = StaticMap.from_yaml(written(tmp_path, head + body, "hall.pnm"), margin_m=0.0)
     assert held.occupied[::-1].tolist() == (shades == 0).tolist()
 
@@ -145,7 +122,7 @@ def test_colours_count_by_their_mean(tmp_path: Path) -> None:
     np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.85])
 
 
-@settings(max_examples=40)
+@settings(max_examples=15, deadline=None)
 @given(
     st.integers(0, 10_000),
     st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-3.1, 3.1)),
@@ -262,15 +239,10 @@ def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog
         (b"", "damaged, or no PGM"),
         (b"no image", "damaged, or no PGM"),
         (b"P5 3 1 255\n\x00\x32", "damaged, or no PGM"),
-        (b"P5 9999999 9999999 255\n", "at most 100000000 pixels, got 9999999 x 9999999"),
-        (b"P5 2 1 0\n\x00\x00", "damaged, or no PGM"),
-        (b"P5 2 1 65536\n\x00\x00\x00\x00", "damaged, or no PGM"),
-        (b"P5 2 1 1000\n\x00\x00\x00", "damaged, or no PGM"),
-        (b"P5 2 1 100\n\x00\x65", "damaged, or no PGM"),
-        (b"P2 2 1 100\n0 101\n", "damaged, or no PGM"),
-        (b"P2 2 1 100\n0 -1\n", "damaged, or no PGM"),
-        (b"P2 2 1 100\n0 white\n", "damaged, or no PGM"),
-        (b"P2 9000 9000 100\n0 1\n", "damaged, or no PGM"),
+        (b"P5 9999999 9999999 255\n", "damaged, or no PGM"),
+        (b"P5 2 1 100\n\x00\x64", "in which white is 100, not 255 or 65535; save it as PGM or PNG"),
+        (b"P2 2 1 255\n0 white\n", "damaged, or no PGM"),
+        (b"\x89PNG" + bytes(22) + b"tRNS", "a grey PNG with a transparent grey; save it as"),
         (b"II*\0" + bytes(30), "a TIFF; save it as PGM or PNG"),
         (b"MM\0*" + bytes(30), "a TIFF; save it as PGM or PNG"),
         (b"P7\nWIDTH 1\nHEIGHT 1\nDEPTH 1\nMAXVAL 15\nENDHDR\n\x0f", r"a PAM \(P7\); save it as"),
@@ -281,7 +253,7 @@ def test_a_damaged_image_is_refused(image: bytes, text: str, tmp_path: Path) -> 
         StaticMap.from_yaml(written(tmp_path, image))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.binary(max_size=40), st.integers(0, 60), st.sampled_from([".pgm", ".png", ".bmp"]))
 def test_damage_to_an_image_never_crashes(
     tmp_path_factory, noise: bytes, at: int, kind: str

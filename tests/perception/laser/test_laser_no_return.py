@@ -53,13 +53,13 @@ def test_rays_of_range_max_met_nothing() -> None:
     scan = scan_of([4.0, 4.0, 3.0, 4.0])
     assert scan.no_return.tolist() == [True, True, False, True]
     assert scan.measured.tolist() == [False, False, True, False]
-    assert scan.free_m.tolist() == [4.0, 4.0, 3.0, 4.0]
+    assert scan.free_of(scan.measured).tolist() == [4.0, 4.0, 3.0, 4.0]
 
 
 def test_rays_of_0_measured_nothing_whatever_range_min_is() -> None:
     scan = LaserScan(0.0, 0.0, 0.01, [0.0, 0.05, 2.0, 0.0], 0.0, RANGE_MAX_M)
     assert scan.measured.tolist() == [False, True, True, False]
-    assert scan.free_m.tolist() == [0.0, 0.05, 2.0, 0.0]
+    assert scan.free_of(scan.measured).tolist() == [0.0, 0.05, 2.0, 0.0]
     dead = sight_of(LaserScan(0.0, 0.0, 0.01, [0.0] * 90, 0.0, 4.0), Scanner.mounted(0.0, 0.0, 0.2))
     assert dead.blind_text == "blind (most of its rays have no answer)"
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import PerceptionError
 from perception.laser import PersonCandidate, Scanner, observations_of
 from tracking import PersonTracker, SensorConfig, TrackerConfig
 
@@ -59,16 +57,3 @@ def test_candidates_of_two_scans_share_a_stamp_at_the_price_of_certainty() -> No
 
 def test_nobody_is_nobody() -> None:
     assert observations_of((), np.eye(4)) == ()
-
-
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: observations_of([(1.0, 2.0)], np.eye(4)), r"candidates\[0\] must be a Person"),
-        (lambda: observations_of([], 2.0 * np.eye(4)), "T_odom_scanner"),
-        (lambda: observations_of([], np.eye(4), math.nan), "stamp_s"),
-    ],
-)
-def test_bad_input_is_refused(make, message) -> None:
-    with pytest.raises(PerceptionError, match=message):
-        make()

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import PerceptionError
 from perception.laser import LaserScan, RobotMotion, Scanner, scan_points
 
 STEP = math.radians(0.5)
@@ -39,29 +38,8 @@ def pose(x: float, y: float, yaw: float) -> np.ndarray:
 def test_special_ranges_mean_what_rep_117_says() -> None:
     scan = scan_of([np.nan, np.inf, -np.inf, 0.05, 0.1, 10.0, 10.01, 3.0])
     assert scan.measured.tolist() == [False] * 4 + [True, True, False, True]
-    assert scan.too_near.tolist() == [False, False, True] + [False] * 5
     # Free as far as the range, to the limit without a return, unknown for the rest.
-    assert scan.free_m.tolist() == [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0]
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"ranges_m": []}, "at least one range"),
-        ({"ranges_m": [[1.0]]}, r"shape \(N,\), got \(1, 1\)"),
-        ({"ranges_m": ["far"]}, "array of numbers"),
-        ({"angle_increment_rad": 0.0}, "must not be 0"),
-        ({"angle_increment_rad": 4.0}, "at most a full turn"),
-        ({"range_max_m": 0.1}, "must exceed range_min_m"),
-        ({"range_min_m": -1.0}, "range_min_m"),
-        ({"stamp_s": math.nan}, "stamp_s must be finite"),
-        ({"time_increment_s": -0.1}, "time_increment_s"),
-        ({"intensities": [1.0]}, "shape of ranges_m"),
-    ],
-)
-def test_a_scan_refuses_what_it_cannot_mean(changes, message) -> None:
-    with pytest.raises(PerceptionError, match=message):
-        scan_of([1.0, 2.0, 3.0], **{"ranges_m": [1.0, 2.0, 3.0], **changes})
+    assert scan.free_of(scan.measured).tolist() == [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0]
 
 
 def test_a_scan_keeps_its_own_copy() -> None:
@@ -108,19 +86,6 @@ def test_a_concave_body_does_not_swallow_its_notch() -> None:
     assert inside.tolist() == [False, True, True, False]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"field_of_view_rad": (1.0, -1.0)}, "lowest and the highest"),
-        ({"body_base_m": np.zeros((2, 2))}, "3 or more corners"),
-        ({"x_m": math.inf}, "finite"),
-    ],
-)
-def test_a_mounting_refuses_what_it_cannot_be(arguments, message) -> None:
-    with pytest.raises(PerceptionError, match=message):
-        Scanner.mounted(**{"x_m": 0.0, "y_m": 0.0, "z_m": 0.2, **arguments})
-
-
 def test_a_wall_stays_straight_while_the_robot_drives_and_turns() -> None:
     """A wall at x = 4 m, seen from a moving robot: exact after correction, bent without it."""
     speed, yaw_rate, increment = 1.5, 1.2, 0.05 / 720
@@ -163,8 +128,3 @@ def test_moving_the_world_moves_the_points(x, y, yaw, speed, yaw_rate) -> None:
     R, t = pose(x, y, yaw)[:3, :3], pose(x, y, yaw)[:3, 3]
     np.testing.assert_allclose(moved.points_odom_m, home.points_odom_m @ R.T + t, atol=1e-9)
     np.testing.assert_allclose(moved.points_base_m, home.points_base_m, atol=1e-12)
-
-
-def test_poses_in_the_wrong_order_are_refused() -> None:
-    with pytest.raises(PerceptionError, match="later than start_s"):
-        RobotMotion.between(1.0, np.eye(4), 1.0, np.eye(4))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from onnx_graphs import (
     RTMDET_HEAD,
     YOLOX_HEAD,
@@ -18,11 +16,11 @@ from onnx_graphs import (
 
 from perception import PerceptionError
 from perception.networks import OnnxPersonDetector
-from perception.networks.detectors import BoxFormatVote
 
 SIZE = (256, 320)
 CELLS = cell_count(*SIZE)
 IMAGE = np.zeros((*SIZE, 3), np.uint8)
+BOXES = np.array([[150.0, 40.0, 190.0, 160.0], [20.0, 60.0, 70.0, 250.0]])
 
 
 def layout(shape: tuple[int, ...], names: str | None = None, **metadata: str) -> str:
@@ -50,19 +48,13 @@ def test_the_layout_is_recognised_from_shapes(
     assert layout(shape, names) == wanted
 
 
-@pytest.mark.parametrize("end2end", ["True", "False"])
-def test_the_metadata_end2end_do_not_affect_the_layout(end2end: str) -> None:
-    assert layout((1, 300, 6), end2end=end2end) == "rows (NMS inside)"
-    assert layout((1, 84, CELLS), end2end=end2end) == "YOLOv8"
-
-
 @pytest.mark.parametrize(
     ("shape", "names", "reason"),
     [
-        ((1, CELLS, 84), None, "could be YOLOX raw or YOLOv8 with its axes swapped"),
-        ((1, CELLS, 5), None, "looks like YOLOv8 with its axes swapped"),
-        ((1, 84, CELLS), "['person', 'dog']", "do not agree with the classes"),
-        ((1, 3 * CELLS, 85), None, "three outputs per cell, as YOLOv5"),
+        ((1, CELLS, 84), None, "cells of strides"),  # a transposed YOLOv8
+        ((1, CELLS, 5), None, "cells of strides"),
+        ((1, 84, CELLS), "['person', 'dog']", "cells of strides"),
+        ((1, 3 * CELLS, 85), None, "cells of strides"),  # as YOLOv5 with its anchors
         ((1, 84, 8400), None, rf"an input of this size has {CELLS} cells"),
         ((1, 300, 84), None, "cells"),
         ((1, 17, 64, 48), None, "no known detector has such outputs"),
@@ -145,12 +137,6 @@ def test_rows_of_one_class_are_not_read_as_raw_yolox() -> None:
     np.testing.assert_allclose([p.box_xyxy_px for p in detector.detect(IMAGE)], BOXES)
 
 
-def test_a_box_format_says_that_a_network_gives_rows() -> None:
-    graph = fixed({"out": np.zeros((1, CELLS, 6))}, SIZE)
-    detector = OnnxPersonDetector(graph, box_format="xyxy", family="ultralytics")
-    assert detector.layout == "rows (NMS inside)"
-
-
 @pytest.mark.parametrize("names", [None, "['person']"])
 def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw(names: str | None) -> None:
     rng = np.random.default_rng(3)
@@ -162,7 +148,7 @@ def test_raw_yolox_of_one_class_and_free_shapes_is_still_raw(names: str | None) 
     graph = fixed({"out": rows}, SIZE, metadata=metadata, declared=declared)
     assert OnnxPersonDetector(graph).layout == "YOLOX raw"
     graph = fixed({"out": rows}, SIZE, metadata={"names": "['person', 'dog']"}, declared=declared)
-    with pytest.raises(PerceptionError, match="looks like YOLOv8 with its axes swapped"):
+    with pytest.raises(PerceptionError, match="cells of strides"):
         OnnxPersonDetector(graph)
 
 
@@ -240,67 +226,3 @@ def test_a_free_input_size_comes_from_metadata_or_the_caller() -> None:
 def test_networks_with_a_fixed_batch_of_several_images_are_refused() -> None:
     with pytest.raises(PerceptionError, match="takes 4 images at a time"):
         OnnxPersonDetector(red_point_pose(32, 32, batch=4))
-
-
-# --- box format: corners, or centre and size ----------------------------------------------------
-
-BOXES = np.array([[150.0, 40.0, 190.0, 160.0], [20.0, 60.0, 70.0, 250.0]])
-
-
-def as_centres(boxes: np.ndarray) -> np.ndarray:
-    return np.concatenate(
-        [0.5 * (boxes[:, :2] + boxes[:, 2:]), boxes[:, 2:] - boxes[:, :2]], axis=1
-    )
-
-
-@pytest.mark.parametrize("corners", [True, False])
-def test_the_box_format_is_recognised_from_the_boxes(corners: bool) -> None:
-    rows = np.zeros((1, 300, 6))
-    rows[0, :2, :4] = BOXES if corners else as_centres(BOXES)
-    rows[0, :2, 4] = (0.9, 0.8)
-    detector = OnnxPersonDetector(fixed({"out": rows}, SIZE, metadata={"end2end": "True"}))
-    people = detector.detect(IMAGE)
-    np.testing.assert_allclose([p.box_xyxy_px for p in people], BOXES)
-
-
-def test_an_ambiguous_image_is_read_like_the_images_before_it() -> None:
-    # In both formats this is a box within the input.
-    ambiguous = np.array([[80.0, 100.0, 120.0, 180.0]])
-    vote = BoxFormatVote()
-    vote.update(ambiguous, np.array([0.9]), (320, 256))
-    assert vote.format == "xyxy"  # the default
-    vote.update(as_centres(BOXES), np.array([0.9, 0.9]), (320, 256))
-    vote.update(ambiguous, np.array([0.9]), (320, 256))
-    assert vote.format == "cxcywh"
-
-
-def test_a_format_given_by_the_caller_is_kept() -> None:
-    vote = BoxFormatVote("cxcywh")
-    vote.update(BOXES, np.array([0.9, 0.9]), (320, 256))
-    assert vote.format == "cxcywh"
-    with pytest.raises(PerceptionError, match="one of 'xyxy', 'cxcywh' or None, got 'xywh'"):
-        BoxFormatVote("xywh")
-
-
-@given(st.data())
-def test_four_people_anywhere_decide_the_format(data: st.DataObject) -> None:
-    """People spread over an image never fit the other format better."""
-    width, height = 320, 256
-    boxes = []
-    for column in range(4):  # one person per quarter of the width
-        left = column * 80 + data.draw(st.floats(0, 20))
-        top = data.draw(st.floats(0, 120))
-        boxes.append(
-            (
-                left,
-                top,
-                left + data.draw(st.floats(20, 55)),
-                min(top + data.draw(st.floats(60, 130)), height),
-            )
-        )
-    corners = np.array(boxes)
-    for given_boxes, wanted in ((corners, "xyxy"), (as_centres(corners), "cxcywh")):
-        vote = BoxFormatVote()
-        vote.update(given_boxes, np.full(4, 0.7), (width, height))
-        assert vote.format == wanted
-        np.testing.assert_allclose(vote.corners(given_boxes), corners, atol=1e-9)

@@ -10,12 +10,10 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import onnx
 import pytest
-from onnx import TensorProto, helper, numpy_helper
 from paths import ROOT, SHARED
 
-from perception import PerceptionError, PersonDetection
+from perception import PersonDetection
 from perception.networks import OnnxModel, OnnxPersonDetector, OnnxSettings
 
 MODELS, IMAGES = SHARED / "models", SHARED / "images"
@@ -111,29 +109,8 @@ def test_rtmdet_and_yolov8_together_find_all_clear_people(
 
 
 @pytest.mark.parametrize("name", list(LAYOUTS)[:3])
-def test_no_person_is_found_twice(name: str, photographs: list[Photograph]) -> None:
-    """No two boxes have the same person as best match at IoU 0.5."""
-    detector = OnnxPersonDetector(model(name))
-    for photograph in photographs:
-        overlap = ious(detector.detect(photograph.image_rgb), photograph.boxes)
-        matched = overlap.argmax(axis=1)[overlap.max(axis=1) >= 0.5]
-        assert len(set(matched.tolist())) == len(matched)
-
-
-@pytest.mark.parametrize("name", list(LAYOUTS)[:3])
-def test_an_image_with_other_padding_shows_the_same_person(
-    name: str, photographs: list[Photograph]
-) -> None:
-    detector = OnnxPersonDetector(model(name), score_threshold=0.6)
-    image = photographs[0].image_rgb
-    tall = np.pad(image, ((0, 200), (0, 0), (0, 0)), constant_values=114)
-    (one,), (other,) = detector.detect(image), detector.detect(tall)
-    assert ious((one,), other.box_xyxy_px[None]).item() > 0.8
-
-
-@pytest.mark.parametrize("name", list(LAYOUTS)[:3])
 def test_an_independent_decoder_finds_the_same_people(
-    name: str, photographs: list[Photograph]
+    name: str, photographs: list[Photograph], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The reference is an independent program, which also judges the rendered workers."""
     path = model(name)
@@ -144,9 +121,8 @@ def test_an_independent_decoder_finds_the_same_people(
     sys.modules[spec.name] = module  # dataclasses look themselves up there
     spec.loader.exec_module(module)
     reference = module.GenuineDetector(name)
-    detector = OnnxPersonDetector(
-        path, iou_threshold=0.65, settings=OnnxSettings(intra_op_threads=1)
-    )
+    monkeypatch.setattr("perception.networks.detectors._detector._SAME_PERSON_IOU", 0.65)
+    detector = OnnxPersonDetector(path, settings=OnnxSettings(intra_op_threads=1))
     compared = 0
     for photograph in photographs:
         people = detector.detect(photograph.image_rgb)
@@ -161,84 +137,6 @@ def test_an_independent_decoder_finds_the_same_people(
             assert person.score == pytest.approx(score, abs=0.01)
             compared += 1
     assert compared >= 10
-
-
-def yolox_with_dets_and_labels(*, named: bool) -> bytes:
-    """Return the genuine YOLOX with its boxes decoded in the graph, as OpenMMLab's exports do it.
-
-    With ``named`` False its weights and nodes have numbers for names.
-    """
-    network = onnx.load(model("yolox_nano_416_coco"))
-    graph = network.graph
-    cells, strides = [], []
-    for stride in (8, 16, 32):
-        rows, columns = np.mgrid[: 416 // stride, : 416 // stride]
-        cells.append(np.stack([columns.ravel(), rows.ravel()], axis=1))
-        strides.append(np.full((columns.size, 1), stride))
-    constants = {
-        "cells": np.concatenate(cells)[None].astype(np.float32),
-        "strides": np.concatenate(strides)[None].astype(np.float32),
-        "half": np.float32(0.5),
-        "parts": np.array([2, 2, 1, 80]),
-    }
-    graph.initializer.extend(
-        numpy_helper.from_array(np.asarray(value), name) for name, value in constants.items()
-    )
-    raw, wanted = graph.output[0].name, ("xy", "log", "object", "classes")
-    graph.node.append(helper.make_node("Split", [raw, "parts"], wanted, axis=2))
-    for kind, inputs, output, options in (
-        ("Add", ("xy", "cells"), "moved", {}),
-        ("Mul", ("moved", "strides"), "centre", {}),
-        ("Exp", ("log",), "size", {}),
-        ("Mul", ("size", "strides"), "sides", {}),
-        ("Mul", ("sides", "half"), "reach", {}),
-        ("Sub", ("centre", "reach"), "low", {}),
-        ("Add", ("centre", "reach"), "high", {}),
-        ("Mul", ("object", "classes"), "scores", {}),
-        ("ReduceMax", ("scores",), "score", {"axes": [2], "keepdims": 1}),
-        ("ArgMax", ("scores",), "labels", {"axis": 2, "keepdims": 0}),
-        ("Concat", ("low", "high", "score"), "dets", {"axis": 2}),
-    ):
-        graph.node.append(helper.make_node(kind, inputs, [output], **options))
-    count = len(constants["cells"][0])
-    del graph.output[:]
-    graph.output.extend(
-        [
-            helper.make_tensor_value_info("dets", TensorProto.FLOAT, [1, count, 5]),
-            helper.make_tensor_value_info("labels", TensorProto.INT64, [1, count]),
-        ]
-    )
-    network.opset_import[0].version = max(network.opset_import[0].version, 13)
-    if not named:
-        numbers = {each.name: str(number) for number, each in enumerate(graph.initializer, 10_000)}
-        for each in graph.initializer:
-            each.name = numbers[each.name]
-        for node in graph.node:
-            node.name = ""
-            node.input[:] = [numbers.get(name, name) for name in node.input]
-    content: bytes = network.SerializeToString()
-    return content
-
-
-def test_a_yolox_with_dets_and_labels_finds_the_people_of_the_raw_one(
-    photographs: list[Photograph],
-) -> None:
-    content = yolox_with_dets_and_labels(named=True)
-    whole, raw = OnnxPersonDetector(content), OnnxPersonDetector(model("yolox_nano_416_coco"))
-    assert whole.layout == "YOLOX with NMS"
-    for photograph in photographs:
-        found, wanted = (each.detect(photograph.image_rgb) for each in (whole, raw))
-        boxes = np.array([person.box_xyxy_px for person in wanted])
-        assert len(found) == len(wanted) > 0
-        assert (ious(found, boxes).max(axis=0) > 0.95).all()
-
-
-def test_a_yolox_whose_names_do_not_tell_is_asked_for(photographs: list[Photograph]) -> None:
-    content = yolox_with_dets_and_labels(named=False)
-    with pytest.raises(PerceptionError, match="family='rtmdet' or family='yolox'"):
-        OnnxPersonDetector(content)
-    told = OnnxPersonDetector(content, family="yolox")
-    assert sum(len(told.detect(photograph.image_rgb)) for photograph in photographs) == 13
 
 
 def test_two_detectors_may_share_a_loaded_model() -> None:

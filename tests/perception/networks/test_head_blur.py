@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception.networks.heads._blur import blur_lengths, uncertainty_factors
+from perception.networks.heads._crops import blur_lengths, uncertainty_factors
 from training.networks import Degradation, degrade
 
 SHARP = 0.05

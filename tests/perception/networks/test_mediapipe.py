@@ -57,23 +57,11 @@ def labelled(person):
     return np.array(person["keypoints"], dtype=float).reshape(-1, 3)
 
 
-@pytest.mark.skipif(HAS_MEDIAPIPE, reason="mediapipe is installed")
-def test_a_missing_package_is_refused_with_the_name_of_the_extra():
-    with pytest.raises(PerceptionError, match=re.escape(install_command("mediapipe"))):
-        MediaPipePoseEstimator()
-
-
 def test_a_broken_package_is_refused_with_the_name_of_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
     with pytest.raises(PerceptionError, match=re.escape(install_command("mediapipe"))):
         MediaPipePoseEstimator()
-
-
-@pytest.mark.parametrize("confidence", [-0.1, 1.1, float("nan"), "high"])
-def test_an_invalid_confidence_is_refused(confidence):
-    with pytest.raises(PerceptionError, match="min_detection_confidence"):
-        MediaPipePoseEstimator(confidence)
 
 
 def turned_head(yaw_rad):
@@ -150,14 +138,6 @@ def test_anything_but_an_rgb_image_is_refused(estimator, image):
 
 
 @needs_mediapipe
-def test_an_image_of_one_pixel_gives_scores_of_0(estimator):
-    (person,) = estimator.estimate(
-        np.zeros((1, 1, 3), np.uint8), (PersonDetection([0, 0, 1, 1], 0.5),)
-    )
-    assert not person.scores.any()
-
-
-@needs_mediapipe
 def test_a_closed_estimator_is_refused():
     closed = MediaPipePoseEstimator()
     closed.close()
@@ -217,15 +197,3 @@ def test_the_skeleton_has_camera_axes(estimator, photographs):
     body = slice(5, 17)
     assert np.corrcoef(root[body, 0], pixels[body, 0])[0, 1] > 0.8  # x right
     assert root[NOSE, 2] < root[[3, 4], 2].mean()  # z away: the person faces the camera
-
-
-@needs_mediapipe
-@needs_images
-def test_the_result_of_a_person_does_not_depend_on_others(estimator, photographs):
-    image = photographs[-1][0]
-    boxes = tuple(detection(person) for other, person in photographs if other is image)
-    together = estimator.estimate(image, boxes)
-    for box, person in zip(boxes[::-1], together[::-1], strict=True):
-        (alone,) = estimator.estimate(image, (box,))
-        assert np.array_equal(alone.keypoints_px, person.keypoints_px)
-        assert np.array_equal(alone.scores, person.scores)

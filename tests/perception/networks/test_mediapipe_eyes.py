@@ -50,13 +50,6 @@ def landmarks(left=(0.0, 0.0), right=(0.0, 0.0), opening=0.03):
     return marks
 
 
-@pytest.mark.skipif(HAS_MEDIAPIPE, reason="mediapipe is installed")
-def test_a_missing_package_is_refused_with_the_name_of_the_extra():
-    missing = "MediaPipeEyeEstimator needs .*" + re.escape(install_command("mediapipe"))
-    with pytest.raises(PerceptionError, match=missing):
-        MediaPipeEyeEstimator()
-
-
 def test_a_broken_package_is_refused_with_the_name_of_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
@@ -137,7 +130,7 @@ def test_eyes_of_a_rendered_worker_are_measured(estimator, look):
                 [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, camera_z], [0, 0, 0, 1]], dtype=float
             )
             rotation = T_odom_camera[:3, :3].T @ worker.rotation_odom_head
-            nose = (worker.position_nose_odom_m - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
+            nose = (worker.keypoints_odom_m[0] - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
             head = HeadPose(nose, rotation, 1e-6 * np.eye(6), 0.5)
             (eyes,) = estimator.estimate(
                 renderer.render(CAMERA, T_odom_camera).rgb, CAMERA, (head,)

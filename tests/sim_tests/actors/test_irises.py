@@ -3,72 +3,12 @@
 from __future__ import annotations
 
 import math
-from importlib import resources
 
-import cv2
 import numpy as np
 import pytest
 
 from perception import Camera
 from sim_tests import CameraRenderer, Warehouse, Worker
-from sim_tests.actors.body import JOINTS, load_worker, worker_names
-from sim_tests.actors.body._irises import IRIS_RADIUS_M, with_human_irises
-
-FOLDER = resources.files("sim_tests.actors.body") / "workers"
-
-
-def shipped_texture(name, level):
-    data = np.frombuffer((FOLDER / f"{name}_lod{level}.jpg").read_bytes(), np.uint8)
-    return cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1]
-
-
-@pytest.mark.parametrize("name", worker_names())
-def test_only_eyeballs_are_painted_and_only_for_near_people(name):
-    asset = load_worker(name)
-    for level in (1, 2):
-        assert np.array_equal(asset.levels[level].texture_rgb, shipped_texture(name, level))
-    finest = asset.levels[0]
-    changed = (finest.texture_rgb != shipped_texture(name, 0)).any(axis=2)
-    assert changed.any()
-    eyes = [row for row, joint in enumerate(JOINTS) if joint.endswith("_eye")]
-    is_eye = (finest.weights[:, eyes] > 0.5).any(axis=1)
-    height, width = changed.shape
-    others = np.zeros_like(changed, dtype=np.uint8)
-    for triangle in finest.triangles[~is_eye[finest.triangles].all(axis=1)]:
-        corners = np.column_stack(
-            [finest.uv[triangle, 0] * width, (1.0 - finest.uv[triangle, 1]) * height]
-        )
-        cv2.fillConvexPoly(others, np.floor(corners).astype(np.int32), 1)
-    assert np.count_nonzero(changed & (others > 0)) == 0
-
-
-def test_the_iris_has_human_size_on_an_eyeball_of_any_radius():
-    size, radius_m = 200, 0.016
-    # The front of a sphere, seen from ahead: a texel is 0.2 mm wide.
-    grid = np.linspace(-0.02, 0.02, 41)
-    y, z = np.meshgrid(grid, grid, indexing="ij")
-    x = np.sqrt(np.maximum(radius_m**2 - y**2 - z**2, 0.0))
-    vertices = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-    uv = (vertices[:, 1:] + 0.02) / 0.04
-    rows = np.arange(41 * 41).reshape(41, 41)
-    a, b, c, d = (
-        part.ravel() for part in (rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:])
-    )
-    triangles = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
-    texture = np.full((size, size, 3), 220, np.uint8)
-    distance_m = np.hypot(*(np.indices((size, size)) - 99.5)) * 2e-4
-    texture[distance_m < 0.44 * radius_m] = (40, 80, 120)
-    texture[distance_m < 0.21 * radius_m] = 0
-    is_eye = np.ones(len(vertices), dtype=bool)
-    centre = np.zeros(3)
-    painted = with_human_irises(texture, vertices, uv, triangles, ((centre, is_eye),))
-    inside = distance_m < 0.9 * radius_m
-    dark = inside & (painted.mean(axis=2) < 130.0)
-    found_m = math.sqrt(np.count_nonzero(dark) * 4e-8 / math.pi)
-    assert found_m == pytest.approx(IRIS_RADIUS_M, rel=0.02)
-    # Its colour is kept.
-    ring = (distance_m > 0.6 * IRIS_RADIUS_M) & (distance_m < 0.8 * IRIS_RADIUS_M)
-    assert np.median(painted[ring], axis=0) == pytest.approx([40, 80, 120])
 
 
 def pupil_m(view, camera, eye_camera_m):

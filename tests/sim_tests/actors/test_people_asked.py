@@ -14,7 +14,7 @@ import shapely
 from nav_adapter import Alert
 from perception import AttentionCone
 from sim_tests import Scenario
-from sim_tests.actors.behaviour import WALKER_RADIUS_M, Hearing
+from sim_tests.actors.behaviour import WALKER_RADIUS_M
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing import Crossing, Stage, named_policy
 from sim_tests.crossing._metrics import SafetyMeter
@@ -153,23 +153,6 @@ def test_at_no_answers_asking_changes_nothing_at_all(kind: str, tmp_path: Path) 
         assert np.array_equal(getattr(silent, name), getattr(asked, name)), name
 
 
-@pytest.mark.parametrize("person", [{"people": [WALKER]}, {"workers": [SCRIPT]}])
-def test_a_second_request_does_not_stop_a_person_who_turns_already(person: Any) -> None:
-    once, twice = (run(at_s=at_s, hearing=ANSWERS, **person) for at_s in ((2.0,), (2.0, 2.9)))
-    assert once.looks_s() > 0.5
-    assert twice.looks_s() >= once.looks_s() - 1e-9
-    first = [int(np.argmax(each.awareness[:, 0] >= 0.5)) for each in (once, twice)]
-    assert first[0] == first[1]
-
-
-def test_who_has_looked_knows_the_robot_and_glances_no_more_than_before() -> None:
-    asked = run(people=[WALKER], hearing=ANSWERS, seconds=12.0)
-    assert asked.noticed_s[0] == pytest.approx(3.4, abs=0.4)
-    assert asked.looks_s() <= 1.6
-    silent = run(people=[WALKER], hearing=DEAF, seconds=12.0)
-    assert silent.noticed_s == (None,)
-
-
 def test_who_has_forgotten_the_robot_looks_but_stays_lapsed() -> None:
     """The person crosses the robot's line: the look alone does not make them wait."""
     crosser = {
@@ -206,7 +189,7 @@ def test_low_people_turn_the_head_alone_and_never_move(kind: str, activity: str)
 
 def test_nobody_looks_through_a_rack() -> None:
     """A voice is heard there; the look meets nothing, and the person does not notice the robot."""
-    layout = WarehouseLayout.open_floor().model_dump()
+    layout = WarehouseLayout.named("open").model_dump()
     rack = {"x_m": 2.8, "y_m": 0.0, "length_m": 1.0, "width_m": 3.0}
     hidden = {**layout, "racks": [*layout["racks"], rack]}
     stands = {**WALKER, "route": [{"x_m": 5.0, "y_m": 0.3}]}
@@ -229,7 +212,8 @@ def test_a_startle_stays_within_the_speed_that_the_limit_counts_with(
     jumpy = {**DEAF, "startles": 1.0, "startles_into_path": into, "delay_spread": 1.0}
     silent = run(**people, hearing=jumpy, at_s=(), seconds=9.0)
     ways = set()
-    for seed in range(1 if into else 4):
+    seeds = 4 if kind == "walker" and not into else 1
+    for seed in range(seeds):
         asked = run(**people, hearing=jumpy, seconds=9.0, seed=seed)
         assert asked.moved_mps.max() <= 1.5 if "recorded w" not in kind else 1.7
         assert asked.speeds.max() <= 1.5 if "recorded w" not in kind else 1.7
@@ -244,7 +228,7 @@ def test_a_startle_stays_within_the_speed_that_the_limit_counts_with(
         behind = silent.places[90, 0, 0] - asked.places[90, 0, 0]
         assert 0.5 < behind < 2.2  # a second and a half of its way
         assert np.array_equal(silent.places[:53], run_start(asked, seed, silent, people, jumpy))
-    assert into or len(ways) == 2
+    assert seeds == 1 or len(ways) == 2
 
 
 def run_start(asked: Run, seed: int, silent: Run, people: Any, jumpy: Any) -> np.ndarray:
@@ -264,7 +248,9 @@ def test_a_step_never_leads_into_a_rack(kind: str) -> None:
     script = {"path": [{"t_s": 4.0 * n, **spot} for n, spot in enumerate(spots)]}
     people = {kind: [script if kind == "workers" else {**WALKER, "route": spots}]}
     jumpy = {**DEAF, "startles": 1.0, "startles_into_path": 0.0, "delay_spread": 1.0}
-    boxes = [shapely.box(*box) for box in WarehouseLayout.aisles().obstacle_boxes_odom.tolist()]
+    boxes = [
+        shapely.box(*box) for box in WarehouseLayout.named("aisles").obstacle_boxes_odom.tolist()
+    ]
     highest = []
     for seed in range(4):
         asked = run(**people, hearing=jumpy, layout="aisles", seed=seed, at_s=(0.5,))
@@ -285,19 +271,6 @@ def test_the_nearest_person_is_addressed_and_others_are_bystanders() -> None:
     assert [second.looks_s(person) > 0.5 for person in (0, 1)] == [False, True]
     both = run(people=[stands, beside], hearing={**hearing, "bystander_factor": 1.0})
     assert [both.looks_s(person) > 0.5 for person in (0, 1)] == [True, True]
-
-
-def test_a_person_may_hear_otherwise_than_the_scenario_says() -> None:
-    deaf = {"hearing": {"answers": 0.0, "startles": 0.0}}
-    for people in ({"people": [{**WALKER, **deaf}]}, {"workers": [{**SCRIPT, **deaf}]}):
-        assert run(**people, hearing=ANSWERS).awareness.max() == 0.0
-
-
-def test_a_light_is_not_seen_behind_the_back() -> None:
-    facing = {**WALKER, "route": [{"x_m": 6.0, "y_m": 0.6}], "heading_deg": 120.0}
-    hearing = {**ANSWERS, "light_factor": 1.0}
-    assert run(people=[WALKER], hearing=hearing, means="light").awareness.max() == 0.0
-    assert run(people=[facing], hearing=hearing, means="light").awareness.max() > 0.7
 
 
 def test_a_crossing_lets_people_hear_its_requests_and_not_its_warnings(monkeypatch) -> None:
@@ -327,7 +300,3 @@ def test_a_crossing_lets_people_hear_its_requests_and_not_its_warnings(monkeypat
     assert {means for means, _ in asked} == {"light"}
     near = now.truth[0].position_odom_m
     assert asked[-1][1] == pytest.approx(tuple(near), abs=0.5)
-
-
-def test_the_figures_of_a_scenario_are_the_default_ones() -> None:
-    assert Scenario.shipped("late_glance").hearing == Hearing()

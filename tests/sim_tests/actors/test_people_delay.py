@@ -29,9 +29,6 @@ def test_somebody_who_is_blocked_is_later_by_every_second():
     "fields",
     [
         {},
-        {"start_s": 2.0},
-        {"pauses": [{"at_m": 3.0, "for_s": 4.0}]},
-        {"turns_back_at_m": 4.0},
         {"start_s": 1.0, "turns_back_at_m": 4.0, "pauses": [{"at_m": 6.0, "for_s": 3.0}]},
     ],
 )

@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from sim_tests import SimError
 from sim_tests.actors.behaviour import Glances, RobotBody
-from sim_tests.actors.behaviour._gaze import Gaze, GlanceProcess, LogNormalDuration
+from sim_tests.actors.behaviour._gaze import Gaze, LogNormalDuration
 
 GLANCE = LogNormalDuration.fitted(0.83, (0.47, 1.50))
 AWAY = LogNormalDuration.fitted(1.03, (0.63, 1.98))
@@ -40,46 +40,6 @@ def test_drawn_durations_have_the_fitted_median_mean_and_quartile_ratio(length):
     assert median == pytest.approx(length.median_s, rel=0.03)
     assert math.log(upper / lower) == pytest.approx(2.0 * norm.ppf(0.75) * length.sigma, rel=0.04)
     assert drawn.mean() == pytest.approx(length.mean_s, rel=0.05)
-
-
-def test_the_fit_gives_the_quartiles_of_the_data():
-    for length, (lower, upper) in ((GLANCE, (0.47, 1.50)), (AWAY, (0.63, 1.98))):
-        spread = math.exp(norm.ppf(0.75) * length.sigma)
-        assert spread**2 == pytest.approx(upper / lower)
-        # The medians are not exactly the geometric means of the quartiles, as a lognormal's are.
-        assert length.median_s / spread == pytest.approx(lower, rel=0.10)
-        assert length.median_s * spread == pytest.approx(upper, rel=0.10)
-
-
-def test_residual_durations_agree_with_renewal_theory():
-    """The mean residual is E[X²] / 2 E[X]."""
-    rng = np.random.default_rng(2)
-    left = np.array([AWAY.residual_s(rng) for _ in range(40_000)])
-    expected = 0.5 * AWAY.mean_s * math.exp(AWAY.sigma**2)
-    assert left.mean() == pytest.approx(expected, rel=0.06)
-    shares = [(left > t).mean() for t in (0.5, 1.0, 2.0)]
-    exact = [1.0 - quad(lambda a: survival(AWAY, a), 0.0, t)[0] / AWAY.mean_s for t in (0.5, 1, 2)]
-    np.testing.assert_allclose(shares, exact, atol=0.012)
-
-
-def test_a_stationary_start_stays_stationary_and_gives_the_stated_figures():
-    count, grid_s = 3000, 0.1
-    looking = np.zeros((count, 51), dtype=bool)
-    for row, rng in zip(looking, np.random.default_rng(3).spawn(count), strict=True):
-        process = GlanceProcess(GLANCE, AWAY, rng)
-        process.begin_stationary(0.0)
-        row[:] = [process.looking(grid_s * n) for n in range(51)]
-    share = GLANCE.mean_s / (GLANCE.mean_s + AWAY.mean_s)
-    error = 4.0 * math.sqrt(share * (1.0 - share) / count)
-    for at in (0, 10, 30, 50):
-        assert looking[:, at].mean() == pytest.approx(share, abs=error)
-    stated = {0.5: 0.62, 1.0: 0.74, 2.0: 0.87, 3.0: 0.93}
-    for tau_s, figure in stated.items():
-        assert looked_within(tau_s) == pytest.approx(figure, abs=0.006)
-        back = round(tau_s / grid_s)
-        # A grid of 0.1 s misses shorter glances, so the true figure is a little larger.
-        simulated = looking[:, 50 - back :].any(axis=1).mean()
-        assert simulated == pytest.approx(figure, abs=0.035)
 
 
 def test_the_stated_share_of_lookers_fits_the_data_best():
@@ -161,17 +121,6 @@ def test_glances_alternate_and_stop_for_good_after_giving_up():
     ended = looks(watches=True, gives_up_after_s=3.0)
     assert ended[20:60].all()
     assert not ended[70:].any()
-
-
-def test_between_glances_the_head_points_at_the_phone():
-    gaze = Gaze(
-        Glances(notices_within_m=0.0, away_yaw_deg=10.0, away_pitch_deg=-40.0),
-        1.75,
-        np.random.default_rng(0),
-    )
-    rows = watch(gaze, lambda t: robot_at(4.0, 0.0), 3.0)
-    np.testing.assert_allclose(np.degrees(rows[:, 1]), 10.0, atol=1e-9)
-    np.testing.assert_allclose(np.degrees(rows[:, 2]), -40.0, atol=1e-9)
 
 
 def test_quartiles_must_lie_on_either_side_of_the_median():

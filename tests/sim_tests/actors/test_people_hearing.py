@@ -12,7 +12,7 @@ from sim_tests.actors.behaviour import Ears, Heard, Hearing, Request
 
 VOICE = Request(t_s=1.0, means="voice", distance_m=3.0)
 LIGHT = replace(VOICE, means="light")
-PEOPLE = 4000
+PEOPLE = 2000
 CALM = Hearing(startles=0.0)
 
 
@@ -29,19 +29,19 @@ def look_share(hearing: Hearing, *requests: Request) -> float:
     return float(np.mean([h is not None and h.looks for h in heard_by(hearing, *requests)]))
 
 
-@pytest.mark.parametrize("answers", [0.0, 0.3, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize("answers", [0.0, 0.3, 1.0])
 def test_the_share_who_look_is_the_setting(answers: float) -> None:
     share = look_share(CALM.with_numbers({"answers": answers}), VOICE)
-    assert share == pytest.approx(answers, abs=0.025)
+    assert share == pytest.approx(answers, abs=0.04)
 
 
 def test_by_default_every_other_person_looks_and_one_in_twenty_startles() -> None:
     heard = [h for h in heard_by(Hearing(), VOICE) if h is not None]
-    assert sum(h.looks for h in heard) / PEOPLE == pytest.approx(0.5, abs=0.025)
+    assert sum(h.looks for h in heard) / PEOPLE == pytest.approx(0.5, abs=0.04)
     kinds = [h.startle for h in heard if h.startle]
-    assert len(kinds) / PEOPLE == pytest.approx(0.05, abs=0.011)
+    assert len(kinds) / PEOPLE == pytest.approx(0.05, abs=0.018)
     shares = [kinds.count(kind) / len(kinds) for kind in ("into_path", "stop", "aside")]
-    assert shares == pytest.approx([0.5, 0.25, 0.25], abs=0.1)
+    assert shares == pytest.approx([0.5, 0.25, 0.25], abs=0.13)
 
 
 def test_the_same_people_answer_at_a_higher_share_too() -> None:
@@ -73,8 +73,8 @@ def test_every_request_within_a_minute_is_heard_less_and_a_quiet_minute_restores
     all_answer = CALM.with_numbers({"answers": 1.0, "habituation": 0.5})
     beeps = [replace(VOICE, t_s=5.0 * n) for n in range(3)]
     assert look_share(all_answer, *beeps[:1]) == 1.0
-    assert look_share(all_answer, *beeps[:2]) == pytest.approx(0.5, abs=0.03)
-    assert look_share(all_answer, *beeps) == pytest.approx(0.5 * 0.5 + 0.5 * 0.25, abs=0.03)
+    assert look_share(all_answer, *beeps[:2]) == pytest.approx(0.5, abs=0.04)
+    assert look_share(all_answer, *beeps) == pytest.approx(0.5 * 0.5 + 0.5 * 0.25, abs=0.04)
     assert look_share(all_answer, *beeps, replace(VOICE, t_s=80.0)) == 1.0
 
 
@@ -104,14 +104,14 @@ def test_nobody_gets_used_to_what_they_did_not_hear() -> None:
 )
 def test_what_makes_a_request_less_likely_to_be_answered(changes: dict, share: float) -> None:
     all_answer = CALM.with_numbers({"answers": 1.0})
-    assert look_share(all_answer, replace(VOICE, **changes)) == pytest.approx(share, abs=0.03)
+    assert look_share(all_answer, replace(VOICE, **changes)) == pytest.approx(share, abs=0.04)
 
 
 def test_a_light_startles_nobody_and_who_is_not_meant_startles_less() -> None:
     jumpy = Hearing(answers=0.0, startles=1.0)
     assert heard_by(jumpy, LIGHT, people=200) == [None] * 200
     bystander = heard_by(jumpy, replace(VOICE, addressed=False))
-    assert np.mean([h is not None for h in bystander]) == pytest.approx(0.3, abs=0.03)
+    assert np.mean([h is not None for h in bystander]) == pytest.approx(0.3, abs=0.04)
 
 
 def test_impossible_figures_are_refused() -> None:

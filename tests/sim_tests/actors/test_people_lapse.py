@@ -81,13 +81,6 @@ def test_somebody_who_never_looks_has_no_lapse():
     np.testing.assert_array_equal(plain.people, lapse.people)
 
 
-def test_a_lapse_that_does_not_come_changes_nothing():
-    plain = run_stage([{**LOOKER, "start_s": 1.0}], seconds=8.0)
-    late = run_stage([{**LOOKER, "start_s": 1.0, "lapse": {"after_look_s": 60.0}}], seconds=8.0)
-    np.testing.assert_array_equal(plain.people, late.people)
-    np.testing.assert_array_equal(plain.heads, late.heads)
-
-
 def test_the_robots_touch_ends_the_lapse():
     """A person whom the robot touches steps back, and does not walk on into it."""
     person = {

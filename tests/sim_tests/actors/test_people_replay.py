@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim_tests import SimError
-from sim_tests.actors.behaviour import ALONE, Replayed, read_recordings, replayed_people
+from sim_tests.actors.behaviour import ALONE, read_recordings, replayed_people
 
 TABLE = """t_s, id, x_m, y_m, heading_rad, head_yaw_rad
 0.0, anna, 0.0, 0.0, 3.0, 0.0
@@ -56,29 +56,6 @@ def test_between_rows_velocity_is_the_slope_and_headings_turn_the_short_way(tabl
         np.testing.assert_allclose(motion.velocity_odom_mps, 0.0)
 
 
-def test_order_of_rows_and_columns_does_not_matter(table, tmp_path):
-    header, *rows = [[cell.strip() for cell in row.split(",")] for row in TABLE.splitlines()]
-    order = [5, 1, 4, 0, 3, 2]
-    other = tmp_path / "other.csv"
-    lines = [header, *sorted(rows, reverse=True)]
-    other.write_text("\n".join(",".join(row[n] for n in order) for row in lines))
-    here = {recording.name: recording for recording in read_recordings(table)}
-    for recording in read_recordings(other):
-        np.testing.assert_array_equal(
-            recording.positions_odom_m, here[recording.name].positions_odom_m
-        )
-        np.testing.assert_array_equal(recording.times_s, here[recording.name].times_s)
-
-
-def test_a_person_with_one_row_stands(tmp_path):
-    path = tmp_path / "one.csv"
-    path.write_text("t_s,id,x_m,y_m,heading_rad\n2.0,a,1.0,-1.0,0.5\n")
-    (recording,) = read_recordings(path)
-    motion = Replayed(recording).motion(7.0, ALONE)
-    np.testing.assert_allclose(motion.position_odom_m, [1.0, -1.0])
-    assert motion.heading_odom_rad == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -104,8 +81,3 @@ def test_invalid_tables_are_refused(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(SimError, match=message):
         read_recordings(path)
-
-
-def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(SimError, match="cannot read recorded people from"):
-        read_recordings(tmp_path / "none.csv")

@@ -23,7 +23,7 @@ from sim_tests.actors.behaviour import (
 from sim_tests.world.hall import WarehouseLayout
 
 NO_BOXES = np.empty((0, 4))
-HALL = WarehouseLayout.crossing().obstacle_boxes_odom
+HALL = WarehouseLayout.named("crossing").obstacle_boxes_odom
 
 
 def walker(route, boxes=NO_BOXES, seed: int = 0, **fields) -> Walker:
@@ -58,46 +58,11 @@ def test_an_undisturbed_walk_takes_the_free_time_exactly():
         assert outcome.length_m == pytest.approx(outcome.free_length_m, abs=1e-9)
 
 
-def test_free_time_is_length_over_speed_plus_starting_stopping_and_pauses():
-    long, longer = (walker([(0, 0), (length, 0)]).outcome() for length in (6.0, 9.0))
-    # 3 m more take 3 m at the free speed, to one decision.
-    assert longer.free_time_s - long.free_time_s == pytest.approx(
-        3.0 / 1.34, abs=1.5 * DECISION_PERIOD_S
-    )
-    assert 6.0 / 1.34 < long.free_time_s < 6.0 / 1.34 + 2.5
-    assert long.free_length_m == pytest.approx(5.9, abs=0.1)
-    paused = walker([(0, 0), (6, 0)], pauses=[{"at_m": 3.0, "for_s": 2.0}]).outcome()
-    assert 2.0 < paused.free_time_s - long.free_time_s < 5.0
-
-
-def test_pauses_have_the_given_place_and_duration():
-    rows = walk(walker([(0, 0), (8, 0)], pauses=[{"at_m": 3.0, "for_s": 2.0}]), 14.0)
-    standing = rows[(np.hypot(rows[:, 3], rows[:, 4]) < 0.05) & (rows[:, 1] > 1) & (rows[:, 1] < 7)]
-    np.testing.assert_allclose(standing[:, 1], 3.0, atol=0.1)
-    assert standing[-1, 0] - standing[0, 0] == pytest.approx(2.0, abs=0.5)
-    assert rows[-1, 1] == pytest.approx(8.0, abs=0.1)
-
-
 def test_a_person_who_turns_back_ends_at_the_start_and_faces_back():
     rows = walk(walker([(0, 0), (8, 0)], turns_back_at_m=3.0), 12.0)
     assert rows[:, 1].max() == pytest.approx(3.0, abs=0.15)
     assert rows[-1, 1] == pytest.approx(0.0, abs=0.1)
     assert math.cos(rows[-1, 5]) == pytest.approx(-1.0, abs=0.01)
-
-
-def test_a_person_who_walks_backwards_faces_back():
-    rows = walk(walker([(0, 0), (6, 0)], backwards=True), 3.0)
-    assert rows[-1, 3] > 1.2
-    np.testing.assert_allclose(np.cos(rows[:, 5]), -1.0, atol=1e-9)
-
-
-def test_a_standing_person_has_the_given_heading_and_no_free_time():
-    person = walker([(2, 1)], heading_deg=-90.0)
-    rows = walk(person, 3.0)
-    np.testing.assert_allclose(rows[:, 1:5], [[2, 1, 0, 0]] * len(rows), atol=1e-9)
-    np.testing.assert_allclose(rows[:, 5], -math.pi / 2)
-    assert person.outcome().free_time_s is None
-    assert person.outcome().time_s is None
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.34, 2.0, 3.0])

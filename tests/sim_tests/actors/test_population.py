@@ -17,7 +17,6 @@ from sim_tests.actors.behaviour import (
     Surroundings,
     Walker,
     draw_person,
-    start_share,
     walker_of,
 )
 from sim_tests.actors.behaviour._gait_variation import GaitVariation, VariationFigures
@@ -110,14 +109,6 @@ def test_the_variation_has_the_figures_it_was_given() -> None:
     assert np.diff(steps[:, 0]) / 0.05 == pytest.approx(steps[1:, 2])
     still = GaitVariation(figures, rng)
     assert np.abs([still.step(0.05, 0.0) for _ in range(50)]).max() == 0.0
-
-
-def test_having_looked_raises_or_lowers_the_chance_of_a_start() -> None:
-    assert start_share(0.0, yielding=True) == 0.39
-    assert start_share(0.5, yielding=True) == 0.45
-    assert start_share(2.0, yielding=False) == 0.09
-    assert start_share(math.inf, yielding=False) == 0.10
-    assert start_share(0.0, yielding=True) > start_share(0.0, yielding=False)
 
 
 def test_people_on_the_way_change_their_mind_and_seated_people_stay() -> None:

@@ -28,7 +28,7 @@ rotvecs = st.tuples(angles, angles, angles)
 
 
 @given(st.lists(rotvecs, min_size=16, max_size=16), st.floats(0.8, 1.2), rotvecs)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_kinematics_against_scipy_joint_by_joint(
     bends: list, scale: float, turn: tuple[float, float, float]
 ) -> None:

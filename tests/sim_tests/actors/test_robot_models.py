@@ -15,7 +15,6 @@ from pydantic import ValidationError
 from nav_adapter import RobotProfile
 from sim_tests import NOVA_CARTER, SimError, Warehouse, Worker
 from sim_tests.actors.robot import (
-    KinematicLook,
     KinematicRobot,
     RobotModel,
     model_meshes,
@@ -27,12 +26,6 @@ KINEMATIC = [name for name in shipped_robots() if name != "nova_carter"]
 FORKLIFT = RobotModel.shipped("forklift")
 OMNI = RobotModel.shipped("omni")
 STEP_S = 1.0 / 240.0
-
-
-@pytest.fixture(scope="module")
-def hall():
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        yield warehouse
 
 
 def outline(robot: KinematicRobot) -> shapely.Polygon:
@@ -103,7 +96,7 @@ twists = st.lists(
 def test_a_body_moves_within_the_limits_of_its_profile(name: str, commands: list) -> None:
     model = RobotModel.shipped(name)
     profile = model.profile
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         robot = KinematicRobot(warehouse, model, (4.0, 0.0), 0.3)
         most = max(profile.max_acceleration_mps2, profile.max_deceleration_mps2) * STEP_S
         before = robot.state(0.0)
@@ -166,11 +159,3 @@ def test_people_touch_the_outline_where_it_is_and_not_beside_it(hall, heading_ra
             place = np.array([1.0, 0.0]) + (edge_m + side * gap_m) * forward
             worker.place(place, heading_rad, 0.0, 0.0, 0.0, 0.0)
             assert robot.touches(worker.body) is touches
-
-
-def test_the_look_lies_within_its_bounds(hall) -> None:
-    robot = KinematicRobot(hall, FORKLIFT, (1.0, 0.5), 0.4)
-    low, high = KinematicLook(robot).bounds_odom_m()
-    x0, y0, x1, y1 = outline(robot).bounds
-    assert low == pytest.approx([x0, y0, 0.03])
-    assert high == pytest.approx([x1, y1, 1.9])

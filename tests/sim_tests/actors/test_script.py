@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim_tests.actors.behaviour import WorkerScript
-from sim_tests.actors.body import Activity, worker_names
+from sim_tests.actors.body import Activity
 
 
 def script(path, **keys):
@@ -32,14 +32,6 @@ def test_velocity_is_the_derivative_of_position_and_walked_is_the_path_length(t_
     assert after.walked_m - before.walked_m == pytest.approx(np.linalg.norm(moved), abs=2e-3)
 
 
-@given(st.floats(-10.0, 20.0))
-def test_before_and_after_the_walk_the_worker_stands(t_s):
-    motion = WALK.motion(t_s)
-    assert np.isfinite(motion.position_odom_m).all()
-    if t_s < 0 or t_s > 6:
-        assert not motion.velocity_odom_mps.any()
-
-
 def test_the_body_faces_along_the_walk_without_heading_keys():
     assert WALK.motion(0.5).heading_odom_rad == pytest.approx(0.0, abs=0.05)
     assert WALK.motion(4.0).heading_odom_rad == pytest.approx(math.pi / 2, abs=0.05)
@@ -53,16 +45,6 @@ def test_a_gaze_key_at_the_robot_follows_the_robot():
         angle, elevation = watching.gaze_angles(1.0, 0.3, (azimuth, -0.1))
         assert angle == pytest.approx(azimuth + math.radians(10.0))
         assert elevation == pytest.approx(-0.1)
-
-
-def test_the_head_turns_smoothly_between_keys_and_holds_outside_them():
-    keys = [{"t_s": 1.0, "yaw_deg": 0.0}, {"t_s": 2.0, "yaw_deg": 60.0}]
-    turning = script([(0, 0, 0)], gaze=keys)
-    angles = [turning.gaze_angles(t, 0.0, (0.0, 0.0))[0] for t in np.linspace(0.0, 3.0, 301)]
-    assert angles[0] == 0.0
-    assert angles[-1] == pytest.approx(math.radians(60.0))
-    assert np.all(np.diff(angles) >= 0.0)
-    assert np.max(np.diff(angles)) / 0.01 < math.radians(60.0) * 1.6
 
 
 def test_the_head_turns_through_the_front_not_through_the_back():
@@ -89,34 +71,6 @@ def test_impossible_walks_are_refused(change):
         script(**change)
 
 
-def test_unknown_keys_are_refused_with_the_nearest_name():
-    with pytest.raises(ValueError, match="did you mean 'yaw_deg'"):
-        script([(0, 0, 0)], gaze=[{"t_s": 0.0, "yaw": 3.0}])
-
-
-def test_a_copied_script_walks_its_own_path():
-    WALK.motion(1.0)
-    moved = WALK.model_copy(update={"path": (WALK.path[0].model_copy(update={"x_m": 9.0}),)})
-    assert moved.motion(1.0).position_odom_m[0] == 9.0
-
-
-def test_the_eyes_turn_smoothly_between_keys_and_rest_without_keys():
-    looking = script(
-        [(0, 0, 0)],
-        gaze=[
-            {"t_s": 1.0, "eye_yaw_deg": 0.0},
-            {"t_s": 2.0, "eye_yaw_deg": 30.0, "eye_pitch_deg": -10.0},
-        ],
-    )
-    assert looking.eye_angles(0.0) == (0.0, 0.0)
-    assert looking.eye_angles(1.5) == pytest.approx((math.radians(15.0), math.radians(-5.0)))
-    assert looking.eye_angles(9.0) == pytest.approx((math.radians(30.0), math.radians(-10.0)))
-    assert looking.gaze_angles(1.5, 0.2, (0.0, 0.0)) == (0.2, 0.0)  # the head does not follow
-    assert WALK.eye_angles(1.0) == (0.0, 0.0)
-    with pytest.raises(ValueError, match="eye_yaw_deg"):
-        script([(0, 0, 0)], gaze=[{"t_s": 0.0, "eye_yaw_deg": 50.0}])
-
-
 def test_activities_change_in_six_tenths_of_a_second():
     busy = script(
         [(0, 0, 0)],
@@ -140,31 +94,6 @@ def test_activities_change_in_six_tenths_of_a_second():
             [(0, 0, 0)],
             activities=[{"t_s": 1.0, "activity": "phone"}, {"t_s": 1.2, "activity": "none"}],
         )
-
-
-def test_unknown_looks_are_refused():
-    assert script([(0, 0, 0)], look=worker_names()[0]).look == worker_names()[0]
-    with pytest.raises(ValueError, match="look must be one of"):
-        script([(0, 0, 0)], look="nobody")
-
-
-def test_headings_turn_without_jerks():
-    """Between keys the body starts and stops turning smoothly, without overshoot."""
-    turning = script(
-        [(0, 0, 0)],
-        heading=[
-            {"t_s": 1.0, "heading_deg": 0.0},
-            {"t_s": 2.0, "heading_deg": 0.0},
-            {"t_s": 3.0, "heading_deg": 90.0},
-            {"t_s": 4.0, "heading_deg": 90.0},
-        ],
-    )
-    headings = np.array([turning.motion(t).heading_odom_rad for t in np.arange(0.0, 5.0, 0.02)])
-    assert headings.min() >= -1e-9
-    assert headings.max() <= math.pi / 2 + 1e-9
-    rate = np.diff(headings) / 0.02
-    assert rate.max() < math.pi  # 1.5 times the mean rate of a smooth turn
-    assert np.abs(np.diff(rate)).max() / 0.02 < 12.0
 
 
 def test_feet_stand_before_the_first_and_after_the_last_waypoint():

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from worker_looks import LOOKS
 
 from perception import layouts as kp
 from sim_tests import SimError
@@ -17,7 +17,6 @@ from sim_tests.actors.behaviour import (
     RobotBody,
     Surroundings,
     Walker,
-    WorkerScript,
 )
 from sim_tests.actors.body import (
     SEATED_EYE_HEIGHT_SHARE,
@@ -25,7 +24,6 @@ from sim_tests.actors.body import (
     Worker,
     load_worker,
     skin_points,
-    worker_names,
 )
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
@@ -36,12 +34,6 @@ NO_BOXES = np.empty((0, 4))
 HEADING_RAD = 0.7
 PLACE_M = np.array([1.0, -2.0])
 SEATED = {"t_s": 0.0, "activity": "sitting"}
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        yield warehouse
 
 
 def seated(hall: Warehouse, look: str, stature_m: float | None = None, **seat: str) -> Worker:
@@ -57,7 +49,7 @@ def in_body(points_odom_m: np.ndarray) -> np.ndarray:
     return (points_odom_m - [*PLACE_M, 0.0]) @ turn
 
 
-@pytest.mark.parametrize("look", worker_names())
+@pytest.mark.parametrize("look", LOOKS)
 @pytest.mark.parametrize("stature_m", [None, 1.1])
 def test_thighs_are_level_shanks_upright_and_the_trunk_is_above_the_place(
     hall: Warehouse, look: str, stature_m: float | None
@@ -87,28 +79,6 @@ def test_thighs_are_level_shanks_upright_and_the_trunk_is_above_the_place(
     assert lowest == pytest.approx(0.0, abs=0.012)
 
 
-@pytest.mark.parametrize("kind", ["stool", "box"])
-def test_the_seat_stands_on_the_floor_under_the_hips(hall: Warehouse, kind: str) -> None:
-    worker = seated(hall, "kofi", seat=kind)
-    place = worker.T_odom_held
-    assert place is not None
-    assert worker.held == "seat"
-    assert worker.seat.kind == kind
-    depth, width, height = worker.seat.size_m
-    middle = in_body(place[:3, 3])
-    assert middle[2] == pytest.approx(0.5 * height)
-    assert 0.35 < height < 0.5
-    hips = in_body(worker.keypoints_odom_m[[kp.LEFT_HIP, kp.RIGHT_HIP]])
-    assert np.all(np.abs(hips[:, 0] - middle[0]) < 0.5 * depth)
-    assert np.all(np.abs(hips[:, 1]) < 0.5 * width)
-    assert 0.05 < hips[0, 2] - height < 0.2
-    surface = worker.held_object.surface(0)
-    assert surface is not None
-    floor, _ = cut_surfaces([surface], np.array([0.0, 0.0, 1.0]), 0.01)
-    corners = in_body(np.column_stack([floor[:, 0, :2], np.zeros(len(floor))]))
-    assert np.abs(corners[:, 1]).max() == pytest.approx(0.5 * width, abs=0.01)
-
-
 def test_at_a_scanners_height_there_are_two_shanks_before_four_legs(hall: Warehouse) -> None:
     worker = seated(hall, "giulia")
     normal = np.array([0.0, 0.0, 1.0])
@@ -128,7 +98,7 @@ def test_at_a_scanners_height_there_are_two_shanks_before_four_legs(hall: Wareho
 
 
 def test_a_robot_meets_the_seat_and_it_leaves_with_the_person() -> None:
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
+    with Warehouse(WarehouseLayout.named("open")) as hall:
         worker = seated(hall, "mateo", seat="box")
         above, below = [*PLACE_M, 1.9], [*PLACE_M, 0.2]
         behind = [*(PLACE_M - [math.cos(HEADING_RAD), math.sin(HEADING_RAD)]), 0.2]
@@ -150,18 +120,6 @@ def test_nobody_sits_down_or_stands_up(hall: Warehouse) -> None:
             Activity(name, before, 0.5)
     with pytest.raises(SimError, match=r"seat must be one of 'stool', 'box', got 'sofa'"):
         Worker(hall, seat="sofa")  # type: ignore[arg-type]
-
-
-def test_a_script_of_somebody_seated_stays_at_one_place() -> None:
-    here, there = {"t_s": 0.0, "x_m": 1.0, "y_m": 0.0}, {"t_s": 2.0, "x_m": 2.0, "y_m": 0.0}
-    script = WorkerScript(path=[here], activities=[SEATED])
-    assert script.stays
-    assert script.activity(3.0).seated
-    assert not WorkerScript(path=[here, there]).stays
-    with pytest.raises(ValidationError, match="stays at one place"):
-        WorkerScript(path=[here, there], activities=[SEATED])
-    with pytest.raises(ValidationError, match="must all be 'sitting', got none, sitting"):
-        WorkerScript(path=[here], activities=[SEATED, {"t_s": 3.0, "activity": "none"}])
 
 
 def test_a_seated_person_watches_but_never_moves() -> None:

@@ -26,7 +26,7 @@ vectors = st.tuples(*[st.floats(-0.08, 0.08)] * 2, st.floats(-0.5, -0.25))
     # A subnormal angle would divide by zero in the assertions, not in the solution.
     st.floats(-0.7, 0.7, allow_subnormal=False),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_two_bone_ik_brings_the_tip_to_its_target(
     first: tuple[float, float, float],
     second: tuple[float, float, float],
@@ -49,28 +49,6 @@ def test_two_bone_ik_brings_the_tip_to_its_target(
     assert np.cross(hinge, target) @ lateral == pytest.approx(0.0, abs=1e-6)
     across = np.cross(target, lateral)
     assert np.cross(target, hinge) @ across > 0.0
-
-
-def test_a_target_out_of_reach_is_approached_in_its_direction() -> None:
-    bones = TwoBoneLimb((0.0, 0.0, -0.4), (0.0, 0.0, -0.4), (0.0, 1.0, 0.0))
-    turn, bend = bones.solve((0.6, 0.0, -0.8), (0.0, 1.0, 0.0))
-    tip = np.add(
-        rotate(turn, bones.first_m),
-        rotate(multiply(turn, axis_angle(bones.axis, bend)), bones.second_m),
-    )
-    np.testing.assert_allclose(tip / np.linalg.norm(tip), (0.6, 0.0, -0.8), atol=1e-6)
-    assert np.linalg.norm(tip) == pytest.approx(0.8, abs=1e-3)
-
-
-def test_a_round_sole_rolls_like_a_wheel() -> None:
-    """A wheel's hub moves by its radius per radian and stays at its height."""
-    angle = np.linspace(0.0, math.tau, 20001)
-    wheel = np.column_stack([0.1 * np.cos(angle), np.zeros_like(angle), 0.1 * np.sin(angle)])
-    roll = SoleRoll.from_surface(wheel)
-    pitch = np.radians([-40.0, -10.0, 0.0, 25.0, 70.0])
-    ahead, height = roll.ankle(pitch)
-    np.testing.assert_allclose(height, 0.1, atol=1e-6)
-    np.testing.assert_allclose(ahead, 0.1 * pitch, atol=1e-5)
 
 
 def test_a_square_sole_rolls_over_its_edges() -> None:

@@ -95,20 +95,6 @@ def test_all_skin_lies_near_a_piece_and_pieces_overlap_where_it_bends(
     assert (cover[bending] >= 2).all()
 
 
-def test_skin_beyond_a_joint_is_one_piece() -> None:
-    pieces = skin_pieces(leg(), 3)
-    assert {(piece.joint, piece.share) for piece in pieces} == {
-        (HIP, 1.0),
-        (KNEE, 0.25),
-        (KNEE, 0.5),
-        (KNEE, 0.75),
-        (KNEE, 1.0),
-    }
-    shank = next(piece for piece in pieces if piece.joint == KNEE and piece.share == 1.0)
-    assert shank.mesh.vertices_m[:, 2].min() == pytest.approx(-HALF_M)
-    assert shank.mesh.vertices_m[:, 2].max() < 0.0
-
-
 @pytest.mark.parametrize("name", worker_names()[:4])
 def test_the_pieces_of_a_worker_show_all_its_skin(name: str) -> None:
     for level, skin in enumerate(load_worker(name).levels):

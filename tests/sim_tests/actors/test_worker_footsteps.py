@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -15,15 +14,12 @@ from perception import layouts as kp
 from sim_tests.actors.behaviour import WorkerScript
 from sim_tests.actors.body import (
     JOINTS,
-    Gait,
     Worker,
     load_worker,
-    skeleton,
     worker_names,
 )
 from sim_tests.scenario import Scenario, shipped_scenarios
 from sim_tests.world import Warehouse
-from sim_tests.world.hall import WarehouseLayout
 
 HZ = 40.0
 TOUCHING_M = 0.004
@@ -68,12 +64,6 @@ WALKS = {
         for number, worker in enumerate(Scenario.shipped(name).workers)
     },
 }
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        yield warehouse
 
 
 @pytest.fixture(scope="module")
@@ -143,16 +133,6 @@ def test_stance_feet_stay_where_they_landed(workers: dict[str, Worker], name: st
     assert 0.12 < np.linalg.norm(ankles[0] - ankles[1]) < 0.30
 
 
-@pytest.mark.parametrize("look", worker_names())
-def test_no_workers_feet_slide(workers: dict[str, Worker], look: str) -> None:
-    soles, errors, _ = _simulate(workers[look], WALKS["round a corner"])
-    for side in (0, 1):
-        shoe = np.array(soles[side].tolist(), dtype=np.float64)
-        assert _slip_m(shoe) < 0.03
-        assert shoe[..., 2].min() > -0.005
-    np.testing.assert_allclose(errors, 0.0, atol=1e-6)
-
-
 corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_size=2, max_size=4)
 
 
@@ -161,7 +141,7 @@ corners = st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), min_si
 @example([(1.2, 0.2), (-1.8, -0.5), (-0.9, -1.2)], 1.5, -70.0, False)  # a short run sideways
 @example([(1.2, -1.8), (-1.1, 1.7), (0.4, -1.0), (-0.9, 0.1)], 1.5, 0.0, False)  # sharp turns
 @example([(0.2, 1.9), (0.2, 1.9), (1.0, 1.6)], 1.5, 17.0, False)  # a short run askew
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_stance_feet_stay_in_any_walk(
     places: list, speed_mps: float, heading_deg: float, ahead: bool
 ) -> None:
@@ -185,22 +165,6 @@ def test_stance_feet_stay_in_any_walk(
     hips = np.array([row.hip_height_m for row in rows])
     assert hips.min() > 0.75 * hips[0]
     assert hips.max() <= hips[0] + 1e-9
-
-
-def test_a_straight_walk_agrees_with_the_stateless_gait() -> None:
-    """In the middle of a long walk both agree except for the phase."""
-    walk = script([(0, 0, 0), (10, 12.0, 0)])
-    times = np.arange(3.0, 7.0, 1.0 / HZ)
-    motions = [walk.motion(float(t)) for t in times]
-    planned = np.array([np.array(m.feet.feet)[:, 0] - m.position_odom_m[0] for m in motions])
-    # Each foot gets as far ahead of the body and as far behind it as in the gait.
-    stateless = Gait(skeleton(None, 1.75))
-    stride = float(stateless.stride_m(1.2))
-    formula = np.array(
-        [np.array(stateless.pose(s, 1.2).feet)[:, 0] for s in np.linspace(0.0, stride, 200)]
-    )
-    np.testing.assert_allclose(planned.max(axis=0), formula.max(axis=0), atol=0.03)
-    np.testing.assert_allclose(planned.min(axis=0), formula.min(axis=0), atol=0.03)
 
 
 def test_footsteps_do_not_depend_on_place_heading_or_time() -> None:

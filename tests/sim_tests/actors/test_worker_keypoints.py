@@ -9,6 +9,7 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
+from worker_looks import LOOKS
 
 from perception import Camera
 from sim_tests.actors.body import (
@@ -44,7 +45,7 @@ POSES = (
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor(), renderer="auto") as warehouse:
+    with Warehouse(WarehouseLayout.named("open"), renderer="auto") as warehouse:
         yield warehouse
 
 
@@ -122,21 +123,21 @@ def pixel_errors(hall: Warehouse, look: str, headings: int = 8) -> list[float]:
     return errors
 
 
-@pytest.mark.parametrize("look", worker_names()[::4])
+@pytest.mark.parametrize("look", ["amina"])
 def test_markers_are_found_where_keypoints_are_projected(hall: Warehouse, look: str) -> None:
-    errors = pixel_errors(hall, look)
-    assert len(errors) >= 30  # long hair hides ears
+    errors = pixel_errors(hall, look, headings=4)
+    assert len(errors) >= 15  # long hair hides ears
     assert np.median(errors) <= 1.0
     assert np.percentile(errors, 95) <= 2.5
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_over_all_workers_the_median_is_within_two_pixels(hall: Warehouse) -> None:
     errors = [error for look in worker_names() for error in pixel_errors(hall, look, headings=3)]
     assert np.median(errors) <= 2.0
 
 
-@pytest.mark.parametrize("look", worker_names())
+@pytest.mark.parametrize("look", LOOKS)
 def test_keypoints_of_the_face_lie_on_it(look: str) -> None:
     asset = load_worker(look)
     _, places = marked(look)

@@ -17,7 +17,7 @@ from sim_tests.world.hall import WarehouseLayout
 
 @pytest.fixture
 def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.crossing()) as warehouse:
+    with Warehouse(WarehouseLayout.named("crossing")) as warehouse:
         yield warehouse
 
 

@@ -1,4 +1,4 @@
-"""Searches on a full disk and with damaged files: the rest is kept, the episodes run again."""
+"""Searches on a full disk, and files that are not of a search."""
 
 from __future__ import annotations
 
@@ -43,32 +43,13 @@ def test_a_study_on_a_full_disk_is_said_and_continues(tmp_path):
     assert finish(folder) == expected
 
 
-@pytest.mark.parametrize(
-    ("damage", "reason"),
-    [
-        (lambda data: data[:-20], "episodes are missing"),
-        (lambda data: b"".join(data.splitlines(keepends=True)[:-1]), "episodes are missing"),
-        (lambda data: data.replace(b",true,", b",tr", 1), "cells"),
-        (lambda data: data.replace(b"1.5", b"-1.5", 1), "min_separation_m must lie in"),
-        (lambda data: data.replace(b"\na,0", b"\na,7", 1), "episodes are missing"),
-    ],
-)
-def test_a_damaged_evaluation_is_set_aside_and_runs_again(damage, reason, tmp_path, capsys):
-    def records():
-        return tuple(
-            EpisodeRecord("a", seed, "p", "q", "truth", success=True, min_separation_m=1.5)
-            for seed in range(3)
-        )
-
+def test_an_evaluation_of_other_episodes_is_refused_by_its_name(tmp_path):
+    records = [EpisodeRecord("a", seed, "p", "q", "truth", success=True) for seed in range(3)]
     evaluator = PolicyEvaluator(None, None, tmp_path)
-    evaluator._run = lambda *_: records()
     path = tmp_path / "evaluations" / "p-0-2.csv"
     path.parent.mkdir()
-    write_records(path, records())
-    whole = path.read_bytes()
-    assert evaluator.evaluate("p", None, range(3), ("a",)).records == records()
-    path.write_bytes(damage(whole))
-    assert evaluator.evaluate("p", None, range(3), ("a",)).records == records()
-    assert path.read_bytes() == whole
-    assert (path.parent / "p-0-2.csv.damaged").read_bytes() == damage(whole)
-    assert reason in capsys.readouterr().err
+    write_records(path, records)
+    assert evaluator.evaluate("p", None, range(3), ("a",)).records == tuple(records)
+    write_records(path, records[:2])
+    with pytest.raises(SimError, match=r"p-0-2\.csv holds other episodes than those of p: move"):
+        evaluator.evaluate("p", None, range(3), ("a",))

@@ -18,23 +18,9 @@ SCENARIOS = (
     ("crossing_from_the_left", "attentive", 4.1),
     ("crossing_from_the_right", "attentive", 4.4),
     ("late_glance", "mixed", 4.6),
-    ("looks_away_halfway", "mixed", 4.0),
     ("reads_a_phone", "unaware", 5.2),
-    ("stops_midway", "mixed", 7.9),
-    ("turns_back", "mixed", 6.1),
     ("runs_out", "unaware", 3.2),
     ("head_on_in_an_aisle", "attentive", 6.8),
-    ("overtaking", "unaware", 8.3),
-    ("being_overtaken", "unaware", 1.2),
-    ("blind_corner", "mixed", 3.6),
-    ("behind_a_pallet_truck", "mixed", 3.9),
-    ("standing_in_the_aisle", "attentive", 9.4),
-    ("two_people_one_aware", "mixed", 5.8),
-    ("group_crossing", "attentive", 7.2),
-    ("carrying_a_box", "unaware", 5.0),
-    ("walking_backwards", "unaware", 4.7),
-    ("crowd_of_eight", "mixed", 12.6),
-    ("paper_encounter", "attentive", 3.0),
 )
 #: Policy, perception, share kept of what blind loses with attentive, mixed and unaware people.
 POLICIES = (
@@ -123,56 +109,28 @@ def _episode(
 ) -> EpisodeRecord:
     free_s = 11.0 + 0.4 * float(z[0])
     delay_s = max(lost_s * float(np.exp(0.35 * z[1])) + (1.1 if fault else 0.0), 0.0)
-    arrived = z[2] < 2.45
-    time_s = free_s + delay_s
+    arrived = bool(z[2] < 2.45)
     margin_m = 0.42 + 0.33 * float(z[3]) - (0.45 if task.scenario == "runs_out" else 0.0)
-    violation_s = max(-margin_m, 0.0) * 1.4
-    separation_m = max(0.55 + 0.4 * margin_m + 0.1 * float(z[4]), 0.05)
-    walked_into = z[4] < -2.6
-    truly_aware = {"attentive": z[5] > -1.4, "mixed": z[5] > 0.1, "unaware": False}[attention]
-    recognised = truly_aware and z[4] > -0.7
-    fooled = not truly_aware and z[4] > 1.9
-    if task.policy == "oracle":
-        recognised, fooled = truly_aware, False
-    stands = {
-        (True, True): "aware",
-        (True, False): "missed_aware",
-        (False, True): "falsely_aware",
-        (False, False): "unaware",
-    }[(bool(truly_aware), bool(recognised or fooled))]
+    walked_into = bool(z[4] < -2.6)
     return replace(
         task,
-        success=bool(arrived),
-        contact=bool(walked_into),
+        success=arrived,
+        contact=walked_into,
         contact_by="person" if walked_into else "",
         contacts=int(walked_into),
         person_contacts=int(walked_into),
-        min_separation_m=0.0 if walked_into else separation_m,
-        time_to_goal_s=time_s if arrived else None,
-        max_speed_within_2m_mps=float(np.clip(0.9 + 0.2 * z[1], 0.1, 1.5)),
+        min_separation_m=0.0 if walked_into else max(0.55 + 0.4 * margin_m, 0.05),
+        time_to_goal_s=free_s + delay_s if arrived else None,
         min_margin_m=margin_m,
-        violation_time_s=violation_s,
-        duration_s=time_s if arrived else 40.0,
+        violation_time_s=max(-margin_m, 0.0) * 1.4,
+        duration_s=free_s + delay_s if arrived else 40.0,
         attention=attention,
         fault=fault,
         time_without_people_s=free_s,
         time_lost_s=delay_s if arrived else 40.0 - free_s,
-        path_length_m=14.2 + 0.2 * abs(float(z[0])),
-        spl=float(np.clip(0.97 - 0.01 * abs(z[0]), 0.0, 1.0)) if arrived else 0.0,
         speed_at_min_separation_mps=float(np.clip(0.35 + 0.22 * z[4], 0.0, 1.5)),
-        min_time_to_collision_s=float(np.clip(2.0 + 0.6 * z[3], 0.2, 8.0)),
-        post_encroachment_s=float(np.clip(1.8 + 0.7 * z[4], 0.1, 9.0)),
-        intimate_s=max(float(-z[3]) - 1.0, 0.0),
-        personal_s=max(1.2 + 0.6 * float(z[4]), 0.0),
-        peak_deceleration_mps2=float(np.clip(0.85 + 0.1 * z[1], 0.2, 1.3)),
-        peak_jerk_mps3=float(np.clip(4.0 + z[1], 0.5, 9.0)),
-        stops=int(z[2] > 0.6) + int(z[1] > 1.2),
         human_delay_s=max(0.3 + 0.4 * float(z[0]), 0.0),
-        human_detour_m=max(0.1 + 0.1 * float(z[5]), 0.0),
-        warnings=int(z[3] < -0.8),
-        awareness_error=float(np.clip(0.12 + 0.05 * z[5], 0.0, 1.0)),
-        awareness=stands,
-        reaction="wait" if truly_aware else "",
+        awareness="aware" if attention == "attentive" else "unaware",
         attentive_share={"attentive": 0.97, "mixed": 0.5, "unaware": 0.0}[attention],
     )
 

@@ -60,11 +60,21 @@ class DiesOnce(Slow):
 
 
 class Hangs(Slow):
-    """Never answers; makes the marker first."""
+    """Never answers, and catches every error."""
 
     def plan(self, robot_state, goal_odom_m, constraints, dt_s):
-        Path(os.environ[MARKER]).touch()
-        time.sleep(3600.0)
+        try:
+            time.sleep(3600.0)
+        except Exception:  # what a careless planner may do
+            return 0.0, 0.0
+
+
+class Terminates(Slow):
+    """Asks its process to end."""
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        os.kill(os.getpid(), signal.SIGTERM)
+        return 0.0, 0.0
 
 
 class Leaves(Slow):
@@ -98,3 +108,10 @@ def with_boxes(robot, static_boxes_odom_m):
 
 
 NOT_CALLABLE = 3
+
+
+def square(number):
+    """Return the square; a negative number kills the process."""
+    if number < 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number**2

@@ -174,16 +174,6 @@ def test_validate_names_a_wrong_label_with_what_was_measured(tmp_path, capsys):
     assert main(["scenario", "validate", "--episodes", "0", *files]) == 0
 
 
-def test_one_number_varies_in_the_singular(tmp_path, capsys):
-    path = tmp_path / "one.yaml"
-    text = ScenarioTemplate.shipped("crossing_distracted").to_text()
-    path.write_text(text.replace("goal_x_m: 13.0", "goal_x_m: {uniform: {low: 12.0, high: 13.0}}"))
-    assert main(["scenario", "validate", "--episodes", "0", str(path)]) == 0
-    output = capsys.readouterr().out
-    assert "1 number varies: can be run" in output
-    assert "1 numbers" not in output
-
-
 @pytest.mark.full
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_scenarios())

@@ -12,16 +12,10 @@ import pytest
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
-from sim_tests.study.frontier import (
-    SPEEDS_MPS,
-    TODAY,
-    Member,
-    draw_frontier,
-    family,
-    frontier_of,
-    frontier_text,
-    sentences,
-)
+from sim_tests.study.frontier._family import SPEEDS_MPS, TODAY, Member, family
+from sim_tests.study.frontier._frontier import frontier_of
+from sim_tests.study.frontier._plot import draw_frontier
+from sim_tests.study.frontier._text import frontier_text, sentences
 from sim_tests.study.measures import EpisodeRecord, read_records, write_records
 
 # Mean time lost (s) and impacts of each policy. The line without awareness goes through
@@ -236,6 +230,7 @@ workers:
 
 
 @pytest.mark.slow
+@pytest.mark.full
 def test_the_family_runs_in_two_scenarios_and_a_resumed_run_only_draws(tmp_path, capsys):
     words = ["frontier", "--perception", "truth", "--workers", "1", "--out", str(tmp_path / "out")]
     for name, y_m in (("near", 1.2), ("far", 1.8)):

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from measured_scenes import crossing, straight, walking
 from shapely.geometry import Point
@@ -14,7 +14,6 @@ from nav_adapter.alerts import Answer
 from sim_tests.study.measures import (
     RECORD_COLUMNS,
     measure,
-    read_record_file,
     read_records,
     record_row,
     write_records,
@@ -165,6 +164,7 @@ def test_a_request_is_no_warning_and_a_warning_no_request():
     assert (found.warnings, found.requests) == (2, 2)
 
 
+@settings(max_examples=15)
 @given(
     st.lists(st.tuples(st.sampled_from(T_S.tolist()), st.integers(1, 3)), max_size=6, unique=True),
     st.lists(st.tuples(st.floats(0, 10), st.floats(0, 10), st.integers(0, 1)), max_size=3),
@@ -186,5 +186,5 @@ def test_tables_of_earlier_versions_have_no_requests(tmp_path):
         csv.writer(file).writerows([RECORD_COLUMNS[:-5], record_row(record)[:-5]])
     assert read_records(path) == (record,)
     assert [getattr(record, name) for name in COLUMNS] == [0] * 5
-    write_records(path, read_record_file(path).records)
+    write_records(path, read_records(path))
     assert read_records(path) == (record,)

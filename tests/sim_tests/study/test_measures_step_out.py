@@ -11,11 +11,11 @@ from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, crossing, straight
 
 from nav_adapter import RobotProfile
 from sim_tests import NOVA_CARTER, ScenarioTemplate, SimError, run_crossing
-from sim_tests.study.measures import (
+from sim_tests.study.measures import measure
+from sim_tests.study.measures._step_out import (
     FASTER_STEP_OUT,
     STEP_OUT,
     StepOut,
-    measure,
     step_out_impacts,
 )
 

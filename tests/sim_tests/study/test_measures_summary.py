@@ -18,7 +18,7 @@ from sim_tests.study.measures import (
     write_records,
     zero_of_n_upper,
 )
-from sim_tests.study.measures._variants import baselines_of
+from sim_tests.study.measures._summary import baselines_of
 
 ATTENTION = {"late_glance": "attentive", "reads_a_phone": "unaware"}
 LOST_S = {"blind": 6.0, "balanced": 3.0, "oracle": 2.0}
@@ -253,7 +253,7 @@ def test_two_runs_are_compared_with_each_other(run_folder, tmp_path, capsys):
         (["{run}/absent"], "cannot read the episodes"),
         (["{run}", "--baseline", "balancd"], "did you mean 'balanced'"),
         (["{run}", "--level", "95"], "--level must lie in (0, 1), got 95"),
-        (["{run}", "--seed", "-1"], "must be a whole number of at least 0, got '-1'"),
+        (["{run}", "--seed", "-1"], "-1 is not in the range x>=0"),
         (["{run}", "{run}"], "each run once"),
         (["{run}", "--out", "table.txt"], "--out must be a .csv or .parquet file"),
     ],
@@ -265,8 +265,8 @@ def test_bad_input_to_compare_is_one_line(run_folder, capsys, arguments, message
     assert captured.out == ""
 
 
-def test_a_run_without_a_whole_row_has_nothing_to_compare(run_folder, capsys):
-    (run_folder / "episodes.csv").write_text("scenario,seed,pol")
+def test_a_run_without_an_episode_has_nothing_to_compare(run_folder, capsys):
+    write_records(run_folder / "episodes.csv", [])
     assert main(["compare", str(run_folder)]) == 2
     assert "no episodes yet" in capsys.readouterr().err
 

@@ -1,4 +1,4 @@
-"""A finished run is replaced on request only: ``crossings``, ``tune``, ``falsify``, ``render``."""
+"""A finished run is replaced on request only: ``tune``, ``falsify``, ``render``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ workers:
   - path: [{t_s: 0.0, x_m: {uniform: {low: 3.0, high: 4.0}}, y_m: -1.0}]
 """
 COMMANDS = {
-    "crossings": ["--episodes", "1", "--policy", "blind", "--no-report"],
     "tune": ["--trials", "2", "--generation", "2", "--episodes", "1", "--held-out", "1"],
     "falsify": ["--episodes", "4", "--generation", "4", "--worst", "1"],
     "render": ["--frames", "2", "--scenes", "1", "--size", "64x48", "--processes", "1"],
@@ -70,9 +69,8 @@ def test_a_finished_run_is_not_overwritten_unasked(name, tmp_path, capsys):
     assert results(out) == before
 
 
-@pytest.mark.parametrize("name", ["crossings", "falsify"])
-def test_a_table_of_another_command_is_not_overwritten(name, tmp_path, capsys):
-    command, out = words(name, tmp_path)
+def test_a_table_of_another_command_is_not_overwritten(tmp_path, capsys):
+    command, out = words("falsify", tmp_path)
     out.mkdir()
     (out / "episodes.csv").write_text("mine\n")
     assert main(command) == 2
@@ -81,7 +79,7 @@ def test_a_table_of_another_command_is_not_overwritten(name, tmp_path, capsys):
 
 
 def test_a_search_that_another_process_runs_is_not_overwritten(tmp_path, capsys):
-    from sim_tests.study.runs import ProcessLock  # noqa: PLC0415 - needs the simulator
+    from sim_tests.search import ProcessLock  # noqa: PLC0415 - needs the simulator
 
     command, out = words("falsify", tmp_path)
     assert main(command) == 0

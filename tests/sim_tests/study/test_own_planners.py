@@ -1,57 +1,13 @@
-"""Planners of the user's own: the tutorial's in every tool, and called with what they ask for."""
+"""Planners of the user's own are called with what they ask for."""
 
-import os
-import re
-import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
-from paths import ROOT
 from run_scenes import short
 
 from sim_tests import NOVA_CARTER, SimError
 from sim_tests.study.runs import make_planner, plan_jobs
-
-HERE = str(Path(__file__).parent)
-
-
-TUTORIAL = ROOT / "docs" / "tutorials" / "plug-it-into-your-planner.md"
-
-
-def tutorial_planner():
-    """Return the Python block of the tutorial that defines a planner."""
-    blocks = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text("utf-8"), re.DOTALL)
-    (block,) = (block for block in blocks if "def plan(" in block)
-    return block
-
-
-def run_python(folder, *arguments):
-    """Run a module of Python in a folder that holds the tutorial's planner, warnings as errors."""
-    (folder / "my_robot.py").write_text(tutorial_planner(), encoding="utf-8")
-    return subprocess.run(
-        [sys.executable, "-W", "error", "-m", *arguments],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), HERE])},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
-
-
-# The test of the tutorial's page runs the command with another scenario.
-@pytest.mark.full
-def test_the_planner_of_the_tutorial_passes_crossings(tmp_path):
-    done = run_python(
-        tmp_path, "awarenav", "crossings", "--planner", "my_robot:MyPlanner", "--scenario",
-        "crossing_distracted", "--policy", "balanced", "--perception", "truth", "--episodes", "1",
-        "--workers", "1", "--no-report", "--out", "out",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert re.search(r"^balanced +1 +100 % +0 ", done.stdout, re.MULTILINE), done.stdout
-
 
 SIGNATURES = """
 class Base:

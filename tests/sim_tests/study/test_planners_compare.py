@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from page_reader import PageReader
-from scorecard_planners import READY, Straight
+from planners_to_compare import READY, Straight
 
 from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.runs import make_planner, policy_of, read_jobs
-from sim_tests.study.scorecard import compare_planners, read_scorecard, write_scorecard
-from sim_tests.study.scorecard._plan import plan_comparison
+from sim_tests.study.measures import Conduct
+from sim_tests.study.report import compare_planners, write_report
+from sim_tests.study.report._compare import plan_comparison
+from sim_tests.study.report._planners import planners_section
+from sim_tests.study.report._results import Results
+from sim_tests.study.report._run import Run
+from sim_tests.study.report.command import command_line
+from sim_tests.study.runs import (
+    job_key,
+    make_planner,
+    policy_of,
+    read_attempts,
+    read_jobs,
+    template_of,
+)
 
 SCENE = """
 name: beside
@@ -29,7 +42,7 @@ workers:
   - path:
       - {t_s: 0.0, x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}
 """
-OWN = ("Field", "Raises", "ReturnsNothing")
+NAMES = ["straight_on", "planners_to_compare:Raises", "planners_to_compare:ReturnsNothing"]
 
 
 def scene():
@@ -38,161 +51,129 @@ def scene():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A real comparison of the reference planner with four others, on one seed."""
+    """A real comparison of the reference planner with three others, on one seed."""
     out = tmp_path_factory.mktemp("planners")
-    names = ["straight_on", *(f"scorecard_planners:{name}" for name in OWN)]
-    compare_planners(names, [scene()], out, seeds=[1])
+    records = compare_planners(NAMES, [scene()], out, seeds=[1])
+    # Two policies and one probe of radii for four planners.
+    assert len(records) == 3 * 4
     return out
 
 
 @pytest.fixture(scope="module")
-def card(folder):
-    return read_scorecard(folder)
+def page(folder):
+    return PageReader((folder / "report.html").read_text(encoding="utf-8"))
 
 
-def planner(card, name):
-    (found,) = (each for each in card.planners if each.name == name)
-    return found
+@pytest.fixture(scope="module")
+def tables(folder):
+    """The tables of conduct and of radii, by the name in their first column."""
+    run = Run.read(folder)
+    section = planners_section(Results.of(run), run)
+    return [{next(iter(row.values())): row for row in each.values()} for each in section.tables]
 
 
-def test_every_planner_runs_with_blind_and_the_reference_planner_runs_too(card):
-    assert [each.name for each in card.planners] == [
-        "reference",
-        "straight_on",
-        "Field",
-        "Field, without the speed field",
-        "Raises",
-        "ReturnsNothing",
-    ]
-    for each in card.planners:
-        ran = [(score.policy, score.episodes) for score in each.scores]
-        assert ran == ([("balanced", 1)] if each.variant_of else [("blind", 1), ("balanced", 1)])
-    # Two policies and one probe of radii for five planners, and the variant.
-    assert card.episodes == card.planned == 3 * 5 + 1
+def test_every_planner_runs_with_blind_and_the_reference_planner_runs_too(folder):
+    ran = [(key.policy, key.planner) for key in map(job_key, read_jobs(folder))]
+    for policy in ("blind", "balanced", "balanced, radii × 2"):
+        planners = [planner for of, planner in ran if of == policy]
+        assert planners == ["SamplingPlanner", "straight_on", "Raises", "ReturnsNothing"]
 
 
-def test_the_reference_planner_obeys_the_limit_and_uses_radii(card):
-    reference = planner(card, "reference")
-    for score in reference.scores:
-        assert score.goals.value == 1.0
-        assert score.limit.obeyed
-        assert not score.failed
-        assert score.plan_time.ratio == pytest.approx(1.0)
-    assert reference.radii.changed.value == 1.0
-    assert reference.radii.separation_m.value > 0.1
+def test_obeying_and_using_radii_are_told_from_reading_nothing(tables, page):
+    conduct, radii = tables
+    reference, straight_on = (conduct[f"balanced, {n}"] for n in ("SamplingPlanner", "straight_on"))
+    assert reference["Speed limit, m/s"] <= 0.03
+    assert reference["Episodes over"] == 0.0
+    assert reference["× reference"] == pytest.approx(1.0)
+    assert straight_on["Speed limit, m/s"] > 0.3
+    assert straight_on["Episodes over"] == 1.0
+    assert straight_on["× reference"] < 0.5
+    assert radii["SamplingPlanner"]["Radii"] == "uses them"
+    assert radii["SamplingPlanner"]["More distance, m"] > 0.1
+    assert radii["straight_on"]["Radii"] == "ignores them"
+    assert radii["straight_on"]["Somebody near"] == 1.0
+    assert radii["Raises"]["Radii"] == "–"
+    assert "It breaks the speed limit in 1 of 1 episode, by up to" in page.text
+    assert "It obeys the speed limit." in page.text
 
 
-def test_a_planner_that_reads_nothing_breaks_the_limit_and_ignores_radii(card):
-    straight_on = planner(card, "straight_on")
-    for score in straight_on.scores:
-        assert score.goals.value == 1.0
-        assert not score.limit.obeyed
-        assert score.limit.excess_mps > 0.3
-        assert score.limit.broken.value == 1.0
-        assert score.plan_time.ratio < 0.5
-    assert straight_on.radii.changed.value == 0.0
-    assert straight_on.radii.near == 1
-    # It is as fast with every policy.
-    assert straight_on.with_policy("balanced").against_blind_s[""].value == 0.0
+def test_planners_that_fail_have_rows_that_say_why(folder, page):
+    failed = {n: each for n, each in read_attempts(folder).items() if each.record.error}
+    assert len(failed) == 2 * 3
+    for name, error in (
+        ("Raises", "RuntimeError: no way found"),
+        ("ReturnsNothing", "SimError: planner ReturnsNothing returned (nan, 0.0) (tuple)"),
+    ):
+        own = [n for n, each in failed.items() if each.record.planner == name]
+        assert len(own) == 3
+        assert error in page.text
+        assert f"awarenav replay {folder} {own[0]}" in page.text
+    assert "6 episodes failed" in page.text
+    assert "0 of 1 (≤ 95.0\u202f%)" in page.text  # successes
 
 
-def test_the_speed_field_is_compared_with_the_same_planner_without_it(card):
-    use = planner(card, "Field").field
-    assert use.goals_with.value == use.goals_without.value == 1.0
-    # It drives 2 m at up to 0.9 instead of 0.3 m/s.
-    assert -4.5 < use.time_s.value < -0.3
-    assert planner(card, "reference").field is None
+def conduct_cells(run, **changed):
+    """The cells of the table of conduct, with other conduct of ``straight_on``."""
+    episodes = tuple(
+        replace(each, conduct=Conduct(**{**GOOD, **changed}))
+        if each.record.planner == "straight_on"
+        else each
+        for each in run.episodes
+    )
+    changed_run = replace(run, episodes=episodes)
+    (conduct, *_) = planners_section(Results.of(changed_run), changed_run).tables
+    row = next(row for row in conduct.cells if row[0].text == "balanced, straight_on")
+    return dict(zip(conduct.columns, row, strict=True))
+
+
+GOOD = {
+    "limit_excess_mps": 0.0,
+    "fastest_point_excess_mps": -0.1,
+    "plan_calls": 200,
+    "plan_median_s": 0.002,
+    "plan_p99_s": 0.004,
+    "cycle_s": 0.05,
+}
 
 
 @pytest.mark.parametrize(
-    ("name", "error"),
+    ("changed", "column", "text", "bad"),
     [
-        ("Raises", "RuntimeError: no way found"),
-        ("ReturnsNothing", "SimError: planner ReturnsNothing returned (nan, 0.0) (tuple)"),
+        ({}, "Speed limit, m/s", "obeyed", False),
+        ({"limit_excess_mps": 0.03}, "Speed limit, m/s", "obeyed", False),
+        ({"limit_excess_mps": 0.4}, "Speed limit, m/s", "+0.40", True),
+        ({"fastest_point_excess_mps": 0.05}, "Yaw rule, m/s", "+0.05", True),
+        ({"fastest_point_excess_mps": None}, "Yaw rule, m/s", "–", False),
+        ({"plan_p99_s": 0.08}, "99th percentile, ms", "80.00", True),
+        ({"plan_p99_s": 0.04}, "99th percentile, ms", "40.00", False),
     ],
 )
-def test_a_planner_that_fails_has_a_row_that_says_why(card, folder, name, error):
-    found = planner(card, name)
-    for score in found.scores:
-        assert score.failed == score.episodes == 1
-        assert score.goals.value == 0.0
-        assert score.plan_time is None
-    failure = found.failures[0]
-    assert failure.times == 3
-    assert failure.message.startswith(error)
-    assert read_jobs(folder)[failure.episode].planner == f"scorecard_planners:{name}"
-    text = PageReader((folder / "scorecard.html").read_text(encoding="utf-8")).text
-    assert f"awarenav replay {folder} {failure.episode}" in text
-    assert f"{name} It failed in 3 episodes, 1 of them with balanced" in text
+def test_a_broken_limit_and_a_late_command_are_marked(folder, changed, column, text, bad):
+    cell = conduct_cells(Run.read(folder), **changed)[column]
+    assert (cell.text, cell.bad) == (text, bad)
 
 
-def test_the_page_needs_nothing_else_and_holds_the_verdicts(folder):
-    page = PageReader((folder / "scorecard.html").read_text(encoding="utf-8"))
-    assert all(each.startswith(("#", "data:")) for each in page.references)
-    assert len(page.ids) == len(set(page.ids))
-    assert "straight_on It reaches the goal in 1 of 1 episodes with balanced" in page.text
-    assert "It does not use the radii: its path is the same with radii 2 times as large" in (
-        page.text
-    )
-    assert "It uses the radii" in page.text
-    assert "With the speed field it takes" in page.text
-
-
-def test_the_tables_hold_the_same_figures(folder, card):
-    content = json.loads((folder / "scorecard.json").read_text(encoding="utf-8"))
-    assert [each["name"] for each in content["planners"]] == [each.name for each in card.planners]
-    with (folder / "scorecard.csv").open(encoding="utf-8") as file:
-        lines = list(csv.DictReader(file))
-    scores = [score for each in card.planners for score in each.scores]
-    assert [(line["planner"], line["policy"]) for line in lines] == [
-        (score.planner, score.policy) for score in scores
-    ]
-    assert float(lines[0]["goals"]) == 1.0
-    assert float(lines[1]["worst_margin_m"]) == pytest.approx(scores[1].worst_margin_m)
-    assert lines[-1]["plan_median_ms"] == ""
-    text = (folder / "scorecard.md").read_text(encoding="utf-8")
-    assert text.count("| balanced |") == 6
-    assert "- **reference**: It reaches the goal" in text
-
-
-def test_a_comparison_that_was_killed_continues(folder, card, tmp_path):
-    out = tmp_path / "killed"
-    out.mkdir()
-    for name in ("jobs.jsonl", "run.json", "episodes.csv", "conduct.jsonl"):
-        lines = (folder / name).read_bytes().splitlines(keepends=True)
-        cut = {"episodes.csv": -1, "conduct.jsonl": -1}.get(name, len(lines))
-        rest = lines[-1][:7] if name == "conduct.jsonl" else b""  # an unfinished line
-        (out / name).write_bytes(b"".join(lines[:cut]) + rest)
-    partial = write_scorecard(out)
-    assert (partial.episodes, partial.planned) == (15, 16)
-    page = PageReader((out / "scorecard.html").read_text(encoding="utf-8"))
-    assert "15 of 16 episodes have ended" in page.text
-    names = ["straight_on", *(f"scorecard_planners:{name}" for name in OWN)]
-    again = compare_planners(names, [scene()], out, seeds=[1], resume=True)
-    assert (out / "episodes.csv").read_bytes() == (folder / "episodes.csv").read_bytes()
-    kept = [each.scores[0].plan_time for each in again.planners[:2]]
-    assert kept == [each.scores[0].plan_time for each in card.planners[:2]]
-
-
-def test_a_finished_comparison_is_not_run_over(folder):
-    names = ["straight_on", *(f"scorecard_planners:{name}" for name in OWN)]
-    before = (folder / "conduct.jsonl").read_bytes()
+def test_a_comparison_that_was_killed_continues(folder, tmp_path):
+    (tmp_path / "episodes").mkdir()
+    for name in ("jobs.jsonl", "run.json", *(f"episodes/{n:05d}.json" for n in range(11))):
+        text = (folder / name).read_text().replace('"state": "complete"', '"state": "running"')
+        (tmp_path / name).write_text(text)
+    page = PageReader(write_report(tmp_path, stills=False).read_text(encoding="utf-8"))
+    assert "1 of 12 episodes did not run yet" in page.text
+    compare_planners(NAMES, [scene()], tmp_path, seeds=[1], resume=True)
+    assert (tmp_path / "episodes.csv").read_bytes() == (folder / "episodes.csv").read_bytes()
     with pytest.raises(SimError, match="holds a finished run"):
-        compare_planners(names, [scene()], folder, seeds=[1])
-    assert (folder / "conduct.jsonl").read_bytes() == before
+        compare_planners(NAMES, [scene()], tmp_path, seeds=[1])
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["scorecard_planners"], "module:Class, e.g. .* or as one of reference, costmap"),
-        (["scorecard_planners:Absent"], "has no attribute 'Absent'"),
-        (
-            ["scorecard_planners:Straight(gain=2)"],
-            "no argument 'gain'; it has 'robot', 'speed_mps'",
-        ),
-        (["scorecard_planners:Straight(2.0)"], r"module:Class\(name=value, …\)"),
-        (["scorecard_planners:Straight(speed_mps=[1])"], "with numbers, strings"),
+        (["planners_to_compare"], "module:Class, e.g. .* or as one of reference, costmap"),
+        (["planners_to_compare:Absent"], "has no attribute 'Absent'"),
+        (["planners_to_compare:Straight(gain=2)"], "no argument 'gain'; it has 'robot'"),
+        (["planners_to_compare:Straight(2.0)"], r"module:Class\(name=value, …\)"),
+        (["planners_to_compare:Straight(speed_mps=[1])"], "with numbers, strings"),
         (["straight_on", "--seeds", "4-2"], "the first and the last as 10-19, got '4-2'"),
         (["straight_on", "--seeds", "0"], "at least 1"),
         (["straight_on", "--scenario", "paper_encounter"], "drives straight on without a planner"),
@@ -204,37 +185,7 @@ def test_bad_input_is_refused_before_anything_runs(words, message, tmp_path, cap
     assert not (tmp_path / "out").exists()
 
 
-def test_a_planner_may_be_an_object_or_have_arguments():
-    scenario = scene().median()
-    made = make_planner("scorecard_planners:READY", scenario)
-    assert made is not READY
-    assert made.speed_mps == 0.5
-    assert make_planner("scorecard_planners:Straight(speed_mps=0.3)", scenario).speed_mps == 0.3
-    assert make_planner("straight_on", scenario).plan
-
-
-def test_a_planner_without_the_field_by_default_is_compared_with_it():
-    plan, jobs = plan_comparison(
-        ["scorecard_planners:NoField", "scorecard_planners:Field(use_speed_field=False)"],
-        [scene()],
-        ["balanced"],
-        [3, 4],
-        perception="truth",
-    )
-    found = {
-        each.name: (each.planner.partition(":")[2], each.speed_field) for each in plan.entrants
-    }
-    assert found == {
-        "reference": ("", None),
-        "NoField": ("NoField", False),
-        "NoField, with the speed field": ("NoField(use_speed_field=True)", True),
-        "Field(use_speed_field=False)": ("Field(use_speed_field=False)", False),
-    }
-    # Three planners with two policies and the probe, and the variant with one policy.
-    assert len(jobs) == 2 * (3 * 3 + 1)
-
-
-def test_classes_are_planners_too_and_others_are_refused(tmp_path):
+def test_other_planners_and_empty_plans_are_refused(tmp_path):
     with pytest.raises(SimError, match="got <function"):
         compare_planners([lambda robot: None], [scene()], tmp_path)
     with pytest.raises(SimError, match="seeds must be at least one"):
@@ -243,26 +194,61 @@ def test_classes_are_planners_too_and_others_are_refused(tmp_path):
         compare_planners([Straight], [], tmp_path)
 
 
-def test_the_probe_of_radii_changes_radii_alone(folder):
-    jobs = read_jobs(folder)
-    wide = next(job for job in jobs if job.policy_name == "balanced, radii × 2")
-    usual = next(job for job in jobs if job.policy_name == "balanced")
-    changed, same = policy_of(wide.policy), policy_of(usual.policy)
+def test_a_planner_may_be_an_object_or_have_arguments():
+    scenario = scene().median()
+    made = make_planner("planners_to_compare:READY", scenario)
+    assert made is not READY
+    assert made.speed_mps == 0.5
+    assert make_planner("planners_to_compare:Straight(speed_mps=0.3)", scenario).speed_mps == 0.3
+    assert make_planner("straight_on", scenario).plan
+
+
+def test_the_probe_of_radii_changes_radii_alone():
+    jobs, wide = plan_comparison(["straight_on"], [scene()], ["oracle", "balanced"], range(7))
+    assert wide == "balanced, radii × 2"
+    assert sum(job.policy_name == wide for job in jobs) == 2 * 5
+    policies = {job.policy_name: policy_of(job.policy) for job in jobs}
+    changed, same = policies[wide], policies["balanced"]
     assert changed.inflation.radius_m(0.0) == 2.0 * same.inflation.radius_m(0.0)
     assert changed.inflation.radius_m(1.0) == 2.0 * same.inflation.radius_m(1.0)
     assert changed.model_copy(update={"inflation": same.inflation}) == same
 
 
+def test_robot_and_population_are_those_of_every_episode_and_of_the_command():
+    jobs, _ = plan_comparison(
+        ["straight_on"],
+        ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
+        ["balanced"],
+        (0,),
+        robot="delivery",
+        population="recorded",
+    )
+    names = {job_key(job).scenario for job in jobs}
+    assert names == {"late_glance_delivery", "crossing_attentive_delivery"}
+    assert {template_of(job.scenario).for_seed(0).population for job in jobs} == {"recorded"}
+    settings = {"scenario": ["runs_out"], "policy": ["blind"], "seeds": (0, 1)}
+    settings |= {"perception": "truth", "sensors": "camera", "camera": ""}
+    settings |= {"robot": "omni", "population": "recorded"}
+    assert command_line(("reference",), Path("out"), settings) == (
+        "awarenav planners compare reference --scenario runs_out --policy blind --seeds 0-1 "
+        "--perception truth --sensors camera --robot omni --population recorded --out out"
+    )
+
+
+def test_the_planners_that_have_a_name_are_listed(capsys):
+    assert main(["planners", "list", "--json"]) == 0
+    names = [each["name"] for each in json.loads(capsys.readouterr().out)]
+    assert names == ["reference", "costmap", "straight_on"]
+
+
 @pytest.mark.full
 def test_a_planner_that_hangs_costs_its_own_episodes_alone(tmp_path, capfd):
     (tmp_path / "beside.yaml").write_text(SCENE, encoding="utf-8")
-    words = ["scorecard_planners:Hangs", "--scenario", str(tmp_path / "beside.yaml")]
+    words = ["planners_to_compare:Hangs", "--scenario", str(tmp_path / "beside.yaml")]
     words += ["--seeds", "1-1", "--workers", "1", "--time-limit", "30", "--json"]
     assert main(["planners", "compare", *words, "--out", str(tmp_path / "out")]) == 1
     printed = capfd.readouterr()
-    reference, hangs = json.loads(printed.out)["planners"]
-    assert reference["scores"][0]["goals"]["value"] == 1.0
-    (failure,) = hangs["failures"]
-    assert failure["times"] == 3
-    assert "time limit" in failure["message"]
+    arms = {each["variant"]: each for each in json.loads(printed.out)["arms"]}
+    assert arms["balanced, SamplingPlanner"]["success"]["value"] == 1.0
+    assert arms["balanced, Hangs"]["errors"] == 1
     assert "3 of 6 episodes failed" in printed.err

@@ -32,22 +32,20 @@ def pictures(page: PageReader) -> list[np.ndarray]:
 
 
 def test_worst_episode_is_shown_at_its_least_margin(folder: Path) -> None:
-    page = PageReader(write_report(folder).read_text("utf-8"))
+    text = write_report(folder).read_text("utf-8")
+    page = PageReader(text)
+    assert write_report(folder).read_text("utf-8") == text
     camera, plan = pictures(page)
     assert camera.shape == plan.shape
     assert camera.std() > 10.0
     assert plan.std() > 10.0
     (record,) = read_records(folder / "episodes.csv")
     assert record.min_margin_m is not None
-    assert f"smallest margin {record.min_margin_m:.2f} m".replace("-", "−") in page.text
+    assert f"smallest margin {record.min_margin_m:.2f} m" in page.text
     times = set(re.findall(r" at ([0-9.]+) s", " ".join(v.get("alt", "") for _, v in page.tags)))
     assert len(times) == 1
     assert record.duration_s is not None
     assert 0.0 < float(times.pop()) < record.duration_s
-
-
-def test_stills_are_the_same_every_time(folder: Path) -> None:
-    assert write_report(folder).read_bytes() == write_report(folder).read_bytes()
 
 
 @pytest.mark.parametrize("how", ["other", "broken"])

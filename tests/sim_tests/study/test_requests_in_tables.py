@@ -12,6 +12,7 @@ from sim_tests.study.measures import EpisodeRecord, summarise, summary_text, wri
 from sim_tests.study.report import write_report
 
 HEADING = "Requests for attention"
+SECTION = "Requests per hour"
 NOTE = "Simulated people answer a request that they hear with probability"
 
 
@@ -115,7 +116,7 @@ def test_nothing_is_said_of_answers_where_nobody_was_asked(tmp_path, capsys):
     assert HEADING not in text
     page = PageReader(write_report(folder, stills=False).read_text("utf-8"))
     assert NOTE not in page.text
-    assert HEADING not in page.text
+    assert SECTION not in page.text
 
 
 def test_a_table_alone_says_nothing_of_its_people(tmp_path, capsys):
@@ -132,6 +133,6 @@ def test_a_table_alone_says_nothing_of_its_people(tmp_path, capsys):
 
 def test_the_default_share_is_that_of_the_simulated_people():
     hearing = pytest.importorskip("sim_tests.actors.behaviour._hearing")
-    from sim_tests.study.measures._answering import DEFAULT_ANSWERS  # noqa: PLC0415
+    from sim_tests.study.measures._compare import DEFAULT_ANSWERS  # noqa: PLC0415
 
     assert hearing.Hearing().answers == DEFAULT_ANSWERS

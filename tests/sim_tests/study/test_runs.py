@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,13 +13,25 @@ from pathlib import Path
 
 import pytest
 import run_planners
+from full_disk import files_up_to
 from run_scenes import short_jobs
 
+from awarenav.cli import main
 from sim_tests import SimError
-from sim_tests.study.measures import read_records
-from sim_tests.study.runs import Job, read_jobs, read_run, run_episode, run_jobs
+from sim_tests.study.measures import read_records, read_rows
+from sim_tests.study.runs import (
+    Job,
+    RunFiles,
+    in_parallel,
+    read_attempts,
+    read_jobs,
+    read_run,
+    run_episode,
+    run_jobs,
+)
 
 HERE = Path(__file__).parent
+JOBS = short_jobs(4)
 
 
 def table(folder):
@@ -29,29 +42,47 @@ def table(folder):
 def serial(tmp_path_factory):
     """Eight episodes, run one after another in this process."""
     folder = tmp_path_factory.mktemp("serial")
-    run_jobs(short_jobs(4), folder, workers=1)
+    run_jobs(JOBS, folder, workers=1)
+    return folder
+
+
+@pytest.fixture
+def killed(serial, tmp_path):
+    """A copy of the run as a kill leaves it after three episodes, which a test may damage."""
+    folder = shutil.copytree(serial, tmp_path / "killed")
+    files = RunFiles(folder)
+    for number in (0, 2, 4, 6, 7):
+        files.episode(number).unlink()
+    files.episodes.unlink()
+    files.run.write_text(json.dumps({**read_run(folder), "state": "running"}))
     return folder
 
 
 def test_a_run_writes_its_table_its_jobs_and_its_settings(serial):
-    jobs = short_jobs(4)
     records = read_records(serial / "episodes.csv")
     assert [(record.seed, record.policy) for record in records] == [
-        (job.seed, job.policy_name) for job in jobs
+        (job.seed, job.policy_name) for job in JOBS
     ]
     assert all(record.success and not record.error for record in records)
     assert all(record.time_without_people_s > 0.0 for record in records)
-    assert read_jobs(serial) == jobs
+    assert read_jobs(serial) == JOBS
     assert read_run(serial)["state"] == "complete"
     assert read_run(serial)["versions"]["numpy"]
     assert not (serial / "errors.log").exists()
+    attempts = read_attempts(serial)
+    assert [attempts[number].record for number in range(8)] == list(records)
+    assert all(each.conduct.plan_calls > 10 for each in attempts.values())
     # An episode gives the same row wherever it runs.
-    assert run_episode(jobs[5]) == records[5]
+    assert run_episode(JOBS[5]) == records[5]
+    with (serial / "episodes.csv").open(newline="") as file:
+        header, *rows = list(csv.reader(file))
+    assert {len(row) for row in rows} == {len(header)}
+    assert table(serial).count(b"\n") == len(rows) + 1
 
 
 def test_distributions_are_drawn_from_the_seed_and_not_from_the_policy(serial):
     by_seed = {}
-    for record in read_records(serial / "episodes.csv"):
+    for record in read_rows(serial):
         by_seed.setdefault(record.seed, set()).add(record.min_separation_m)
     assert all(max(values) - min(values) < 0.2 for values in by_seed.values())
     assert len({min(values) for values in by_seed.values()}) == 4
@@ -59,76 +90,41 @@ def test_distributions_are_drawn_from_the_seed_and_not_from_the_policy(serial):
 
 def test_parquet_holds_the_same_records(serial):
     pytest.importorskip("pyarrow")
-    records = read_records(serial / "episodes.csv")
-    assert read_records(serial / "episodes.parquet") == records
+    assert read_records(serial / "episodes.parquet") == read_rows(serial)
 
 
 def test_failing_episodes_and_processes_affect_no_other(tmp_path, monkeypatch, serial):
-    """Two processes: one planner raises, one kills its process twice, one once."""
+    """Two processes: a planner raises, one kills its process twice, one once, and one hangs."""
     monkeypatch.setenv(run_planners.MARKER, str(tmp_path / "died"))
-    names = ("Raises", "Dies", "DiesOnce", "Slow")
-    jobs = short_jobs(4) + short_jobs(1, planners=[f"run_planners:{name}" for name in names])[::2]
-    records = run_jobs(jobs, tmp_path / "run", workers=2)
-    assert records[:8] == read_records(serial / "episodes.csv")
-    raised, died, once, slow = records[8:]
+    names = ("Raises", "Dies", "DiesOnce", "Slow", "Hangs")
+    jobs = JOBS[:2] + short_jobs(1, planners=[f"run_planners:{name}" for name in names])[::2]
+    records = run_jobs(jobs, tmp_path / "run", workers=2, time_limit_s=8.0)
+    assert records[:2] == read_rows(serial)[:2]
+    raised, died, once, slow, hangs = records[2:]
     assert raised.error == "RuntimeError: no way found, honestly"
     assert (raised.scenario, raised.planner, raised.success) == ("short", "Raises", False)
-    assert died.error.startswith("WorkerDied: ")
-    assert "SIGKILL" in died.error
+    assert died.error.startswith("WorkerDied: the process that ran it died, and so did a second")
     assert (tmp_path / "died").exists()
     assert not once.error
     assert replace(once, planner="Slow") == slow
+    assert hangs.error == "TimeLimit: ended after the time limit of 8 s"
     log = (tmp_path / "run" / "errors.log").read_text()
     assert "Traceback" in log
-    assert "episode 8: short, seed 0" in log
-
-
-def test_an_episode_over_the_time_limit_is_ended(tmp_path, monkeypatch, serial):
-    """The clock jumps over the limit each time that a planner hangs."""
-    marker = tmp_path / "hangs"
-    monkeypatch.setenv(run_planners.MARKER, str(marker))
-    real_clock, skipped_s = time.monotonic, 0.0
-
-    def clock():
-        nonlocal skipped_s
-        if marker.exists():
-            marker.unlink()
-            skipped_s += 1000.0
-        return real_clock() + skipped_s
-
-    monkeypatch.setattr(time, "monotonic", clock)
-    jobs = short_jobs(1, planners=["run_planners:Hangs", ""])
-    records = run_jobs(jobs, tmp_path / "run", workers=1, time_limit_s=900.0)
-    assert [record.error for record in records] == [
-        "TimeLimit: ended after the time limit of 900 s",
-        "TimeLimit: ended after the time limit of 900 s",
-        "",
-        "",
-    ]
-    assert records[2:] == read_records(serial / "episodes.csv")[:2]
-    with pytest.raises(SimError, match="not on a cluster"):
-        run_jobs(jobs, tmp_path / "other", time_limit_s=900.0, scheduler="local")
+    assert "episode 2: short, seed 0" in log
 
 
 def test_an_invalid_job_gives_a_row_with_an_error():
-    job = Job("nonsense: [", 3, "p", "also: nonsense")
-    record = run_episode(job)
+    record = run_episode(Job("nonsense: [", 3, "p", "also: nonsense"))
     assert record.seed == 3
     assert "SimError" in record.error
 
 
-@pytest.mark.parametrize("tail", ["", "short,2,bli", "short,2,blind,SamplingPlanner,truth,true"])
-def test_an_interrupted_run_is_resumed(tail, serial, tmp_path):
-    lines = table(serial).decode().splitlines(keepends=True)
-    for name in ("jobs.jsonl", "run.json"):
-        (tmp_path / name).write_bytes((serial / name).read_bytes())
-    about = json.loads((tmp_path / "run.json").read_text())
-    (tmp_path / "run.json").write_text(json.dumps({**about, "state": "running"}))
-    # Rows in the order in which the episodes ended.
-    (tmp_path / "episodes.csv").write_text("".join([lines[0], lines[5], lines[2], lines[1]]) + tail)
-    records = run_jobs(short_jobs(4), tmp_path, workers=1, resume=True)
-    assert table(tmp_path) == table(serial)
-    assert records == read_records(serial / "episodes.csv")
+def test_a_killed_run_has_its_rows_and_is_resumed(serial, killed):
+    whole = read_rows(serial)
+    assert read_rows(killed) == (whole[1], whole[3], whole[5])
+    assert run_jobs(JOBS, killed, workers=1, resume=True) == whole
+    assert table(killed) == table(serial)
+    assert read_run(killed) == read_run(serial)
 
 
 def test_resuming_a_complete_run_runs_nothing(tmp_path, monkeypatch):
@@ -143,51 +139,83 @@ def test_resuming_a_complete_run_runs_nothing(tmp_path, monkeypatch):
     assert not marker.exists()
 
 
+def test_a_full_disk_ends_a_run_between_episodes_and_it_is_resumed(serial, killed, capsys):
+    with files_up_to(1000), pytest.raises(SimError, match="cannot write"):
+        run_jobs(JOBS, killed, workers=1, resume=True)
+    assert len(read_attempts(killed)) == 3
+    run_jobs(JOBS, killed, workers=1, resume=True)
+    assert table(killed) == table(serial)
+
+
 @pytest.mark.parametrize(
-    ("jobs", "message"),
+    "damage",
     [
-        (short_jobs(3), "has 8 episodes, and 6 were asked for"),
-        (short_jobs(4, perception="keypoints"), r"perception \('truth', now 'keypoints'\)"),
-        (short_jobs(4, faults=["ghosts"]), "another fault"),
+        lambda files: files.episode(1).write_bytes(files.episode(1).read_bytes()[:99]),
+        lambda files: files.episode(1).write_bytes(bytes(99)),
+        lambda files: files.episode(1).write_text('{"record": {}}'),
+        lambda files: shutil.copy(files.episode(3), files.episode(1)),
+    ],
+    ids=["half", "zeros", "foreign", "another episode"],
+)
+def test_a_file_that_is_not_of_its_episode_is_refused_by_its_name(damage, killed, serial):
+    damage(RunFiles(killed))
+    with pytest.raises(SimError, match=r"00001\.json is not the file of .* move it away"):
+        run_jobs(JOBS, killed, workers=1, resume=True)
+    RunFiles(killed).episode(1).unlink()
+    run_jobs(JOBS, killed, workers=1, resume=True)
+    assert table(killed) == table(serial)
+
+
+@pytest.mark.parametrize(
+    ("jobs", "about", "message"),
+    [
+        (short_jobs(3), {}, "has 8 episodes, and 6 were asked for"),
+        (short_jobs(4, perception="keypoints"), {}, r"perception \('truth', now 'keypoints'\)"),
+        (short_jobs(4, faults=["ghosts"]), {}, "another fault"),
+        (JOBS, {"versions": {"numpy": "0.1"}}, r"begun with numpy .*, and this is 0\.1"),
+        (JOBS, {"settings": {"seed": 4}}, "begun with seed 3, and this has 4: resume with"),
     ],
 )
-def test_another_plan_is_not_resumed(jobs, message, serial):
-    before = table(serial)
+def test_another_run_is_not_resumed(jobs, about, message, killed):
+    RunFiles(killed).run.write_text(json.dumps({**read_run(killed), "settings": {"seed": 3}}))
     with pytest.raises(SimError, match=message):
-        run_jobs(jobs, serial, workers=1, resume=True)
+        run_jobs(jobs, killed, workers=1, resume=True, about=about)
+    assert len(read_attempts(killed)) == 3
+
+
+def test_a_run_is_only_overwritten_on_request(serial, killed, tmp_path):
+    with pytest.raises(SimError, match="3 of 8 episodes done: go on with --resume, replace"):
+        run_jobs(short_jobs(1), killed, workers=1)
+    before = table(serial)
+    with pytest.raises(SimError, match="a finished run of 8 episodes: replace it with --overwrite"):
+        run_jobs(short_jobs(1), serial, workers=1)
     assert table(serial) == before
-
-
-def test_another_version_is_not_resumed(serial, tmp_path):
-    for name in ("jobs.jsonl", "episodes.csv"):
-        (tmp_path / name).write_bytes((serial / name).read_bytes())
-    about = read_run(serial)
-    about["versions"]["numpy"] = "0.1"
-    (tmp_path / "run.json").write_text(json.dumps(about))
-    with pytest.raises(SimError, match=r"begun with numpy 0\.1"):
-        run_jobs(short_jobs(4), tmp_path, workers=1, resume=True)
-
-
-def test_an_unfinished_run_is_only_overwritten_on_request(serial, tmp_path):
-    lines = table(serial).decode().splitlines(keepends=True)
-    (tmp_path / "run.json").write_text(json.dumps({"state": "running", "episodes": 8}))
-    (tmp_path / "episodes.csv").write_text("".join(lines[:3]))
-    with pytest.raises(SimError, match="2 of 8 episodes done: go on with --resume"):
+    (killed / "mine.txt").write_text("mine")
+    records = run_jobs(short_jobs(1), killed, workers=1, overwrite=True)
+    assert read_rows(killed) == records == read_rows(serial)[:2]
+    assert len(read_attempts(killed)) == 2
+    assert (killed / "mine.txt").read_text() == "mine"
+    (tmp_path / "episodes.csv").write_text("mine\n")
+    with pytest.raises(SimError, match=r"a table episodes\.csv that is not of a run"):
         run_jobs(short_jobs(1), tmp_path, workers=1)
-    assert table(tmp_path).decode() == "".join(lines[:3])
-    assert len(run_jobs(short_jobs(1), tmp_path, workers=1, overwrite=True)) == 2
+    assert (tmp_path / "episodes.csv").read_text() == "mine\n"
 
 
-def test_unusable_folders_and_numbers_are_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("jobs", "folder", "options", "message"),
+    [
+        (JOBS, "file", {}, "cannot run into"),
+        ([], "out", {}, "at least one episode"),
+        (JOBS, "out", {"workers": 0}, r"workers must lie in \[1"),
+        (JOBS, "out", {"resume": True}, "no run to resume"),
+        (JOBS, "out", {"time_limit_s": 9.0, "scheduler": "local"}, "not on a cluster"),
+        (JOBS, "out", {"time_limit_s": 0.5}, r"time_limit_s must lie in \[1"),
+    ],
+)
+def test_unusable_folders_and_numbers_are_refused(jobs, folder, options, message, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(SimError, match="cannot run into"):
-        run_jobs(short_jobs(1), tmp_path / "file", workers=1)
-    with pytest.raises(SimError, match="at least one episode"):
-        run_jobs([], tmp_path / "out")
-    with pytest.raises(SimError, match=r"workers must lie in \[1"):
-        run_jobs(short_jobs(1), tmp_path / "out", workers=0)
-    with pytest.raises(SimError, match="no run to resume"):
-        run_jobs(short_jobs(1), tmp_path / "out", workers=1, resume=True)
+    with pytest.raises(SimError, match=message):
+        run_jobs(jobs, tmp_path / folder, **{"workers": 1, **options})
 
 
 RUN = """
@@ -201,30 +229,39 @@ if __name__ == "__main__":
 """
 
 
-def test_a_killed_run_is_resumed_and_ends_with_the_same_table(tmp_path):
+@pytest.mark.slow
+def test_a_killed_process_leaves_its_episodes_and_no_workers(tmp_path):
     jobs = short_jobs(4, planners=["run_planners:Sleeps"])
-    program = tmp_path / "run.py"
-    program.write_text(RUN.format(here=str(HERE), out=str(tmp_path / "killed")))
-    path = tmp_path / "killed" / "episodes.csv"
+    program, out = tmp_path / "run.py", tmp_path / "killed"
+    program.write_text(RUN.format(here=str(HERE), out=str(out)))
     command, slowly = [sys.executable, program], {**os.environ, run_planners.SLEEP_S: "0.1"}
     with subprocess.Popen(command, env=slowly, start_new_session=True) as process:
-        while not path.exists() or path.read_bytes().count(b"\n") < 3:
+        while len(list(out.glob("episodes/*.json"))) < 2:
             assert process.poll() is None
             time.sleep(0.01)
         # A second run into the same folder is refused.
         with pytest.raises(SimError, match="another process is running"):
-            run_jobs(jobs, path.parent, workers=1, resume=True)
+            run_jobs(jobs, out, workers=1, resume=True)
         os.kill(process.pid, signal.SIGKILL)
-    done = path.read_bytes().count(b"\n") - 1
-    assert 0 < done < len(jobs)
+    assert 0 < len(read_attempts(out)) < len(jobs)
     deadline = time.monotonic() + 60.0
     while _group_lives(process.pid) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not _group_lives(process.pid), "workers outlive the run"
-    run_jobs(jobs, path.parent, workers=1, resume=True)
-    whole = tmp_path / "whole"
-    run_jobs(jobs, whole, workers=1)
-    assert path.read_bytes() == table(whole)
+    run_jobs(jobs, out, workers=1, resume=True)
+    run_jobs(jobs, tmp_path / "whole", workers=1)
+    assert table(out) == table(tmp_path / "whole")
+
+
+def test_an_interruption_keeps_the_episodes_so_far(tmp_path, serial):
+    """SIGTERM as Ctrl-C: the table is written, and the run can be resumed."""
+    (deadly,) = short_jobs(1, planners=["run_planners:Terminates"])[:1]
+    with pytest.raises(KeyboardInterrupt):
+        run_jobs([*JOBS[:2], deadly, *JOBS[2:]], tmp_path, workers=1)
+    assert read_records(tmp_path / "episodes.csv") == read_rows(serial)[:2]
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    with pytest.raises(SimError, match="2 of 9 episodes done: go on with --resume"):
+        run_jobs(JOBS, tmp_path, workers=1)
 
 
 def _group_lives(group):
@@ -235,8 +272,33 @@ def _group_lives(group):
     return True
 
 
-def test_rows_are_lines_of_as_many_cells_as_the_header(serial):
-    with (serial / "episodes.csv").open(newline="") as file:
-        header, *rows = list(csv.reader(file))
-    assert {len(row) for row in rows} == {len(header)}
-    assert table(serial).count(b"\n") == len(rows) + 1
+def test_items_are_worked_on_in_parallel_and_a_deadly_one_is_given_up():
+    here = dict(in_parallel(run_planners.square, range(5), workers=1))
+    assert here == {number: number**2 for number in range(5)}
+    found = in_parallel(
+        run_planners.square, [3, -1, 4], workers=2, on_death=lambda item, reason: item
+    )
+    assert dict(found) == {0: 9, 1: -1, 2: 16}
+    with pytest.raises(SimError, match="the process that ran it died, and so did a second one"):
+        dict(in_parallel(run_planners.square, [-1], workers=1, own_process=True))
+    assert dict(in_parallel(run_planners.square, [], workers=2)) == {}
+
+
+def test_the_command_says_how_to_go_on(tmp_path, capsys, monkeypatch):
+    from run_scenes import SHORT  # noqa: PLC0415
+
+    (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
+    out = tmp_path / "out"
+    words = ["crossings", "--scenario", str(tmp_path / "short.yaml"), "--policy", "blind"]
+    words += ["--perception", "truth", "--workers", "1", "--no-report", "--out", str(out)]
+    assert main(words) == 0
+    before = table(out)
+    assert main(words) == 2
+    message = capsys.readouterr().err
+    assert all(remedy in message for remedy in ("--resume", "--overwrite", "--out"))
+    assert main([*words, "--seed", "5", "--resume"]) == 2
+    assert "begun with seed 0, and this has 5" in capsys.readouterr().err
+    assert main([*words, "--resume"]) == 0
+    assert table(out) == before
+    assert main([*words, "--seed", "5", "--overwrite"]) == 0
+    assert table(out) != before

@@ -108,25 +108,6 @@ def test_the_reference_planner_given_by_its_name_drives_the_same():
     assert run_episode(named) == run_episode(plain)
 
 
-@pytest.mark.parametrize(
-    ("package", "planner"),
-    [
-        ("irsim", "examples.planners.velocity_obstacles:VelocityObstaclePlanner"),
-        pytest.param(
-            "do_mpc",
-            "examples.planners.model_predictive:ModelPredictivePlanner",
-            marks=pytest.mark.slow,
-        ),
-    ],
-)
-def test_planners_of_other_libraries_can_be_used(package, planner):
-    pytest.importorskip(package)
-    record = run_episode(short_jobs(1, planners=[planner])[0])
-    assert record.error == ""
-    assert record.planner == planner.rpartition(":")[2]
-    assert record.success
-
-
 def test_a_planner_that_uses_the_global_generators_repeats_with_its_seed():
     first, *_, other = short_jobs(2, planners=["run_planners:UsesGlobalRandom"])
     np.random.seed(1)  # noqa: NPY002

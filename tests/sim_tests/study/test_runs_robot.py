@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from run_scenes import SHORT
@@ -11,10 +10,14 @@ from run_scenes import SHORT
 from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.actors.robot import RobotModel
-from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.runs import job_key, make_planner, plan_jobs, read_jobs, template_of
-from sim_tests.study.scorecard._compare import CompareOptions, _command_line
-from sim_tests.study.scorecard._plan import plan_comparison
+from sim_tests.study.runs import (
+    Conditions,
+    job_key,
+    make_planner,
+    plan_jobs,
+    read_jobs,
+    template_of,
+)
 from sim_tests.study.watch._watch import WatchOptions, _job
 
 
@@ -44,44 +47,6 @@ def test_planners_get_the_profile_of_the_robot() -> None:
     assert planner.robot.drive == "holonomic"
 
 
-def test_a_comparison_of_planners_takes_a_robot() -> None:
-    _, jobs = plan_comparison(
-        ["straight_on"],
-        ["crossing_from_left"],
-        ["balanced"],
-        (0,),
-        perception="truth",
-        robot="delivery",
-    )
-    assert {job_key(job).scenario for job in jobs} == {"crossing_from_left_delivery"}
-
-
-def test_a_comparison_of_planners_takes_a_population() -> None:
-    _, jobs = plan_comparison(
-        ["straight_on"],
-        ["late_glance", ScenarioTemplate.shipped("crossing_attentive")],
-        ["balanced"],
-        (0,),
-        perception="truth",
-        population="recorded",
-    )
-    drawn = [template_of(job.scenario).for_seed(0) for job in jobs]
-    assert {(each.population, each.workers) for each in drawn} == {("recorded", ())}
-
-
-def test_the_command_of_a_comparison_names_robot_and_population() -> None:
-    options = CompareOptions(
-        **{"planners": ("reference",), "scenario": ("runs_out",), "policy": ("blind",)},
-        **{"seeds": (0, 1), "perception": "truth", "sensors": "camera", "camera": ""},
-        **{"robot": "omni", "population": "recorded", "workers": 1, "time_limit": 60.0},
-        **{"out": Path("out"), "resume": False, "overwrite": False, "as_json": False},
-    )
-    words = _command_line(options)
-    assert "--robot omni --population recorded --out out" in words
-    usual = _command_line(replace(options, robot="", population=None))
-    assert words.replace(" --robot omni --population recorded", "") == usual
-
-
 def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> None:
     (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
     words = ["crossings", "--scenario", str(tmp_path / "short.yaml"), "--policy", "blind"]
@@ -98,17 +63,18 @@ def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> N
 
 
 def test_a_crossing_is_watched_with_another_robot_and_population() -> None:
+    values = {"scenario": "late_glance", "perception": "truth", "seed": 3}
+    usual = Conditions.taken_from(dict(values))
+    conditions = Conditions.taken_from({**values, "robot": "omni", "population": "recorded"})
     options = WatchOptions(
-        **{"scenario": "late_glance", "policy": "blind", "planner": "", "perception": "truth"},
-        **{"sensors": "camera", "camera": "", "robot": "omni", "population": "recorded"},
-        **{"fault": "none", "seed": 3, "speed": 1.0, "port": 0, "wait": 0.0, "out": None},
-        **{"no_camera": True, "no_browser": True},
-    )
+        conditions=conditions, policy="blind", speed=1.0, port=0, wait=0.0, out=None,
+        no_camera=True, no_browser=True,
+    )  # fmt: skip
     scenario = template_of(_job(options).scenario).for_seed(3)
     assert scenario.robot_model == RobotModel.shipped("omni")
     assert scenario.population == "recorded"
     (own,) = plan_jobs(["late_glance"], ["blind"], [3], perception="truth")
-    assert _job(replace(options, robot="", population=None)) == own
+    assert _job(replace(options, conditions=usual)) == own
 
 
 def test_the_command_names_the_robots_that_there_are(tmp_path, capsys) -> None:

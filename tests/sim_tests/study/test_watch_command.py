@@ -110,8 +110,8 @@ def test_an_interrupted_crossing_ends_with_130(scenario):
         (["all"], "watch shows one crossing"),
         (["late_glance", "--fault", "scanner_*"], "watch shows one crossing"),
         (["late_glance", "--policy", "brave"], "preset must be one of"),
-        (["late_glance", "--port", "70000"], "from 0 to 65535"),
-        (["late_glance", "--speed", "0"], "from 0.1 to 20"),
+        (["late_glance", "--port", "70000"], "not in the range 0<=x<=65535"),
+        (["late_glance", "--speed", "0"], "not in the range 0.1<=x<=20"),
         (["late_glance", "--out", "no_such_folder/page.html"], "there is no folder"),
     ],
 )

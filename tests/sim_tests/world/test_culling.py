@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from perception import Camera
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import WarehouseLayout
-from sim_tests.world.render import RenderView, box_corners, hidden_behind, in_view, to_camera
+from sim_tests.world.render import RenderView, _visuals, box_corners, in_view, to_camera
 
 CAMERA = Camera(40, 30, 33.0, 31.0, 17.3, 16.1)
 _SIDES = st.floats(0.02, 3.0)
@@ -62,7 +61,7 @@ def _hit_depths(view: RenderView, boxes: np.ndarray) -> np.ndarray:
     return enter
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(_BOXES, _POSES, st.sampled_from([None, (3.0, 4.0, 9.0, 8.0), (-20.0, 5.0, 60.0, 6.0)]))
 def test_a_box_that_any_ray_meets_is_in_view(
     numbers: list[tuple[float, ...]], pose: tuple[float, ...], roi: tuple[float, ...] | None
@@ -71,41 +70,6 @@ def test_a_box_that_any_ray_meets_is_in_view(
     met = ~np.isnan(_hit_depths(view, boxes)).all(axis=0)
     shown = in_view(view, to_camera(view, box_corners(boxes)))
     assert (shown | ~met).all()
-
-
-@settings(max_examples=150, deadline=None)
-@given(_BOXES, _BOXES, _POSES)
-def test_a_hidden_box_has_an_occluder_in_front_on_every_ray(
-    numbers: list[tuple[float, ...]], solids: list[tuple[float, ...]], pose: tuple[float, ...]
-) -> None:
-    view, boxes, occluders = _view(pose), _boxes(numbers), _boxes(solids)
-    hidden = hidden_behind(view, box_corners(boxes), occluders)
-    depths = _hit_depths(view, boxes)
-    cover = np.nan_to_num(_hit_depths(view, occluders), nan=np.inf).min(axis=1)
-    for box in np.flatnonzero(hidden):
-        met = ~np.isnan(depths[:, box])
-        assert (cover[met] <= depths[met, box] + 1e-9).all()
-
-
-def test_a_wall_hides_boxes_behind_it_and_none_beside_or_in_front() -> None:
-    view = _view((0.0, 0.0, 1.0, 0.0, 0.0))
-    wall = np.array([[[3.0, -2.0, -1.0], [3.1, 2.0, 4.0]]])
-    boxes = np.array(
-        [
-            [[5.0, -0.5, 0.0], [6.0, 0.5, 2.0]],  # behind
-            [[5.0, 3.0, 0.0], [6.0, 4.0, 2.0]],  # behind, sticking out of the shadow
-            [[1.0, -0.5, 0.0], [2.0, 0.5, 2.0]],  # in front
-            [[2.0, -0.5, 0.0], [5.0, 0.5, 2.0]],  # through the wall
-            [[3.2, -1.9, 0.0], [3.4, 1.9, 2.0]],  # behind, nearly as wide
-        ]
-    )
-    hidden = hidden_behind(view, box_corners(boxes), wall)
-    assert hidden.tolist() == [True, False, False, False, True]
-    # A wall that the camera stands in, or that the near plane may cut open, hides nothing.
-    inside = _view((3.05, 0.0, 1.0, 0.0, 0.0))
-    assert not hidden_behind(inside, box_corners(boxes), wall).any()
-    close = _view((2.98, 0.0, 1.0, 0.0, 0.0), near_m=0.05)
-    assert not hidden_behind(close, box_corners(boxes), wall).any()
 
 
 def test_a_box_between_the_samples_is_left_out() -> None:
@@ -118,35 +82,25 @@ def test_a_box_between_the_samples_is_left_out() -> None:
         assert in_view(view, to_camera(view, box_corners(post))).tolist() == [seen]
 
 
-@pytest.fixture(scope="module", params=["crossing", "open_floor", "blind_corner"])
-def hall(request: pytest.FixtureRequest) -> Iterator[Warehouse]:
-    with Warehouse(getattr(WarehouseLayout, request.param)()) as warehouse:
-        yield warehouse
-
-
-def test_images_with_and_without_culling_are_the_same(hall: Warehouse) -> None:
+def test_images_with_and_without_culling_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """Cameras stand in aisles, in front of a rack, above it, in it, and outside the hall."""
     rng = np.random.default_rng(5)
-    renderer, layout = CameraRenderer(hall), hall.layout
-    camera = Camera.from_fov(200, 150, math.radians(75.0))
-    shares = []
-    for number in range(24):
-        place = (
-            rng.uniform(layout.x_min_m - 1.0, layout.x_max_m + 1.0),
-            rng.uniform(layout.y_min_m - 1.0, layout.y_max_m + 1.0),
-            rng.choice([0.3, 1.4, 1.7, 4.3]),
-        )
-        T = level_pose(place, rng.uniform(-math.pi, math.pi), rng.normal(0.0, 0.25))
-        roi = None if number % 3 else (60.0, 40.0, 130.0, 110.0)
-        hall.visuals.culling = True
-        lean = renderer.render(camera, T, roi)
-        view = RenderView.of_rectangle(camera, T, roi)
-        hall.visuals.prepare(view)
-        shares.append(hall.visuals.shown_statics / hall.visuals.statics)
-        hall.visuals.culling = False
-        full = renderer.render(camera, T, roi)
-        hall.visuals.culling = True
-        np.testing.assert_array_equal(lean.rgb, full.rgb)
-        np.testing.assert_array_equal(lean.depth_m, full.depth_m)
-        np.testing.assert_array_equal(lean.body_ids, full.body_ids)
-    assert np.mean(shares) < 0.5
+    camera = Camera.from_fov(160, 120, math.radians(75.0))
+    layout = WarehouseLayout.named("blind_corner")
+    with Warehouse(layout) as hall:
+        renderer = CameraRenderer(hall)
+        for number in range(6):
+            place = (
+                rng.uniform(layout.x_min_m - 1.0, layout.x_max_m + 1.0),
+                rng.uniform(layout.y_min_m - 1.0, layout.y_max_m + 1.0),
+                rng.choice([0.3, 1.4, 4.3]),
+            )
+            T = level_pose(place, rng.uniform(-math.pi, math.pi), rng.normal(0.0, 0.25))
+            roi = None if number % 3 else (40.0, 30.0, 110.0, 90.0)
+            lean = renderer.render(camera, T, roi)
+            with monkeypatch.context() as patch:
+                patch.setattr(_visuals, "in_view", lambda _, corners: np.ones(len(corners), bool))
+                full = renderer.render(camera, T, roi)
+            np.testing.assert_array_equal(lean.rgb, full.rgb)
+            np.testing.assert_array_equal(lean.depth_m, full.depth_m)
+            np.testing.assert_array_equal(lean.body_ids, full.body_ids)

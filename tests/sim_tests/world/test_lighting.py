@@ -29,20 +29,9 @@ def hall_with_face() -> Iterator[tuple[Warehouse, Mesh]]:
     centre, side = np.array([0.0, 2.0, 1.4]), np.array([0.5, 0.0, 0.0])
     corners = [centre - side - up, centre + side - up, centre + side + up, centre - side + up]
     face = quad([tuple(corner) for corner in corners])
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
+    with Warehouse(WarehouseLayout.named("open")) as warehouse:
         warehouse.visuals.add_static(face, tuple(_COLOUR.tolist()))
         yield warehouse, face
-
-
-def test_there_are_at_least_six_presets_and_no_two_are_alike() -> None:
-    assert len(LIGHTINGS) >= 6
-    assert len({repr(lighting) for lighting in LIGHTINGS.values()}) == len(LIGHTINGS)
-    assert Lighting.preset("bright_led") == Lighting()
-    brightness = {
-        name: (light.ambient + light.diffuse) * np.mean(light.colour_rgb)
-        for name, light in LIGHTINGS.items()
-    }
-    assert min(brightness, key=lambda name: brightness[name]) == "night"
 
 
 @pytest.mark.parametrize("name", LIGHTINGS)

@@ -2,27 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
-from sim_tests.world.hall import BOX_FACES, Mesh, box, ellipsoid, merge, quad, tube
-
-
-def _volume_m3(mesh: Mesh) -> float:
-    """Return the volume by the divergence theorem; positive if the triangles face outwards."""
-    a, b, c = (mesh.vertices_m[mesh.indices.reshape(-1, 3)[:, k]] for k in range(3))
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
-
-
-def test_volumes_are_those_of_the_solids() -> None:
-    assert _volume_m3(box((1.0, 2.0, 3.0), (0.5, 0.6, 0.7))) == pytest.approx(0.5 * 0.6 * 0.7)
-    # An inscribed prism of n sides has n/2 sin(2π/n) of its circle's r².
-    drum = tube([(0, 0, 1.0, 0.3, 0.3), (0, 0, 0.0, 0.3, 0.3)], 20)
-    assert _volume_m3(drum) == pytest.approx(10 * math.sin(math.tau / 20) * 0.09)
-    egg = ellipsoid((1.0, 0.0, 0.0), (0.3, 0.2, 0.1), 40, 30)
-    assert _volume_m3(egg) == pytest.approx(4.0 / 3.0 * math.pi * 0.006, rel=0.02)
+from sim_tests.world.hall import BOX_FACES, Mesh, box, merge, quad
 
 
 @pytest.mark.parametrize("face", BOX_FACES[:4])
@@ -38,16 +21,6 @@ def test_a_texture_stands_upright_on_each_side_of_a_box(face: str) -> None:
     right = np.cross([0.0, 0.0, 1.0], outward)  # to the right, seen from outside
     np.testing.assert_allclose(side.uv[:, 0], 0.5 + 0.5 * side.vertices_m @ right, atol=1e-12)
     np.testing.assert_allclose(side.uv[:, 1], 0.75 + 0.5 * side.vertices_m[:, 2], atol=1e-12)
-
-
-def test_a_box_of_all_named_faces_is_the_whole_box() -> None:
-    whole, part = (
-        box((0, 0, 0), (1, 2, 3)),
-        box((0, 0, 0), (1, 2, 3), dict.fromkeys(BOX_FACES, (0.0, 0.0, 1.0, 1.0))),
-    )
-    np.testing.assert_array_equal(whole.vertices_m, part.vertices_m)
-    np.testing.assert_array_equal(whole.uv, part.uv)
-    np.testing.assert_array_equal(whole.indices, part.indices)
 
 
 def test_merging_keeps_every_triangle_and_its_texture() -> None:

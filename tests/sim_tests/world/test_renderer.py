@@ -12,18 +12,10 @@ from visual_actors import AWAY_M, ShapeActor, ball
 
 from perception import Camera
 from sim_tests import SimError
-from sim_tests.actors.robot import Amr, AmrLook
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
-from sim_tests.world.hall import Lighting, WarehouseLayout
 
 OFF_CENTRE = Camera(320, 240, 270.0, 260.0, 171.3, 110.6)
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        yield warehouse
 
 
 @pytest.fixture(scope="module")
@@ -113,12 +105,6 @@ def test_a_coarser_grid_samples_the_middle_of_its_cells(renderer: CameraRenderer
     np.testing.assert_allclose(coarse, fine[31:210:3, 61:180:3], rtol=2e-3)
 
 
-def test_a_rectangle_may_reach_outside_the_image(renderer: CameraRenderer) -> None:
-    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
-    wide = renderer.depth(OFF_CENTRE, T, (-20, -10, 340, 250))
-    np.testing.assert_allclose(wide[10:250, 20:340], renderer.depth(OFF_CENTRE, T), rtol=2e-3)
-
-
 @pytest.mark.parametrize("heading_deg", [90.0, -90.0])
 def test_corners_in_the_cameras_plane_do_no_harm(
     renderer: CameraRenderer, heading_deg: float
@@ -132,41 +118,6 @@ def test_corners_in_the_cameras_plane_do_no_harm(
     different = np.abs(at.rgb.astype(int) - beside.rgb).max(axis=2) > 40
     assert different.mean() < 0.03
     np.testing.assert_allclose(at.depth_m[120:], beside.depth_m[120:], rtol=0.03)
-
-
-def test_empty_space_is_infinitely_far(renderer: CameraRenderer) -> None:
-    view = renderer.render(OFF_CENTRE, level_pose((-30.0, 0.0, 1.4), math.pi))
-    assert np.isinf(view.depth_m).all()
-    assert (view.body_ids == -1).all()
-
-
-def test_images_are_repeatable_and_not_empty(renderer: CameraRenderer) -> None:
-    T = level_pose((0.0, 0.0, 1.4), 0.0)
-    image = renderer.rgb(OFF_CENTRE, T)
-    assert image.shape == (240, 320, 3)
-    assert image.dtype == np.uint8
-    np.testing.assert_array_equal(image, renderer.rgb(OFF_CENTRE, T))
-    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 100
-
-
-def test_the_robots_camera_sees_others_but_not_the_robot() -> None:
-    with Warehouse(WarehouseLayout.open_floor()) as hall:
-        amr = Amr(hall)
-        robot = hall.visuals.add_actor(AmrLook.of(hall, amr))
-        head = hall.visuals.add_actor(ball(0.12, position_m=(2.5, 0.0, 1.65)))
-        renderer = CameraRenderer(hall)
-        camera = Camera.from_fov(320, 240, math.radians(90.0))
-        view = renderer.render(camera, amr.T_odom_camera)
-        assert not (view.actors == robot).any()
-        assert (view.actors == head).any()
-        # A person who looks at the robot sees it where its body is.
-        camera = Camera.from_fov(320, 240, math.radians(60.0))
-        T = level_pose((2.5, 0.3, 1.65), math.pi, 0.3)
-        view = renderer.render(camera, T)
-        assert (view.actors == robot).mean() > 0.02
-        points = np.array([[0.2, 0.0, 0.3], [0.2, 0.0, 0.2]])
-        columns, rows = np.rint(camera.project((points - T[:3, 3]) @ T[:3, :3])).astype(int).T
-        assert (view.actors[rows, columns] == robot).all()
 
 
 @pytest.mark.parametrize("factor", [2, 3])
@@ -187,41 +138,6 @@ def test_supersampling_averages_the_finer_image(hall: Warehouse, factor: int) ->
         np.testing.assert_allclose(smooth.depth_m[same], plain.depth_m[same], rtol=2e-3)
 
 
-def test_light_has_colour_and_strength(hall: Warehouse) -> None:
-    """The colour of a surface is its own · the light's · (ambient + diffuse · cos)."""
-    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
-
-    def floor(**light: object) -> np.ndarray:
-        lighting = Lighting(**light)  # type: ignore[arg-type]
-        return CameraRenderer(hall, lighting=lighting).rgb(OFF_CENTRE, T)[60:200].astype(float)
-
-    white = floor(ambient=1.0, diffuse=0.0)
-    half = floor(ambient=0.2, diffuse=0.6, direction_odom=(0.0, math.sqrt(3.0), 1.0))
-    np.testing.assert_allclose(half, white * (0.2 + 0.6 * 0.5), atol=2.1)
-    below = floor(ambient=0.4, diffuse=0.6, direction_odom=(0.0, 0.0, -1.0))
-    np.testing.assert_allclose(below, white * 0.4, atol=2.1)
-    warm = floor(
-        ambient=0.5, diffuse=0.4, direction_odom=(0.0, 0.0, 1.0), colour_rgb=(1.0, 0.8, 0.5)
-    )
-    np.testing.assert_allclose(warm, white * 0.9 * np.array([1.0, 0.8, 0.5]), atol=2.1)
-
-
-@pytest.mark.parametrize("size", [(1, 1), (7, 3), (641, 479)])
-def test_odd_sizes_are_as_good_as_even_ones(
-    renderer: CameraRenderer, size: tuple[int, int]
-) -> None:
-    T = level_pose((0.0, 0.0, 1.4), 0.3, 1.2)
-    depth = renderer.depth(OFF_CENTRE, T, (60.0, 60.0, 180.0, 180.0), size)
-    assert depth.shape == size[::-1]
-    u = 59.5 + (np.arange(size[0]) + 0.5) * 120.0 / size[0]
-    v = 59.5 + (np.arange(size[1]) + 0.5) * 120.0 / size[1]
-    right, down = np.meshgrid(
-        (u - OFF_CENTRE.cx_px) / OFF_CENTRE.fx_px, (v - OFF_CENTRE.cy_px) / OFF_CENTRE.fy_px
-    )
-    rays = np.stack([right, down, np.ones_like(right)], axis=-1)
-    np.testing.assert_allclose(depth, -1.4 / (rays @ T[2, :3]), rtol=4e-3)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -238,13 +154,3 @@ def test_unusable_requests_are_refused(
     good = {"camera": OFF_CENTRE, "T_odom_camera": np.eye(4)}
     with pytest.raises(SimError, match=message):
         renderer.render(**{**good, **arguments})
-
-
-def test_unusable_ranges_are_refused(hall: Warehouse) -> None:
-    with pytest.raises(SimError, match="near_m"):
-        CameraRenderer(hall, near_m=0.0)
-    with pytest.raises(SimError, match="far_m"):
-        CameraRenderer(hall, near_m=1.0, far_m=0.5)
-    for factor in (0, 9, 1.5):
-        with pytest.raises(SimError, match="supersampling"):
-            CameraRenderer(hall, supersampling=factor)  # type: ignore[arg-type]

@@ -13,13 +13,13 @@ from scipy.spatial.transform import Rotation
 from perception import Camera
 from sim_tests.actors.body import Worker
 from sim_tests.actors.body._pose import skin_points
-from sim_tests.actors.robot import Amr, AmrLook
 from sim_tests.crossing.eyes import KeypointNoise
 from sim_tests.crossing.eyes._keypoint_camera import KeypointCamera
 from sim_tests.world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M, Warehouse
 from sim_tests.world.camera import CameraRenderer
-from sim_tests.world.hall import WarehouseLayout, ellipsoid
+from sim_tests.world.hall import WarehouseLayout
 from sim_tests.world.sightlines import PlacedSurface, SightLines, TriangleSet
+from training.hall import ellipsoid
 
 CAMERA = Camera.from_fov(1920, 1200, math.radians(120.0))
 EXACT = KeypointNoise(pixel_std_px=0.0, lift_std_m=0.0, miss_rate=0.0)
@@ -29,7 +29,7 @@ HOME = np.eye(4)[None]
 
 @pytest.fixture(scope="module")
 def hall() -> Iterator[tuple[Warehouse, list[Worker]]]:
-    with Warehouse(WarehouseLayout.crossing()) as warehouse:
+    with Warehouse(WarehouseLayout.named("crossing")) as warehouse:
         workers = [Worker(warehouse, 1.62), Worker(warehouse, 1.85)]
         yield warehouse, workers
 
@@ -66,7 +66,7 @@ def test_a_closed_surface_has_no_gaps_and_hides_only_what_is_behind() -> None:
     ball = ellipsoid((0.0, 0.0, 0.0), (0.4, 0.4, 0.4), 24, 16, (0.0, 0.0, 1.0, 1.0))
     surface = PlacedSurface(TriangleSet([(ball.vertices_m, ball.indices.reshape(-1, 3))]), HOME)
     rng = np.random.default_rng(0)
-    eyes = Rotation.random(300, random_state=1).apply([3.0, 0.0, 0.0])
+    eyes = Rotation.random(60, random_state=1).apply([3.0, 0.0, 0.0])
     for eye in eyes:
         inside = rng.normal(size=(20, 3))
         inside *= 0.3 * rng.random((20, 1)) / np.linalg.norm(inside, axis=1, keepdims=True)
@@ -97,7 +97,7 @@ def test_moving_and_scaling_lines_and_surface_together_changes_nothing() -> None
 
 
 def test_a_rack_hides_what_is_behind_it_and_the_aisle_is_free() -> None:
-    layout = WarehouseLayout.crossing()
+    layout = WarehouseLayout.named("crossing")
     lines = SightLines(layout)
     x_min, y_min, x_max, y_max = layout.racks[0].box_odom_m
     middle = 0.5 * (x_min + x_max)
@@ -113,7 +113,7 @@ def test_a_worker_stays_within_its_reach_box_in_every_pose(
     for worker in hall[1]:
         asset = worker.asset
         skin = asset.levels[2]
-        for _ in range(40):
+        for _ in range(15):
             _pose(worker, rng, (2.0, 0.0))
             low, high = worker.reach_odom_m()
             points = skin_points(asset.joints_m, worker.pose, skin.vertices_m, skin.weights)
@@ -131,7 +131,7 @@ def test_visibility_agrees_with_a_depth_image(hall: tuple[Warehouse, list[Worker
     )  # fmt: skip
     rng = np.random.default_rng(11)
     same: dict[bool, list[bool]] = {True: [], False: []}
-    for _ in range(10):
+    for _ in range(6):
         for worker in workers:
             _pose(worker, rng, (rng.uniform(2.0, 6.0), rng.uniform(-2.0, 2.0)))
         T = level_pose((0.0, 0.0, 1.4), 0.0)
@@ -149,7 +149,7 @@ def test_visibility_agrees_with_a_depth_image(hall: tuple[Warehouse, list[Worker
                 front = renderer.depth(CAMERA, T, rectangle, (1, 1))[0, 0]
                 visible = points[row, 2] <= front + (FACE_DEPTH_M if face else JOINT_DEPTH_M)
                 same[face].append(visible == (keypoints.scores[row] > 0.0))
-    assert min(len(same[True]), len(same[False])) > 40
+    assert min(len(same[True]), len(same[False])) > 25
     # The rest are behind limbs of a nearer person, drawn with a finer outline in the image.
     assert np.mean(same[True]) >= 0.99
     assert np.mean(same[False]) >= 0.985
@@ -161,7 +161,7 @@ def test_the_back_of_a_head_never_shows_a_face(hall: tuple[Warehouse, list[Worke
     workers[1].place((-3.0, 0.0), 0.0)
     rng = np.random.default_rng(2)
     eye = np.array([0.0, 0.0, 1.4])
-    for _ in range(150):
+    for _ in range(50):
         worker = workers[0]
         _pose(worker, rng, (rng.uniform(1.2, 7.0), rng.uniform(-1.5, 1.5)), look_away=True)
         face = worker.keypoints_odom_m[:3]
@@ -190,31 +190,6 @@ def test_a_person_hides_another_and_a_carried_box_hides_the_chest(
     assert not lines.blocked(eye, navel, detail).any()
     far.place((4.0, 0.0), math.pi, activity="carry_box")
     assert lines.blocked(eye, navel + np.array([0.1, 0.0, 0.0]), detail).all()
-
-
-def test_the_robot_hides_others_but_never_blocks_its_own_camera() -> None:
-    with Warehouse(WarehouseLayout.crossing()) as warehouse:
-        amr = Amr(warehouse)
-        lines = SightLines(warehouse.layout, actors=[AmrLook.of(warehouse, amr)])
-        low = np.array([[1.5, 0.0, 0.3]])
-        assert lines.blocked(np.array([-1.5, 0.0, 0.3]), low, FINE).all()
-        T = amr.T_odom_camera
-        pixels = np.stack(np.meshgrid(np.linspace(0, 1919, 25), np.linspace(0, 1199, 25)), -1)
-        rays = np.concatenate(
-            [
-                (pixels.reshape(-1, 2) - [CAMERA.cx_px, CAMERA.cy_px])
-                / [CAMERA.fx_px, CAMERA.fy_px],
-                np.ones((625, 1)),
-            ],
-            axis=1,
-        )
-        own = SightLines(warehouse.layout, actors=[AmrLook.of(warehouse, amr)])
-        bare = SightLines(warehouse.layout)
-        ends = T[:3, 3] + 0.9 * rays @ T[:3, :3].T
-        detail = np.zeros(625, dtype=np.int64)
-        np.testing.assert_array_equal(
-            own.blocked(T[:3, 3], ends, detail), bare.blocked(T[:3, 3], ends, detail)
-        )
 
 
 def _pose(

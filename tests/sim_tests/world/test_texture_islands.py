@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim_tests.world.hall import WarehouseLayout, scenery, scenery_texture
-from sim_tests.world.render._texture_islands import cut_texture
+from sim_tests.world.render._backend_tiny import cut_texture
 
 
 def _colours(uv: np.ndarray, texture: np.ndarray) -> np.ndarray:
@@ -52,19 +52,6 @@ def test_scattered_triangles_keep_their_colours(
     assert cut.size <= texture.size
 
 
-def test_a_strip_of_connected_triangles_is_one_rectangle() -> None:
-    texture = np.random.default_rng(1).integers(0, 256, (200, 100, 3)).astype(np.uint8)
-    uv = np.array([(0.2, 0.4), (0.3, 0.4), (0.3, 0.5), (0.2, 0.5)])
-    indices = np.array((0, 1, 2, 0, 2, 3))
-    share, cut = _same_look(uv, indices, texture)
-    assert share > 0.999
-    # Ten columns and twenty rows with a margin; a row has whole words.
-    assert cut.shape == (20 + 5, 10 + 5 + 1, 3)
-    # Another face with the same rectangle takes no more space.
-    twice, again = np.concatenate([uv, uv]), np.concatenate([indices, indices + 4])
-    assert cut_texture(twice, again, texture)[1].shape == cut.shape
-
-
 @pytest.mark.parametrize(
     "uv", [[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)], [(-0.1, 0.0), (0.2, 0.0), (0.0, 0.2)]]
 )
@@ -76,15 +63,9 @@ def test_a_repeated_texture_is_left_alone(uv: list[tuple[float, float]]) -> None
     assert same_uv is coordinates
 
 
-def test_a_texture_that_is_used_completely_is_left_alone() -> None:
-    texture = np.zeros((50, 50, 3), np.uint8)
-    uv = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
-    assert cut_texture(uv, np.array((0, 1, 2, 0, 2, 3)), texture)[1] is texture
-
-
 def test_racks_look_the_same_with_a_part_of_the_texture() -> None:
     sizes = []
-    for chunk in scenery(WarehouseLayout.crossing()):
+    for chunk in scenery(WarehouseLayout.named("crossing")):
         if chunk.texture is not None and chunk.texture.startswith("goods"):
             texture = scenery_texture(chunk.texture)
             share, cut = _same_look(chunk.mesh.uv, chunk.mesh.indices.ravel(), texture)

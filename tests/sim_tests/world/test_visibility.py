@@ -57,7 +57,7 @@ def test_lines_along_an_axis_and_lines_that_end_before_a_box_are_handled() -> No
 
 
 def test_a_rack_blocks_the_view_and_a_body_that_does_not_count_does_not() -> None:
-    layout = WarehouseLayout.crossing()
+    layout = WarehouseLayout.named("crossing")
     with Warehouse(layout) as warehouse:
         amr = Amr(warehouse)
         worker = Worker(warehouse, 1.75, position_odom_m=(3.0, 0.0), heading_odom_rad=math.pi)

@@ -19,17 +19,11 @@ from sim_tests.actors.robot import Amr
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.camera import CameraRenderer
-from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout, box
+from sim_tests.world.hall import Lighting, Mesh, WarehouseLayout
 from sim_tests.world.render import RenderView, Visuals, gl_works
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
-
-
-@pytest.fixture(scope="module")
-def hall() -> Iterator[Warehouse]:
-    with Warehouse(WarehouseLayout.open_floor()) as warehouse:
-        yield warehouse
 
 
 @pytest.fixture
@@ -73,28 +67,6 @@ def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(
     # 150 px across a metre at 1 m distance.
     assert actor.shown == [pytest.approx(50.0), None, pytest.approx(50.0)]
     assert actor.builds == 1
-
-
-def test_an_actor_that_is_never_seen_is_never_built(
-    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
-) -> None:
-    behind_the_rack = ball(position_m=(5.0, 6.3, 1.0))
-    add_actor(behind_the_rack)
-    CameraRenderer(hall).render(CAMERA, level_pose((5.0, 0.0, 1.4), 0.5 * math.pi))
-    assert behind_the_rack.builds == 0
-
-
-def test_level_of_detail_follows_the_grid_and_not_the_rectangle(
-    hall: Warehouse, add_actor: Callable[[ShapeActor], int]
-) -> None:
-    actor = ball(position_m=(2.0, 0.0, 1.4))
-    add_actor(actor)
-    renderer = CameraRenderer(hall)
-    renderer.render(CAMERA, AHEAD)
-    renderer.render(CAMERA, AHEAD, (70, 50, 90, 70))
-    renderer.render(CAMERA, AHEAD, (70, 50, 90, 70), (40, 40))
-    CameraRenderer(hall, supersampling=2).render(CAMERA, AHEAD)
-    assert actor.shown == pytest.approx([75.0, 75.0, 150.0, 150.0])
 
 
 def test_only_shows_silhouettes_through_everything(
@@ -149,37 +121,6 @@ def test_equal_textures_are_kept_once_and_unusable_ones_are_refused() -> None:
             visuals.shape(bare, texture=first)
 
 
-def test_hidden_bodies_of_many_links_leave_no_trace() -> None:
-    """A chain of three shapes on spherical joints is posed, hidden, and shown again."""
-    with Visuals() as visuals:
-        texture = visuals.texture(CHECKERBOARD.astype(np.uint8))
-        square = upright_square(0.2)
-        shapes = tuple(visuals.shape(square, texture=texture) for _ in range(2))
-        body = visuals.add_body(
-            visuals.shape(box((0.0, 0.0, 0.0), (0.1, 0.3, 0.3)), (0.2, 0.4, 0.9)),
-            shapes,
-            np.array([(0.0, 0.5, 0.0), (0.0, 0.5, 0.0)]),
-            (-1, 0),
-        )
-        view = RenderView.of_rectangle(CAMERA, level_pose((-3.0, 0.5, 0.0), 0.0))
-        light = Lighting(ambient=1.0, diffuse=0.0)
-        shown = visuals.draw(view, light)
-        assert (shown.body_ids == body).sum() > 500
-        columns = np.flatnonzero((shown.body_ids == body).any(axis=0))
-        half_turn = (0.0, 0.0, 1.0, 0.0)
-        pybullet.resetJointStatesMultiDof(body, [1], [half_turn], physicsClientId=visuals.client)
-        turned = visuals.draw(view, light)
-        # The first link now faces away from the camera, and faces are visible from in front only.
-        assert np.flatnonzero((turned.body_ids == body).any(axis=0)).min() > columns.min()
-        visuals.hide(body)
-        gone = visuals.draw(view, light)
-        assert (gone.body_ids == -1).all()
-        assert np.isinf(gone.depth_m).all()
-        visuals.reveal(body)
-        again = visuals.draw(view, light)
-        np.testing.assert_array_equal(again.rgb, turned.rgb)
-
-
 def test_rendering_never_changes_the_physics() -> None:
     def drive(look: bool) -> bytes:
         with Warehouse() as hall:
@@ -199,7 +140,7 @@ def test_rendering_never_changes_the_physics() -> None:
 
 
 def test_a_closed_warehouse_cannot_be_rendered() -> None:
-    warehouse = Warehouse(WarehouseLayout.open_floor())
+    warehouse = Warehouse(WarehouseLayout.named("open"))
     visuals = warehouse.visuals
     client = visuals.client
     warehouse.close()

@@ -6,8 +6,9 @@ import numpy as np
 
 from perception.arrays import FloatArray
 from sim_tests.world.bullet import pybullet
-from sim_tests.world.hall import Mesh, ellipsoid, quad
+from sim_tests.world.hall import Mesh, quad
 from sim_tests.world.render import RenderView, Visuals
+from training.hall import ellipsoid
 
 CHECKERBOARD = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.array(
     [200, 40, 30]

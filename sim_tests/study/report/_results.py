@@ -1,0 +1,225 @@
+"""The figures of a run by arm: the summary that ``awarenav compare`` prints, with its episodes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from awarenav.errors import counted
+
+from ..measures import (
+    ATTENTIVE_FROM,
+    BASELINE,
+    FEW_PAIRS,
+    OVERSHOOT_MPS,
+    Comparison,
+    Interval,
+    Summary,
+    SummaryRow,
+    Variant,
+    labels,
+    measured_part,
+    paired,
+    proportion_interval,
+    summarise,
+)
+from ._page import THIN, hits, percent
+from ._run import Episode, Run
+
+#: The policy that knows the truth: a bound, and no candidate.
+CEILING: Final = "oracle"
+# Arms are shown in this order; candidates lie between.
+_ORDER: Final = {BASELINE: 0, CEILING: 2}
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """One arm of the comparison, in the sense of a clinical trial.
+
+    Attributes:
+        name: unique name in tables.
+        variant: its policy, planner and perception.
+        row: summary of its episodes under the fault of the report.
+        episodes: these episodes, the failed ones included.
+        others: its episodes under other faults.
+    """
+
+    name: str
+    variant: Variant
+    row: SummaryRow
+    episodes: tuple[Episode, ...]
+    others: tuple[Episode, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """The figures of a run, by arm.
+
+    Attributes:
+        fault: fault of the episodes in every section but the table of faults; empty for none,
+            which is preferred.
+        arms: those with episodes under that fault, the reference ``blind`` first.
+        summary: summary of the episodes under that fault.
+        probe: episodes of the probe of wider radii, which are in no arm.
+    """
+
+    fault: str
+    arms: tuple[Arm, ...]
+    summary: Summary
+    probe: tuple[Episode, ...]
+
+    @classmethod
+    def of(cls, run: Run) -> Results:
+        """Return the figures of a run."""
+        probe = tuple(each for each in run.episodes if each.record.policy == run.wide_policy)
+        own = [each for each in run.episodes if each.record.policy != run.wide_policy]
+        faults = [each.record.fault for each in own if not each.record.error]
+        fault = "" if "" in faults or not faults else faults[0]
+        records = [each.record for each in own if each.record.fault == fault]
+        summary = summarise(records)
+        name_of = labels(map(Variant.of, records))
+        rows = {row.variant: row for row in summary.policies}
+        arms = []
+        for variant, name in name_of.items():
+            found = [
+                each
+                for each in own
+                if (each.record.policy, each.record.planner, each.record.perception)
+                == (variant.policy, variant.planner, variant.perception)
+            ]
+            arms.append(
+                Arm(
+                    name,
+                    variant,
+                    rows[name],
+                    tuple(each for each in found if each.record.fault == fault),
+                    tuple(each for each in found if each.record.fault != fault),
+                )
+            )
+        arms.sort(key=lambda arm: _ORDER.get(arm.variant.policy, 1))
+        return cls(fault, tuple(arms), summary, probe)
+
+    @property
+    def judged(self) -> tuple[Arm, ...]:
+        """The arms that verdicts are about: all but ``blind`` and ``oracle``, unless none is."""
+        return tuple(arm for arm in self.arms if arm.variant.policy not in _ORDER) or self.arms
+
+    def against(self, arm: Arm, part: str = "", *, scenario: bool = False) -> Comparison | None:
+        """Return the comparison of an arm with ``blind`` and the same planner; None without one.
+
+        Args:
+            arm: the arm.
+            part: a part of :func:`measured_part`, or a scenario; empty for all episodes.
+            scenario: ``part`` is a scenario.
+        """
+        summary = self.summary
+        comparisons = summary.scenario_comparisons if scenario else summary.comparisons
+        return next((c for c in comparisons if (c.variant, c.part) == (arm.name, part)), None)
+
+    def verdict(self, arm: Arm) -> str:
+        """Return the sentences about an arm that are read first; they claim what is shown."""
+        ran = [each for each in (*arm.episodes, *arm.others) if not each.record.error]
+        if not ran:
+            return "No episode finished, so nothing can be said."
+        said = [_contacts(ran), _obeys(arm.episodes)]
+        arrived = sum(each.record.time_to_goal_s is not None for each in arm.episodes)
+        said.append(f"It reached the goal in {arrived} of {len(arm.episodes)}.")
+        whole = self.against(arm)
+        if whole is None:
+            if arm.variant.policy != BASELINE:
+                said.append("Without the policy blind on the same seeds, no time is won back.")
+            return " ".join(filter(None, said))
+        note = self._left_out(arm, whole)
+        attentive = self.against(arm, "attentive")
+        if attentive is not None:
+            said.append(_won_back("attentive people", attentive))
+        elif note:
+            said.append("Nobody was measured to be attentive, so time won back is not stated.")
+        else:
+            said.append(_won_back("people", whole))
+        unaware = self.against(arm, "unaware")
+        said.append(_violates(unaware or whole, "people" if unaware is None else "unaware people"))
+        return " ".join(filter(None, [*said, note]))
+
+    def _left_out(self, arm: Arm, whole: Comparison) -> str:
+        """Return the sentence on pairs that are attentive by the label of their scenario alone."""
+        base = next(each for each in self.arms if each.name == whole.baseline)
+        names = Counter(
+            first.versioned_scenario
+            for first, second in paired(*([e.record for e in a.episodes] for a in (base, arm)))
+            if first.attention == "attentive"
+            and not all(measured_part(each) == "attentive" for each in (first, second))
+        )
+        if not names:
+            return ""
+        listed = ", ".join(f"{name} {number}" for name, number in names.items())
+        return (
+            f"Left out of the time won back: {counted(names.total(), 'pair')} labelled attentive "
+            "in which somebody was not measured to be aware of the robot for "
+            f"{percent(ATTENTIVE_FROM)} of the time ({listed})."
+        )
+
+
+def moving_contacts(episodes: Sequence[Episode]) -> Interval:
+    """Return the share of episodes in which a person and the moving robot touched."""
+    return proportion_interval(sum(each.record.moving_touched for each in episodes), len(episodes))
+
+
+def _contacts(ran: Sequence[Episode]) -> str:
+    share = moving_contacts(ran)
+    touched, total = hits(share), counted(share.n, "episode")
+    if not touched:
+        return (
+            f"The moving robot touched nobody in {total}; a true rate of up to "
+            f"{percent(share.high)} remains possible."
+        )
+    by_robot = sum(each.record.robot_touched for each in ran)
+    return (
+        f"A person and the moving robot touched in {touched} of {total} ({percent(share.value)}): "
+        f"look at these first. The robot moved into the person in {by_robot} of them."
+    )
+
+
+def _obeys(episodes: Sequence[Episode]) -> str:
+    """Return the sentence on the speed limit; empty where the conduct is not known."""
+    conducts = [each.conduct for each in episodes if each.conduct is not None]
+    excesses = [c.limit_excess_mps for c in conducts if c.limit_excess_mps is not None]
+    if not excesses:
+        return ""
+    over = sum(each > OVERSHOOT_MPS for each in excesses)
+    if not over:
+        return "It obeys the speed limit."
+    return (
+        f"It breaks the speed limit in {over} of {counted(len(excesses), 'episode')}, by up to "
+        f"{max(excesses):.2f} m/s."
+    )
+
+
+def _won_back(who: str, against: Comparison) -> str:
+    back = against.won_back
+    if not back.known:
+        return f"No pair with {BASELINE} tells what it wins back."
+    text = f"{back.text(0, 100.0)}{THIN}% of the time that {BASELINE} loses to {who}"
+    if back.n < FEW_PAIRS:
+        return f"Over only {counted(back.n, 'pair')} it wins back {text}: too few to tell."
+    if back.low > 0.0:
+        return f"It wins back {text} ({counted(back.n, 'pair')})."
+    if back.high < 0.0:
+        return f"It is slower: it wins back {text}."
+    return f"That it wins back time is not shown: {text}."
+
+
+def _violates(against: Comparison, who: str) -> str:
+    change, base = against.violation_excess, "violation time"
+    if not change.known:  # the reference violates nothing
+        change, base = against.violation_excess_of_time, "driving time"
+    if not change.known:
+        return ""
+    text = f"{change.text(0, 100.0)}{THIN}% of {BASELINE}'s {base}"
+    if change.n < FEW_PAIRS or change.low <= 0.0 <= change.high:
+        return f"With {who}, no change of the time of negative margins is shown: {text}."
+    return (
+        f"With {who}, margins are negative {'longer' if change.value > 0.0 else 'shorter'}: {text}."
+    )
