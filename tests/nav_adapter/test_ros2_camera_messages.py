@@ -16,7 +16,7 @@ pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 from test_ros2_bridge import INFO, START_S, Listener, image, nobody, odometry
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import camera_of, is_rectified, optical_problem, picture_of
+from nav_adapter.ros2 import is_rectified, optical_problem, picture_of
 from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.geometry_msgs import (
     Quaternion,
@@ -97,13 +97,6 @@ def test_a_bridge_of_rectified_images_uses_p_without_distortion() -> None:
     assert nav.bridge.camera is None
 
 
-def test_a_bridge_of_raw_images_says_what_to_do_with_a_fisheye() -> None:
-    nav = Listener()
-    nav.bridge.on_camera_info(replace(INFO, distortion_model="equidistant", p=P))
-    assert "use their topic (image_rect)" in nav.warnings[-1]
-    assert nav.bridge.camera is None
-
-
 def test_the_images_tell_whether_a_part_or_the_whole_is_delivered() -> None:
     for size, principal in (((64, 48), (32.0, 24.0)), ((128, 96), (64.0, 48.0))):
         made: list[Camera] = []
@@ -125,13 +118,6 @@ def test_the_images_tell_whether_a_part_or_the_whole_is_delivered() -> None:
         assert len(made) <= 2
     assert not nav.bridge.on_image(picture(32, 24, START_S + 0.05), START_S + 0.05)
     assert "leave 64 x 48 px, but the images have 32 x 24 px" in nav.warnings[-1]
-
-
-def test_camera_of_takes_the_messages_of_other_libraries() -> None:
-    assert camera_of(CUT).cx_px == 32.0
-    assert camera_of(CUT, image_size_px=(128, 96)).cx_px == 64.0
-    with pytest.raises(NavError, match=r"camera_info: .* 128 x 96 px, .* 64 x 48 px, .* 9 x 9 px"):
-        camera_of(CUT, image_size_px=(9, 9))
 
 
 def test_a_row_that_is_shorter_than_its_pixels_is_named() -> None:

@@ -197,17 +197,6 @@ def test_transforms_from_the_future_are_refused_and_counted() -> None:
     assert robot.drive(now_s, 1.0)[-1].limited_by == "robot maximum"
 
 
-def test_images_from_the_future_are_refused_and_counted() -> None:
-    robot = Robot()
-    robot.drive(START_S, 1.0)
-    now_s = START_S + 1.0
-    for _ in range(3):
-        assert not robot.bridge.on_image(image(now_s + 3600.0), now_s)
-    assert robot.step(now_s).limited_by == "robot maximum"
-    assert robot.details()["images_from_future"] == "3"
-    assert len(robot.warnings) == 1
-
-
 def test_the_buffer_forgets_moving_transforms_only() -> None:
     buffer = TransformBuffer()
     buffer.add("base_link", "camera", 0.0, HERE, static=True)

@@ -13,7 +13,7 @@ from nav_scenes import ROBOT, finite, person, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
 from nav_adapter.ros2 import SLOWEST_MPS, Frames, SpeedMaskSettings, outgoing, speed_limit
-from nav_adapter.ros2._mask_stream import SpeedMaskStream
+from nav_adapter.ros2._speed_mask import SpeedMaskStream
 
 MPPI_RADPS = 1.9
 

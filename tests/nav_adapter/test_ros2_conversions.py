@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, crowds, finite, person, robot_at
 from shapely import affinity
@@ -92,6 +93,7 @@ def test_a_stamp_that_ros_cannot_hold_is_refused(stamp_s: float) -> None:
         to_time(stamp_s)
 
 
+@settings(max_examples=40)
 @given(crowds())
 def test_every_person_has_a_polygon_and_the_stop_polygon_comes_last(tracks) -> None:
     constraints = around(tracks)
@@ -134,6 +136,7 @@ def test_the_stop_zone_is_the_footprint_stretched_by_the_stopping_distance(speed
     assert zone.symmetric_difference(wanted).area < 1e-9
 
 
+@settings(max_examples=40)
 @given(crowds(), finite(-5.0, 5.0), finite(-5.0, 5.0))
 def test_the_grid_is_occupied_where_the_costmap_is_lethal(tracks, x: float, y: float) -> None:
     constraints = around(tracks)
@@ -156,31 +159,45 @@ def test_a_grid_without_cells_or_with_too_many_is_refused(change) -> None:
         occupancy_grid(limited(1.0), (0.0, 0.0), **change)
 
 
+@settings(max_examples=40)
 @given(crowds())
-def test_circles_contain_their_obstacles_and_keep_their_uuid(tracks) -> None:
+def test_every_person_is_in_the_messages_of_circles_obstacles_boxes_and_markers(tracks) -> None:
     constraints = around(tracks)
-    circles = circle_objects(constraints)
+    circles, teb = circle_objects(constraints), teb_obstacles(constraints, frame_id="world")
+    assert teb.header.frame_id == "world"
     assert len({each.uuid.uuid for each in circles}) == len(circles)
-    for circle, obstacle in zip(circles, constraints.obstacles, strict=True):
-        assert circle.fill
-        assert circle.value == 100
-        assert circle.radius >= obstacle.radius_m
-        assert circle.radius <= 1.02 * obstacle.radius_m
     assert [each.uuid for each in circle_objects(constraints)] == [each.uuid for each in circles]
-
-
-@given(crowds())
-def test_teb_gets_circles_with_velocities(tracks) -> None:
-    constraints = around(tracks)
-    message = teb_obstacles(constraints, frame_id="world")
-    assert message.header.frame_id == "world"
-    for each, obstacle in zip(message.obstacles, constraints.obstacles, strict=True):
-        (center,) = each.polygon.points
-        moving = each.velocities.twist.linear
-        assert (center.x, center.y) == tuple(obstacle.center_odom_m)
-        assert (moving.x, moving.y) == tuple(obstacle.velocity_odom_mps)
-        assert each.radius == obstacle.radius_m
-        assert each.id == obstacle.track_id
+    for obstacle, circle, moving, found in zip(
+        constraints.obstacles,
+        circles,
+        teb.obstacles,
+        detections(constraints).detections,
+        strict=True,
+    ):
+        x, y = obstacle.center_odom_m
+        vx, vy = obstacle.velocity_odom_mps
+        assert (circle.fill, circle.value, circle.radius) == (True, 100, obstacle.radius_m)
+        assert (circle.center.x, circle.center.y) == (x, y)
+        (center,) = moving.polygon.points
+        assert (center.x, center.y, moving.radius, moving.id) == (
+            (x, y, obstacle.radius_m, obstacle.track_id)
+        )
+        assert (moving.velocities.twist.linear.x, moving.velocities.twist.linear.y) == (vx, vy)
+        size, box = found.bbox.size, found.bbox.center
+        assert (size.x, size.y, size.z) == (*(2.0 * obstacle.radius_m,) * 2, obstacle.height_m)
+        assert box.position.z == 0.5 * obstacle.height_m
+        # The rotation about z turns x to the person's direction.
+        turn = box.orientation
+        heading = np.array([1.0 - 2.0 * turn.z**2, 2.0 * turn.w * turn.z])
+        assert np.allclose(heading * math.hypot(vx, vy), (vx, vy), atol=1e-9)
+        scores = {each.hypothesis.class_id: each.hypothesis.score for each in found.results}
+        assert scores == {"person": 1.0, "aware_person": obstacle.awareness_lower}
+    first, *rest = markers(constraints, robot_at()).markers
+    assert first.action == Marker.DELETEALL
+    assert len({(each.ns, each.id) for each in rest}) == len(rest)
+    assert all(each.lifetime.sec > 0 for each in rest)
+    assert sum(each.ns == "body" for each in rest) == len(constraints.obstacles)
+    assert constraints.limited_by in rest[-1].text
 
 
 def test_people_carry_awareness_in_their_tags() -> None:
@@ -194,43 +211,10 @@ def test_people_carry_awareness_in_their_tags() -> None:
     assert float(tags["awareness"]) == seen.awareness
     assert tags["status"] == "confirmed"
     assert message.reliability == 1.0
-
-
-def test_a_person_without_a_track_has_no_reliability() -> None:
-    constraints = around([person(track_id=4)])
-    (message,) = people(constraints, []).people
-    assert message.reliability == 0.0
-    assert "awareness" not in message.tagnames
-    assert "awareness_lower" in message.tagnames
-
-
-@given(crowds())
-def test_detections_are_the_papers_boxes(tracks) -> None:
-    constraints = around(tracks)
-    message = detections(constraints)
-    for found, obstacle in zip(message.detections, constraints.obstacles, strict=True):
-        size, center = found.bbox.size, found.bbox.center
-        assert (size.x, size.y) == (2.0 * obstacle.radius_m,) * 2
-        assert size.z == obstacle.height_m
-        assert center.position.z == 0.5 * obstacle.height_m
-        # The rotation about z turns x to the person's direction.
-        turn = center.orientation
-        heading = np.array([1.0 - 2.0 * turn.z**2, 2.0 * turn.w * turn.z])
-        speed = np.linalg.norm(obstacle.velocity_odom_mps)
-        assert np.allclose(heading * speed, obstacle.velocity_odom_mps, atol=1e-9)
-        scores = {each.hypothesis.class_id: each.hypothesis.score for each in found.results}
-        assert scores == {"person": 1.0, "aware_person": obstacle.awareness_lower}
-
-
-@given(crowds())
-def test_markers_delete_the_old_ones_and_have_distinct_ids(tracks) -> None:
-    constraints = around(tracks)
-    first, *rest = markers(constraints, robot_at()).markers
-    assert first.action == Marker.DELETEALL
-    assert len({(each.ns, each.id) for each in rest}) == len(rest)
-    assert all(each.lifetime.sec > 0 for each in rest)
-    assert sum(each.ns == "body" for each in rest) == len(constraints.obstacles)
-    assert constraints.limited_by in rest[-1].text
+    # Of a person without a track, whom the adapter still keeps.
+    (kept,) = people(constraints, []).people
+    assert kept.reliability == 0.0
+    assert kept.tagnames == ("awareness_lower", "radius_m")
 
 
 ALERTS = st.builds(
@@ -243,6 +227,7 @@ ALERTS = st.builds(
 )
 
 
+@settings(max_examples=40)
 @given(st.lists(ALERTS, max_size=4), st.booleans(), st.booleans())
 def test_alerts_follow_the_state_of_the_limit_as_warnings(
     given_alerts: list[Alert], stale: bool, suffices: bool

@@ -16,11 +16,10 @@ from paths import ROOT
 from scipy.spatial.transform import Rotation
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import CameraMount, RobotFile, TransformBuffer, camera_of, picture_of
+from nav_adapter.ros2 import CameraMount, RobotFile, TransformBuffer, picture_of
 from nav_adapter.ros2.conversions import pose_matrix, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import Quaternion
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image
-from perception import Camera
+from nav_adapter.ros2.messages.sensor_msgs import CompressedImage, Image
 
 RGB = np.random.default_rng(5).integers(0, 256, (4, 6, 3), dtype=np.uint8)
 SMOOTH = np.full((16, 16, 3), (200, 90, 30), np.uint8)
@@ -84,11 +83,6 @@ def test_the_orientation_in_an_image_file_is_ignored() -> None:
     assert read.shape == (64, 32, 3)
 
 
-def test_grey_becomes_three_equal_channels() -> None:
-    read = picture_of(raw(RGB[:, :, :1], "mono8"))
-    assert (read == RGB[:, :, :1]).all()
-
-
 @pytest.mark.parametrize(
     ("encoding", "first", "second"),
     [
@@ -132,38 +126,6 @@ def test_compressed_images_are_decoded(suffix: str, tolerance: int) -> None:
 def test_images_that_cannot_be_read_are_refused(message) -> None:
     with pytest.raises(NavError):
         picture_of(message)
-
-
-def test_camera_info_becomes_a_camera() -> None:
-    info = CameraInfo(
-        height=480,
-        width=640,
-        distortion_model="plumb_bob",
-        d=(0.1, -0.2, 0.001, 0.002, 0.0),
-        k=(500.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0),
-    )
-    wanted = Camera(640, 480, 500.0, 510.0, 320.0, 240.0, np.array(info.d))
-    point = [[0.3, -0.2, 2.0]]
-    assert np.array_equal(camera_of(info).project(point), wanted.project(point))
-
-
-@pytest.mark.parametrize(
-    ("info", "text"),
-    [
-        (CameraInfo(height=480, width=640), "calibrate"),
-        (CameraInfo(k=(500.0, *[0.0] * 8)), "camera_info"),
-        (
-            CameraInfo(
-                height=4, width=4, distortion_model="equidistant", d=(0.1,) * 4, k=(5.0,) * 9
-            ),
-            "rectify",
-        ),
-        (CameraInfo(height=4, width=4, k=(math.nan,) * 9), "calibrat"),
-    ],
-)
-def test_an_invalid_calibration_is_refused(info: CameraInfo, text: str) -> None:
-    with pytest.raises(NavError, match=text):
-        camera_of(info)
 
 
 poses = st.builds(
@@ -232,12 +194,6 @@ def test_frames_that_are_not_connected_are_refused_by_name() -> None:
         buffer.add("base", "odom", 0.0, np.eye(4))
     with pytest.raises(NavError, match="tree"):
         buffer.add("odom", "odom", 0.0, np.eye(4))
-
-
-@pytest.mark.parametrize("turn", [Quaternion(w=0.0), Quaternion(w=math.nan)])
-def test_a_quaternion_without_length_is_refused(turn: Quaternion) -> None:
-    with pytest.raises(NavError, match="quaternion"):
-        pose_matrix((0.0, 0.0, 0.0), turn)
 
 
 def test_a_camera_mount_looks_in_its_direction() -> None:

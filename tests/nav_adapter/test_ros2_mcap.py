@@ -81,17 +81,6 @@ def test_foxgloves_decoder_reads_it_too(recording: Path) -> None:
     assert limits == [dict(sent_messages())["/speed_limit"]["speed_limit"]] * 3
 
 
-def test_closing_twice_changes_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "once.mcap"
-    recorder = McapRecorder(path)
-    key, message = everything()[0]
-    recorder.write(PUBLISHED[key], encode(message), STAMP_S)
-    recorder.close()
-    whole = path.read_bytes()
-    recorder.close()
-    assert path.read_bytes() == whole
-
-
 def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NavError, match="cannot write"):
         McapRecorder(tmp_path / "nowhere" / "run.mcap")

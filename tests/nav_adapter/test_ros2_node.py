@@ -14,9 +14,7 @@ pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 from ros2_scenes import ROOT, everything, plain, typestore
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import decode, encode
 from nav_adapter.ros2.conversions import from_ros, ros_class, to_ros
-from nav_adapter.ros2.messages import ros_type
 from nav_adapter.ros2.messages.nav2_msgs import CircleObject
 from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.node import AwarenessNode
@@ -26,14 +24,6 @@ MESSAGES = [*everything(), ("odom", Odometry())]
 no_ros = pytest.mark.skipif(
     importlib.util.find_spec("rclpy") is not None, reason="ROS is installed here"
 )
-
-
-@pytest.mark.parametrize(("key", "message"), MESSAGES, ids=lambda value: str(value)[:12])
-def test_a_message_of_another_library_is_converted(key: str, message) -> None:
-    # rosbags' messages have attributes and arrays like those of rclpy.
-    cdr = encode(message)
-    theirs = STORE.deserialize_cdr(cdr, ros_type(type(message)))
-    assert from_ros(type(message), theirs) == decode(type(message), cdr)
 
 
 @pytest.mark.parametrize(("key", "message"), MESSAGES, ids=lambda value: str(value)[:12])

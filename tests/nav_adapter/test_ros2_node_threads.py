@@ -117,9 +117,13 @@ def two_scanners(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(StandInNode, "parameters", given)
 
 
-def test_the_node_reads_scanners_without_a_camera(node_module: Any, two_scanners: None) -> None:
+def test_the_node_reads_scanners_and_a_map_and_publishes_the_speed_mask(
+    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("use_map", True), ("speed_mask_hz", 2.0)):
+        monkeypatch.setitem(StandInNode.parameters, name, value)
     ros_node = node_module.AwarenessNode()
-    assert set(ros_node.callbacks) == {"odom", "tf", "tf_static", "scan", "scan_2"}
+    assert set(ros_node.callbacks) == {"odom", "tf", "tf_static", "scan", "scan_2", "map"}
 
     def hear(key: str, message: Any) -> None:
         ros_node.callbacks[READ[key].name](to_ros(message, lambda kind: SimpleNamespace))
@@ -136,6 +140,9 @@ def test_the_node_reads_scanners_without_a_camera(node_module: Any, two_scanners
             time.sleep(0.02)
         ros_node.timer()
         assert limits[-1].speed_limit > limits[0].speed_limit
+        (info,) = ros_node.sent[MASK_TOPICS["speed_mask_info"].name]
+        assert info.filter_mask_topic == "/robot_1/awarenav/speed_mask"  # as remapped
+        assert len(ros_node.sent[MASK_TOPICS["speed_mask"].name]) == 1
     finally:
         ros_node.stop()
     assert limits[-1].speed_limit == limits[0].speed_limit
@@ -169,47 +176,9 @@ def test_the_node_takes_a_calibrated_prediction_or_refuses_the_file(
     ros_node = node_module.AwarenessNode()
     try:
         assert ros_node._bridge._adapter._prediction == model
+        assert MASK_TOPICS["speed_mask"].name not in ros_node.sent  # by default there is none
     finally:
         ros_node.stop()
-
-
-def test_the_node_reads_a_map_beside_fixed_mounts(
-    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(StandInNode.parameters, "use_map", True)
-    ros_node = node_module.AwarenessNode()
-    try:
-        assert set(ros_node.callbacks) == {"odom", "scan", "scan_2", "map", "tf", "tf_static"}
-    finally:
-        ros_node.stop()
-
-
-def test_the_node_publishes_the_speed_mask_if_it_is_asked_to(
-    node_module: Any, two_scanners: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for rate_hz, count in ((0.0, 0), (2.0, 1)):
-        monkeypatch.setitem(StandInNode.parameters, "speed_mask_hz", rate_hz)
-        ros_node = node_module.AwarenessNode()
-        try:
-            end = time.monotonic() + PATIENCE_S
-            while ros_node._bridge.counts["scans"] < 4 and time.monotonic() < end:
-                for key, message in (
-                    ("odom", odometry(time.time(), speed=0.0)),
-                    ("scan", scan_message(time.time())),
-                    ("scan_2", scan_message(time.time())),
-                ):
-                    ros_node.callbacks[READ[key].name](
-                        to_ros(message, lambda kind: SimpleNamespace)
-                    )
-                time.sleep(0.02)
-            ros_node.timer()
-            infos = ros_node.sent[MASK_TOPICS["speed_mask_info"].name]
-            assert len(infos) == count
-            assert len(ros_node.sent[MASK_TOPICS["speed_mask"].name]) == count
-            if infos:  # as remapped
-                assert infos[0].filter_mask_topic == "/robot_1/awarenav/speed_mask"
-        finally:
-            ros_node.stop()
 
 
 def test_the_node_publishes_while_perception_is_busy(node_module: Any) -> None:
