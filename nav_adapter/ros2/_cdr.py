@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 import threading
-from functools import cache
 from types import SimpleNamespace
 from typing import Any, Final, TypeVar
 
@@ -13,7 +12,7 @@ import numpy as np
 from perception.installation import install_command
 
 from .._errors import NavError
-from ._message import FieldType, Message, definition, field_types, ros_type
+from ._message import FieldType, Message, definition, field_types, once_per_kind, ros_type
 from .conversions import from_ros
 
 try:
@@ -66,7 +65,7 @@ def decode(kind: type[_AnyMessage], data: bytes) -> _AnyMessage:
         raise NavError(f"received bytes are not a {name}: {cause}") from cause
 
 
-@cache
+@once_per_kind
 def _registered(kind: type[Message]) -> str:
     """Return the ROS name of a message class, which rosbags knows from then on."""
     name = ros_type(kind)
@@ -93,7 +92,7 @@ def _with_arrays(message: Message) -> Any:
     return SimpleNamespace(**values)
 
 
-@cache
+@once_per_kind
 def _fields_with_numbers(kind: type[Message]) -> tuple[tuple[str, FieldType], ...]:
     """Return the fields that are sequences of numbers, or messages that hold some."""
 

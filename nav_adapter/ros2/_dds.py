@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, Final, cast
 
 from perception.installation import install_command
 
 from .._errors import NavError
 from ._cdr import decode, encode
-from ._message import FieldType, Message, field_types, ros_type
+from ._message import FieldType, Message, field_types, once_per_kind, ros_type
 from ._topics import Topic
 
 try:
@@ -164,7 +163,7 @@ def _qos(topic: Topic) -> Qos:
     )
 
 
-@cache
+@once_per_kind
 def topic_type(kind: type[Message]) -> Any:
     """Return the DDS type of a message: an IDL structure with the name that ROS 2 gives it.
 
@@ -186,7 +185,7 @@ def topic_type(kind: type[Message]) -> Any:
     return made
 
 
-@cache
+@once_per_kind
 def _idl_type(kind: type[Message]) -> Any:
     """Return the IDL structure of a message."""
     # rosidl_generator_dds_idl mangles package/msg/Name in this way.

@@ -189,11 +189,8 @@ class ImageInput:
 
     def read(self, message: Image | CompressedImage, now_s: float) -> bool:
         """Process one image; return True if it was used."""
-        shared, stamp_s, frame_id = (
-            self._shared,
-            to_seconds(message.header.stamp),
-            message.header.frame_id,
-        )
+        shared = self._shared
+        stamp_s, frame_id = to_seconds(message.header.stamp), message.header.frame_id
         try:
             with shared.lock:
                 if self._camera is None:

@@ -125,6 +125,72 @@ class RobotPoses:
         self.transforms.forget(after_s=now_s + CLOCK_TOLERANCE_S)
         self._odometry.forget(after_s=now_s + CLOCK_TOLERANCE_S)
 
+    def forget(self) -> None:
+        """Forget the state, all transforms but the static ones, and which problems were told."""
+        self.state, self.problem = None, ""
+        self._ahead.clear()
+        self.transforms.forget()
+        self._odometry.forget()
+        self._check = OdometryCheck(self._frames)
+
+    def T_odom_camera(self, frame: str, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
+        """Return the pose (4, 4) of the camera.
+
+        Args:
+            frame: of the image; not used if the camera's frame has a name in ``frames``, or its
+                pose is fixed.
+            stamp_s: of the image.
+
+        Raises:
+            NavError: for a pose that is not known at that time, or not of an optical frame.
+        """
+        T_base_camera = self._T_base_camera
+        if T_base_camera is None:
+            frame = self._frames.camera or frame
+            if not self._is_on_robot(frame):
+                T_odom_camera = self.transforms.lookup(self._frames.odom, frame, stamp_s)
+                return _optical(T_odom_camera, frame, self._frames.odom)
+            T_base_camera = _optical(self.in_base(frame, stamp_s), frame, self._frames.base)
+        return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
+
+    def in_base(self, frame: str, stamp_s: float) -> FloatArray:
+        """Return the pose (4, 4) of a frame of the robot in the base frame.
+
+        Raises:
+            NavError: for a pose that is not known at that time.
+        """
+        return self.transforms.lookup(self._frames.base, frame, stamp_s)
+
+    def camera_in_base(self, frame: str, stamp_s: float) -> FloatArray | None:
+        """Return the pose (4, 4) of the camera in the base frame; None if it is not known."""
+        if self._T_base_camera is not None:
+            return self._T_base_camera
+        try:
+            return self.in_base(self._frames.camera or frame, stamp_s)
+        except NavError:
+            return None
+
+    def motion(self, start_s: float, end_s: float) -> RobotMotion:
+        """Return the robot's motion from one time to a later one, of a scan's first and last ray.
+
+        Where the odometry ends before that, the robot goes on at its speed.
+
+        Raises:
+            NavError: for poses that are not known, or end too long before.
+        """
+        state = self.state
+        if state is None:
+            raise NavError("no odometry yet: the pose of the robot is unknown")
+        velocity_mps = np.array([state.speed_mps, state.lateral_mps])
+        # Raises where the odometry ends too long before, also for a scan after its end.
+        T_end = self._T_odom_base(end_s)
+        if end_s > state.stamp_s:
+            T = self._T_odom_base(state.stamp_s)
+            return RobotMotion(state.stamp_s, T, velocity_mps, state.yaw_rate_radps)
+        if end_s <= start_s:
+            return RobotMotion(end_s, T_end, velocity_mps, state.yaw_rate_radps)
+        return RobotMotion.between(start_s, self._T_odom_base(start_s), end_s, T_end)
+
     def _is_future(self, kind: InputKind, stamp_s: float, now_s: float | None) -> bool:
         """Return whether a message is from the future; it is then counted."""
         refusal = None if now_s is None else self._clock.refusal(kind, stamp_s, now_s)
@@ -206,72 +272,6 @@ class RobotPoses:
         except NavError:
             return False
         return not any(self._frames.odom.lstrip("/") in way for way in ways)
-
-    def forget(self) -> None:
-        """Forget the state, all transforms but the static ones, and which problems were told."""
-        self.state, self.problem = None, ""
-        self._ahead.clear()
-        self.transforms.forget()
-        self._odometry.forget()
-        self._check = OdometryCheck(self._frames)
-
-    def T_odom_camera(self, frame: str, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
-        """Return the pose (4, 4) of the camera.
-
-        Args:
-            frame: of the image; not used if the camera's frame has a name in ``frames``, or its
-                pose is fixed.
-            stamp_s: of the image.
-
-        Raises:
-            NavError: for a pose that is not known at that time, or not of an optical frame.
-        """
-        T_base_camera = self._T_base_camera
-        if T_base_camera is None:
-            frame = self._frames.camera or frame
-            if not self._is_on_robot(frame):
-                T_odom_camera = self.transforms.lookup(self._frames.odom, frame, stamp_s)
-                return _optical(T_odom_camera, frame, self._frames.odom)
-            T_base_camera = _optical(self.in_base(frame, stamp_s), frame, self._frames.base)
-        return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
-
-    def in_base(self, frame: str, stamp_s: float) -> FloatArray:
-        """Return the pose (4, 4) of a frame of the robot in the base frame.
-
-        Raises:
-            NavError: for a pose that is not known at that time.
-        """
-        return self.transforms.lookup(self._frames.base, frame, stamp_s)
-
-    def camera_in_base(self, frame: str, stamp_s: float) -> FloatArray | None:
-        """Return the pose (4, 4) of the camera in the base frame; None if it is not known."""
-        if self._T_base_camera is not None:
-            return self._T_base_camera
-        try:
-            return self.in_base(self._frames.camera or frame, stamp_s)
-        except NavError:
-            return None
-
-    def motion(self, start_s: float, end_s: float) -> RobotMotion:
-        """Return the robot's motion from one time to a later one, of a scan's first and last ray.
-
-        Where the odometry ends before that, the robot goes on at its speed.
-
-        Raises:
-            NavError: for poses that are not known, or end too long before.
-        """
-        state = self.state
-        if state is None:
-            raise NavError("no odometry yet: the pose of the robot is unknown")
-        velocity_mps = np.array([state.speed_mps, state.lateral_mps])
-        # Raises where the odometry ends too long before, also for a scan after its end.
-        T_end = self._T_odom_base(end_s)
-        if end_s > state.stamp_s:
-            T = self._T_odom_base(state.stamp_s)
-            return RobotMotion(state.stamp_s, T, velocity_mps, state.yaw_rate_radps)
-        if end_s <= start_s:
-            return RobotMotion(end_s, T_end, velocity_mps, state.yaw_rate_radps)
-        return RobotMotion.between(start_s, self._T_odom_base(start_s), end_s, T_end)
 
     def _T_odom_base(self, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
         return self._odometry.lookup(self._frames.odom, self._frames.base, stamp_s)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT
 
@@ -275,6 +275,7 @@ def _mount() -> TFMessage:
     return TFMessage((TransformStamped(Header(frame_id="base_link"), "camera", move),))
 
 
+@settings(max_examples=40)
 @given(
     st.sampled_from(["odometry", "camera_info", "transforms", "image"]),
     st.lists(st.tuples(st.integers(4, 4000), st.integers(0, 255)), min_size=1, max_size=6),

@@ -87,7 +87,7 @@ def test_a_clock_step_of_10_ms_back_changes_nothing() -> None:
     assert robot.warnings == []
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(st.floats(0.0, 3600.0), st.floats(-3600.0, 3600.0))
 def test_static_transforms_survive_any_clock_step(before_s: float, step_s: float) -> None:
     robot = Robot(wanted={"speed_limit", "collision_polygons"}.__contains__)
