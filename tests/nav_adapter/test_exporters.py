@@ -1,39 +1,52 @@
-"""The shapes of the obstacles: circles, points, polygons and boxes."""
+"""People in a costmap, as shapes and as costs of trajectories, against brute force."""
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given
 from hypothesis import strategies as st
-from nav_scenes import ROBOT, crowds, finite, person, robot_at
+from nav_scenes import (
+    ROBOT,
+    Circle,
+    constraints_of,
+    crowds,
+    finite,
+    person,
+    robot_at,
+    settled_update,
+    some_circles,
+)
 from shapely.geometry import Point
 
 from nav_adapter import (
     AwarenessPolicy,
     NavAdapter,
     NavConstraints,
-    NavError,
     boxes,
     circles,
     points,
     polygons,
 )
+from nav_adapter.exporters import people_cost
 from tracking import PersonTrack
 
 NOBODY = NavConstraints(0.0, (), 1.0, "robot maximum", False)
 
 
-def constraints_for(tracks: tuple[PersonTrack, ...]) -> NavConstraints:
+def constraints_of_people(tracks: tuple[PersonTrack, ...]) -> NavConstraints:
     return NavAdapter(AwarenessPolicy(), ROBOT).update(tracks, robot_at(), 0.0)
 
 
 @given(tracks=crowds(), spacing_m=finite(0.01, 2.0))
 def test_all_shapes_agree(tracks: tuple[PersonTrack, ...], spacing_m: float) -> None:
-    constraints = constraints_for(tracks)
+    constraints = constraints_of_people(tracks)
     rows = circles(constraints)
     assert rows.shape == (len(tracks), 5)
     assert boxes(constraints).shape == (len(tracks), 7)
@@ -73,7 +86,76 @@ def test_without_people_every_shape_is_empty() -> None:
     assert polygons(NOBODY) == ()
 
 
-@given(spacing_m=st.sampled_from([0.0, -1.0, 1e-9, math.nan, math.inf]))
-def test_an_invalid_spacing_is_refused(spacing_m: float) -> None:
-    with pytest.raises(NavError, match="spacing_m must"):
-        points(constraints_for((person(),)), spacing_m)
+def test_copies_have_the_same_polygon() -> None:
+    (obstacle,) = settled_update([person(position=(3.0, 1.0))]).obstacles
+    copies = (
+        pickle.loads(pickle.dumps(obstacle)),
+        copy.copy(obstacle),
+        replace(obstacle, track_id=7),
+    )
+    for each in copies:
+        assert each.polygon.equals_exact(obstacle.polygon, 0.0)
+
+
+def gaps_m(circle: Circle, positions: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    x, y, vx, vy, radius = circle
+    centers = np.stack([x + vx * times_s, y + vy * times_s], axis=1)
+    return np.linalg.norm(positions - centers, axis=-1) - radius
+
+
+@given(
+    circles=some_circles(),
+    samples=st.integers(0, 5),
+    steps=st.integers(0, 6),
+    first_s=finite(0, 1),
+    robot_radius_m=finite(0, 1),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_the_cost_is_the_formula_summed_over_people(
+    circles: list[Circle],
+    samples: int,
+    steps: int,
+    first_s: float,
+    robot_radius_m: float,
+    seed: int,
+) -> None:
+    positions = np.random.default_rng(seed).uniform(-6, 6, (samples, steps, 2))
+    times_s = first_s + 0.2 * np.arange(steps)
+    expected = np.zeros((samples, steps))
+    for circle in circles:
+        gap = gaps_m(circle, positions, times_s) - robot_radius_m
+        for index, g in np.ndenumerate(gap):
+            expected[index] += 3.0 * math.exp(-g / 0.5) if g > 0.0 else 50.0 * (1.0 - g)
+    cost = people_cost(
+        constraints_of(*circles),
+        positions,
+        0.2,
+        robot_radius_m=robot_radius_m,
+        first_s=first_s,
+        inside_cost=50.0,
+        near_cost=3.0,
+        decay_m=0.5,
+    )
+    np.testing.assert_allclose(cost, expected, atol=1e-9)
+
+
+@given(circles=some_circles(1, 3), direction_rad=finite(-math.pi, math.pi))
+def test_cost_rises_towards_a_person_and_most_inside(
+    circles: list[Circle], direction_rad: float
+) -> None:
+    constraints = constraints_of(circles[0])
+    x, y, _, _, radius = circles[0]
+    distance_m = np.linspace(0.0, radius + 3.0, 50)
+    ray = np.array([math.cos(direction_rad), math.sin(direction_rad)])
+    cost = people_cost(constraints, ([x, y] + distance_m[:, None] * ray)[:, None], 0.1)[:, 0]
+    assert (np.diff(cost) < 0.0).all()
+    assert cost[distance_m < radius - 1e-9].min() >= 1000.0
+    assert cost[distance_m > radius + 1e-9].max() < 1.0
+
+
+def test_people_count_at_their_predicted_positions() -> None:
+    constraints = constraints_of((0.0, 5.0, 0.0, -1.0, 0.5))
+    waiting = np.zeros((1, 101, 2))
+    cost = people_cost(constraints, waiting, 0.1)[0]
+    times_s = 0.1 * np.arange(101)
+    np.testing.assert_array_equal(cost >= 1000.0, np.abs(times_s - 5.0) < 0.5 + 1e-9)
