@@ -1,4 +1,4 @@
-"""The adapter at one time: radii, limits, and the arithmetic behind them."""
+"""The adapter at one time: radii, limits, whom they count, and the arithmetic behind them."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ from nav_adapter import (
     RobotProfile,
 )
 from nav_adapter.limit import course_of, limit_mps
+from nav_adapter.policies import ReachRules
 from nav_adapter.reach import Reach
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
@@ -301,3 +302,82 @@ def test_finite_tracks_give_constraints_or_an_error_of_the_package(
     assert obstacle.polygon.is_valid
     assert obstacle.polygon.contains(Point(obstacle.center_odom_m))
     assert 0.0 <= constraints.speed_limit_mps <= ROBOT.max_speed_mps
+
+
+POLICY = AwarenessPolicy()
+
+
+def limit_for(
+    bearing_rad: float, distance_m: float, speed_mps: float, policy: AwarenessPolicy = POLICY
+) -> NavConstraints:
+    position = distance_m * np.array([math.cos(bearing_rad), math.sin(bearing_rad)])
+    state = robot_at(speed_mps=speed_mps)
+    return NavAdapter(policy, ROBOT).update((person(position=position),), state, 0.0)
+
+
+def test_a_person_behind_a_moving_robot_limits_it_less_than_one_ahead() -> None:
+    """Only somebody who is faster than the robot reaches it from behind."""
+    ahead, behind = limit_for(0.0, 1.5, 1.0), limit_for(math.pi, 1.5, 1.0)
+    assert behind.speed_limit_mps > ahead.speed_limit_mps
+    assert ahead.limited_by == "track 1: reach"
+    assert limit_for(math.pi, 5.0, 1.0).limited_by == "robot maximum"
+    # Somebody at the rear edge does reach a robot that stops.
+    assert limit_for(math.pi, 0.7, 1.0).speed_limit_mps < ROBOT.max_speed_mps
+
+
+@given(bearing=finite(-math.pi, math.pi), distance=finite(0.5, 4.0))
+def test_a_robot_limits_itself_the_way_it_drives(bearing: float, distance: float) -> None:
+    """Backwards as forwards: the robot is as long behind as ahead."""
+    forward = limit_for(bearing, distance, 1.0).speed_limit_mps
+    backward = limit_for(bearing + math.pi, distance, -1.0).speed_limit_mps
+    assert backward == pytest.approx(forward, abs=1e-6)
+    # A robot that stands may start either way.
+    standing = limit_for(bearing, distance, 0.0).speed_limit_mps
+    reversing = limit_for(bearing, distance, -1.0).speed_limit_mps
+    assert standing <= min(forward, reversing) + 0.02
+
+
+@given(bearing=finite(-math.pi, math.pi), distance=finite(0.5, 4.0), speed=finite(0.1, 1.5))
+def test_a_wider_turn_never_allows_more(bearing: float, distance: float, speed: float) -> None:
+    limits = [
+        limit_for(
+            bearing,
+            distance,
+            speed,
+            POLICY.model_copy(update={"reach": ReachRules(turn_deg=turn_deg)}),
+        ).speed_limit_mps
+        for turn_deg in (0.0, 30.0, 90.0, 180.0)
+    ]
+    assert (np.diff(limits) <= 1e-9).all()
+
+
+def test_the_limiting_rule_and_person_are_named() -> None:
+    tracks = (
+        person(track_id=4, position=(2.2, 0.0), awareness_lower=1.0),
+        person(track_id=7, position=(3.5, 0.0)),
+        person(track_id=9, position=(1.0, 0.0)),
+    )
+    driving = robot_at(speed_mps=0.3)
+    field = AwarenessPolicy(reach=None)
+    for policy, rule in ((POLICY, "reach"), (field, "in the path")):
+        assert settled_update(tracks[:1], policy=policy, state=driving).limited_by == (
+            f"track 4: {rule}"
+        )
+        assert settled_update(tracks, policy=policy, state=driving).limited_by == (
+            f"track 9: {rule}"
+        )
+    # Somebody unaware farther away limits more than somebody aware near the robot.
+    nearest_unaware = settled_update(
+        (
+            replace(tracks[0], position_odom_m=np.array([2.6, 0.0])),
+            person(track_id=7, position=(2.8, 0.0)),
+        ),
+        state=driving,
+    )
+    assert nearest_unaware.limited_by == "track 7: reach"
+
+
+@given(distance=finite(0.0, 6.0), bearing=finite(-math.pi, math.pi), share=finite(0.0, 1.0))
+def test_who_obeys_can_always_brake(distance: float, bearing: float, share: float) -> None:
+    allowed = limit_for(bearing, distance, 0.0).speed_limit_mps
+    assert limit_for(bearing, distance, share * allowed).braking_suffices

@@ -241,37 +241,3 @@ def test_the_protective_field_is_a_rectangle_ahead() -> None:
     assert in_the_path_mps((-0.7, 0.0), 0.30, 0.10, at) == at.maximum_mps
     assert in_the_path_mps((0.6, 0.0), 0.30, 0.10, at) == 0.0
     assert in_the_path_mps((math.nan, 0.0), 0.30, 0.10, at) == 0.0
-
-
-def keeps_place(x_m: float, variances: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Reach:
-    """Return the reach of somebody who stays where they are, ahead of the robot."""
-    return Reach(x_m, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, margin_m=MARGIN_M, variances=variances)
-
-
-def turning(rate_radps: float) -> RobotState:
-    return RobotState(0.0, np.zeros(2), 0.0, 0.5, rate_radps)
-
-
-def test_a_corner_that_swings_past_the_side_counts_at_its_farthest() -> None:
-    halves = [course_of(ROBOT, turning(rate), 0.0).half_m for rate in np.linspace(0.0, 8.0, 41)]
-    assert np.diff(halves).min() >= 0.0
-    assert halves[-1] == pytest.approx(ROBOT.circumscribed_radius_m)
-
-
-def test_no_turn_makes_the_robot_larger_than_its_circle() -> None:
-    radius_m = ROBOT.circumscribed_radius_m
-    for rate_radps in (2.0, 4.0, 8.0):
-        course = course_of(ROBOT, turning(rate_radps), math.pi)
-        for angle in np.linspace(0.0, math.pi, 13).tolist():
-            away_m = radius_m + MARGIN_M + 0.05
-            place = {"x_m": away_m * math.cos(angle), "y_m": away_m * math.sin(angle)}
-            assert limit_mps(keeps_place(0.0)._replace(**place), course) > 0.0
-
-
-@pytest.mark.parametrize("speed_mps", [0.55, 0.6, 0.81, 1.07])
-def test_a_robot_that_brakes_goes_as_far_as_its_stop(speed_mps: float) -> None:
-    course = straight_course_of(ROBOT, state(speed_mps))
-    way_m = 0.5 * speed_mps**2 / ROBOT.max_deceleration_mps2
-    at_m = 0.36 + MARGIN_M + way_m
-    assert not stops_in_time(keeps_place(at_m - 1e-4), course, speed_mps)
-    assert stops_in_time(keeps_place(at_m + 1e-4), course, speed_mps)

@@ -188,22 +188,6 @@ def test_for_people_who_stand_and_are_seen_the_field_is_the_limit() -> None:
     assert np.median(shares) > 0.999
 
 
-def test_straight_ahead_of_a_person_who_stands_the_field_is_the_limit_at_every_distance() -> None:
-    for alpha in (0.0, 1.0):
-        now = settled_update([person(position=(0.0, 0.0), awareness_lower=alpha)])
-        places = np.stack([np.linspace(-5.0, -0.9, 30), np.zeros(30)], axis=1)
-        field = speed_limit_at(
-            now, places[:, None], np.zeros((30, 1)), dt_s=1.0, speeds_mps=np.full((30, 1), 0.5)
-        )
-        assert field[0, 0] == ROBOT.max_speed_mps
-        for place, limit in zip(places.tolist(), field[:, 0].tolist(), strict=True):
-            there = settled_update(
-                [person(position=(0.0, 0.0), awareness_lower=alpha)],
-                state=robot_at(position=place, speed_mps=0.5),
-            ).speed_limit_mps
-            assert 0.95 * there - 5e-3 <= limit <= there
-
-
 @settings(max_examples=30)
 @given(scene=scenes(known=0), shift=st.tuples(finite(-0.5, 0.5), finite(-0.5, 0.5)))
 def test_a_cell_of_the_map_holds_for_a_robot_anywhere_in_it(
