@@ -64,7 +64,8 @@ def expected_mps(distance_m: float, human_mps: float) -> float:
     assert rules is not None
     times = rules.time_constant_s, rules.delay_s
     standing = Reach(distance_m, 0.0, 0.0, 0.0, human_mps, *times, margin_m=FLOOR_M)
-    return limit_mps(standing, course_of(ROBOT, robot_at(speed_mps=0.1), math.radians(30.0)))
+    course = course_of(ROBOT, robot_at(speed_mps=0.1), math.radians(30.0))
+    return min(limit_mps(standing, course), ROBOT.max_speed_mps)
 
 
 @pytest.mark.parametrize("distance_m", [1.2, 1.6, 2.4])

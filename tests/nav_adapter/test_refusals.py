@@ -19,6 +19,7 @@ from nav_adapter import (
     NavConstraints,
     NavError,
     PersonObstacle,
+    RobotProfile,
     RobotState,
     max_speed_mps,
     paint_costmap,
@@ -43,7 +44,10 @@ from nav_adapter.motion import (
     twist_envelope,
 )
 from nav_adapter.ros2 import RobotFile
-from tracking import PersonTrack
+from perception import PerceptionError
+from perception.arrays import finite_number
+from sim_tests.actors.robot import RobotModel, shipped_robots
+from tracking import PersonTrack, TrackerConfig, TrackingError
 from tracking.prediction import FITTED
 
 ONE = constraints_of((2, 0, 0, 0, 0.5))
@@ -51,6 +55,7 @@ ALONE = NavConstraints(0.0, (), 1.0, "a test", False)
 SETTLED = settled_update([person()])
 PLACES = np.zeros((2, 3, 2))
 STEERS = replace(ROBOT, drive="ackermann", min_turning_radius_m=1.4)
+OUTLINE_M = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
 CIRCLE = PersonObstacle(1, (3.0, 0.0), (0.0, 0.0), 0.5, 1.7, 0.0, ONE.obstacles[0].polygon)
 
 
@@ -104,6 +109,24 @@ def ahead(twists: Any = (0.1, 0.1), dt_s: float = 0.05, **changes: Any) -> Any:
 READ_ONLY = np.zeros((5, 5), dtype=np.uint8)
 READ_ONLY.setflags(write=False)
 
+#: Robots in another unit, or in the frame of a map, and what is said of them.
+OUTLINES: list[tuple[Any, str]] = [
+    (OUTLINE_M * 1000.0, "within 10 m of the base .*, got a corner at 438.292 m; .*millimetres"),
+    (OUTLINE_M * 100.0, "within 10 m of the base .*, got a corner at 43.8292 m; .*centimetres"),
+    (OUTLINE_M + np.array([12.0, 40.0]), "within 10 m of the base origin"),
+    (OUTLINE_M * 0.01, "at least 0.002 m², got 3.6e-05 m²; its corners are in metres"),
+    (OUTLINE_M * [1.0, 0.001], "at least 0.002 m², got 0.00036 m²"),
+]
+SPEEDS: list[tuple[str, float, str]] = [
+    ("max_speed_mps", 150.0, "at most 15 m/s, got 150 m/s; is it in mm/s, cm/s or km/h"),
+    ("max_acceleration_mps2", 100.0, "at most 10 m/s², got 100 m/s²"),
+    ("max_deceleration_mps2", 1000.0, "at most 10 m/s², got 1000 m/s²; is it in mm/s²"),
+    ("reaction_time_s", 300.0, "at most 5 s, got 300 s; is it in milliseconds"),
+    ("max_yaw_rate_radps", 90.0, "at most 20 rad/s, got 90 rad/s; is it in degrees per second"),
+    ("max_yaw_acceleration_radps2", 180.0, "at most 100 rad/s², got 180 rad/s²"),
+    ("min_turning_radius_m", 1500.0, "at most 100 m, got 1500 m; is it in millimetres"),
+]
+
 #: Calls, and what is said of their arguments.
 CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: NavAdapter({}, ROBOT), "policy must be an AwarenessPolicy, got dict"),
@@ -135,6 +158,14 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (
         lambda: replace(ROBOT, drive="tracked"),
         "drive must be 'differential', 'ackermann', 'holonomic'",
+    ),
+    *(
+        (lambda outline=outline: replace(ROBOT, footprint_m=outline), f"^footprint_m must .*{text}")
+        for outline, text in OUTLINES
+    ),
+    *(
+        (lambda name=name, value=value: replace(STEERS, **{name: value}), f"{name} must be {text}")
+        for name, value, text in SPEEDS
     ),
     *(
         (lambda name=name, value=value: replace(ROBOT, **{name: value}), name)
@@ -418,3 +449,23 @@ def test_a_robot_file_with_another_unit_or_a_boolean_is_refused(
     path.write_text(ROBOT_FILE.replace(old, new))
     with pytest.raises(NavError, match=text):
         RobotFile.from_yaml(path).profile()
+
+
+def test_small_large_and_shipped_robots_are_within_the_bounds() -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    e_puck_m = 0.035 * np.column_stack([np.cos(angle), np.sin(angle)])
+    assert RobotProfile(e_puck_m, 0.15, 1.0, 1.0, 0.0).reaction_time_s == 0.0
+    assert RobotProfile(OUTLINE_M * 12.0, 3.0, 2.0, 8.0, 1.0).max_deceleration_mps2 == 8.0
+    for name in shipped_robots():
+        assert RobotModel.shipped(name).profile.max_speed_mps <= 5.0
+
+
+def test_a_boolean_is_no_number_anywhere(tmp_path: Path) -> None:
+    for value in (True, np.False_):
+        with pytest.raises(PerceptionError, match="x must be a number, got bool"):
+            finite_number("x", value)
+        with pytest.raises(NavError, match="reaction_time_s must be a number"):
+            replace(ROBOT, reaction_time_s=value)
+    (tmp_path / "tracker.yaml").write_text("awareness: {memory_s: no}\n")
+    with pytest.raises(TrackingError, match="awareness: memory_s must be a number, got False"):
+        TrackerConfig.from_yaml(tmp_path / "tracker.yaml")
