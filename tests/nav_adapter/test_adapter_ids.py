@@ -75,6 +75,19 @@ def test_frames_of_a_tentative_track_count_as_sight() -> None:
     assert limit > unaware
 
 
+def test_repeated_tracks_are_no_longer_sight() -> None:
+    """Ten updates with one frame are one sighting."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    track = somebody(1, (2.5, 0.0), 0.95)
+    for k in range(5):
+        now = k * PERIOD_S
+        result = adapter.update((track,), robot_at(now, speed_mps=0.1), now)
+    unaware = frame(
+        NavAdapter(AwarenessPolicy(), ROBOT), 0.0, somebody(1, (2.5, 0.0), 0.0)
+    ).speed_limit_mps
+    assert result.speed_limit_mps <= unaware
+
+
 def test_whoever_had_a_reused_id_is_kept_for_a_second() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     seen(adapter, 40, somebody(1, NEAR, 0.9))

@@ -168,7 +168,7 @@ def test_the_people_kept_are_bounded_by_those_of_the_last_seconds() -> None:
         if step % 20 == 19:
             sizes.append(len(pickle.dumps(adapter)))
     assert max(sizes[5:]) <= 1.02 * max(sizes[:5])
-    for late_s in (1.1, 4.0):
+    for late_s in (1.1, 4.0, 7.0):  # the one before the last may have to be taken back
         after = adapter.update((), robot_at(now + late_s), now + late_s)
     assert after.obstacles == ()
     assert len(pickle.dumps(adapter)) <= 1.1 * empty

@@ -48,6 +48,15 @@ def test_a_person_who_is_missed_now_and_then_is_still_confirmed(
     assert (track.id, track.status) == (1, "confirmed")
 
 
+def test_hits_too_far_apart_confirm_no_track() -> None:
+    """One detection in four frames at one place is not enough for a person."""
+    tracker = PersonTracker(TrackerConfig(max_tentative_gap_s=1.0))
+    for step in range(60):
+        now = step * PERIOD_S
+        tracker.update([observe((3.0, 0.0), now)] if step % 4 == 0 else [], now, CAMERA)
+        assert all(track.status == "tentative" for track in tracker.predict(now))
+
+
 def test_a_repeated_frame_confirms_no_track() -> None:
     tracker = PersonTracker()
     for _ in range(10):
