@@ -19,9 +19,9 @@ from tqdm import tqdm
 
 from awarenav.errors import counted
 from awarenav.files import atomic_path
-from awarenav.line_files import LineFile
 from awarenav.records import (
     Record,
+    RecordFile,
     continue_records,
     read_records,
     record_line,
@@ -38,9 +38,7 @@ _TRUTH: Final = "truth.jsonl"
 _SETTINGS: Final = "render.yaml"
 _SHEET: Final = "contact_sheet.png"
 # All files of a set but its settings.
-_MADE: Final = re.compile(
-    r"(\d{6,}\.png|truth\.jsonl|camera\.yaml|contact_sheet\.png)(\.part|\.damaged)?"
-)
+_MADE: Final = re.compile(r"(\d{6,}\.png|truth\.jsonl|camera\.yaml|contact_sheet\.png)(\.part)?")
 # Time without a record after which the processes are checked for being alive.
 _POLL_S: Final = 1.0
 
@@ -91,7 +89,7 @@ def render(
     tasks = _group_by_scene(config, missing)
     workers = min(processes or os.cpu_count() or 1, max(len(tasks), 1))
     with (
-        LineFile(truth, SimError) as file,
+        RecordFile(truth, SimError) as file,
         tqdm(
             total=config.frames,
             initial=len(done),
@@ -102,7 +100,7 @@ def render(
         ) as bar,
     ):
         for record in _render_tasks(config, out, tasks, workers):
-            file.add(record_line(record))
+            file.add(record)
             bar.update()
     records = sorted(read_records(truth), key=lambda record: str(record["frame"]))
     write_records(truth, records)
@@ -169,10 +167,9 @@ def _write(content: Camera | RenderConfig, path: Path) -> None:
 
 
 def _finished_records(config: RenderConfig, out: Path) -> list[Record]:
-    """Return the records whose images exist; set damaged lines aside."""
+    """Return the records whose images exist."""
     truth = out / _TRUTH
-    names = {frame_name(frame) for frame in range(config.frames)}
-    records = continue_records(truth, names) if truth.exists() else []
+    records = continue_records(truth) if truth.exists() else []
     return [record for record in records if (out / str(record["frame"])).is_file()]
 
 
