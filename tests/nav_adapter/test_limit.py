@@ -81,7 +81,7 @@ def test_never_above_brute_force(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "worlds", [4_000, pytest.param(1_000_000, marks=pytest.mark.slow)], ids=str
+    "worlds", [4_000, pytest.param(1_000_000, marks=pytest.mark.full)], ids=str
 )
 def test_a_robot_that_obeys_touches_nobody_in_random_worlds(worlds: int) -> None:
     rng = np.random.default_rng(46)
