@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from paths import ROOT
 
 from sim_tests import SimError
-from sim_tests.demo._tables import EPISODE_COLUMNS
+from sim_tests.demo._comparison import EPISODE_COLUMNS
 from sim_tests.study.measures import (
     RECORD_COLUMNS,
     EpisodeRecord,
