@@ -54,8 +54,8 @@ def plot_comparison(path: Path, rows: Rows) -> None:
     _plot_curves(speed, "speed (m/s)", 1.8, rows, lambda frame: frame.robot_state.travel_mps)
     _mark_limits(speed, rows)
     _plot_curves(bound, "awareness α: the lower bound that acts", 1.1, aware, lowest_bound)
-    for row in aware:
-        _mark_memory(bound, row.result)
+    for number, row in enumerate(aware):
+        _mark_memory(bound, row.result, named=number == 0)
     _plot_curves(radius, "obstacle radius (m)", 2.5, met, largest_radius_m)
     for axes in (speed, bound, radius) if met else ():
         place_m = float(met[0].result.frames[-1].truth[0].position_odom_m[0])
@@ -130,17 +130,18 @@ def _mark_limits(axes: Axes, rows: Rows) -> None:
             if frame.constraints.speed_limit_mps < np.interp(x, along, speeds) - _SLOWER_MPS:
                 colour = _COLOURS[row.label]
                 axes.plot(x, frame.robot_state.travel_mps, "o", color=colour, ms=7)
-                place = (0.1, 0.08 + 0.2 * number)
+                place = (1.3, 0.08 + 0.2 * number)
                 axes.text(*place, f"limit from {x:.1f} m", fontsize=_SMALL_PT, color=colour)
                 break
 
 
-def _mark_memory(axes: Axes, result: CrossingResult) -> None:
+def _mark_memory(axes: Axes, result: CrossingResult, *, named: bool) -> None:
     """Mark where the worker is out of the camera's view and still counts as aware."""
     along, frames = _along_m(result).tolist(), result.frames
     seen = [x for x, frame in zip(along, frames, strict=True) if frame.observation_of(0)]
     aware = [x for x, frame in zip(along, frames, strict=True) if lowest_bound(frame)]
     if seen and aware and aware[-1] > seen[-1]:
-        axes.axvspan(seen[-1], aware[-1], color=_COLOURS["aware, attentive worker"], alpha=0.10)
+        axes.axvspan(seen[-1], aware[-1], color=_QUIET, alpha=0.12, lw=0)
+    if named and seen:
         text = "out of camera's view:\nremembered"
         axes.text(seen[-1] + 0.1, 0.85, text, fontsize=_SMALL_PT, color=_QUIET, va="center")
