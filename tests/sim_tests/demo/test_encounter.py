@@ -15,6 +15,7 @@ from sim_tests.demo import _demo
 from sim_tests.demo._encounter import CASES, case_values
 from sim_tests.world.camera import CameraTiming
 
+
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     """The command's folder, what it prints, and the encounter that it runs."""

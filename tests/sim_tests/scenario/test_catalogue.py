@@ -120,12 +120,6 @@ def test_impossible_positions_are_reported():
     assert scenario_problems(replay) == ("replay_csv: there is no file nowhere.csv",)
 
 
-def test_list_shows_every_scenario(capsys):
-    assert main(["scenario", "list"]) == 0
-    output = capsys.readouterr().out
-    assert all(f"{name}@1" in output for name in shipped_scenarios())
-
-
 def test_show_describes_what_varies_and_writes_yaml_that_can_be_read_back(capsys, tmp_path):
     assert main(["scenario", "show", "stops_midway"]) == 0
     output = capsys.readouterr().out
