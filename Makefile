@@ -27,7 +27,7 @@ demo: setup ## run the paper's encounter and the demonstration crossings; result
 test: lint ## run the linters, then every test; also build, install and import the wheel
 	$(PYTEST) $(PYTEST_ARGS)
 
-mutants: setup ## change constants of safety and geometry, one at a time: every change must fail a test
+mutants: setup ## change the code in 150 places, one at a time: how many changes does a test notice?
 	$(PY) -m tools.mutants
 
 lint: setup ## run ruff, the speller, the import contracts and strict type checks

@@ -281,17 +281,14 @@ def passing_radius_m(
         return floor_m
     state = RobotState(0.0, np.zeros(2), 0.0, PASSING_MPS, 0.0)
     course = course_of(robot, state, math.radians(rules.turn_deg))
-    person = Reach(
-        *(0.0, 0.0, 0.0, 0.0, speed_mps, rules.time_constant_s, rules.delay_s),
-        margin_m=floor_m,
-    )
+    motion = 0.0, 0.0, speed_mps, rules.time_constant_s, rules.delay_s
 
     def passes(radius_m: float) -> bool:
         beside_m = radius_m + course.half_m
         places = np.linspace(course.rear_m - radius_m, course.front_m + 3.0 * radius_m, 16)
         return all(
-            limit_mps(person._replace(x_m=x, y_m=beside_m), course) >= PASSING_MPS
-            for x in places.tolist()
+            limit_mps(Reach(x_m, beside_m, *motion, margin_m=floor_m), course) >= PASSING_MPS
+            for x_m in places.tolist()
         )
 
     low_m, high_m = floor_m, floor_m + 0.25

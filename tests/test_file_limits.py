@@ -10,7 +10,7 @@ from paths import ROOT
 
 from awarenav.baseline import read_baseline
 from awarenav.errors import AwarenavError
-from awarenav.estimate._open_source import open_source
+from awarenav.estimate import open_source
 from awarenav.models._catalogue import Catalogue
 from awarenav.records import continue_records, read_records
 from nav_adapter import AwarenessPolicy, NavError

@@ -55,7 +55,7 @@ def with_evidence(
     logits: FloatArray,
     dt_s: float,
     config: TrackerConfig,
-    sensor: int = 0,
+    sensor: int,
 ) -> TrackTable:
     """Return the tracks with the evidence of one frame, ``dt_s`` after the frame before.
 

@@ -17,7 +17,7 @@ def main() -> int:
     """Run the command; return 2 for bad input."""
     parser = make_parser(
         "benchmarks.leaderboard",
-        "Measure the rows that docs/leaderboard lacks, and write docs/leaderboard.md. An "
+        "Measure the rows that docs/leaderboard lacks, and write docs/what_it_wins.md. An "
         "interrupted run continues with the same command.",
     )
     parser.add_argument(

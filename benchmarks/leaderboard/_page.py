@@ -129,7 +129,7 @@ def write_leaderboard(board: Board, path: Path, folder: Path = RESULTS) -> None:
     for name, each in tables.items():
         plain = [[_MARKUP.sub(r"\1", cell.text) for cell in row] for row in each.cells]
         sections.append(Section(name, titles[name], tables=(Table(each.columns, plain),)))
-    lead = "Rows are policies with sensors and a planner; docs/leaderboard.md has the definitions."
+    lead = "Rows are policies with sensors and a planner; docs/what_it_wins.md has the definitions."
     write_page(path, "Leaderboard", sections, lead=lead)
 
 

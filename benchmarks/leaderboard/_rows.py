@@ -25,7 +25,7 @@ RESULTS: Final = _ROOT / "docs" / "leaderboard"
 #: Folder of the runs that measure them, which git ignores.
 WORK: Final = _ROOT / "build" / "leaderboard"
 #: The page.
-PAGE: Final = _ROOT / "docs" / "leaderboard.md"
+PAGE: Final = _ROOT / "docs" / "what_it_wins.md"
 _ROWS_FILE: Final = "rows.yaml"
 _TRUTH: Final = "truth"
 _REFERENCE: Final = "reference"

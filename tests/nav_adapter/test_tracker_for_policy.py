@@ -46,8 +46,6 @@ def test_no_code_passes_a_part_of_what_a_policy_needs() -> None:
     for folder, kind in itertools.product(folders, ("py", "md", "ipynb")):
         files += (ROOT / folder).rglob(f"*.{kind}")
     printed = [path for path in files if "TrackerConfig.for_policy(policy)" in path.read_text()]
-    assert {"README.md", "plug-it-into-your-planner.md", "plug_into_planner.py"} <= {
-        path.name for path in printed
-    }
+    assert {"README.md", "planners.md", "plug_into_planner.py"} <= {path.name for path in printed}
     parts = re.compile(r"awareness=\w*policy\w*\.filter")
     assert [path.name for path in files if parts.search(path.read_text())] == []

@@ -25,7 +25,6 @@ HELPERS = (
     "tests/paths.py",
     "tests/nav_adapter/conftest.py",
     "tests/nav_adapter/nav_scenes.py",
-    "tests/perception/networks/onnx_graphs.py",
 )
 #: Runs over every scenario, and so over the new one.
 CATALOGUE_TEST = "tests/sim_tests/scenario/test_catalogue.py"
@@ -113,16 +112,15 @@ def test_there_is_an_example_of_each_kind_with_its_test() -> None:
         "nav_adapter/policies/",
         "sim_tests/scenario/shipped/",
         "nav_adapter/exporters/_",
-        "perception/networks/detectors/_",
         CATALOGUE,
     ):
         assert any(path.startswith(folder) for path in paths), folder
-    assert sum(path.startswith("tests/") for path in paths) == 5
+    assert sum(path.startswith("tests/") for path in paths) == 4
 
 
 @pytest.mark.slow
 def test_the_tests_of_the_page_pass(copy: Path) -> None:
-    """One run, since most of the time goes to imports: six of the page, three of the catalogue."""
+    """One run, since most of the time goes to imports: five of the page, three of the catalogue."""
     pytest.importorskip("pybullet", reason="two of the examples cross a hall (extra sim)")
     tests = [block.path for block in blocks() if block.path.startswith("tests/")]
     tests += [
@@ -134,7 +132,7 @@ def test_the_tests_of_the_page_pass(copy: Path) -> None:
         )
     ]
     out = run(copy, "pytest", "-q", "-p", "no:cacheprovider", "--durations=5", *tests)
-    assert re.search(r"\b9 passed", out), out
+    assert re.search(r"\b8 passed", out), out
 
 
 def test_the_code_of_the_page_passes_the_linters(copy: Path) -> None:

@@ -2,7 +2,7 @@
 
     python -m tools.docs_site.films                # all scenarios, into docs/images/films
     python -m tools.docs_site.films blind_corner   # one
-    python -m tools.docs_site.films asking         # the two of docs/asking.md
+    python -m tools.docs_site.films asking         # the two of docs/policies.md
 
 The robot has the recommended set-up, a camera ahead and two laser scanners, and drives with the
 policy ``balanced`` and seed 0. Films run at twice the real speed.
@@ -28,7 +28,7 @@ from sim_tests.crossing import Stage, TopView
 from sim_tests.scenario import SCENARIO_SETS, ScenarioTemplate
 
 FOLDER: Final = Path(__file__).parents[2] / "docs" / "images" / "films"
-# Films of docs/asking.md, beside the folder: the same crossing with somebody who answers or not.
+# Films of docs/policies.md, beside the folder: the same crossing with somebody who answers or not.
 _ASKING: Final = {"asking_answered": 1.0, "asking_in_vain": 0.0}
 _ASKING_SEED: Final = 0
 #: Largest film, and largest sum of all films.

@@ -21,7 +21,7 @@ from awarenav.cli import POSITIVE, FolderPath, argument, command, option, option
         130: "Interrupted; the episodes so far are kept.",
     },
     epilog="A killed or interrupted run continues with the same command and --resume. "
-    "docs/frontier.md explains the picture. Needs the extra 'plot'.",
+    "docs/what_it_wins.md explains the picture. Needs the extra 'plot'.",
 )
 @argument(
     "folder",

@@ -8,7 +8,7 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
-#: Width of the parabola that smooths the speed; docs/metrics.md gives its frequency response.
+#: Width of the parabola that smooths the speed; docs/simulation.md gives its frequency response.
 SMOOTHED_OVER_S: Final = 0.5
 _DEGREE: Final = 2
 #: A robot counts as moving above this speed; it stops when it falls below the standing speed.

@@ -1,4 +1,4 @@
-"""The record of a crossing: every metric of docs/metrics.md."""
+"""The record of a crossing: every metric of docs/simulation.md."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def measure(
     attention: str = "mixed",
     fault: str = "",
 ) -> EpisodeRecord:
-    """Return all metrics of a crossing, as docs/metrics.md defines them.
+    """Return all metrics of a crossing, as docs/simulation.md defines them.
 
     Numbers are rounded to the six decimals that files keep, so that a record read from a file is
     equal.

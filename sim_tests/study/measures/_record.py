@@ -77,7 +77,7 @@ def _measure(
 
 @dataclass(frozen=True, slots=True, repr=False)
 class EpisodeRecord:
-    """The measures of one episode, as docs/metrics.md defines them.
+    """The measures of one episode, as docs/simulation.md defines them.
 
     None means that a measure does not apply to the episode. With an ``error``, every measure keeps
     its default. :data:`COLUMNS` has the meaning of each field.
@@ -411,7 +411,7 @@ class Ratio:
     factor: float = 1.0
 
 
-#: Ratios of sums by the name of their figure, as docs/metrics.md defines them.
+#: Ratios of sums by the name of their figure, as docs/simulation.md defines them.
 RATIOS: Final = {
     each.metric.name: each
     for each in (

@@ -220,7 +220,7 @@ def check_columns(columns: Sequence[str], source: str) -> None:
             hint = did_you_mean(name, RECORD_COLUMNS)
             raise SimError(
                 f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
-                "(docs/metrics.md lists all)"
+                "(docs/simulation.md lists all)"
             )
         if list(columns).count(name) > 1:
             raise SimError(f"{source} has the column {name!r} {list(columns).count(name)} times")

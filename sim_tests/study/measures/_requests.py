@@ -27,7 +27,7 @@ _SAME_S: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Requests:
-    """The requests for attention of one episode, as docs/metrics.md defines them.
+    """The requests for attention of one episode, as docs/simulation.md defines them.
 
     Attributes:
         requests: their number.

@@ -1,7 +1,7 @@
 """Step-out impacts: the share and speed of impacts with people who might set off at any time.
 
-An index of what a drive leaves to luck, computed from the log of an episode. docs/metrics.md says
-what it is not.
+An index of what a drive leaves to luck, computed from the log of an episode. docs/simulation.md
+says what it is not.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ FASTER_STEP_OUT: Final = StepOut(speed_mps=1.6, time_constant_s=0.35)
 
 @dataclass(frozen=True, slots=True)
 class StepOutImpacts:
-    """The step-out impacts of one episode, as docs/metrics.md defines them.
+    """The step-out impacts of one episode, as docs/simulation.md defines them.
 
     Attributes:
         unaware: expected impacts with unaware people, per 1 000 such crossings.

@@ -236,7 +236,7 @@ def _notes(summary: Summary) -> list[str]:
         "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
         "person and the moving robot touched, by any cause. step-out: step-out impacts\n"
         "with unaware people. (≤ x %): upper end of the exact interval. [?]: too few for an\n"
-        "interval. docs/metrics.md defines all figures."
+        "interval. docs/simulation.md defines all figures."
     ]
     if any(row.part == UNCONFIRMED for row in summary.attentions):
         notes.append(

@@ -14,7 +14,7 @@ from awarenav.cli import NUMBER, FilePath, argument, command, option, options
         "awarenav compare monday tuesday --baseline balanced --out both.csv",
     ],
     exit_status={0: "Success.", 2: "Bad input."},
-    epilog="docs/metrics.md defines every metric.",
+    epilog="docs/simulation.md defines every metric.",
 )
 @argument(
     "runs",

@@ -15,7 +15,7 @@ from awarenav.cli import FolderPath, Number, Seeds, argument, command, group, op
     "report",
     examples=["awarenav report crossings"],
     exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="docs/bench.md explains the page. Needs the extra 'bench'; the images of the worst "
+    epilog="docs/simulation.md explains the page. Needs the extra 'bench'; the images of the worst "
     "episodes also need the extra 'sim'.",
 )
 @argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")

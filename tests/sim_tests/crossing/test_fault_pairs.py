@@ -1,6 +1,6 @@
 """Pairs of faults of camera or odometry and of scanners: the robot touches nobody.
 
-One pair in each scenario always runs. docs/runs.md has the command for all pairs.
+One pair in each scenario always runs. docs/simulation.md has the command for all pairs.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def test_braking_counts_in_either_direction_and_is_never_overstated(dt_s, sign):
     deceleration, jerk = peak_deceleration_and_jerk(t, speed)
     assert deceleration == pytest.approx(1.0, abs=0.01)
     assert deceleration <= 1.0 + 1e-9
-    assert 2.5 < jerk < 5.0  # a sudden m/s² spreads over the window; see docs/metrics.md
+    assert 2.5 < jerk < 5.0  # a sudden m/s² spreads over the window; see docs/simulation.md
 
 
 def test_the_jerk_of_a_sudden_square_metre_per_second_is_as_documented():

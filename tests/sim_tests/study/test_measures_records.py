@@ -7,7 +7,6 @@ from dataclasses import fields, replace
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from paths import ROOT
 
 from sim_tests import SimError
 from sim_tests.demo._comparison import EPISODE_COLUMNS
@@ -60,11 +59,6 @@ def test_the_columns_of_earlier_tables_come_first_and_alone_suffice(tmp_path):
         writer.writerow(EPISODE_COLUMNS)
         writer.writerow(record_row(PLAIN)[: len(EPISODE_COLUMNS)])
     assert read_records(path) == (PLAIN,)
-
-
-def test_the_documentation_defines_every_column():
-    text = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
-    assert [name for name in RECORD_COLUMNS if f"`{name}`" not in text] == []
 
 
 def test_numbers_are_what_files_keep():

@@ -1,0 +1,1 @@
+"""How many single changes of the code a test notices."""
