@@ -159,7 +159,7 @@ def _draw_robot(axes: Axes, scenario: Scenario, now_s: float) -> FloatArray:
     cos, sin = math.cos(heading), math.sin(heading)
     outline = robot.footprint_m @ np.array([[cos, sin], [-sin, cos]]) + here
     axes.add_patch(Polygon(outline, fc=_ROBOT, ec="black", lw=0.8, zorder=5))
-    return here
+    return np.asarray(here)
 
 
 def _draw_person(axes: Axes, spec: PersonSpec, now_s: float, robot_m: FloatArray) -> None:
