@@ -163,7 +163,6 @@ def test_no_other_module_parses_yaml_or_json():
     """
     own = {
         "sim_tests/study/runs/_episode.py",
-        "sim_tests/dataset/_render.py",
         "perception/installation.py",
     }
     pattern = re.compile(r"yaml\.(\w*load\w*)\(|json\.loads?\(|model_validate_json\(|YAML\(")
