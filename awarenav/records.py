@@ -12,7 +12,9 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Container, Iterable
+import sys
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, cast
@@ -31,7 +33,6 @@ from perception.evidence import AWARENESS_REASONS, AwarenessReason
 
 from .errors import AwarenavError, not_one_of
 from .files import atomic_path
-from .line_files import DamagedLine, set_aside
 
 Record = dict[str, Any]
 
@@ -76,70 +77,68 @@ def read_records(path: Path) -> list[Record]:
     return records
 
 
-def check_record(record: Any, where: str) -> Record:
-    """Return a frame after checking every value that this library reads.
-
-    Raises:
-        AwarenavError: for a value that is missing or out of range; the message begins with
-            ``where``.
-    """
-    if not isinstance(record, dict) or any(key not in record for key in _KEYS):
-        raise AwarenavError(f"{where}: a frame needs the keys {', '.join(_KEYS)}")
-    if not isinstance(record["frame"], str):
-        raise AwarenavError(f"{where}: frame must be a name, got {record['frame']!r:.60}")
-    finite_number(f"{where}: stamp_s", record["stamp_s"], AwarenavError)
-    if record["T_odom_camera"] is not None:
-        finite_array(f"{where}: T_odom_camera", record["T_odom_camera"], (4, 4), AwarenavError)
-    if not isinstance(record["people"], list):
-        raise AwarenavError(f"{where}: people must be a list, got {record['people']!r:.60}")
-    for index, person in enumerate(record["people"]):
-        read_person(person, f"{where}, person {index}")
-    return record
-
-
-def continue_records(path: Path, known: Container[str] | None = None) -> list[Record]:
+def continue_records(path: Path) -> list[Record]:
     """Return the frames of a file that is to be continued, and leave only their lines in it.
 
-    An unfinished last line is removed. A line in front of it that is not a frame, that has a value
-    out of range or the name of an earlier frame, is damaged: it is set aside in the file
-    ``.damaged`` and named on standard error.
-
-    Args:
-        path: of the file.
-        known: valid names of frames; None for any.
+    An unfinished last line, which an interrupted writer leaves, is cut off with a remark on
+    standard error.
 
     Raises:
-        AwarenavError: for a file that cannot be read or written, or of which no line is a frame
-            (unless ``known`` says what its frames are).
+        AwarenavError: for a file that cannot be read or written; for any other line that is not a
+            frame, with its number; for two frames of one name.
     """
-    found: list[tuple[int, bytes, Record]] = []
-    damaged = []
-    for number, line in enumerate(read_lines(path, AwarenavError), start=1):
-        where = f"{path}, line {number}"
+    records = read_records(path)
+    by_name = {str(record["frame"]): record for record in records}
+    if len(by_name) < len(records):
+        names = [str(record["frame"]) for record in records]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise AwarenavError(f"{path}: two frames have the name {twice!r}")
+    if sum(1 for line in read_lines(path, AwarenavError) if line.strip()) > len(records):
+        print(f"{path}: the last line is unfinished, its frame is made again", file=sys.stderr)
+    write_records(path, records)
+    return records
+
+
+class RecordFile(AbstractContextManager["RecordFile"]):
+    """A JSON Lines file that frames are appended to; a killed process leaves half a line at most.
+
+    Args:
+        path: of the file, made when missing.
+        error: class of the errors.
+
+    Raises:
+        AwarenavError: or ``error``, if the file cannot be opened.
+    """
+
+    def __init__(self, path: Path, error: type[AwarenavError] = AwarenavError) -> None:
+        self._path, self._error = path, error
         try:
-            if line.strip():
-                value = parse_json(line, where, AwarenavError, finite=True)
-                record = check_record(value, where)
-                if known is not None and record["frame"] not in known:
-                    raise AwarenavError(f"{where}: there is no frame {record['frame']!r}")
-                found.append((number, line, record))
-        except ValueError as cause:
-            if line.endswith(b"\n"):  # else the writer was interrupted
-                damaged.append(DamagedLine(number, line.rstrip(b"\n"), str(cause)))
-    records: dict[str, Record] = {}
-    for _, _, record in found:
-        records.setdefault(record["frame"], record)
-    differing = {record["frame"] for _, _, record in found if records[record["frame"]] != record}
-    for number, line, record in found:
-        if record["frame"] in differing:  # nothing says which of them is right
-            records.pop(record["frame"], None)
-            reason = f"another frame has the name {record['frame']!r}"
-            damaged.append(DamagedLine(number, line.rstrip(b"\n"), reason))
-    if damaged and not records and known is None:
-        raise AwarenavError(f"{path} is not a file of frames: {damaged[0].reason}")
-    set_aside(path, damaged, "their frames are made again")
-    write_records(path, records.values())
-    return list(records.values())
+            self._file = path.open("ab", buffering=0)
+        except OSError as cause:
+            raise error(f"cannot write {path}: {cause.strerror or cause}") from cause
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; every line is already in it."""
+        self._file.close()
+
+    def add(self, record: Record) -> None:
+        """Append a frame.
+
+        Raises:
+            AwarenavError: or the class given, if it cannot be written, as on a full disk.
+        """
+        rest = memoryview(record_line(record).encode())
+        try:
+            while rest:
+                rest = rest[self._file.write(rest) :]
+        except OSError as cause:
+            raise self._error(
+                f"cannot write {self._path}: {cause.strerror or cause}; the lines so far are "
+                "kept, and --resume continues"
+            ) from cause
 
 
 def write_records(path: Path, records: Iterable[Record]) -> None:

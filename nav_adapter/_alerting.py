@@ -16,10 +16,9 @@ from ._people import Person, Vector2
 from ._predicted import predicted_sigmas_m
 from ._robot import RobotProfile, RobotState
 from .alerts import Alert, AlertKind
+from .limit import STANDING_MPS
 from .policies import AlertRules
 
-# Nobody is warned of a robot slower than this.
-_STANDING_MPS: Final = 0.05
 # Below this relative speed there is no closest approach.
 _SAME_VELOCITY_MPS: Final = 1e-3
 # Below this value of −(r · v), whether they approach is a matter of rounding.
@@ -98,7 +97,7 @@ def _candidates(
     prediction: PredictionModel | None,
 ) -> list[Alert]:
     """Return the alert for each person to warn, without the limit on how often."""
-    if robot_state.travel_mps <= _STANDING_MPS:
+    if robot_state.travel_mps <= STANDING_MPS:
         return []
     # The robot's state is ``age_s`` old; it has driven straight on since.
     age_s, position = now - robot_state.stamp_s, robot_state.position_odom_m.tolist()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.matrices import larger_eigenvalue
 from tracking import PersonTrack
 
 from .reach import covariance_terms
@@ -28,7 +29,7 @@ def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
     xx += ahead_s * (2.0 * xu + ahead_s * uu)
     yy += ahead_s * (2.0 * yv + ahead_s * vv)
     xy += ahead_s * (xv + yu + ahead_s * uv)
-    return math.sqrt(max(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy), 0.0))
+    return math.sqrt(max(larger_eigenvalue(xx, xy, yy), 0.0))
 
 
 def velocity_variance_m2ps2(track: PersonTrack) -> float:

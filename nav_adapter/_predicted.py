@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from perception.arrays import FloatArray
+from perception.matrices import larger_eigenvalue
 from tracking import PersonTrack
 from tracking.prediction import PredictionModel, predict_ahead
 
@@ -18,5 +19,5 @@ def predicted_sigmas_m(
 
 def largest_sigmas_m(covariances_m2: FloatArray) -> FloatArray:
     """Return standard deviations (...) of positions (..., 2, 2), in their most uncertain way."""
-    xx, xy, yy = (covariances_m2[..., 0, 0], covariances_m2[..., 0, 1], covariances_m2[..., 1, 1])
-    return np.asarray(np.sqrt(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)))
+    xx, xy, yy = (covariances_m2[..., row, column] for row, column in ((0, 0), (0, 1), (1, 1)))
+    return np.asarray(np.sqrt(larger_eigenvalue(xx, xy, yy)))

@@ -17,6 +17,7 @@ import math
 from typing import Final, NamedTuple
 
 from perception.anthropometry import BODY_RADIUS_M
+from perception.matrices import larger_eigenvalue
 
 #: A time constant with which a velocity does not change within seconds.
 WALKING_ON_S: Final = 1e4
@@ -97,12 +98,7 @@ def covariance_terms(
     (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = covariance_odom
     factor = sigmas * sigmas
     return (
-        factor * _largest(xx, yy, xy),
-        factor * _largest(2.0 * xu, 2.0 * yv, xv + yu),
-        factor * _largest(uu, vv, uv),
+        factor * larger_eigenvalue(xx, xy, yy),
+        factor * larger_eigenvalue(2.0 * xu, xv + yu, 2.0 * yv),
+        factor * larger_eigenvalue(uu, uv, vv),
     )
-
-
-def _largest(xx: float, yy: float, xy: float) -> float:
-    """Return the larger eigenvalue of a symmetric matrix."""
-    return 0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy)

@@ -1,4 +1,4 @@
-"""Links, paths, imports and command lines in the documentation lead to things that exist."""
+"""Links, paths, imports, command lines and quoted messages in the documentation exist."""
 
 from __future__ import annotations
 
@@ -156,3 +156,53 @@ def test_commands_shown_exist_with_their_options(page: str) -> None:
 def test_the_documentation_is_found() -> None:
     assert len(PAGES) >= 12
     assert sum(len(list(command_lines(page))) for page in PAGES) > 40
+
+
+# --- the FAQ ------------------------------------------------------------------------------------
+
+#: Messages: bold code at the start of a paragraph.
+QUOTED = re.findall(
+    r"^\*\*`([^`]+(?:`{1}[^`*]+`{1}[^`]*)*)`\*\*",
+    (ROOT / "docs" / "faq.md").read_text("utf-8"),
+    re.MULTILINE,
+)
+#: Those of other programs.
+FOREIGN = {"externally-managed-environment", "No matching distribution found for awarenav"}
+# A part of a message that says so much belongs to it alone.
+ENOUGH = 15
+
+
+def fixed_parts(node: ast.expr) -> Iterator[str]:
+    """Yield the parts of a string in the code that do not depend on the case."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        for part in node.values:
+            yield from fixed_parts(part)
+
+
+@cache
+def said_by_the_code() -> frozenset[str]:
+    found = set()
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                if isinstance(node, (ast.Constant, ast.JoinedStr)):
+                    parts = [part.strip() for part in fixed_parts(node)]
+                    found |= {part for part in parts if len(part) >= ENOUGH}
+    return frozenset(found)
+
+
+@pytest.mark.parametrize("message", [each for each in QUOTED if each not in FOREIGN])
+def test_a_quoted_message_is_one_of_the_code(message: str) -> None:
+    # Lines are wrapped, and a message may be cut off.
+    plain = " ".join(message.split())
+    pieces = [piece.strip() for piece in plain.split("…") if len(piece.strip()) >= ENOUGH]
+    assert any(
+        part in plain or any(piece in part for piece in pieces) for part in said_by_the_code()
+    ), plain
+
+
+def test_messages_are_found() -> None:
+    assert len(QUOTED) > 12
+    assert set(QUOTED) >= FOREIGN

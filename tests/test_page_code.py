@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from page_code import Block, Reader, blocks_of, compare_output, is_installation
+from page_code import Block, Reader, blocks_of, compare_output
 from paths import ROOT
 
 from nav_adapter import RobotState
@@ -108,28 +108,6 @@ def test_every_tutorial_says_what_it_gives_what_it_needs_and_how_long_it_takes()
         assert "\n## Where to go next\n" in text, path.name
 
 
-def test_blocks_are_read_with_what_is_said_before_them() -> None:
-    page = (
-        "Save this as `a/b.py`:\n\n```python\nx = 1\n```\n\nSave nothing. Then:\n\n"
-        "<!-- exits with 2 -->\n\n    awarenav x\n    pip install 'awarenav[sim]'\n\n"
-        "<!-- varies: it has a clock -->\n```text\n12 s\n```\n\n"
-        "<!-- not run: needs a camera -->\n```sh\nawarenav doctor 0\n```\n\n"
-        "A diagram:\n\n    a ─► b\n\n<!-- slow: minutes -->\n```python\ny = 2\n```\n"
-    )
-    assert [(each.kind, each.name, each.status) for each in blocks_of(page)] == [
-        ("file", "a/b.py", 0),
-        ("shell", "", 2),
-        ("output", "", 0),
-        ("shell", "", 0),
-        ("python", "", 0),
-    ]
-    _, shell, output, camera, slow = blocks_of(page)
-    assert shell.text == "awarenav x\npip install 'awarenav[sim]'\n"
-    assert output.varies
-    assert camera.skipped == "needs a camera"
-    assert slow.slow
-
-
 def test_output_may_leave_out_lines_and_differ_in_the_last_digits() -> None:
     printed = "0%\r50%\nfound  12 people at 3.14 m\nmore\nlimit 0.51 m/s (track 1)\n"
     compare_output("found 12 people at 3.15 m\n…\nlimit 0.51 m/s (…)\n", printed, "page")
@@ -146,10 +124,3 @@ def test_a_failing_block_names_its_page_and_line(tmp_path: Path) -> None:
     with pytest.raises(AssertionError, match=r"page\.md:7"):
         reader.follow([Block("shell", "python -c 'raise SystemExit(3)'\n", 7)], full=False)
     assert reader.follow([Block("python", "assert 1 + 1 == 2\n", 8)], full=False) == 1
-
-
-def test_installations_are_not_run_but_name_extras_that_exist() -> None:
-    assert is_installation("pip install 'awarenav[sim,bench]'", "page")
-    assert not is_installation("awarenav doctor", "page")
-    with pytest.raises(AssertionError, match="no extra 'simulator'"):
-        is_installation("pip install 'awarenav[simulator]'", "page")

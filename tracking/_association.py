@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from perception.arrays import FloatArray
+from perception.matrices import mahalanobis2
 
 from ._sizes import Sized
 from ._table import BoolArray, IndexArray
@@ -160,37 +161,39 @@ def _edges(
 ) -> _Edges:
     """Return the matches that pass both gates, with their costs d² + ln det S."""
     places_m = measured_m[None] if sizes is None else sizes.positions_odom_m
-    offset_x = places_m[..., 0] - positions_m[:, None, 0]
-    offset_y = places_m[..., 1] - positions_m[:, None, 1]
-    near = offset_x * offset_x + offset_y * offset_y <= gates.distance_m**2
+    offsets_m = places_m - positions_m[:, None]
+    near = np.square(offsets_m).sum(axis=-1) <= gates.distance_m**2
     flat = np.flatnonzero(near if wide is None else near | wide.near)
     tracks, measurements = np.divmod(flat, len(measured_m))
-    x, y = offset_x.ravel()[flat], offset_y.ravel()[flat]
+    offsets_m = offsets_m.reshape(-1, 2)[flat]
     spread = covariances_m2[tracks] + noises_m2[measurements]
     if sizes is not None:
         scale2 = sizes.scales[tracks, measurements] ** 2 - 1.0
         spread += scale2[:, None, None] * noises_m2[measurements]
         spread += sizes.extra[tracks, measurements]
-    s_xx, s_xy, s_yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
-    determinant = s_xx * s_yy - s_xy * s_xy
-    distance2 = (s_yy * x * x - 2.0 * s_xy * x * y + s_xx * y * y) / determinant
-    costs = distance2 + np.log(determinant)
+    distance2, costs = _distance2_and_cost(offsets_m, spread)
     inside = distance2 <= gates.mahalanobis2
     beyond = np.zeros(len(flat), dtype=np.bool_)
     if wide is not None:
         inside &= near.ravel()[flat]
         rows = np.flatnonzero(wide.near.ravel()[flat])
-        x, y = x[rows], y[rows]
         spread = spread[rows] + wide.extra[tracks[rows], :2, :2]
-        s_xx, s_xy, s_yy = spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1]
-        determinant = s_xx * s_yy - s_xy * s_xy
-        distance2 = (s_yy * x * x - 2.0 * s_xy * x * y + s_xx * y * y) / determinant
-        dearer = distance2 + np.log(determinant) + wide.price
+        distance2, dearer = _distance2_and_cost(offsets_m[rows], spread)
+        dearer += wide.price
         possible = (distance2 <= gates.mahalanobis2) & ~inside[rows]
         costs[rows[possible]] = dearer[possible]
         beyond[rows[possible]] = inside[rows[possible]] = True
     edges = _Edges(tracks, measurements, costs, beyond)
     return edges if inside.all() else edges.where(inside)
+
+
+def _distance2_and_cost(
+    offsets_m: FloatArray, spread_m2: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return d² and d² + ln det S, (E,) each, of offsets (E, 2) with covariances S (E, 2, 2)."""
+    distance2 = mahalanobis2(offsets_m, spread_m2)
+    determinant = spread_m2[:, 0, 0] * spread_m2[:, 1, 1] - spread_m2[:, 0, 1] ** 2
+    return distance2, np.asarray(distance2 + np.log(determinant))
 
 
 def _solve(edges: _Edges, miss_cost: float, partner: IndexArray) -> None:

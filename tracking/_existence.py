@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from perception.arrays import FloatArray
+from perception.matrices import mahalanobis2
 
 from ._config import TrackerConfig
-from ._kalman import inverse_2x2
 from ._table import IndexArray, TrackTable
 
 # The share of people who are missed so often in a row that a tentative track gives them up.
@@ -39,9 +39,7 @@ def detection_logits(
         config: settings.
     """
     spread = covariances_m2 + noises_m2
-    inverse = inverse_2x2(spread)
-    x, y = (measured_m - positions_m).T
-    d2 = x * x * inverse[:, 0, 0] + 2.0 * x * y * inverse[:, 0, 1] + y * y * inverse[:, 1, 1]
+    d2 = mahalanobis2(measured_m - positions_m, spread)
     determinant = spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2
     return np.asarray(
         0.5 * (config.miss_cost - d2 - np.log(determinant))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from perception.arrays import FloatArray
+from perception.matrices import inverse_2x2
 
 _IDENTITY = np.eye(4)
 
@@ -34,14 +35,3 @@ def correct(
     joseph += gain @ noises_m2 @ gain.transpose(0, 2, 1)
     # Rounding leaves the covariance asymmetric in the last digit.
     return corrected, 0.5 * (joseph + joseph.transpose(0, 2, 1))
-
-
-def inverse_2x2(matrices: FloatArray) -> FloatArray:
-    """Return the inverses of (N, 2, 2) symmetric matrices in closed form."""
-    inverse = np.empty_like(matrices)
-    xx, xy, yy = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
-    scale = 1.0 / (xx * yy - xy * xy)
-    inverse[:, 0, 0] = yy * scale
-    inverse[:, 1, 1] = xx * scale
-    inverse[:, 0, 1] = inverse[:, 1, 0] = -xy * scale
-    return inverse

@@ -26,10 +26,10 @@ from typing import Final
 import numpy as np
 
 from perception.arrays import FloatArray
+from perception.matrices import mahalanobis2
 
 from ._clocks import FrameClock
 from ._faces import face_period_s
-from ._kalman import inverse_2x2
 from ._matching import Found
 from ._measurement import Frame
 from ._sensors import Sensors
@@ -233,8 +233,7 @@ def _jumped(before: TrackTable, after: TrackTable, frame: Frame, found: Found) -
         columns = found.source[rows]
         spread = before.covariances[rows, :2, :2] + frame.measurements.noises_m2[columns]
         offset = frame.measurements.positions_odom_m[columns] - before.states[rows, :2]
-        chi2 = (offset[:, None] @ inverse_2x2(spread) @ offset[:, :, None])[:, 0, 0]
-        jumped[rows] = chi2 > _JUMP_CHI2
+        jumped[rows] = mahalanobis2(offset, spread) > _JUMP_CHI2
     return jumped
 
 
@@ -285,7 +284,6 @@ def _set_off(tracks: TrackTable, towards: FloatArray) -> BoolArray:
     slower = tracks.look_speeds_mps / np.maximum(np.hypot(before[:, 0], before[:, 1]), 1e-9)
     expected_mps *= np.minimum(slower, 1.0)
     faster = approach_mps > expected_mps + _FASTER_MPS
-    inverse = inverse_2x2(tracks.covariances[:, 2:, 2:])
-    chi2 = (velocity[:, None] @ inverse @ velocity[:, :, None])[:, 0, 0]
+    chi2 = mahalanobis2(velocity, tracks.covariances[:, 2:, 2:])
     moves = (np.hypot(velocity[:, 0], velocity[:, 1]) > _STARTED_MPS) & (chi2 > _STARTED_CHI2)
     return np.asarray(faster | (tracks.look_standing & moves))

@@ -11,12 +11,12 @@ from typing import Final
 import numpy as np
 
 from perception.arrays import FloatArray
+from perception.matrices import mahalanobis2
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._existence import confirming_logit
 from ._exits import floor_places
-from ._kalman import inverse_2x2
 from ._measurement import Frame
 from ._table import BoolArray, IndexArray, TrackTable
 from ._views import RangedView, View
@@ -131,13 +131,7 @@ def is_standing(states: FloatArray, covariances: FloatArray, config: TrackerConf
     well_known = spread[:, 0, 0] + spread[:, 1, 1] <= 2.0 * limit2
     standing = slow & well_known
     if standing.any():
-        inverse = inverse_2x2(spread)
-        chi2 = (
-            v_x * v_x * inverse[:, 0, 0]
-            + 2.0 * v_x * v_y * inverse[:, 0, 1]
-            + v_y * v_y * inverse[:, 1, 1]
-        )
-        standing &= chi2 <= _STANDING_CHI2
+        standing &= mahalanobis2(velocity, spread) <= _STANDING_CHI2
     return standing
 
 

@@ -16,10 +16,10 @@ from typing import Final
 import numpy as np
 
 from perception.arrays import FloatArray
+from perception.matrices import mahalanobis2
 
 from ._awareness_update import forgotten
 from ._config import TrackerConfig
-from ._kalman import inverse_2x2
 from ._measurement import Measurements
 from ._table import BoolArray, IndexArray, TrackTable
 
@@ -351,11 +351,9 @@ def _log_ratio(
 
     def log_likelihood(track_rows: IndexArray) -> FloatArray:
         spread = tracks.covariances[track_rows, :2, :2] + measured.noises_m2[rows]
-        x, y = (measured.positions_odom_m[rows] - tracks.states[track_rows, :2]).T
-        inverse = inverse_2x2(spread)
-        d2 = x * x * inverse[:, 0, 0] + 2.0 * x * y * inverse[:, 0, 1] + y * y * inverse[:, 1, 1]
+        offset = measured.positions_odom_m[rows] - tracks.states[track_rows, :2]
         determinant = spread[:, 0, 0] * spread[:, 1, 1] - spread[:, 0, 1] ** 2
-        return np.asarray(-0.5 * (d2 + np.log(determinant)))
+        return np.asarray(-0.5 * (mahalanobis2(offset, spread) + np.log(determinant)))
 
     found = log_likelihood(first) - log_likelihood(second)
     return np.clip(found, -_MOST_LOG_RATIO, _MOST_LOG_RATIO)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._loop import BridgeInputs, BridgeLoop
-    from ._publisher import TopicPublisher
+    from ._loop import BridgeInputs, BridgeLoop, TopicPublisher
     from ._replay import BagReplay, ReplayPublisher, recorded_messages, static_transforms
     from ._rerun import RerunRecorder, cone_lines
 

@@ -42,8 +42,7 @@ from ..estimate import (
     choose_networks,
 )
 from ..policies import read_policy
-from ._loop import BridgeInputs, BridgeLoop
-from ._publisher import TopicPublisher
+from ._loop import BridgeInputs, BridgeLoop, TopicPublisher
 from ._replay import BagReplay, ReplayPublisher, recorded_messages, static_transforms
 
 # The last messages need so long to leave before the node is closed.

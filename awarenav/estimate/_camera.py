@@ -13,7 +13,7 @@ from perception import Camera
 from perception.arrays import FloatArray, finite_number
 
 from ..errors import AwarenavError
-from ._source import ImageSource
+from ._sources import ImageSource
 
 #: Assumed without a calibration; webcams and phones have 55 to 75 degrees.
 ASSUMED_FOV_DEG: Final = 60.0

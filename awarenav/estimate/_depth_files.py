@@ -13,16 +13,10 @@ from perception.depth_image import checked_depth
 from perception.errors import DepthImageError
 
 from ..errors import AwarenavError, counted
-from ._exif import decode_upright
-from ._images import read_image
-from ._source import ImageSource
-from ._source_images import ImageFiles, natural_order
+from ._pictures import decode_upright, read_image
+from ._sources import ImageFiles, ImageSource, natural_order, surely_has
 
-#: Suffixes of the names of depth images.
-DEPTH_SUFFIXES: Final = (".png", ".npy", ".tif", ".tiff")
-# Containers may state a few frames more than they have.
-_MISCOUNTED_FRAMES: Final = 2
-_MISCOUNTED_SHARE: Final = 0.01
+_SUFFIXES: Final = (".png", ".npy", ".tif", ".tiff")
 
 
 class DepthFiles:
@@ -106,14 +100,17 @@ def _by_stem(path: Path, images: tuple[Path, ...], used: Iterable[Path]) -> dict
     if path.is_file():
         if len(images) > 1:
             raise AwarenavError(f"--depth must be a folder for {len(images)} images, got {path}")
-        _require_suffix(path)
+        if path.suffix.lower() not in _SUFFIXES:
+            raise AwarenavError(
+                f"a depth image must be a file of {', '.join(_SUFFIXES)}, got {path}"
+            )
         return {images[0].stem: path}
     files = {each.stem: each for each in _depth_files(path)}
     for image in used:
         if image.stem not in files:
             raise AwarenavError(
                 f"{path} has no depth image of {image.name}: there must be a file {image.stem} "
-                f"with one of the suffixes {', '.join(DEPTH_SUFFIXES)}"
+                f"with one of the suffixes {', '.join(_SUFFIXES)}"
             )
     return files
 
@@ -136,9 +133,8 @@ def _numbered(path: Path, count: int | None, every: int, limit: int | None) -> d
             raise AwarenavError(f"{files[number]} and {file} are of the same frame")
         files[number] = file
     if count is not None:
-        sure = count - max(_MISCOUNTED_FRAMES, int(_MISCOUNTED_SHARE * count))
         for index in list(range(0, count, every))[:limit]:
-            if str(index) not in files and (index < sure or index == 0):
+            if str(index) not in files and surely_has(index, count):
                 raise AwarenavError(
                     f"{path} has no depth image of frame {index}, as {index:06d}.png; frames count "
                     "from 0"
@@ -154,20 +150,13 @@ def _depth_files(path: Path) -> list[Path]:
     files = [
         each
         for each in path.iterdir()
-        if each.suffix.lower() in DEPTH_SUFFIXES and not each.name.startswith(".")
+        if each.suffix.lower() in _SUFFIXES and not each.name.startswith(".")
     ]
     if not files:
-        raise AwarenavError(f"{path} has no depth image ({', '.join(DEPTH_SUFFIXES)})")
+        raise AwarenavError(f"{path} has no depth image ({', '.join(_SUFFIXES)})")
     by_stem: dict[str, Path] = {}
     for file in sorted(files):
         if file.stem in by_stem:
             raise AwarenavError(f"{by_stem[file.stem]} and {file} are of the same image")
         by_stem[file.stem] = file
     return sorted(files, key=natural_order)
-
-
-def _require_suffix(path: Path) -> None:
-    if path.suffix.lower() not in DEPTH_SUFFIXES:
-        raise AwarenavError(
-            f"a depth image must be a file of {', '.join(DEPTH_SUFFIXES)}, got {path}"
-        )

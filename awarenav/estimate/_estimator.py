@@ -33,8 +33,8 @@ from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 from ..errors import AwarenavError
 from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
-from ._exif import FIRST_TRANSPOSED, UPRIGHT
-from ._source import SourceFrame
+from ._pictures import FIRST_TRANSPOSED, UPRIGHT
+from ._sources import SourceFrame
 
 # An observation farther than this from a track does not belong to it.
 _SAME_PERSON_M: Final = 1.5

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from ..errors import AwarenavError
-from ._images import IMAGE_SUFFIXES
-from ._source import ImageSource
-from ._source_images import ImageFiles
-from ._source_video import VideoSource
+from ._pictures import IMAGE_SUFFIXES
+from ._sources import ImageFiles, ImageSource, open_video
 
 _BAG_SUFFIXES: Final = (".bag", ".db3", ".mcap")
 #: A camera's number, as a source.
@@ -19,40 +17,39 @@ CAMERA_NUMBER: Final = re.compile("[0-9]{1,9}")
 _STREAM: Final = re.compile(r"^[a-z][a-z0-9+.-]*://")
 
 
-def open_source(text: str, *, topic: str | None = None, interval_s: float = 1.0) -> ImageSource:
+def open_source(text: str, *, topic: str | None = None) -> ImageSource:
     """Open an image, a folder of images, a video, a camera, a stream or a recording.
 
     Args:
         text: a path, the number of a camera such as ``0``, or an address such as ``rtsp://…``.
         topic: image topic of a recording; None if it has only one.
-        interval_s: time between the images of a folder without stamps, seconds.
 
     Raises:
         AwarenavError: if there is no such source, or it cannot be read.
     """
     if _STREAM.match(text):
-        return VideoSource.of_stream(text)
+        return open_video(text, live=True)
     path = Path(text)
     try:
         exists = path.exists()
     except OSError as cause:
         raise AwarenavError(f"cannot read {text[:60]}…: {cause.strerror or cause}") from cause
     if not exists and CAMERA_NUMBER.fullmatch(text):
-        return VideoSource.of_camera(int(text))
+        return open_video(int(text), live=True)
     if not exists:
         raise AwarenavError(
             f"no such file or folder: {text}{_nearest(path)}; SOURCE is an image, a folder of "
             "images, a video, the number of a camera, the address of a stream or a ROS recording"
         )
     if is_recording(path):
-        from ._source_bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
+        from ._bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
 
         return BagSource(path, topic)
     if topic is not None:
         raise AwarenavError(f"--topic is for ROS recordings; {text} is not one")
     if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
-        return ImageFiles(path, interval_s)
-    return VideoSource.of_file(text)
+        return ImageFiles(path)
+    return open_video(text, live=False)
 
 
 def is_recording(path: Path) -> bool:

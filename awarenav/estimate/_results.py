@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,13 +11,11 @@ import numpy as np
 
 from perception import PersonKeypoints, PersonObservation
 from perception.arrays import FloatArray
-from perception.documents import parse_json, read_lines
 from perception.layouts import COCO_NAMES, FOOT_NAMES, LEFT_SHOULDER, RIGHT_SHOULDER
 from tracking import PersonTrack
 
 from ..errors import AwarenavError
-from ..line_files import LineFile
-from ..records import Record, continue_records, record_line
+from ..records import Record, RecordFile, continue_records, read_records, write_records
 from ._estimator import FrameEstimate
 
 # Significant digits of a number; any error of an estimate is far larger.
@@ -133,13 +130,10 @@ def settings_hash(settings: Mapping[str, object]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-class ResultsFile(AbstractContextManager["ResultsFile"]):
-    """A JSON Lines file that gets one line per frame, whole or not at all.
-
-    A damaged line of a continued file is set aside, and its frame is not in ``done``.
-
-    Attributes:
-        done: names of the frames that a continued file has already.
+def open_results(
+    path: Path, settings: str, *, resume: bool = False, overwrite: bool = False
+) -> tuple[RecordFile, frozenset[str]]:
+    """Return a file that gets one line per frame, and the names of the frames that it has already.
 
     Args:
         path: of the file.
@@ -150,50 +144,21 @@ class ResultsFile(AbstractContextManager["ResultsFile"]):
     Raises:
         AwarenavError: for an existing file that may not be replaced or cannot be continued.
     """
-
-    def __init__(
-        self, path: Path, settings: str, *, resume: bool = False, overwrite: bool = False
-    ) -> None:
-        self.done: frozenset[str] = frozenset()
-        exists = path.exists()
-        if path.is_dir():
-            raise AwarenavError(f"--out must be a file, {path} is a folder")
-        if exists and not resume and not overwrite:
-            raise AwarenavError(
-                f"{path} exists already: --resume continues it, --overwrite replaces it"
-            )
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            if exists and resume:
-                _require_same_settings(path, settings)
-                self.done = frozenset(record["frame"] for record in continue_records(path))
-            else:
-                path.write_bytes(b"")
-            self._file = LineFile(path)
-        except OSError as cause:
-            raise AwarenavError(f"cannot write {path}: {cause.strerror or cause}") from cause
-
-    def add(self, record: Record) -> None:
-        """Append the record of a frame."""
-        self._file.add(record_line(record))
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-
-def _require_same_settings(path: Path, settings: str) -> None:
-    """Refuse a file whose lines have the mark of other settings; damaged lines have none."""
-    others = set()
-    for line in read_lines(path, AwarenavError):
-        with suppress(AwarenavError, AttributeError):
-            others.add(str(parse_json(line, "line", AwarenavError).get("settings")))
-    others -= {settings}
+    if path.is_dir():
+        raise AwarenavError(f"--out must be a file, {path} is a folder")
+    exists = path.exists()
+    if exists and not resume and not overwrite:
+        raise AwarenavError(
+            f"{path} exists already: --resume continues it, --overwrite replaces it"
+        )
+    if not (exists and resume):
+        write_records(path, ())
+        return RecordFile(path), frozenset()
+    others = {str(record.get("settings")) for record in read_records(path)} - {settings}
     if others:
         raise AwarenavError(
             f"{path} was made with other settings (hash {', '.join(sorted(others))}, now "
             f"{settings}); use the same settings to continue it, --overwrite, or another file"
         )
+    done = frozenset(str(record["frame"]) for record in continue_records(path))
+    return RecordFile(path), done

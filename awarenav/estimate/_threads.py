@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import queue
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, suppress
 from typing import Final, Generic, TypeVar
 
-from ._source import ImageSource, SourceFrame
+from ._sources import ImageSource, SourceFrame
 
 _QUEUE_SIZE: Final = 4
-# Each side waits so long before it checks whether the other side has ended.
 _POLL_S: Final = 0.1
 
 _Item = TypeVar("_Item")
@@ -21,15 +22,16 @@ class FramePrefetcher(AbstractContextManager["FramePrefetcher"]):
     """Iterates over the frames of a source, a few of which a thread reads ahead.
 
     A live source never waits: its newest frame replaces one that was not taken yet. An error of the
-    source is raised here, after the frames before it.
+    source is raised here, after the frames before it. On exit the thread has ended, and reads the
+    source no more.
 
     Args:
-        source: is closed with this object.
-        every: takes every N-th frame only.
+        source: of the frames.
+        every: takes every N-th frame only; one with a problem is never skipped.
         limit: most frames to take; None for all.
     """
 
-    def __init__(self, source: ImageSource, *, every: int = 1, limit: int | None = None) -> None:
+    def __init__(self, source: ImageSource, every: int = 1, limit: int | None = None) -> None:
         self._source = source
         self._every = every
         self._limit = limit
@@ -41,65 +43,45 @@ class FramePrefetcher(AbstractContextManager["FramePrefetcher"]):
         self._thread.start()
 
     def __iter__(self) -> Iterator[SourceFrame]:
-        while True:
-            item = self._queue.get()
-            if item is None:
-                return
+        while (item := self._queue.get()) is not None:
             if isinstance(item, BaseException):
                 raise item
             yield item
 
     def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Stop reading and close the source."""
         self._stop.set()
         while self._thread.is_alive():
-            try:
-                self._queue.get_nowait()  # a thread that waits for a free place then sees the stop
-            except queue.Empty:
-                self._thread.join(_POLL_S)
-        self._source.close()
+            with suppress(queue.Empty):  # a thread that waits for a free place then sees the stop
+                self._queue.get_nowait()
+            self._thread.join(_POLL_S)
 
     def _read(self) -> None:
         """Read frames into the queue until the end, the limit or an error (in the thread)."""
         last: BaseException | None = None
+        taken = 0
         try:
-            taken = 0
             for index, frame in enumerate(self._source.frames()):
                 if self._stop.is_set():
-                    return
-                # A frame with a problem is never skipped.
+                    break
                 if index % self._every and frame.image_rgb is not None:
                     continue
-                self._put(frame, newest=self._source.live and frame.image_rgb is not None)
+                if self._source.live and frame.image_rgb is not None:
+                    with suppress(queue.Empty):
+                        self._queue.get_nowait()
+                self._queue.put(frame)
                 taken += 1
                 if taken == self._limit:
                     break
         except BaseException as error:
             last = error
-        self._put(last)
-
-    def _put(self, item: SourceFrame | BaseException | None, *, newest: bool = False) -> None:
-        """Put an item into the queue; a ``newest`` one replaces the item that is in it."""
-        while not self._stop.is_set():
-            try:
-                self._queue.put(item, timeout=0.0 if newest else _POLL_S)
-                return
-            except queue.Full:
-                if newest:
-                    try:
-                        self._queue.get_nowait()
-                    except queue.Empty:
-                        continue
+        self._queue.put(last)
 
 
 class BackgroundWorker(AbstractContextManager["BackgroundWorker[_Item]"], Generic[_Item]):
     """Calls a function with one item after another, in a thread.
 
-    An error of the function is raised by the next :meth:`put` or by :meth:`close`; the function is
-    not called again after it.
+    An error of the function is raised by a later :meth:`put` or on exit; the items after it are
+    dropped then.
 
     Args:
         work: the function.
@@ -107,45 +89,26 @@ class BackgroundWorker(AbstractContextManager["BackgroundWorker[_Item]"], Generi
 
     def __init__(self, work: Callable[[_Item], None]) -> None:
         self._work = work
-        self._queue: queue.Queue[_Item | None] = queue.Queue(_QUEUE_SIZE)
-        self._error: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, name="background worker", daemon=True)
-        self._thread.start()
+        self._executor = ThreadPoolExecutor(1, "background worker")
+        self._pending: deque[Future[None]] = deque()
 
     def put(self, item: _Item) -> None:
-        """Hand over an item; wait while the queue is full."""
-        while True:
-            self._raise_error()
-            try:
-                self._queue.put(item, timeout=_POLL_S)
-                return
-            except queue.Full:
-                continue
+        """Hand over an item; wait while several others are pending."""
+        self._pending.append(self._executor.submit(self._work, item))
+        if len(self._pending) > _QUEUE_SIZE:
+            self._finish_one()
 
     def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
         """Wait until all items are done."""
-        while self._thread.is_alive():
-            try:
-                self._queue.put(None, timeout=_POLL_S)
-                break
-            except queue.Full:
-                continue
-        self._thread.join()
-        self._raise_error()
+        while self._pending:
+            self._finish_one()
+        self._executor.shutdown()
 
-    def _raise_error(self) -> None:
-        """Raise the error of the function, once."""
-        if self._error is not None:
-            error, self._error = self._error, None
-            raise error
-
-    def _run(self) -> None:
-        while (item := self._queue.get()) is not None:
-            try:
-                self._work(item)
-            except BaseException as error:
-                self._error = error
-                return
+    def _finish_one(self) -> None:
+        """Wait for the oldest item; after its error, drop all others."""
+        try:
+            self._pending.popleft().result()
+        except BaseException:
+            self._pending.clear()
+            self._executor.shutdown(cancel_futures=True)
+            raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, Final
 
 from ..cli import NUMBER, POSITIVE, SHARE, FilePath, argument, command, option, options
@@ -100,6 +101,6 @@ def estimate(**values: Any) -> int:
 
     Writes one JSON line per frame, in the format of the truth that `awarenav render` writes.
     """
-    from ._run import EstimateOptions, estimate_command  # noqa: PLC0415 - help needs no networks
+    from ._run import estimate_command  # noqa: PLC0415 - help needs no networks
 
-    return estimate_command(EstimateOptions(**values))
+    return estimate_command(SimpleNamespace(**values))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,45 +14,36 @@ from tracking.units import refuse_other_units
 from ..errors import AwarenavError
 from ..files import json_text, write_text
 from ._run import log, read_file
-from ._smoothed import arrays_of, smoothed_path
-from ._tracking import track_recording
+from ._tracking import arrays_of, smoothed_path, track_recording
 
 _FORMATS: Final = (".yaml", ".yml")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CalibrateOptions:
-    """The options of ``awarenav tracks calibrate``."""
-
-    files: tuple[Path, ...]
-    out: Path
-    as_json: bool
-    config: Path | None
-    longest: float
-
-
-def calibrate_command(options: CalibrateOptions) -> int:
-    """Run the command; return the exit status.
+def calibrate_command(
+    files: Sequence[Path], out: Path, *, as_json: bool, config: Path | None, longest: float
+) -> int:
+    """Run the command with the options of the same names; return the exit status.
 
     Raises:
         AwarenavError: for input that cannot be used; nothing is written then.
         TrackingError: for settings that cannot be used, or recordings that are too short.
     """
-    if options.out.suffix.lower() not in _FORMATS:
-        raise AwarenavError(f"--out must end in {' or '.join(_FORMATS)}, got {options.out}")
-    inputs = {path.resolve() for path in (*options.files, options.config) if path is not None}
-    if options.out.resolve() in inputs:
-        raise AwarenavError(f"--out {options.out} would replace an input")
-    config = None if options.config is None else TrackerConfig.from_yaml(options.config)
-    people = [each for path in options.files for each in followed_people(path, config)]
-    horizons_s = sorted({*(each for each in HORIZONS_S if each < options.longest), options.longest})
+    if out.suffix.lower() not in _FORMATS:
+        raise AwarenavError(f"--out must end in {' or '.join(_FORMATS)}, got {out}")
+    if out.resolve() in {path.resolve() for path in (*files, config) if path is not None}:
+        raise AwarenavError(f"--out {out} would replace an input")
+    settings = None if config is None else TrackerConfig.from_yaml(config)
+    people = [each for path in files for each in followed_people(path, settings)]
+    horizons_s = sorted({*(each for each in HORIZONS_S if each < longest), longest})
     found = calibrate(people, horizons_s=horizons_s)
-    write_text(options.out, found.model.yaml_text())
-    if options.as_json:
-        print(json_text(_record(found)), end="")
+    write_text(out, found.model.yaml_text())
+    rows = _rows(found)
+    if as_json:
+        record = {"people": list(found.people), "wanted": REGION_SHARE, "horizons": rows}
+        print(json_text(record), end="")
     else:
-        print("\n".join(_lines(found)))
-        print(f"Written to {options.out}")
+        _print_table(rows, found)
+        print(f"Written to {out}")
     return 0
 
 
@@ -80,29 +71,29 @@ def followed_people(path: Path, config: TrackerConfig | None) -> list[FollowedPe
     return people
 
 
-def _lines(found: Calibration) -> list[str]:
-    """Return the table, one line per horizon, and how to read it."""
-    lines = [
+def _print_table(rows: list[dict[str, Any]], found: Calibration) -> None:
+    """Print a line per horizon, and how to read it."""
+    print(
         f"{'horizon':>9s}{'factor':>9s}{'inside before':>15s}{'after':>9s}{'1st half':>10s}"
-        f"{'2nd half':>10s}{'NEES/2':>9s}{'stretches':>12s}",
-    ]
-    for row in _rows(found):
+        f"{'2nd half':>10s}{'NEES/2':>9s}{'stretches':>12s}"
+    )
+    for row in rows:
         used, judged = row["stretches"]
         first, second = row["inside_halves"]
-        lines.append(
+        print(
             f"{row['horizon_s']:7g} s{row['factor']:9.2f}{row['inside_before']:15.1%}"
             f"{row['inside']:9.1%}{first:10.1%}{second:10.1%}{row['nees_over_2']:9.2f}"
             f"{f'{used} + {judged}':>12s}"
         )
     first, second = found.people
-    lines.append(
+    print(
         f"{REGION_SHARE:.1%} inside is right. Each half ({first} and {second} people) is judged by "
         "the factors of the other; the file has those of all."
     )
-    return lines
 
 
 def _rows(found: Calibration) -> list[dict[str, Any]]:
+    """Return the table as plain data."""
     return [
         {
             "horizon_s": horizon_s,
@@ -124,8 +115,3 @@ def _rows(found: Calibration) -> list[dict[str, Any]]:
             strict=True,
         )
     ]
-
-
-def _record(found: Calibration) -> dict[str, Any]:
-    """Return the table as plain data."""
-    return {"people": list(found.people), "wanted": REGION_SHARE, "horizons": _rows(found)}

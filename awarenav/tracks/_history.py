@@ -233,10 +233,3 @@ class TrackedRecording:
             return 0.0
         steps = np.diff(self.camera_poses[:, :2], axis=0)
         return float(np.median(np.hypot(steps[:, 0], steps[:, 1])))
-
-
-def camera_pose(T_odom_camera: FloatArray) -> tuple[float, float, float]:
-    """Return position and view of a camera on the floor plane: x, y (m), heading (rad)."""
-    x, y = T_odom_camera[:2, 3].tolist()
-    ahead = T_odom_camera[:2, 2]
-    return x, y, float(np.arctan2(ahead[1], ahead[0]))

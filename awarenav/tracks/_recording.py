@@ -1,9 +1,12 @@
-"""A file of estimates or truth as frames for the tracker, in the order of its lines."""
+"""A file of estimates, truth or positions as frames for the tracker."""
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections import Counter
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,9 +18,25 @@ from perception.arrays import FloatArray, finite_number, rigid_transform
 from ..errors import AwarenavError, counted
 from ..estimate import fixed_camera_pose
 from ..records import PersonRecord, Record, read_person, read_records
+from ._people_table import PersonRow, read_people_table
 
 #: Standard deviation per axis that is assumed for a position without a covariance.
 ASSUMED_POSITION_STD_M: Final = 0.05
+_STD: Final = "std_m"
+_WHOLE: Final = re.compile(r"-?[0-9]+")
+_MOST_NAMED: Final = 20
+# Observations need a sensor's frame: this one looks straight down from above the people. Its x is
+# odom's x, its y is against odom's y.
+_ABOVE_M: Final = 8.0
+_CHEST_M: Final = 1.2
+_T_ODOM_ABOVE: Final = np.array(
+    [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0, 0.0],
+        [0.0, 0.0, -1.0, _ABOVE_M],
+        [0.0, 0.0, 0.0, 1.0],
+    ]
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,7 +215,65 @@ def _remarks(counts: Counter[str]) -> list[str]:
     ]
 
 
-def floor_covariance(T_odom_camera: FloatArray, covariance_camera_m2: FloatArray) -> FloatArray:
-    """Return the covariance (2, 2) on the odom floor plane of one (3, 3) in the camera frame."""
-    turn = T_odom_camera[:2, :3]
-    return np.asarray(turn @ covariance_camera_m2 @ turn.T)
+def is_positions(path: Path) -> bool:
+    """Return whether a file holds positions, by its suffix."""
+    return path.suffix.lower() == ".csv"
+
+
+def read_positions(path: Path) -> Recording:
+    """Read a CSV of positions on the floor, in metres of any fixed frame.
+
+    Rows of the same time are one frame. Ids that are no whole numbers are numbered.
+
+    Raises:
+        AwarenavError: for a file that cannot be read, without the columns, with a value that is not
+            valid, or in other units; see :func:`read_people_table`.
+    """
+    rows = sorted(read_people_table(path, (_STD,)).rows, key=attrgetter("t_s"))
+    for row in rows:
+        std_m = row.more.get(_STD)
+        if std_m is not None and std_m <= 0.0:
+            raise AwarenavError(f"{path}, line {row.line}: {_STD} must be above 0 m, got {std_m:g}")
+    ids, remark = _numbers_of([row.id for row in rows])
+    frames = [
+        _frame_of_rows(stamp_s, list(group), ids)
+        for stamp_s, group in itertools.groupby(rows, attrgetter("t_s"))
+    ]
+    assumed = sum(row.more.get(_STD) is None for row in rows)
+    return Recording(path, tuple(frames), remark, assumed, has_camera=False)
+
+
+def _numbers_of(ids: list[str]) -> tuple[dict[str, int], tuple[str, ...]]:
+    """Return the number of each id, and a remark if some are no whole numbers."""
+    numbers = {id: int(id) for id in ids if _WHOLE.fullmatch(id)}
+    first = max(numbers.values(), default=0) + 1
+    others = [id for id in dict.fromkeys(ids) if id not in numbers]
+    texts = {id: first + index for index, id in enumerate(others)}
+    if not texts:
+        return numbers, ()
+    named = ", ".join(f"{number} is {id!r}" for id, number in list(texts.items())[:_MOST_NAMED])
+    more = ", …" if len(texts) > _MOST_NAMED else ""
+    return {**numbers, **texts}, (f"ids that are no whole numbers are numbered: {named}{more}",)
+
+
+def _frame_of_rows(stamp_s: float, rows: list[PersonRow], ids: dict[str, int]) -> RecordedFrame:
+    observations = tuple(
+        PersonObservation(
+            stamp_s=stamp_s,
+            position_camera_m=np.array([row.x_m, -row.y_m, _ABOVE_M - _CHEST_M]),
+            position_covariance_m2=(row.more.get(_STD) or ASSUMED_POSITION_STD_M) ** 2 * np.eye(3),
+            gaze_camera=None,
+            awareness=None,
+            awareness_std=None,
+            score=1.0,
+        )
+        for row in rows
+    )
+    return RecordedFrame(
+        name=f"{stamp_s:g} s",
+        stamp_s=stamp_s,
+        T_odom_camera=_T_ODOM_ABOVE,
+        observations=observations,
+        ids=tuple(ids[row.id] for row in rows),
+        tracks=None,
+    )

@@ -1,11 +1,14 @@
-"""The work of ``awarenav tracks``."""
+"""The work of ``awarenav tracks``: the plot, and the tracks as text, JSON and CSV."""
 
 from __future__ import annotations
 
+import io
+import math
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from csv import writer as csv_writer
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,16 +17,18 @@ from tracking import TrackerConfig
 from tracking.smoothing import SmoothedPath
 
 from ..errors import AwarenavError, counted
-from ..files import json_text
-from ._file_tracks import tracks_in_file
-from ._history import TrackedRecording
-from ._positions import is_positions, read_positions
-from ._recording import Recording, read_recording
-from ._smoothed import distances_m, smoothed_path
-from ._tables import summary_lines, summary_records, write_csv
-from ._tracking import track_recording
-from ._truth import Truth, truth_beside_tracks
+from ..files import csv_number, json_text, write_text
+from ._history import TrackedRecording, TrackHistory, TrackSample
+from ._recording import Recording, is_positions, read_positions, read_recording
+from ._tracking import distances_m, smoothed_path, track_recording, tracks_in_file
+from ._truth import Truth, person_ids_text, truth_beside_tracks
 
+#: Columns of the CSV file: one row per track and frame; empty for what is not known.
+CSV_COLUMNS: Final = (
+    *("stamp_s", "id", "status", "seen", "x_odom_m", "y_odom_m", "vx_odom_mps", "vy_odom_mps"),
+    *("x_std_m", "y_std_m", "awareness", "awareness_std", "awareness_lower"),
+    *("measured_awareness", "measured_awareness_std"),
+)
 _FORMATS: Final = (".png", ".svg", ".pdf")
 _CAMERA: Final = "camera.yaml"
 # A camera that moves more than this from frame to frame takes single images.
@@ -31,44 +36,39 @@ _MAX_CAMERA_STEP_M: Final = 2.0
 _MOST_LINES: Final = 50
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TracksOptions:
-    """The options of ``awarenav tracks``."""
-
-    file: Path
-    out: Path
-    as_json: bool
-    csv: Path | None
-    truth: Path | None
-    config: Path | None
-    ids: bool
-    smooth: bool
-    camera: Path | None
-    most: int
-
-
-def tracks_command(options: TracksOptions) -> int:
-    """Run the command; return the exit status.
+def tracks_command(
+    file: Path,
+    out: Path,
+    *,
+    as_json: bool,
+    csv: Path | None,
+    truth: Path | None,
+    config: Path | None,
+    smooth: bool,
+    ids: bool,
+    camera: Path | None,
+    most: int,
+) -> int:
+    """Run the command with the options of the same names; return the exit status.
 
     Raises:
         AwarenavError: for input that cannot be used; nothing is written then.
         TrackingError: for settings that cannot be used.
         PerceptionError: for a calibration that cannot be used.
     """
-    out = None if str(options.out) == "none" else options.out
-    _check(options, out)
-    if out is not None:
+    plot = None if str(out) == "none" else out
+    if camera is not None and is_positions(file):
+        raise AwarenavError(f"--camera cannot be used with positions, got {file}")
+    _check_outputs(plot, csv, (file, truth, config, camera))
+    if plot is not None:
         # Only the plot needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
         from ._plot import tracks_figure  # noqa: PLC0415
-    config = None if options.config is None else TrackerConfig.from_yaml(options.config)
-    recording = read_file(options.file)
-    camera = _camera(options) if recording.has_camera else None
-    truth_recording = None if options.truth is None else read_file(options.truth)
-    if options.ids:
-        tracked = tracks_in_file(recording)
-    else:
-        tracked = track_recording(recording, config, camera)
+    settings = None if config is None else TrackerConfig.from_yaml(config)
+    recording = read_file(file)
+    view = _camera(file, camera) if recording.has_camera else None
+    true = None if truth is None else read_file(truth)
+    tracked = tracks_in_file(recording) if ids else track_recording(recording, settings, view)
     for remark in tracked.remarks:
         log(remark)
     if tracked.camera_jump_m > _MAX_CAMERA_STEP_M:
@@ -76,57 +76,52 @@ def tracks_command(options: TracksOptions) -> int:
             f"the camera jumps by {tracked.camera_jump_m:.1f} m from frame to frame: these look "
             "like single images, in which people cannot be tracked"
         )
-    truth = None
-    if truth_recording is not None:
-        truth = truth_beside_tracks(tracked.histories, truth_recording)
-    smoothed = _smoothed(tracked, config) if options.smooth else {}
-    if out is not None:
+    beside = None if true is None else truth_beside_tracks(tracked.histories, true)
+    paths = _smoothed(tracked, settings) if smooth else {}
+    if plot is not None:
         title = _title(recording, tracked)
-        figure = tracks_figure(
-            tracked, title, camera=camera, truth=truth, smoothed=smoothed, most=options.most
+        save_figure(
+            tracks_figure(tracked, title, camera=view, truth=beside, smoothed=paths, most=most),
+            plot,
         )
-        save_figure(figure, out)
-    if options.csv is not None:
-        write_csv(options.csv, tracked.histories)
-    _report(options, tracked, truth, out)
+    if csv is not None:
+        _write_csv(csv, tracked.histories)
+    if as_json:
+        print(json_text(_summaries(tracked.histories, beside)), end="")
+    else:
+        _print_table(tracked, beside)
+        if written := [str(path) for path in (plot, csv) if path is not None]:
+            print(f"Written to {' and '.join(written)}")
     return 0
 
 
-def _check(options: TracksOptions, out: Path | None) -> None:
-    """Refuse outputs with another suffix, or that would replace an input, and a camera too many."""
-    if options.camera is not None and is_positions(options.file):
-        raise AwarenavError(f"--camera cannot be used with positions, got {options.file}")
-    if out is not None and out.suffix.lower() not in _FORMATS:
-        raise AwarenavError(f"--out must end in {', '.join(_FORMATS)} or be none, got {out}")
-    inputs = {
-        path.resolve()
-        for path in (options.file, options.truth, options.config, options.camera)
-        if path is not None
-    }
-    for name, path in (("--out", out), ("--csv", options.csv)):
-        if path is None:
-            continue
-        if path.resolve() in inputs:
+def _check_outputs(plot: Path | None, table: Path | None, inputs: Sequence[Path | None]) -> None:
+    """Refuse outputs with another suffix, or that would replace an input or each other."""
+    if plot is not None and plot.suffix.lower() not in _FORMATS:
+        raise AwarenavError(f"--out must end in {', '.join(_FORMATS)} or be none, got {plot}")
+    read = {path.resolve() for path in inputs if path is not None}
+    for name, path in (("--out", plot), ("--csv", table)):
+        if path is not None and path.resolve() in read:
             raise AwarenavError(f"{name} {path} would replace an input")
-        if path.is_dir():
+        if path is not None and path.is_dir():
             raise AwarenavError(f"{name} must be a file, {path} is a folder")
-    if out is not None and options.csv is not None and out.resolve() == options.csv.resolve():
-        raise AwarenavError(f"--out and --csv are the same file, {out}")
+    if plot is not None and table is not None and plot.resolve() == table.resolve():
+        raise AwarenavError(f"--out and --csv are the same file, {plot}")
 
 
-def _camera(options: TracksOptions) -> Camera | None:
+def _camera(file: Path, given: Path | None) -> Camera | None:
     """Return the camera whose field of view the tracker uses, if it is known."""
-    path = options.camera
-    if path is None:
-        path = options.file.parent / _CAMERA
-        if not path.exists():
-            log(
-                "no --camera and no camera.yaml beside the file: the field of view is not known, "
-                "and the tracks of all unseen people are kept equally long"
-            )
-            return None
-        log(f"the field of view is that of {path}")
-    return Camera.from_yaml(path)
+    if given is not None:
+        return Camera.from_yaml(given)
+    beside = file.parent / _CAMERA
+    if not beside.exists():
+        log(
+            "no --camera and no camera.yaml beside the file: the field of view is not known, "
+            "and the tracks of all unseen people are kept equally long"
+        )
+        return None
+    log(f"the field of view is that of {beside}")
+    return Camera.from_yaml(beside)
 
 
 def read_file(path: Path) -> Recording:
@@ -163,28 +158,80 @@ def _title(recording: Recording, tracked: TrackedRecording) -> str:
     )
 
 
-def _report(
-    options: TracksOptions, tracked: TrackedRecording, truth: Truth | None, out: Path | None
-) -> None:
-    """Print the table, or the JSON, and the files that were written."""
-    if options.as_json:
-        matches = None if truth is None else truth.matches
-        print(json_text(summary_records(tracked.histories, matches)), end="")
-        return
+def _summaries(histories: Sequence[TrackHistory], truth: Truth | None) -> list[dict[str, Any]]:
+    """Return the life, the frames and the awareness of each track; NaN for what is not known."""
+    summaries = []
+    for history in histories:
+        alpha = history.mean("awareness")
+        if not math.isfinite(alpha):  # there is no filter
+            alpha = history.mean("measured_awareness")
+        summary: dict[str, Any] = {
+            "id": history.id,
+            "born_s": history.born_s,
+            "confirmed_s": history.confirmed_s,
+            "died_s": history.died_s,
+            "seen_frames": history.seen_frames,
+            "coasted_frames": len(history.frames) - history.seen_frames,
+            "mean_awareness": alpha,
+            "mean_awareness_lower": history.mean("awareness_lower"),
+        }
+        if truth is not None:
+            summary["person"] = person_ids_text(truth.matches.get(history.id, []))
+        summaries.append(summary)
+    return summaries
+
+
+def _print_table(tracked: TrackedRecording, truth: Truth | None) -> None:
+    """Print a line per confirmed track, and the number of the others."""
     confirmed = [each for each in tracked.histories if each.confirmed_s is not None]
-    if confirmed:
-        lines = summary_lines(confirmed, None if truth is None else truth.matches)
-        print("\n".join(lines[: _MOST_LINES + 1]))
+    header = ["id", "born (s)", "confirmed (s)", "died (s)", "seen", "coasted", "mean α", "lower"]
+    rows = [header if truth is None else [*header, "person"]]
+    rows += [list(map(_cell, each.values())) for each in _summaries(confirmed, truth)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows[: _MOST_LINES + 1] if confirmed else ():
+        print("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)))
     if len(confirmed) > _MOST_LINES:
         print(f"and {len(confirmed) - _MOST_LINES} more; --csv has all")
-    unconfirmed = len(tracked.histories) - len(confirmed)
-    if unconfirmed:
+    if unconfirmed := len(tracked.histories) - len(confirmed):
         print(f"{counted(unconfirmed, 'track')} never confirmed")
     if not tracked.histories:
         print(f"no people in {counted(len(tracked.camera_stamps_s), 'frame')}")
-    written = [str(path) for path in (out, options.csv) if path is not None]
-    if written:
-        print(f"Written to {' and '.join(written)}")
+
+
+def _cell(value: Any) -> str:
+    """Return a value of a summary as text: numbers with two decimals, a dash for unknown ones."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return "–"
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
+def _write_csv(path: Path, histories: Sequence[TrackHistory]) -> None:
+    """Write a CSV file with one row per track and frame, in the order of stamps and ids."""
+    samples = [(each.stamp_s, history.id, each) for history in histories for each in history.frames]
+    samples.sort(key=lambda row: row[:2])
+    text = io.StringIO()
+    writer = csv_writer(text, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    writer.writerows(_csv_row(id, sample) for _, id, sample in samples)
+    write_text(path, text.getvalue())
+
+
+def _csv_row(id: int, sample: TrackSample) -> list[object]:
+    """Return the row of a sample, in the order of :data:`CSV_COLUMNS`."""
+    velocity, covariance = sample.velocity_odom_mps, sample.position_covariance_m2
+    numbers = (
+        *sample.position_odom_m.tolist(),
+        *((None, None) if velocity is None else velocity.tolist()),
+        *((None, None) if covariance is None else np.sqrt(np.diagonal(covariance)).tolist()),
+        sample.awareness,
+        sample.awareness_std,
+        sample.awareness_lower,
+        sample.measured_awareness,
+        sample.measured_awareness_std,
+    )
+    # The stamp has all its digits, so that rows can be joined with the frames of the file.
+    seen = str(sample.seen).lower()
+    return [repr(sample.stamp_s), id, sample.status, seen, *map(csv_number, numbers)]
 
 
 def log(text: str) -> None:

@@ -70,9 +70,9 @@ def tracks(**values: Any) -> int:
     Reads JSON Lines as `awarenav estimate` and `awarenav render` write them, or positions as CSV.
     Frames are processed in the order of the file, as on a robot.
     """
-    from ._run import TracksOptions, tracks_command  # noqa: PLC0415 - help needs no tracker
+    from ._run import tracks_command  # noqa: PLC0415 - help needs no tracker
 
-    return tracks_command(TracksOptions(**values))
+    return tracks_command(**values)
 
 
 @command(
@@ -109,9 +109,9 @@ def calibrate(**values: Any) -> int:
     people. To check it, each half of them is judged by the factors of the other half. The smoothed
     tracks count as the truth. Read the file with `PredictionModel.from_yaml`.
     """
-    from ._calibrate import CalibrateOptions, calibrate_command  # noqa: PLC0415
+    from ._calibrate import calibrate_command  # noqa: PLC0415
 
-    return calibrate_command(CalibrateOptions(**values))
+    return calibrate_command(**values)
 
 
 assert isinstance(tracks, Command)

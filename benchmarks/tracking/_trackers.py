@@ -70,21 +70,17 @@ def observations(
     places_m: FloatArray, stamp_s: float, noise_std_m: float
 ) -> tuple[PersonObservation, ...]:
     """Return observations of people at (M, 2), x and y in odom, who look at the camera overhead."""
-    count = len(places_m)
-    positions_m = np.full((count, 3), T_ODOM_CAMERA[2, 3] - _CHEST_M)
-    positions_m[:, 0], positions_m[:, 1] = places_m[:, 0], -places_m[:, 1]
-    covariances = np.zeros((count, 3, 3))
-    covariances[:] = noise_std_m**2 * _EYE
-    gazes = np.zeros((count, 3))
-    gazes[:, 2] = -1.0
-    return PersonObservation.batch(
-        stamp_s,
-        positions_m,
-        covariances,
-        np.full(count, 0.9),
-        gazes_camera=gazes,
-        awareness=np.full(count, 0.6),
-        awareness_std=np.full(count, 0.08),
+    return tuple(
+        PersonObservation(
+            stamp_s=stamp_s,
+            position_camera_m=np.array([x, -y, T_ODOM_CAMERA[2, 3] - _CHEST_M]),
+            position_covariance_m2=noise_std_m**2 * _EYE,
+            gaze_camera=np.array([0.0, 0.0, -1.0]),
+            awareness=0.6,
+            awareness_std=0.08,
+            score=0.9,
+        )
+        for x, y in places_m
     )
 
 

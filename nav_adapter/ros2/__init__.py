@@ -13,23 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 from ._alerts import alerts
 from ._bridge import AwarenessBridge
-from ._grid import occupancy_grid
-from ._image_perception import PerceivedFrame
+from ._image_input import PerceivedFrame
 from ._images import camera_of, depth_of, picture_of
-from ._markers import markers
-from ._mask_stream import SpeedMaskSettings
-from ._optical import optical_problem
 from ._outgoing import Frames, outgoing
-from ._people import circle_objects, detections, people, teb_obstacles
-from ._perception_thread import PerceptionThread
+from ._people import circle_objects, detections, markers, occupancy_grid, people, teb_obstacles
 from ._polygons import STOP_POLYGON_ID, collision_polygons, stop_zone
-from ._pose_reader import odometry_problems
+from ._poses import odometry_problems, optical_problem
 from ._robot_file import CameraMount, RobotFile, ScannerMount
-from ._scan_perception import ScannerInput, scanner_inputs
-from ._scan_thread import ScanThread
+from ._scan_input import ScannerInput, scanner_inputs
 from ._scans import ScanMessages, laser_scan_of, map_cells_of
 from ._speed_limit import SLOWEST_MPS, speed_limit
-from ._speed_mask import speed_mask
+from ._speed_mask import SpeedMaskSettings, speed_mask
+from ._threads import PerceptionThread, ScanThread
 from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, is_rectified, renamed
 from ._transforms import TransformBuffer
 

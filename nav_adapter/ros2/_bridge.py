@@ -10,7 +10,7 @@ from dataclasses import replace
 from perception import AwarenessPipeline, Camera, PerceptionError
 from perception.arrays import FloatArray
 from perception.laser import LegDetector, MapCells
-from tracking import PersonTrack, TrackerConfig, TrackingError
+from tracking import PersonTrack, TrackerConfig
 from tracking.prediction import PredictionModel
 
 from .._adapter import NavAdapter
@@ -20,18 +20,14 @@ from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
 from ._alerts import sensor_status
 from ._clock import BridgeClock
-from ._depth_reader import DepthReader
-from ._guard import explained, guarded_update, stopped
-from ._image_perception import ImagePerception, PerceivedFrame
-from ._mask_stream import SpeedMaskSettings
+from ._image_input import ImageInput, PerceivedFrame
 from ._outgoing import Frames, Sender
-from ._pose_reader import PoseReader
 from ._poses import RobotPoses
-from ._scan_perception import ScannerInput, ScanPerception
-from ._scan_reader import ScanReader
+from ._scan_input import ScanInput, ScannerInput, ScanPerception
 from ._sensor_watch import CAMERA, SensorWatch
+from ._shared import Shared
 from ._shared_tracker import SharedTracker
-from .conversions import to_seconds
+from ._speed_mask import SpeedMaskSettings
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
 from .messages.nav_msgs import OccupancyGrid, Odometry
@@ -111,14 +107,15 @@ class AwarenessBridge:
         self._warn_user, self._warned = warn, ""
         if not with_camera and not scanners:
             raise NavError("with_camera must be True, or scanners must name one or two, got none")
-        self._tracker = SharedTracker(TrackerConfig.for_policy(policy), len(scanners))
-        self._perception = ImagePerception(make_pipeline, self._tracker, camera, rectified)
         self._adapter = NavAdapter(policy, robot, prediction=prediction)
-        self._poses = RobotPoses(self.frames, T_base_camera)
-        self._frame: PerceivedFrame | None = None
+        self._perception_failures = 0
+        # For all that is shared but the tracker; perception is not held up.
+        self._lock = threading.RLock()
+        # Keeps the messages of one publication together.
+        self._sending = threading.Lock()
         self._clock = BridgeClock()
-        self._pose_reader = PoseReader(
-            self._poses, self._clock, self.frames.odom, self._warn, with_map=bool(scanners)
+        self._poses = RobotPoses(
+            self.frames, T_base_camera, self._clock, self._warn, with_map=bool(scanners)
         )
         self._watch = SensorWatch(
             [each.name for each in scanners],
@@ -126,32 +123,22 @@ class AwarenessBridge:
             lost_after_s=policy.timing.stale_after_s,
             with_depth=with_depth,
         )
-        self._frames = self._perception_failures = 0
-        # For all of the above but perception, which is not held up.
-        self._lock = threading.RLock()
-        # Keeps the messages of one publication together.
-        self._sending = threading.Lock()
-        self._depth: DepthReader | None = None
-        if with_depth:
-            self._depth = DepthReader(self._clock, self._watch, self._lock, self._warn)
-        self._scans: ScanReader | None = None
+        self._tracker = SharedTracker(TrackerConfig.for_policy(policy), len(scanners))
+        shared = Shared(
+            self._clock, self._poses, self._watch, self._tracker, self._lock, self._warn
+        )
+        self._images = ImageInput(
+            shared, make_pipeline, camera, rectified=rectified, with_depth=with_depth
+        )
+        self._scans: ScanInput | None = None
         if inputs := tuple(scanners):
-            self._scans = ScanReader(
-                inputs,
-                ScanPerception(robot.footprint_m, inputs, make_detector),
-                self._tracker,
-                self._poses,
-                self._clock,
-                self._watch,
-                self._lock,
-                self._warn,
-                self.frames.odom,
-            )
+            legs = ScanPerception(robot.footprint_m, inputs, make_detector)
+            self._scans = ScanInput(shared, inputs, legs, self.frames.odom)
 
     @property
     def frame(self) -> PerceivedFrame | None:
         """The latest frame with its image, people and tracks, or None before the first."""
-        return self._frame
+        return self._images.frame
 
     @property
     def tracks(self) -> tuple[PersonTrack, ...]:
@@ -171,15 +158,16 @@ class AwarenessBridge:
         """
         with self._lock:
             refused = self._clock.refused
-            readers = {"scans": self._scans, "depth_images": self._depth}
+            depth, scans = self._images.depth, self._scans
+            readers = {"scans": scans, "depth_images": depth}
             absent = {kind for kind, reader in readers.items() if reader is None}
             return {
-                "frames": self._frames,
+                "frames": self._images.frames,
                 **{f"{key}_from_future": n for key, n in refused.items() if key not in absent},
                 "perception_failures": self._perception_failures,
                 "clock_restarts": self._clock.restarts,
-                **({} if self._depth is None else self._depth.counts),
-                **({} if self._scans is None else self._scans.counts),
+                **({} if depth is None else depth.counts),
+                **({} if scans is None else scans.counts),
             }
 
     @property
@@ -190,13 +178,13 @@ class AwarenessBridge:
     @property
     def camera(self) -> Camera | None:
         """The camera, or None while it is unknown."""
-        return self._perception.camera
+        return self._images.camera
 
     def on_camera_info(self, message: CameraInfo) -> None:
         """Make the pipeline from the first calibration; later ones are ignored."""
         try:
             if self._with_camera:
-                self._perception.calibrate(message)
+                self._images.calibrate(message)
         except (NavError, PerceptionError) as problem:
             self._warn(str(problem))
 
@@ -211,7 +199,7 @@ class AwarenessBridge:
             static: whether they hold at all times; their stamps are then not looked at.
         """
         with self._lock:
-            self._pose_reader.read_transforms(message, now_s, static=static)
+            self._poses.read_transforms(message, now_s, static=static)
 
     def on_odometry(self, message: Odometry, now_s: float | None = None) -> None:
         """Store the robot's state and pose.
@@ -221,40 +209,15 @@ class AwarenessBridge:
             now_s: the present time; None to check the stamp in the next :meth:`tick` only.
         """
         with self._lock:
-            self._pose_reader.read_odometry(message, now_s)
+            self._poses.read_odometry(message, now_s)
 
     def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
         """Process one image; return True if it was used."""
-        stamp_s = to_seconds(message.header.stamp)
-        depth = None if self._depth is None else self._depth.nearest(stamp_s)
-        try:
+        used = self._images.read(message, now_s)
+        if used:
             with self._lock:
-                if self._perception.camera is None:
-                    raise NavError("no camera_info yet: the image cannot be used")
-                refusal = self._clock.refusal("images", stamp_s, now_s)
-                if refusal is not None:
-                    raise NavError(f"the image's {refusal}")
-                restarts = self._clock.restarts
-                T_odom_camera = self._poses.T_odom_camera(message.header.frame_id, stamp_s)
-            frame = self._perception.process(
-                message, stamp_s, T_odom_camera, lambda: self._clock.restarts == restarts, depth
-            )
-        except (NavError, PerceptionError, TrackingError) as problem:
-            self._warn(f"image: {problem}")
-            return False
-        with self._lock:
-            if frame is None or self._clock.restarts != restarts:
-                return False
-            self._frame, self._warned = frame, ""
-            self._frames += 1
-            assert self._perception.camera is not None
-            T_base_camera = self._poses.camera_in_base(message.header.frame_id, stamp_s)
-            self._watch.saw_image(stamp_s, self._perception.camera, T_base_camera)
-            if self._depth is not None and frame.depth is not None:
-                self._depth.used(frame.depth)
-        if frame.depth_problem:
-            self.refuse_depth(frame.depth_problem, now_s)
-        return True
+                self._warned = ""
+        return used
 
     def on_depth(self, message: Image, now_s: float) -> bool:
         """Keep a depth image, aligned with the pictures, for the picture of its time.
@@ -265,14 +228,14 @@ class AwarenessBridge:
         Raises:
             NavError: if the bridge was made without depth images.
         """
-        if self._depth is None:
+        if self._images.depth is None:
             raise NavError("the bridge was made without depth images")
-        return self._depth.read(message, now_s)
+        return self._images.depth.read(message, now_s)
 
     def refuse_depth(self, problem: str, now_s: float) -> None:
         """Count and report a depth image that could not be decoded or used."""
-        if self._depth is not None:
-            self._depth.refuse(problem, now_s)
+        if self._images.depth is not None:
+            self._images.depth.refuse(problem, now_s)
 
     def on_scan(self, number: int, message: LaserScan, now_s: float) -> bool:
         """Process one scan of a scanner, numbered from 0; return True if it was used.
@@ -280,7 +243,7 @@ class AwarenessBridge:
         Raises:
             NavError: for a number that no scanner has.
         """
-        return self._scan_reader().read(number, message, now_s)
+        return self._scan_input().read(number, message, now_s)
 
     def on_map(self, message: OccupancyGrid | MapCells) -> None:
         """Use a map of fixed things, also one from a file: they are not taken for legs.
@@ -288,17 +251,17 @@ class AwarenessBridge:
         It is used while tf tells where the map is in odom.
         """
         try:
-            self._scan_reader().set_map(message)
+            self._scan_input().set_map(message)
         except NavError as problem:
             self._warn(f"map: {problem}")
 
     def refuse_scan(self, number: int, problem: str, now_s: float) -> None:
         """Count and report a scan that could not be decoded."""
-        self._scan_reader().refuse(number, problem, now_s)
+        self._scan_input().refuse(number, problem, now_s)
 
     def scan_dropped(self) -> None:
         """Count a scan that was dropped, because others came faster than they are processed."""
-        self._scan_reader().dropped()
+        self._scan_input().dropped()
 
     def tick(self, now_s: float) -> NavConstraints:
         """Publish every topic at ``now_s`` and return the constraints."""
@@ -311,12 +274,12 @@ class AwarenessBridge:
                 if time_s is None:
                     constraints = stopped(now_s, "the clock went backward")
                 else:
-                    self._pose_reader.drop_future(time_s)
+                    self._poses.drop_future(time_s)
                     constraints = explained(self._constraints(time_s), self._watch.blind_text)
                 tracks, state = self.tracks, self._poses.state
                 details = {name: str(count) for name, count in self.counts.items()}
-                if self._frame is not None:
-                    details["frame_age_s"] = f"{constraints.stamp_s - self._frame.stamp_s:.3f}"
+                if self.frame is not None:
+                    details["frame_age_s"] = f"{constraints.stamp_s - self.frame.stamp_s:.3f}"
                 sensors, news = self._sensors(constraints.stamp_s)
             for line in news:
                 self._warn_user(line)
@@ -361,7 +324,7 @@ class AwarenessBridge:
             return f"odometry: {self._poses.problem}"
         if self._poses.state is None:
             return "no odometry yet"
-        if self._with_camera and self._perception.camera is None:
+        if self._with_camera and self._images.camera is None:
             return "no camera_info yet"
         return self._watch.missing_text
 
@@ -369,22 +332,21 @@ class AwarenessBridge:
         """Forget all that has a stamp of the clock before it was set."""
         self._adapter.reset()
         self._tracker.forget()
-        self._frame = None
-        self._pose_reader.forget()
+        self._poses.forget()
         self._watch.forget()
-        for reader in (self._depth, self._scans):
-            if reader is not None:
-                reader.forget()
+        self._images.forget()
+        if self._scans is not None:
+            self._scans.forget()
         self._warn("the clock has been set back: all tracks and moving transforms are deleted")
 
     def _sensors(self, now_s: float) -> tuple[DiagnosticStatus | None, list[str]]:
         """Return the status of the sensors, and a line for each loss and return."""
-        if self._scans is None and self._depth is None:
+        if self._scans is None and self._images.depth is None:
             return None, []
         status = sensor_status(self._watch.ages_s(now_s), self._watch.lost(now_s))
         return status, self._watch.news(now_s)
 
-    def _scan_reader(self) -> ScanReader:
+    def _scan_input(self) -> ScanInput:
         if self._scans is None:
             raise NavError("the bridge was made without scanners")
         return self._scans
@@ -397,3 +359,57 @@ class AwarenessBridge:
             self._warned = text
         self._warn_user(text)
         return True
+
+
+def guarded_update(
+    adapter: NavAdapter,
+    tracks: tuple[PersonTrack, ...],
+    robot_state: RobotState,
+    now_s: float,
+    perception_stamp_s: float,
+    warn: Callable[[str], bool],
+) -> NavConstraints:
+    """Return the adapter's constraints, or a stop with the reason if it refuses or fails.
+
+    Args:
+        adapter: is updated.
+        tracks: the latest.
+        robot_state: the latest.
+        now_s: the present time.
+        perception_stamp_s: time from which perception is.
+        warn: called with the problem; returns whether it is a new one.
+    """
+    try:
+        return adapter.update(tracks, robot_state, now_s, perception_stamp_s=perception_stamp_s)
+    except NavError as problem:
+        warn(str(problem))
+        reason = f"refused: {problem}"
+    except Exception as problem:
+        # Publishing must go on, whatever is wrong with these data.
+        reason = f"the adapter failed: {type(problem).__name__}: {problem}"
+        if warn(reason):
+            _LOG.error("the adapter failed", exc_info=problem)
+    try:
+        # A stop that keeps the people of the last good data, grown older.
+        older = adapter.watchdog(now_s)
+    except Exception:
+        return stopped(now_s, reason)
+    return replace(
+        older,
+        speed_limit_mps=0.0,
+        reachable_speed_limit_mps=0.0,
+        limited_by=reason,
+        stale=True,
+    )
+
+
+def explained(constraints: NavConstraints, blind: str) -> NavConstraints:
+    """Return constraints whose reason says which scanners are blind, where data are stale."""
+    if not blind or not constraints.stale:
+        return constraints
+    return replace(constraints, limited_by=f"{constraints.limited_by}; {blind}")
+
+
+def stopped(now_s: float, reason: str) -> NavConstraints:
+    """Return constraints without people that stop the robot."""
+    return NavConstraints(now_s, (), 0.0, reason, True)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 from tracking.clock import JumpedClock
+
+from .._errors import NavError
 
 #: Tolerated difference between the clock of a sender and that of this computer.
 CLOCK_TOLERANCE_S: Final = 0.05
@@ -30,13 +32,7 @@ class BridgeClock:
 
     def __init__(self) -> None:
         self.restarts = 0
-        self.refused: dict[InputKind, int] = {
-            "odometry": 0,
-            "transforms": 0,
-            "images": 0,
-            "depth_images": 0,
-            "scans": 0,
-        }
+        self.refused: dict[InputKind, int] = dict.fromkeys(get_args(InputKind), 0)
         self._last_s: float | None = None
         self._jumped: JumpedClock | None = None
 
@@ -74,3 +70,12 @@ class BridgeClock:
             return None
         self.refused[kind] += 1
         return f"stamp is {ahead_s:.3f} s ahead of this computer's clock"
+
+    def check(self, kind: InputKind, stamp_s: float, now_s: float, whose: str) -> None:
+        """Count and refuse a message from the future.
+
+        Raises:
+            NavError: for one; its text begins with ``whose``.
+        """
+        if (refusal := self.refusal(kind, stamp_s, now_s)) is not None:
+            raise NavError(f"{whose} {refusal}")

@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, cast
+
+from perception.installation import install_command
 
 from .._errors import NavError
-from ._cdr import decode, encode, sample, topic_type
+from ._cdr import decode, encode
+from ._message import FieldType, Message, field_types, once_per_kind, ros_type
 from ._topics import Topic
-from .messages import Message
 
-# isort: split
-from cyclonedds.core import (
-    DDSException,
-    InstanceState,
-    ReadCondition,
-    SampleState,
-    ViewState,
-    WaitSet,
-)
-from cyclonedds.domain import DomainParticipant
-from cyclonedds.pub import DataWriter
-from cyclonedds.qos import Policy, Qos
-from cyclonedds.sub import DataReader
-from cyclonedds.topic import Topic as DdsTopic
+try:
+    from cyclonedds.core import (
+        DDSException,
+        InstanceState,
+        ReadCondition,
+        SampleState,
+        ViewState,
+        WaitSet,
+    )
+    from cyclonedds.domain import DomainParticipant
+    from cyclonedds.idl import IdlStruct, types
+    from cyclonedds.idl._main import IdlMeta
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.qos import Policy, Qos
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic as DdsTopic
+except ImportError as cause:  # pragma: no cover - depends on the installation
+    raise NavError(
+        "topics over DDS need the package cyclonedds, which is not installed; it is part of the "
+        f"extra 'ros2': {install_command('ros2')}"
+    ) from cause
 
 _BLOCKING_NS: Final = 100_000_000
 _ANY: Final = SampleState.Any | ViewState.Any | InstanceState.Any
@@ -82,7 +91,8 @@ class DdsNode:
         """Send a message that is already encoded."""
         declared, writer = self._writers[topic.name]
         try:
-            writer.write(sample(declared.message, cdr))
+            sample = topic_type(declared.message).deserialize(cdr)
+            writer.write(sample)
         except DDSException as cause:
             raise NavError(f"{topic.name}: cannot publish: {cause}") from cause
 
@@ -151,3 +161,47 @@ def _qos(topic: Topic) -> Qos:
         # ROS 2 reads the first version of CDR.
         Policy.DataRepresentation(use_cdrv0_representation=True),
     )
+
+
+@once_per_kind
+def topic_type(kind: type[Message]) -> Any:
+    """Return the DDS type of a message: an IDL structure with the name that ROS 2 gives it.
+
+    Its samples hold CDR bytes (attribute ``cdr``), which DDS does not decode.
+    """
+
+    def serialize(self: Any, *_: Any, **__: Any) -> bytes:
+        return cast(bytes, self.cdr)
+
+    def deserialize(cls: Any, data: bytes, *_: Any, **__: Any) -> Any:
+        sample = object.__new__(cls)
+        sample.cdr = bytes(data)
+        return sample
+
+    made = _idl_type(kind)
+    made.cdr = b""
+    made.serialize = serialize
+    made.deserialize = classmethod(deserialize)
+    return made
+
+
+@once_per_kind
+def _idl_type(kind: type[Message]) -> Any:
+    """Return the IDL structure of a message."""
+    # rosidl_generator_dds_idl mangles package/msg/Name in this way.
+    name = ros_type(kind).replace("/", "::").replace("::msg::", "::msg::dds_::") + "_"
+    namespace: Any = IdlMeta.__prepare__(kind.__name__, (IdlStruct,), typename=name)
+    for field, field_type in field_types(kind).items():
+        namespace["__annotations__"][field] = _idl_field(field_type)
+    namespace["__module__"] = __name__
+    return IdlMeta(kind.__name__, (IdlStruct,), namespace)
+
+
+def _idl_field(kind: FieldType) -> Any:
+    if kind.message is not None:
+        one = _idl_type(kind.message)
+    else:
+        one = {"bool": bool, "string": str}.get(kind.name) or getattr(types, kind.name)
+    if kind.count is None:
+        return one
+    return types.array[one, kind.count] if kind.count else types.sequence[one]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
+from collections.abc import Callable
+from functools import cache
+from typing import Annotated, Any, Final, TypeVar, cast, get_args, get_origin, get_type_hints
 
 # The second argument is the ROS name of the type.
 Bool = Annotated[bool, "bool"]
@@ -26,6 +28,7 @@ Float64x12 = Annotated[tuple[float, ...], "float64[12]"]
 Float64x36 = Annotated[tuple[float, ...], "float64[36]"]
 
 _RULE: Final = "=" * 80
+_Made = TypeVar("_Made")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,6 +63,13 @@ def ros_type(message: type[Message]) -> str:
     return f"{message.__module__.rsplit('.', 1)[1]}/msg/{message.__name__}"
 
 
+def once_per_kind(make: Callable[[type[Message]], _Made]) -> Callable[[type[Message]], _Made]:
+    """Return a function that keeps what ``make`` returns for each message class."""
+    # Classes of frozen dataclasses are hashable, which mypy denies.
+    return cast(Callable[[type[Message]], _Made], cache(cast(Any, make)))
+
+
+@once_per_kind
 def field_types(message: type[Message]) -> dict[str, FieldType]:
     """Return name and type of each field, in the order of the wire."""
     hints = get_type_hints(message, include_extras=True)

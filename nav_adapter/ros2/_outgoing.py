@@ -10,12 +10,10 @@ from tracking import PersonTrack
 from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
 from ._alerts import alerts
-from ._grid import occupancy_grid
-from ._markers import markers
-from ._mask_stream import SpeedMaskSettings, SpeedMaskStream
-from ._people import circle_objects, detections, people, teb_obstacles
+from ._people import circle_objects, detections, markers, occupancy_grid, people, teb_obstacles
 from ._polygons import collision_polygons, stop_zone
 from ._speed_limit import speed_limit
+from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
 

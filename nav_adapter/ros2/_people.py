@@ -1,16 +1,24 @@
-"""People as obstacles, people and boxes of other ROS packages."""
+"""People as messages of other ROS packages: obstacles, people, boxes, a grid, and markers."""
 
 from __future__ import annotations
 
+import math
 import uuid
 from collections.abc import Iterable
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
+
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import finite_array, finite_number
 from tracking import PersonTrack
 
 from .._constraints import NavConstraints
-from ..exporters import boxes
-from .conversions import header, yaw_quaternion
+from .._errors import NavError
+from .._robot import RobotState
+from ..exporters import boxes, paint_costmap
+from .conversions import header, to_time, yaw_quaternion
+from .messages.builtin_interfaces import Duration
 from .messages.costmap_converter_msgs import ObstacleArrayMsg, ObstacleMsg
 from .messages.geometry_msgs import (
     Point,
@@ -23,7 +31,9 @@ from .messages.geometry_msgs import (
     Vector3,
 )
 from .messages.nav2_msgs import CircleObject
+from .messages.nav_msgs import MapMetaData, OccupancyGrid
 from .messages.people_msgs import People, Person
+from .messages.std_msgs import ColorRGBA
 from .messages.unique_identifier_msgs import UUID
 from .messages.vision_msgs import (
     BoundingBox3D,
@@ -32,11 +42,19 @@ from .messages.vision_msgs import (
     ObjectHypothesis,
     ObjectHypothesisWithPose,
 )
+from .messages.visualization_msgs import Marker, MarkerArray
 
 _OCCUPIED: Final = 100
 # Any fixed namespace, so that a track has the same UUID in every process.
 _NAMESPACE: Final = uuid.UUID("6f1b3f0a-6f53-4d5e-9c0e-5b2f3f8a7c11")
 _RELIABILITY: Final = {"confirmed": 1.0, "coasting": 0.5, "tentative": 0.25}
+_LARGEST_CELLS: Final = 4_000_000
+# A marker disappears from the display after this time without an update.
+_LIFETIME: Final = Duration(1, 0)
+_STANDING_MPS: Final = 0.1
+_LINE_M: Final = 0.04
+_TEXT_M: Final = 0.25
+_WHITE: Final = ColorRGBA(1.0, 1.0, 1.0, 1.0)
 
 
 def circle_objects(
@@ -144,3 +162,143 @@ def detections(constraints: NavConstraints, *, frame_id: str = "odom") -> Detect
             )
         )
     return Detection3DArray(top, tuple(found))
+
+
+def occupancy_grid(
+    constraints: NavConstraints,
+    center_odom_m: Any,
+    *,
+    size_m: float = 10.0,
+    resolution_m: float = 0.05,
+    frame_id: str = "odom",
+) -> OccupancyGrid:
+    """Return ``nav_msgs/OccupancyGrid``: 100 inside the obstacles, 0 elsewhere.
+
+    The grid is a square around ``center_odom_m``. Its corner is rounded to whole cells so that
+    people do not smear when the grid moves. Costs around them are left to Nav2's inflation layer.
+
+    Args:
+        constraints: the people.
+        center_odom_m: (2,), usually the robot.
+        size_m: side of the square.
+        resolution_m: side of a cell.
+        frame_id: of the constraints.
+
+    Raises:
+        NavError: for numbers that are not finite or not positive, or over four million cells.
+    """
+    center = finite_array("center_odom_m", center_odom_m, (2,), NavError)
+    size = finite_number("size_m", size_m, NavError, minimum=0.0, exclusive_minimum=True)
+    cell = finite_number("resolution_m", resolution_m, NavError, minimum=1e-3)
+    side = round(min(size / cell, 1e9))  # of a float, which may overflow
+    if not 0 < side * side <= _LARGEST_CELLS:
+        raise NavError(
+            f"a grid must have 1 to {_LARGEST_CELLS} cells, got {side} x {side} "
+            f"(size_m {size:g}, resolution_m {cell:g})"
+        )
+    origin = (np.floor(center / cell) - side // 2) * cell
+    costs = np.zeros((side, side), dtype=np.uint8)
+    paint_costmap(costs, origin, cell, constraints, ring_m=0.0)
+    return OccupancyGrid(
+        header(constraints.stamp_s, frame_id),
+        MapMetaData(
+            to_time(constraints.stamp_s),
+            cell,
+            side,
+            side,
+            Pose(Point(float(origin[0]), float(origin[1]), 0.0)),
+        ),
+        np.where(costs > 0, np.int8(_OCCUPIED), np.int8(0)).tobytes(),
+    )
+
+
+def markers(
+    constraints: NavConstraints,
+    robot_state: RobotState | None = None,
+    *,
+    frame_id: str = "odom",
+) -> MarkerArray:
+    """Return ``visualization_msgs/MarkerArray``: bodies, outlines, velocities, α and the limit.
+
+    Bodies and outlines run from red (unaware) to green (aware). The first marker deletes the old
+    ones. The limit and its reason are shown above the robot.
+    """
+    top = header(constraints.stamp_s, frame_id)
+    shapes = [Marker(top, action=Marker.DELETEALL)]
+    for each in constraints.obstacles:
+        (x, y), (vx, vy) = each.center_odom_m.tolist(), each.velocity_odom_mps.tolist()
+        color = awareness_color(each.awareness_lower)
+        ring = [Point(u, v, 0.02) for u, v, *_ in each.polygon.exterior.coords]
+        shapes.append(
+            Marker(
+                top,
+                "body",
+                each.track_id,
+                Marker.CYLINDER,
+                pose=Pose(Point(x, y, 0.5 * each.height_m)),
+                scale=Vector3(2.0 * BODY_RADIUS_M, 2.0 * BODY_RADIUS_M, each.height_m),
+                color=ColorRGBA(color.r, color.g, color.b, 0.6),
+                lifetime=_LIFETIME,
+            )
+        )
+        shapes.append(
+            Marker(
+                top,
+                "obstacle",
+                each.track_id,
+                Marker.LINE_STRIP,
+                scale=Vector3(_LINE_M, 0.0, 0.0),
+                color=color,
+                lifetime=_LIFETIME,
+                points=tuple(ring),
+            )
+        )
+        shapes.append(
+            Marker(
+                top,
+                "awareness",
+                each.track_id,
+                Marker.TEXT_VIEW_FACING,
+                pose=Pose(Point(x, y, each.height_m + _TEXT_M)),
+                scale=Vector3(0.0, 0.0, _TEXT_M),
+                color=_WHITE,
+                lifetime=_LIFETIME,
+                text=f"{each.track_id}: α ≥ {each.awareness_lower:.2f}",
+            )
+        )
+        if math.hypot(vx, vy) > _STANDING_MPS:
+            shapes.append(
+                Marker(
+                    top,
+                    "velocity",
+                    each.track_id,
+                    Marker.ARROW,
+                    scale=Vector3(0.06, 0.12, 0.15),
+                    color=color,
+                    lifetime=_LIFETIME,
+                    points=(Point(x, y, 0.1), Point(x + vx, y + vy, 0.1)),
+                )
+            )
+    if robot_state is not None:
+        x, y = robot_state.position_odom_m.tolist()
+        shapes.append(
+            Marker(
+                top,
+                "limit",
+                0,
+                Marker.TEXT_VIEW_FACING,
+                pose=Pose(Point(x, y, 2.0)),
+                scale=Vector3(0.0, 0.0, _TEXT_M),
+                color=_WHITE,
+                lifetime=_LIFETIME,
+                text=f"{constraints.speed_limit_mps:.2f} m/s: {constraints.limited_by}",
+            )
+        )
+    return MarkerArray(tuple(shapes))
+
+
+def awareness_color(awareness_lower: float) -> ColorRGBA:
+    """Return a colour from red for 0 through yellow to green for 1."""
+    return ColorRGBA(
+        min(1.0, 2.0 - 2.0 * awareness_lower), min(1.0, 2.0 * awareness_lower), 0.1, 1.0
+    )

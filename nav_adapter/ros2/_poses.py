@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -12,25 +14,37 @@ from perception.laser import RobotMotion
 
 from .._errors import NavError
 from .._robot import RobotState
+from ._clock import CLOCK_TOLERANCE_S, BridgeClock, InputKind
 from ._odometry_check import OdometryCheck
-from ._optical import optical_problem
 from ._outgoing import Frames
 from ._transforms import TransformBuffer
 from .conversions import pose_matrix, to_seconds
 from .messages.geometry_msgs import TransformStamped
 from .messages.nav_msgs import Odometry
+from .messages.tf2_msgs import TFMessage
 
 # No robot drives or turns so fast: more is an error of the sender.
 _FASTEST_MPS: Final = 100.0
 _FASTEST_RADPS: Final = 100.0
+# A camera on a robot that looks for people never looks further up.
+_STEEPEST_RAD: Final = math.radians(60.0)
+# A body frame (x ahead, y left, z up) that is tilted down looks like an optical one that is rolled
+# by a quarter turn and looks up. No camera that is mounted so looks further up than this.
+_STEEPEST_ROLLED_RAD: Final = math.radians(30.0)
 
 
 class RobotPoses:
-    """The poses of robot and sensors over the last seconds. One thread at a time may use it.
+    """The poses of robot and sensors over the last seconds, from odometry, tf and fixed mounts.
+
+    One thread at a time may use it.
 
     Args:
         frames: names of the frames.
         T_base_camera: (4, 4) pose of a fixed camera; None to look it up in tf.
+        clock: of the bridge.
+        warn: called with each problem.
+        with_map: whether the pose of odom in a map is needed. Localisation stamps it ahead on
+            purpose; the latest one then holds until the next.
 
     Attributes:
         transforms: from tf.
@@ -38,8 +52,19 @@ class RobotPoses:
         problem: why the odometry cannot be trusted; empty if nothing is wrong with it.
     """
 
-    def __init__(self, frames: Frames, T_base_camera: FloatArray | None) -> None:
+    def __init__(
+        self,
+        frames: Frames,
+        T_base_camera: FloatArray | None,
+        clock: BridgeClock,
+        warn: Callable[[str], object],
+        *,
+        with_map: bool,
+    ) -> None:
         self._frames, self._T_base_camera = frames, T_base_camera
+        self._clock, self._warn, self._with_map = clock, warn, with_map
+        # Kinds of messages from the future that have been reported.
+        self._ahead: set[InputKind] = set()
         self.transforms = TransformBuffer()
         # Apart from tf, which may have a pose of the robot too: two sources in one history would
         # be one robot that jumps.
@@ -48,15 +73,141 @@ class RobotPoses:
         self.state: RobotState | None = None
         self.problem = ""
 
-    def add_transform(self, message: TransformStamped, *, static: bool) -> None:
-        """Store a transform.
+    def read_transforms(
+        self, message: TFMessage, now_s: float | None, *, static: bool = False
+    ) -> None:
+        """Store the transforms of /tf or /tf_static.
+
+        Args:
+            message: the transforms.
+            now_s: the present time; None to check no stamps.
+            static: whether they hold at all times; their stamps are then not looked at.
+        """
+        for each in message.transforms:
+            to_odom = each.child_frame_id.lstrip("/") == self._frames.odom
+            timeless = static or (to_odom and self._with_map)
+            if not timeless and self._is_future_transform(each, now_s):
+                continue
+            try:
+                self.transforms.add_message(each, static=timeless)
+            except NavError as problem:
+                self._warn(f"tf: {problem}")
+
+    def read_odometry(self, message: Odometry, now_s: float | None) -> None:
+        """Store the robot's state and pose.
+
+        Args:
+            message: in the odom frame.
+            now_s: the present time; None to check no stamp.
+        """
+        if message.header.frame_id.lstrip("/") != self._frames.odom:
+            self._warn(
+                f"odometry must be in frame {self._frames.odom!r}, got "
+                f"{message.header.frame_id!r}: ignored"
+            )
+            return
+        if self._is_future("odometry", to_seconds(message.header.stamp), now_s):
+            return
+        before = self.problem
+        try:
+            self._add_odometry(message)
+            problem = self.problem
+        except NavError as refused:
+            problem = str(refused)
+        if problem and problem != before:
+            self._warn(f"odometry: {problem}")
+
+    def drop_future(self, now_s: float) -> None:
+        """Forget what is from the future and would shut out good messages until then."""
+        state = self.state
+        if state is not None and self._is_future("odometry", state.stamp_s, now_s):
+            self.state = None
+        self.transforms.forget(after_s=now_s + CLOCK_TOLERANCE_S)
+        self._odometry.forget(after_s=now_s + CLOCK_TOLERANCE_S)
+
+    def forget(self) -> None:
+        """Forget the state, all transforms but the static ones, and which problems were told."""
+        self.state, self.problem = None, ""
+        self._ahead.clear()
+        self.transforms.forget()
+        self._odometry.forget()
+        self._check = OdometryCheck(self._frames)
+
+    def T_odom_camera(self, frame: str, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
+        """Return the pose (4, 4) of the camera.
+
+        Args:
+            frame: of the image; not used if the camera's frame has a name in ``frames``, or its
+                pose is fixed.
+            stamp_s: of the image.
 
         Raises:
-            NavError: for a pose or a stamp that cannot be used.
+            NavError: for a pose that is not known at that time, or not of an optical frame.
         """
-        self.transforms.add_message(message, static=static)
+        T_base_camera = self._T_base_camera
+        if T_base_camera is None:
+            frame = self._frames.camera or frame
+            if not self._is_on_robot(frame):
+                T_odom_camera = self.transforms.lookup(self._frames.odom, frame, stamp_s)
+                return _optical(T_odom_camera, frame, self._frames.odom)
+            T_base_camera = _optical(self.in_base(frame, stamp_s), frame, self._frames.base)
+        return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
 
-    def add_odometry(self, message: Odometry) -> None:
+    def in_base(self, frame: str, stamp_s: float) -> FloatArray:
+        """Return the pose (4, 4) of a frame of the robot in the base frame.
+
+        Raises:
+            NavError: for a pose that is not known at that time.
+        """
+        return self.transforms.lookup(self._frames.base, frame, stamp_s)
+
+    def camera_in_base(self, frame: str, stamp_s: float) -> FloatArray | None:
+        """Return the pose (4, 4) of the camera in the base frame; None if it is not known."""
+        if self._T_base_camera is not None:
+            return self._T_base_camera
+        try:
+            return self.in_base(self._frames.camera or frame, stamp_s)
+        except NavError:
+            return None
+
+    def motion(self, start_s: float, end_s: float) -> RobotMotion:
+        """Return the robot's motion from one time to a later one, of a scan's first and last ray.
+
+        Where the odometry ends before that, the robot goes on at its speed.
+
+        Raises:
+            NavError: for poses that are not known, or end too long before.
+        """
+        state = self.state
+        if state is None:
+            raise NavError("no odometry yet: the pose of the robot is unknown")
+        velocity_mps = np.array([state.speed_mps, state.lateral_mps])
+        # Raises where the odometry ends too long before, also for a scan after its end.
+        T_end = self._T_odom_base(end_s)
+        if end_s > state.stamp_s:
+            T = self._T_odom_base(state.stamp_s)
+            return RobotMotion(state.stamp_s, T, velocity_mps, state.yaw_rate_radps)
+        if end_s <= start_s:
+            return RobotMotion(end_s, T_end, velocity_mps, state.yaw_rate_radps)
+        return RobotMotion.between(start_s, self._T_odom_base(start_s), end_s, T_end)
+
+    def _is_future(self, kind: InputKind, stamp_s: float, now_s: float | None) -> bool:
+        """Return whether a message is from the future; it is then counted."""
+        refusal = None if now_s is None else self._clock.refusal(kind, stamp_s, now_s)
+        # A sender that is always ahead must not flood the terminal: the diagnostics have the count.
+        if refusal is not None and kind not in self._ahead:
+            self._ahead.add(kind)
+            self._warn(f"{kind}: the {refusal}: refused and counted, without further warnings")
+        return refusal is not None
+
+    def _is_future_transform(self, message: TransformStamped, now_s: float | None) -> bool:
+        stamp_s = to_seconds(message.header.stamp)
+        if message.child_frame_id.lstrip("/") == self._frames.odom and now_s is not None:
+            # Localisation stamps map -> odom ahead on purpose, and it is not needed here.
+            return stamp_s > self._clock.read(now_s) + CLOCK_TOLERANCE_S
+        return self._is_future("transforms", stamp_s, now_s)
+
+    def _add_odometry(self, message: Odometry) -> None:
         """Store the robot's state, unless a newer one is known, and its pose.
 
         Pose and twist of another frame on the robot are moved to the base frame. The place of that
@@ -122,76 +273,6 @@ class RobotPoses:
             return False
         return not any(self._frames.odom.lstrip("/") in way for way in ways)
 
-    def forget(self) -> None:
-        """Forget the state and all transforms but the static ones."""
-        self.state, self.problem = None, ""
-        self.transforms.forget()
-        self._odometry.forget()
-        self._check = OdometryCheck(self._frames)
-
-    def drop_after(self, stamp_s: float) -> None:
-        """Forget the poses after a time, but for static transforms."""
-        self.transforms.forget(after_s=stamp_s)
-        self._odometry.forget(after_s=stamp_s)
-
-    def T_odom_camera(self, frame: str, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
-        """Return the pose (4, 4) of the camera.
-
-        Args:
-            frame: of the image; not used if the camera's frame has a name in ``frames``, or its
-                pose is fixed.
-            stamp_s: of the image.
-
-        Raises:
-            NavError: for a pose that is not known at that time, or not of an optical frame.
-        """
-        T_base_camera = self._T_base_camera
-        if T_base_camera is None:
-            frame = self._frames.camera or frame
-            if not self._is_on_robot(frame):
-                T_odom_camera = self.transforms.lookup(self._frames.odom, frame, stamp_s)
-                return _optical(T_odom_camera, frame, self._frames.odom)
-            T_base_camera = _optical(self.in_base(frame, stamp_s), frame, self._frames.base)
-        return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
-
-    def in_base(self, frame: str, stamp_s: float) -> FloatArray:
-        """Return the pose (4, 4) of a frame of the robot in the base frame.
-
-        Raises:
-            NavError: for a pose that is not known at that time.
-        """
-        return self.transforms.lookup(self._frames.base, frame, stamp_s)
-
-    def camera_in_base(self, frame: str, stamp_s: float) -> FloatArray | None:
-        """Return the pose (4, 4) of the camera in the base frame; None if it is not known."""
-        if self._T_base_camera is not None:
-            return self._T_base_camera
-        try:
-            return self.in_base(self._frames.camera or frame, stamp_s)
-        except NavError:
-            return None
-
-    def motion(self, start_s: float, end_s: float) -> RobotMotion:
-        """Return the robot's motion from one time to a later one, of a scan's first and last ray.
-
-        Where the odometry ends before that, the robot goes on at its speed.
-
-        Raises:
-            NavError: for poses that are not known, or end too long before.
-        """
-        state = self.state
-        if state is None:
-            raise NavError("no odometry yet: the pose of the robot is unknown")
-        velocity_mps = np.array([state.speed_mps, state.lateral_mps])
-        # Also for its error, where the odometry ends too long before.
-        T_end = self._T_odom_base(end_s)
-        if end_s > state.stamp_s:
-            T = self._T_odom_base(state.stamp_s)
-            return RobotMotion(state.stamp_s, T, velocity_mps, state.yaw_rate_radps)
-        if end_s <= start_s:
-            return RobotMotion(end_s, T_end, velocity_mps, state.yaw_rate_radps)
-        return RobotMotion.between(start_s, self._T_odom_base(start_s), end_s, T_end)
-
     def _T_odom_base(self, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
         return self._odometry.lookup(self._frames.odom, self._frames.base, stamp_s)
 
@@ -205,3 +286,67 @@ def _optical(T: FloatArray, frame: str, level_frame: str) -> FloatArray:
     if problem := optical_problem(T, frame, level_frame):
         raise NavError(f"{problem}, or the bridge's camera frame must be it")
     return T
+
+
+def optical_problem(T_level_camera: FloatArray, frame: str, level_frame: str) -> str:
+    """Return why a frame cannot be the optical frame of images; empty if it can.
+
+    Cameras that are upside down or rolled by a quarter turn are in order.
+
+    Args:
+        T_level_camera: (4, 4) pose of the frame in one whose z axis points up.
+        frame: its name.
+        level_frame: name of the other frame.
+    """
+    right, down, ahead = T_level_camera[2, :3].tolist()
+    up_rad = math.asin(max(-1.0, min(1.0, ahead)))
+    highest_rad = _STEEPEST_ROLLED_RAD if abs(down) <= abs(right) else _STEEPEST_RAD
+    # A camera may look straight down, if at least the name is right.
+    lowest_rad = -math.pi if "optical" in frame.lower() else -_STEEPEST_RAD
+    if lowest_rad <= up_rad <= highest_rad:
+        return ""
+    where = "up" if up_rad > 0.0 else "down"
+    optical = f"{frame.removesuffix('_link').removesuffix('_frame')}_optical_frame"
+    return (
+        f"the frame {frame!r} of the images is not an optical frame: its z axis, the view, points "
+        f"{abs(math.degrees(up_rad)):.0f} degrees {where} in {level_frame!r}; the driver must name "
+        f"the frame with z ahead, x right and y down, often {optical!r}"
+    )
+
+
+def odometry_problems(
+    odometry: Iterable[Odometry],
+    transforms: Iterable[TFMessage] = (),
+    static_transforms: Iterable[TFMessage] = (),
+    *,
+    frames: Frames | None = None,
+) -> tuple[str, ...]:
+    """Return in words what the bridge would find wrong with a recording's odometry and tf.
+
+    For example that they contradict each other, or that the odometry is in another frame.
+
+    Args:
+        odometry: all messages of its topic.
+        transforms: all messages of /tf.
+        static_transforms: all messages of /tf_static.
+        frames: names of the frames.
+
+    Returns:
+        Each problem once, in the order of their first sight; none if nothing is wrong.
+    """
+    named = frames or Frames()
+    problems: dict[str, None] = {}
+    poses = RobotPoses(named, None, BridgeClock(), problems.setdefault, with_map=False)
+    for message in static_transforms:
+        poses.read_transforms(message, None, static=True)
+    moving = [
+        (to_seconds(each.header.stamp), 0, partial(poses.read_transforms, TFMessage((each,))))
+        for message in transforms
+        for each in message.transforms
+    ]
+    driven = [
+        (to_seconds(each.header.stamp), 1, partial(poses.read_odometry, each)) for each in odometry
+    ]
+    for _, _, read in sorted([*moving, *driven], key=lambda entry: entry[:2]):
+        read(None)
+    return tuple(problems)

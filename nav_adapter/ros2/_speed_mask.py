@@ -1,17 +1,32 @@
-"""The speed map as the mask of Nav2's speed filter."""
+"""The speed map as the mask of Nav2's speed filter, and as a stream of masks."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+
+from perception.arrays import finite_number, set_fields
+
+from .._constraints import NavConstraints
+from .._errors import NavError
+from .._robot import RobotState
 from ..exporters import SpeedMap
+from ._speed_limit import fastest_point_per_axis
 from .conversions import header, to_time
+from .messages import Message
 from .messages.geometry_msgs import Point, Pose
 from .messages.nav2_msgs import CostmapFilterInfo
 from .messages.nav_msgs import MapMetaData, OccupancyGrid
 
 # nav2_costmap_2d/costmap_filters/filter_values.hpp: SPEED_FILTER_PERCENT
 _PERCENT: Final = 1
+# Beyond this a mask takes longer to compute than to drive across.
+_MOST_CELLS: Final = 1_000_000
+# Rounding of stamps, in periods.
+_ROUNDING: Final = 1e-6
 
 
 def speed_mask(
@@ -43,3 +58,116 @@ def speed_mask(
         speed_map.percent.tobytes(),
     )
     return mask, CostmapFilterInfo(top, _PERCENT, mask_topic, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedMaskSettings:
+    """The settings of a published speed mask.
+
+    Attributes:
+        rate_hz: masks per second, 0.1 to 50; never more than there are publications.
+        size_m: side of the square around the robot.
+        resolution_m: side of a cell, at least 1 cm.
+        topic: of the mask, as the filter info names it.
+
+    Raises:
+        NavError: for a number out of bounds, or over a million cells.
+    """
+
+    rate_hz: float = 2.0
+    size_m: float = 10.0
+    resolution_m: float = 0.1
+    topic: str = "/awarenav/speed_mask"
+
+    def __post_init__(self) -> None:
+        rate = finite_number("the speed mask's rate_hz", self.rate_hz, NavError, minimum=0.1)
+        if rate > 50.0:
+            raise NavError(f"the speed mask's rate_hz must be at most 50, got {rate:g}")
+        cell = finite_number(
+            "the speed mask's resolution_m", self.resolution_m, NavError, minimum=0.01
+        )
+        size = finite_number("the speed mask's size_m", self.size_m, NavError, minimum=cell)
+        if (size / cell) ** 2 > _MOST_CELLS:
+            raise NavError(
+                f"the speed mask must have at most {_MOST_CELLS} cells, got size_m {size:g} and "
+                f"resolution_m {cell:g}"
+            )
+        set_fields(self, rate_hz=rate, size_m=size, resolution_m=cell)
+
+
+class SpeedMaskStream:
+    """Makes the messages of a speed mask, publication by publication.
+
+    Nav2's filter subscribes to the mask anew at every filter info, so the info is sent once, before
+    the first mask. A mask holds until the next one: the lower limit of its stamp and a period later
+    counts. When constraints stop the robot for lack of data, the mask is a stop everywhere, at
+    once.
+
+    Args:
+        settings: rate, size and topic.
+        frame_id: of the mask.
+    """
+
+    def __init__(self, settings: SpeedMaskSettings, frame_id: str) -> None:
+        self._settings, self._frame_id = settings, frame_id
+        self._map: SpeedMap | None = None
+        self._is_stop = self._info_sent = False
+
+    def messages(
+        self,
+        constraints: NavConstraints,
+        state: RobotState | None,
+        wanted: Callable[[str], bool],
+    ) -> Iterator[tuple[str, Message]]:
+        """Yield topic key (:data:`~nav_adapter.ros2.MASK_TOPICS`) and message, if they are due.
+
+        Args:
+            constraints: of this publication.
+            state: the robot that the mask is around; without it only a stop is sent.
+            wanted: whether messages of a key are wanted.
+        """
+        if not wanted("speed_mask"):
+            return
+        stops = constraints.speed_basis is None or (
+            constraints.stale and constraints.speed_limit_mps == 0.0
+        )
+        if not (stops and not self._is_stop) and not self._is_due(constraints.stamp_s):
+            return
+        chart = self._stop_map(constraints.stamp_s) if stops else self._map_of(constraints, state)
+        if chart is None:
+            return
+        self._map, self._is_stop = chart, stops
+        mask, info = speed_mask(chart, self._settings.topic, frame_id=self._frame_id)
+        if not self._info_sent and wanted("speed_mask_info"):
+            self._info_sent = True
+            yield "speed_mask_info", info
+        yield "speed_mask", mask
+
+    def _is_due(self, stamp_s: float) -> bool:
+        if self._map is None:
+            return True
+        periods = (stamp_s - self._map.stamp_s) * self._settings.rate_hz
+        # A clock that was set back makes the latest mask one of the future.
+        return periods >= 1.0 - _ROUNDING or periods < 0.0
+
+    def _map_of(self, constraints: NavConstraints, state: RobotState | None) -> SpeedMap | None:
+        if state is None:
+            return None
+        chart = SpeedMap.around(
+            constraints,
+            state.position_odom_m,
+            size_m=self._settings.size_m,
+            resolution_m=self._settings.resolution_m,
+            times_s=(0.0, 1.0 / self._settings.rate_hz),
+        )
+        assert constraints.robot is not None
+        limits = chart.limits_mps
+        lower = limits / fastest_point_per_axis(constraints.robot)
+        return replace(chart, limits_mps=np.where(limits < chart.max_speed_mps, lower, limits))
+
+    def _stop_map(self, stamp_s: float) -> SpeedMap | None:
+        """Return a stop where the latest mask is; None before the first mask."""
+        latest = self._map
+        if latest is None:
+            return None
+        return replace(latest, stamp_s=stamp_s, limits_mps=np.zeros_like(latest.limits_mps))

@@ -44,12 +44,11 @@ from tracking.prediction import PredictionModel
 from .._errors import NavError
 from .._policy import AwarenessPolicy
 from ._bridge import AwarenessBridge
-from ._mask_stream import SpeedMaskSettings
 from ._outgoing import Frames
-from ._perception_thread import PerceptionThread
 from ._robot_file import RobotFile
-from ._scan_perception import scanner_inputs
-from ._scan_thread import ScanThread
+from ._scan_input import scanner_inputs
+from ._speed_mask import SpeedMaskSettings
+from ._threads import PerceptionThread, ScanThread
 from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, is_rectified
 from .conversions import from_ros, ros_class, to_ros
 from .messages import Message, ros_type

@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-import json
-import multiprocessing
 import os
-import queue
 import re
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import cv2
 import numpy as np
+from joblib import Parallel, delayed
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from awarenav.errors import counted
 from awarenav.files import atomic_path
-from awarenav.line_files import LineFile
-from awarenav.records import (
-    Record,
-    continue_records,
-    read_records,
-    record_line,
-    write_records,
-)
+from awarenav.records import Record, read_records, write_records
 from perception import Camera
-from perception.documents import parse_json
 
 from ..world.errors import SimError
 from ._config import RenderConfig
@@ -39,10 +30,8 @@ _SETTINGS: Final = "render.yaml"
 _SHEET: Final = "contact_sheet.png"
 # All files of a set but its settings.
 _MADE: Final = re.compile(
-    r"(\d{6,}\.png|truth\.jsonl|camera\.yaml|contact_sheet\.png)(\.part|\.damaged)?"
+    r"(\d{6,}\.(png|json)|truth\.jsonl|camera\.yaml|contact_sheet\.png)(\.part)?"
 )
-# Time without a record after which the processes are checked for being alive.
-_POLL_S: Final = 1.0
 
 
 def render(
@@ -56,8 +45,9 @@ def render(
 ) -> Path:
     """Write the images of ``config`` into a folder; continue an interrupted set.
 
-    Images ``000000.png`` … appear whole or not at all. ``truth.jsonl`` grows by one line per image
-    and is sorted at the end. ``camera.yaml`` is ROS camera_info, ``render.yaml`` holds the
+    Images ``000000.png`` … and their truth, ``000000.json`` …, appear whole or not at all; an
+    interrupted set is continued with those that are missing. At the end the truth of all images
+    moves into ``truth.jsonl``. ``camera.yaml`` is ROS camera_info, ``render.yaml`` holds the
     settings, and ``contact_sheet.png`` shows a sample with the true boxes.
 
     Args:
@@ -73,39 +63,47 @@ def render(
 
     Raises:
         SimError: when ``out`` holds images of other settings, a finished set (with neither
-            ``resume`` nor ``overwrite``) or none (with ``resume``), or all processes died.
+            ``resume`` nor ``overwrite``) or none (with ``resume``), or a process died.
     """
     if overwrite:
         _remove_set(out)
     _check_folder(config, out, resume=resume)
     truth = out / _TRUTH
-    done = {record["frame"]: record for record in _finished_records(config, out)}
+    done = _finished_records(config, out)
     if len(done) == config.frames and (out / _SHEET).exists() and not resume:
         raise SimError(
             f"{out} holds a finished set of {counted(config.frames, 'image')}: replace it with "
             "--overwrite, choose another --out, or keep it with --resume"
         )
-    write_records(truth, done.values())
-    missing = [frame for frame in range(config.frames) if frame_name(frame) not in done]
     _write(config.camera, out / "camera.yaml")
-    tasks = _group_by_scene(config, missing)
+    tasks = _group_by_scene(config, [f for f in range(config.frames) if frame_name(f) not in done])
     workers = min(processes or os.cpu_count() or 1, max(len(tasks), 1))
-    with (
-        LineFile(truth, SimError) as file,
-        tqdm(
-            total=config.frames,
-            initial=len(done),
-            desc="render",
-            unit="frame",
-            file=sys.stderr,
-            disable=not progress,
-        ) as bar,
-    ):
-        for record in _render_tasks(config, out, tasks, workers):
-            file.add(record_line(record))
-            bar.update()
-    records = sorted(read_records(truth), key=lambda record: str(record["frame"]))
+    with tqdm(
+        total=config.frames,
+        initial=len(done),
+        desc="render",
+        unit="frame",
+        file=sys.stderr,
+        disable=not progress,
+    ) as bar:
+        scenes = Parallel(n_jobs=workers, return_as="generator_unordered")(
+            delayed(_render_scene)(config, out, task) for task in tasks
+        )
+        try:
+            for records in scenes:
+                done.update((record["frame"], record) for record in records)
+                bar.update(len(records))
+        except TerminatedWorkerError as cause:
+            left = config.frames - len(done)
+            raise SimError(
+                f"a rendering process ended with {left} images to go; run the command again to "
+                "continue"
+            ) from cause
+    records = [done[frame_name(frame)] for frame in range(config.frames)]
     write_records(truth, records)
+    for part in out.glob("*.json"):
+        if _MADE.fullmatch(part.name):
+            part.unlink()
     write_contact_sheet(out, records, config.camera, out / _SHEET)
     return truth
 
@@ -168,12 +166,18 @@ def _write(content: Camera | RenderConfig, path: Path) -> None:
         raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
 
 
-def _finished_records(config: RenderConfig, out: Path) -> list[Record]:
-    """Return the records whose images exist; set damaged lines aside."""
-    truth = out / _TRUTH
+def _finished_records(config: RenderConfig, out: Path) -> dict[str, Record]:
+    """Return the truth of the images that exist, by their names."""
     names = {frame_name(frame) for frame in range(config.frames)}
-    records = continue_records(truth, names) if truth.exists() else []
-    return [record for record in records if (out / str(record["frame"])).is_file()]
+    files = [path for path in out.glob("*.json") if f"{path.stem}.png" in names]
+    found = [record for path in sorted(files) for record in read_records(path)]
+    if (out / _TRUTH).exists():
+        found += read_records(out / _TRUTH)
+    return {
+        record["frame"]: record
+        for record in found
+        if record["frame"] in names and (out / record["frame"]).is_file()
+    }
 
 
 def _group_by_scene(config: RenderConfig, frames: Sequence[int]) -> list[list[int]]:
@@ -184,76 +188,19 @@ def _group_by_scene(config: RenderConfig, frames: Sequence[int]) -> list[list[in
     return list(scenes.values())
 
 
-def _render_tasks(
-    config: RenderConfig, out: Path, tasks: list[list[int]], workers: int
-) -> Iterator[Record]:
-    """Yield records as they are made; one worker runs in this process."""
-    if workers <= 1:
-        for task in tasks:
-            yield from _scene_records(config, out, task)
-        return
-    context = multiprocessing.get_context("spawn")
-    task_queue, record_queue = context.Queue(), context.Queue()
-    for task in tasks:
-        task_queue.put(task)
-    for _ in range(workers):
-        task_queue.put(None)
-    settings = config.model_dump_json()
-    processes = [
-        context.Process(
-            target=_render_scenes, args=(settings, str(out), task_queue, record_queue), daemon=True
-        )
-        for _ in range(workers)
-    ]
-    for process in processes:
-        process.start()
-    try:
-        left = sum(map(len, tasks))
-        while left:
-            try:
-                line = record_queue.get(timeout=_POLL_S)
-            except queue.Empty:
-                if not any(process.is_alive() for process in processes) and record_queue.empty():
-                    raise SimError(
-                        f"every rendering process ended with {left} images to go; "
-                        "run the command again to continue"
-                    ) from None
-                continue
-            record = parse_json(line, "a rendering process", SimError)
-            if "error" in record:
-                raise SimError(f"rendering failed: {record['error']}")
-            left -= 1
-            yield record
-    finally:
-        for process in processes:
-            process.terminate()
-        for process in processes:
-            process.join()
-
-
-def _render_scenes(settings: str, out: str, task_queue: Any, record_queue: Any) -> None:
-    """Run one process: render scenes until the queue of tasks ends."""
-    cv2.setNumThreads(1)
-    config = RenderConfig.model_validate_json(settings)
-    try:
-        while (task := task_queue.get()) is not None:
-            for record in _scene_records(config, Path(out), task):
-                record_queue.put(record_line(record))
-    except KeyboardInterrupt:
-        return
-    except Exception as error:
-        record_queue.put(json.dumps({"error": f"{type(error).__name__}: {error}"}))
-
-
-def _scene_records(config: RenderConfig, out: Path, frames: list[int]) -> Iterator[Record]:
-    """Render and write the images of one scene; yield their records."""
+def _render_scene(config: RenderConfig, out: Path, frames: list[int]) -> list[Record]:
+    """Render and write the images of one scene; return their records."""
     from ._scene import RenderScene  # noqa: PLC0415 - the parent process needs no simulator
 
+    cv2.setNumThreads(1)
+    records = []
     with RenderScene(config, config.scene_of(frames[0])) as scene:
         for frame in frames:
             image, record = scene.snapshot(frame)
             _write_png(out / frame_name(frame), image)
-            yield record
+            write_records(out / f"{frame:06d}.json", [record])
+            records.append(record)
+    return records
 
 
 def _write_png(path: Path, image_rgb: NDArray[np.uint8]) -> None:

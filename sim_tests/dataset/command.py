@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from awarenav.cli import NUMBER, POSITIVE, OneOf, command, option, options
+from awarenav.errors import counted
 
 
 @command(
@@ -73,12 +75,41 @@ from awarenav.cli import NUMBER, POSITIVE, OneOf, command, option, options
 @options.resume()
 @options.overwrite()
 @options.seed()
-def render(**values: Any) -> int:
+def render(
+    out: Path,
+    size: str,
+    fov: float,
+    range_m: tuple[float, float],
+    workers: tuple[str, ...],
+    layouts: tuple[str, ...],
+    *,
+    processes: int | None,
+    resume: bool,
+    overwrite: bool,
+    **settings: Any,
+) -> int:
     """Render images of people in randomised warehouses, with the truth about each person.
 
     Writes the images, camera.yaml (ROS camera_info), truth.jsonl (boxes, keypoints, gaze, position
     and awareness: one line per image) and contact_sheet.png.
     """
-    from ._run import RenderOptions, render_command  # noqa: PLC0415 - help needs no simulator
+    from ._config import RenderConfig, parse_image_size  # noqa: PLC0415 - help needs no simulator
+    from ._render import render as render_images  # noqa: PLC0415
 
-    return render_command(RenderOptions(**values))
+    width, height = parse_image_size(size)
+    config = RenderConfig.checked(
+        width_px=width,
+        height_px=height,
+        horizontal_fov_deg=fov,
+        min_range_m=range_m[0],
+        max_range_m=range_m[1],
+        workers=list(workers) or None,
+        layouts=list(layouts) or None,
+        **settings,
+    )
+    truth = render_images(config, out, processes=processes, resume=resume, overwrite=overwrite)
+    print(
+        f"Written to {out}: {counted(config.frames, 'image')}, camera.yaml, {truth.name}, "
+        "contact_sheet.png"
+    )
+    return 0

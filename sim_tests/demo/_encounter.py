@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import csv
+import sys
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from tqdm import tqdm
 
+from awarenav.files import csv_number, write_text
 from awarenav.video import VideoWriter
 from nav_adapter import AwarenessPolicy
-from perception import AttentionCone, Camera
+from perception import AttentionCone, Camera, PersonObservation
 from perception.arrays import ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult, Stage, TopView, draw_camera_view, run_crossing
 from ..scenario import Scenario
 from ..world.camera import CameraRenderer
-from ._cases import CAMERA_PERIOD_S, CASES
-from ._encounter_plot import CaseImages, plot_encounter
-from ._tables import write_encounter
+from ..world.errors import SimError
+from ._encounter_plot import CAMERA_PERIOD_S, CASES, CaseImages, EncounterCase, plot_encounter
 
 _VIDEO_HZ: Final = 15
 _VIEW_SCALE: Final = 1.0 / 3.0
@@ -36,7 +39,6 @@ def run_encounter(
     seed: int = 0,
     video: bool = True,
     perception: str = "keypoints",
-    progress: Callable[[int], None] | None = None,
 ) -> CrossingResult:
     """Run the encounter and write its table, plot and video.
 
@@ -45,7 +47,6 @@ def run_encounter(
         seed: seed of the perception's noise.
         video: whether to render the video, which takes most of the time with keypoints.
         perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
-        progress: called once per frame with the number of finished frames.
 
     Returns:
         The crossing, with the truth and the observation of every frame.
@@ -53,11 +54,11 @@ def run_encounter(
     scenario = Scenario.shipped("paper_encounter")
     # The robot of the paper asks nobody, and the worker's looks are those of the script.
     policy = AwarenessPolicy.preset("balanced").model_copy(update={"attention": None})
-    with _Recorder(scenario, out / "encounter.mp4" if video else None, progress) as recorder:
+    with _Recorder(scenario, out / "encounter.mp4" if video else None) as recorder:
         result = run_crossing(
             scenario, policy=policy, perception=perception, seed=seed, observer=recorder
         )
-    write_encounter(out / "encounter.csv", result.frames, perception)
+    _write_table(out / "encounter.csv", result)
     plot_encounter(out / "encounter.png", result, recorder.images)
     return result
 
@@ -65,15 +66,14 @@ def run_encounter(
 class _Recorder(AbstractContextManager["_Recorder"]):
     """Renders the video and the images of the three cases while the encounter runs."""
 
-    def __init__(
-        self, scenario: Scenario, path: Path | None, progress: Callable[[int], None] | None
-    ) -> None:
+    def __init__(self, scenario: Scenario, path: Path | None) -> None:
         self._camera = scenario.camera.camera(_VIEW_SCALE)
         self._cone = AttentionCone()
         self._every = round(scenario.control_hz / _VIDEO_HZ)
         self._ticks = 0
         self._last_observed: CrossingFrame | None = None
-        self._progress = progress
+        total = round(scenario.duration_s * scenario.control_hz)
+        self._bar = tqdm(total=total, desc="encounter", unit="frame", disable=None, file=sys.stderr)
         self._map: TopView | None = None
         size = (2 * self._camera.width_px, self._camera.height_px)
         self._video = None if path is None else VideoWriter(path, _VIDEO_HZ, size)
@@ -81,6 +81,7 @@ class _Recorder(AbstractContextManager["_Recorder"]):
         self.images: list[CaseImages] = []
 
     def __exit__(self, *exception: object) -> None:
+        self._bar.close()
         if self._video is not None:
             self._video.close()
 
@@ -107,8 +108,7 @@ class _Recorder(AbstractContextManager["_Recorder"]):
                 above = self._map.draw(frame, stage, self._cone)
                 self._video.add(np.hstack([drawn, above]))
         self._ticks += 1
-        if self._progress is not None:
-            self._progress(self._ticks)
+        self._bar.update()
 
     def _with_last_observations(self, frame: CrossingFrame) -> CrossingFrame:
         """Return the frame with the observations of the last image, unless they are too old."""
@@ -126,3 +126,70 @@ def _eye_view(stage: Stage, like: Camera) -> ImageRgb:
     pose[:3, 3] += _EYE_FORWARD_M * pose[:3, 2]
     camera = Camera.from_fov(like.width_px, like.height_px, float(_EYE_CAMERA_FOV_RAD))
     return CameraRenderer(stage.warehouse).rgb(camera, pose)
+
+
+# Of a row of a table of the encounter: α, d_fwd (m), d_lat (m); None where nothing is known.
+_Values = tuple[float | None, float | None, float | None]
+
+
+def case_values(result: CrossingResult) -> list[tuple[EncounterCase, str, _Values]]:
+    """Return α, d_fwd and d_lat of each case, for the truth and for the perception.
+
+    The observation is that of the image closest in time to the case.
+    """
+    rows = []
+    for case in CASES:
+        off_s = [abs(frame.t_s - case.t_s) for frame in result.frames]
+        seen = [
+            (off, number)
+            for number, off in enumerate(off_s)
+            if off <= CAMERA_PERIOD_S and result.frames[number].observation_of(0) is not None
+        ]
+        observation = result.frames[min(seen)[1]].observation_of(0) if seen else None
+        rows.append((case, "truth", _true_values(result.frames[int(np.argmin(off_s))])))
+        rows.append((case, result.perception, _observed_values(observation)))
+    return rows
+
+
+def encounter_table(result: CrossingResult) -> str:
+    """Return the three cases of the encounter beside the paper's values, as text."""
+    lines = [f"{'case':27s}{'':11s}{'alpha':>8s}{'d_fwd':>9s}{'d_lat':>9s}", "-" * 64]
+    for case, perception, (alpha, forward, lateral) in case_values(result):
+        if perception == "truth":
+            lines.append(
+                f"{case.t_s:5.2f} s {case.meaning:19s}{'paper':11s}{case.awareness:8.2f}"
+                f"{case.d_fwd_m:7.2f} m{case.d_lat_m:7.2f} m"
+            )
+        cells = [
+            "-" if value is None else f"{value:.2f}{unit}"
+            for value, unit in ((alpha, ""), (forward, " m"), (lateral, " m"))
+        ]
+        lines.append(f"{'':27s}{perception:11s}{cells[0]:>8s}{cells[1]:>9s}{cells[2]:>9s}")
+    return "\n".join(lines)
+
+
+def _write_table(path: Path, result: CrossingResult) -> None:
+    """Write ``encounter.csv``: of each frame the truth, then the perception.
+
+    A frame without an observation, or without evidence of awareness, has empty cells.
+    """
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("t_s", "perception", "awareness", "d_fwd_m", "d_lat_m"))
+    for frame in result.frames:
+        observed = _observed_values(frame.observation_of(0))
+        for name, values in (("truth", _true_values(frame)), (result.perception, observed)):
+            writer.writerow([csv_number(frame.t_s), name, *(csv_number(each) for each in values)])
+    write_text(path, text.getvalue(), SimError)
+
+
+def _true_values(frame: CrossingFrame) -> _Values:
+    true = frame.truth[0]
+    return true.awareness, true.d_fwd_m, true.d_lat_m
+
+
+def _observed_values(observation: PersonObservation | None) -> _Values:
+    if observation is None:
+        return None, None, None
+    right_m, _, forward_m = observation.position_camera_m.tolist()
+    return observation.awareness, forward_m, -right_m

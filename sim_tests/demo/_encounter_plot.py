@@ -14,11 +14,34 @@ from awarenav.figures import Axes, new_figure
 from perception.arrays import FloatArray, ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult
-from ._cases import CAMERA_PERIOD_S, CASES, EncounterCase
+from ..crossing.eyes import PIXEL_RATE_HZ
 
 _TRUTH_COLOUR: Final = "#1f4e79"
 _PERCEPTION_COLOUR: Final = "#d9822b"
 _BOUND_COLOUR: Final = "#7fb77e"
+
+
+#: Longest time between two images of the slowest camera of an encounter, with a margin.
+CAMERA_PERIOD_S: Final = 1.1 / PIXEL_RATE_HZ
+
+
+@dataclass(frozen=True, slots=True)
+class EncounterCase:
+    """A row of the paper's table: awareness and position of the worker at one time."""
+
+    t_s: float
+    awareness: float
+    d_fwd_m: float
+    d_lat_m: float
+    meaning: str
+
+
+#: Table I of the paper.
+CASES: Final = (
+    EncounterCase(5.65, 0.34, 2.77, -1.04, "partial awareness"),
+    EncounterCase(10.00, 0.00, 2.13, 0.92, "no awareness"),
+    EncounterCase(16.25, 0.88, 2.05, -0.15, "full awareness"),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

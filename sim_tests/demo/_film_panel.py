@@ -12,12 +12,18 @@ from perception import AttentionCone
 from perception.arrays import FloatArray, ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult, RequestMemory
-from ._film_values import WITHOUT_AWARENESS, FilmRun, FilmValues, film_values, frame_index
+from ._comparison import (
+    WITHOUT_AWARENESS,
+    ComparisonRow,
+    largest_radius_m,
+    lowest_bound,
+    time_behind_s,
+    time_lost_s,
+)
+from ._portraits import FILM_HZ, PORTRAIT_PX
 
 #: Width and height of a panel, pixels.
 PANEL_PX: Final = (320, 826)
-#: Width and height of the worker's portrait, pixels.
-PORTRAIT_PX: Final = (136, 150)
 
 _MAP_TOP_PX: Final = 282
 _MAP_PX: Final = (320, 468)
@@ -45,93 +51,110 @@ _CONE_LENGTH_M: Final = 1.6
 _PLATE: Final[Colour] = (214, 217, 222)
 
 
-def draw_panel(run: FilmRun, free: CrossingResult, t_s: float, picture: int) -> ImageRgb:
-    """Draw one crossing at one time.
+#: Rows of the comparison that the film shows: title, note and colour of the panel.
+PANELS: Final[dict[str, tuple[str, str, Colour]]] = {
+    "today's AMR": ("Scanners only", "today's AMR", (31, 78, 121)),
+    "aware, attentive worker": ("Aware robot", "worker watches it", (46, 125, 79)),
+    "aware, distracted worker": ("Aware robot", "worker looks away", (190, 105, 25)),
+}
+
+
+def draw_panel(row: ComparisonRow, free: CrossingResult, picture: int) -> ImageRgb:
+    """Draw one crossing at one time; after its end the panel stands still.
 
     Args:
-        run: the crossing.
+        row: the crossing, one of :data:`PANELS`.
         free: the same crossing with nobody there.
-        t_s: time since the start; after the end of the crossing the panel stands still.
-        picture: number of the picture in the film, which selects the portrait.
+        picture: number of the picture in the film.
 
     Returns:
         An (H, W, 3) RGB image of :data:`PANEL_PX`.
     """
-    values = film_values(run.result, free, t_s)
+    title, note, colour = PANELS[row.label]
+    index = frame_index(row.result, picture / FILM_HZ)
     image = np.full((PANEL_PX[1], PANEL_PX[0], 3), _BACKGROUND, np.uint8)
-    image[:6] = run.colour
-    _LARGE.write(image, run.title, (8, 12), _INK)
-    _SMALL.write(image, run.note, (8, 46), _QUIET)
-    _draw_portrait(image, run, picture)
-    _write_numbers(image, values, run.result.policy in WITHOUT_AWARENESS)
+    image[:6] = colour
+    _LARGE.write(image, title, (8, 12), _INK)
+    _SMALL.write(image, note, (8, 46), _QUIET)
+    _draw_portrait(image, row.portraits, picture)
+    _write_numbers(image, row.result.frames[index], row.result.policy in WITHOUT_AWARENESS)
     bottom = _MAP_TOP_PX + _MAP_PX[1]
-    image[_MAP_TOP_PX:bottom] = draw_map(run, free, t_s)
-    _write_clock(image, run.result, values, bottom + 4)
+    image[_MAP_TOP_PX:bottom] = draw_map(row, free, picture / FILM_HZ)
+    _write_clock(image, row.result, free, index, bottom + 4)
     return image
 
 
-def _draw_portrait(image: ImageRgb, run: FilmRun, picture: int) -> None:
+def frame_index(result: CrossingResult, t_s: float) -> int:
+    """Return the index of the newest frame at ``t_s``; the last one after the end."""
+    times = [frame.t_s for frame in result.frames]
+    # A rounding error must not select the frame before.
+    return max(int(np.searchsorted(times, t_s + 1e-9, side="right")) - 1, 0)
+
+
+def _draw_portrait(image: ImageRgb, portraits: tuple[ImageRgb | None, ...], picture: int) -> None:
     left, top = 8, 80
     width, height = PORTRAIT_PX
     place = image[top : top + height, left : left + width]
-    portrait = None
-    lines = ("no", "camera")
-    if run.portraits:
-        portrait = run.portraits[min(picture, len(run.portraits) - 1)]
-        lines = ("out of", "view")
+    portrait = portraits[min(picture, len(portraits) - 1)] if portraits else None
     if portrait is not None:
         place[:] = portrait
         return
     place[:] = _PLATE
-    for row, text in enumerate(lines):
+    for row, text in enumerate(("out of", "view") if portraits else ("no", "camera")):
         x = left + (width - _TEXT.width_px(text)) // 2
         _TEXT.write(image, text, (x, top + 46 + 29 * row), _QUIET)
 
 
-def _write_numbers(image: ImageRgb, values: FilmValues, unused: bool) -> None:
+def _write_numbers(image: ImageRgb, frame: CrossingFrame, unused: bool) -> None:
     left, top = 158, 80
-    if values.alpha is None:
+    alpha, radius_m = lowest_bound(frame), largest_radius_m(frame)
+    if unused or alpha is None:
         _LARGE.write(image, "α unused" if unused else "α –", (left, top), _QUIET)
     else:
-        draw_disc(image, np.array([left + 9.0, top + 19.0]), 9.0, awareness_colour(values.alpha))
-        _LARGE.write(image, f"α ≥ {values.alpha:.2f}", (left + 26, top), _INK)
-    radius = "–" if values.radius_m is None else f"{values.radius_m:.2f} m"
+        draw_disc(image, np.array([left + 9.0, top + 19.0]), 9.0, awareness_colour(alpha))
+        _LARGE.write(image, f"α ≥ {alpha:.2f}", (left + 26, top), _INK)
+    radius = "–" if radius_m is None else f"{radius_m:.2f} m"
     _TEXT.write(image, f"radius {radius}", (left, top + 38), _INK)
-    _LARGE.write(image, f"{values.speed_mps:.2f} m/s", (left, top + 72), _INK)
-    _TEXT.write(image, f"limit {values.speed_limit_mps:.2f} m/s", (left, top + 110), _INK)
-    _SMALL.write(image, f"limited by {values.limited_by}", (8, 240), _QUIET)
+    _LARGE.write(image, f"{frame.robot_state.travel_mps:.2f} m/s", (left, top + 72), _INK)
+    limit = frame.constraints
+    _TEXT.write(image, f"limit {limit.speed_limit_mps:.2f} m/s", (left, top + 110), _INK)
+    rule = limit.limited_by.rpartition(": ")[2]  # without the person's number
+    _SMALL.write(image, f"limited by {rule}", (8, 240), _QUIET)
 
 
-def _write_clock(image: ImageRgb, result: CrossingResult, values: FilmValues, top: int) -> None:
-    lost = "" if values.lost_s is None else f"{values.lost_s:.1f} s lost"
-    colour = _INK
-    if not values.finished:
-        clock, below = f"{values.t_s:.1f} s", ""
-    elif result.time_to_goal_s is None:
-        clock, below, colour = "not at the goal", "", _BAD
+def _write_clock(
+    image: ImageRgb, result: CrossingResult, free: CrossingResult, index: int, top: int
+) -> None:
+    frame, colour, below = result.frames[index], _INK, ""
+    if index < len(result.frames) - 1:
+        clock, lost_s = f"{frame.t_s:.1f} s", time_behind_s(frame, free)
     else:
-        clock = f"goal {result.time_to_goal_s:.2f} s"
-        below = f"passed at up to {result.max_speed_within_2m_mps:.2f} m/s"
-    if result.contact and values.finished:
-        below, colour = "touched the worker", _BAD
-    if values.finished:
+        clock, lost_s = "not at the goal", time_lost_s(result, free)
+        if result.time_to_goal_s is not None:
+            clock = f"goal {result.time_to_goal_s:.2f} s"
+            below = f"passed at up to {result.max_speed_within_2m_mps:.2f} m/s"
+        if result.contact:
+            below = "touched the worker"
+        if result.contact or result.time_to_goal_s is None:
+            colour = _BAD
         image[top - 2 : top + 40] = _PLATE
+    lost = "" if lost_s is None else f"{lost_s:.1f} s lost"
     _LARGE.write(image, clock, (8, top), colour)
     _LARGE.write(image, lost, (PANEL_PX[0] - 8 - _LARGE.width_px(lost), top), colour)
     _TEXT.write(image, below, (8, top + 40), colour)
 
 
-def draw_map(run: FilmRun, free: CrossingResult, t_s: float) -> ImageRgb:
+def draw_map(row: ComparisonRow, free: CrossingResult, t_s: float) -> ImageRgb:
     """Draw the hall from above, the robot's way pointing up.
 
     Shows racks, the worker with head and attention cone, each obstacle as its circle, the robot,
     requests to look and their answers, and as an outline the robot that meets nobody.
     """
-    result = run.result
+    result, robot = row.result, PANELS[row.label][2]
     index = frame_index(result, t_s)
     frame = result.frames[index]
     image = np.full((_MAP_PX[1], _MAP_PX[0], 3), _FLOOR, np.uint8)
-    for x0, y0, x1, y1 in run.boxes_odom_m:
+    for x0, y0, x1, y1 in row.scenario.layout.obstacle_boxes_odom:
         fill_hull(image, map_px(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), _RACK, 1.0)
     blind = result.policy in WITHOUT_AWARENESS
     for obstacle in frame.constraints.obstacles:
@@ -140,17 +163,17 @@ def draw_map(run: FilmRun, free: CrossingResult, t_s: float) -> ImageRgb:
         fill_hull(image, map_px(ring), colour, 0.30)
         draw_line(image, map_px(ring), colour, 2)
     path = np.array([each.robot_state.position_odom_m for each in result.frames[: index + 1]])
-    draw_line(image, map_px(path), run.colour, 1)
+    draw_line(image, map_px(path), robot, 1)
     for number in range(len(frame.truth)):
         walked = [each.truth[number].position_odom_m for each in result.frames[: index + 1]]
         draw_line(image, map_px(np.array(walked)), _GHOST, 1)
         _draw_person(image, frame, number)
     ghost = free.frames[frame_index(free, t_s)]
     draw_line(image, map_px(_footprint(ghost, free)), _GHOST, 2)
-    fill_hull(image, map_px(_footprint(frame, result)), run.colour, 1.0)
+    fill_hull(image, map_px(_footprint(frame, result)), robot, 1.0)
     nose = frame.robot_state.position_odom_m + _turn(frame) @ np.array([0.62, 0.0])
-    draw_line(image, map_px(np.stack([frame.robot_state.position_odom_m, nose])), run.colour, 3)
-    _draw_requests(image, result, index, run.colour)
+    draw_line(image, map_px(np.stack([frame.robot_state.position_odom_m, nose])), robot, 3)
+    _draw_requests(image, result, index, robot)
     return image
 
 

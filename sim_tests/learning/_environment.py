@@ -274,7 +274,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         frame, cone = self.situation.frame(command), AttentionCone()
         if self._render_view == "top":
             if self._plan is None:
-                self._plan = TopView(crossing.stage, _PICTURE_PX, _window_m(crossing.scenario))
+                window_odom_m = crossing.scenario.robot.window_odom_m(_PLAN_MARGIN_M)
+                self._plan = TopView(crossing.stage, _PICTURE_PX, window_odom_m)
             return self._plan.draw(frame, crossing.stage, cone)
         spec = crossing.scenario.camera
         camera = spec.camera(_PICTURE_PX[0] / spec.width_px)
@@ -377,13 +378,3 @@ def _contact(crossing: Crossing) -> str:
     """Return who caused a contact in this episode; empty for none."""
     causes = {contact.by for contact in crossing.meter.contacts}
     return "robot" if "robot" in causes else "person" if causes else ""
-
-
-def _window_m(scenario: Scenario) -> tuple[float, float, float, float]:
-    task, far = scenario.robot, _PLAN_MARGIN_M
-    return (
-        min(task.start_x_m, task.goal_x_m) - far,
-        min(task.start_y_m, task.goal_y_m) - far,
-        max(task.start_x_m, task.goal_x_m) + far,
-        max(task.start_y_m, task.goal_y_m) + far,
-    )

@@ -146,6 +146,15 @@ class RobotTask(SimConfig):
             )
         return self
 
+    def window_odom_m(self, margin_m: float) -> tuple[float, float, float, float]:
+        """Return x_min, y_min, x_max, y_max of the robot's way with a margin, for a plan."""
+        return (
+            min(self.start_x_m, self.goal_x_m) - margin_m,
+            min(self.start_y_m, self.goal_y_m) - margin_m,
+            max(self.start_x_m, self.goal_x_m) + margin_m,
+            max(self.start_y_m, self.goal_y_m) + margin_m,
+        )
+
     @property
     def path_odom_m(self) -> FloatArray:
         """The reference path (M, 2) for planners that follow one: straight from start to goal.

@@ -51,7 +51,7 @@ def begin_of(episode: Episode, stage: Stage) -> dict[str, Any]:
         "step_s": cycles_per_state(scenario.control_hz) / scenario.control_hz,
         "planned_s": scenario.duration_s,
         "floor_odom_m": _rounded(floor),
-        "plan_odom_m": _plan_window(task.start_x_m, task.start_y_m, task.goal_x_m, task.goal_y_m),
+        "plan_odom_m": _rounded(task.window_odom_m(_PLAN_MARGIN_M)),
         "boxes_odom_m": [_rounded(box) for box in warehouse.obstacle_boxes_odom],
         "goal_odom_m": _rounded((task.goal_x_m, task.goal_y_m)),
         "footprint_m": [_rounded(corner) for corner in stage.amr.profile.footprint_m],
@@ -92,8 +92,7 @@ def state_of(
     """
     state, limit = frame.robot_state, frame.constraints
     points = frame.scan_points_odom_m if scan_points_odom_m is None else scan_points_odom_m
-    task = stage.scenario.robot
-    window = _plan_window(task.start_x_m, task.start_y_m, task.goal_x_m, task.goal_y_m)
+    window = stage.scenario.robot.window_odom_m(_PLAN_MARGIN_M)
     return {
         "t_s": _rounded_number(frame.t_s),
         "robot_odom": _rounded((*state.position_odom_m, state.heading_odom_rad)),
@@ -176,17 +175,7 @@ def _obstacle(obstacle: PersonObstacle) -> dict[str, Any]:
     }
 
 
-def _plan_window(start_x: float, start_y: float, goal_x: float, goal_y: float) -> list[float]:
-    """Return x_min, y_min, x_max, y_max (m) of the robot's way with a margin."""
-    return [
-        round(min(start_x, goal_x) - _PLAN_MARGIN_M, 3),
-        round(min(start_y, goal_y) - _PLAN_MARGIN_M, 3),
-        round(max(start_x, goal_x) + _PLAN_MARGIN_M, 3),
-        round(max(start_y, goal_y) + _PLAN_MARGIN_M, 3),
-    ]
-
-
-def _scan(points_odom_m: FloatArray, window: list[float]) -> list[int]:
+def _scan(points_odom_m: FloatArray, window: tuple[float, float, float, float]) -> list[int]:
     """Return the points in the window as x, y, x, y … in centimetres, thinned to cells."""
     low, high = np.array(window[:2]), np.array(window[2:])
     inside = points_odom_m[((points_odom_m >= low) & (points_odom_m <= high)).all(axis=1)]

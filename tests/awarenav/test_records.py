@@ -1,93 +1,55 @@
-"""Files of frames: read as written, and continued without the lines that are damaged."""
+"""Files of frames: read as written, continued but for an unfinished last line, or refused."""
 
 from __future__ import annotations
 
-import json
-import re
 from pathlib import Path
 
 import pytest
 
 from awarenav.errors import AwarenavError
-from awarenav.records import continue_records, read_records, record_line, write_records
+from awarenav.records import RecordFile, continue_records, read_records, record_line, write_records
 
-PERSON = {"id": 0, "position_camera_m": [0.0, 0.0, 3.0], "awareness": 0.5, "score": 0.9}
-POSE = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 FRAMES = [
-    {"frame": f"{k:06d}.png", "stamp_s": k / 20, "T_odom_camera": POSE, "people": [PERSON]}
+    {"frame": f"{k:06d}.png", "stamp_s": k / 20, "T_odom_camera": None, "people": []}
     for k in range(5)
 ]
+WHOLE = "".join(map(record_line, FRAMES))
 
 
-def changed(**values):
-    return record_line({**FRAMES[2], **values})
-
-
-def with_person(**values):
-    return changed(people=[{**PERSON, **values}])
-
-
-WHOLE = record_line(FRAMES[2])
-DAMAGED = {
-    "half a line, then the next": (WHOLE[:40] + record_line(FRAMES[0]), "Expecting|delimiter"),
-    "no text": ("\udcff\udcfe\n", "utf-8"),
-    "no frame": ('{"frame": "000002.png"}\n', "needs the keys"),
-    "awareness above 1": (with_person(awareness=1.5), "awareness must lie in"),
-    "NaN": (WHOLE.replace("0.5", "NaN"), "NaN is not a finite number"),
-    "a pose of three rows": (changed(T_odom_camera=POSE[:3]), "T_odom_camera"),
-}
-
-
-@pytest.mark.parametrize("kind", DAMAGED)
-def test_a_damaged_line_is_set_aside_and_its_frame_is_missing(kind, tmp_path, capsys):
-    line, message = DAMAGED[kind]
-    content = line.encode("utf-8", "surrogateescape")
+def test_a_file_stays_as_it_is_byte_for_byte_but_for_an_unfinished_line(tmp_path, capsys):
     path = tmp_path / "truth.jsonl"
-    lines = [record_line(frame).encode() for frame in FRAMES]
-    path.write_bytes(b"".join([*lines[:2], content, *lines[3:]]))
-    records = continue_records(path)
-    assert [record["frame"] for record in records] == [FRAMES[k]["frame"] for k in (0, 1, 3, 4)]
-    assert path.read_bytes() == b"".join([*lines[:2], *lines[3:]])
-    assert (tmp_path / "truth.jsonl.damaged").read_bytes() == content
-    told = capsys.readouterr().err
-    assert "line 3 is damaged" in told
-    assert re.search(message, told), told
-
-
-def test_a_whole_file_stays_as_it_is_byte_for_byte(tmp_path, capsys):
-    path = tmp_path / "truth.jsonl"
-    write_records(path, FRAMES)
-    before = path.read_bytes()
-    path.write_bytes(before + record_line({**FRAMES[0], "frame": "x"}).encode()[:50])
-    assert continue_records(path) == FRAMES
-    assert path.read_bytes() == before
-    assert not (tmp_path / "truth.jsonl.damaged").exists()
+    write_records(path, FRAMES[:3])
+    assert continue_records(path) == FRAMES[:3]
     assert not capsys.readouterr().err
+    path.write_text(path.read_text() + record_line(FRAMES[3])[:50])
+    assert continue_records(path) == FRAMES[:3]
+    assert f"{path}: the last line is unfinished" in capsys.readouterr().err
+    with RecordFile(path) as file:
+        for frame in FRAMES[3:]:
+            file.add(frame)
+    assert path.read_text() == WHOLE
 
 
-def test_frames_that_cannot_be_are_set_aside(tmp_path):
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (WHOLE.replace('"stamp_s": 0.1,', "", 1), "line 3: a frame needs the keys"),
+        (WHOLE.replace('"people": []}\n', '"peo', 1), "line 1"),
+        (WHOLE + WHOLE[: WHOLE.index("\n") + 1], "two frames have the name '000000.png'"),
+        ("dear diary,\ntoday\n", "line 1"),
+    ],
+)
+def test_a_damaged_file_is_refused_and_left_alone(tmp_path, text, message):
     path = tmp_path / "truth.jsonl"
-    write_records(path, FRAMES)
-    known = {str(frame["frame"]) for frame in FRAMES[:4]}
-    assert continue_records(path, known) == FRAMES[:4]
-    assert json.loads((tmp_path / "truth.jsonl.damaged").read_text()) == FRAMES[4]
-
-
-def test_a_file_of_something_else_is_left_alone(tmp_path):
-    path = tmp_path / "notes.txt"
-    path.write_text("dear diary,\ntoday\n")
-    with pytest.raises(AwarenavError, match="is not a file of frames"):
+    path.write_text(text)
+    with pytest.raises(AwarenavError, match=message):
         continue_records(path)
-    assert path.read_text() == "dear diary,\ntoday\n"
+    assert path.read_text() == text
 
 
-def test_two_frames_of_one_name_are_both_made_again(tmp_path):
-    path = tmp_path / "truth.jsonl"
-    other = record_line({**FRAMES[2], "frame": FRAMES[1]["frame"]})
-    path.write_text("".join([*map(record_line, FRAMES), other, record_line(FRAMES[4])]))
-    assert continue_records(path) == [FRAMES[0], *FRAMES[2:]]
-    damaged = (tmp_path / "truth.jsonl.damaged").read_text()
-    assert damaged == record_line(FRAMES[1]) + other
+def test_a_file_that_cannot_be_opened_is_said(tmp_path):
+    with pytest.raises(AwarenavError, match="cannot write"):
+        RecordFile(tmp_path / "absent" / "lines")
 
 
 def test_records_survive_writing_and_reading(tmp_path: Path) -> None:

@@ -7,10 +7,9 @@ import pytest
 
 from benchmarks.laser_people import Figures, drive
 from benchmarks.laser_trolley import TROLLEY_SIZE_M, Trolley
-from benchmarks.laser_wanderer import Wanderer
 from perception.laser import LegDetectorConfig
 from sim_tests.actors.body import worker_names
-from sim_tests.world.hall import LAYOUTS, WarehouseLayout
+from sim_tests.world.hall import LAYOUTS
 from sim_tests.world.sightlines import cut_surfaces
 from training.legs import TRAINING_HALLS, TRAINING_WORKERS
 
@@ -51,10 +50,6 @@ def test_people_who_push_trolleys_are_found_by_their_legs() -> None:
     assert not figures.ghosts
 
 
-def test_people_come_near_the_robot_in_a_large_hall() -> None:
-    assert len(found(driven("aisles", 5, 5.0, 3))) > 100
-
-
 @pytest.mark.parametrize("kind", ["base", "castors"])
 def test_a_trolley_is_cut_at_the_height_of_a_scanner(kind) -> None:
     """Its base is one box; of its castors four are met, below the platform."""
@@ -73,12 +68,6 @@ def test_a_trolley_is_cut_at_the_height_of_a_scanner(kind) -> None:
         assert np.ptp(across) == pytest.approx(width - 2.0 * (off and 0.06 - 0.025))
 
 
-def test_an_empty_hall_has_no_people() -> None:
-    figures = driven("staging_hall", 0, 5.0, 2)
-    assert not figures.ghosts
-    assert figures.wrong < 0.02 * figures.scans
-
-
 @pytest.mark.full
 def test_every_hall_keeps_its_figures() -> None:
     every, ghosts, seconds = [], 0, 0.0
@@ -89,15 +78,3 @@ def test_every_hall_keeps_its_figures() -> None:
             ghosts, seconds = ghosts + len(figures.ghosts), seconds + 60.0
     assert np.mean(every) >= 0.96
     assert ghosts <= seconds / 60.0
-
-
-def test_a_wanderer_keeps_clear_of_boxes_and_moves() -> None:
-    boxes = WarehouseLayout.named("staging_hall").obstacle_boxes_odom
-    wanderer = Wanderer(boxes, np.random.default_rng(3), 0.35, (0.6, 1.7), 0.2)
-    places = []
-    for tick in range(500):
-        wanderer.advance(0.04 * tick, 0.04)
-        places.append(wanderer.place_m)
-    inside = (np.array(places)[:, None] > boxes[:, :2]) & (np.array(places)[:, None] < boxes[:, 2:])
-    assert not inside.all(axis=2).any()
-    assert np.linalg.norm(np.ptp(places, axis=0)) > 2.0

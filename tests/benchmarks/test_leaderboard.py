@@ -128,16 +128,6 @@ def test_rows_that_are_missing_or_not_whole_are_measured(tmp_path):
     assert "today&#39;s AMR" in (tmp_path / "page.html").read_text()
 
 
-def test_results_of_another_policy_are_not_continued(tmp_path):
-    board = _small_board(tmp_path)
-    measure(board, board.rows, tmp_path, work=tmp_path / "runs")
-    other = _small_board(tmp_path, policy="assertive")
-    with pytest.raises(SimError, match="'mine' belong to another policy"):
-        measure(other, other.rows, tmp_path, work=tmp_path / "runs")
-    measure(other, other.rows[1:], tmp_path, work=tmp_path / "runs", again=True)
-    assert {each.policy for each in read_results(other, other.rows[1], tmp_path)} == {"assertive"}
-
-
 @pytest.mark.parametrize(
     ("changed", "message"),
     [

@@ -43,9 +43,3 @@ def test_the_gate_is_one_metre() -> None:
     # One missed person and one false track in every frame.
     assert outside.mota == 0.0
     assert outside.misses == outside.false_positives == FRAMES
-
-
-def test_no_tracks_at_all_give_a_score() -> None:
-    score = judge(TRUTH, frames([[]] * FRAMES, [[]] * FRAMES))
-    assert score.mota == 0.0
-    assert score.misses == 2 * FRAMES

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import json
 import os
 import re
 import subprocess
@@ -60,25 +59,6 @@ def test_nothing_is_fetched_from_other_hosts(site: Path) -> None:
         assert not re.search(f'{fetched}|{styles}|class="mermaid"', text), path.name
     for path in site.rglob("*.css"):
         assert not re.search(r"url\([\"']?(?:https?:)?//", path.read_text("utf-8")), path.name
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("words", "page"),
-    [
-        ("awareness_lower", "reference/nav_adapter.html"),
-        ("LaserScan", "reference/perception.laser.html"),
-    ],
-)
-def test_the_search_finds_a_word_as_a_whole(site: Path, words: str, page: str) -> None:
-    index = json.loads((site / "search" / "search_index.json").read_text("utf-8"))
-    separator = re.compile(index["config"]["separator"])
-    found = {
-        entry["location"].partition("#")[0]
-        for entry in index["docs"]
-        if words.lower() in separator.split(f"{entry['title']} {entry['text']}".lower())
-    }
-    assert page in found
 
 
 @pytest.mark.full

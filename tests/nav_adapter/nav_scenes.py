@@ -8,9 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
+from shapely.geometry import Point
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
+from nav_adapter import (
+    AwarenessPolicy,
+    NavAdapter,
+    NavConstraints,
+    PersonObstacle,
+    RobotProfile,
+    RobotState,
+)
 from nav_adapter.limit import passing_radius_m
+from perception import PersonObservation
 from perception.arrays import FloatArray
 from tracking import PersonTrack
 
@@ -181,4 +190,55 @@ def crowds(draw: st.DrawFn, stamp_s: float = 0.0, max_size: int = 4) -> tuple[Pe
             time_since_seen_s=draw(st.sampled_from([0.0, 0.05, 0.4])),
         )
         for track_id, share in zip(ids, calm, strict=True)
+    )
+
+
+#: x, y, vx, vy, radius.
+Circle = tuple[float, float, float, float, float]
+
+
+def constraints_of(*circles: Circle) -> NavConstraints:
+    """Return constraints made of circles, for the exporters."""
+    obstacles = tuple(
+        PersonObstacle(
+            track_id=index,
+            center_odom_m=(x, y),
+            velocity_odom_mps=(vx, vy),
+            radius_m=radius,
+            height_m=1.7,
+            awareness_lower=0.0,
+            polygon=Point(x, y).buffer(1.01 * radius),
+        )
+        for index, (x, y, vx, vy, radius) in enumerate(circles)
+    )
+    return NavConstraints(0.0, obstacles, 1.0, "robot maximum", False)
+
+
+def some_circles(
+    min_size: int = 0, max_size: int = 4, reach_m: float = 6.0
+) -> st.SearchStrategy[list[Circle]]:
+    place, velocity = finite(-reach_m, reach_m), finite(-2, 2)
+    one = st.tuples(place, place, velocity, velocity, finite(0.3, 1.5))
+    return st.lists(one, min_size=min_size, max_size=max_size)
+
+
+#: Of a camera on the robot's mast, looking along odom x: optical z forward, x right, y down.
+T_ODOM_CAMERA = np.array(
+    [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.4], [0.0, 0.0, 0.0, 1.0]]
+)
+
+
+def observed(
+    stamp_s: float, place_m: tuple[float, float], awareness: float | None = None
+) -> PersonObservation:
+    """Return somebody at (x, y) in odom, seen by that camera."""
+    x, y = place_m
+    return PersonObservation(
+        stamp_s=stamp_s,
+        position_camera_m=np.array([-y, 0.2, x]),
+        position_covariance_m2=np.diag([0.03, 0.03, 0.08]) ** 2,
+        gaze_camera=None,
+        awareness=awareness,
+        awareness_std=None if awareness is None else 0.05,
+        score=0.9,
     )

@@ -6,9 +6,18 @@ import logging
 from itertools import pairwise
 
 import pytest
-from nav_scenes import ROBOT, numbers, person, policy_radius_m, robot_at
+from nav_scenes import (
+    ROBOT,
+    T_ODOM_CAMERA,
+    numbers,
+    observed,
+    person,
+    policy_radius_m,
+    robot_at,
+)
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
+from tracking import PersonTracker
 
 PERIOD_S = 0.1
 UNAWARE_M, AWARE_M = (policy_radius_m(AwarenessPolicy(), alpha) for alpha in (0.0, 0.9))
@@ -118,3 +127,125 @@ def test_reset_forgets_people_and_clock_and_lets_the_limit_rise_slowly() -> None
     for k in range(1, 30):
         free = adapter.update((), robot_at(1.0 + k * PERIOD_S), 1.0 + k * PERIOD_S)
     assert free.speed_limit_mps == ROBOT.max_speed_mps
+
+
+FRAME_S = 0.05
+SET_BACK_AT_S = 4.0
+POLICY = AwarenessPolicy()
+
+
+def drive(
+    back_s: float, walking_mps: float, *, everywhere: bool
+) -> dict[float, NavConstraints | None]:
+    """Return the constraints by the time since the clock was set back a little.
+
+    None stands for a refusal. The tracker cannot tell its frames from late ones, and puts them back
+    in time: the awareness of the last frames before stays until the new stamps have passed them,
+    and somebody who walks has a second track for a while.
+
+    Somebody watches the robot up to that instant and then looks away. ``everywhere`` is False if
+    only the camera's clock is set back.
+    """
+    tracker, adapter = PersonTracker(), NavAdapter(POLICY, ROBOT)
+    results: dict[float, NavConstraints | None] = {}
+    for step in range(round((SET_BACK_AT_S + 2.0) / FRAME_S)):
+        true_s = step * FRAME_S
+        late = true_s >= SET_BACK_AT_S
+        stamp_s = true_s - back_s if late else true_s
+        now = stamp_s if everywhere else true_s
+        place = (4.0, walking_mps * (true_s - SET_BACK_AT_S))
+        frame = observed(stamp_s, place, 0.05 if late else 0.95)
+        tracks = tracker.update([frame], stamp_s, T_ODOM_CAMERA)
+        try:
+            result = adapter.update(tracks, robot_at(now), now)
+        except NavError:
+            result = None
+        results[round(true_s - SET_BACK_AT_S, 3)] = result
+    assert tracker.refused_late_frames == 0
+    return results
+
+
+def most_aware(constraints: NavConstraints) -> float:
+    return max(obstacle.awareness_lower for obstacle in constraints.obstacles)
+
+
+@pytest.mark.parametrize(("back_s", "walking_mps"), [(0.1, 1.2), (0.3, 0.0), (0.49, 1.2)])
+def test_with_the_clock_of_the_camera_awareness_ends_after_fresh_within_s(
+    back_s: float, walking_mps: float
+) -> None:
+    results = drive(back_s, walking_mps, everywhere=False)
+    in_time = drive(0.0, walking_mps, everywhere=False)
+    before = results[-FRAME_S]
+    assert before is not None
+    assert most_aware(before) > 0.6
+    for age_s, result in results.items():
+        if age_s <= POLICY.timing.fresh_within_s + 1e-9:
+            continue
+        fresh = in_time[age_s]
+        assert result is not None
+        assert fresh is not None
+        assert most_aware(result) < POLICY.speed.unaware_below
+        assert result.speed_limit_mps <= fresh.speed_limit_mps + 1e-6
+        assert min(obstacle.radius_m for obstacle in result.obstacles) >= 1.0
+
+
+@pytest.mark.parametrize(("back_s", "walking_mps"), [(0.1, 1.2), (0.3, 0.0), (0.49, 1.2)])
+def test_with_the_clock_of_the_robot_nobody_is_aware_once_it_has_caught_up(
+    back_s: float, walking_mps: float
+) -> None:
+    """Until then there are no constraints."""
+    results = drive(back_s, walking_mps, everywhere=True)
+    in_time = drive(0.0, walking_mps, everywhere=True)
+    refused = [age_s for age_s, result in results.items() if result is None]
+    assert refused[0] == 0.0
+    assert back_s - 2.1 * FRAME_S <= refused[-1] < back_s
+    for age_s, result in results.items():
+        fresh = in_time[age_s]
+        if age_s <= POLICY.timing.fresh_within_s + FRAME_S or result is None:
+            continue
+        assert fresh is not None
+        assert result.speed_limit_mps <= fresh.speed_limit_mps + 0.02
+        assert min(obstacle.radius_m for obstacle in result.obstacles) >= 1.0
+
+
+def test_two_resets_keep_the_ceiling_of_one() -> None:
+    nav = NavAdapter(POLICY, ROBOT)
+    nav.update([person(position=(1.5, 0))], robot_at(), 0.0)
+    nav.update([], robot_at(5.0), 5.0, perception_stamp_s=2.0)
+    nav.reset()
+    nav.reset()
+    assert nav.update([], robot_at(5.1), 5.1).speed_limit_mps == 0.0
+
+
+@pytest.mark.parametrize("ahead_s", [0.6, 9.9])
+@pytest.mark.parametrize("by", ["update", "watchdog"])
+def test_a_stamp_a_few_seconds_ahead_costs_one_update(ahead_s: float, by: str) -> None:
+    nav = NavAdapter(POLICY, ROBOT)
+    for k in range(120):
+        now = 100.0 + k * 0.1
+        if k == 50:
+            ahead = now + ahead_s
+            if by == "watchdog":
+                nav.watchdog(ahead)
+            else:
+                nav.update([person(ahead)], robot_at(ahead, speed_mps=0.5), ahead)
+        result = nav.update([person(now, awareness_lower=0.9)], robot_at(now), now)
+        if k > 20:
+            assert result.obstacles[0].radius_m == pytest.approx(policy_radius_m(POLICY, 0.9))
+    assert nav.clock_restarts == 0
+    assert nav.refused_stamps == (1 if by == "update" else 0)
+
+
+def test_a_clock_that_was_set_back_is_believed_although_its_stamps_are_slightly_unordered() -> None:
+    nav, accepted = NavAdapter(POLICY, ROBOT), 0
+    for k in range(20):
+        nav.update([], robot_at(5000 + k * 0.05), 5000 + k * 0.05)
+    for k in range(200):
+        now = 100 + k * 0.05 - 0.07 * (k % 4 == 3)
+        try:
+            nav.update([], robot_at(now), now)
+            accepted += 1
+        except NavError:
+            pass
+    assert nav.clock_restarts == 1
+    assert accepted >= 120

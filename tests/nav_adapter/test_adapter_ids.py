@@ -1,4 +1,4 @@
-"""Ids of a foreign tracker: nobody inherits the awareness of whoever had the id before."""
+"""Ids of a foreign tracker: nobody inherits awareness, and whoever loses an id is kept."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, finite, person, policy_radius_m, robot_at
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
 from nav_adapter.ros2 import STOP_POLYGON_ID
 from tracking import PersonTrack
 
@@ -103,13 +103,6 @@ def test_whoever_had_a_reused_id_is_kept_for_a_second() -> None:
     assert [each.track_id for each in result.obstacles] == [1]
 
 
-def test_negative_ids_are_refused() -> None:
-    """They are those of the stop polygon, and of people who are kept."""
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    with pytest.raises(NavError, match="ids of at least 0, got -1"):
-        frame(adapter, 0.0, somebody(-1, FAR, 0.0))
-
-
 def test_two_who_lose_one_id_after_the_other_are_both_kept() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     places = [(2.0, -2.0), (2.0, 2.0), (4.0, 0.0)]
@@ -167,3 +160,121 @@ def test_a_jump_beyond_covariance_and_human_speed_is_first_sight(
         assert obstacle.radius_m == pytest.approx(UNAWARE_M + 2.0 * sigma)
     elif distance < reach_m:
         assert obstacle.awareness_lower == 0.9
+
+
+POLICY = AwarenessPolicy()
+
+
+def adapter() -> NavAdapter:
+    return NavAdapter(POLICY, ROBOT)
+
+
+@pytest.mark.parametrize("dead", ["everything", "odometry"])
+def test_the_reachable_limit_falls_to_zero_when_the_robots_state_repeats(dead: str) -> None:
+    nav = adapter()
+    for k in range(20):
+        nav.update([person(k * 0.05, position=(6, 0))], robot_at(k * 0.05, speed_mps=1.0), k * 0.05)
+    last = robot_at(0.95, speed_mps=1.0)
+    for k in range(20, 80):
+        now = k * 0.05
+        if dead == "everything":
+            result = nav.watchdog(now)
+        else:
+            result = nav.update([person(now, position=(6, 0))], last, now)
+    assert result.speed_limit_mps == 0.0
+    assert result.reachable_speed_limit_mps == 0.0
+
+
+def test_a_neighbour_does_not_stand_for_somebody_whose_id_has_jumped() -> None:
+    nav = adapter()
+
+    def neighbour(t: float) -> PersonTrack:
+        return person(t, track_id=2, position=(2, 0.4), sigma_m=0.05, awareness_lower=0.95)
+
+    for k in range(40):
+        now = k * 0.05
+        tracks = [person(now, position=(2, 0), sigma_m=0.05), neighbour(now)]
+        before = nav.update(tracks, robot_at(now, speed_mps=0.2), now)
+    tracks = [person(2.0, position=(8, 0), sigma_m=0.05), neighbour(2.0)]
+    after = nav.update(tracks, robot_at(2.0, speed_mps=0.2), 2.0)
+    assert [each.track_id for each in after.obstacles] == [-2, 1, 2]
+    assert after.speed_limit_mps <= before.speed_limit_mps + 1e-9
+
+
+def test_clutter_does_not_stand_for_somebody_whose_id_has_jumped() -> None:
+    nav = adapter()
+    for k in range(40):
+        now = k * 0.05
+        nav.update([person(now, position=(2, 0), sigma_m=0.05)], robot_at(now), now)
+    jumped = person(2.0, position=(8, 0), sigma_m=0.05)
+    clutter = person(2.0, track_id=7, position=(2.02, 0), sigma_m=0.05, status="tentative")
+    nav.update([jumped, clutter], robot_at(2.0), 2.0)
+    after = nav.update([replace(jumped, stamp_s=2.05)], robot_at(2.05), 2.05)
+    assert [each.track_id for each in after.obstacles] == [-2, 1]
+
+
+def test_one_new_track_stands_for_one_person() -> None:
+    nav = adapter()
+    places = {1: (2.0, 0.1), 2: (2.0, -0.1)}
+    for k in range(40):
+        now = k * 0.05
+        tracks = [person(now, track_id=i, position=at, sigma_m=0.1) for i, at in places.items()]
+        nav.update(tracks, robot_at(now), now)
+    tracks = [
+        person(2.0, track_id=1, position=(8, 3), sigma_m=0.1),
+        person(2.0, track_id=2, position=(8, -3), sigma_m=0.1),
+        person(2.0, track_id=3, position=(2, 0), sigma_m=0.1),
+    ]
+    after = nav.update(tracks, robot_at(2.0), 2.0)
+    assert [each.track_id for each in after.obstacles] == [-2, 1, 2, 3]
+
+
+def test_a_robot_may_have_set_off_since_its_state() -> None:
+    """It stood 0.4 s ago, and may have driven ½ · 1 m/s² · (0.4 s)² = 0.08 m since."""
+
+    def limit(age_s: float, at: tuple[float, float]) -> float:
+        state = robot_at(-age_s)
+        track = person(position=at)
+        nav = adapter()
+        return nav.update([track], state, 0.0, perception_stamp_s=0.0).speed_limit_mps
+
+    assert limit(0.4, (3.0, 0.0)) == pytest.approx(limit(0.0, (2.92, 0.0)), abs=0.01)
+    assert limit(0.4, (3.0, 0.0)) < limit(0.0, (3.0, 0.0)) - 0.02
+
+
+def test_after_a_silence_an_id_is_first_sight_for_the_speed() -> None:
+    unaware = (
+        adapter().update([person(position=(2.2, 0))], robot_at(speed_mps=1.2), 0.0).speed_limit_mps
+    )
+    limits = []
+    for track_id in (1, 5):
+        nav = adapter()
+        for k in range(20):
+            now = k * 0.05
+            nav.update([person(now, position=(-4, 0))], robot_at(now, speed_mps=1.2), now)
+        track = person(5.95, track_id=track_id, position=(2.2, 0), awareness_lower=0.95)
+        limits.append(nav.update([track], robot_at(5.95, speed_mps=1.2), 5.95).speed_limit_mps)
+    assert limits[0] == limits[1] == unaware
+
+
+def test_a_person_once_confirmed_is_kept_although_the_track_was_tentative_at_last() -> None:
+    nav = adapter()
+    for k in range(40):
+        nav.update([person(k * 0.05)], robot_at(k * 0.05), k * 0.05)
+    before = nav.update([person(2.0, status="tentative")], robot_at(2.0), 2.0)
+    after = nav.update([], robot_at(2.05), 2.05)
+    assert [each.track_id for each in after.obstacles] == [1]
+    assert after.speed_limit_mps <= before.speed_limit_mps + 1e-9
+
+
+def test_repeated_frames_shrink_no_sooner() -> None:
+    radii = []
+    for repeats in (1, 2, 5):
+        nav = adapter()
+        for frame in range(5):
+            for again in range(repeats):
+                now = 0.2 * frame + 0.2 * again / repeats
+                track = person(0.2 * frame, awareness_lower=0.95)
+                result = nav.update([track], robot_at(now), now)
+        radii.append(result.obstacles[0].radius_m)
+    assert radii == pytest.approx([radii[0]] * 3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -12,11 +13,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from nav_scenes import ROBOT, finite, numbers, person, robot_at
+from nav_scenes import (
+    ROBOT,
+    T_ODOM_CAMERA,
+    finite,
+    numbers,
+    observed,
+    person,
+    policy_radius_m,
+    robot_at,
+)
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
 from nav_adapter.policies import TimeBehaviour
-from perception import Camera, PersonObservation
+from perception import Camera
 from perception.laser import LaserScan, RobotMotion, Scanner, scan_points
 from tracking import (
     CameraView,
@@ -31,10 +41,6 @@ PERIOD_S = 0.05
 POLICY = AwarenessPolicy()
 RISE_MPS2 = 0.7
 MAXIMUM_MPS = ROBOT.max_speed_mps
-# On the robot's mast, looking along odom x: optical z forward, x right, y down.
-T_ODOM_CAMERA = np.array(
-    [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 1.4], [0.0, 0.0, 0.0, 1.0]]
-)
 
 
 def with_rise(rise_mps2: float | None, **timing: float) -> AwarenessPolicy:
@@ -133,7 +139,6 @@ def test_somebody_who_is_back_is_not_lost_any_more() -> None:
     back = person(4.2, position=(4.0, 0.0))
     one, other = (each.update((back,), robot_at(4.2), 4.2) for each in (adapter, twin))
     assert numbers(one) == numbers(other)
-    assert adapter._memory.lost == {}
 
 
 def test_a_track_that_was_never_more_than_tentative_is_not_lost() -> None:
@@ -152,15 +157,21 @@ def test_after_a_pause_in_the_updates_lost_people_are_forgotten() -> None:
     assert numbers(one) == numbers(other)
 
 
-def test_the_lost_are_not_kept_for_longer_than_the_limit_rises() -> None:
-    adapter = NavAdapter(POLICY, ROBOT)
-    for step in range(400):
+def test_the_people_kept_are_bounded_by_those_of_the_last_seconds() -> None:
+    adapter, sizes = NavAdapter(POLICY, ROBOT), []
+    adapter.update((), robot_at(-0.1), -0.1)
+    empty = len(pickle.dumps(adapter))
+    for step in range(200):
         now = step * 0.1
-        adapter.update((person(now, track_id=step),), robot_at(now), now)
-        assert len(adapter._memory.lost) <= 10.0 * MAXIMUM_MPS / RISE_MPS2 + 1.0
-    for late_s in (1.1, 4.0):
-        adapter.update((), robot_at(now + late_s), now + late_s)
-    assert adapter._memory.lost == {}
+        result = adapter.update((person(now, track_id=step),), robot_at(now), now)
+        assert len(result.obstacles) <= 12  # the one in view and those of the last second
+        if step % 20 == 19:
+            sizes.append(len(pickle.dumps(adapter)))
+    assert max(sizes[5:]) <= 1.02 * max(sizes[:5])
+    for late_s in (1.1, 4.0, 7.0):  # the one before the last may have to be taken back
+        after = adapter.update((), robot_at(now + late_s), now + late_s)
+    assert after.obstacles == ()
+    assert len(pickle.dumps(adapter)) <= 1.1 * empty
 
 
 def test_every_preset_remembers_people_it_lost() -> None:
@@ -198,20 +209,6 @@ def test_losing_people_is_between_holding_and_forgetting_them(
         if not there:
             assert limits["lost"] - before_mps <= RISE_MPS2 * dt + 1e-6
         before_mps = limits["lost"]
-
-
-def observed(now: float, place_m: tuple[float, float]) -> PersonObservation:
-    """Return somebody at (x, y) in odom, seen by the camera."""
-    x, y = place_m
-    return PersonObservation(
-        stamp_s=now,
-        position_camera_m=np.array([-y, 0.2, x]),
-        position_covariance_m2=np.diag([0.03, 0.03, 0.08]) ** 2,
-        gaze_camera=None,
-        awareness=None,
-        awareness_std=None,
-        score=0.9,
-    )
 
 
 def follow(place_of: Callable[[float], tuple[float, float] | None]) -> list[NavConstraints]:
@@ -287,3 +284,49 @@ def test_the_tracker_tells_before_it_ends_a_track_whose_place_is_empty(period_s:
     tracker = PersonTracker(sensors={"laser": SensorConfig(view=ScannerView(10.0))})
     (track,) = ended(period_s, tracker, sensor="laser")
     assert not track.place_empty
+
+
+def watch(seconds: float, awareness: float) -> tuple[PersonTracker, NavAdapter, NavConstraints]:
+    tracker = PersonTracker(TrackerConfig(awareness=POLICY.filter))
+    adapter = NavAdapter(POLICY, ROBOT)
+    for step in range(round(seconds / PERIOD_S)):
+        now = step * PERIOD_S
+        tracks = tracker.update((observed(now, (3.0, 0.0), awareness),), now, T_ODOM_CAMERA)
+        result = adapter.update(tracks, robot_at(now), now)
+    return tracker, adapter, result
+
+
+LOSSES: dict[str, Callable[[PersonTracker, float], tuple[PersonTrack, ...]]] = {
+    "predict": lambda tracker, now: tracker.predict(now),
+    "empty frames": lambda tracker, now: tracker.update((), now, T_ODOM_CAMERA),
+}
+
+
+@pytest.mark.parametrize("seen_s", [0.1, 0.6, 3.0])
+@pytest.mark.parametrize("loss", [*LOSSES, "repeated tracks"])
+def test_losing_the_camera_for_a_second_never_shrinks_a_radius(loss: str, seen_s: float) -> None:
+    tracker, adapter, before = watch(seen_s, 0.95)
+    lost = before.stamp_s
+    last_tracks = tracker.predict(lost)
+    for step in range(1, round(1.0 / PERIOD_S) + 1):
+        now = lost + step * PERIOD_S
+        tracks = LOSSES[loss](tracker, now) if loss in LOSSES else last_tracks
+        after = adapter.update(tracks, robot_at(now), now)
+        for a in before.obstacles:
+            # A person seen only for a moment may be dropped, but must not shrink.
+            for b in (o for o in after.obstacles if o.track_id == a.track_id):
+                assert b.radius_m >= a.radius_m
+                assert b.awareness_lower <= a.awareness_lower
+        if seen_s > 0.15:
+            assert len(after.obstacles) == 1
+        before = after
+    assert all(o.radius_m >= policy_radius_m(POLICY, 0.0) for o in before.obstacles)
+
+
+def test_an_attentive_person_lets_the_robot_pass_faster_and_nearer_than_a_distracted_one() -> None:
+    attentive, distracted = watch(3.0, 0.95)[2], watch(3.0, 0.0)[2]
+    assert attentive.obstacles[0].awareness_lower > POLICY.inflation.aware_above
+    nearer_m = policy_radius_m(POLICY, 0.0) - policy_radius_m(POLICY, 1.0)
+    assert attentive.obstacles[0].radius_m < distracted.obstacles[0].radius_m - 0.9 * nearer_m
+    assert attentive.speed_limit_mps > 1.3 * distracted.speed_limit_mps
+    assert distracted.limited_by == "track 1: reach"

@@ -1,4 +1,4 @@
-"""The adapter over time: shrinking, losing the camera, holding, staleness."""
+"""The adapter over time: shrinking, losing the camera, holding, staleness, silence."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 from nav_scenes import (
     FLOOR_M,
     ROBOT,
-    crowds,
     finite,
+    numbers,
     person,
     policy_radius_m,
     robot_at,
     settled_update,
 )
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
 from nav_adapter.policies import SafetyMargins
 from tracking import PersonTrack
 
@@ -64,16 +64,6 @@ def test_short_looks_shrink_no_more_than_the_time_they_last() -> None:
         assert radius(result) == pytest.approx(UNAWARE_M - RATE_MPS * PERIOD_S * (step % 5))
 
 
-def test_awareness_raises_no_speed_at_first_sight() -> None:
-    """Frames must have shown somebody for 0.2 s."""
-    limits = [result.speed_limit_mps for result in watch(NavAdapter(AwarenessPolicy(), ROBOT), 0.5)]
-    unaware_mps = settled_update((person(),)).speed_limit_mps
-    aware_mps = settled_update((person(awareness_lower=1.0),)).speed_limit_mps
-    assert limits[:4] == [unaware_mps] * 4
-    assert limits[4:] == [aware_mps] * 6
-    assert aware_mps > unaware_mps
-
-
 @pytest.mark.parametrize("late_s", [0.0, 0.2, 0.3, 0.45])
 def test_late_frames_reduce_the_uncertainty_of_the_first_sighting(late_s: float) -> None:
     """A slow camera still shows the position; only its evidence of awareness is too old."""
@@ -89,16 +79,6 @@ def test_late_frames_reduce_the_uncertainty_of_the_first_sighting(late_s: float)
     assert max(before - after for before, after in pairwise(radii)) <= RATE_MPS * PERIOD_S + 1e-9
 
 
-def test_late_frames_are_no_evidence_of_awareness() -> None:
-    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    for step in range(60):
-        now = step * PERIOD_S
-        track = person(now, unseen_s=0.3, awareness_lower=1.0)
-        result = adapter.update((track,), robot_at(now), now)
-        assert radius(result) == UNAWARE_M
-        assert result.obstacles[0].awareness_lower == 0.0
-
-
 def test_obstacles_grow_at_once() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     watch(adapter, 2.0)
@@ -106,7 +86,7 @@ def test_obstacles_grow_at_once() -> None:
     assert radius(result) == UNAWARE_M
 
 
-@pytest.mark.parametrize("control_period_s", [0.01, 0.03, 0.1, 0.2])
+@pytest.mark.parametrize("control_period_s", [0.01, 0.2])
 def test_shrinking_depends_on_time_and_not_on_the_number_of_updates(
     control_period_s: float,
 ) -> None:
@@ -123,7 +103,6 @@ def test_shrinking_depends_on_time_and_not_on_the_number_of_updates(
 
 
 Loss = Callable[[float, float], PersonTrack]
-
 LOSSES: dict[str, Loss] = {
     # The tracker predicts, or gets empty frames, or is not called.
     "predicted": lambda lost, now: person(
@@ -257,7 +236,7 @@ def test_a_person_who_returns_continues_with_the_held_radius() -> None:
     sigma_m=finite(0.0, 0.4),
     reach=st.booleans(),
 )
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_unseen_people_count_with_more_standard_deviations(
     seen_sigmas: float, unseen_sigmas: float, sigma_m: float, reach: bool
 ) -> None:
@@ -305,29 +284,6 @@ def test_a_tentative_or_long_unseen_person_is_not_held() -> None:
     assert [obstacle.track_id for obstacle in result.obstacles] == [3]
 
 
-@given(tracks=crowds(), perception_age=finite(0.0, 3.0), robot_age=finite(0.0, 3.0))
-def test_old_data_are_never_looser_than_fresh_ones(
-    tracks: tuple[PersonTrack, ...], perception_age: float, robot_age: float
-) -> None:
-    def constraints(perception_age_s: float, robot_age_s: float) -> NavConstraints:
-        adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-        state = robot_at(-robot_age_s, speed_mps=0.8)
-        return adapter.update(tracks, state, 0.0, perception_stamp_s=-perception_age_s)
-
-    fresh, old = constraints(0.0, 0.0), constraints(perception_age, robot_age)
-    age = max(perception_age, robot_age)
-    assert old.stale is (age > 0.5)
-    assert old.speed_limit_mps <= fresh.speed_limit_mps
-    for a, b in zip(fresh.obstacles, old.obstacles, strict=True):
-        assert b.radius_m >= a.radius_m
-        assert b.awareness_lower <= a.awareness_lower
-        assert b.awareness_lower == 0.0 or not old.stale
-    if age > 1.5:
-        assert old.speed_limit_mps == 0.0
-        assert old.limited_by.startswith("stale data: ")
-        assert f"{age:.2f} s old" in old.limited_by or min(perception_age, robot_age) > 1.5
-
-
 def test_without_a_stamp_of_perception_the_newest_track_counts() -> None:
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
     tracks = (person(0.0, awareness_lower=1.0), person(0.3, track_id=2, awareness_lower=1.0))
@@ -354,13 +310,76 @@ def test_the_limit_for_a_braking_robot_falls_no_faster_than_it_can_brake() -> No
     assert result.reachable_speed_limit_mps == pytest.approx(1.2 - 0.1)
 
 
-def test_memory_is_bounded_by_the_people_present() -> None:
+def driving(seconds: float = 2.0) -> NavAdapter:
+    """Return an adapter after updates with an attentive person and a robot at 1 m/s."""
     adapter = NavAdapter(AwarenessPolicy(), ROBOT)
-    for step in range(400):
-        now = step * 0.1
-        result = adapter.update((person(now, track_id=step),), robot_at(now), now)
-        # The one in view and those of the last second.
-        assert len(result.obstacles) <= 12
-    later = now + 1.5
-    assert adapter.update((), robot_at(later), later).obstacles == ()
-    assert adapter._memory.people == {}
+    for step in range(round(seconds / PERIOD_S) + 1):
+        now = step * PERIOD_S
+        track = person(now, position=(4.0, 0.0), awareness_lower=1.0)
+        adapter.update((track,), robot_at(now, speed_mps=1.0), now, perception_stamp_s=now)
+    return adapter
+
+
+def test_before_any_input_the_watchdog_returns_a_stop() -> None:
+    result = NavAdapter(AwarenessPolicy(), ROBOT).watchdog(3.0)
+    assert (result.speed_limit_mps, result.stale, result.obstacles) == (0.0, True, ())
+    assert result.limited_by == "stale data: none yet"
+
+
+def test_without_input_everyone_becomes_unaware_and_then_the_robot_stops() -> None:
+    adapter = driving()
+    before = adapter.watchdog(2.0)
+    assert not before.stale
+    limits, radii = [before.speed_limit_mps], [before.obstacles[0].radius_m]
+    for step in range(1, 40):
+        now = 2.0 + step * PERIOD_S
+        result = adapter.watchdog(now)
+        assert result.stale is (now - 2.0 > 0.5 + 1e-9)
+        limits.append(result.speed_limit_mps)
+        if result.obstacles:
+            radii.append(result.obstacles[0].radius_m)
+        if result.stale:
+            assert all(o.awareness_lower == 0.0 for o in result.obstacles)
+        assert result.alerts == () or not result.stale
+    assert limits == sorted(limits, reverse=True)
+    assert radii == sorted(radii)
+    assert limits[-1] == 0.0
+    assert result.limited_by.startswith("stale data: ")
+
+
+def test_the_watchdog_is_an_update_with_the_latest_input() -> None:
+    watched, updated = driving(), driving()
+    for now in (2.1, 2.4, 2.7):
+        track = person(2.0, position=(4.0, 0.0), awareness_lower=1.0)
+        state = robot_at(2.0, speed_mps=1.0)
+        expected = updated.update((track,), state, now, perception_stamp_s=2.0)
+        assert numbers(watched.watchdog(now)) == numbers(expected)
+    with pytest.raises(NavError, match="must not go backward"):
+        watched.watchdog(2.6)
+
+
+@pytest.mark.parametrize("silent", [True, False], ids=["no update", "watchdog"])
+def test_the_limit_recovers_with_a_ramp(silent: bool) -> None:
+    adapter = driving()
+    if not silent:
+        for step in range(1, 40):
+            stopped = adapter.watchdog(2.0 + step * PERIOD_S)
+        assert stopped.speed_limit_mps == 0.0
+    limits, reasons, radii = [], [], []
+    for step in range(80):
+        now = 4.0 + step * PERIOD_S
+        track = person(now, position=(6.0, 0.0), awareness_lower=1.0)
+        result = adapter.update((track,), robot_at(now), now, perception_stamp_s=now)
+        limits.append(result.speed_limit_mps)
+        reasons.append(result.limited_by)
+        radii.append(result.obstacles[0].radius_m)
+    # The robot stands: the limit starts with at most ``fresh_within_s`` of acceleration.
+    assert limits[0] <= ROBOT.max_acceleration_mps2 * 0.25
+    steps = [after - before for before, after in pairwise(limits)]
+    assert max(steps) <= ROBOT.max_acceleration_mps2 * PERIOD_S + 1e-9
+    assert reasons[0] == "recovery after stale data"
+    assert limits[-1] == 1.5
+    assert reasons[-1] == "robot maximum"
+    # A sighting counts for at most 0.25 s, in which a radius shrinks by half as much.
+    assert radii[0] >= policy_radius_m(AwarenessPolicy(), 0.0) - 0.5 * 0.25 - 1e-9
+    assert radii[-1] == pytest.approx(policy_radius_m(AwarenessPolicy(), 1.0))

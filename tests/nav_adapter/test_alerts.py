@@ -113,18 +113,3 @@ def test_a_refused_update_uses_up_no_alert() -> None:
         adapter.update((track, track), state, 0.0)
     assert len(adapter.update((track,), state, 0.0).alerts) == 1
     assert adapter.update((track,), state, 0.0).alerts == ()
-
-
-def test_an_alert_is_checked() -> None:
-    with pytest.raises(NavError, match="kind must be one of light, voice, horn, attention, got"):
-        Alert(1, "siren", 1.0, 0.0, "")
-    with pytest.raises(NavError, match="time_to_closest_s must lie in"):
-        Alert(1, "horn", -1.0, 0.0, "")
-    with pytest.raises(NavError, match="means must be light, voice, horn with kind 'attention'"):
-        Alert(1, "attention", 1.0, 0.0, "")
-    with pytest.raises(NavError, match="means must be horn with kind 'horn', got 'light'"):
-        Alert(1, "horn", 1.0, 0.0, "", means="light")
-    with pytest.raises(NavError, match="wins_s must lie in"):
-        Alert(1, "attention", 1.0, 0.0, "", means="voice", wins_s=-1.0)
-    assert Alert(1, "horn", 1.0, 0.0, "").means == "horn"
-    assert Alert(1, "attention", 1.0, 0.0, "", means="voice").means == "voice"

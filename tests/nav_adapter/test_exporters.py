@@ -1,39 +1,52 @@
-"""The shapes of the obstacles: circles, points, polygons and boxes."""
+"""People as shapes, as costs of trajectories, and as half-planes and cones of velocities."""
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
-from nav_scenes import ROBOT, crowds, finite, person, robot_at
+from nav_scenes import (
+    ROBOT,
+    Circle,
+    constraints_of,
+    crowds,
+    finite,
+    person,
+    robot_at,
+    settled_update,
+    some_circles,
+)
 from shapely.geometry import Point
 
 from nav_adapter import (
     AwarenessPolicy,
     NavAdapter,
     NavConstraints,
-    NavError,
     boxes,
     circles,
     points,
     polygons,
 )
+from nav_adapter.exporters import half_planes, people_cost, velocity_obstacles
 from tracking import PersonTrack
 
 NOBODY = NavConstraints(0.0, (), 1.0, "robot maximum", False)
 
 
-def constraints_for(tracks: tuple[PersonTrack, ...]) -> NavConstraints:
+def constraints_of_people(tracks: tuple[PersonTrack, ...]) -> NavConstraints:
     return NavAdapter(AwarenessPolicy(), ROBOT).update(tracks, robot_at(), 0.0)
 
 
 @given(tracks=crowds(), spacing_m=finite(0.01, 2.0))
 def test_all_shapes_agree(tracks: tuple[PersonTrack, ...], spacing_m: float) -> None:
-    constraints = constraints_for(tracks)
+    constraints = constraints_of_people(tracks)
     rows = circles(constraints)
     assert rows.shape == (len(tracks), 5)
     assert boxes(constraints).shape == (len(tracks), 7)
@@ -73,7 +86,217 @@ def test_without_people_every_shape_is_empty() -> None:
     assert polygons(NOBODY) == ()
 
 
-@given(spacing_m=st.sampled_from([0.0, -1.0, 1e-9, math.nan, math.inf]))
-def test_an_invalid_spacing_is_refused(spacing_m: float) -> None:
-    with pytest.raises(NavError, match="spacing_m must"):
-        points(constraints_for((person(),)), spacing_m)
+def test_copies_have_the_same_polygon() -> None:
+    (obstacle,) = settled_update([person(position=(3.0, 1.0))]).obstacles
+    copies = (
+        pickle.loads(pickle.dumps(obstacle)),
+        copy.copy(obstacle),
+        replace(obstacle, track_id=7),
+    )
+    for each in copies:
+        assert each.polygon.equals_exact(obstacle.polygon, 0.0)
+
+
+def gaps_m(circle: Circle, positions: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    x, y, vx, vy, radius = circle
+    centers = np.stack([x + vx * times_s, y + vy * times_s], axis=1)
+    return np.linalg.norm(positions - centers, axis=-1) - radius
+
+
+@given(
+    circles=some_circles(),
+    samples=st.integers(0, 5),
+    steps=st.integers(0, 6),
+    first_s=finite(0, 1),
+    robot_radius_m=finite(0, 1),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_the_cost_is_the_formula_summed_over_people(
+    circles: list[Circle],
+    samples: int,
+    steps: int,
+    first_s: float,
+    robot_radius_m: float,
+    seed: int,
+) -> None:
+    positions = np.random.default_rng(seed).uniform(-6, 6, (samples, steps, 2))
+    times_s = first_s + 0.2 * np.arange(steps)
+    expected = np.zeros((samples, steps))
+    for circle in circles:
+        gap = gaps_m(circle, positions, times_s) - robot_radius_m
+        for index, g in np.ndenumerate(gap):
+            expected[index] += 3.0 * math.exp(-g / 0.5) if g > 0.0 else 50.0 * (1.0 - g)
+    cost = people_cost(
+        constraints_of(*circles),
+        positions,
+        0.2,
+        robot_radius_m=robot_radius_m,
+        first_s=first_s,
+        inside_cost=50.0,
+        near_cost=3.0,
+        decay_m=0.5,
+    )
+    np.testing.assert_allclose(cost, expected, atol=1e-9)
+
+
+@given(circles=some_circles(1, 3), direction_rad=finite(-math.pi, math.pi))
+def test_cost_rises_towards_a_person_and_most_inside(
+    circles: list[Circle], direction_rad: float
+) -> None:
+    constraints = constraints_of(circles[0])
+    x, y, _, _, radius = circles[0]
+    distance_m = np.linspace(0.0, radius + 3.0, 50)
+    ray = np.array([math.cos(direction_rad), math.sin(direction_rad)])
+    cost = people_cost(constraints, ([x, y] + distance_m[:, None] * ray)[:, None], 0.1)[:, 0]
+    assert (np.diff(cost) < 0.0).all()
+    assert cost[distance_m < radius - 1e-9].min() >= 1000.0
+    assert cost[distance_m > radius + 1e-9].max() < 1.0
+
+
+def test_people_count_at_their_predicted_positions() -> None:
+    constraints = constraints_of((0.0, 5.0, 0.0, -1.0, 0.5))
+    waiting = np.zeros((1, 101, 2))
+    cost = people_cost(constraints, waiting, 0.1)[0]
+    times_s = 0.1 * np.arange(101)
+    np.testing.assert_array_equal(cost >= 1000.0, np.abs(times_s - 5.0) < 0.5 + 1e-9)
+
+
+ROBOT_RADIUS_M = 0.45
+VELOCITIES = st.tuples(finite(-2, 2), finite(-2, 2))
+
+
+def least_gap_m(circle: Circle, velocity: np.ndarray, horizon_s: float) -> float:
+    """Return the smallest gap to a robot that starts at the origin, at constant velocities."""
+    x, y, vx, vy, radius = circle
+    dvx, dvy = vx - velocity[0], vy - velocity[1]
+    square = dvx * dvx + dvy * dvy
+    nearest_s = -(x * dvx + y * dvy) / square if square > 0.0 else 0.0
+    t_s = min(max(nearest_s, 0.0), horizon_s)
+    return math.hypot(x + t_s * dvx, y + t_s * dvy) - radius - ROBOT_RADIUS_M
+
+
+@given(circles=some_circles(1, 1), velocity=VELOCITIES, tried=VELOCITIES, horizon_s=finite(0.5, 8))
+def test_an_allowed_velocity_touches_nobody_within_the_horizon(
+    circles: list[Circle],
+    velocity: tuple[float, float],
+    tried: tuple[float, float],
+    horizon_s: float,
+) -> None:
+    assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
+    ((nx, ny, bound),) = half_planes(
+        constraints_of(*circles), (0, 0), velocity, ROBOT_RADIUS_M, horizon_s=horizon_s
+    )
+    normal = np.array([nx, ny])
+    assert np.hypot(nx, ny) == pytest.approx(1.0)
+    # The tried velocity itself if it is allowed, else the nearest allowed one.
+    allowed = np.array(tried) + max(bound - normal @ tried, 0.0) * normal
+    assert least_gap_m(circles[0], allowed, horizon_s) >= -1e-6
+
+
+@given(circles=some_circles(1, 1), velocity=VELOCITIES, horizon_s=finite(0.5, 8))
+def test_the_half_plane_touches_the_velocity_obstacle(
+    circles: list[Circle], velocity: tuple[float, float], horizon_s: float
+) -> None:
+    """The boundary point nearest to the velocity just touches the person."""
+    gap_m = least_gap_m(circles[0], np.array(velocity), horizon_s)
+    assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
+    ((nx, ny, bound),) = half_planes(
+        constraints_of(*circles), (0, 0), velocity, ROBOT_RADIUS_M, horizon_s=horizon_s
+    )
+    excess_mps = nx * velocity[0] + ny * velocity[1] - bound
+    assert (excess_mps >= 0.0) == (gap_m >= 0.0) or abs(excess_mps) < 1e-6 or abs(gap_m) < 1e-6
+    grazing = np.array(velocity) - excess_mps * np.array([nx, ny])
+    assert least_gap_m(circles[0], grazing, horizon_s) == pytest.approx(0.0, abs=1e-6)
+
+
+@given(
+    angle_rad=finite(-math.pi, math.pi),
+    depth_m=finite(0.02, 1.0),
+    velocity=VELOCITIES,
+    walking=VELOCITIES,
+    resolve_s=finite(0.1, 2.0),
+)
+def test_a_robot_inside_an_obstacle_gets_out_in_time(
+    angle_rad: float,
+    depth_m: float,
+    velocity: tuple[float, float],
+    walking: tuple[float, float],
+    resolve_s: float,
+) -> None:
+    distance_m = 1.0 + ROBOT_RADIUS_M - depth_m
+    circle = (distance_m * math.cos(angle_rad), distance_m * math.sin(angle_rad), *walking, 1.0)
+    ((nx, ny, bound),) = half_planes(
+        constraints_of(circle), (0, 0), velocity, ROBOT_RADIUS_M, resolve_s=resolve_s
+    )
+    normal = np.array([nx, ny])
+    out = np.array(velocity) + max(bound - normal @ velocity, 0.0) * normal
+    apart = np.array(circle[:2]) + resolve_s * (np.array(walking) - out)
+    assert np.hypot(*apart) >= 1.0 + ROBOT_RADIUS_M - 1e-6
+
+
+@given(circles=some_circles(1, 1), velocity=VELOCITIES)
+def test_the_share_scales_the_change_of_velocity(
+    circles: list[Circle], velocity: tuple[float, float]
+) -> None:
+    constraints = constraints_of(*circles)
+    whole, half = (
+        half_planes(constraints, (0, 0), velocity, ROBOT_RADIUS_M, share=share)[0]
+        for share in (1.0, 0.5)
+    )
+    now = whole[:2] @ velocity
+    np.testing.assert_allclose(half[:2], whole[:2])
+    assert half[2] - now == pytest.approx(0.5 * (whole[2] - now), abs=1e-9)
+
+
+def test_half_planes_agree_with_the_authors_library() -> None:
+    """RVO2, through its Python binding; its share is always one half."""
+    pyrvo = pytest.importorskip("pyrvo", reason="pyrvo comes with the extra dev")
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        x, y = rng.uniform(-5, 5, 2)
+        (vx, vy), velocity = rng.uniform(-2, 2, (2, 2))
+        radius = rng.uniform(0.3, 1.5)
+        simulator = pyrvo.RVOSimulator()
+        simulator.set_time_step(0.5)
+        for place, speed, size in (((0, 0), velocity, 0.45), ((x, y), (vx, vy), radius)):
+            agent = simulator.add_agent(tuple(place), 50.0, 10, 3.0, 3.0, size, 9.0)
+            simulator.set_agent_velocity(agent, tuple(speed))
+            simulator.set_agent_pref_velocity(agent, tuple(speed))
+        simulator.do_step()
+        along, point = np.array(simulator.get_agent_orca_line(0, 0))
+        (ours,) = half_planes(
+            constraints_of((x, y, vx, vy, radius)),
+            (0, 0),
+            velocity,
+            0.45,
+            horizon_s=3.0,
+            resolve_s=0.5,
+            share=0.5,
+        )
+        normal = np.array([-along[1], along[0]])
+        np.testing.assert_allclose(ours, [*normal, normal @ point], atol=2e-4)
+
+
+@given(circles=some_circles(1, 1), velocity=VELOCITIES)
+def test_a_velocity_between_the_legs_leads_into_the_person(
+    circles: list[Circle], velocity: tuple[float, float]
+) -> None:
+    assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
+    ((*apex, lx, ly, rx, ry),) = velocity_obstacles(
+        constraints_of(*circles), (0, 0), ROBOT_RADIUS_M
+    )
+    dx, dy = np.array(velocity) - apex
+    gap_m = least_gap_m(circles[0], np.array(velocity), 1e9)
+    assume(abs(gap_m) > 1e-6 and math.hypot(dx, dy) > 1e-6)
+    between = lx * dy - ly * dx <= 0.0 and rx * dy - ry * dx >= 0.0
+    assert between == (gap_m < 0.0)
+
+
+def test_no_people_and_a_person_at_the_robots_position() -> None:
+    assert half_planes(constraints_of(), (0, 0), (1, 0), 0.4).shape == (0, 3)
+    assert velocity_obstacles(constraints_of(), (0, 0), 0.4).shape == (0, 6)
+    same = constraints_of((0.0, 0.0, 0.0, 0.0, 0.5))
+    rows = half_planes(same, (0, 0), (0, 0), 0.4, resolve_s=0.5)
+    assert np.hypot(*rows[0, :2]) == pytest.approx(1.0)
+    assert rows[0, 2] == pytest.approx(0.9 / 0.5)
+    assert np.isfinite(velocity_obstacles(same, (0, 0), 0.4)).all()

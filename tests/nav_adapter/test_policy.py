@@ -1,17 +1,22 @@
-"""Policies: ramps, refusals, YAML and presets."""
+"""Policies: ramps, YAML and presets."""
 
 from __future__ import annotations
 
+import itertools
+import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from nav_policies import human_speeds, inflations, policies
 from nav_scenes import finite
+from paths import ROOT
 from pydantic import ValidationError
 
 from nav_adapter import AwarenessPolicy, NavError
 from nav_adapter.policies import InterpolatedHumanSpeed, InterpolatedInflation
+from tracking import AwarenessFilterConfig, TrackerConfig, TrackingError
 
 ALPHA = finite(0.0, 1.0)
 PRESETS = ("blind", "conservative", "balanced", "assertive")
@@ -71,13 +76,6 @@ def test_a_policy_is_the_same_after_yaml(
     assert AwarenessPolicy.from_yaml(path) == policy
 
 
-@pytest.mark.parametrize("name", PRESETS)
-def test_a_preset_is_the_same_after_yaml(name: str, tmp_path: Path) -> None:
-    policy = AwarenessPolicy.preset(name)
-    policy.to_yaml(tmp_path / "policy.yaml")
-    assert AwarenessPolicy.from_yaml(tmp_path / "policy.yaml") == policy
-
-
 def test_presets_are_loaded_by_name() -> None:
     assert AwarenessPolicy.preset("balanced") == AwarenessPolicy()
     blind = AwarenessPolicy.preset("blind")
@@ -98,45 +96,6 @@ def test_a_file_that_sets_a_part_leaves_the_rest_at_its_defaults() -> None:
     assert AwarenessPolicy.model_validate({"reach": None}).reach is None
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("inflation: {aware_radius: 0.5}", "did you mean 'aware_radius_m'"),
-        ("timming: {}", "did you mean 'timing'"),
-        ("margins: {clearance_m: 0.05}", "margins.clearance_m"),
-        ("inflation: {aware_radius_m: 1.2}", "at most unaware_radius_m, got 1.2 m and 1 m"),
-        ("speed: {aware_human_speed_mps: 2}", "at most unaware_human_speed_mps, got 2 m/s"),
-        ("speed: {unaware_human_speed_mps: 11}", "speed.unaware_human_speed_mps"),
-        ("speed: {unaware_below: 0.7}", "aware_above must exceed unaware_below"),
-        ("inflation: {unaware_radius_m: .nan}", "inflation.unaware_radius_m"),
-        ("timing: {stop_after_s: 0.4}", "stale_after_s <= stop_after_s must hold"),
-        ("timing: {lost_rise_mps2: on}", "must be a number, got True"),
-        ("inflation: 3", "inflation"),
-        ("reach: {turn: 30}", "did you mean 'turn_deg'"),
-        ("reach: {turn_deg: 181}", "reach.turn_deg"),
-        ("reach: {time_constant_s: 0}", "reach.time_constant_s"),
-        ("reach: {delay_s: -0.1}", "reach.delay_s"),
-        ("noticed_counts_as: 1.5", "noticed_counts_as"),
-        ("alerts: {horn_within_s: -1}", "alerts.horn_within_s"),
-        # What 0.2 had is refused, with the keys that are valid.
-        ("margins: {minimum_clearance_m: 0.2}", "did you mean 'clearance_m'"),
-        ("inflation: {shape: linear}", "unknown key 'shape'"),
-        ("rules: {standing: null}", "unknown key 'rules'"),
-        ("outline: {sweep_s: 1}", "unknown key 'outline'"),
-        ("timing: {shrink_after_s: 0.2}", "unknown key 'shrink_after_s'"),
-        ("[1, 2]", "must hold a mapping"),
-        ("inflation: {", "not valid YAML"),
-    ],
-)
-def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "policy.yaml"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(NavError) as refusal:
-        AwarenessPolicy.from_yaml(path)
-    assert message in str(refusal.value)
-    assert "policy.yaml" in str(refusal.value)
-
-
 def test_custom_policy_objects_are_accepted_but_not_written(tmp_path: Path) -> None:
     own = Constant()
     policy = AwarenessPolicy(inflation=own, speed=own)
@@ -148,3 +107,31 @@ def test_custom_policy_objects_are_accepted_but_not_written(tmp_path: Path) -> N
     for wrong in (Constant, object(), None, 0.5):
         with pytest.raises(ValidationError, match="radius_m"):
             AwarenessPolicy(inflation=wrong)
+
+
+@pytest.mark.parametrize("name", ["balanced", "assertive", "conservative", "blind"])
+def test_a_rule_that_needs_the_tracker_has_what_it_needs(name: str) -> None:
+    policy = AwarenessPolicy.preset(name)
+    assert TrackerConfig.for_policy(policy) == TrackerConfig(awareness=policy.filter)
+
+
+def test_any_object_with_the_needs_of_a_policy_will_do() -> None:
+    @dataclass(frozen=True)
+    class Mine:
+        filter: AwarenessFilterConfig
+
+    config = TrackerConfig.for_policy(Mine(AwarenessFilterConfig(memory_s=2.0)))
+    assert config.awareness.memory_s == 2.0
+    with pytest.raises(TrackingError, match="policy must be an AwarenessPolicy, got str"):
+        TrackerConfig.for_policy("balanced")  # type: ignore[arg-type]
+
+
+def test_no_code_passes_a_part_of_what_a_policy_needs() -> None:
+    folders = ("docs", "examples", "perception", "nav_adapter", "awarenav", "sim_tests")
+    files = [ROOT / "README.md"]
+    for folder, kind in itertools.product(folders, ("py", "md", "ipynb")):
+        files += (ROOT / folder).rglob(f"*.{kind}")
+    printed = [path for path in files if "TrackerConfig.for_policy(policy)" in path.read_text()]
+    assert {"README.md", "planners.md", "plug_into_planner.py"} <= {path.name for path in printed}
+    parts = re.compile(r"awareness=\w*policy\w*\.filter")
+    assert [path.name for path in files if parts.search(path.read_text())] == []

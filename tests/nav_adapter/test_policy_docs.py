@@ -1,8 +1,9 @@
-"""docs/policies.md shows the figures of the presets and a valid policy file."""
+"""The pages show the figures of the presets, and the tests of the safety argument exist."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 
@@ -13,7 +14,9 @@ import yaml
 from paths import ROOT
 
 from awarenav.cli import main
-from nav_adapter import AwarenessPolicy
+from nav_adapter import AwarenessPolicy, RobotProfile, RobotState
+from nav_adapter.limit import course_of, limit_mps, passing_radius_m
+from nav_adapter.reach import Reach
 from perception.anthropometry import BODY_RADIUS_M
 
 TEXT = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
@@ -26,7 +29,7 @@ ROBOT = replace(
 )
 
 
-def row(name: str) -> list[list[float]]:
+def policy_row(name: str) -> list[list[float]]:
     """Return the numbers of a table row: per preset one value, or an unaware and an aware one."""
     (line,) = [line for line in TEXT.splitlines() if line.startswith(f"| {name} |")]
     cells = line.strip("|").split("|")[1:]
@@ -52,18 +55,18 @@ def test_the_table_of_presets_shows_what_the_command_prints(
         "limit, 1 m along and 1.2 m beside": beside[:, 0],
     }
     for title, values in expected.items():
-        shown = row(title)[column]
+        shown = policy_row(title)[column]
         assert shown[0] == pytest.approx(values[0], abs=0.0051), title
         assert shown[-1] == pytest.approx(values[-1], abs=0.0051), title
-    assert row("shrinks at")[column] == [policy.timing.shrink_rate_mps]
-    assert row("noticed counts as")[column] == [
+    assert policy_row("shrinks at")[column] == [policy.timing.shrink_rate_mps]
+    assert policy_row("noticed counts as")[column] == [
         each for each in (policy.noticed_counts_as,) if each is not None
     ]
 
 
 @pytest.mark.parametrize(("column", "name"), list(enumerate(PRESETS)))
 def test_the_robot_is_at_full_speed_beyond_the_distance_shown(column: int, name: str) -> None:
-    shown = row("full speed beyond, ahead")[column]
+    shown = policy_row("full speed beyond, ahead")[column]
     for alpha, at_m in ((0.0, shown[0]), (1.0, shown[-1])):
         for off_m, full in ((-0.03, False), (0.03, True)):
             place = (FRONT_M + BODY_RADIUS_M + at_m + off_m, 0.0)
@@ -102,3 +105,78 @@ def test_every_test_named_in_the_safety_argument_exists() -> None:
             checked += 1
             assert f"def {function}(" in (root / file).read_text(encoding="utf-8"), function
     assert checked >= 12
+
+
+SAFETY = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
+PLANNERS = (ROOT / "docs" / "planners.md").read_text(encoding="utf-8")
+FOOTPRINT_M = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
+ROBOT_ON_PAGES = RobotProfile(FOOTPRINT_M, 1.5, 1.0, 1.0, 0.3)
+
+
+def reach(
+    name: str, alpha: float, x_m: float = 0.0, y_m: float = 0.0, *, walks: float = 0.0
+) -> Reach:
+    policy = AwarenessPolicy.preset(name)
+    assert policy.reach is not None
+    return Reach(
+        *(x_m, y_m, walks, 0.0, policy.speed.human_speed_mps(alpha)),
+        policy.reach.time_constant_s,
+        policy.reach.delay_s,
+        margin_m=policy.margins.floor_m,
+    )
+
+
+def numbers(line: str) -> list[float]:
+    return [float(each) for each in re.findall(r"\d+\.\d+", line)]
+
+
+def row(page: str, title: str) -> list[float]:
+    """Return the numbers of the one row of a table that begins with a title."""
+    (line,) = [line for line in page.splitlines() if line.startswith(f"| {title}")]
+    return numbers(line.split("|", 2)[2])
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_the_table_of_reaches_is_that_of_the_presets(name: str) -> None:
+    (line,) = [line for line in SAFETY.splitlines() if re.match(rf"\| .*`{name}`.*: U \d", line)]
+    top, delay, *ways = numbers(line)
+    person = reach(name, 0.0)
+    assert (top, delay) == (person.speed_mps, person.delay_s)
+    assert ways == [round(person.radius_m(t), 2) for t in (0.5, 1.0, 1.5, 2.0)]
+
+
+def test_an_aware_person_who_walks_may_stop_or_walk_on() -> None:
+    walker = reach("balanced", 1.0, walks=1.2)
+    assert f"{1.2 * walker.drift_s(100.0):.2f} m from 1.2 m/s" in " ".join(SAFETY.split())
+    assert walker.radius_m(2.0) == 0.0
+    assert walker.walks_faster
+    assert 1.2 * walker.walking_on().drift_s(2.0) == pytest.approx(2.4, abs=0.01)
+
+
+def test_the_smallest_circles_are_those_of_the_presets() -> None:
+    for index, name in enumerate(PRESETS):
+        policy = AwarenessPolicy.preset(name)
+        for title, alpha in (("has not noticed", 0.0), ("has noticed", 1.0)):
+            own_m = row(PLANNERS, f"{title}: radius of the policy")[index]
+            assert own_m == policy.inflation.radius_m(alpha)
+            smallest_m = passing_radius_m(
+                policy.speed.human_speed_mps(alpha),
+                policy.reach,
+                policy.margins.clearance_m,
+                ROBOT_ON_PAGES,
+            )
+            shown_m = row(PLANNERS, f"{title}: smallest circle")[index]
+            # It is found to within 0.4 %.
+            assert shown_m == pytest.approx(smallest_m, abs=0.0101)
+
+
+def test_the_limits_beside_somebody_are_those_of_the_page() -> None:
+    course = course_of(
+        ROBOT_ON_PAGES, RobotState(0.0, np.zeros(2), 0.0, 1.0, 0.0), math.radians(30.0)
+    )
+    unaware, aware = (
+        limit_mps(reach("balanced", alpha, 0.36, 0.25 + 0.8), course) for alpha in (0.0, 1.0)
+    )
+    assert "is its maximum, instead of 0.04 m/s" in " ".join(PLANNERS.split())
+    assert unaware == pytest.approx(0.04, abs=0.0051)
+    assert aware >= ROBOT_ON_PAGES.max_speed_mps

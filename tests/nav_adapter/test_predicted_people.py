@@ -1,25 +1,67 @@
-"""People over the horizon with their covariance: against sampling and the adapter's own numbers."""
+"""People over the horizon: circles, covariances, and the prediction model where it is chosen."""
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from nav_scenes import ROBOT, crowds, finite, person, robot_at
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_scenes import (
+    ROBOT,
+    Circle,
+    constraints_of,
+    crowds,
+    finite,
+    person,
+    robot_at,
+    some_circles,
+)
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, PersonObstacle
-from nav_adapter._people import position_sigma_m
-from nav_adapter.exporters import predicted_circles, predicted_people
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
+from nav_adapter.exporters import predicted_circles, predicted_people, speed_limit_at
 from tracking import PersonTrack
-from tracking.prediction import PredictionModel
-
-TIMES_S = np.array([0.0, 0.4, 1.0, 3.0])
+from tracking.prediction import FITTED, PredictionModel, predict_ahead
 
 
-def constraints_for(tracks: tuple[PersonTrack, ...], now: float = 0.0) -> NavConstraints:
-    return NavAdapter(AwarenessPolicy(), ROBOT).update(tracks, robot_at(now), now)
+@given(circles=some_circles(), growth_mps=finite(0, 1), steps=st.integers(0, 5))
+def test_predicted_circles_move_and_grow(
+    circles: list[Circle], growth_mps: float, steps: int
+) -> None:
+    times_s = 0.3 * np.arange(steps)
+    rows = predicted_circles(constraints_of(*circles), times_s, growth_mps=growth_mps)
+    assert rows.shape == (len(circles), steps, 5)
+    for circle, over_time in zip(circles, rows, strict=True):
+        x, y, vx, vy, radius = circle
+        for t_s, row in zip(times_s, over_time, strict=True):
+            np.testing.assert_allclose(
+                row, [x + vx * t_s, y + vy * t_s, vx, vy, radius + growth_mps * t_s]
+            )
+
+
+@given(circles=some_circles(0, 6), slots=st.integers(1, 5))
+def test_slots_hold_the_nearest_people_and_then_empty_circles(
+    circles: list[Circle], slots: int
+) -> None:
+    times_s = np.array([0.0, 0.5, 1.0])
+    robot = np.array([1.0, -2.0])
+    constraints = constraints_of(*circles)
+    everybody = predicted_circles(constraints, times_s)
+    rows = predicted_circles(constraints, times_s, slots=slots, robot_position_odom_m=robot)
+    assert rows.shape == (slots, 3, 5)
+    here = np.broadcast_to(robot, (3, 2))
+
+    def least_gap_m(row: np.ndarray) -> float:
+        return float((np.linalg.norm(row[:, :2] - here, axis=1) - row[:, 4]).min())
+
+    gaps = [least_gap_m(row) for row in rows]
+    assert gaps == sorted(gaps)
+    nearest = sorted(least_gap_m(row) for row in everybody)[:slots]
+    assert gaps[: len(nearest)] == nearest
+    for empty in rows[len(nearest) :]:
+        assert (empty[:, 4] == 0.0).all()
+        assert least_gap_m(empty) > 50.0
 
 
 @given(tracks=crowds())
@@ -28,8 +70,8 @@ def test_means_are_those_of_the_circles_and_covariances_are_valid(
 ) -> None:
     constraints = constraints_for(tracks)
     people = predicted_people(constraints, TIMES_S)
-    assert people.means_odom_m.shape == (len(tracks), 4, 2)
-    assert people.covariances_odom_m2.shape == (len(tracks), 4, 2, 2)
+    assert people.means_odom_m.shape == (len(tracks), 5, 2)
+    assert people.covariances_odom_m2.shape == (len(tracks), 5, 2, 2)
     circles = predicted_circles(constraints, TIMES_S)
     np.testing.assert_array_equal(people.means_odom_m, circles[:, :, :2])
     transposed = np.swapaxes(people.covariances_odom_m2, -1, -2)
@@ -37,74 +79,8 @@ def test_means_are_those_of_the_circles_and_covariances_are_valid(
     assert (np.linalg.eigvalsh(people.covariances_odom_m2) > -1e-9).all()
 
 
-def with_white_acceleration(density_m2ps3: float) -> PredictionModel:
-    """Return constant velocity with white acceleration and nothing else."""
-    return PredictionModel(
-        lag_per_s2=0.0,
-        acceleration_density_m2ps3=density_m2ps3,
-        change_mps=0.0,
-        slow_change_mps=0.0,
-        sway_s=0.0,
-        max_speed_mps=15.0,
-        max_acceleration_mps2=50.0,
-    )
-
-
-@given(tracks=crowds(), t_s=finite(0.0, 3.0))
-def test_the_largest_deviation_is_that_of_the_adapter(
-    tracks: tuple[PersonTrack, ...], t_s: float
-) -> None:
-    """The adapter predicts the track from its own stamp, in plain Python."""
-    now = constraints_for(tracks)
-    people = predicted_people(now, [t_s], model=with_white_acceleration(0.0))
-    by_id = sorted(tracks, key=lambda track: track.id)
-    for track, covariances in zip(by_id, people.covariances_odom_m2, strict=True):
-        variance = position_sigma_m(track, t_s - track.stamp_s) ** 2
-        largest = float(np.linalg.eigvalsh(covariances[0])[-1])
-        assert largest == pytest.approx(variance, abs=1e-9)
-
-
-def test_the_covariance_is_that_of_sampled_walks() -> None:
-    """Positions after steps of constant velocity with white acceleration, from the track's own."""
-    rng = np.random.default_rng(4)
-    root = np.array([[0.2, 0, 0, 0], [0.05, 0.15, 0, 0], [0.1, 0, 0.3, 0], [0, 0.1, 0.05, 0.2]])
-    track = PersonTrack(
-        id=1,
-        stamp_s=-0.2,
-        status="confirmed",
-        position_odom_m=[3.0, 1.0],
-        velocity_odom_mps=[-0.5, 0.3],
-        covariance_odom=root @ root.T,
-        awareness=0.5,
-        awareness_std=0.1,
-        awareness_lower=0.3,
-        height_m=1.7,
-        time_since_seen_s=0.0,
-    )
-    density, count, step_s, horizon_s = 0.1, 40_000, 0.02, 1.5
-    state = np.array([3.0, 1.0, -0.5, 0.3]) + rng.normal(size=(count, 4)) @ root.T
-    state[:, :2] += 0.2 * state[:, 2:]
-    for _ in range(round(horizon_s / step_s)):
-        kick = rng.normal(0.0, math.sqrt(density * step_s), (count, 2))
-        state[:, :2] += step_s * (state[:, 2:] + 0.5 * kick)
-        state[:, 2:] += kick
-    model = with_white_acceleration(density)
-    people = predicted_people(constraints_for((track,)), [horizon_s], model=model)
-    np.testing.assert_allclose(people.means_odom_m[0, 0], state[:, :2].mean(axis=0), atol=0.02)
-    np.testing.assert_allclose(
-        people.covariances_odom_m2[0, 0], np.cov(state[:, :2].T), rtol=0.04, atol=0.01
-    )
-
-
-def test_the_covariance_grows_with_time() -> None:
-    people = predicted_people(constraints_for((person(sigma_m=0.1),)), TIMES_S)
-    trace = np.trace(people.covariances_odom_m2[0], axis1=1, axis2=2)
-    assert trace[0] == pytest.approx(2 * 0.1**2)
-    assert (np.diff(trace) > 0.0).all()
-
-
 def test_obstacles_keep_a_read_only_covariance_at_the_stamp() -> None:
-    (obstacle,) = constraints_for((person(sigma_m=0.2),), 0.1).obstacles
+    (obstacle,) = constraints_for((person(sigma_m=0.2),), now=0.1).obstacles
     assert obstacle.covariance_odom is not None
     np.testing.assert_allclose(obstacle.covariance_odom, np.diag([0.04, 0.04, 0.0, 0.0]))
     with pytest.raises(ValueError, match="read-only"):
@@ -112,17 +88,90 @@ def test_obstacles_keep_a_read_only_covariance_at_the_stamp() -> None:
     assert "covariance" not in repr(obstacle)
 
 
-def test_what_is_not_known_is_refused() -> None:
-    (known,) = constraints_for((person(),)).obstacles
-    made = PersonObstacle(
-        1, known.center_odom_m, (0.0, 0.0), known.radius_m, 1.7, 0.0, known.polygon
+TIMES_S = np.array([0.0, 0.2, 0.5, 1.0, 2.0])
+
+
+def walker(**arguments: object) -> PersonTrack:
+    """Return a person whose velocity is uncertain too."""
+    track = person(**arguments)  # type: ignore[arg-type]
+    covariance = np.kron([[0.01, 0.01], [0.01, 0.04]], np.eye(2))
+    return replace(track, covariance_odom=covariance)
+
+
+def constraints_for(
+    tracks: tuple[PersonTrack, ...],
+    prediction: PredictionModel | None = None,
+    *,
+    speed_mps: float = 0.0,
+    now: float = 0.0,
+) -> NavConstraints:
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT, prediction=prediction)
+    return adapter.update(tracks, robot_at(now, speed_mps=speed_mps), now)
+
+
+@settings(max_examples=25)
+@given(tracks=crowds())
+def test_circles_and_limits_are_those_without_a_prediction(tracks: tuple[PersonTrack, ...]) -> None:
+    plain, wide = constraints_for(tracks), constraints_for(tracks, FITTED)
+    assert wide.speed_limit_mps == plain.speed_limit_mps
+    assert wide.limited_by == plain.limited_by
+    for one, other in zip(plain.obstacles, wide.obstacles, strict=True):
+        assert one.radius_m == other.radius_m
+        np.testing.assert_array_equal(one.center_odom_m, other.center_odom_m)
+        assert one.polygon.equals(other.polygon)
+
+
+def test_the_speed_field_is_more_cautious_the_further_ahead() -> None:
+    track = walker(position=(4.0, 0.0))
+    plain, wide = constraints_for((track,)), constraints_for((track,), FITTED)
+    poses = np.zeros((1, 20, 2))
+    before, after = (speed_limit_at(each, poses, dt_s=0.1)[0] for each in (plain, wide))
+    assert after[0] == pytest.approx(before[0], abs=0.02)
+    assert (np.diff(after) <= 0.0).all()
+    assert np.ptp(before) < 1e-6
+    assert after[-1] < before[-1] - 0.1
+
+
+def test_alerts_reach_as_far_as_the_person_may_be_by_then() -> None:
+    """A person who passes at 1.8 m in 1.5 s may have come within half a metre."""
+    aside = walker(position=(1.8, 1.8), velocity=(0.0, 0.0))
+    plain, wide = (
+        constraints_for((aside,), model, speed_mps=1.2).alerts for model in (None, FITTED)
     )
-    with pytest.raises(NavError, match=r"obstacles\[0\] has covariance_odom=None"):
-        predicted_people(NavConstraints(0.0, (made,), 1.0, "a test", False), TIMES_S)
-    nobody = predicted_people(NavConstraints(0.0, (), 1.0, "a test", False), TIMES_S)
-    assert nobody.means_odom_m.shape == (0, 4, 2)
-    assert nobody.covariances_odom_m2.shape == (0, 4, 2, 2)
-    with pytest.raises(NavError, match="times_s"):
-        predicted_people(constraints_for(()), [-0.1])
-    with pytest.raises(NavError, match="covariance_odom"):
-        PersonObstacle(1, (0, 0), (0, 0), 0.5, 1.7, 0.0, known.polygon, -np.eye(4))
+    assert plain == ()
+    assert [alert.track_id for alert in wide] == [1]
+
+
+@settings(max_examples=25)
+@given(tracks=crowds())
+def test_predicted_people_are_those_of_tracking(tracks: tuple[PersonTrack, ...]) -> None:
+    fresh = tuple(replace(track, stamp_s=0.0) for track in tracks)
+    by_id = sorted(fresh, key=lambda track: track.id)
+    model = PredictionModel(horizons_s=(1.0,), std_factors=(1.3,))
+    constraints = constraints_for(fresh)
+    for chosen in (FITTED, model):
+        found, wanted = (
+            predicted_people(constraints, TIMES_S, model=chosen),
+            predict_ahead(by_id, TIMES_S, chosen),
+        )
+        np.testing.assert_array_equal(found.means_odom_m, wanted.means_odom_m)
+        np.testing.assert_allclose(
+            found.covariances_odom_m2, wanted.covariances_odom_m2, atol=1e-12
+        )
+    np.testing.assert_array_equal(
+        predicted_people(constraints, TIMES_S).covariances_odom_m2,
+        predicted_people(constraints, TIMES_S, model=FITTED).covariances_odom_m2,
+    )
+
+
+def test_predicted_circles_grow_with_the_uncertainty() -> None:
+    tracks = (walker(position=(4.0, 1.0)), walker(track_id=2, velocity=(1.3, 0.0)))
+    constraints = constraints_for(tracks)
+    plain = predicted_circles(constraints, TIMES_S)
+    grown = predicted_circles(constraints, TIMES_S, model=FITTED, sigmas=1.5)
+    np.testing.assert_array_equal(grown[:, :, :4], plain[:, :, :4])
+    spread = predict_ahead(tracks, TIMES_S).covariances_odom_m2
+    sigmas_m = np.sqrt(np.linalg.eigvalsh(spread)[..., -1])
+    wanted = plain[:, :, 4] + 1.5 * np.maximum(sigmas_m - 0.1, 0.0)
+    np.testing.assert_allclose(grown[:, :, 4], wanted, atol=1e-9)
+    assert (np.diff(grown[:, :, 4], axis=1) > 0.0).all()

@@ -16,7 +16,7 @@ pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
 from scan_scenes import RAYS, STEP_RAD, scan_message
 from test_ros2_bridge import START_S, image, odometry
-from two_sensor_scenes import FRONT, PERIOD_S, REAR, TIMING, Attentive, Robot
+from two_sensor_scenes import FRONT, PERIOD_S, TIMING, Attentive, Robot
 
 from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
 
@@ -114,18 +114,6 @@ def test_scans_go_on_only_while_they_see_when_the_camera_falls_silent() -> None:
     assert nav.sensors().message == "lost: camera, scan_front"
 
 
-def test_a_scanner_that_never_measures_has_not_been_heard() -> None:
-    nav = Blinded(FRONT, people=[NEAR])
-    nav.change = every_ray(0.0)
-    last = nav.drive(START_S, 2.0)[-1]
-    assert nav.standing()
-    assert last.limited_by == (
-        "no scan yet from 'scan_front'; scan_front: blind (most of its rays have no answer)"
-    )
-    nav.change = every_ray(5.0)
-    assert nav.drive(START_S + 2.0, 1.0)[-1].speed_limit_mps > 0.0
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -147,26 +135,6 @@ def test_a_sector_ahead_that_is_blind_stops_the_robot_and_is_named(
     nav.change = lambda ranges: ranges
     assert nav.drive(START_S + 5.0, 3.0)[-1].speed_limit_mps > 1.0
     assert nav.warnings[1:] == ["scan_front is back"]
-
-
-def test_a_blind_sector_beside_the_robot_is_told_and_does_not_stop_it() -> None:
-    nav = alone()
-    nav.drive(START_S, 1.0)
-    nav.change = sector(80.0, 120.0, math.nan)
-    assert nav.drive(START_S + 1.0, 3.0)[-1].speed_limit_mps == 1.5
-    (told,) = nav.warnings
-    assert told.startswith("scan_front: blind from 80° to 1")
-
-
-def test_another_scanner_that_sees_there_replaces_a_blind_one() -> None:
-    second = replace(REAR, mount=FRONT.mount)
-    nav = alone(FRONT, second)
-    nav.drive(START_S, 1.0)
-    nav.change = every_ray(math.nan)
-    assert nav.drive(START_S + 1.0, 3.0)[-1].speed_limit_mps == 1.5
-    assert nav.warnings == [
-        "scan_front: blind (most of its rays have no answer): scan_rear goes on"
-    ]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.6])

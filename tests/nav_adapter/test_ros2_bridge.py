@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT
 
@@ -163,6 +163,7 @@ def test_unwanted_messages_are_not_made() -> None:
     # The stop is published on every topic, for late subscribers too.
     nav.bridge.stop(START_S + 0.03, "the end")
     assert {"collision_polygons", "stop_zone", "people"} <= set(nav.heard)
+    assert nav.standing()
 
 
 class OneApproaching:
@@ -209,17 +210,6 @@ def test_every_alert_is_in_one_message() -> None:
     assert len(nav.heard["alerts"]) == 100
 
 
-def test_the_pose_of_the_camera_follows_from_mount_and_odometry() -> None:
-    nav = Listener()
-    nav.bridge.on_camera_info(INFO)
-    nav.bridge.on_odometry(odometry(START_S, x=2.0, yaw=math.pi / 2.0))
-    assert nav.bridge.on_image(image(START_S), START_S)
-    assert nav.bridge.frame is not None
-    T = nav.bridge.frame.T_odom_camera
-    assert np.allclose(T[:3, 3], [2.0, 0.2, 1.4])
-    assert np.allclose(T[:3, 2], [0.0, 1.0, 0.0], atol=1e-9)
-
-
 def test_the_pose_of_the_camera_can_come_from_tf() -> None:
     nav = Listener(T_base_camera=None)
     nav.bridge.on_camera_info(INFO)
@@ -250,6 +240,7 @@ def test_refused_images_warn_once_and_stop_the_robot_when_stale() -> None:
             assert not nav.bridge.on_image(image(now + 1.0), now)
         nav.bridge.tick(now)
     assert nav.standing()
+    assert nav.bridge.counts["images_from_future"] == 79
     assert nav.warnings == ["image: the image's stamp is 1.000 s ahead of this computer's clock"]
 
 
@@ -279,62 +270,12 @@ def test_impossible_odometry_is_refused(message: Odometry, text: str) -> None:
     assert nav.standing()
 
 
-def test_an_empty_calibration_keeps_the_robot_standing() -> None:
-    nav = Listener()
-    nav.bridge.on_camera_info(CameraInfo())
-    assert "calibrate" in nav.warnings[-1]
-    nav.bridge.on_odometry(odometry(START_S))
-    assert not nav.bridge.on_image(image(START_S), START_S)
-    nav.bridge.tick(START_S)
-    assert nav.standing()
-    nav.bridge.on_camera_info(INFO)
-    assert nav.bridge.on_image(image(START_S), START_S)
-
-
-def test_an_image_of_another_size_than_the_calibration_is_refused() -> None:
-    nav = Listener()
-    nav.bridge.on_camera_info(INFO)
-    nav.bridge.on_odometry(odometry(START_S))
-    small = Image(Header(to_time(START_S), "camera"), 1, 1, "rgb8", 0, 3, bytes(3))
-    assert not nav.bridge.on_image(small, START_S)
-    assert "calibrated for 64 x 48 px, but the images have 1 x 1 px" in nav.warnings[-1]
-
-
-def test_a_clock_that_goes_backward_restarts_with_a_stop() -> None:
-    nav = Listener()
-    nav.bridge.on_camera_info(INFO)
-    nav.bridge.on_odometry(odometry(START_S))
-    nav.bridge.on_image(image(START_S), START_S)
-    nav.bridge.tick(START_S)
-    assert not nav.standing()
-    for tick in range(21):
-        # Until the new clock has lasted for 1 s, it may be a wrong reading.
-        assert nav.bridge.tick(10.0 + 0.05 * tick).speed_limit_mps == 0.0
-        assert nav.standing()
-    nav.bridge.on_odometry(odometry(11.05))
-    assert nav.bridge.on_image(image(11.05), 11.05)
-    nav.bridge.tick(11.05)
-    assert not nav.standing()
-    assert nav.warnings == [
-        "the clock has been set back: all tracks and moving transforms are deleted"
-    ]
-
-
-def test_stop_publishes_a_stop() -> None:
-    nav = Listener()
-    nav.bridge.on_camera_info(INFO)
-    nav.bridge.on_odometry(odometry(START_S))
-    nav.bridge.on_image(image(START_S), START_S)
-    nav.bridge.tick(START_S)
-    nav.bridge.stop(START_S + 0.1, "the end")
-    assert nav.standing()
-
-
 def _mount() -> TFMessage:
     move = Transform(Vector3(0.2, 0.0, 1.4), Quaternion(-0.5, 0.5, -0.5, 0.5))
     return TFMessage((TransformStamped(Header(frame_id="base_link"), "camera", move),))
 
 
+@settings(max_examples=40)
 @given(
     st.sampled_from(["odometry", "camera_info", "transforms", "image"]),
     st.lists(st.tuples(st.integers(4, 4000), st.integers(0, 255)), min_size=1, max_size=6),

@@ -1,13 +1,17 @@
-"""The messages for constraints, and the conversion of stamps."""
+"""The messages for constraints, the limit as Nav2 keeps it, and the conversion of stamps."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+
+pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
+
 from nav_scenes import ROBOT, crowds, finite, person, robot_at
 from shapely import affinity
 from shapely.geometry import Point as ShapelyPoint
@@ -19,23 +23,28 @@ from nav_adapter import (
     NavAdapter,
     NavConstraints,
     NavError,
+    RobotProfile,
     paint_costmap,
 )
 from nav_adapter.alerts import Answer
 from nav_adapter.ros2 import (
     SLOWEST_MPS,
     STOP_POLYGON_ID,
+    Frames,
+    SpeedMaskSettings,
     alerts,
     circle_objects,
     collision_polygons,
     detections,
     markers,
     occupancy_grid,
+    outgoing,
     people,
     speed_limit,
     stop_zone,
     teb_obstacles,
 )
+from nav_adapter.ros2._speed_mask import SpeedMaskStream
 from nav_adapter.ros2.conversions import to_seconds, to_time
 from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
 from nav_adapter.ros2.messages.visualization_msgs import Marker
@@ -92,6 +101,7 @@ def test_a_stamp_that_ros_cannot_hold_is_refused(stamp_s: float) -> None:
         to_time(stamp_s)
 
 
+@settings(max_examples=40)
 @given(crowds())
 def test_every_person_has_a_polygon_and_the_stop_polygon_comes_last(tracks) -> None:
     constraints = around(tracks)
@@ -134,6 +144,7 @@ def test_the_stop_zone_is_the_footprint_stretched_by_the_stopping_distance(speed
     assert zone.symmetric_difference(wanted).area < 1e-9
 
 
+@settings(max_examples=40)
 @given(crowds(), finite(-5.0, 5.0), finite(-5.0, 5.0))
 def test_the_grid_is_occupied_where_the_costmap_is_lethal(tracks, x: float, y: float) -> None:
     constraints = around(tracks)
@@ -156,31 +167,45 @@ def test_a_grid_without_cells_or_with_too_many_is_refused(change) -> None:
         occupancy_grid(limited(1.0), (0.0, 0.0), **change)
 
 
+@settings(max_examples=40)
 @given(crowds())
-def test_circles_contain_their_obstacles_and_keep_their_uuid(tracks) -> None:
+def test_every_person_is_in_the_messages_of_circles_obstacles_boxes_and_markers(tracks) -> None:
     constraints = around(tracks)
-    circles = circle_objects(constraints)
+    circles, teb = circle_objects(constraints), teb_obstacles(constraints, frame_id="world")
+    assert teb.header.frame_id == "world"
     assert len({each.uuid.uuid for each in circles}) == len(circles)
-    for circle, obstacle in zip(circles, constraints.obstacles, strict=True):
-        assert circle.fill
-        assert circle.value == 100
-        assert circle.radius >= obstacle.radius_m
-        assert circle.radius <= 1.02 * obstacle.radius_m
     assert [each.uuid for each in circle_objects(constraints)] == [each.uuid for each in circles]
-
-
-@given(crowds())
-def test_teb_gets_circles_with_velocities(tracks) -> None:
-    constraints = around(tracks)
-    message = teb_obstacles(constraints, frame_id="world")
-    assert message.header.frame_id == "world"
-    for each, obstacle in zip(message.obstacles, constraints.obstacles, strict=True):
-        (center,) = each.polygon.points
-        moving = each.velocities.twist.linear
-        assert (center.x, center.y) == tuple(obstacle.center_odom_m)
-        assert (moving.x, moving.y) == tuple(obstacle.velocity_odom_mps)
-        assert each.radius == obstacle.radius_m
-        assert each.id == obstacle.track_id
+    for obstacle, circle, moving, found in zip(
+        constraints.obstacles,
+        circles,
+        teb.obstacles,
+        detections(constraints).detections,
+        strict=True,
+    ):
+        x, y = obstacle.center_odom_m
+        vx, vy = obstacle.velocity_odom_mps
+        assert (circle.fill, circle.value, circle.radius) == (True, 100, obstacle.radius_m)
+        assert (circle.center.x, circle.center.y) == (x, y)
+        (center,) = moving.polygon.points
+        assert (center.x, center.y, moving.radius, moving.id) == (
+            (x, y, obstacle.radius_m, obstacle.track_id)
+        )
+        assert (moving.velocities.twist.linear.x, moving.velocities.twist.linear.y) == (vx, vy)
+        size, box = found.bbox.size, found.bbox.center
+        assert (size.x, size.y, size.z) == (*(2.0 * obstacle.radius_m,) * 2, obstacle.height_m)
+        assert box.position.z == 0.5 * obstacle.height_m
+        # The rotation about z turns x to the person's direction.
+        turn = box.orientation
+        heading = np.array([1.0 - 2.0 * turn.z**2, 2.0 * turn.w * turn.z])
+        assert np.allclose(heading * math.hypot(vx, vy), (vx, vy), atol=1e-9)
+        scores = {each.hypothesis.class_id: each.hypothesis.score for each in found.results}
+        assert scores == {"person": 1.0, "aware_person": obstacle.awareness_lower}
+    first, *rest = markers(constraints, robot_at()).markers
+    assert first.action == Marker.DELETEALL
+    assert len({(each.ns, each.id) for each in rest}) == len(rest)
+    assert all(each.lifetime.sec > 0 for each in rest)
+    assert sum(each.ns == "body" for each in rest) == len(constraints.obstacles)
+    assert constraints.limited_by in rest[-1].text
 
 
 def test_people_carry_awareness_in_their_tags() -> None:
@@ -194,43 +219,10 @@ def test_people_carry_awareness_in_their_tags() -> None:
     assert float(tags["awareness"]) == seen.awareness
     assert tags["status"] == "confirmed"
     assert message.reliability == 1.0
-
-
-def test_a_person_without_a_track_has_no_reliability() -> None:
-    constraints = around([person(track_id=4)])
-    (message,) = people(constraints, []).people
-    assert message.reliability == 0.0
-    assert "awareness" not in message.tagnames
-    assert "awareness_lower" in message.tagnames
-
-
-@given(crowds())
-def test_detections_are_the_papers_boxes(tracks) -> None:
-    constraints = around(tracks)
-    message = detections(constraints)
-    for found, obstacle in zip(message.detections, constraints.obstacles, strict=True):
-        size, center = found.bbox.size, found.bbox.center
-        assert (size.x, size.y) == (2.0 * obstacle.radius_m,) * 2
-        assert size.z == obstacle.height_m
-        assert center.position.z == 0.5 * obstacle.height_m
-        # The rotation about z turns x to the person's direction.
-        turn = center.orientation
-        heading = np.array([1.0 - 2.0 * turn.z**2, 2.0 * turn.w * turn.z])
-        speed = np.linalg.norm(obstacle.velocity_odom_mps)
-        assert np.allclose(heading * speed, obstacle.velocity_odom_mps, atol=1e-9)
-        scores = {each.hypothesis.class_id: each.hypothesis.score for each in found.results}
-        assert scores == {"person": 1.0, "aware_person": obstacle.awareness_lower}
-
-
-@given(crowds())
-def test_markers_delete_the_old_ones_and_have_distinct_ids(tracks) -> None:
-    constraints = around(tracks)
-    first, *rest = markers(constraints, robot_at()).markers
-    assert first.action == Marker.DELETEALL
-    assert len({(each.ns, each.id) for each in rest}) == len(rest)
-    assert all(each.lifetime.sec > 0 for each in rest)
-    assert sum(each.ns == "body" for each in rest) == len(constraints.obstacles)
-    assert constraints.limited_by in rest[-1].text
+    # Of a person without a track, whom the adapter still keeps.
+    (kept,) = people(constraints, []).people
+    assert kept.reliability == 0.0
+    assert kept.tagnames == ("awareness_lower", "radius_m")
 
 
 ALERTS = st.builds(
@@ -243,6 +235,7 @@ ALERTS = st.builds(
 )
 
 
+@settings(max_examples=40)
 @given(st.lists(ALERTS, max_size=4), st.booleans(), st.booleans())
 def test_alerts_follow_the_state_of_the_limit_as_warnings(
     given_alerts: list[Alert], stale: bool, suffices: bool
@@ -291,3 +284,115 @@ def test_requests_and_answers_are_no_fault_and_follow_the_warnings(means: str) -
         {"track_id": "4", "after_s": "0.900"},
         {"track_id": "7", "after_s": "1.250"},
     ]
+
+
+MPPI_RADPS = 1.9
+
+
+def obeying(sent_mps: float, robot: RobotProfile, share: np.ndarray, yaw_rate: float) -> float:
+    """Return the speed of the robot's fastest point under a controller that obeys the message.
+
+    Args:
+        sent_mps: the limit in the message.
+        robot: its profile.
+        share: (2,) in [-1, 1], of the limits of x and y that the controller uses.
+        yaw_rate: in [-1, 1], of the controller's largest yaw rate, which it scales.
+    """
+    velocity = sent_mps * share
+    if robot.moves_sideways is False:
+        velocity[1] = 0.0
+    turn = yaw_rate * (robot.max_yaw_rate_radps or MPPI_RADPS) * sent_mps / robot.max_speed_mps
+    if robot.min_turning_radius_m is not None:
+        most = abs(velocity[0]) / robot.min_turning_radius_m
+        turn = min(max(turn, -most), most)
+    x, y = robot.footprint_m.T
+    return float(np.hypot(velocity[0] - turn * y, velocity[1] + turn * x).max())
+
+
+robots = st.builds(
+    lambda drive, yaw_rate, offset, speed: replace(
+        ROBOT,
+        drive=drive,
+        max_yaw_rate_radps=yaw_rate,
+        footprint_m=ROBOT.footprint_m + np.array([offset, 0.0]),
+        max_speed_mps=speed,
+        min_turning_radius_m=0.9 if drive == "ackermann" else None,
+    ),
+    st.sampled_from(["differential", "holonomic", "ackermann", None]),
+    st.none() | finite(0.1, 4.0),
+    finite(-0.6, 0.6),
+    finite(0.3, 2.5),
+)
+shares = st.sampled_from([-1.0, 0.0, 1.0]) | finite(-1.0, 1.0)
+
+
+@given(robots, finite(0.02, 3.0), shares, shares, shares, st.booleans())
+def test_no_point_is_faster_than_the_limit_under_an_obedient_controller(
+    robot: RobotProfile, limit: float, x: float, y: float, yaw_rate: float, percentage: bool
+) -> None:
+    constraints = NavConstraints(0.0, (), limit, "a test", False, robot=robot)
+    message = speed_limit(constraints, robot.max_speed_mps, percentage=percentage)
+    sent_mps = message.speed_limit * (robot.max_speed_mps / 100.0 if percentage else 1.0)
+    fastest = obeying(sent_mps, robot, np.array([x, y]), yaw_rate)
+    assert sent_mps == SLOWEST_MPS or fastest <= limit + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("drive", "factor"),
+    [
+        ("differential", 1.0 + 1.9 / 1.5 * math.hypot(0.3625, 0.25)),
+        ("holonomic", math.sqrt(2.0) + 1.9 / 1.5 * math.hypot(0.3625, 0.25)),
+        (None, math.sqrt(2.0) + 1.9 / 1.5 * math.hypot(0.3625, 0.25)),
+    ],
+)
+def test_what_is_sent_is_no_lower_than_it_must_be(drive: str | None, factor: float) -> None:
+    """1.56 times the limit at the corner of a differential drive, 1.97 of one that moves aside."""
+    robot = replace(ROBOT, drive=drive)
+    constraints = NavAdapter(AwarenessPolicy.preset("balanced"), robot).update(
+        [person(position=(3.0, 0.0))], robot_at(speed_mps=0.5), 0.0
+    )
+    assert 0.1 < constraints.speed_limit_mps < 1.4
+    messages = dict(outgoing(constraints, (), robot, robot_at(), Frames()))
+    sent = messages["speed_limit"].speed_limit
+    assert sent == pytest.approx(constraints.speed_limit_mps / factor)
+    turned = obeying(sent, robot, np.array([1.0, 1.0]), 1.0)
+    assert 0.8 * constraints.speed_limit_mps < turned <= constraints.speed_limit_mps
+
+
+@pytest.mark.parametrize("drive", ["differential", "holonomic", None])
+def test_where_nobody_is_the_robot_keeps_its_own_maximum(drive: str | None) -> None:
+    robot = replace(ROBOT, drive=drive)
+    adapter = NavAdapter(AwarenessPolicy.preset("balanced"), robot)
+    constraints = adapter.update([], robot_at(), 0.0)
+    assert speed_limit(constraints, 1.5).speed_limit == pytest.approx(0.999 * 1.5)
+
+
+def test_a_limit_that_is_too_low_to_send_is_a_stop_on_every_topic() -> None:
+    robot = replace(ROBOT, drive="holonomic")
+    limit = 1.5 * SLOWEST_MPS
+    constraints = NavConstraints(0.0, (), limit, "a test", False, robot=robot)
+    messages = dict(outgoing(constraints, (), robot, robot_at(), Frames()))
+    assert messages["speed_limit"].speed_limit == SLOWEST_MPS
+    corners = messages["collision_polygons"].polygon.polygon.points
+    assert all(abs(corner.x) < 1.0 for corner in corners)
+
+
+def test_the_speed_mask_is_for_the_fastest_point_too() -> None:
+    masks = {}
+    for drive in ("differential", "holonomic"):
+        robot = replace(ROBOT, drive=drive)
+        adapter = NavAdapter(AwarenessPolicy.preset("balanced"), robot)
+        constraints = adapter.update([person(position=(3.0, 0.0))], robot_at(), 0.0)
+        stream = SpeedMaskStream(SpeedMaskSettings(size_m=8.0), "odom")
+        (_, mask), *_ = (
+            each
+            for each in stream.messages(constraints, robot_at(), lambda key: True)
+            if each[0] == "speed_mask"
+        )
+        masks[drive] = np.frombuffer(mask.data, np.int8).astype(float)
+    limited = masks["differential"] > 10.0
+    assert limited.any()
+    assert masks["holonomic"][limited] / masks["differential"][limited] == pytest.approx(
+        (1.0 + 0.5578) / (math.sqrt(2.0) + 0.5578), abs=0.08
+    )
+    assert ((masks["holonomic"] == 0.0) == (masks["differential"] == 0.0)).all()

@@ -164,21 +164,6 @@ def test_the_robot_stands_until_depth_has_come_and_goes_on_without_it() -> None:
     assert "no depth" not in nav.bridge.tick(START_S + 2.95).limited_by
 
 
-def test_a_lost_camera_with_depth_stops_the_robot_as_without() -> None:
-    nav = DepthListener()
-    nav.bridge.on_depth(depth_image(START_S), START_S)
-    nav.picture(START_S)
-    nav.bridge.tick(START_S)
-    for tick in range(1, 60):
-        now = START_S + 0.05 * tick
-        nav.bridge.on_depth(depth_image(now), now)
-        nav.bridge.on_odometry(odometry(now), now)
-        constraints = nav.bridge.tick(now)
-    assert now - START_S > TIMING.stop_after_s
-    assert "stale data" in constraints.limited_by
-    assert any("the robot stops" in line for line in nav.warnings)
-
-
 def test_without_the_option_depth_images_are_an_error() -> None:
     with pytest.raises(NavError, match="made without depth images"):
         Listener().bridge.on_depth(depth_image(START_S), START_S)

@@ -84,25 +84,3 @@ def _default(name: str) -> Any:
 def _options(words: list[str]) -> dict[str, Any]:
     with bridge.make_context("bridge", words) as context:
         return context.params
-
-
-def test_the_page_says_which_distribution_has_what() -> None:
-    """As Nav2's migration guides and package lists have it."""
-    table = re.search(r"^\| needs \|.*?\n\n", TEXT, re.MULTILINE | re.DOTALL)
-    assert table is not None
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")] for line in table[0].split("\n")[:-2]
-    ]
-    columns = ["Humble, Iron", "Jazzy", "Kilted", "Lyrical and later"]
-    assert rows[0][1:] == columns
-    (circles,) = (row[1:] for row in rows if "CircleObject" in row[0])
-    (polygons,) = (row[1:] for row in rows if "PolygonInstanceStamped" in row[0])
-    (speed,) = (row[1:] for row in rows if "Regulated Pure Pursuit" in row[0])
-    assert circles == ["no", "no", "no", "yes"]
-    assert polygons == ["no", "yes", "yes", "yes"]
-    assert speed == ["`desired_linear_vel`"] * 3 + ["`max_linear_vel`"]
-
-
-def test_the_rate_on_the_page_is_that_of_the_command() -> None:
-    (rate,) = (option.default for option in bridge.params if option.name == "rate")
-    assert f"published {rate:g} times per second (`--rate`)" in " ".join(TEXT.split())

@@ -13,7 +13,7 @@ pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
 from test_ros2_bridge import INFO, START_S, Listener, image, odometry
 
-from nav_adapter import AwarenessPolicy, NavError
+from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import PerceptionThread
 
 PATIENCE_S = 20.0
@@ -149,18 +149,6 @@ def test_of_the_waiting_images_only_the_newest_is_processed() -> None:
         nav.network.open.set()
         nav.until(lambda: nav.frames() == 3)
         assert nav.network.stamps_s == pytest.approx([START_S, START_S + 0.1, START_S + 0.8])
-
-
-def test_a_message_that_cannot_be_decoded_is_refused_in_the_thread() -> None:
-    def damaged():
-        raise NavError("/camera/image_raw: received bytes are not an image")
-
-    with threaded() as nav:
-        nav.thread.submit(damaged)
-        nav.until(lambda: bool(nav.warnings))
-        assert nav.warnings == ["/camera/image_raw: received bytes are not an image"]
-        nav.send(START_S + 0.1)
-        nav.until(lambda: nav.frames() == 2)
 
 
 def test_closing_waits_for_the_frame_in_hand_and_leaves_one_that_hangs() -> None:

@@ -228,7 +228,7 @@ def test_a_map_whose_place_is_unknown_is_not_used() -> None:
     assert nav.warnings[2:] == ["the map is used"]
 
 
-@settings(max_examples=40)
+@settings(max_examples=25)
 @given(st.lists(st.tuples(st.integers(4, 2400), st.integers(0, 255)), min_size=1, max_size=6))
 def test_damaged_scans_never_crash_the_bridge(damage: list[tuple[int, int]]) -> None:
     data = bytearray(encode(scan_message(START_S, [PERSON])))

@@ -1,4 +1,4 @@
-"""LaserScan and OccupancyGrid messages: what they become, and what is refused."""
+"""LaserScan and OccupancyGrid messages as drivers send them: what they become, what is refused."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from hypothesis import strategies as st
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
 from scan_scenes import RAYS, planar, scan_message
+from test_ros2_bridge import START_S, Listener, odometry
+from two_sensor_scenes import FRONT
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import decode, encode, laser_scan_of, map_cells_of
-from nav_adapter.ros2.conversions import from_ros, to_ros, yaw_quaternion
+from nav_adapter.ros2.conversions import from_ros, to_ros, to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import Point, Pose
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
 from nav_adapter.ros2.messages.sensor_msgs import LaserScan
@@ -49,7 +51,6 @@ def test_ros_ranges_keep_their_meaning() -> None:
     message = replace(SCAN, ranges=ranges, angle_max=SCAN.angle_min + 5 * SCAN.angle_increment)
     scan = laser_scan_of(decode(LaserScan, encode(message)))
     assert scan.measured.tolist() == [False] * 5 + [True]
-    assert scan.free_m.tolist() == [20.0, 0.0, 0.0, 0.0, 0.0, 2.0]
 
 
 def test_a_scan_of_rclpy_is_read() -> None:
@@ -58,9 +59,40 @@ def test_a_scan_of_rclpy_is_read() -> None:
     assert laser_scan_of(from_ros(LaserScan, theirs)).ranges_m == pytest.approx(SCAN.ranges)
 
 
+def scaled(factor: float, where=lambda each: True, other: float = math.inf) -> tuple[float, ...]:
+    """Return the ranges in another unit; those that are not ``where`` are ``other``."""
+    return tuple(factor * each if where(each) else other for each in SCAN.ranges)
+
+
+CENTIMETRES = tuple(min(100.0 * each, 200.0 + 0.05 * ray) for ray, each in enumerate(SCAN.ranges))
+MILLIMETRES = scaled(1000.0)
+SOME_MILLIMETRES = scaled(1000.0, lambda each: each < 3.5)
+ELSEWHERE = "angle_max must be the angle of the last ray"
+SWEEP = "time_increment must be the seconds from ray to ray"
+UNIT = "ranges must be in metres"
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
+        ({"angle_min": -math.pi, "angle_max": math.pi, "angle_increment": 0.0068}, ELSEWHERE),
+        ({"angle_increment": -SCAN.angle_increment}, ELSEWHERE),
+        ({"ranges": (2.0,) * 600}, ELSEWHERE),
+        ({"time_increment": 153333.328}, SWEEP),
+        ({"time_increment": 0.005}, SWEEP),
+        ({"time_increment": -0.28}, SWEEP),
+        ({"ranges": MILLIMETRES}, UNIT + ": no rays measure anything"),
+        ({"ranges": MILLIMETRES, "range_max": 20_000.0}, UNIT + ": no rays measure anything"),
+        ({"ranges": MILLIMETRES, "range_max": math.inf}, UNIT + ": no rays measure anything"),
+        ({"ranges": scaled(100.0), "range_max": 12.0}, UNIT + ": no rays measure anything"),
+        ({"ranges": SOME_MILLIMETRES}, UNIT),
+        ({"ranges": SOME_MILLIMETRES, "range_max": 20_000.0}, UNIT),
+        # Most of a small room is less than 250 "m" away in centimetres.
+        (
+            {"ranges": CENTIMETRES, "range_min": 2.0, "range_max": math.inf},
+            UNIT + ": no of 541 are below 20 m",
+        ),
+        ({"range_min": 120.0, "range_max": 3500.0}, "range_min must be in metres, got 120 m"),
         ({"ranges": ()}, "at least one range"),
         ({"ranges": (1.0,) * 20_001}, "at most 20000 rays, got 20001"),
         ({"angle_increment": math.nan}, "angle_increment_rad must be"),
@@ -121,3 +153,154 @@ def test_unknown_and_free_cells_are_not_occupied() -> None:
 def test_a_map_that_contradicts_itself_is_refused(message: OccupancyGrid, text: str) -> None:
     with pytest.raises(NavError, match=text):
         map_cells_of(message)
+
+
+HEADED = scan_message(12.5, [(2.0, 0.0)])
+PLACE = (2.5, 0.4)
+PI = math.pi
+
+
+def sent(low_rad: float, angle_max_rad: float, step_rad: float, rays: int, **changes) -> LaserScan:
+    """Return a message as it comes over DDS, in single precision."""
+    message = replace(
+        HEADED,
+        angle_min=low_rad,
+        angle_max=angle_max_rad,
+        angle_increment=step_rad,
+        ranges=tuple(np.linspace(2.0, 3.0, rays).tolist()),
+        **changes,
+    )
+    return decode(LaserScan, encode(message))
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        pytest.param(sent(-PI, PI, 0.00869043637067, 719), id="YDLIDAR X4"),
+        pytest.param(sent(-PI, PI, 0.00872664619237, 710), id="last rays missing"),
+        pytest.param(sent(-PI, PI, 2.0 * PI / 720, 702), id="2.5 % missing"),
+        pytest.param(sent(-PI, 0.0, 2.0 * PI / 360, 360), id="angle_max not set"),
+        pytest.param(sent(0.5, 4.9 - 2.0 * PI, 4.4 / 300, 301), id="angle_max within pi"),
+        pytest.param(sent(2.0, 0.5 - 4.0 + 2.0 * PI, -5.5 / 250, 251), id="clockwise, within pi"),
+    ],
+)
+def test_number_and_increment_place_the_rays(message: LaserScan) -> None:
+    scan = laser_scan_of(message)
+    rays = np.arange(len(message.ranges))
+    assert len(scan) == len(rays)
+    np.testing.assert_allclose(scan.angles_rad, message.angle_min + message.angle_increment * rays)
+
+
+@pytest.mark.parametrize("extra", [1, 5, 11])
+def test_rays_beyond_a_full_turn_keep_the_nearer_range(extra: int) -> None:
+    message = sent(0.0, 2.0 * PI, 2.0 * PI / 450, 451 + extra)
+    ranges = np.full(451 + extra, 5.0)
+    ranges[-1] = 1.0  # seen by the last ray only
+    scan = laser_scan_of(replace(message, ranges=tuple(ranges.tolist())))
+    assert 450 <= len(scan) <= 451
+    (near,) = np.flatnonzero(scan.ranges_m == 1.0)
+    assert scan.angles_rad[near] == pytest.approx(2.0 * PI / 450 * extra, abs=1e-3)
+
+
+def test_no_limit_of_range_and_odd_intensities_cost_nothing() -> None:
+    scan = laser_scan_of(replace(HEADED, range_max=math.inf, intensities=(1.0, 2.0)))
+    assert scan.range_max_m == 250.0
+    assert scan.intensities is None
+    assert scan.ranges_m == pytest.approx(HEADED.ranges)
+
+
+def test_a_scan_whose_array_was_turned_round_is_read_in_the_order_of_time() -> None:
+    turned = replace(HEADED, ranges=HEADED.ranges[::-1], time_increment=-1e-4)
+    scan = laser_scan_of(turned)
+    last = len(HEADED.ranges) - 1
+    assert scan.stamps_s[[0, -1]] == pytest.approx([12.5 - 1e-4 * last, 12.5])
+    assert scan.ranges_m == pytest.approx(HEADED.ranges)
+    assert scan.angles_rad[0] == pytest.approx(HEADED.angle_max)
+
+
+def test_far_walls_are_read_where_the_limit_vouches_for_the_unit() -> None:
+    far = tuple(30.0 + 0.01 * ray for ray in range(541))
+    assert laser_scan_of(replace(HEADED, ranges=far, range_max=100.0)).measured.all()
+    some = (3.0,) * 60 + far[60:]
+    assert laser_scan_of(replace(HEADED, ranges=some, range_max=math.inf)).measured.all()
+    code = (3.0,) * 20 + (65.535,) * 521
+    assert laser_scan_of(replace(HEADED, ranges=code, range_max=math.inf)).measured.all()
+
+
+def test_returns_beyond_a_low_range_max_are_no_other_unit() -> None:
+    """Whoever comes within it is still to be found."""
+    ranges = tuple(each if each < 6.0 else math.inf for each in HEADED.ranges)
+    scan = laser_scan_of(replace(HEADED, ranges=ranges, range_max=3.5))
+    assert 3 < scan.measured.sum() < 100
+
+
+def test_a_code_for_no_return_is_no_unit() -> None:
+    """One value beyond the limits on most rays, beside some true ranges."""
+    ranges = tuple(each if each < 4.0 else 9999.0 for each in HEADED.ranges)
+    assert laser_scan_of(replace(HEADED, ranges=ranges)).measured.sum() > 3
+
+
+def found(stamp_at: str, rate_hz: float, speed_mps: float = 1.0):
+    """Return a bridge that has followed somebody for 2 s past whom the robot drives."""
+    nav = Listener(scanners=[FRONT], with_camera=False)
+    period_s = 1.0 / rate_hz
+    rays = len(HEADED.ranges)
+    for sweep in range(round(2.0 * rate_hz)):
+        start_s = START_S + period_s * sweep
+        stamps = start_s + period_s * np.arange(rays) / rays
+        x_m = speed_mps * (stamps - START_S) - 2.0
+        now_s = start_s + period_s + 0.005
+        for tick in range(round(period_s / 0.02) + 1):
+            at_s = start_s + 0.02 * tick
+            here = odometry(at_s, x=speed_mps * (at_s - START_S) - 2.0, speed=speed_mps)
+            nav.bridge.on_odometry(here, now_s)
+        message = scan_message(
+            start_s,
+            [PLACE],
+            poses=[planar(x + 0.3, 0.0, 0.0) for x in x_m],
+            time_increment_s=period_s / rays,
+        )
+        stamp_s = start_s if stamp_at == "start" else now_s - 0.005
+        header = replace(message.header, stamp=to_time(stamp_s))
+        message = replace(message, header=header, scan_time=period_s)
+        nav.bridge.on_scan(0, message, now_s)
+    return nav
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 10.0])
+def test_stamps_at_the_end_of_the_sweep_place_people_as_stamps_at_its_start(rate_hz) -> None:
+    right, nav = found("start", rate_hz), found("end", rate_hz)
+    assert not right.warnings
+    (warning,) = nav.warnings
+    assert "the stamp is taken for that of the last ray" in warning
+    assert "time_increment" in warning
+    (track,), (wanted,) = nav.bridge.tracks, right.bridge.tracks
+    np.testing.assert_allclose(track.position_odom_m, wanted.position_odom_m, atol=0.02)
+    assert np.linalg.norm(track.position_odom_m - PLACE) < 0.1
+
+
+@pytest.mark.parametrize("scan_time", [0.0, 1.0])
+def test_sweeps_that_go_on_while_others_begin_are_named(scan_time: float) -> None:
+    """Also where scan_time is not set, or is wrong by the same factor."""
+    nav = Listener(scanners=[FRONT], with_camera=False)
+    used = []
+    for tick in range(200):
+        now_s = START_S + 0.02 * tick
+        nav.bridge.on_odometry(odometry(now_s, speed=0.0), now_s)
+        if tick > 75 and tick % 5 == 0:
+            sent = scan_message(now_s, [PLACE], time_increment_s=1.0 / 541)
+            used.append(nav.bridge.on_scan(0, replace(sent, scan_time=scan_time), now_s))
+    assert not any(used[4:])
+    assert nav.bridge.tick(now_s).speed_limit_mps == 0.0
+    assert any("is 0.998 s, but scans come every 0.100 s" in each for each in nav.warnings)
+
+
+def test_corrections_are_said_once() -> None:
+    nav = Listener(scanners=[FRONT], with_camera=False)
+    for tick in range(5):
+        now_s = START_S + 0.1 * tick
+        nav.bridge.on_odometry(odometry(now_s, speed=0.0), now_s)
+        message = replace(scan_message(now_s, [PLACE]), intensities=(1.0,))
+        assert nav.bridge.on_scan(0, message, now_s)
+    (warning,) = nav.warnings
+    assert "541 ranges but 1 intensities, which are not used" in warning

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scan_scenes import planar
 
@@ -49,6 +49,7 @@ def scanned(
     watch.saw_scan(number, stamp_s, sight_of(scan, scanner))
 
 
+@settings(max_examples=40)
 @given(st.floats(-180.0, 180.0), st.floats(-180.0, 180.0), st.floats(1.0, 360.0))
 def test_one_scanner_replaces_the_camera_if_it_sees_all_of_its_field(yaw, other, field) -> None:
     watch = looking(yaw)

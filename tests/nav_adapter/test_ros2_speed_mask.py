@@ -17,7 +17,7 @@ from test_ros2_bridge import INFO, ROBOT, START_S, Listener, image, odometry
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, RobotState
 from nav_adapter.exporters import speed_limit_at
 from nav_adapter.ros2 import SpeedMaskSettings
-from nav_adapter.ros2._mask_stream import SpeedMaskStream
+from nav_adapter.ros2._speed_mask import SpeedMaskStream
 from nav_adapter.ros2.messages import Message
 from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid
 

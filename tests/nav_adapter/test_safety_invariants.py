@@ -202,11 +202,17 @@ def test_the_order_of_people_does_not_matter(
 
 
 @FEW
-@given(policy=policies(), robot=robots(), walk=followed(), age=finite(0.0, 3.0))
+@given(
+    policy=policies(),
+    robot=robots(),
+    walk=followed(),
+    age=finite(0.0, 3.0),
+    share=finite(0.0, 1.0),
+)
 def test_stale_is_never_looser_than_fresh(
-    policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, age: float
+    policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, age: float, share: float
 ) -> None:
-    """The same history, then one update with data of this age."""
+    """The same history, then one update with people of this age, and a state of a share of it."""
     after = []
     for late in (0.0, age):
         adapter, now = NavAdapter(policy, robot), 0.0
@@ -217,6 +223,7 @@ def test_stale_is_never_looser_than_fresh(
             adapter.update(tracks, state, now, perception_stamp_s=now)
         # Both adapters are updated at the same time; one gets no new stamp of perception.
         later = now + age
+        state = replace(state, stamp_s=later - share * late)
         after.append(adapter.update(tracks, state, later, perception_stamp_s=later - late))
     fresh, old = after
     assert old.stale or age <= policy.timing.stale_after_s

@@ -8,7 +8,7 @@ from hypothesis import given
 from nav_scenes import finite
 from scipy.optimize import brentq
 
-from nav_adapter import NavError, max_speed_mps, protective_separation_m
+from nav_adapter import max_speed_mps, protective_separation_m
 
 SETTINGS = {
     "deceleration_mps2": finite(0.2, 4.0),
@@ -79,15 +79,6 @@ def test_the_limit_broadcasts_and_is_0_where_it_must_be() -> None:
     assert limits[1, 1] > 0.0
     assert limits[2].tolist() == [0.0, 0.0]
     assert (limits[3] > 0.0).all()
-
-
-@pytest.mark.parametrize("deceleration", [0.0, -1.0, float("nan")])
-def test_a_robot_that_cannot_brake_is_refused(deceleration: float) -> None:
-    rest = {"deceleration_mps2": deceleration, "reaction_time_s": 0.3, "clearance_m": 0.1}
-    with pytest.raises(NavError, match="deceleration_mps2 must be > 0 m/s²"):
-        max_speed_mps(3.0, 1.6, **rest)
-    with pytest.raises(NavError, match="deceleration_mps2"):
-        protective_separation_m(1.0, 1.6, **rest)
 
 
 def test_a_robot_at_the_limit_stands_before_contact() -> None:

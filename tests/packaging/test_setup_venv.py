@@ -115,24 +115,3 @@ def test_a_failure_shows_the_end_of_the_log_and_the_next_run_repairs_it(checkout
     assert repaired.returncode == 0, repaired.stdout
     assert "an earlier set-up was interrupted" in repaired.stdout
     assert set_up(checkout).stdout == ""
-
-
-@pytest.mark.full
-def test_an_interpreter_that_does_not_run_is_refused_before_anything_is_removed(
-    checkout: Path,
-) -> None:
-    # The tests before may have run in another process.
-    make = [sys.executable, "-m", "venv", "--without-pip", checkout / ".venv"]
-    subprocess.run(make, check=True)
-    environment = os.environ | {"PYTHON": "/bin/false"}
-    refused = subprocess.run(
-        ["sh", "tools/setup_venv.sh"],
-        cwd=checkout,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert refused.returncode == 1
-    assert "PYTHON=/bin/false is not a Python 3.10 or 3.11" in refused.stderr
-    assert (checkout / ".venv/bin/python").exists()

@@ -7,15 +7,20 @@ which are averages of more than one source.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from perception import Camera, PersonKeypoints
+from perception import AttentionCone, Camera, HeadPose, PersonDetection, PersonKeypoints
 from perception.anthropometry import EYES_HEAD_M, HEAD_TEMPLATE_M
+from perception.awareness import estimate_awareness
 
 BODY_STATURE_M = 1.83
+#: Rotation of a head that faces the camera, in the camera frame.
+FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 # Forward, left, up from the mid-hip.
 _SHOULDER, _ELBOW, _WRIST = (0.007, 0.175, 0.537), (0.025, 0.363, 0.313), (0.193, 0.501, 0.168)
 _HIP, _KNEE, _ANKLE = (0.013, 0.099, 0.0), (0.022, 0.156, -0.424), (-0.003, 0.197, -0.849)
@@ -79,3 +84,52 @@ def person_at(
     chest = 0.7 * points[5:7].mean(axis=0) + 0.3 * points[11:13].mean(axis=0)
     eyes = points[0] + rotation @ EYES_HEAD_M * scale
     return SyntheticPerson(points, chest, rotation, eyes)
+
+
+class Given:
+    """A detector, pose estimator and head pose estimator with fixed answers.
+
+    Without detections, boxes hold the keypoints tightly.
+    """
+
+    def __init__(
+        self,
+        people: Sequence[PersonKeypoints],
+        detections: Sequence[PersonDetection] | None = None,
+        heads: Sequence[HeadPose | None] = (),
+    ) -> None:
+        self.people, self.heads = tuple(people), tuple(heads)
+        if detections is None:
+            pixels = [person.keypoints_px for person in people]
+            boxes = [np.r_[each.min(axis=0), each.max(axis=0)] for each in pixels]
+            detections = [PersonDetection(box, 0.9) for box in boxes]
+        self.detections = tuple(detections)
+
+    def detect(self, image_rgb: Any) -> tuple[PersonDetection, ...]:
+        return self.detections
+
+    def estimate(self, image_rgb: Any, *given: Any) -> tuple[Any, ...]:
+        # Head pose estimators get the camera as well.
+        return self.people if len(given) == 1 else self.heads
+
+
+def awareness_of(
+    head: HeadPose,
+    *,
+    seen: float = 1.0,
+    eye_std_rad: tuple[float, float] = (0.0, 0.0),
+    extra_std_rad: float = 0.0,
+    points_m: Any = ((0.0, 0.0, 0.0),),
+    eyes: Sequence[Any] = (),
+) -> tuple[float, float]:
+    """Return α and its standard deviation; by default eyes look where the head points."""
+    (found,) = estimate_awareness(
+        AttentionCone(),
+        (head,),
+        np.asarray(points_m),
+        extra_std_rad=np.array([extra_std_rad]),
+        eye_in_head_std_rad=eye_std_rad,
+        face_seen=np.array([seen]),
+        eyes=eyes,
+    )
+    return found.awareness, found.awareness_std

@@ -108,12 +108,6 @@ def stander(t_s):
     return 1.2, 4.0, 0.0
 
 
-def test_the_detector_looks_at_every_image_by_default():
-    world = World(walker)
-    world.run(AwarenessPipeline(CAMERA, world, world), 10)
-    assert len(world.looks) == 10
-
-
 def test_between_looks_boxes_follow_and_awareness_is_of_the_same_image():
     often, seldom = World(walker), World(walker)
     wanted = often.run(pipeline(often, 0.0), 25)
@@ -131,7 +125,7 @@ def test_between_looks_boxes_follow_and_awareness_is_of_the_same_image():
     assert len({round(each.awareness, 3) for (each,) in found}) > 15
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(rate_hz=st.floats(5.0, 100.0), every_s=st.floats(0.01, 0.2))
 def test_two_looks_are_never_farther_apart_than_asked(rate_hz, every_s):
     world = World(stander)
@@ -144,46 +138,35 @@ def test_two_looks_are_never_farther_apart_than_asked(rate_hz, every_s):
         assert gaps[:-1].min(initial=np.inf) > every_s - 1.0 / rate_hz - 1e-6
 
 
+@pytest.mark.parametrize("camera_px_per_s", [0.0, 300.0])
 @pytest.mark.parametrize("start_s", [0.05, 0.31, 0.449])
-def test_a_newcomer_is_found_in_the_first_image_of_a_camera_that_stands_still(start_s):
-    world = World(stander, lambda t_s: None if t_s < start_s else (-1.2, 4.0, 0.0))
-    seen = world.run(pipeline(world, 0.2), 14)
-    for index, people in enumerate(seen):
-        assert len(people) == (2 if index / RATE_HZ >= start_s else 1)
-    assert len(world.looks) < 14
-
-
-@pytest.mark.parametrize("start_s", [0.05, 0.31, 0.449])
-def test_a_newcomer_is_found_within_the_time_asked_by_a_camera_that_moves(start_s):
+def test_a_newcomer_is_found_at_once_or_in_the_time_asked_if_the_camera_moves(
+    start_s, camera_px_per_s
+):
     world = World(
         stander,
         lambda t_s: None if t_s < start_s else (-1.2, 4.0, 0.0),
-        camera_px_per_s=300.0,
+        camera_px_per_s=camera_px_per_s,
     )
     seen = world.run(pipeline(world, 0.2), 20)
     assert len(world.looks) < 10
-    late = [i / RATE_HZ for i, people in enumerate(seen) if len(people) < 2]
-    assert max(late) < start_s + 0.2
+    late_s = [i / RATE_HZ for i, people in enumerate(seen) if len(people) < 2]
+    assert max(late_s) < start_s + (0.2 if camera_px_per_s else 0.0)
 
 
 def test_nobody_is_reported_who_is_gone():
-    world = World(stander, lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
-    seen = world.run(pipeline(world, 0.2), 14)
-    assert [len(people) for people in seen] == [2 if i / RATE_HZ < 0.32 else 1 for i in range(14)]
-    assert all(people[0].awareness is not None for people in seen)
-
-
-def test_the_only_person_is_not_reported_when_they_are_gone():
-    world = World(lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
-
     class Heads(PnpHeadPoseEstimator):
         def estimate(self, image_rgb, camera, people):
             assert people, "heads of nobody"
             return super().estimate(image_rgb, camera, people)
 
-    pipe = AwarenessPipeline(CAMERA, world, world, Heads(), detect_every_s=0.2)
-    seen = world.run(pipe, 10)
-    assert [len(people) for people in seen] == [1] * 7 + [0] * 3
+    for others in ((stander,), ()):
+        world = World(*others, lambda t_s: (-1.2, 4.0, 0.0) if t_s < 0.32 else None)
+        pipe = AwarenessPipeline(CAMERA, world, world, Heads(), detect_every_s=0.2)
+        seen = world.run(pipe, 14)
+        wanted = [(1 if i / RATE_HZ < 0.32 else 0) + len(others) for i in range(14)]
+        assert [len(people) for people in seen] == wanted
+        assert all(each.awareness is not None for people in seen for each in people)
 
 
 def test_without_anybody_the_detector_still_looks():
@@ -218,16 +201,7 @@ def test_after_a_jump_in_time_the_detector_looks(jump_s):
     assert len(world.looks) == count + 1
 
 
-def test_another_scene_needs_the_detector_at_once():
-    world = World(stander)
-    pipe = pipeline(world, 0.2)
-    world.run(pipe, 2)
-    count = len(world.looks)
-    pipe.process(255 - world.image(), world.t_s + 0.05)
-    assert len(world.looks) == count + 1
-
-
-def test_after_a_failure_the_detector_looks():
+def test_after_another_scene_and_after_a_failure_the_detector_looks():
     world = World(stander)
     pipe = pipeline(world, 0.2)
     world.run(pipe, 2)
@@ -238,6 +212,8 @@ def test_after_a_failure_the_detector_looks():
     world.fails = False
     assert len(pipe.process(world.image(), 0.15)) == 1
     assert len(world.looks) == count + 1
+    pipe.process(255 - world.image(), 0.2)
+    assert len(world.looks) == count + 2
 
 
 def changed(image, boxes=(), reference=None):
@@ -255,7 +231,7 @@ def test_noise_and_light_are_no_change(noise):
         assert not changed(noisy.astype(np.uint8), reference=image)
 
 
-@pytest.mark.parametrize("size", [(160, 120, 3), (480, 640, 3), (1080, 1920, 3), (51, 37, 3)])
+@pytest.mark.parametrize("size", [(1080, 1920, 3), (51, 37, 3)])
 def test_a_person_sized_change_counts_unless_it_is_in_a_box(size):
     height, width = size[:2]
     reference = np.full(size, 90, np.uint8)
@@ -265,7 +241,3 @@ def test_a_person_sized_change_counts_unless_it_is_in_a_box(size):
     image[top:bottom, left:right] = 180
     assert changed(image, reference=reference)
     assert not changed(image, [np.array([left, top, right, bottom])], reference)
-
-
-def test_without_a_reference_everything_is_new():
-    assert SceneChanges().found_in(np.zeros((48, 64, 3), np.uint8), [])

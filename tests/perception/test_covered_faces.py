@@ -10,25 +10,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from synthetic_people import person_at
+from synthetic_people import FACING, Given, awareness_of, person_at
 
 from perception import (
     AttentionCone,
     AwarenessPipeline,
     Camera,
     HeadPose,
-    PersonDetection,
     PersonKeypoints,
     PnpHeadPoseEstimator,
 )
-from perception.awareness import estimate_awareness
 from perception.evidence import judge_face
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 FRAME = np.zeros((960, 1280, 3), np.uint8)
 CONE = AttentionCone()
 EYE_STD_RAD = (0.2, 0.06)
-COUNT = 200
+COUNT = 150
 # Scores of nose, left eye, right eye, left ear, right ear.
 COVERED = {
     "cup": (0, 1, 1, 1, 1),
@@ -77,17 +75,11 @@ def found(shown, noise_px=1.0):
         turn = Rotation.from_matrix(truth @ head.rotation_camera_head.T).as_rotvec()
         nees = turn @ np.linalg.solve(head.covariance[:3, :3], turn)
         face = judge_face(CAMERA, keypoints, head, 0.3, noise_px)
-        (alpha,) = estimate_awareness(
-            CONE,
-            [head],
-            np.zeros((1, 3)),
-            extra_std_rad=np.array([face.extra_std_rad]),
-            eye_in_head_std_rad=EYE_STD_RAD,
-            face_seen=np.array([face.seen]),
+        alpha = awareness_of(
+            head, seen=face.seen, extra_std_rad=face.extra_std_rad, eye_std_rad=EYE_STD_RAD
         )
         wanted = CONE.score(person.eyes_camera_m, truth[:, 1], np.zeros(3))
-        rows.append((math.degrees(error), math.degrees(std), nees, alpha.awareness,
-                     alpha.awareness_std, wanted))  # fmt: skip
+        rows.append((math.degrees(error), math.degrees(std), nees, *alpha, wanted))
     return np.array(rows).reshape(-1, 6)
 
 
@@ -140,23 +132,9 @@ def _face_on_the_hair(keypoints, rng):
 
 def test_a_face_without_a_nose_in_the_pipeline():
     for row, (_, keypoints) in enumerate(people(7500, COVERED["cup"], count=30)):
-        known = Known(keypoints)
+        known = Given([keypoints])
         (person,) = AwarenessPipeline(CAMERA, known, known).process(FRAME, float(row))
         assert person.awareness > 0.3
-
-
-class Known:
-    """A detector and pose estimator that knows the keypoints."""
-
-    def __init__(self, keypoints):
-        self.keypoints = keypoints
-
-    def detect(self, image_rgb):
-        pixels = self.keypoints.keypoints_px
-        return (PersonDetection(np.r_[pixels.min(axis=0), pixels.max(axis=0)], 0.9),)
-
-    def estimate(self, image_rgb, detections):
-        return (self.keypoints,)
 
 
 @pytest.mark.parametrize(
@@ -190,6 +168,5 @@ def test_one_of_nose_and_eyes_is_half_a_face_without_depth(scores, lifted, seen)
     padded = np.r_[scores, 1.0, 1.0, np.zeros(12)]
     pixels = np.tile((640.0, 480.0), (17, 1))
     person = PersonKeypoints(pixels, np.zeros((17, 3)), padded, "coco", lifted=lifted)
-    facing = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]).T
-    head = HeadPose(np.array([0.0, 0.0, 2.0]), facing, 1e-4 * np.eye(6), 0.5)
+    head = HeadPose(np.array([0.0, 0.0, 2.0]), FACING, 1e-4 * np.eye(6), 0.5)
     assert judge_face(CAMERA, person, head, 0.3).seen == pytest.approx(seen)

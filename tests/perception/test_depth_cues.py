@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from synthetic_people import person_at
 
 from perception import Camera, FloorPlane, HeadPose, PersonDetection, PersonKeypoints
@@ -51,25 +52,6 @@ def test_without_outliers_the_result_is_generalised_least_squares():
     mean, std = combined(cues)
     assert mean == pytest.approx(weight.sum(axis=0) @ [0.02, -0.01, 0.0] / weight.sum(), abs=1e-6)
     assert std == pytest.approx(1.0 / math.sqrt(weight.sum()), rel=1e-4)
-
-
-def test_a_common_error_of_the_stature_is_not_averaged_out():
-    correlated = [DepthCue(0.0, 0.05, 0.0499, NO_OUTLIER)] * 2
-    assert combined(correlated)[1] == pytest.approx(0.05, rel=0.01)
-    independent = [DepthCue(0.0, 0.05, 0.0, NO_OUTLIER)] * 2
-    assert combined(independent)[1] == pytest.approx(0.05 / math.sqrt(2.0), rel=0.01)
-
-
-@given(st.lists(cue, min_size=1, max_size=4), st.floats(-2.0, 2.0))
-def test_a_common_shift_of_all_cues_shifts_the_result(cues, shift):
-    moved = [
-        DepthCue(one.log_range + shift, one.log_std, one.stature_std, one.outlier_probability)
-        for one in cues
-    ]
-    mean, std = combined(cues)
-    other_mean, other_std = combined(moved)
-    assert other_mean == pytest.approx(mean + shift, abs=1e-9)
-    assert other_std == pytest.approx(std, rel=1e-6)
 
 
 @given(st.floats(0.4, 1.5))
@@ -286,13 +268,6 @@ def test_a_single_cue_has_the_standard_deviation_of_the_mixture():
     assert one.lasting_std == pytest.approx(math.sqrt(np.mean(size**2)), rel=0.01)
 
 
-@given(st.lists(cue, min_size=2, max_size=4), st.floats(0.0, 0.3))
-def test_the_lasting_part_is_a_part(cues, unusual):
-    together = combined_range(cues, unusual)
-    assert 0.0 <= together.lasting_std <= together.log_std
-    assert (together.log_range, together.log_std) == combined(cues, unusual)
-
-
 @given(st.floats(0.2, 0.8))
 def test_feet_that_seem_nearer_are_believed_and_feet_that_seem_farther_are_not(off):
     body = DepthCue(0.0, 0.06, 0.05, 0.03, 0.2, 0.3)
@@ -349,19 +324,6 @@ def test_knees_place_people_whose_feet_are_hidden(stature_m):
     assert np.median(np.abs(off)) <= 0.08
 
 
-def test_the_lower_edge_of_a_box_counts_only_where_feet_may_be_in_it():
-    """A skeleton without ankles and without limbs to be placed by: the box ends above the feet."""
-    rng = np.random.default_rng(12)
-    _, shown, detection = seen_person(rng, depth=4.0)
-    scores = np.zeros(17)
-    scores[:2] = 1.0
-    two = PersonKeypoints(shown.keypoints_px, shown.keypoints_root_m, scores, "coco")
-    box = np.array(detection.box_xyxy_px)
-    box[3] = 0.5 * (box[1] + box[3])
-    cut = PersonDetection(box, 0.9)
-    np.testing.assert_array_equal(place(two, cut, None, FLOOR)[0], place(two, cut)[0])
-
-
 def test_agreeing_box_cues_hold_that_the_lower_part_may_be_hidden():
     box = DepthCue(0.0, 0.26, 0.05, 0.05, 0.2, 0.3, hidden_offset=0.7)
     edge = DepthCue(0.0, 0.1, 0.0, 0.3, hidden_offset=math.inf)
@@ -370,3 +332,58 @@ def test_agreeing_box_cues_hold_that_the_lower_part_may_be_hidden():
     assert held.log_range == pytest.approx(taken.log_range, abs=0.05)
     # The edge of a shelf puts the person 0.7 too far in both cues.
     assert held.log_std > taken.log_std + 0.01
+
+
+# --- the floor as a cue ---------------------------------------------------------------------------
+
+
+LEVEL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # camera to odom
+
+
+def pose(height_m=1.2, pitch_rad=0.0, roll_rad=0.0, yaw_rad=0.0):
+    T = np.eye(4)
+    turn = Rotation.from_euler("zyx", [yaw_rad, pitch_rad, roll_rad]).as_matrix()
+    T[:3, :3] = turn @ LEVEL
+    T[:3, 3] = (3.0, -2.0, height_m)
+    return T
+
+
+@given(
+    pitch=st.floats(-0.3, 0.6), roll=st.floats(-0.3, 0.3), yaw=st.floats(-3.0, 3.0),
+    ahead=st.floats(1.0, 12.0), left=st.floats(-3.0, 3.0), above=st.floats(0.0, 0.3),
+)  # fmt: skip
+def test_points_on_the_floor_are_found_at_their_depth(pitch, roll, yaw, ahead, left, above):
+    T = pose(1.2, pitch, roll, yaw)
+    floor = FloorPlane.from_pose(T)
+    heading = np.array([math.cos(yaw), math.sin(yaw)])
+    flat = T[:2, 3] + ahead * heading + left * np.array([-heading[1], heading[0]])
+    point = np.linalg.inv(T) @ np.append(flat, [above, 1.0])
+    assume(point[2] > 0.3)
+    depth, std = floor.depth_of((point[:2] / point[2])[None], above, 0.0, 0.0)
+    assert depth[0] == pytest.approx(point[2], rel=1e-9)
+    assert std[0] > 0.0
+    assert floor.normal_camera @ point[:3] + floor.height_m == pytest.approx(above, abs=1e-9)
+
+
+def test_rays_at_the_horizon_and_points_above_the_camera_have_no_depth():
+    floor = FloorPlane(np.array([0.0, -1.0, 0.0]), 1.0)
+    depth, std = floor.depth_of(np.array([[0.0, 0.0], [0.0, -0.2], [0.1, 0.005]]), 0.0, 0.0, 0.0)
+    assert np.isnan(depth).all()
+    assert np.isnan(std).all()
+    assert np.isnan(floor.depth_of(np.array([[0.0, 0.3]]), 1.4, 0.0, 0.0)[0]).all()
+
+
+def test_the_standard_deviation_agrees_with_random_errors():
+    floor = FloorPlane.from_pose(pose(1.1, 0.2), height_std_m=0.02, tilt_std_rad=0.01)
+    ray, count = np.array([0.15, 0.12]), 40000
+    rng = np.random.default_rng(0)
+    turns = Rotation.from_rotvec(rng.normal(0.0, 0.01, (count, 3))).as_matrix()
+    normals = turns @ floor.normal_camera
+    rays = np.append(ray, 1.0) + np.column_stack(
+        [rng.normal(0.0, 0.004, (count, 2)), np.zeros(count)]
+    )
+    heights = 1.1 + rng.normal(0.0, 0.02, count) - (0.07 + rng.normal(0.0, 0.03, count))
+    drawn = np.log(heights / -np.einsum("ni,ni->n", normals, rays))
+    depth, std = floor.depth_of(ray[None], 0.07, 0.03, 0.004)
+    assert np.median(drawn) == pytest.approx(math.log(depth[0]), abs=0.005)
+    assert std[0] == pytest.approx(drawn.std(), rel=0.1)

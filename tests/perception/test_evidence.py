@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from synthetic_people import FACING, awareness_of
 
 from perception import AttentionCone, Camera, HeadPose, PersonKeypoints, PnpHeadPoseEstimator
 from perception.anthropometry import EYES_HEAD_M
-from perception.awareness import estimate_awareness
 from perception.evidence import FaceEvidence, judge_face
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 CONE = AttentionCone()
-ROBOT = np.zeros((1, 3))
-FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
-NO_EYES = (0.0, 0.0)
 NO_HEAD = "no keypoint of the head"
 
 
@@ -42,23 +40,9 @@ def with_scores(*scores, face_evidence=True, at_px=(320.0, 240.0)):
 ALL = with_scores(1, 1, 1, 1, 1)
 
 
-def awareness(head, *, seen=1.0, eyes=NO_EYES, extra=0.0, points=ROBOT):
-    (estimate,) = estimate_awareness(
-        CONE,
-        (head,),
-        points,
-        extra_std_rad=np.array([extra]),
-        eye_in_head_std_rad=eyes,
-        face_seen=np.array([seen]),
-    )
-    return estimate.awareness, estimate.awareness_std
-
-
-def awareness_with_evidence(head, person=ALL, eyes=NO_EYES):
+def awareness_with_evidence(head, person=ALL):
     evidence = judge_face(CAMERA, person, head, 0.3)
-    if isinstance(evidence, str):
-        return None
-    return awareness(head, seen=evidence.seen, extra=evidence.extra_std_rad, eyes=eyes)
+    return awareness_of(head, seen=evidence.seen, extra_std_rad=evidence.extra_std_rad)
 
 
 # --- evidence of a face -------------------------------------------------------------------------
@@ -94,14 +78,7 @@ def test_a_higher_score_never_lowers_the_probability_of_a_face(scores, which):
 
 
 def moved(head, x_m):
-    position = head.position_camera_m + np.array([x_m, 0.0, 0.0])
-    return HeadPose(
-        position,
-        head.rotation_camera_head,
-        head.covariance,
-        head.reprojection_error_px,
-        head.face_seen,
-    )
+    return replace(head, position_camera_m=head.position_camera_m + np.array([x_m, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize("at_px", [(12.0, 240.0), (630.0, 240.0), (320.0, 3.0), (320.0, 470.0)])
@@ -157,10 +134,7 @@ def test_a_tilt_about_the_gaze_is_no_uncertainty_of_the_direction(yaw_deg, axis)
     direction = head.rotation_camera_head[:, axis]
     covariance = head.covariance + 0.0
     covariance[:3, :3] += 0.5**2 * np.outer(direction, direction)
-    wide = HeadPose(
-        head.position_camera_m, head.rotation_camera_head, covariance, 0.0, head.face_seen
-    )
-    judged = judge_face(CAMERA, ALL, wide, 0.3)
+    judged = judge_face(CAMERA, ALL, replace(head, covariance=covariance), 0.3)
     assert (judged == "head direction unknown") == (axis != 1)
 
 
@@ -220,7 +194,7 @@ def test_the_standard_deviation_is_the_rms_difference_of_alpha_and_truth(yaw_deg
     """Monte Carlo with random errors of the gaze and random directions of the eyes."""
     head = head_at(yaw_deg, std_rad=math.radians(std_deg))
     eyes = (math.radians(7.0), math.radians(3.4))
-    alpha, std = awareness(head, eyes=eyes)
+    alpha, std = awareness_of(head, eye_std_rad=eyes)
     rng = np.random.default_rng(0)
     count = 20000
     turns = Rotation.from_rotvec(rng.normal(0.0, math.radians(std_deg), (count, 3))).as_matrix()
@@ -237,67 +211,20 @@ def test_the_standard_deviation_is_the_rms_difference_of_alpha_and_truth(yaw_deg
 def test_uncertainty_never_raises_alpha(yaw_deg, std_rad, extra, seen):
     head = head_at(yaw_deg, std_rad=std_rad)
     nominal = CONE.score([0.0, 0.0, 2.0], head.gaze_camera, np.zeros(3))
-    alpha, std = awareness(head, extra=extra, seen=seen)
+    alpha, std = awareness_of(head, extra_std_rad=extra, seen=seen)
     assert 0.0 <= alpha <= nominal + 1e-9
     assert 0.0 <= std <= 1.0
-    assert alpha <= awareness(head, extra=extra, seen=min(1.0, seen + 0.1))[0] + 1e-12
+    assert alpha <= awareness_of(head, extra_std_rad=extra, seen=min(1.0, seen + 0.1))[0] + 1e-12
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 70.0))
 def test_an_uncertain_face_gives_the_moments_of_both_cases(seen, yaw_deg):
     """The score is that of the head with the probability of a face, else 0."""
     head = head_at(yaw_deg, std_rad=1e-6)
-    score, _ = awareness(head)
-    alpha, std = awareness(head, seen=seen)
+    score, _ = awareness_of(head)
+    alpha, std = awareness_of(head, seen=seen)
     assert alpha == pytest.approx(seen * score, abs=1e-5)
     assert std == pytest.approx(score * math.sqrt(seen * (1.0 - seen)), abs=1e-3)
-
-
-def test_several_people_at_once_equal_people_one_by_one():
-    rng = np.random.default_rng(2)
-    points = rng.normal(0.0, 0.3, (4, 3))
-    heads = tuple(
-        head_at(yaw, distance, std)
-        for yaw, distance, std in zip(
-            rng.uniform(-90, 90, 6), rng.uniform(1, 5, 6), rng.uniform(0.01, 0.4, 6), strict=True
-        )
-    )
-    together = estimate_awareness(
-        CONE,
-        heads,
-        points,
-        extra_std_rad=np.full(6, 0.02),
-        eye_in_head_std_rad=(0.1, 0.05),
-        face_seen=np.full(6, 0.8),
-    )
-    for head, estimate in zip(heads, together, strict=True):
-        alone = awareness(head, seen=0.8, eyes=(0.1, 0.05), extra=0.02, points=points)
-        assert (estimate.awareness, estimate.awareness_std) == pytest.approx(alone)
-
-
-@given(st.floats(-math.pi, math.pi), st.floats(-0.5, 0.5), st.floats(0.0, 90.0))
-def test_rotating_the_world_about_the_robot_changes_nothing(about_y, about_x, yaw_deg):
-    head = head_at(yaw_deg, std_rad=0.1)
-    turn = Rotation.from_euler("yx", [about_y, about_x]).as_matrix()
-    both = np.kron(np.eye(2), turn)
-    moved = HeadPose(
-        turn @ head.position_camera_m,
-        turn @ head.rotation_camera_head,
-        both @ head.covariance @ both.T,
-        0.0,
-    )
-    eyes = (0.12, 0.06)
-    assert awareness(moved, eyes=eyes) == pytest.approx(awareness(head, eyes=eyes), abs=1e-6)
-
-
-def test_sideways_eye_movements_matter_for_a_robot_beside_the_gaze_only():
-    """They hardly matter for a robot above the gaze."""
-    eyes = (math.radians(10.0), 0.0)
-    beside, above = (
-        awareness(head_at(yaw, pitch_deg=pitch, std_rad=1e-3), eyes=eyes)[1]
-        for yaw, pitch in ((30.0, 0.0), (0.0, 30.0))
-    )
-    assert beside > 3.0 * above
 
 
 @pytest.mark.slow
@@ -315,7 +242,10 @@ def test_random_keypoints_with_good_scores_are_hardly_ever_aware(height_px):
         (head,) = estimator.estimate(None, CAMERA, (person,))
         evidence = None if head is None else judge_face(CAMERA, person, head, 0.3)
         if isinstance(evidence, FaceEvidence):
-            aware += awareness(head, seen=evidence.seen, extra=evidence.extra_std_rad)[0] >= 0.5
+            aware += (
+                awareness_of(head, seen=evidence.seen, extra_std_rad=evidence.extra_std_rad)[0]
+                >= 0.5
+            )
     assert aware < 0.01 * count
 
 

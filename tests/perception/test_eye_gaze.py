@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from synthetic_people import FACING, awareness_of
 
 from perception import AttentionCone, Camera, HeadPose
 from perception.anthropometry import EYES_HEAD_M
-from perception.awareness import estimate_awareness
 from perception.eyes import (
     AHEAD_M,
     AHEAD_STD_M,
@@ -28,7 +28,6 @@ from perception.networks.heads import looking_at
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 CONE = AttentionCone()
 PRIOR = (math.radians(7.0), math.radians(3.4))
-FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 NO_ERROR = np.diag([1e-12] * 6)
 angle = st.floats(-0.4, 0.4)
 
@@ -146,16 +145,7 @@ def test_eyes_that_nobody_turns_so_far_are_not_known():
 
 
 def awareness(head, eyes):
-    (estimate,) = estimate_awareness(
-        CONE,
-        (head,),
-        np.zeros((1, 3)),
-        extra_std_rad=np.zeros(1),
-        eye_in_head_std_rad=PRIOR,
-        face_seen=np.ones(1),
-        eyes=eyes,
-    )
-    return estimate.awareness, estimate.awareness_std
+    return awareness_of(head, eye_std_rad=PRIOR, eyes=eyes)
 
 
 def head_off(yaw_deg, std_rad=0.05):
@@ -179,17 +169,6 @@ def test_a_measurement_that_says_nothing_never_raises_awareness(yaw_deg, eye_yaw
     assert alpha <= awareness(head, ())[0] + (1e-3 if inside else 0.05)
 
 
-def test_eyes_that_look_away_lower_awareness_and_sure_eyes_do_so_more():
-    head = head_off(0.0)
-    alone, _ = awareness(head, ())
-    alphas = []
-    for std_deg in (20.0, 8.0, 4.0, 1.0):
-        measured = EyeGaze([math.radians(15.0), 0.0], np.eye(2) * math.radians(std_deg) ** 2)
-        alphas.append(awareness(head, known_eyes((measured,), PRIOR))[0])
-    assert alone > alphas[0]
-    assert alphas == sorted(alphas, reverse=True)
-
-
 def test_eyes_on_the_robot_raise_awareness_only_as_far_as_they_are_sure():
     head = head_off(25.0)  # turned to its left, so the robot is to its right
     alone, _ = awareness(head, ())
@@ -202,18 +181,13 @@ def test_eyes_on_the_robot_raise_awareness_only_as_far_as_they_are_sure():
         before = alpha
 
 
-def test_awareness_is_the_mean_over_head_and_eyes():
-    rng = np.random.default_rng(11)
-    head = head_off(30.0, 0.08)
-    eyes = EyeGaze([-0.1, 0.03], [[0.07**2, 0.001], [0.001, 0.05**2]])
-    alpha, std = awareness(head, (eyes,))
-    count = 20000
-    turns = Rotation.from_rotvec(rng.normal(0.0, 0.08, (count, 3)))
-    yaw, pitch = rng.multivariate_normal(eyes.angles_rad, eyes.covariance_rad2, count).T
-    in_head = np.column_stack(
-        [-np.sin(pitch), np.cos(pitch) * np.cos(yaw), -np.cos(pitch) * np.sin(yaw)]
-    )
-    gazes = turns.apply(in_head @ head.rotation_camera_head.T)
-    scores = CONE.score(np.tile([0.0, 0.0, 1.5], (count, 1)), gazes, np.zeros((count, 3)))
-    assert alpha <= np.mean(scores) + 0.005
-    assert std == pytest.approx(np.sqrt(np.mean((scores - alpha) ** 2)), rel=0.08)
+def test_eyes_that_look_away_lower_awareness_and_sure_eyes_do_so_more():
+    head = head_at()
+    alone, _ = awareness_of(head, eye_std_rad=PRIOR)
+    alphas = []
+    for std_deg in (20.0, 8.0, 4.0, 1.0):
+        measured = EyeGaze([math.radians(15.0), 0.0], np.eye(2) * math.radians(std_deg) ** 2)
+        eyes = known_eyes((measured,), PRIOR)
+        alphas.append(awareness_of(head, eye_std_rad=PRIOR, eyes=eyes)[0])
+    assert alone > alphas[0]
+    assert alphas == sorted(alphas, reverse=True)

@@ -1,32 +1,23 @@
-"""Accuracy and covariance of PnP head poses, for heads in all directions."""
+"""PnP head poses: accuracy, covariance, and the head frame of the paper's printed formula."""
+
+from __future__ import annotations
 
 import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
-from synthetic_people import person_at
+from synthetic_people import awareness_of, person_at
 
 from perception import AttentionCone, Camera, PersonKeypoints, PnpHeadPoseEstimator
-from perception.anthropometry import HEAD_TEMPLATE_M
-from perception.awareness import estimate_awareness
+from perception.anthropometry import HEAD_TEMPLATE_M, NECK_TO_NOSE_UP_M
+from perception.head_frame import lifted_head_model, printed_head_rotation
 
 CAMERA = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0)
 EAR_TO_NOSE_M = 0.1107
-
-
-def awareness_of(cone, head, robot):
-    """Return α and its standard deviation, for eyes that look where the head points."""
-    (found,) = estimate_awareness(
-        cone,
-        (head,),
-        robot,
-        extra_std_rad=np.zeros(1),
-        eye_in_head_std_rad=(0.0, 0.0),
-        face_seen=np.ones(1),
-    )
-    return found.awareness, found.awareness_std
 
 
 def turned_head(rng, yaw_rad, ear_to_nose_px=55.0):
@@ -57,7 +48,7 @@ def gaze_errors_deg(noise_px, count, seed, **options):
             math.acos(np.clip(head.gaze_camera @ rotation[:, 1], -1.0, 1.0))
             for head, (rotation, _) in zip(heads, truth, strict=True)
         ]
-    ), [(head, pose) for head, pose in zip(heads, truth, strict=True)]
+    ), list(zip(heads, truth, strict=True))
 
 
 def test_without_noise_the_pose_is_exact():
@@ -67,16 +58,17 @@ def test_without_noise_the_pose_is_exact():
         np.testing.assert_allclose(head.position_camera_m, position, atol=1e-4)
 
 
-@pytest.mark.parametrize(("noise_px", "median_deg"), [(1.0, 2.0), (2.0, 3.5)])
-def test_the_gaze_error_in_all_directions(noise_px, median_deg):
-    errors, _ = gaze_errors_deg(noise_px, 500, 1)
+@pytest.mark.parametrize(
+    ("noise_px", "median_deg", "most_deg"), [(1.0, 2.0, 90.0), (2.0, 3.5, 181)]
+)
+def test_the_gaze_error_in_all_directions(noise_px, median_deg, most_deg):
+    errors, _ = gaze_errors_deg(noise_px, 250, 1)
     assert np.median(errors) <= median_deg
-    if noise_px == 1.0:
-        assert errors.max() < 90.0
+    assert errors.max() < most_deg
 
 
 def test_covariance_is_consistent_with_the_errors_of_heads_of_a_known_shape():
-    _, pairs = gaze_errors_deg(1.0, 800, 2, head_shape_spread=0.0)
+    _, pairs = gaze_errors_deg(1.0, 400, 2, head_shape_spread=0.0)
     nees = []
     for head, (rotation, position) in pairs:
         turn = Rotation.from_matrix(rotation @ head.rotation_camera_head.T).as_rotvec()
@@ -94,14 +86,15 @@ def test_the_standard_deviation_of_awareness_agrees_with_monte_carlo(yaw_deg):
     """
     rng = np.random.default_rng(4)
     person = person_at((0.2, 0.3, 2.5), body_yaw_rad=0.3, head_yaw_rad=math.radians(yaw_deg) - 0.3)
-    robot, cone = np.zeros((1, 3)), AttentionCone()
     estimator = PnpHeadPoseEstimator(head_shape_spread=0.0)
-    people = tuple(person.keypoints(CAMERA, 1.0, rng) for _ in range(400))
+    people = tuple(person.keypoints(CAMERA, 1.0, rng) for _ in range(200))
     heads = estimator.estimate(None, CAMERA, people)
-    drawn = np.array([awareness_of(cone, head, robot)[0] for head in heads])
+    drawn = np.array([awareness_of(head)[0] for head in heads])
     (nominal,) = estimator.estimate(None, CAMERA, (person.keypoints(CAMERA, 0.0, rng),))
-    alpha, std = awareness_of(cone, nominal, robot)
-    truth = cone.score(person.eyes_camera_m, person.rotation_camera_head[:, 1], np.zeros(3))
+    alpha, std = awareness_of(nominal)
+    truth = AttentionCone().score(
+        person.eyes_camera_m, person.rotation_camera_head[:, 1], np.zeros(3)
+    )
     assert alpha == pytest.approx(truth, abs=0.01)
     assert std == pytest.approx(drawn.std(), rel=0.25)
 
@@ -110,10 +103,8 @@ def test_the_standard_deviation_of_awareness_agrees_with_monte_carlo(yaw_deg):
     ("head_yaw_deg", "seen", "tolerance_deg"),
     [
         (90, (1, 1, 0, 1, 0), 15),  # left profile: nose, near eye, near ear
-        (-90, (1, 0, 1, 0, 1), 15),
         (60, (1, 1, 1, 1, 0), 10),
         (180, (0, 0, 0, 1, 1), 50),  # back of the head: ears only
-        (150, (0, 0, 0, 1, 1), 60),
     ],
 )
 def test_turned_heads_with_some_keypoints_hidden(head_yaw_deg, seen, tolerance_deg):
@@ -135,10 +126,9 @@ def test_turned_heads_with_some_keypoints_hidden(head_yaw_deg, seen, tolerance_d
     ]
     assert len(errors) >= 55
     assert np.median(errors) < tolerance_deg
-    robot = np.zeros((1, 3))
     for head in heads:
         if head is not None and abs(head_yaw_deg) >= 90:
-            alpha, std = awareness_of(AttentionCone(), head, robot)
+            alpha, std = awareness_of(head)
             assert alpha - 1.28 * std < 0.2, "a face turned away was called aware"
 
 
@@ -164,3 +154,45 @@ def test_distorted_images_give_the_same_pose():
     person = PersonKeypoints(pixels, np.zeros((17, 3)), scores, "coco")
     (head,) = PnpHeadPoseEstimator().estimate(None, distorted, (person,))
     np.testing.assert_allclose(head.rotation_camera_head, rotation, atol=1e-3)
+
+
+# --- printed formula ------------------------------------------------------------------------------
+
+
+NECK_HEAD_M = np.array([NECK_TO_NOSE_UP_M, -0.144, 0.0])
+
+
+@given(st.integers(0, 2**31), st.floats(0.5, 2.0))
+def test_the_frame_turns_with_the_head_and_is_right_handed(seed, scale):
+    turn = Rotation.random(random_state=seed).as_matrix()
+    points = scale * HEAD_TEMPLATE_M @ turn.T + [0.1, 0.2, 3.0]
+    neck = scale * turn @ NECK_HEAD_M + [0.1, 0.2, 3.0]
+    still = printed_head_rotation(HEAD_TEMPLATE_M, NECK_HEAD_M)
+    np.testing.assert_allclose(printed_head_rotation(points, neck), turn @ still, atol=1e-9)
+    np.testing.assert_allclose(still @ still.T, np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(np.cross(still[:, 1], still[:, 2]), still[:, 0], atol=1e-9)
+
+
+def test_the_printed_formula_points_36_degrees_below_straight_ahead():
+    gaze = printed_head_rotation(HEAD_TEMPLATE_M, NECK_HEAD_M)[:, 1]
+    below = math.degrees(math.atan2(gaze[0], gaze[1]))
+    assert below == pytest.approx(36.0, abs=0.5)
+    assert gaze[2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_z_points_from_the_left_ear_to_the_right_ear():
+    rotation = printed_head_rotation(HEAD_TEMPLATE_M, NECK_HEAD_M)
+    ears = HEAD_TEMPLATE_M[4] - HEAD_TEMPLATE_M[3]
+    np.testing.assert_allclose(rotation[:, 2], ears / np.linalg.norm(ears), atol=1e-12)
+
+
+def test_pnp_on_lifted_points_agrees_with_the_printed_formula():
+    camera = Camera(1280, 960, 1100.0, 1100.0, 640.0, 480.0)
+    person = person_at((0.0, 0.4, 2.5), body_yaw_rad=0.4, head_yaw_rad=-0.2)
+    keypoints = person.keypoints(camera, 0.0, np.random.default_rng(0))
+    (head,) = PnpHeadPoseEstimator(head_model="lifted").estimate(None, camera, (keypoints,))
+    points = person.points_camera_m
+    printed = printed_head_rotation(points[:5], points[5:7].mean(axis=0))
+    np.testing.assert_allclose(head.rotation_camera_head, printed, atol=1e-4)
+    model = lifted_head_model(points[:5], points[5:7].mean(axis=0))
+    np.testing.assert_allclose(model[0], 0.0, atol=1e-12)

@@ -7,13 +7,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from synthetic_people import person_at
+from synthetic_people import Given, person_at
 
 from perception import (
     AwarenessPipeline,
     Camera,
     HeadPose,
-    PersonDetection,
     PersonKeypoints,
     PersonObservation,
 )
@@ -35,29 +34,9 @@ HEAD_STATURE_STD = 0.4 * 0.04
 HEAD_OFFSET_M, BODY_WRONG, HEAD_WRONG = 0.05, 0.03, 0.05
 
 
-class _Given:
-    """A detector, pose estimator and head pose estimator that answer what they were given."""
-
-    def __init__(self, person: PersonKeypoints, head: HeadPose | None) -> None:
-        self._person, self._head = person, head
-
-    def detect(self, image_rgb: np.ndarray) -> tuple[PersonDetection, ...]:
-        low, high = self._person.keypoints_px.min(axis=0), self._person.keypoints_px.max(axis=0)
-        return (PersonDetection(np.array([*low, *high]), 0.9),)
-
-    def estimate(self, image_rgb: np.ndarray, *given: object) -> tuple[object, ...]:
-        return (self._person,) if len(given) == 1 else (self._head,)
-
-
 def observed(person: PersonKeypoints, head: HeadPose | None) -> PersonObservation:
-    given = _Given(person, head)
-    pipeline = AwarenessPipeline(
-        CAMERA,
-        given,
-        given,
-        given,
-        keypoint_std_px=KEYPOINT_STD_PX,  # type: ignore[arg-type]
-    )
+    given = Given([person], heads=[head])
+    pipeline = AwarenessPipeline(CAMERA, given, given, given, keypoint_std_px=KEYPOINT_STD_PX)
     (observation,) = pipeline.process(IMAGE, 0.0)
     return observation
 
@@ -94,8 +73,7 @@ def mixture_std(own: tuple[float, float], stature_stds: tuple[float, float]) -> 
     return math.sqrt(sum((off**2 + var) * weight for off, var, weight in found) / total)
 
 
-@pytest.mark.parametrize("head_std", [0.02, 0.05, 0.10])
-@pytest.mark.parametrize("range_m", [2.0, 5.0])
+@pytest.mark.parametrize(("range_m", "head_std"), [(2.0, 0.05), (5.0, 0.10)])
 def test_the_range_is_that_of_cues_that_err_together(range_m: float, head_std: float) -> None:
     truth = person_at((0.2, 0.1, range_m), stature_m=1.74)
     person = truth.keypoints(CAMERA, 0.0, np.random.default_rng(0))

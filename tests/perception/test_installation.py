@@ -30,39 +30,39 @@ def installed_from(tmp_path, monkeypatch):
     return install
 
 
-def test_from_an_index(installed_from):
-    installed_from(None)
-    assert install_command("sim") == "pip install 'awarenav[sim]'"
-    assert reinstall_command() == "pip install --force-reinstall --no-deps awarenav"
+WHEEL = "file:///srv/awarenav-9-py3-none-any.whl"
 
 
-@pytest.mark.parametrize(("editable", "option"), [(True, "-e "), (False, "")])
-def test_from_a_checkout(installed_from, editable, option):
-    installed_from({"url": "file:///srv/my%20robot", "dir_info": {"editable": editable}})
-    command = install_command("sim,bench")
-    assert command == f"pip install {option}'/srv/my robot[sim,bench]'"
-    assert shlex.split(command)[-1] == "/srv/my robot[sim,bench]"
-
-
-def test_from_an_archive(installed_from):
-    installed_from({"url": "file:///srv/awarenav-9-py3-none-any.whl", "archive_info": {}})
-    assert shlex.split(install_command("ros2"))[2:] == [
-        "awarenav[ros2] @ file:///srv/awarenav-9-py3-none-any.whl"
-    ]
-
-
-def test_from_a_repository(installed_from):
-    vcs = {"vcs": "git", "commit_id": "abc"}
-    installed_from({"url": "https://example.org/awarenav.git", "vcs_info": vcs})
-    assert shlex.split(install_command())[2:] == [
-        "awarenav @ git+https://example.org/awarenav.git@abc"
-    ]
-
-
-@pytest.mark.parametrize("record", ["{", "[]", '{"url": 3}'])
-def test_a_damaged_record_falls_back_to_the_name(installed_from, record):
+@pytest.mark.parametrize(
+    ("record", "extras", "wanted"),
+    [
+        (None, "sim", ["awarenav[sim]"]),  # from an index
+        (
+            {"url": "file:///srv/my%20robot", "dir_info": {"editable": True}},
+            "sim,bench",
+            ["-e", "/srv/my robot[sim,bench]"],
+        ),
+        ({"url": "file:///srv/robot", "dir_info": {"editable": False}}, "", ["/srv/robot"]),
+        ({"url": WHEEL, "archive_info": {}}, "ros2", [f"awarenav[ros2] @ {WHEEL}"]),
+        (
+            {
+                "url": "https://example.org/awarenav.git",
+                "vcs_info": {"vcs": "git", "commit_id": "abc"},
+            },
+            "",
+            ["awarenav @ git+https://example.org/awarenav.git@abc"],
+        ),
+        # A damaged record falls back to the name.
+        ("{", "viz", ["awarenav[viz]"]),
+        ("[]", "viz", ["awarenav[viz]"]),
+        ('{"url": 3}', "viz", ["awarenav[viz]"]),
+    ],
+)
+def test_the_command_installs_from_where_this_one_came_from(installed_from, record, extras, wanted):
     installed_from(record)
-    assert install_command("viz") == "pip install 'awarenav[viz]'"
+    assert shlex.split(install_command(extras)) == ["pip", "install", *wanted]
+    if record is None:
+        assert reinstall_command() == "pip install --force-reinstall --no-deps awarenav"
 
 
 def test_a_checkout_that_is_not_installed(monkeypatch):

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from paths import SHARED
-from synthetic_people import person_at
+from synthetic_people import Given, person_at
 
 from perception import (
     AwarenessPipeline,
     Camera,
-    OnnxPersonDetector,
     PersonDetection,
     PersonKeypoints,
 )
 from perception.confirmation import DISOWNED, disowned_keypoints, without_disowned
 from perception.layouts import HEAD
-from perception.networks import MediaPipePoseEstimator
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 WIDE = Camera.from_fov(1920, 1200, math.radians(120.0))
@@ -93,7 +88,7 @@ def test_of_two_boxes_with_one_skeleton_that_which_fits_keeps_it():
     assert reasons((person, doubtful), (again, detection)) == [SKELETON, None]
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations(range(4))))
+@given(st.permutations(range(4)))
 def test_the_order_of_detections_does_not_matter(order):
     one, other = seen(-0.8), seen(0.8, seed=1)
     thief = (changed(one[0]), shifted(one[1], (50.0, 0.0)))
@@ -183,25 +178,17 @@ def test_people_without_keypoints_lose_nothing():
 # --- in the pipeline ----------------------------------------------------------------------------
 
 
-class Given:
-    """A detector and pose estimator with fixed answers."""
-
-    def __init__(self, *pairs):
-        self._people, self._detections = zip(*pairs, strict=True)
-
-    def detect(self, image_rgb):
-        return self._detections
-
-    def estimate(self, image_rgb, detections):
-        return self._people
+def processed(*pairs):
+    """Return the observations of a pipeline whose networks found these people and boxes."""
+    known = Given(*zip(*pairs, strict=True))
+    return AwarenessPipeline(CAMERA, known, known).process(BLANK, 0.0)
 
 
 def test_only_one_of_two_boxes_has_the_awareness_of_a_skeleton():
     # Yaw π of the test bodies looks at the camera or away; whichever it is, one has an α.
     person, detection = seen()
     neighbour = shifted(detection, (40.0, 0.0))
-    given_ = Given((changed(person), neighbour), (person, detection))
-    second, first = AwarenessPipeline(CAMERA, given_, given_).process(BLANK, 0.0)
+    second, first = processed((changed(person), neighbour), (person, detection))
     assert first.awareness is not None
     assert first.awareness_reason is None
     assert (second.awareness, second.awareness_std, second.gaze_camera) == (None, None, None)
@@ -223,72 +210,6 @@ def test_only_one_of_two_boxes_has_the_awareness_of_a_skeleton():
 )
 def test_an_observation_says_why_there_is_no_awareness(change, reason):
     person, detection = seen()
-    given_ = Given((change(person), detection))
-    (seen_as,) = AwarenessPipeline(CAMERA, given_, given_).process(BLANK, 0.0)
+    (seen_as,) = processed((change(person), detection))
     assert seen_as.awareness is None
     assert seen_as.awareness_reason == reason
-
-
-# --- on photographs -----------------------------------------------------------------------------
-
-
-# People whose head is turned away by more than 90 degrees, by eye: photograph and box.
-TURNED_AWAY = [
-    ("coco_000000196141", (455, 204, 633, 415)),
-    ("dev/coco_000000002153", (276, 273, 468, 448)),
-    ("dev/coco_000000002153", (272, 296, 345, 441)),
-    ("dev/coco_000000002532", (180, 303, 287, 480)),
-]
-# Somebody who looks into the camera.
-LOOKS = ("coco_000000000785", (281, 42, 493, 380))
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not (SHARED / "images").is_dir(), reason="no photographs beside the checkout")
-@pytest.mark.parametrize(("name", "box"), TURNED_AWAY)
-def test_nobody_who_is_turned_away_on_a_photograph_looks_aware(name, box):
-    """On the photograph, and pasted beside and behind somebody who looks into the camera."""
-    pytest.importorskip("mediapipe", reason="mediapipe is not installed (the extra 'mediapipe')")
-    detector = OnnxPersonDetector(
-        SHARED / "models" / "rtmdet_nano_person_320_mmpose.onnx", score_threshold=0.3
-    )
-    found = 0
-    with MediaPipePoseEstimator() as poses:
-        for image, away in _beside_a_face(name, box):
-            camera = Camera.from_fov(image.shape[1], image.shape[0], math.radians(60.0))
-            for each in AwarenessPipeline(camera, detector, poses).process(image, 0.0):
-                if _overlap(each.box_xyxy_px, away) > 0.6:
-                    found += 1
-                    assert each.awareness is None or each.awareness <= 0.2
-    assert found >= 3
-
-
-def _beside_a_face(name, box):
-    """Yield pictures and the box (4,) of the person who is turned away in them."""
-    photograph = _photograph(name)
-    yield photograph, np.array(box, dtype=float)
-    away, looks = _scaled(photograph, box), _scaled(_photograph(LOOKS[0]), LOOKS[1])
-    for overlap in (0.0, 0.3, 0.6):
-        image = np.full((400, 700, 3), 120, np.uint8)
-        left = 100 + round(looks.shape[1] - overlap * min(looks.shape[1], away.shape[1]))
-        image[50:350, 100 : 100 + looks.shape[1]] = looks
-        image[50:350, left : left + away.shape[1]] = away
-        yield image, np.array([left, 50.0, left + away.shape[1], 350.0])
-
-
-def _photograph(name):
-    return np.ascontiguousarray(cv2.imread(str(SHARED / "images" / f"{name}.jpg"))[..., ::-1])
-
-
-def _scaled(image, box):
-    """Return what is in the box, 300 pixels high."""
-    left, top, right, bottom = box
-    width_px = round(300 * (right - left) / (bottom - top))
-    return cv2.resize(np.ascontiguousarray(image[top:bottom, left:right]), (width_px, 300))
-
-
-def _overlap(first, second):
-    """Return the intersection over union of two boxes."""
-    sides = np.minimum(first[2:], second[2:]) - np.maximum(first[:2], second[:2])
-    both = float(np.prod(np.maximum(sides, 0.0)))
-    return both / (float(np.prod(first[2:] - first[:2]) + np.prod(second[2:] - second[:2])) - both)

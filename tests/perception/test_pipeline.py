@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from synthetic_people import person_at
+from synthetic_people import Given, person_at
 
 from perception import (
     AttentionCone,
@@ -14,7 +14,6 @@ from perception import (
     HeadPose,
     PerceptionError,
     PersonDetection,
-    PersonObservation,
 )
 from perception.eyes import EyeGaze
 
@@ -22,31 +21,19 @@ CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 FRAME = np.zeros((960, 1280, 3), np.uint8)
 
 
-class KnownPeople:
-    """A detector and pose estimator for given people."""
-
-    def __init__(self, people, noise_px=1.0, seed=0, seen=None):
-        self.people = people
-        self.noise_px = noise_px
-        self.rng = np.random.default_rng(seed)
-        self.seen = seen
-
-    def detect(self, image_rgb):
-        boxes = []
-        for person in self.people:
-            pixels = CAMERA.project(person.points_camera_m)
-            boxes.append(PersonDetection(np.r_[pixels.min(axis=0), pixels.max(axis=0)], 0.9))
-        return tuple(boxes)
-
-    def estimate(self, image_rgb, detections):
-        return tuple(
-            person.keypoints(CAMERA, self.noise_px, self.rng, lift_std_m=0.02, seen=self.seen)
-            for person in self.people
-        )
+def known(*people, noise_px=1.0, seen=None):
+    """Return a detector and pose estimator for people, with errors of pixels and depths."""
+    rng = np.random.default_rng(0)
+    boxes = [CAMERA.project(person.points_camera_m) for person in people]
+    return Given(
+        [person.keypoints(CAMERA, noise_px, rng, lift_std_m=0.02, seen=seen) for person in people],
+        [PersonDetection(np.r_[each.min(axis=0), each.max(axis=0)], 0.9) for each in boxes],
+    )
 
 
-def pipeline(known, **options):
-    return AwarenessPipeline(CAMERA, known, known, **options)
+def processed(networks, stamp_s=0.0, floor=None, **options):
+    pipeline = AwarenessPipeline(CAMERA, networks, networks, **options)
+    return pipeline.process(FRAME, stamp_s, floor=floor)
 
 
 def test_several_people_have_position_gaze_and_awareness_each():
@@ -55,7 +42,7 @@ def test_several_people_have_position_gaze_and_awareness_each():
         person_at((0.4, 0.4, 2.5), body_yaw_rad=0.8, head_yaw_rad=0.3),
         person_at((1.5, 0.4, 6.0), body_yaw_rad=-0.6),
     ]
-    seen = pipeline(KnownPeople(people)).process(FRAME, 12.5)
+    seen = processed(known(*people), 12.5)
     assert len(seen) == 3
     for person, observation in zip(people, seen, strict=True):
         assert observation.stamp_s == 12.5
@@ -72,24 +59,15 @@ def test_several_people_have_position_gaze_and_awareness_each():
 
 def test_the_position_is_that_of_the_body_and_not_of_the_nose():
     person = person_at((0.0, 0.4, 3.0), body_yaw_rad=math.pi / 2)
-    (seen,) = pipeline(KnownPeople([person], noise_px=0.0)).process(FRAME, 0.0)
+    (seen,) = processed(known(person, noise_px=0.0))
     nose = person.points_camera_m[0]
     assert np.linalg.norm(seen.position_camera_m - person.chest_camera_m) < 0.1
     assert np.linalg.norm(seen.position_camera_m - nose) > 0.25
 
 
-def test_a_head_that_is_not_seen_gives_no_evidence():
-    person = person_at((0.0, 0.4, 3.0))
-    hidden = np.r_[np.zeros(5), np.ones(12)]
-    (seen,) = pipeline(KnownPeople([person], seen=hidden)).process(FRAME, 0.0)
-    assert seen.awareness is None
-    assert seen.awareness_std is None
-    assert seen.gaze_camera is None
-
-
 def test_a_person_without_usable_keypoints_still_has_a_position():
     person = person_at((0.5, 0.4, 4.0))
-    (seen,) = pipeline(KnownPeople([person], seen=np.zeros(17))).process(FRAME, 0.0)
+    (seen,) = processed(known(person, seen=np.zeros(17)))
     assert seen.awareness is None
     assert np.linalg.norm(seen.position_camera_m - person.chest_camera_m) < 1.5
     assert np.sqrt(seen.position_covariance_m2[2, 2]) > 0.5
@@ -97,13 +75,11 @@ def test_a_person_without_usable_keypoints_still_has_a_position():
 
 def test_a_person_who_looks_at_any_point_of_the_robot_is_aware():
     person = person_at((0.0, 0.4, 3.0), head_yaw_rad=math.radians(50.0))
-    known = KnownPeople([person], noise_px=0.0)
-    (camera_only,) = pipeline(known).process(FRAME, 0.0)
+    networks = known(person, noise_px=0.0)
+    (camera_only,) = processed(networks)
     gaze = person.rotation_camera_head[:, 1]
     looked_at = person.eyes_camera_m + 2.0 * gaze
-    (two_points,) = pipeline(known, robot_points_camera_m=[[0, 0, 0], looked_at]).process(
-        FRAME, 0.0
-    )
+    (two_points,) = processed(networks, robot_points_camera_m=[[0, 0, 0], looked_at])
     assert camera_only.awareness < 0.4
     assert two_points.awareness > 0.95
 
@@ -111,46 +87,24 @@ def test_a_person_who_looks_at_any_point_of_the_robot_is_aware():
 def test_the_back_of_a_head_is_unaware_with_certainty():
     person = person_at((0.0, 0.4, 3.0), body_yaw_rad=math.pi)
     ears_only = np.r_[np.zeros(3), np.ones(14)]
-    (seen,) = pipeline(KnownPeople([person], seen=ears_only)).process(FRAME, 0.0)
+    (seen,) = processed(known(person, seen=ears_only))
     assert seen.awareness == 0.0
     assert seen.awareness_std < 0.05
 
 
-class UnsureHeads:
-    """A head pose network whose direction is off by up to 30°."""
-
-    def __init__(self, face_seen):
-        self.face_seen = face_seen
-
-    def estimate(self, image_rgb, camera, people):
-        rotation = person_at((0.0, 0.4, 3.0)).rotation_camera_head
-        covariance = np.diag([math.radians(30.0) ** 2] * 3 + [0.01**2] * 3)
-        pose = HeadPose((0.0, -0.1, 3.0), rotation, covariance, 0.0, self.face_seen)
-        return tuple(pose for _ in people)
-
-
 def test_a_head_of_unknown_direction_is_no_evidence_unless_it_shows_no_face():
-    face, back = (
-        pipeline(
-            KnownPeople([person_at((0.0, 0.4, 3.0))]), head_pose_estimator=UnsureHeads(seen)
-        ).process(FRAME, 0.0)[0]
-        for seen in (0.9, 0.01)
-    )
+    person = person_at((0.0, 0.4, 3.0))
+    covariance = np.diag([math.radians(30.0) ** 2] * 3 + [0.01**2] * 3)
+    observed = []
+    for seen in (0.9, 0.01):
+        head = HeadPose((0.0, -0.1, 3.0), person.rotation_camera_head, covariance, 0.0, seen)
+        observed += processed(known(person), head_pose_estimator=Given((), heads=(head,)))
+    face, back = observed
     assert face.awareness is face.awareness_std is face.gaze_camera is back.gaze_camera is None
     assert face.awareness_reason == "head direction unknown"
     assert back.awareness == pytest.approx(0.0, abs=0.01)
     assert back.awareness_std < 0.1
     np.testing.assert_array_equal(face.position_camera_m, back.position_camera_m)
-
-
-def test_eye_movements_increase_the_standard_deviation_and_do_not_change_alpha():
-    person = person_at((0.0, 0.4, 2.5), head_yaw_rad=math.radians(25.0))
-    steady, wandering = (
-        pipeline(KnownPeople([person]), eye_in_head_std_rad=std).process(FRAME, 0.0)[0]
-        for std in (0.0, (math.radians(15.0), math.radians(10.0)))
-    )
-    assert steady.awareness == wandering.awareness
-    assert wandering.awareness_std > 1.5 * steady.awareness_std
 
 
 def test_a_floor_improves_the_range_and_may_be_given_per_frame():
@@ -160,13 +114,11 @@ def test_a_floor_improves_the_range_and_may_be_given_per_frame():
     for stature in (1.55, 1.95):
         scale = stature / 1.83
         person = person_at((0.0, camera_height_m - 0.93 * scale, 4.5), stature_m=stature)
-        known = KnownPeople([person])
-        known.estimate = lambda image, found, person=person, stature=stature: (
-            person.keypoints(CAMERA, 1.0, np.random.default_rng(0), unit=1.0 / stature),
-        )
-        (without,) = pipeline(known).process(FRAME, 0.0)
-        (constant,) = pipeline(known, floor=floor).process(FRAME, 0.0)
-        (per_frame,) = pipeline(known).process(FRAME, 0.0, floor=floor)
+        rng = np.random.default_rng(0)
+        networks = Given([person.keypoints(CAMERA, 1.0, rng, unit=1.0 / stature)])
+        ((without,), (per_frame,)) = (processed(networks, floor=each) for each in (None, floor))
+        pipeline = AwarenessPipeline(CAMERA, networks, networks, floor=floor)
+        (constant,) = pipeline.process(FRAME, 0.0)
         np.testing.assert_array_equal(constant.position_camera_m, per_frame.position_camera_m)
         errors.append(
             [
@@ -178,35 +130,9 @@ def test_a_floor_improves_the_range_and_may_be_given_per_frame():
 
 
 def test_an_estimator_with_too_few_results_is_named():
-    class LosesOne(KnownPeople):
-        def estimate(self, image_rgb, detections):
-            return super().estimate(image_rgb, detections)[1:]
-
+    found = known(person_at((0.0, 0.4, 3.0)))
     with pytest.raises(PerceptionError, match="pose_estimator"):
-        pipeline(LosesOne([person_at((0.0, 0.4, 3.0))])).process(FRAME, 0.0)
-
-
-def observation(**change):
-    fields = {
-        "stamp_s": 0.0,
-        "position_camera_m": [0, 0, 1],
-        "position_covariance_m2": np.eye(3),
-        "gaze_camera": None,
-        "awareness": None,
-        "awareness_std": None,
-        "score": 1.0,
-        "box_xyxy_px": None,
-    }
-    return PersonObservation(**(fields | change))
-
-
-def test_observations_keep_a_read_only_copy_of_arrays():
-    position = np.array([0.0, 0.0, 1.0])
-    seen = observation(position_camera_m=position)
-    position[2] = 9.0
-    assert seen.position_camera_m[2] == 1.0
-    with pytest.raises(ValueError, match="read-only"):
-        seen.position_camera_m[2] = 5.0
+        processed(Given((), found.detections))
 
 
 # --- eyes ---------------------------------------------------------------------------------------
@@ -223,10 +149,9 @@ class KnownEyes:
         return (self.eyes,) * len(heads)
 
 
-def seen_with(eye_estimator, **options):
+def seen_with(eye_estimator):
     people = [person_at((0.0, 0.4, 1.8), head_yaw_rad=0.2), person_at((0.9, 0.4, 2.5))]
-    known = pipeline(KnownPeople(people), eye_estimator=eye_estimator, **options)
-    return known.process(FRAME, 0.0)
+    return processed(known(*people), eye_estimator=eye_estimator)
 
 
 def test_measured_eyes_turn_the_gaze_and_awareness_follows():

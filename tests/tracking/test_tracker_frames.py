@@ -1,4 +1,4 @@
-"""Frames of reference: the camera's motion and the choice of odom do not matter."""
+"""Frames of reference: the motion of the camera, its pose errors and the choice of odom."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tracking_scenes import PERIOD_S, FloatArray, camera_at, observe
+from tracking_scenes import CAMERA, PERIOD_S, FloatArray, camera_at, observe
 
-from tracking import PersonTrack, PersonTracker
+from tracking import PersonTrack, PersonTracker, TrackerConfig
 
 NOISE_M2 = np.array([[0.01, 0.004], [0.004, 0.03]])
 
@@ -84,7 +84,7 @@ def test_standing_people_have_no_velocity_however_the_camera_moves() -> None:
     np.testing.assert_allclose(tracks[0].velocity_odom_mps, (0.0, 0.0), atol=1e-9)
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(x_m=st.floats(-100.0, 100.0), y_m=st.floats(-100.0, 100.0), yaw=st.floats(-math.pi, math.pi))
 def test_rotating_and_shifting_the_world_rotates_and_shifts_the_tracks(
     x_m: float, y_m: float, yaw: float
@@ -93,3 +93,39 @@ def test_rotating_and_shifting_the_world_rotates_and_shifts_the_tracks(
     world[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
     world[:3, 3] = x_m, y_m, 0.3
     assert_same(crowd(moving_camera), crowd(moving_camera, world), world)
+
+
+LOOSE = TrackerConfig(position_noise_floor_m=1e-3)
+POSE = np.array([[0.01, 0.002, 0.001], [0.002, 0.02, -0.002], [0.001, -0.002, 0.0009]])
+
+
+def first_sight(
+    place_m: tuple[float, float], T: FloatArray, pose: FloatArray | None
+) -> PersonTrack:
+    seen = [observe(place_m, 0.0, T_odom_camera=T, covariance_odom_m2=1e-4)]
+    (track,) = PersonTracker(LOOSE).update(seen, 0.0, T, pose_covariance_odom=pose)
+    return track
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 0.7, -2.0])
+def test_an_uncertain_pose_adds_the_covariance_of_a_monte_carlo_run(yaw_rad: float) -> None:
+    rng = np.random.default_rng(0)
+    camera_m = np.array([1.0, -2.0])
+    ahead = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
+    place = camera_m + 4.0 * ahead
+    covariance = first_sight(tuple(place), camera_at(*camera_m, yaw_rad), POSE).covariance_odom
+    errors = rng.multivariate_normal(np.zeros(3), POSE, 40_000)
+    turned = np.array([[0.0, -1.0], [1.0, 0.0]]) @ (place - camera_m)
+    # The camera reports the same position in its own frame, whatever its true pose.
+    c, s = np.cos(errors[:, 2:]), np.sin(errors[:, 2:])
+    sampled = camera_m + errors[:, :2] + c * (place - camera_m) + s * turned
+    expected = np.cov(sampled.T) + 1e-4 * np.eye(2)
+    np.testing.assert_allclose(covariance[:2, :2], expected, rtol=0.04, atol=4e-4)
+
+
+@pytest.mark.parametrize("range_m", [1.0, 2.0, 4.0, 8.0])
+def test_an_error_in_yaw_moves_people_sideways_in_proportion_to_range(range_m: float) -> None:
+    pose = np.diag([0.0, 0.0, 0.02**2])
+    covariance = first_sight((range_m, 0.0), CAMERA, pose).covariance_odom
+    assert covariance[0, 0] == pytest.approx(1e-4)
+    assert covariance[1, 1] == pytest.approx(1e-4 + (0.02 * range_m) ** 2)

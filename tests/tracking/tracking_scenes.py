@@ -70,18 +70,9 @@ def observe(
 def as_bytes(tracks: Sequence[PersonTrack]) -> list[tuple[object, ...]]:
     """Return all values of the tracks, for comparison to the last bit."""
     return [
-        (
-            track.id,
-            track.stamp_s,
-            track.status,
-            track.position_odom_m.tobytes(),
-            track.velocity_odom_mps.tobytes(),
-            track.covariance_odom.tobytes(),
-            track.awareness,
-            track.awareness_std,
-            track.awareness_lower,
-            track.height_m,
-            track.time_since_seen_s,
+        tuple(
+            value.tobytes() if isinstance(value, np.ndarray) else value
+            for value in (getattr(track, name) for name in PersonTrack.__slots__)
         )
         for track in tracks
     ]
@@ -93,10 +84,16 @@ def nearest(tracks: Sequence[PersonTrack], position_odom_m: ArrayLike) -> Person
 
 
 @lru_cache(maxsize=64)
-def white_acceleration(dt_s: float, density_m2ps3: float) -> tuple[FloatArray, FloatArray]:
-    """Return F and Q by Van Loan's matrix exponential, from the differential equation alone."""
+def white_acceleration(
+    dt_s: float, density_m2ps3: float, decay_per_s: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Return F and Q by Van Loan's matrix exponential, from the differential equation alone.
+
+    The velocity dies away with ``decay_per_s``.
+    """
     A = np.zeros((4, 4))
     A[0, 2] = A[1, 3] = 1.0
+    A[2, 2] = A[3, 3] = -decay_per_s
     W = np.diag([0.0, 0.0, density_m2ps3, density_m2ps3])
     block = expm(dt_s * np.block([[-A, W], [np.zeros((4, 4)), A.T]]))
     F = block[4:, 4:].T

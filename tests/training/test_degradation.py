@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from sim_tests.world.camera import to_linear
 from training.networks import (
     Degradation,
-    compressed,
     degrade,
     motion_kernel,
     random_degradation,
-    rolling_shutter,
 )
 
 
@@ -85,20 +83,6 @@ def test_noise_has_the_variance_of_photons_and_read_noise(light):
     assert out.std() / out.mean() == pytest.approx(wanted, rel=0.05)
 
 
-def test_a_tenth_of_the_light_is_a_tenth_and_noisier():
-    image = smooth()
-    dark = degrade(image, Degradation(light=0.1), np.random.default_rng(0))
-    ratio = np.asarray(to_linear(dark)).mean() / np.asarray(to_linear(image)).mean()
-    assert ratio == pytest.approx(0.1, abs=0.005)
-
-    def noise(share):
-        effects = Degradation(light=share, gain=1.0 / share, white_e=8000.0, read_noise_e=6.0)
-        out = degrade(grey(128), effects, np.random.default_rng(3))
-        return out.astype(float).std()
-
-    assert noise(0.1) > 2.5 * noise(1.0)
-
-
 def test_noise_of_a_picture_made_smaller_is_that_of_the_mean_of_its_pixels():
     effects = Degradation(white_e=500.0, read_noise_e=8.0)
     full = degrade(grey(128, (256, 256)), effects, np.random.default_rng(0))
@@ -119,32 +103,11 @@ def test_overexposure_clips_and_white_balance_keeps_green():
     assert warm[..., 2].mean() < image[..., 2].mean()
 
 
-def test_jpeg_gets_worse_with_quality_and_keeps_the_order_of_colours():
-    image = smooth()
-    errors = [
-        np.abs(compressed(image, quality).astype(int) - image).mean() for quality in (90, 50, 20)
-    ]
-    assert errors[0] < errors[1] < errors[2]
-    red = np.zeros((32, 32, 3), np.uint8)
-    red[..., 0] = 200
-    assert (compressed(red, 20)[..., 0] > 150).all()
-
-
 def test_light_comes_before_clipping_and_jpeg():
     """A picture that is dark and then overexposed is not clipped: the order is the camera's."""
     image = smooth()
     both = degrade(image, Degradation(light=0.25, exposure_ev=2.0), np.random.default_rng(0))
     assert np.abs(both.astype(int) - image.astype(int)).max() <= 1
-
-
-@given(st.floats(-0.2, 0.2), st.floats(0.0, 100.0))
-@settings(max_examples=30, deadline=None)
-def test_a_rolling_shutter_keeps_the_middle_row_and_moves_each_row_by_the_shear(shear, middle):
-    matrix = rolling_shutter(shear, middle)
-    points = np.array([[10.0, middle], [10.0, middle + 1.0], [10.0, middle - 20.0]])
-    moved = points @ matrix[:, :2].T + matrix[:, 2]
-    np.testing.assert_allclose(moved[:, 1], points[:, 1], atol=1e-12)
-    np.testing.assert_allclose(moved[:, 0], 10.0 + shear * np.array([0.0, 1.0, -20.0]), atol=1e-9)
 
 
 def test_random_degradations_reach_what_was_asked_and_leave_some_pictures_alone():
@@ -162,14 +125,6 @@ def test_random_degradations_reach_what_was_asked_and_leave_some_pictures_alone(
     for field in fields(Degradation):
         values = {getattr(each, field.name) for each in drawn}
         assert len(values) > 10, field.name
-
-
-def test_a_small_head_is_not_blurred_away():
-    rng = np.random.default_rng(0)
-    drawn = [random_degradation(rng, size_px=12.0) for _ in range(500)]
-    assert max(each.motion_px for each in drawn) <= 0.45 * 12.0
-    gentle = [random_degradation(rng, 0.3) for _ in range(1000)]
-    assert np.mean([each.jpeg_quality is not None for each in gentle]) < 0.25
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Figures stand on the floor in every posture, and their truth is that of the drawn body."""
+"""Figures in every posture, their looks and backgrounds: the truth is that of the drawn body."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from perception.anthropometry import HEAD_TEMPLATE_M
 from perception.layouts import LEFT_HIP, LEFT_SHOULDER, RIGHT_HIP, RIGHT_SHOULDER
-from sim_tests.actors.body import Worker
+from sim_tests.actors.body import JOINTS, Worker, load_worker
 from sim_tests.dataset import RenderConfig
 from sim_tests.world import Warehouse
-from training.networks._clutter import Clutter, random_chair, random_thing
+from training.networks import random_background, random_texture
+from training.networks._backgrounds import Backgrounds
 from training.networks._figures import Figure
+from training.networks._looks import FEET, HANDS, HEAD, LOWER, UPPER, parts_of_texture
 from training.networks._postures import POSTURES, random_posture
 from training.networks._scenes import TrainingScene
 
@@ -97,28 +99,6 @@ def test_postures_look_like_their_names(figure):
     assert crouching[:, 0].max() < 0.62
 
 
-def test_things_have_a_base_and_chairs_have_a_seat():
-    for seed in range(40):
-        rng = np.random.default_rng(seed)
-        thing = random_thing(rng)
-        assert thing.vertices_m[:, 2].min() == pytest.approx(0.0, abs=1e-9)
-        assert thing.uv is not None
-        assert np.isfinite(thing.vertices_m).all()
-        assert np.ptp(thing.vertices_m, axis=0).max() < 8.0
-        chair = random_chair(rng)
-        assert chair.vertices_m[:, 2].min() <= -0.99
-
-
-def test_clutter_is_drawn_where_it_is_placed(warehouse):
-    thing = Clutter(warehouse, random_chair(np.random.default_rng(1)), np.random.default_rng(1))
-    assert (thing.bounds_odom_m()[1, 0]) < warehouse.layout.x_min_m
-    thing.place((1.0, 2.0, 0.5), Rotation.from_rotvec([0.0, 0.0, 0.3]))
-    low, high = thing.bounds_odom_m()
-    np.testing.assert_allclose(0.5 * (low + high), [1.0, 2.0, 0.5])
-    assert thing.height_m >= 0.0
-    assert thing.base_m >= 0.99
-
-
 def test_a_training_scene_draws_people_in_their_boxes_and_is_repeatable():
     config = RenderConfig(
         frames=10, scenes=1, people=3, width_px=320, height_px=240, layouts=("open",)
@@ -142,3 +122,46 @@ def test_a_training_scene_draws_people_in_their_boxes_and_is_repeatable():
     assert shots[0][2] == shots[1][2]
     assert len(shots[0][2]) >= 2
     assert 1 <= shots[0][3] <= 3
+
+
+# --- backgrounds and looks ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("make", [random_texture, random_background])
+def test_pictures_have_the_size_asked_and_the_same_seed_gives_the_same(make):
+    for size in ((48, 64), (37, 21), (5, 9)):
+        first, again, other = (make(np.random.default_rng(seed), size) for seed in (1, 1, 2))
+        assert first.shape == (*size, 3)
+        assert first.dtype == np.uint8
+        assert np.array_equal(first, again)
+        assert not np.array_equal(first, other)
+
+
+def test_a_store_of_backgrounds_is_repeatable_and_seeds_do_not_share_pictures():
+    first, again, other = Backgrounds(3, 5), Backgrounds(3, 5), Backgrounds(3, 6)
+    draws = [store.random(np.random.default_rng(0)) for store in (first, again, other)]
+    assert np.array_equal(draws[0], draws[1])
+    assert not np.array_equal(draws[0], draws[2])
+    rng = np.random.default_rng(1)
+    taken = [first.sometimes(rng, 0.3) is not None for _ in range(500)]
+    assert 0.22 < np.mean(taken) < 0.38
+    with pytest.raises(ValueError, match="at least 1, got 0"):
+        Backgrounds(0, 1)
+
+
+@pytest.mark.parametrize("level", [1, 2])
+def test_parts_of_a_texture_are_those_of_the_body(level):
+    parts = parts_of_texture("amina", level)
+    mesh = load_worker("amina").levels[level]
+    height, width = parts.shape
+    uv = mesh.uv[mesh.triangles].mean(axis=1)
+    rows = np.clip(((1.0 - uv[:, 1]) * height).astype(int), 0, height - 1)
+    columns = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
+    z = mesh.vertices_m[mesh.triangles].mean(axis=1)[:, 2]
+    at = parts[rows, columns]
+    top = z.max()
+    assert (at[z > 0.93 * top] == HEAD).mean() > 0.95
+    assert (at[z < 0.04 * top] == FEET).mean() > 0.9
+    assert set(np.unique(at)) == {HEAD, HANDS, UPPER, LOWER, FEET}
+    knee = load_worker("amina").joints_m[JOINTS.index("left_knee"), 2]
+    assert (at[np.abs(z - knee) < 0.03] == LOWER).mean() > 0.9

@@ -21,7 +21,6 @@ from training.hall import (
     textures,
     tube,
 )
-from training.hall._atlas import PaintedAtlas
 
 HALL = resources.files("sim_tests.world.hall")
 
@@ -54,26 +53,6 @@ def test_shipped_meshes_are_those_that_are_made() -> None:
             ours, theirs = getattr(mesh, field), getattr(shipped[name], field)
             np.testing.assert_allclose(ours, theirs, atol=1e-12)
     assert sum(piece.triangles for piece in base_pieces()) == shipped["base_link"].triangles
-
-
-def test_cells_of_an_atlas_do_not_overlap_and_their_regions_stay_inside() -> None:
-    size = 64
-    atlas = PaintedAtlas(size, {"a": (40, 20), "b0": (20, 30), "b1": (10, 10), "c": (64, 20)})
-    used = np.zeros((size, size), dtype=int)
-    for name, (left, top, width, height) in atlas.cells_px.items():
-        bottom, right = top + height, left + width
-        assert max(bottom, right) <= size
-        used[top:bottom, left:right] += 1
-        u_min, v_min, u_max, v_max = atlas.region(name)
-        # The centres of the outermost texels; v counts from the lower edge of the texture.
-        assert (u_min * size, u_max * size) == (left + 0.5, right - 0.5)
-        assert (size - v_max * size, size - v_min * size) == (top + 0.5, bottom - 0.5)
-        middle = atlas.region(name, (0.5, 0.5, 0.5, 0.5))
-        assert middle[:2] == pytest.approx((0.5 * (u_min + u_max), 0.5 * (v_min + v_max)))
-    assert used.max() == 1
-    assert atlas.count("b") == 2
-    with pytest.raises(ValueError, match="cell 'wide' does not fit into an atlas of 16 px"):
-        PaintedAtlas(16, {"small": (8, 8), "wide": (17, 4)})
 
 
 def test_volumes_are_those_of_the_solids() -> None:

@@ -60,12 +60,6 @@ def test_the_manifest_and_the_card_are_written_from_the_file(folder):
     assert verify_shipped_model("thing", folder) == folder / "thing.onnx"
 
 
-def test_the_manifest_is_written_without_a_card(folder):
-    (folder / "thing.md").unlink()
-    write_manifest(folder, [ENTRY])
-    assert verify_shipped_model("thing", folder) == folder / "thing.onnx"
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

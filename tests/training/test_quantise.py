@@ -10,7 +10,6 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from perception.networks import OnnxModel
-from perception.networks.heads import OnnxHeadPoseEstimator
 from perception.shipped import DETECTOR, HEAD, POSE, shipped_model_path
 from training.networks.quantise import in_floating_point, is_quantised, quantise
 
@@ -56,13 +55,6 @@ def _network(rng):
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
     helper.set_model_props(model, {"task": "detect", "training_domain": "renders"})
     return model
-
-
-def test_inputs_outputs_and_metadata_stay(networks):
-    before, after, _ = networks
-    assert after.inputs == before.inputs
-    assert [each.name for each in after.outputs] == [each.name for each in before.outputs]
-    assert before.metadata.items() <= after.metadata.items()
 
 
 def test_a_quantised_network_of_renders_still_says_that_it_is_one(networks):
@@ -123,24 +115,3 @@ def test_in_floating_point_it_is_the_network_with_rounded_weights(networks, tmp_
     # Without rounded activations it is nearer to the network than the one in 8 bits.
     error = np.abs(got - wanted).mean()
     assert 0.0 < error < np.abs(after.run({"image": images})[0] - wanted).mean()
-
-
-@pytest.mark.parametrize("name", [DETECTOR, POSE, HEAD])
-def test_a_shipped_network_in_floating_point_is_nearly_the_same(name, tmp_path):
-    shipped, path = OnnxModel(shipped_model_path(name)), tmp_path / "float.onnx"
-    in_floating_point(shipped.path, path)
-    network = OnnxModel(path)
-    assert network.metadata == shipped.metadata
-    if name == HEAD:
-        assert OnnxHeadPoseEstimator(shipped).layout.is_awarenav
-        assert OnnxHeadPoseEstimator(network).layout.is_awarenav
-    (entry,) = shipped.inputs
-    shape = [2 if not isinstance(n, int) else n for n in entry.shape]
-    if name == DETECTOR:
-        shape = [1, 3, 256, 320]
-    rng = np.random.default_rng(4)
-    image = rng.uniform(0.0, 1.0, shape).astype(np.float32)
-    for ours, theirs in zip(
-        network.run({entry.name: image}), shipped.run({entry.name: image}), strict=True
-    ):
-        assert np.corrcoef(ours.ravel(), theirs.ravel())[0, 1] > 0.9

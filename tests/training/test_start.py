@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -16,9 +14,8 @@ from training.networks._detector_net import DetectorExport, DetectorNet  # noqa:
 from training.networks._export import export_detector, export_head, export_pose  # noqa: E402
 from training.networks._head_net import HeadExport, HeadNet  # noqa: E402
 from training.networks._pose_net import PoseExport, PoseNet  # noqa: E402
-from training.networks._recipe import Recipe, Run  # noqa: E402
-from training.networks._start import start_from, unseen  # noqa: E402
-from training.networks.quantise import in_floating_point, quantise  # noqa: E402
+from training.networks._start import start_from  # noqa: E402
+from training.networks.quantise import quantise  # noqa: E402
 
 _NETWORKS = {
     HEAD: (HeadNet, HeadExport, (4, 3, 64, 64)),
@@ -49,24 +46,6 @@ def test_it_is_the_function_of_the_file(name, tmp_path):
         np.testing.assert_allclose(ours, theirs, atol=1e-4, rtol=1e-5)
         compared += 1
     assert compared == {HEAD: 9, POSE: 3, DETECTOR: 1}[name]
-
-
-@pytest.mark.parametrize("name", _NETWORKS)
-def test_it_is_the_function_of_a_shipped_file_in_8_bits(name, tmp_path):
-    """The file's activations are rounded, so its weights are compared in floating point."""
-    make, export, shape = _NETWORKS[name]
-    torch.manual_seed(5)
-    net = make()
-    start_from(net, shipped_model_path(name), [torch.randn(shape) for _ in range(2)])
-    path = tmp_path / "float.onnx"
-    in_floating_point(shipped_model_path(name), path)
-    compared = 0
-    for output, ours, theirs in _outputs(net, export, path, torch.rand(shape)):
-        # Standard deviations have factors in the file, from the calibration.
-        if "std" not in output and "covariance" not in output:
-            np.testing.assert_allclose(ours, theirs, atol=1e-4, rtol=1e-5)
-            compared += 1
-    assert compared >= {HEAD: 6, POSE: 3, DETECTOR: 1}[name]
 
 
 def _outputs(net, export, path, x):
@@ -119,38 +98,6 @@ def _folded(layer):
     conv, norm = layer[0], layer[1]
     factor = norm.weight / (norm.running_var + norm.eps).sqrt()
     return (conv.weight * factor[:, None, None, None]).detach().numpy()
-
-
-def test_normalisation_has_the_statistics_of_the_data():
-    """In training mode, batches of such data are normalised to about the same function."""
-    torch.manual_seed(5)
-    net = HeadNet()
-    start_from(net, shipped_model_path(HEAD), [torch.randn(16, 3, 64, 64) for _ in range(2)])
-    x = torch.randn(64, 3, 64, 64)
-    norms = [m for m in net.modules() if isinstance(m, torch.nn.BatchNorm2d)]
-    assert all(float(norm.weight.detach().min()) > 0.0 for norm in norms)
-    net.eval()
-    with torch.no_grad():
-        fixed = net.fine(x)
-        net.train()
-        batch = net.fine(x)
-    spread = float(fixed.std())
-    assert float((fixed - batch).abs().mean()) < 0.1 * spread
-
-
-def test_learning_is_slower_from_a_trained_network(tmp_path):
-    run = Run(Recipe(), tmp_path, tmp_path, tmp_path, "cpu")
-    assert run.learning_rate(2e-3, 1e-3) == 2e-3
-    run = replace(run, start=shipped_model_path(HEAD))
-    assert run.learning_rate(2e-3, 1e-3) == 1e-3
-
-
-def test_the_statistics_come_from_batches_that_are_not_trained_on():
-    recipe = Recipe()
-    numbers = [int(batch) for batch in unseen(torch.tensor)]
-    assert len(numbers) == len(set(numbers)) >= 2
-    steps = max(recipe.head_steps, recipe.pose_steps, recipe.detector_steps)
-    assert min(numbers) > steps
 
 
 def test_a_file_of_another_network_is_refused():

@@ -1,4 +1,4 @@
-"""Targets follow the pictures exactly: under shear, turns, mirrors, crops and other backgrounds."""
+"""Targets follow the pictures exactly, and crops and halls are those in use, but held out."""
 
 from __future__ import annotations
 
@@ -6,19 +6,28 @@ import cv2
 import numpy as np
 import pytest
 
+from perception import Camera
 from perception.networks.heads import OUTSIDE_GREY
-from training.networks import Degradation, rolling_shutter, similarity, warp
+from perception.networks.heads._crops import head_crop, looking_at
+from sim_tests.dataset import RenderConfig
+from sim_tests.world.hall import LAYOUTS
+from training.networks import (
+    Degradation,
+    HeadSample,
+    Recipe,
+    cropped,
+    rolling_shutter,
+    similarity,
+    warp,
+)
 from training.networks._augment import (
     before_background,
     box_around,
     composed,
     covered,
-    emptied_outside,
     moved,
     photographed_layers,
-    reduced,
     sheared,
-    within_rectangle,
 )
 from training.networks._samples import (
     ImageSample,
@@ -65,31 +74,6 @@ def test_the_box_of_an_outline_is_the_box_of_the_pixels_turned_and_sheared_too(s
     np.testing.assert_allclose(box_around(moved(points, matrix)), pixel_box(drawn > 127), atol=1.6)
 
 
-def test_the_part_of_an_outline_in_a_rectangle_is_that_of_its_pixels():
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        mask = np.zeros((120, 160), np.uint8)
-        angle = float(rng.uniform(0.0, 180.0))
-        cv2.ellipse(mask, (80, 60), (50, 20), angle, 0, 360, (1,), -1)
-        low, high = rng.integers(40, 75, 2), rng.integers(80, 118, 2)
-        part = within_rectangle(outline(mask > 0), low, high)
-        mask[: low[1]] = mask[high[1] :] = 0
-        mask[:, : low[0]] = mask[:, high[0] :] = 0
-        assert part is not None
-        # Where the outline crosses the edge at a small angle, its pixels are stairs.
-        np.testing.assert_allclose(box_around(part), pixel_box(mask > 0), atol=2.5)
-    assert within_rectangle(outline(blob()), np.array([0, 0]), np.array([1, 1])) is None
-
-
-def test_a_map_of_a_map_is_the_second_after_the_first():
-    first = rolling_shutter(0.13, 20.0)
-    second = similarity(np.array([30.0, 10.0]), 0.7, 0.3, (50, 40), flip=True)
-    points = np.random.default_rng(0).uniform(0.0, 60.0, (9, 2))
-    np.testing.assert_allclose(
-        moved(points, composed(second, first)), moved(moved(points, first), second), atol=1e-9
-    )
-
-
 def test_a_sheared_picture_agrees_with_its_points():
     rng = np.random.default_rng(2)
     for _ in range(20):
@@ -134,27 +118,6 @@ def test_a_cover_becomes_part_of_the_foreground():
         x, y = max(round(x1), 0), max(round(y1), 0)
         inside[y : max(round(y2), 0), x : max(round(x2), 0)] = True
         np.testing.assert_array_equal(out[..., 3] == 255, inside)
-
-
-def test_outside_the_camera_s_picture_nothing_is_degraded():
-    image = np.full((60, 80, 3), 30, np.uint8)
-    corners = np.array([[10.0, 5.0], [70.0, 5.0], [70.0, 55.0], [10.0, 55.0]])
-    out = emptied_outside(image, corners)
-    assert (out[5:55, 10:70] == 30).all()
-    out[5:55, 10:70] = OUTSIDE_GREY
-    assert (out == OUTSIDE_GREY).all()
-    whole = np.array([[-1.0, -1.0], [99.0, -1.0], [99.0, 99.0], [-1.0, 99.0]])
-    assert emptied_outside(image, whole) is image
-
-
-def test_a_reduced_picture_scales_its_points():
-    image = np.random.default_rng(0).integers(0, 256, (90, 130, 4), np.uint8)
-    same, factors = reduced(image, 1.3)
-    assert same is image
-    assert factors.tolist() == [1.0, 1.0]
-    small, factors = reduced(image, 0.4)
-    assert small.shape == (36, 52, 4)
-    np.testing.assert_allclose(factors, [0.4, 0.4])
 
 
 def truth(rng, size=(320, 240)):
@@ -300,3 +263,56 @@ def test_devices_that_are_not_here_are_refused():
     absent = f"cuda:{torch.cuda.device_count()}"
     with pytest.raises(ValueError, match=f"device {absent} is not here"):
         torch_device(absent)
+
+
+# --- recipe and crops -----------------------------------------------------------------------------
+
+
+def test_evaluation_has_its_own_halls_goods_and_colours():
+    recipe = Recipe()
+    held_out = recipe.held_out()
+    shipped = RenderConfig()
+    assert set(LAYOUTS) - set(recipe.layouts) == {"crossing", "staging_hall"}
+    assert shipped.variants[1] < recipe.variants[0]
+    assert recipe.variants[1] < held_out.variants[0]
+    assert held_out.seed != recipe.seed
+
+
+@pytest.mark.parametrize("side", [20.0, 41.3, 64.0, 97.0, 150.5])
+def test_the_head_crop_in_training_equals_the_head_crop_in_use(side):
+    image = np.random.default_rng(4).integers(0, 256, (240, 320, 3), np.uint8)
+    centre = np.array([171.3, 118.8])
+    oversampling = max(1, int(np.ceil(side / 64)))
+    # Training counts from the image's corner, use from the centre of its first pixel.
+    matrix = similarity(centre + 0.5, 64 / side, 0.0, (64, 64), flip=False)
+    theirs = warp(image, matrix, (64, 64), oversampling)
+    ours = head_crop(image, centre, side)
+    # OpenCV rounds coordinates to 1/32 pixel, differently for the two crops.
+    assert np.abs(theirs.astype(int) - ours.astype(int)).mean() < 3.0
+    assert np.corrcoef(theirs.ravel(), ours.ravel())[0, 1] > 0.999
+
+
+def test_the_crops_are_equal_off_the_axis_of_a_wide_lens_too():
+    rng = np.random.default_rng(5)
+    image = cv2.GaussianBlur(rng.integers(0, 256, (240, 320, 3), np.uint8), (0, 0), 1.5)
+    camera = Camera.from_fov(320, 240, np.radians(110.0))
+    centre = np.array([262.3, 71.8])
+    head = HeadSample(
+        image=image,
+        centre=centre + 0.5,
+        side_px=45.0,
+        keypoints=np.tile(centre + 0.5, (5, 1)),
+        visible=np.ones(5, bool),
+        focal_px=camera.fx_px,
+        principal_point=np.array([camera.cx_px, camera.cy_px]) + 0.5,
+        rotation_camera_head=np.eye(3),
+        seen=1.0,
+    )
+    sample = cropped(head, np.zeros(2), 1.0, 0.0, flip=False)
+    (axes,), (stretch,) = looking_at(camera, centre[None])
+    ours = head_crop(image, centre, 45.0, 64, stretch)
+    assert np.abs(sample["image"].astype(int) - ours.astype(int)).mean() < 3.0
+    np.testing.assert_allclose(sample["rotation"], axes.T, atol=1e-9)
+    np.testing.assert_allclose(sample["keypoints"], 0.5, atol=1e-9)
+    moved = cropped(head, np.array([0.1, 0.0]), 1.0, 0.0, flip=False)
+    assert moved["centre"][0] == pytest.approx(0.4, abs=0.02)

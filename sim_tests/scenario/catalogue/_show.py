@@ -1,4 +1,4 @@
-"""The work of ``awarenav scenario list``, ``show`` and ``draw``."""
+"""The work of ``awarenav scenario list`` and ``show``."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def _list_row(template: ScenarioTemplate, scenario_set: str) -> dict[str, Any]:
     }
 
 
-def show_command(name: str, *, yaml: bool, seed: int | None) -> int:
-    """Print one scenario: in words, or as YAML."""
+def show_command(name: str, *, yaml: bool, seed: int | None, out: Path | None) -> int:
+    """Print one scenario, in words or as YAML, and draw it."""
     template = ScenarioTemplate.named(name)
     if seed is not None and not yaml:
         raise SimError("--seed needs --yaml: the description covers all draws of a scenario")
@@ -63,6 +63,15 @@ def show_command(name: str, *, yaml: bool, seed: int | None) -> int:
         print(text, end="")
         return 0
     print("\n".join(description_lines(template)))
+    if out is not None:
+        if out.suffix.lower() not in _FORMATS:
+            raise SimError(f"--out must end in {', '.join(_FORMATS)}, got {out}")
+        from awarenav.figures import save_figure  # noqa: PLC0415 - needs matplotlib
+
+        from ._drawing import scenario_figure  # noqa: PLC0415
+
+        save_figure(scenario_figure(template), out)
+        print(f"\nWritten: {out}")
     return 0
 
 
@@ -110,29 +119,6 @@ def distribution_text(distribution: Distribution) -> str:
         return f"one of {', '.join(f'{value:g}' for value in distribution.values)}"
     kind = type(distribution).__name__.lower()
     return f"{low:g} to {high:g}, median {distribution.median:.3g} ({kind})"
-
-
-def draw_command(names: Sequence[str], out: str) -> int:
-    """Draw scenarios into a file or a folder."""
-    from ._drawing import save_drawing, scenario_figure  # noqa: PLC0415 - needs matplotlib
-
-    chosen = names_of_sets(names)
-    templates = [ScenarioTemplate.named(name) for name in chosen]
-    path = Path(out)
-    is_file = path.suffix.lower() in _FORMATS
-    if is_file and len(templates) > 1:
-        raise SimError(
-            f"--out must be a folder for {len(templates)} scenarios, got the file {path}"
-        )
-    if not is_file and path.suffix:
-        raise SimError(f"--out must end in {', '.join(_FORMATS)} or be a folder, got {path}")
-    if is_file and path.resolve() in {Path(name).resolve() for name in chosen}:
-        raise SimError(f"--out {path} would overwrite a scenario")
-    for template in templates:
-        file = path if is_file else path / f"{template.name}.png"
-        save_drawing(scenario_figure(template), file)
-        print(file)
-    return 0
 
 
 def names_of_sets(names: Sequence[str]) -> list[str]:

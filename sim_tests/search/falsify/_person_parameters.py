@@ -10,24 +10,27 @@ import numpy as np
 from perception.arrays import FloatArray
 
 from ...actors.body import STAYING
-from ._variation import Parameter, bent_path
+from ._variation import (
+    ENDS,
+    FASTEST_WALK_MPS,
+    ON_THE_WAY,
+    SETS_OFF,
+    SHORTEST_PAUSE_S,
+    SHORTEST_WAY_M,
+    SLOWEST_MPS,
+    Parameter,
+    shifted_path,
+)
 
-#: Fast walking; a person who is faster in the scenario keeps that speed as the limit.
-FASTEST_WALK_MPS: Final = 2.0
+#: A person walks no faster backwards.
 FASTEST_BACKWARDS_MPS: Final = 1.2
-_SLOWEST_MPS: Final = 0.5
 _EARLIER_S: Final = 4.0
-_ASIDE_M: Final = 0.8
-_LONGEST_PAUSE_S: Final = 3.0
-# A shorter pause is none.
-_SHORTEST_PAUSE_S: Final = 0.15
 # A person with this value or more never forgets the robot.
 _NEVER_LAPSES_S: Final = 6.0
-# A person who stands in the scenario takes no shorter way than this after a lapse.
-_SHORTEST_WAY_M: Final = 0.3
-_LONGEST_WAY_M: Final = 3.0
 # A person with this value or more never gives up looking.
 _LOOKS_ON_S: Final = 10.0
+# The time from a request to the answer.
+_ANSWERS_AFTER_S: Final = (0.2, 3.0)
 _REACTIONS: Final = ("walk_on", "wait", "hurry", "pass_behind", "claim")
 
 
@@ -42,23 +45,15 @@ def person_parameters(
     """
     start_s, speed_mps = float(person["start_s"]), float(person["speed_mps"])
     walks = len(person["route"]) > 1
-    parameters = {
-        "aside_first_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
-        "aside_last_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
-    }
+    parameters = dict(ENDS)
     if walks:
         fastest = FASTEST_BACKWARDS_MPS if person["backwards"] else fastest_mps
-        if (
-            person.get("sets_off_within_m") is None
-        ):  # else the robot's place decides, a distribution
+        # Of somebody who sets off near the robot, that distance is varied: a distribution.
+        if person.get("sets_off_within_m") is None:
             earliest_s = max(start_s - _EARLIER_S, 0.0)
             parameters["start_s"] = Parameter.of(earliest_s, start_s + _EARLIER_S, start_s)
-        parameters |= {
-            "speed_mps": Parameter.of(_SLOWEST_MPS, fastest, speed_mps),
-            "aside_middle_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
-            "pause_at": Parameter.of(0.05, 0.95, 0.5),
-            "pause_s": Parameter.of(0.0, _LONGEST_PAUSE_S, 0.0),
-        }
+        parameters["speed_mps"] = Parameter.of(SLOWEST_MPS, fastest, speed_mps)
+        parameters |= ON_THE_WAY
     glances = person["glances"]
     if glances["notices_within_m"] > 0.0:  # a person who never looks up keeps to that
         parameters |= {
@@ -89,14 +84,9 @@ def changed_person(person: Mapping[str, Any], values: Mapping[str, float]) -> di
     for name in ("start_s", "speed_mps"):
         if name in values:
             changed[name] = values[name]
-    points = bent_path(
-        person_path(person),
-        values.get("aside_first_m", 0.0),
-        values.get("aside_middle_m", 0.0),
-        values.get("aside_last_m", 0.0),
-    )
+    points = shifted_path(person_path(person), values)
     changed["route"] = [{"x_m": x, "y_m": y} for x, y in points.tolist()]
-    if values.get("pause_s", 0.0) > _SHORTEST_PAUSE_S:
+    if values.get("pause_s", 0.0) > SHORTEST_PAUSE_S:
         length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         stop = {"at_m": values["pause_at"] * length_m, "for_s": values["pause_s"]}
         changed["pauses"] = sorted([*person["pauses"], stop], key=lambda pause: pause["at_m"])
@@ -115,6 +105,39 @@ def person_path(person: Mapping[str, Any]) -> FloatArray:
     return np.array([[point["x_m"], point["y_m"]] for point in person["route"]], dtype=np.float64)
 
 
+def hearing_parameters(hearing: Mapping[str, Any]) -> dict[str, Parameter]:
+    """Return the parameters of a person's hearing, the YAML of ``Hearing``.
+
+    They are whether and when the person answers a robot that asks for attention, and a step into
+    its path.
+    """
+    return {
+        "answers": Parameter.of(0.0, 1.0, 0.5),
+        "answer_delay_s": Parameter.of(*_ANSWERS_AFTER_S, float(hearing["delay_median_s"])),
+        "startles_into_path": Parameter.of(0.0, 1.0, 0.0),
+    }
+
+
+def changed_hearing(
+    own: Mapping[str, Any] | None, scenarios: Mapping[str, Any], values: Mapping[str, float]
+) -> dict[str, Any] | None:
+    """Return how a person hears with the given values: a change of their own or the scenario's.
+
+    As written, which is None for the scenario's, where nothing changes.
+    """
+    hearing = scenarios if own is None else own
+    changes: dict[str, float] = {}
+    if not 1.0 / 3.0 <= values["answers"] <= 2.0 / 3.0:  # never or always; else the seed draws
+        changes["answers"] = float(values["answers"] > 0.5)
+    if values["answer_delay_s"] != hearing["delay_median_s"]:
+        changes |= {"delay_median_s": values["answer_delay_s"], "delay_spread": 1.0}
+    if values["startles_into_path"] >= 0.5:
+        changes |= {"startles": 1.0, "startles_into_path": 1.0}
+    if not changes:
+        return None if own is None else dict(own)
+    return {**hearing, **changes}
+
+
 def _lapse_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
     """Return the parameters of somebody who forgets the robot after a look, or sets off then.
 
@@ -126,11 +149,9 @@ def _lapse_parameters(person: Mapping[str, Any]) -> dict[str, Parameter]:
         "lapse_halts": Parameter.of(0.0, 1.0, 0.0),
     }
     if len(person["route"]) == 1:
-        parameters |= {
-            "sets_off_x_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
-            "sets_off_y_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
-            "sets_off_mps": Parameter.of(_SLOWEST_MPS, FASTEST_WALK_MPS, person["speed_mps"]),
-        }
+        own_mps = person["speed_mps"]
+        parameters |= SETS_OFF
+        parameters["sets_off_mps"] = Parameter.of(SLOWEST_MPS, FASTEST_WALK_MPS, own_mps)
     return parameters
 
 
@@ -139,7 +160,7 @@ def _add_lapse(person: dict[str, Any], values: Mapping[str, float]) -> None:
     if after_s >= _NEVER_LAPSES_S:
         return
     way = np.array([values.get("sets_off_x_m", 0.0), values.get("sets_off_y_m", 0.0)])
-    sets_off = bool(np.hypot(*way) >= _SHORTEST_WAY_M)
+    sets_off = bool(np.hypot(*way) >= SHORTEST_WAY_M)
     if sets_off:
         x, y = (person_path(person)[0] + way).tolist()
         person["route"] = [*person["route"], {"x_m": x, "y_m": y}]

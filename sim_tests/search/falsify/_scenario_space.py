@@ -15,17 +15,23 @@ from ...actors.behaviour import FASTEST_RECORDED_MPS, PersonSpec, median_person
 from ...actors.robot import NOVA_CARTER
 from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
 from ...world.errors import SimError
-from .._optimizer import Range
-from ._hearing_parameters import changed_hearing, hearing_parameters
+from .._study import Range
 from ._joint_parameters import add_joint, is_joint_possible, joint_parameters
 from ._person_parameters import (
-    FASTEST_WALK_MPS,
+    changed_hearing,
     changed_person,
+    hearing_parameters,
     person_parameters,
     person_path,
 )
 from ._script_parameters import changed_script, is_human, script_parameters, script_path
-from ._variation import RACK_CLEARANCE_M, ROBOT_CLEARANCE_M, Parameter, clearance_m
+from ._variation import (
+    FASTEST_WALK_MPS,
+    RACK_CLEARANCE_M,
+    ROBOT_CLEARANCE_M,
+    Parameter,
+    clearance_m,
+)
 
 # An impossible variation is drawn back to a share of its distance from the scenario as written.
 _SHARES: Final = (1.0, 0.75, 0.5, 0.25, 0.0)
@@ -155,41 +161,36 @@ class ScenarioSpace:
                 data[kind][row] = median_person(person).model_dump(mode="json")
 
     def _is_possible(self, data: Mapping[str, Any], values: Mapping[str, float]) -> bool:
+        if not is_joint_possible(data, values, self._boxes, self._longer_m):
+            return False
         robot = np.array([data["robot"]["start_x_m"], data["robot"]["start_y_m"]])
-        joint = is_joint_possible(data, values, self._boxes, self._longer_m)
-        if not joint or not self._is_companion_possible(data, robot):
+        added = data["people"][len(self._median["people"]) :]
+        if not all(self._keeps_clear(person_path(person), robot) for person in added):
             return False
         for kind, row in self._varied_people:
             changed, original = data[kind][row], self._median[kind][row]
             path_of = script_path if kind == "workers" else person_path
-            path, original_path = path_of(changed), path_of(original)
-            for limit_m, distance_m, original_m in (
-                (
-                    RACK_CLEARANCE_M,
-                    clearance_m(path, self._boxes),
-                    clearance_m(original_path, self._boxes),
-                ),
-                (
-                    ROBOT_CLEARANCE_M + self._longer_m,
-                    float(np.linalg.norm(path[0] - robot)),
-                    float(np.linalg.norm(original_path[0] - robot)),
-                ),
-            ):
-                if distance_m < min(limit_m, original_m) - 1e-9:
-                    return False
+            if not self._keeps_clear(path_of(changed), robot, path_of(original)):
+                return False
             if kind == "workers" and not is_human(changed, original):
                 return False
         return True
 
-    def _is_companion_possible(self, data: Mapping[str, Any], robot: FloatArray) -> bool:
-        """Return whether people who were added keep clear of racks and of the robot's start."""
-        for person in data["people"][len(self._median["people"]) :]:
-            path = person_path(person)
-            if clearance_m(path, self._boxes) < RACK_CLEARANCE_M - 1e-9:
-                return False
-            if float(np.linalg.norm(path[0] - robot)) < ROBOT_CLEARANCE_M + self._longer_m:
-                return False
-        return True
+    def _keeps_clear(
+        self, path: FloatArray, robot: FloatArray, written: FloatArray | None = None
+    ) -> bool:
+        """Return whether a path keeps clear of racks, and its start of the robot's.
+
+        It need not keep farther away than the path as written.
+        """
+        found, was = (
+            (clearance_m(each, self._boxes), float(np.linalg.norm(each[0] - robot)))
+            for each in (path, path if written is None else written)
+        )
+        limits = RACK_CLEARANCE_M, ROBOT_CLEARANCE_M + self._longer_m
+        if written is not None:
+            limits = min(limits[0], was[0]), min(limits[1], was[1])
+        return all(each >= limit - 1e-9 for each, limit in zip(found, limits, strict=True))
 
 
 def _distribution_parameter(distribution: Distribution) -> Parameter:

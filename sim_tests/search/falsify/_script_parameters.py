@@ -13,21 +13,24 @@ from scipy.interpolate import PchipInterpolator
 from perception.arrays import FloatArray
 
 from ...actors.body import STAYING
-from ._person_parameters import FASTEST_WALK_MPS
-from ._variation import Parameter, bent_path
+from ._variation import (
+    ENDS,
+    FASTEST_WALK_MPS,
+    ON_THE_WAY,
+    SETS_OFF,
+    SHORTEST_PAUSE_S,
+    SHORTEST_WAY_M,
+    SLOWEST_MPS,
+    Parameter,
+    shifted_path,
+)
 
 #: Largest acceleration of a worker, unless the script has a larger one.
 LARGEST_ACCELERATION_MPS2: Final = 3.0
-_ASIDE_M: Final = 0.8
-_SHORTEST_PAUSE_S: Final = 0.15
 # Least time between two activities of the hands.
 _CHANGE_S: Final = 0.6
 # A worker with this value or more stays where the script ends.
 _STAYS_S: Final = 6.0
-# The way that a worker sets off on then; a shorter one is none.
-_SHORTEST_WAY_M: Final = 0.3
-_LONGEST_WAY_M: Final = 3.0
-_SLOWEST_MPS: Final = 0.5
 _WALK_MPS: Final = 1.34
 # A worker with this value or more looks where the script says.
 _LOOKS_ON_S: Final = 15.0
@@ -45,27 +48,17 @@ def script_parameters(script: Mapping[str, Any]) -> dict[str, Parameter]:
     They are start, pace, path, a pause, setting off again after the end of the script, the time of
     the gaze and, where the script looks at the robot, looking away for good.
     """
-    parameters = {
-        "aside_first_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
-        "aside_last_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
-    }
+    parameters = dict(ENDS)
     if len(script["path"]) > 1:
-        parameters |= {
-            "later_s": Parameter.of(-4.0, 4.0, 0.0),
-            "pace": Parameter.of(0.6, 1.6, 1.0),
-            "aside_middle_m": Parameter.of(-_ASIDE_M, _ASIDE_M, 0.0),
-            "pause_at": Parameter.of(0.05, 0.95, 0.5),
-            "pause_s": Parameter.of(0.0, 3.0, 0.0),
-        }
+        parameters["later_s"] = Parameter.of(-4.0, 4.0, 0.0)
+        parameters["pace"] = Parameter.of(0.6, 1.6, 1.0)
+        parameters |= ON_THE_WAY
     if len(script["gaze"]) > 1:
         parameters["gaze_later_s"] = Parameter.of(-3.0, 3.0, 0.0)
     if not any(key["activity"] in STAYING for key in script["activities"]):
-        parameters |= {
-            "sets_off_after_s": Parameter.of(0.0, _STAYS_S, _STAYS_S),
-            "sets_off_x_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
-            "sets_off_y_m": Parameter.of(-_LONGEST_WAY_M, _LONGEST_WAY_M, 0.0),
-            "sets_off_mps": Parameter.of(_SLOWEST_MPS, FASTEST_WALK_MPS, _WALK_MPS),
-        }
+        parameters["sets_off_after_s"] = Parameter.of(0.0, _STAYS_S, _STAYS_S)
+        parameters |= SETS_OFF
+        parameters["sets_off_mps"] = Parameter.of(SLOWEST_MPS, FASTEST_WALK_MPS, _WALK_MPS)
     if any(key["look"] == "robot" for key in script["gaze"]):
         parameters |= {
             "looks_away_after_s": Parameter.of(0.0, _LOOKS_ON_S, _LOOKS_ON_S),
@@ -79,7 +72,7 @@ def changed_script(script: Mapping[str, Any], values: Mapping[str, float]) -> di
     path = [[key["t_s"], key["x_m"], key["y_m"]] for key in script["path"]]
     begin, end = path[0][0], path[-1][0]
     pause_s = values.get("pause_s", 0.0)
-    pause_s = pause_s if pause_s > _SHORTEST_PAUSE_S and len(path) > 1 else 0.0
+    pause_s = pause_s if pause_s > SHORTEST_PAUSE_S and len(path) > 1 else 0.0
     halt_s = begin + values.get("pause_at", 0.5) * (end - begin)
     pace, later_s = values.get("pace", 1.0), values.get("later_s", 0.0)
 
@@ -93,12 +86,7 @@ def changed_script(script: Mapping[str, Any], values: Mapping[str, float]) -> di
         rows = rows[np.concatenate([[True], np.diff(rows[:, 0]) > 1e-6])]
     elif len(rows) == 2 and values.get("aside_middle_m", 0.0) != 0.0:
         rows = np.array([rows[0], rows.mean(axis=0), rows[1]])
-    points = bent_path(
-        rows[:, 1:],
-        values.get("aside_first_m", 0.0),
-        values.get("aside_middle_m", 0.0),
-        values.get("aside_last_m", 0.0),
-    )
+    points = shifted_path(rows[:, 1:], values)
     keys = [[when(t_s), *point] for t_s, point in zip(rows[:, 0], points.tolist(), strict=True)]
     if pause_s > 0.0:
         row = int(np.argmin(np.abs(rows[:, 0] - halt_s)))
@@ -121,7 +109,7 @@ def _set_off(script: dict[str, Any], values: Mapping[str, float]) -> None:
     after_s = values.get("sets_off_after_s", _STAYS_S)
     way = values.get("sets_off_x_m", 0.0), values.get("sets_off_y_m", 0.0)
     length_m = math.hypot(*way)
-    if after_s >= _STAYS_S or length_m < _SHORTEST_WAY_M:
+    if after_s >= _STAYS_S or length_m < SHORTEST_WAY_M:
         return
     here = script["path"][-1]
     begin_s = here["t_s"] + max(after_s, _KEY_S)

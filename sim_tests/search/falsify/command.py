@@ -86,6 +86,7 @@ def falsify(**values: Any) -> int:
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings
     --scenario` runs them again), episodes.csv, falsify.png, summary.json and the studies.
     """
-    from ._run import FalsifyOptions, falsify_command  # noqa: PLC0415 - help needs no simulator
+    from ...study.runs import Conditions  # noqa: PLC0415 - help needs no simulator
+    from ._run import run_falsify  # noqa: PLC0415
 
-    return falsify_command(FalsifyOptions(**values))
+    return run_falsify(conditions=Conditions.taken_from(values), **values)

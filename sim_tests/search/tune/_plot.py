@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 from awarenav.errors import counted
 from awarenav.figures import new_figure, save_figure, scale_by_roots
 
-from .._shared_study import NOTES
 from ._evaluation import FIGURES, RISK
 from ._tune import Tuning
 
@@ -37,7 +36,6 @@ def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], p
 
 
 def _draw_trials(axes: Axes, tuning: Tuning) -> None:
-    within = {trial.number for trial in tuning.ranked}
     groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {
         (_TRIAL, "o", "trial"): [],
         (_WITHIN, "o", "trial within the bounds"): [],
@@ -45,11 +43,12 @@ def _draw_trials(axes: Axes, tuning: Tuning) -> None:
     }
     other, fine, touched = groups.values()
     for trial in tuning.trials:
-        if trial.values is None:
-            continue
-        notes = trial.user_attrs[NOTES]
-        rows = touched if notes["moving_contacts"] else fine if trial.number in within else other
-        rows.append((trial.values[0], max(notes[RISK], 0.0)))
+        time_s, notes = trial.outcome.value, trial.outcome.notes
+        if time_s is not None:
+            kind = (
+                touched if notes["moving_contacts"] else fine if trial in tuning.ranked else other
+            )
+            kind.append((time_s, max(notes[RISK], 0.0)))
     for (colour, marker, label), points in groups.items():
         if points:
             times_s, risks = zip(*points, strict=True)

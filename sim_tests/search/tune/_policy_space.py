@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -17,7 +16,7 @@ from perception.documents import parse_yaml, read_yaml
 from tracking.config import complaints
 
 from ...world.errors import SimError
-from .._optimizer import Range
+from .._study import Range
 
 # Lower bounds of all ranges: the floor.
 _LOWER_BOUNDS: Final = {
@@ -73,9 +72,9 @@ class PolicySpace:
     def __init__(
         self, base: AwarenessPolicy, ranges: Mapping[str, PolicyRange] | None = None
     ) -> None:
-        self._data: dict[str, Any] = base.model_dump(mode="json")
+        self._base = _flat(base.model_dump(mode="json"))
         given = shipped_ranges() if ranges is None else ranges
-        self.ranges = {key: each for key, each in given.items() if not _is_off(self._data, key)}
+        self.ranges = {key: each for key, each in given.items() if not self._is_off(key)}
         if not self.ranges:
             raise SimError("the policy has turned off every part that the ranges search")
         for key, each in self.ranges.items():
@@ -85,17 +84,16 @@ class PolicySpace:
                     raise SimError(
                         f"{place}: must not be searched below {bound:g}, got {each.low:g}"
                     )
-                if _is_off(self._data, place):
-                    continue
-                if not isinstance(_get(self._data, place), float | int):
-                    hint = did_you_mean(place, _number_keys(self._data))
+                if not self._is_off(place) and not _is_number(self._base.get(place)):
+                    numbers = [name for name, value in self._base.items() if _is_number(value)]
+                    hint = did_you_mean(place, numbers)
                     raise SimError(f"the policy has no number {place!r}{hint}")
         for corner in (0.0, 1.0):
             self.policy({p: (1 - corner) * r.low + corner * r.high for p, r in self.ranges.items()})
 
     def base_parameters(self) -> dict[str, float]:
         """Return the point of the base policy, or the nearest point of the space."""
-        return {key: each.clipped(_get(self._data, key)) for key, each in self.ranges.items()}
+        return {key: each.clipped(self._base[key]) for key, each in self.ranges.items()}
 
     def policy(self, parameters: Mapping[str, float]) -> AwarenessPolicy:
         """Return the policy at a point of the space.
@@ -103,24 +101,31 @@ class PolicySpace:
         Raises:
             SimError: values that no policy may have.
         """
-        data = copy.deepcopy(self._data)
+        data = dict(self._base)
         for key, value in parameters.items():
             for place in (key, *self.ranges[key].also):
-                _put(data, place, value)
+                if place in data:
+                    data[place] = value
         for larger, smaller in _AT_MOST:
-            if _has_both(data, larger, smaller):
-                _put(data, smaller, min(_get(data, smaller), _get(data, larger)))
+            if data.get(larger) is not None and data.get(smaller) is not None:
+                data[smaller] = min(data[smaller], data[larger])
         for below, above, gap in _ABOVE:
-            if _has_both(data, below, above):
-                _put(data, above, max(_get(data, above), _get(data, below) + gap))
+            if data.get(below) is not None and data.get(above) is not None:
+                data[above] = max(data[above], data[below] + gap)
         try:
-            return AwarenessPolicy.model_validate(data)
+            return AwarenessPolicy.model_validate(_nested(data))
         except ValidationError as cause:
             raise SimError(
                 f"a range leads to a policy that cannot be: {complaints(cause)}"
             ) from cause
         except NavError as cause:
             raise SimError(f"a range leads to a policy that cannot be: {cause}") from cause
+
+    def _is_off(self, place: str) -> bool:
+        """Return whether the policy has null for a part that holds the dotted key."""
+        parts = place.split(".")
+        above = (".".join(parts[:depth]) for depth in range(1, len(parts)))
+        return any(part in self._base and self._base[part] is None for part in above)
 
 
 def shipped_ranges() -> dict[str, PolicyRange]:
@@ -153,52 +158,28 @@ def _parsed_ranges(data: Any, source: str) -> dict[str, PolicyRange]:
     return ranges
 
 
-def _get(data: Mapping[str, Any], place: str) -> Any:
-    """Return the value at a dotted key; None without one."""
-    node: Any = data
-    for key in place.split("."):
-        if not isinstance(node, Mapping) or key not in node:
-            return None
-        node = node[key]
-    return node
+def _is_number(value: Any) -> bool:
+    return isinstance(value, float | int) and not isinstance(value, bool)
 
 
-def _is_off(data: Mapping[str, Any], place: str) -> bool:
-    """Return whether the policy has null for a part that holds the dotted key."""
-    *parts, _ = place.split(".")
-    node: Any = data
-    for part in parts:
-        if not isinstance(node, Mapping) or part not in node:
-            return False
-        node = node[part]
-        if node is None:
-            return True
-    return False
-
-
-def _has_both(data: Mapping[str, Any], *places: str) -> bool:
-    """Return whether the policy has a value in all of these places."""
-    return all(_get(data, place) is not None for place in places)
-
-
-def _put(data: dict[str, Any], place: str, value: Any) -> None:
-    """Set the value at a dotted key, if the policy has that key."""
-    *parents, last = place.split(".")
-    node = data
-    for key in parents:
-        if not isinstance(node.get(key), dict):
-            return
-        node = node[key]
-    if last in node:
-        node[last] = value
-
-
-def _number_keys(data: Mapping[str, Any], start: str = "") -> list[str]:
-    """Return the dotted keys of all numbers."""
-    found = []
+def _flat(data: Mapping[str, Any], start: str = "") -> dict[str, Any]:
+    """Return nested values by dotted key; an empty part is a value."""
+    flat: dict[str, Any] = {}
     for key, value in data.items():
-        if isinstance(value, Mapping):
-            found += _number_keys(value, f"{start}{key}.")
-        elif isinstance(value, float | int) and not isinstance(value, bool):
-            found.append(f"{start}{key}")
-    return found
+        if isinstance(value, Mapping) and value:
+            flat |= _flat(value, f"{start}{key}.")
+        else:
+            flat[start + key] = value
+    return flat
+
+
+def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the nested values of which :func:`_flat` gives the dotted keys."""
+    data: dict[str, Any] = {}
+    for place, value in flat.items():
+        *parents, last = place.split(".")
+        node = data
+        for key in parents:
+            node = node.setdefault(key, {})
+        node[last] = value
+    return data

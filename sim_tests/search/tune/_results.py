@@ -1,11 +1,8 @@
-"""The result files of a tuning, and its table."""
+"""The results of a tuning: its files, its table and its verdict against the base policy."""
 
 from __future__ import annotations
 
 import json
-import math
-import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,17 +10,15 @@ from awarenav.errors import counted
 from awarenav.files import csv_number, write_text
 
 from ...actors.behaviour import DEFAULT_POPULATION
-from ...study.measures import Interval
+from ...study.measures import FEW_PAIRS, Interval, zero_of_n_upper
 from ...study.runs import policy_text
 from ...world.errors import SimError
-from .._files import templates_of, write_csv
-from .._optuna import optuna
-from .._shared_study import NOTES
+from .._settings import write_csv
+from .._study import importances
 from ._evaluation import FIGURES, OBJECTIVE, RISK
-from ._finalists import REASONS, Candidate
+from ._finalists import BEATS_BASE, REASONS, Candidate, level_of
 from ._plot import draw_tuning
 from ._tune import Tuning
-from ._verdict import verdict_text
 
 # Words and unit of each figure.
 _LABELS: Final = {
@@ -32,43 +27,16 @@ _LABELS: Final = {
 }
 
 
-def importances(study: optuna.Study) -> dict[str, dict[str, float]]:
-    """Return the importance of each parameter, by figure; the importances of a figure sum to 1.
-
-    The importance is a parameter's share in being among the best tenth, by PED-ANOVA (Watanabe,
-    Bansal and Hutter 2023). All are 0 for fewer than three trials, and where the trials do not
-    differ in the figure.
-    """
-    done = [t for t in study.get_trials(deepcopy=False) if t.values is not None]
-    names = sorted({name for trial in done for name in trial.params})
-    figures: dict[str, Callable[[optuna.trial.FrozenTrial], float]] = {
-        OBJECTIVE: lambda trial: trial.values[0],
-        RISK: lambda trial: float(trial.user_attrs[NOTES][RISK]),
-    }
-    return {name: _importance(study, target, names, done) for name, target in figures.items()}
-
-
-def _importance(
-    study: optuna.Study,
-    target: Callable[[optuna.trial.FrozenTrial], float],
-    names: list[str],
-    done: list[optuna.trial.FrozenTrial],
-) -> dict[str, float]:
-    nothing = dict.fromkeys(names, 0.0)
-    if len(done) < 3 or len({target(trial) for trial in done}) < 2:
-        return nothing
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        found = optuna.importance.get_param_importances(
-            study, evaluator=optuna.importance.PedAnovaImportanceEvaluator(), target=target
-        )
-    known = {name: value for name, value in found.items() if math.isfinite(value)}
-    return dict(sorted((nothing | known).items(), key=lambda each: -each[1]))
-
-
 def write_tuning(tuning: Tuning, folder: Path) -> None:
     """Write trials.csv, importances.json, chosen.json, chosen/*.yaml and tuning.png."""
-    importance = importances(tuning.study)
+    done = [trial for trial in tuning.trials if trial.outcome.value is not None]
+    points = [trial.parameters for trial in done]
+    times_s = [float(trial.outcome.value or 0.0) for trial in done]
+    risks = [float(trial.outcome.notes[RISK]) for trial in done]
+    importance = {
+        name: importances(points, values, tuning.ranges)
+        for name, values in zip(FIGURES, (times_s, risks), strict=True)
+    }
     _write_trials(tuning, folder / "trials.csv")
     _write_json(folder / "importances.json", importance)
     base = tuning.base
@@ -131,7 +99,7 @@ def table_lines(tuning: Tuning) -> list[str]:
     )
     if tuning.settings.requests is not None:
         lines.append(f"At most {tuning.settings.requests:g} requests for attention per crossing.")
-    trials = [trial.user_attrs.get(NOTES, {}) for trial in tuning.trials]
+    trials = [trial.outcome.notes for trial in tuning.trials]
     early = [notes for notes in trials if notes.get("dropped")]
     if early:
         episodes = sum(notes["episodes"] for notes in early)
@@ -142,26 +110,144 @@ def table_lines(tuning: Tuning) -> list[str]:
     return lines
 
 
+def verdict_text(tuning: Tuning) -> str:
+    """Return whether a chosen policy is better than the base policy, in sentences."""
+    base, winner = tuning.base, tuning.winner
+    if not tuning.ranked:
+        return (
+            f"keep {base.name}. No trial ran all of its episodes within the bounds and without "
+            "a contact with the moving robot."
+        )
+    if winner is not None:
+        return (
+            f"{BEATS_BASE} ({_also(winner)}) is better than {base.name}. "
+            + _comparison(tuning, winner)
+            + " It has not been falsified yet."
+        )
+    nearest = nearest_candidate(tuning)
+    if nearest is None:
+        return f"keep {base.name}. No trial within the bounds differs from it and the presets."
+    reason = _reason(tuning, nearest)
+    return (
+        f"keep {base.name}. The nearest is {nearest.name} ({_also(nearest)}): {reason}. "
+        + _comparison(tuning, nearest)
+    )
+
+
+def nearest_candidate(tuning: Tuning) -> Candidate | None:
+    """Return the chosen policy with the fewest contacts and the least time lost on held-out.
+
+    One above the risk or the bound of requests comes after those within it.
+    """
+    return min(
+        tuning.chosen,
+        key=lambda each: (
+            each.held_out.moving_contacts,
+            not tuning.allows(each),
+            each.held_out.figures,
+        ),
+        default=None,
+    )
+
+
+def is_undecided(tuning: Tuning) -> bool:
+    """Return whether more held-out episodes could show that a chosen policy is better."""
+    return tuning.winner is None and any(
+        not each.held_out.moving_contacts
+        and tuning.allows(each)
+        and tuning.minus_base(each).value < 0.0
+        for each in tuning.chosen
+    )
+
+
+def _also(candidate: Candidate) -> str:
+    return ", ".join([f"trial {candidate.trial}", *candidate.names[1:]])
+
+
+def _reason(tuning: Tuning, candidate: Candidate) -> str:
+    """Return why a policy does not beat the base policy."""
+    if candidate.held_out.moving_contacts:
+        return "the moving robot and a person touched in held-out episodes"
+    if not tuning.allows(candidate):
+        risky = candidate.held_out.risk > tuning.held_out_risk
+        what = "is above the risk" if risky else "asks for attention too often"
+        return f"it {what} on held-out episodes"
+    change = tuning.minus_base(candidate)
+    if change.n < FEW_PAIRS:
+        return f"fewer than {FEW_PAIRS} pairs of held-out episodes show nothing"
+    if change.low <= 0.0 <= change.high:
+        return "a difference is not shown"
+    if change.low > 0.0:
+        return "it is shown to lose more time"
+    return "it does not hold in the held-out scenarios alone"
+
+
+def _comparison(tuning: Tuning, candidate: Candidate) -> str:
+    """Return the differences to the base policy on held-out episodes, and the contacts."""
+    settings, base = tuning.settings, tuning.base
+    level = level_of(len(tuning.chosen))
+    held_out = candidate.held_out
+    text = f"On {counted(len(held_out.records), 'held-out episode')} it " + change_text(
+        tuning.minus_base(candidate)
+    )
+    if settings.hold_out_scenarios:
+        alone = held_out.within(settings.hold_out_scenarios)
+        where = counted(len(settings.hold_out_scenarios), "held-out scenario")
+        text += f"; in the {where} alone it " + change_text(
+            alone.minus(base.held_out, OBJECTIVE, level)
+        )
+    else:
+        text += "; no scenario was held out"
+    n, contacts = len(held_out.records), held_out.moving_contacts
+    touched = (
+        f"The moving robot touched nobody (at most {100.0 * zero_of_n_upper(n):.1f} % with 95 % "
+        "confidence)."
+        if not contacts
+        else f"The moving robot and a person touched in {contacts} of them."
+    )
+    risk = (
+        f"It has {held_out.risk:.2f} step-out impacts per 1 000 crossings, {base.name} "
+        f"{base.held_out.risk:.2f}; {tuning.held_out_risk:.2f} are allowed."
+    )
+    if tuning.asks:
+        most = "" if settings.requests is None else f"; {settings.requests:g} are allowed"
+        risk += (
+            f" It makes {held_out.requests:.2f} requests for attention per crossing, {base.name} "
+            f"{base.held_out.requests:.2f}{most}."
+        )
+    return f"{text} ({100.0 * level:.4g} % intervals). {risk} {touched}"
+
+
+def change_text(change: Interval) -> str:
+    """Return a paired difference in time lost in words, such as ``"loses 0.30 s less (…)"``."""
+    if not change.known:
+        return "loses ? (no pair)"
+    amount = f"{abs(change.value):.2f}"
+    text = f"loses {amount} s {'less' if change.value < 0.0 else 'more'}"
+    if not float(amount):
+        text = "loses neither less nor more"
+    if not change.bounded:
+        return f"{text} (too few pairs for an interval)"
+    return f"{text} ({change.low:+.2f} to {change.high:+.2f} s)"
+
+
 def _write_trials(tuning: Tuning, path: Path) -> None:
     rank = {trial.number: place for place, trial in enumerate(tuning.ranked, start=1)}
-    names = list(tuning.space.ranges)
     notes = ("moving_contacts", "requests", "reached", "episodes", "dropped")
-    write_csv(
-        path,
-        ["trial", "state", *FIGURES, *notes, "rank", *names],
-        (
+    rows = []
+    for trial in tuning.trials:
+        value, found = trial.outcome.value, trial.outcome.notes
+        rows.append(
             [
                 trial.number,
-                trial.state.name.lower(),
-                *map(csv_number, trial.values or [None]),
-                csv_number(trial.user_attrs.get(NOTES, {}).get(RISK)),
-                *(trial.user_attrs.get(NOTES, {}).get(note, "") for note in notes),
+                "fail" if value is None else "complete",
+                *map(csv_number, (value, found.get(RISK))),
+                *(found.get(note, "") for note in notes),
                 rank.get(trial.number, ""),
-                *(repr(trial.params[name]) for name in names),
+                *(repr(trial.parameters[name]) for name in tuning.ranges),
             ]
-            for trial in tuning.trials
-        ),
-    )
+        )
+    write_csv(path, ["trial", "state", *FIGURES, *notes, "rank", *tuning.ranges], rows)
 
 
 def _figures(tuning: Tuning, candidate: Candidate) -> dict[str, Any]:
@@ -233,7 +319,7 @@ def _others(tuning: Tuning) -> str:
 
 
 def _scenarios(tuning: Tuning) -> list[str]:
-    return [template.id for template in templates_of(tuning.settings.scenarios)]
+    return [template.id for template in tuning.settings.templates]
 
 
 def _ends(seeds: range) -> str:

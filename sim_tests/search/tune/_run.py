@@ -2,136 +2,92 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from ...crossing.eyes import Perception, PerceptionKind, SensorSet
-from .._files import common_settings, templates_of
-from .._optimizer import SamplerName
-from .._verdict import Verdict, command_text, episode_words
+from ...scenario import ScenarioTemplate
+from ...study.runs import Conditions
+from .._settings import command_text, common_settings, episode_words, print_verdict
 from ._finalists import BEATS_BASE
 from ._policy_space import read_ranges, shipped_ranges
-from ._results import table_lines, write_tuning
-from ._settings import TuneSettings, held_out_scenarios
-from ._tune import Tuning, require_trials, tune
-from ._verdict import is_undecided, verdict_text
+from ._results import is_undecided, table_lines, verdict_text, write_tuning
+from ._tune import TuneSettings, Tuning, held_out_scenarios, tune
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TuneOptions:
-    """The options of ``awarenav tune``."""
+def run_tune(
+    *,
+    conditions: Conditions,
+    policy: str,
+    ranges: Path | None,
+    hold_out_scenarios: Sequence[str],
+    workers: int,
+    out: Path,
+    resume: bool,
+    overwrite: bool,
+    as_json: bool,
+    **fields: Any,
+) -> int:
+    """Run the command, whose options these are, and return its exit status.
 
-    policy: str
-    scenario: tuple[str, ...]
-    ranges: Path | None
-    trials: int
-    episodes: int
-    held_out: int
-    hold_out_scenarios: tuple[str, ...]
-    generation: int
-    sampler: SamplerName
-    risk: float | None
-    requests: float | None
-    perception: PerceptionKind
-    sensors: SensorSet
-    camera: str
-    robot: str
-    population: str | None
-    planner: str
-    seed: int
-    workers: int
-    out: Path
-    resume: bool
-    overwrite: bool
-    as_json: bool
-
-
-def tune_command(options: TuneOptions) -> int:
-    """Run the command and return its exit status.
+    The other options are fields of :class:`TuneSettings`, by their names.
 
     Raises:
         SimError: an unusable option.
         NavError: an unusable policy.
     """
-    common = common_settings(
-        options.policy,
-        options.scenario,
-        options.camera,
-        options.population or "",
-        options.robot,
-    )
-    ranges = shipped_ranges() if options.ranges is None else read_ranges(options.ranges)
+    common = common_settings(policy, conditions)
+    templates = [ScenarioTemplate.from_text(text) for text in common["scenarios"]]
+    searched = shipped_ranges() if ranges is None else read_ranges(ranges)
     settings = TuneSettings(
         **common,
-        ranges={key: each.model_dump(mode="json") for key, each in ranges.items()},
-        trials=options.trials,
-        episodes=options.episodes,
-        held_out=options.held_out,
-        perception=Perception.of(options.perception, options.sensors).name,
-        planner=options.planner,
-        seed=options.seed,
-        sampler=options.sampler,
-        generation=options.generation,
-        hold_out_scenarios=held_out_scenarios(
-            options.hold_out_scenarios, templates_of(common["scenarios"])
-        ),
-        risk=options.risk,
-        requests=options.requests,
+        **fields,
+        ranges={key: each.model_dump(mode="json") for key, each in searched.items()},
+        hold_out_scenarios=held_out_scenarios(hold_out_scenarios, templates),
     )
+    given = {"--policy": policy, "--ranges": ranges, "--workers": workers, "--out": out}
 
     def report(tuning: Tuning) -> None:
-        require_trials(tuning)
-        write_tuning(tuning, options.out)
-        if options.as_json:
-            print((options.out / "chosen.json").read_text(encoding="utf-8"), end="")
+        write_tuning(tuning, out)
+        if as_json:
+            print((out / "chosen.json").read_text(encoding="utf-8"), end="")
             return
         print("\n".join(table_lines(tuning)))
-        print("\n".join(_verdict(tuning, options).lines()))
+        following = _next_command(tuning, conditions, given, hold_out_scenarios)
+        print_verdict(verdict_text(tuning), following)
 
-    tune(
-        settings,
-        options.out,
-        workers=options.workers,
-        resume=options.resume,
-        overwrite=options.overwrite,
-        report=report,
-    )
-    if not options.as_json:
-        print(f"Written to {options.out}")
+    tune(settings, out, workers=workers, resume=resume, overwrite=overwrite, report=report)
+    if not as_json:
+        print(f"Written to {out}")
     return 0
 
 
-def _verdict(tuning: Tuning, options: TuneOptions) -> Verdict:
-    """Return what the tuning has shown, and the next command."""
+def _next_command(
+    tuning: Tuning, conditions: Conditions, given: Mapping[str, Any], hold_out: Sequence[str]
+) -> str:
+    """Return the next command: falsify the winner, or go on with more seeds or more trials."""
+    settings, out = tuning.settings, given["--out"]
     if tuning.winner is not None:
-        command = command_text(
-            "falsify",
-            *("--policy", options.out / "chosen" / f"{BEATS_BASE}.yaml"),
-            *("--against", options.policy),
-            *episode_words(options),
-            *("--workers", options.workers, "--out", options.out / "falsify"),
+        return command_text(
+            *("falsify", "--policy", out / "chosen" / f"{BEATS_BASE}.yaml"),
+            *("--against", given["--policy"], *episode_words(conditions)),
+            *("--workers", given["--workers"], "--out", out / "falsify"),
         )
-    elif is_undecided(tuning):
-        command = _continued(options, options.trials, 2 * options.held_out)
-    else:
-        command = _continued(options, 2 * options.trials, options.held_out)
-    return Verdict(verdict_text(tuning), command)
-
-
-def _continued(options: TuneOptions, trials: int, held_out: int) -> str:
-    """Return the command that goes on with the tuning."""
-    ranges = () if options.ranges is None else ("--ranges", options.ranges)
-    risk = () if options.risk is None else ("--risk", options.risk)
-    requests = () if options.requests is None else ("--requests", options.requests)
+    more_seeds = is_undecided(tuning)
+    words = ["tune", "--policy", given["--policy"], *episode_words(conditions)]
+    for name, value in (
+        ("--ranges", given["--ranges"]),
+        ("--risk", settings.risk),
+        ("--requests", settings.requests),
+        ("--trials", settings.trials * (1 if more_seeds else 2)),
+        ("--episodes", settings.episodes),
+        ("--held-out", settings.held_out * (2 if more_seeds else 1)),
+    ):
+        if value is not None:
+            words += [name, value]
     return command_text(
-        "tune",
-        *("--policy", options.policy),
-        *episode_words(options),
-        *ranges,
-        *risk,
-        *requests,
-        *("--trials", trials, "--episodes", options.episodes, "--held-out", held_out),
-        *("--hold-out-scenarios", *options.hold_out_scenarios),
-        *("--generation", options.generation, "--sampler", options.sampler),
-        *("--seed", options.seed, "--workers", options.workers, "--out", options.out, "--resume"),
+        *words,
+        *("--hold-out-scenarios", *hold_out),
+        *("--generation", settings.generation, "--sampler", settings.sampler),
+        *("--seed", settings.seed, "--workers", given["--workers"], "--out", out, "--resume"),
     )

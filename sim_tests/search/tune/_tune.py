@@ -2,53 +2,142 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final, cast
+from typing import Any, Final, cast
 
-from awarenav.errors import counted
+import filelock
+
+from awarenav.errors import counted, not_one_of
 from nav_adapter import AwarenessPolicy
 
 from ...crossing import named_policy
-from ...study.frontier import TODAY
-from ...study.measures import Interval
-from ...study.runs import policy_of
+from ...crossing.eyes import Perception
+from ...scenario import ScenarioTemplate
+from ...study.frontier import TODAY, sensors_of_today
+from ...study.measures import EpisodeRecord, Interval, read_records, write_records
+from ...study.runs import Job, plan_jobs, policy_of
 from ...world.errors import SimError
-from .._episode_runner import EpisodeRunner
-from .._files import write_or_check_settings
-from .._optimizer import Optimizer, Outcome, SamplerName
-from .._optuna import optuna
-from .._process_lock import ProcessLock
-from .._shared_study import NOTES, Claim, SharedStudy
-from ._evaluation import OBJECTIVE, RISK, Evaluation
-from ._evaluator import PolicyEvaluator
+from .._episodes import EpisodeRunner
+from .._settings import SearchSettings, write_or_check_settings
+from .._study import Optimizer, Outcome, ParameterValues, SamplerName, SharedStudy, Trial
+from ._evaluation import OBJECTIVE, RISK, Dropped, Evaluation, dropped, stages
 from ._finalists import BEATS_BASE, PLACES, Candidate, level_of, merged, named_winner
 from ._policy_space import PolicyRange, PolicySpace
-from ._race import Dropped, dropped, stages
-from ._settings import TuneSettings
 
 _SETTINGS_FILE: Final = "tune.json"
 _RESULTS: Final = (
-    "evaluations/*.csv",
-    "evaluations/*.damaged",
-    "trials.csv",
-    "importances.json",
-    "chosen.json",
-    "chosen/*.yaml",
-    "tuning.png",
+    *("evaluations/*.csv", "evaluations/.*.lock", "trials.csv", "importances.json"),
+    *("chosen.json", "chosen/*.yaml", "tuning.png"),
 )
+#: Values of ``--hold-out-scenarios`` beside names.
+THIRD: Final = "third"
+NONE: Final = "none"
+# Distance from the first tuning seed to the first held-out seed.
+_HELD_OUT_OFFSET: Final = 1_000_000
 # Evaluated beside the trials.
 _PRESETS: Final = ("blind", "conservative", "balanced", "assertive", TODAY)
-# Constraints of a trial: the moving robot touches nobody, and the risk and, with a bound, the
-# requests for attention are at most the given ones.
-_CONTACTS: Final = "moving_contacts"
-_OVER_RISK: Final = "over_risk"
-_OVER_REQUESTS: Final = "over_requests"
-_POLL_S: Final = 0.5
 # Without a number of their own, policies may have this share of the risk of today's AMR.
 _SHARE_OF_TODAY: Final = 1.0 / 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TuneSettings(SearchSettings):
+    """The settings of a tuning; ``episodes`` counts tuning seeds, of which ``seed`` is the first.
+
+    Attributes:
+        ranges: search ranges, by dotted key of the policy file.
+        trials: number of policies to try.
+        held_out: number of held-out seeds, each run in every scenario.
+        sampler: ``"tpe"`` or ``"nsga2"``.
+        hold_out_scenarios: names of the scenarios that no trial runs.
+        risk: step-out impacts per 1 000 crossings that a policy may have; None for a twentieth of
+            those of today's AMR in the same episodes.
+        requests: requests for attention that a policy may make per crossing; None for no bound.
+    """
+
+    ranges: dict[str, dict[str, Any]]
+    trials: int
+    held_out: int
+    sampler: str
+    hold_out_scenarios: tuple[str, ...] = ()
+    risk: float | None = None
+    requests: float | None = None
+
+    @property
+    def tuning_templates(self) -> tuple[ScenarioTemplate, ...]:
+        """Scenarios by which trials are judged."""
+        return tuple(each for each in self.templates if each.name not in self.hold_out_scenarios)
+
+    @property
+    def tuning_seeds(self) -> range:
+        """Seeds by which trials are judged."""
+        return range(self.seed, self.seed + self.episodes)
+
+    @property
+    def held_out_seeds(self) -> range:
+        """Seeds that no trial has run; disjoint from the tuning seeds."""
+        first = self.seed + _HELD_OUT_OFFSET
+        return range(first, first + self.held_out)
+
+    def risk_beside(self, today: Evaluation) -> float:
+        """Return the impacts that a policy may have: the given ones, or a share of today's."""
+        return _SHARE_OF_TODAY * today.risk if self.risk is None else self.risk
+
+    def jobs(
+        self,
+        name: str,
+        policy: AwarenessPolicy,
+        seeds: Sequence[int],
+        templates: Sequence[ScenarioTemplate],
+    ) -> tuple[Job, ...]:
+        """Return the episodes of a policy: every seed in every one of some scenarios.
+
+        Today's AMR has its laser scanners alone, where the robot has any.
+
+        Raises:
+            SimError: an episode that cannot be run.
+        """
+        perception = Perception.named(self.perception)
+        sensors = perception.sensors
+        return plan_jobs(
+            templates,
+            [(name, policy)],
+            seeds,
+            planners=[self.planner],
+            perception=perception.kind or "keypoints",  # without a camera it does not matter
+            sensors=[sensors_of_today(sensors) if name == TODAY else sensors],
+        )
+
+
+def held_out_scenarios(
+    given: Sequence[str], templates: Sequence[ScenarioTemplate]
+) -> tuple[str, ...]:
+    """Return the names of the scenarios that no trial runs.
+
+    Args:
+        given: names, with or without the robot's; ``"third"`` for every third scenario, the second
+            of three first, in the order of what people look at (attentive, mixed, unaware) and of
+            the names; or ``"none"``. Of fewer than three scenarios, ``"third"`` holds none out.
+        templates: all scenarios of the tuning.
+
+    Raises:
+        SimError: an unknown name, or no scenario is left to tune on.
+    """
+    names = [each.name for each in sorted(templates, key=lambda each: (each.attention, each.name))]
+    if tuple(given) == (NONE,):
+        return ()
+    if tuple(given) == (THIRD,):
+        return tuple(names[1::3]) if len(names) >= 3 else ()
+    meant = {also: each.name for each in templates for also in each.names}
+    for name in given:
+        if name not in meant:
+            raise SimError(not_one_of("--hold-out-scenarios", name, (THIRD, NONE, *names)))
+    chosen = {meant[name] for name in given}
+    if len(chosen) == len(names):
+        raise SimError("--hold-out-scenarios must leave a scenario to tune on, got all of them")
+    return tuple(name for name in names if name in chosen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +146,7 @@ class Tuning:
 
     Attributes:
         settings: its settings.
-        space: its search space.
-        study: Optuna's study.
+        ranges: of the parameters of the trials.
         trials: all finished trials, by number.
         ranked: trials within the constraints that ran every episode, by time lost.
         anchors: the base policy, the presets and today's AMR.
@@ -68,10 +156,9 @@ class Tuning:
     """
 
     settings: TuneSettings
-    space: PolicySpace
-    study: optuna.Study
-    trials: tuple[optuna.trial.FrozenTrial, ...]
-    ranked: tuple[optuna.trial.FrozenTrial, ...]
+    ranges: Mapping[str, PolicyRange]
+    trials: tuple[Trial, ...]
+    ranked: tuple[Trial, ...]
     anchors: tuple[Candidate, ...]
     chosen: tuple[Candidate, ...]
     risk: float
@@ -107,6 +194,21 @@ class Tuning:
         return candidate.held_out.minus(self.base.held_out, OBJECTIVE, level)
 
 
+def ranked_trials(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials that satisfy every constraint, by time lost.
+
+    A trial that was dropped before it ran every episode is not among them.
+    """
+    feasible = [
+        (trial.outcome.value, trial.number, trial)
+        for trial in trials
+        if trial.outcome.value is not None
+        and all(value <= 0.0 for value in trial.outcome.constraints.values())
+        and not trial.outcome.notes.get("dropped")
+    ]
+    return [trial for _, _, trial in sorted(feasible, key=lambda each: each[:2])]
+
+
 def tune(
     settings: TuneSettings,
     folder: Path,
@@ -118,16 +220,12 @@ def tune(
 ) -> Tuning:
     """Search until all trials are finished, by this or other processes.
 
-    Args:
-        settings: settings of the search.
-        folder: made when missing; holds the study.
-        workers: number of processes that run episodes.
-        resume: continue the search in the folder.
-        overwrite: replace the search in the folder.
-        report: called with the result while the study is open.
+    The folder is made when missing. The result does not depend on the number of workers. It is
+    given to ``report`` while no other process reports in the folder.
 
     Raises:
-        SimError: settings that do not fit together, or a preset with an episode without a result.
+        SimError: settings that do not fit together, a preset with an episode without a result, or
+            no trial with one.
     """
     base = policy_of(settings.policy)
     ranges = {key: PolicyRange.model_validate(each) for key, each in settings.ranges.items()}
@@ -137,103 +235,34 @@ def tune(
         space.ranges,
         generation=settings.generation,
         seed=settings.seed,
-        initial=[space.base_parameters()],
+        first=space.base_parameters(),
     )
     # Refuses what cannot be run.
     settings.jobs(settings.policy_name, base, settings.tuning_seeds, settings.templates)
     anchors = _anchors(settings.policy_name, base)
     write_or_check_settings(
         settings,
-        folder,
-        _SETTINGS_FILE,
+        folder / _SETTINGS_FILE,
         "tuning",
         resume=resume,
         overwrite=overwrite,
         results=_RESULTS,
         may_grow=["trials", "held_out"],
     )
-    with (
-        SharedStudy(folder, "tune", optimizer, settings.trials) as study,
-        EpisodeRunner(workers, "tune") as runner,
-    ):
-        evaluator = PolicyEvaluator(settings, runner, folder)
-        runner.bar.total = _planned_episodes(settings, study.finished_count, len(anchors))
-        runner.bar.set_postfix_str("presets")
-        tuned = {
-            name: evaluator.evaluate_all(
-                name, policy, settings.tuning_seeds, settings.tuning_templates
-            )
-            for name, policy in anchors.items()
-        }
-        race = _Race(space, evaluator, settings, anchors, tuned, _risk(settings, tuned[TODAY]))
-        _run_trials(study, settings, race, runner)
+    study = SharedStudy(folder / "study.log", optimizer, settings.trials)
+    with EpisodeRunner(workers, "tune") as runner:
+        race = _Race(settings, folder, runner, space, anchors)
+        runner.bar.total = race.planned_episodes(len(study.trials()))
+        race.run_anchors()
+        while len(done := study.trials()) < settings.trials:
+            runner.bar.set_postfix_str(f"{len(done)} of {counted(settings.trials, 'trial')}")
+            study.evaluate(1, race.outcomes)
         runner.bar.set_postfix_str("held-out seeds")
-        tuning = _tuning(study, race)
+        tuning = race.result(done)
         runner.bar.total = runner.bar.n  # some episodes were known before, some trials dropped
-        runner.bar.close()
-        with ProcessLock(folder / "locks" / "report.lock"):  # several processes may end at once
-            report(tuning)
+    with filelock.FileLock(folder / "evaluations" / ".report.lock"):  # several may end at once
+        report(tuning)
     return tuning
-
-
-def _tuning(study: SharedStudy, race: _Race) -> Tuning:
-    """Return the result of a finished study; runs the held-out seeds."""
-    settings, trials = race.settings, study.finished_trials()
-    ranked = ranked_trials(trials)
-    rows = merged(
-        [
-            *(race.anchor(name) for name in race.anchors),
-            *(race.finalist(trial, (name,)) for name, trial in zip(PLACES, ranked, strict=False)),
-        ]
-    )
-    anchors = tuple(each for each in rows if each.trial is None)
-    new = [each for each in rows if each.trial is not None]
-    today = next(each for each in anchors if TODAY in each.names)
-    held_out_risk = _risk(settings, today.held_out)
-    return Tuning(
-        settings=settings,
-        space=race.space,
-        study=study.study,
-        trials=tuple(trials),
-        ranked=tuple(ranked),
-        anchors=anchors,
-        chosen=tuple(
-            named_winner(
-                new, anchors[0], held_out_risk, settings.hold_out_scenarios, settings.requests
-            )
-        ),
-        risk=race.risk,
-        held_out_risk=held_out_risk,
-    )
-
-
-def _risk(settings: TuneSettings, today: Evaluation) -> float:
-    """Return the impacts that a policy may have: the given ones, or a share of today's."""
-    return _SHARE_OF_TODAY * today.risk if settings.risk is None else settings.risk
-
-
-def ranked_trials(
-    trials: Sequence[optuna.trial.FrozenTrial],
-) -> list[optuna.trial.FrozenTrial]:
-    """Return the trials that satisfy every constraint, by time lost.
-
-    A trial that was dropped before it ran every episode is not among them.
-    """
-    feasible = [
-        trial
-        for trial in trials
-        if trial.state == optuna.trial.TrialState.COMPLETE
-        and all(value <= 0.0 for value in trial.constraints.values())
-        and not trial.user_attrs.get(NOTES, {}).get("dropped")
-    ]
-    return sorted(feasible, key=lambda trial: (trial.values[0], trial.number))
-
-
-def require_trials(tuning: Tuning) -> None:
-    """Raise SimError if no trial has a result."""
-    if not any(trial.state == optuna.trial.TrialState.COMPLETE for trial in tuning.trials):
-        first = next(iter(tuning.trials)).user_attrs.get(NOTES, {}).get("error", "")
-        raise SimError(f"no trial could be judged; the first said: {first}")
 
 
 def _anchors(policy_name: str, base: AwarenessPolicy) -> dict[str, AwarenessPolicy]:
@@ -247,111 +276,187 @@ def _anchors(policy_name: str, base: AwarenessPolicy) -> dict[str, AwarenessPoli
     return anchors
 
 
-def _planned_episodes(settings: TuneSettings, finished_trials: int, anchors: int) -> int:
-    """Return the number of episodes that are left at most."""
-    per_trial = settings.episodes * len(settings.tuning_templates)
-    per_held_out = settings.held_out * len(settings.scenarios)
-    left = settings.trials - finished_trials
-    return per_trial * (left + anchors) + per_held_out * (anchors + len(PLACES))
-
-
-def _run_trials(
-    study: SharedStudy, settings: TuneSettings, race: _Race, runner: EpisodeRunner
-) -> None:
-    """Evaluate trials until all are finished, by this or other processes."""
-    while not study.is_complete:
-        runner.bar.set_postfix_str(f"{study.finished_count} of {counted(settings.trials, 'trial')}")
-        if not study.evaluate(1, race.outcomes):
-            runner.bar.set_postfix_str("others work on the rest of this generation")
-            time.sleep(_POLL_S)
-
-
 @dataclass(frozen=True, slots=True)
 class _Race:
     """Runs trials, each only as long as it does not lose to the base policy, and the finalists.
 
     Attributes:
-        space: gives the policy of a trial.
-        evaluator: runs episodes.
         settings: settings of the tuning.
+        folder: its folder, where the records of all episodes are kept.
+        runner: runs episodes.
+        space: gives the policy of a trial.
         anchors: the base policy and the presets, by name.
         tuned: their evaluations on the tuning seeds.
-        risk: step-out impacts per 1 000 crossings that a policy may have on the tuning seeds.
     """
 
-    space: PolicySpace
-    evaluator: PolicyEvaluator
     settings: TuneSettings
+    folder: Path
+    runner: EpisodeRunner
+    space: PolicySpace
     anchors: dict[str, AwarenessPolicy]
-    tuned: dict[str, Evaluation]
-    risk: float
+    tuned: dict[str, Evaluation] = field(default_factory=dict)
 
-    def outcomes(self, claims: Sequence[Claim]) -> list[Outcome]:
-        """Return the outcomes of trials."""
-        return [self._outcome(claim) for claim in claims]
+    def planned_episodes(self, finished_trials: int) -> int:
+        """Return the number of episodes that are left at most."""
+        settings = self.settings
+        per_trial = settings.episodes * len(settings.tuning_templates)
+        per_held_out = settings.held_out * len(settings.scenarios)
+        left = settings.trials - finished_trials
+        return per_trial * (left + len(self.anchors)) + per_held_out * (
+            len(self.anchors) + len(PLACES)
+        )
 
-    def anchor(self, name: str) -> Candidate:
+    def run_anchors(self) -> None:
+        """Evaluate the base policy and the presets on the tuning seeds."""
+        self.runner.bar.set_postfix_str("presets")
+        for name, policy in self.anchors.items():
+            self.tuned[name] = self._tuned(name, policy)
+
+    def outcomes(self, trials: Mapping[int, ParameterValues]) -> list[Outcome]:
+        """Return the outcomes of trials, given their parameters by number."""
+        return [self._outcome(_label(number), values) for number, values in trials.items()]
+
+    def result(self, trials: Sequence[Trial]) -> Tuning:
+        """Return the result of a finished study; runs the held-out seeds."""
+        if all(trial.outcome.value is None for trial in trials):
+            error = trials[0].outcome.notes["error"]
+            raise SimError(f"no trial could be judged; the first said: {error}")
+        settings, ranked = self.settings, ranked_trials(trials)
+        places = zip(PLACES, ranked, strict=False)
+        rows = merged(
+            [
+                *(self._anchor(name) for name in self.anchors),
+                *(self._finalist(trial, (name,)) for name, trial in places),
+            ]
+        )
+        anchors = tuple(each for each in rows if each.trial is None)
+        today = next(each for each in anchors if TODAY in each.names)
+        held_out_risk = settings.risk_beside(today.held_out)
+        new = [each for each in rows if each.trial is not None]
+        elsewhere = settings.hold_out_scenarios
+        chosen = named_winner(new, anchors[0], held_out_risk, elsewhere, settings.requests)
+        return Tuning(
+            settings=settings,
+            ranges=self.space.ranges,
+            trials=tuple(trials),
+            ranked=tuple(ranked),
+            anchors=anchors,
+            chosen=tuple(chosen),
+            risk=self._risk,
+            held_out_risk=held_out_risk,
+        )
+
+    @property
+    def _risk(self) -> float:
+        return self.settings.risk_beside(self.tuned[TODAY])
+
+    def _anchor(self, name: str) -> Candidate:
         """Return the base policy or a preset as a candidate."""
         policy = self.anchors[name]
         return Candidate((name,), None, policy, self.tuned[name], self._held_out(name, policy))
 
-    def finalist(self, trial: optuna.trial.FrozenTrial, names: tuple[str, ...]) -> Candidate:
+    def _finalist(self, trial: Trial, names: tuple[str, ...]) -> Candidate:
         """Return a trial as a candidate; as the anchor whose policy it has, if there is one."""
-        policy, label = self.space.policy(trial.params), _trial_label(trial.number)
+        policy, label = self.space.policy(trial.parameters), _label(trial.number)
         for name, known in self.anchors.items():
             if known == policy:
-                return replace(self.anchor(name), names=names)
-        settings = self.settings
-        tuned = self.evaluator.evaluate_all(
-            label, policy, settings.tuning_seeds, settings.tuning_templates
-        )
-        return Candidate(names, trial.number, policy, tuned, self._held_out(label, policy))
+                return replace(self._anchor(name), names=names)
+        tuned, held_out = self._tuned(label, policy), self._held_out(label, policy)
+        return Candidate(names, trial.number, policy, tuned, held_out)
 
-    def _held_out(self, name: str, policy: AwarenessPolicy) -> Evaluation:
-        settings = self.settings
-        return self.evaluator.evaluate_all(
-            name, policy, settings.held_out_seeds, settings.templates
-        )
-
-    def _outcome(self, claim: Claim) -> Outcome:
-        policy, base = self.space.policy(claim.parameters), self.tuned[self.settings.policy_name]
+    def _outcome(self, label: str, parameters: ParameterValues) -> Outcome:
+        settings, base = self.settings, self.tuned[self.settings.policy_name]
+        policy = self.space.policy(parameters)
         evaluation = Evaluation(())
         reason: Dropped = ""
         for name, known in self.anchors.items():
             if known == policy:  # the first trial is the base policy
                 evaluation = self.tuned[name]
         if not evaluation.records:
-            for seeds in stages(self.settings.tuning_seeds):
-                part = self.evaluator.evaluate(
-                    _trial_label(claim.number), policy, seeds, self.settings.tuning_templates
-                )
+            for seeds in stages(settings.tuning_seeds):
+                part = self._evaluate(label, policy, seeds, settings.tuning_templates)
                 if part.errors:
                     # Episodes without a result must not make a policy look better.
                     return Outcome(None, notes={"error": part.errors[0]})
                 evaluation = Evaluation.joined([evaluation, part])
                 if len(evaluation.records) == len(base.records):
                     break
-                reason = dropped(evaluation, base, self.risk)
+                reason = dropped(evaluation, base, self._risk)
                 if reason:
                     break
         time_s, risk = evaluation.estimate(base)
         contacts, requests = evaluation.moving_contacts, evaluation.requests
-        constraints = {_CONTACTS: float(contacts), _OVER_RISK: risk - self.risk}
-        if self.settings.requests is not None:
-            constraints[_OVER_REQUESTS] = requests - self.settings.requests
-        return Outcome(
-            (time_s,),
-            constraints,
-            {
-                RISK: risk,
-                _CONTACTS: contacts,
-                "requests": requests,
-                "reached": evaluation.reached,
-                "episodes": len(evaluation.records),
-                "dropped": reason,
-            },
-        )
+        constraints = {"moving_contacts": float(contacts), "over_risk": risk - self._risk}
+        if settings.requests is not None:
+            constraints["over_requests"] = requests - settings.requests
+        notes = {
+            RISK: risk,
+            "moving_contacts": contacts,
+            "requests": requests,
+            "reached": evaluation.reached,
+            "episodes": len(evaluation.records),
+            "dropped": reason,
+        }
+        return Outcome(time_s, constraints, notes)
+
+    def _tuned(self, name: str, policy: AwarenessPolicy) -> Evaluation:
+        settings = self.settings
+        return self._evaluate_all(name, policy, settings.tuning_seeds, settings.tuning_templates)
+
+    def _held_out(self, name: str, policy: AwarenessPolicy) -> Evaluation:
+        settings = self.settings
+        return self._evaluate_all(name, policy, settings.held_out_seeds, settings.templates)
+
+    def _evaluate_all(
+        self,
+        name: str,
+        policy: AwarenessPolicy,
+        seeds: range,
+        templates: Sequence[ScenarioTemplate],
+    ) -> Evaluation:
+        """Return the evaluation of a policy of which every episode has a result, or refuse it."""
+        parts = [self._evaluate(name, policy, part, templates) for part in stages(seeds)]
+        evaluation = Evaluation.joined(parts)
+        if evaluation.errors:
+            raise SimError(
+                f"{counted(len(evaluation.errors), 'episode')} of {name} without a result; the "
+                f"first: {evaluation.errors[0]}"
+            )
+        return evaluation
+
+    def _evaluate(
+        self,
+        name: str,
+        policy: AwarenessPolicy,
+        seeds: range,
+        templates: Sequence[ScenarioTemplate],
+    ) -> Evaluation:
+        """Return the evaluation of a policy, from a file if this or another process has run it."""
+        path = self.folder / "evaluations" / f"{name}-{seeds[0]}-{seeds[-1]}.csv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with filelock.FileLock(path.with_name(f".{path.stem}.lock")):  # freed if its process dies
+            if path.exists():
+                return Evaluation.of(kept_records(path, name, seeds, len(templates)))
+            records = self.runner.run(self.settings.jobs(name, policy, seeds, templates))
+            if not any(record.error for record in records):
+                write_records(path, records)
+        return Evaluation.of(records)
 
 
-def _trial_label(number: int) -> str:
+def kept_records(
+    path: Path, name: str, seeds: Sequence[int], scenarios: int
+) -> tuple[EpisodeRecord, ...]:
+    """Return the records of an evaluation's file; raise SimError for one of other episodes."""
+    records = read_records(path)
+    episodes = {(record.scenario, record.seed) for record in records}
+    if len(records) == len(episodes) == len(seeds) * scenarios and all(
+        record.policy == name and record.seed in seeds for record in records
+    ):
+        return records
+    raise SimError(
+        f"{path} holds other episodes than those of {name}: move it away, and they run again"
+    )
+
+
+def _label(number: int) -> str:
     return f"trial_{number:04d}"

@@ -103,9 +103,10 @@ def tune(**values: Any) -> int:
     set off at any time. Trials run few episodes first, and end when an interval shows that they
     are above the risk or lose to --policy. A policy with which a moving robot and a person touched
     is not chosen. Ends with a verdict against --policy on held-out seeds and scenarios, and the
-    next command. Writes study.db, trials.csv, tuning.png, importances.json, chosen.json, and
+    next command. Writes study.log, trials.csv, tuning.png, importances.json, chosen.json, and
     chosen/*.yaml with their results on the held-out seeds.
     """
-    from ._run import TuneOptions, tune_command  # noqa: PLC0415 - help needs no simulator
+    from ...study.runs import Conditions  # noqa: PLC0415 - help needs no simulator
+    from ._run import run_tune  # noqa: PLC0415
 
-    return tune_command(TuneOptions(**values))
+    return run_tune(conditions=Conditions.taken_from(values), **values)

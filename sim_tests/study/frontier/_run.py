@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from awarenav.errors import counted
 from awarenav.files import json_text, write_text
@@ -18,31 +18,27 @@ from ._plot import draw_frontier
 from ._text import frontier_text
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FrontierOptions:
-    """The options of ``awarenav frontier``."""
-
-    folder: Path | None
-    conditions: Conditions
-    workers: int | None
-    out: Path
-    resume: bool
-    overwrite: bool
-    as_json: bool
-
-
-def frontier_command(options: FrontierOptions) -> int:
+def frontier_command(
+    folder: Path | None, conditions: Conditions, out: Path, *, as_json: bool, **running: Any
+) -> int:
     """Run the family unless a folder of episodes is given, and write what it shows.
+
+    Args:
+        folder: of episodes; None to run the family.
+        conditions: of the episodes to run.
+        out: folder of the episodes to run.
+        as_json: print the frontier as JSON.
+        running: ``workers``, ``resume`` and ``overwrite`` of
+            :func:`~sim_tests.study.runs.run_jobs`.
 
     Raises:
         SimError: an unusable option or folder, or no episode to compare.
     """
     failed = 0
-    if options.folder is None:
-        folder, records = options.out, _run(options)
+    if folder is None:
+        folder, records = out, _run(conditions, out, **running)
         failed = sum(bool(record.error) for record in records)
     else:
-        folder = options.folder
         records = read_rows(folder)
     frontier = frontier_of(records)
     text, data = frontier_text(frontier), json_text(asdict(frontier))
@@ -50,7 +46,7 @@ def frontier_command(options: FrontierOptions) -> int:
     write_text(folder / "frontier.json", data, SimError)
     for suffix in ("png", "svg"):
         draw_frontier(frontier, folder / f"frontier.{suffix}")
-    if options.as_json:
+    if as_json:
         print(data, end="")
     else:
         print(text)
@@ -60,23 +56,14 @@ def frontier_command(options: FrontierOptions) -> int:
     return 1 if failed else 0
 
 
-def _run(options: FrontierOptions) -> Iterable[EpisodeRecord]:
+def _run(conditions: Conditions, out: Path, **running: Any) -> tuple[EpisodeRecord, ...]:
     """Run the family and today's AMR, and write the policies beside the episodes."""
-    conditions = options.conditions
     (sensors,) = conditions.sensors
     members = [(each.name, each.policy()) for each in family(memory="scanner" in sensors)]
     jobs = conditions.jobs(members)
     jobs += conditions.with_sensors(sensors_of_today(sensors)).jobs([TODAY])
-    records = run_jobs(
-        jobs,
-        options.out,
-        workers=options.workers,
-        resume=options.resume,
-        overwrite=options.overwrite,
-        progress=True,
-        about=conditions.about("frontier", options.out),
-    )
+    about = conditions.about("frontier", out)
+    records = run_jobs(jobs, out, progress=True, about=about, **running)
     for name, policy in members:
-        path = options.out / "policies" / f"{name}.yaml"
-        write_text(path, policy_text(policy), SimError)
+        write_text(out / "policies" / f"{name}.yaml", policy_text(policy), SimError)
     return records

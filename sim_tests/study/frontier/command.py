@@ -54,6 +54,6 @@ def frontier(**values: Any) -> int:
     the folder of such episodes, it runs nothing and draws them again.
     """
     from ..runs import Conditions  # noqa: PLC0415 - help needs no simulator
-    from ._run import FrontierOptions, frontier_command  # noqa: PLC0415
+    from ._run import frontier_command  # noqa: PLC0415
 
-    return frontier_command(FrontierOptions(conditions=Conditions.taken_from(values), **values))
+    return frontier_command(conditions=Conditions.taken_from(values), **values)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -23,45 +23,33 @@ DEFAULT_ANSWERS: Final = 0.5
 _SETTING: Final = re.compile(r"(?:^|,)\s*answers\s*=\s*([^,\s]+)")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CompareOptions:
-    """The options of ``awarenav compare``."""
-
-    runs: tuple[Path, ...]
-    baseline: str
-    level: float
-    seed: int
-    out: Path | None
-    as_json: bool
-
-
-def compare_command(options: CompareOptions) -> int:
-    """Read runs, print their tables, and write their episodes to ``--out``.
+def compare_command(
+    runs: Sequence[Path], *, baseline: str, level: float, seed: int, out: Path | None, as_json: bool
+) -> int:
+    """Read runs, print their tables, and write their episodes to ``out``.
 
     Raises:
         SimError: a run cannot be read, the baseline is not among its policies, or an option is out
             of range.
     """
-    names = _run_names(options.runs)
-    if not 0.0 < options.level < 1.0:
-        raise SimError(f"--level must lie in (0, 1), got {options.level:g}")
-    if options.out is not None and options.out.suffix not in (".csv", ".parquet"):
-        raise SimError(f"--out must be a .csv or .parquet file, got {options.out}")
-    sources = {name: read_rows(path) for name, path in zip(names, options.runs, strict=True)}
+    names = _run_names(runs)
+    if not 0.0 < level < 1.0:
+        raise SimError(f"--level must lie in (0, 1), got {level:g}")
+    if out is not None and out.suffix not in (".csv", ".parquet"):
+        raise SimError(f"--out must be a .csv or .parquet file, got {out}")
+    sources = {name: read_rows(path) for name, path in zip(names, runs, strict=True)}
     records = [record for table in sources.values() for record in table]
     if not records:
-        raise SimError(f"no episodes yet in {', '.join(map(str, options.runs))}")
-    _check_baseline(options.baseline, sorted({record.policy for record in records}))
-    summary = summarise_sources(
-        sources, baseline=options.baseline, level=options.level, seed=options.seed
-    )
-    if options.as_json:
+        raise SimError(f"no episodes yet in {', '.join(map(str, runs))}")
+    _check_baseline(baseline, sorted({record.policy for record in records}))
+    summary = summarise_sources(sources, baseline=baseline, level=level, seed=seed)
+    if as_json:
         print(json_text(asdict(summary)).rstrip())
     else:
         asked = any(row.asked for row in summary.policies)
-        print(summary_text(summary, _answering(options.runs) if asked else ()))
-    if options.out is not None:
-        write_records(options.out, records)
+        print(summary_text(summary, _answering(runs) if asked else ()))
+    if out is not None:
+        write_records(out, records)
     return 0
 
 

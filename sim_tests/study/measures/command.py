@@ -41,6 +41,6 @@ def compare(**values: Any) -> int:
     Compares every policy with the baseline on the same scenarios and seeds. A run may be
     unfinished.
     """
-    from ._compare import CompareOptions, compare_command  # noqa: PLC0415 - help needs no statistics
+    from ._compare import compare_command  # noqa: PLC0415 - help needs no statistics
 
-    return compare_command(CompareOptions(**values))
+    return compare_command(**values)

@@ -107,7 +107,11 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         nearest_m = min(frame.separations_m, default=float("inf"))
         closer = nearest_m < self._closest_m or self._closest is None
         if self._view is None:
-            self._view = TopView(stage, (_MAP_WIDTH_PX, _HEIGHT_PX), _window(stage))
+            self._view = TopView(
+                stage,
+                (_MAP_WIDTH_PX, _HEIGHT_PX),
+                stage.scenario.robot.window_odom_m(_MAP_MARGIN_M),
+            )
         self._view.watch(frame)
         if number % every and not closer:
             return
@@ -128,18 +132,6 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
             size = (image.shape[1], image.shape[0])
             self._video = VideoWriter(self._video_path, _VIDEO_HZ, size)  # type: ignore[arg-type]
         self._video.add(image)
-
-
-def _window(stage: Stage) -> tuple[float, float, float, float]:
-    """Return x_min, y_min, x_max, y_max (m) of the robot's way with a margin."""
-    task = stage.scenario.robot
-    xs, ys = (task.start_x_m, task.goal_x_m), (task.start_y_m, task.goal_y_m)
-    return (
-        min(xs) - _MAP_MARGIN_M,
-        min(ys) - _MAP_MARGIN_M,
-        max(xs) + _MAP_MARGIN_M,
-        max(ys) + _MAP_MARGIN_M,
-    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

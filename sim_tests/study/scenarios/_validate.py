@@ -1,16 +1,18 @@
-"""The work of ``awarenav scenario validate``."""
+"""The work of ``awarenav scenario validate``: a scenario's draws, and its people's attention."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
 
 from tqdm import tqdm
 
 from awarenav.errors import counted
+from nav_adapter import AwarenessPolicy
 
-from ...scenario import ScenarioTemplate
+from ...scenario import Scenario, ScenarioTemplate
 from ...scenario.catalogue import (
     CHECKED_DRAWS,
     CONFLICT_M,
@@ -19,7 +21,19 @@ from ...scenario.catalogue import (
     template_problems,
 )
 from ...world.errors import MissingSimulatorError, SimError
+from ..measures import (
+    ATTENTION_WITHIN_M,
+    ATTENTIVE_FROM,
+    UNAWARE_UP_TO,
+    MeasuredAttention,
+    Trace,
+)
 
+if TYPE_CHECKING:
+    from ...crossing import CrossingResult
+
+# Nobody who is aware for less of the time has noticed the robot.
+_NEVER: Final = 0.02
 # A scenario with a smaller share of conflicts than this tests little.
 _MIN_CONFLICT_SHARE: Final = 0.8
 _WRONG_LABEL, _CANNOT_RUN = 1, 2
@@ -80,13 +94,156 @@ def _attention_findings(
     """Return what contradicts the scenario's ``attention``, and what was measured."""
     if not episodes:
         return (), ()
+    seeds = tqdm(
+        range(episodes),
+        desc=template.name,
+        unit="crossing",
+        disable=None,
+        leave=False,
+        file=sys.stderr,
+    )
     try:
-        from ._attention_check import check_attention  # noqa: PLC0415 - needs the extra sim
+        check = check_attention(template, seeds)
     except MissingSimulatorError as error:
         return (), (f"what people look at was not measured: {error}",)
-    seeds = range(episodes)
-    with tqdm(
-        seeds, desc=template.name, unit="crossing", disable=None, leave=False, file=sys.stderr
-    ) as bar:
-        check = check_attention(template, bar)
     return check.contradictions, check.remarks
+
+
+@dataclass(frozen=True, slots=True)
+class PersonAttention:
+    """The attention of one person in all crossings together.
+
+    Attributes:
+        name: name of the person.
+        could_look_s: seconds with the robot in front, in sight and within 5 m.
+        aware_share: share of these with a true α ≥ 0.5.
+        looked_share: share of these with a gaze straight at the robot, α ≥ 0.9.
+    """
+
+    name: str
+    could_look_s: float
+    aware_share: float
+    looked_share: float
+
+
+@dataclass(frozen=True, slots=True)
+class AttentionCheck:
+    """The label of a scenario, and the attention of its people.
+
+    Attributes:
+        label: the scenario's ``attention``.
+        crossings: number of crossings.
+        people: the people who had the robot before them for half a second or more.
+    """
+
+    label: str
+    crossings: int
+    people: tuple[PersonAttention, ...]
+
+    @classmethod
+    def of(cls, template: ScenarioTemplate, results: Iterable[CrossingResult]) -> AttentionCheck:
+        """Return the check of a scenario by crossings of it."""
+        measured = [MeasuredAttention.of(Trace.of(result)) for result in results]
+        names = _names(template.median(), measured)
+        return cls(template.attention, len(measured), _people(names, measured))
+
+    @property
+    def contradictions(self) -> tuple[str, ...]:
+        """One sentence for each person who contradicts the label."""
+        if self.label == "attentive":
+            return tuple(
+                f"attention: attentive, but {each.name} was aware of the robot (α ≥ 0.5) for "
+                f"{each.aware_share:.0%} of {each.could_look_s:.1f} s; attentive people are for at "
+                f"least {ATTENTIVE_FROM:.0%}"
+                for each in self.people
+                if each.aware_share < ATTENTIVE_FROM
+            )
+        if self.label == "unaware":
+            return tuple(
+                f"attention: unaware, but {each.name} looked straight at the robot (α ≥ 0.9) for "
+                f"{each.looked_share:.0%} of {each.could_look_s:.1f} s; unaware people do for at "
+                f"most {UNAWARE_UP_TO:.0%}"
+                for each in self.people
+                if each.looked_share > UNAWARE_UP_TO
+            )
+        return ()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The figures that were measured, and a label that would fit better."""
+        crossings = counted(self.crossings, "crossing")
+        if not self.people:
+            return (
+                f"in {crossings}, nobody had the robot in front of them within "
+                f"{ATTENTION_WITHIN_M:g} m: the attention could not be measured",
+            )
+        shares = "; ".join(
+            f"{each.name} aware (α ≥ 0.5) for {each.aware_share:.0%}, looking straight at it for "
+            f"{each.looked_share:.0%} of {each.could_look_s:.1f} s"
+            for each in self.people
+        )
+        found = [
+            f"in {crossings}, with the robot in front within {ATTENTION_WITHIN_M:g} m: {shares}"
+        ]
+        if self.label == "mixed":
+            looks = [each.looked_share for each in self.people]
+            if min(looks) >= ATTENTIVE_FROM:
+                found.append("everybody watches the robot: its attention could be attentive")
+            elif max(each.aware_share for each in self.people) <= _NEVER:
+                found.append("nobody is aware of the robot: its attention could be unaware")
+        if self.label == "unaware":
+            found += [
+                f"{each.name} does not watch the robot, but has it in the attention cone for "
+                f"{each.aware_share:.0%} of the time: it may take them for aware"
+                for each in self.people
+                if each.looked_share <= UNAWARE_UP_TO < each.aware_share
+            ]
+        return tuple(found)
+
+
+def check_attention(template: ScenarioTemplate, seeds: Iterable[int]) -> AttentionCheck:
+    """Run a scenario with perfect perception and return what its people looked at.
+
+    Args:
+        template: the scenario; with the policy ``balanced``, which asks nobody.
+        seeds: one crossing each.
+
+    Raises:
+        MissingSimulatorError: the extra ``sim`` is missing.
+    """
+    from ...crossing import run_crossing  # noqa: PLC0415 - needs the extra sim
+
+    # Nobody is asked to look: what people do by themselves counts.
+    policy = AwarenessPolicy.preset("balanced").model_copy(update={"attention": None})
+    return AttentionCheck.of(
+        template,
+        (
+            run_crossing(template.for_seed(seed), policy=policy, perception="truth", seed=seed)
+            for seed in seeds
+        ),
+    )
+
+
+def _names(scenario: Scenario, measured: Sequence[MeasuredAttention]) -> list[str]:
+    """Return the names of all people: scripted workers, people, replayed people."""
+    names = [f"worker {number}" for number in range(len(scenario.workers))]
+    names += [person.name for person in scenario.people]
+    everybody = max((len(each.could_look_s) for each in measured), default=0)
+    return names + [f"recorded person {number}" for number in range(everybody - len(names))]
+
+
+def _people(
+    names: Sequence[str], measured: Sequence[MeasuredAttention]
+) -> tuple[PersonAttention, ...]:
+    """Return the people who could look at the robot, with their times of all crossings together."""
+    people = []
+    for index, name in enumerate(names):
+        judged = [each for each in measured if each.judged[index]]
+        could_look_s = sum(float(each.could_look_s[index]) for each in judged)
+        if could_look_s > 0.0:
+            aware_s = sum(float(each.aware_s[index]) for each in judged)
+            looked_s = sum(float(each.looked_s[index]) for each in judged)
+            people.append(
+                PersonAttention(name, could_look_s, aware_s / could_look_s, looked_s / could_look_s)
+            )
+    return tuple(people)

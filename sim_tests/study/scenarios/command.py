@@ -33,12 +33,13 @@ def list_scenarios(*, as_json: bool) -> int:
 
 @command(
     "show",
-    short_help="Describe a scenario, or print it as YAML.",
+    short_help="Describe a scenario, draw it, or print it as YAML.",
     examples=[
-        "awarenav scenario show blind_corner",
+        "awarenav scenario show blind_corner --out corner.png",
         "awarenav scenario show crossing_from_left --yaml > mine.yaml",
     ],
     exit_status={0: "Success.", 2: "Bad input."},
+    epilog="The drawing needs matplotlib.",
 )
 @argument(
     "scenario",
@@ -48,50 +49,17 @@ def list_scenarios(*, as_json: bool) -> int:
 )
 @option("--yaml", is_flag=True, help="Print YAML instead, with the shared defaults written out.")
 @options.seed(" With --yaml: print the scenario of the episode with this seed.", default=None)
-def show(scenario: str, *, yaml: bool, seed: int | None) -> int:
+@options.out_file(None, "Also draw the scenario from above.", "FILE.png|svg|pdf")
+def show(scenario: str, *, yaml: bool, seed: int | None, out: Path | None) -> int:
     """Describe what happens in a scenario and what varies.
 
-    Also prints how often robot and people would meet if nobody reacted.
+    Also prints how often robot and people would meet if nobody reacted. The drawing shows the hall,
+    paths with dots every 2 s, and gaze. Values that vary are at their medians; thin lines are the
+    paths of other episodes. Robot and people stand where they are 1.5 s before they come nearest.
     """
     from ...scenario.catalogue import show_command  # noqa: PLC0415 - help needs no scenarios
 
-    return show_command(scenario, yaml=yaml, seed=seed)
-
-
-@command(
-    "draw",
-    short_help="Draw scenarios from above.",
-    examples=[
-        "awarenav scenario draw crossing_from_left --out left.svg",
-        "awarenav scenario draw all --out drawings",
-    ],
-    exit_status={0: "Success.", 2: "Bad input; nothing was written."},
-    epilog="The drawing needs matplotlib.",
-)
-@argument(
-    "scenarios",
-    nargs=-1,
-    required=True,
-    metavar="NAME|FILE...",
-    shell_complete=options.COMPLETE_SCENARIOS,
-    help="Shipped scenarios, YAML files, or a set of shipped ones: 'all', 'guidelines' or "
-    "'step_out'.",
-)
-@options.out_file(
-    "scenario.png",
-    "The drawing; for several scenarios a folder, which gets a PNG of each.",
-    "FILE.png|svg|pdf|DIR",
-)
-def draw(scenarios: tuple[str, ...], out: Path) -> int:
-    """Draw scenarios from above: hall, paths with times, and gaze.
-
-    Values that vary are at their medians; thin lines are the paths of other episodes. Dots are 2 s
-    apart; sectors show the directions of gaze. Robot and people stand where they are 1.5 s before
-    they come nearest to each other.
-    """
-    from ...scenario.catalogue import draw_command  # noqa: PLC0415 - help needs no scenarios
-
-    return draw_command(scenarios, str(out))
+    return show_command(scenario, yaml=yaml, seed=seed, out=out)
 
 
 @command(
@@ -194,5 +162,5 @@ def from_recording(
     return 0
 
 
-for _command in (list_scenarios, show, draw, validate, from_recording):
+for _command in (list_scenarios, show, validate, from_recording):
     scenario.add_command(_command)

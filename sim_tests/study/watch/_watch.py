@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,21 +26,17 @@ _DELIVERY_S: Final = 5.0
 _CATCH_UP_S: Final = 0.3
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WatchOptions:
-    """The options of ``awarenav watch``."""
-
-    conditions: Conditions
-    policy: str
-    speed: float
-    port: int
-    wait: float
-    out: Path | None
-    no_camera: bool
-    no_browser: bool
-
-
-def watch_command(options: WatchOptions) -> int:
+def watch_command(
+    conditions: Conditions,
+    policy: str,
+    *,
+    speed: float,
+    port: int,
+    wait: float,
+    out: Path | None,
+    no_camera: bool,
+    no_browser: bool,
+) -> int:
     """Serve the page, run the crossing at the pace of the clock, and end with it.
 
     Raises:
@@ -49,18 +44,18 @@ def watch_command(options: WatchOptions) -> int:
         NavError: an unknown preset or unusable policy file.
         PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
-    job = _job(options)
+    job = _job(conditions, policy)
     key = job_key(job)
-    if options.out is not None and not options.out.parent.is_dir():
-        raise SimError(f"cannot write {options.out}: there is no folder {options.out.parent}")
-    with LivePage(live_page(f"awarenav watch: {key.scenario}"), options.port) as page:
+    if out is not None and not out.parent.is_dir():
+        raise SimError(f"cannot write {out}: there is no folder {out.parent}")
+    with LivePage(live_page(f"awarenav watch: {key.scenario}"), port) as page:
         print(f"{describe(key)}\nWatch it at {page.url} (Ctrl-C ends it)", flush=True)
-        if not options.no_browser:
+        if not no_browser:
             show_page(page.url)
-        pace = _Pace(page, options.speed, options.wait)
+        pace = _Pace(page, speed, wait)
         recorder = recorder_of(
             job,
-            camera=not options.no_camera,
+            camera=not no_camera,
             share=_PICTURE_SHARE,
             on_begin=pace.begin,
             on_state=pace.state,
@@ -80,9 +75,9 @@ def watch_command(options: WatchOptions) -> int:
         print(f"{outcome}.", flush=True)
         if not page.opened:
             print("Nobody opened the page.")
-    if options.out is not None:
-        write_page(options.out, recorder.begin, recorder.states, outcome, recorder.note)
-        print(f"Written: {options.out}")
+    if out is not None:
+        write_page(out, recorder.begin, recorder.states, outcome, recorder.note)
+        print(f"Written: {out}")
     return 0
 
 
@@ -116,11 +111,11 @@ class _Pace:
         self._page.state(state)
 
 
-def _job(options: WatchOptions) -> Job:
+def _job(conditions: Conditions, policy: str) -> Job:
     """Return the job of the options, as a run of ``awarenav crossings`` would plan it."""
-    jobs = options.conditions.jobs([options.policy])
+    jobs = conditions.jobs([policy])
     if len(jobs) != 1:
-        scenario, fault = options.conditions.scenario[0], options.conditions.fault[0]
+        scenario, fault = conditions.scenario[0], conditions.fault[0]
         raise SimError(
             f"watch shows one crossing, but scenario {scenario!r} with fault {fault!r} stands for "
             f"{len(jobs)}; give one of each"

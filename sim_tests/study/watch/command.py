@@ -81,6 +81,6 @@ def watch(**values: Any) -> int:
     and over time each person's α with its bound, the speed limit and what sets it.
     """
     from ..runs import Conditions  # noqa: PLC0415 - help needs no simulator
-    from ._watch import WatchOptions, watch_command  # noqa: PLC0415
+    from ._watch import watch_command  # noqa: PLC0415
 
-    return watch_command(WatchOptions(conditions=Conditions.taken_from(values), **values))
+    return watch_command(Conditions.taken_from(values), **values)

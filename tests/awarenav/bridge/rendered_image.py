@@ -56,7 +56,7 @@ class RenderedImage:
 
     def _take(self) -> None:
         """Change a pixel: no two pictures of a camera are the same to the bit."""
-        self.bgr[0, 0, 0] += 1
+        self.bgr[0, 0, 0] = (int(self.bgr[0, 0, 0]) + 1) % 256
 
     def info(self, stamp_s: float) -> CameraInfo:
         k = tuple(self.camera.matrix.ravel().tolist())

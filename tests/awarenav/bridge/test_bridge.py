@@ -39,6 +39,7 @@ ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
 PATIENCE_S = 60.0
 RATE_HZ = 15.0
 CORES = 2
+SCANS = ["--scan", "a", "--scan", "b"]
 
 
 class Nobody:
@@ -106,7 +107,11 @@ def drive(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("compressed", [False, True], ids=["raw", "compressed"])
+@pytest.mark.parametrize(
+    "compressed",
+    [False, pytest.param(True, marks=pytest.mark.full)],
+    ids=["raw", "compressed"],
+)
 def test_an_image_on_dds_gives_a_person_and_a_speed_limit(
     robot: DdsNode,
     domain: int,
@@ -151,7 +156,7 @@ def test_an_image_on_dds_gives_a_person_and_a_speed_limit(
     assert {"/odom", "/tf_static", *(f"/{t.name}" for t in PUBLISHED.values())} == set(last)
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_a_frame_costs_less_than_two_cores_have_at_fifteen_hertz(scene: RenderedImage) -> None:
     robot = RobotFile.from_yaml(ROBOT)
     sent: list = []
@@ -259,7 +264,7 @@ def test_the_loop_waits_while_messages_come_that_it_does_not_need(domain: int) -
         (["--robot", str(ROBOT), "--rate", "0"], "--rate"),
         (["--robot", str(ROBOT), "--detector", "nowhere"], "--detector must be"),
         (["--robot", str(ROBOT), "--seconds", "-1"], "--seconds"),
-        (["--robot", str(ROBOT), "--domain", "300"], "0 to 232"),
+        (["--robot", str(ROBOT), "--domain", "300"], "0<=x<=232"),
         (["--robot", str(ROBOT), "--topic", "speed=x"], "--topic must be KEY=TOPIC"),
         (["--robot", str(ROBOT), "--topic", "people=speed_limit"], "share a topic"),
         (["--robot", str(ROBOT), "--only", "speed"], "--only must name some of"),
@@ -272,6 +277,23 @@ def test_the_loop_waits_while_messages_come_that_it_does_not_need(domain: int) -
         (["--robot", str(ROBOT), "--image", "a b"], "a topic must consist of"),
         (["--robot", str(ROBOT), "--record", "nowhere/run.mcap"], "cannot write nowhere"),
         (["--robot", str(ROBOT), "--camera", "nowhere.yaml"], "cannot read nowhere.yaml"),
+        (["--robot", str(ROBOT), "--bag", str(ROBOT)], "cannot read the recording"),
+        (["--robot", str(ROBOT), "--prediction", "nowhere.yaml"], "nowhere.yaml"),
+        (["--robot", str(ROBOT), "--prediction", str(ROBOT)], "unknown key"),
+        (["--robot", str(ROBOT), "--no-camera"], "--no-camera needs a scanner"),
+        (["--robot", str(ROBOT), "--map", "map"], "--map is for the scans"),
+        (["--robot", str(ROBOT), *SCANS, "--scan", "c"], "--scan must name up to 2"),
+        (["--robot", str(ROBOT), "--scan", "a", "--scan", "/a"], "different topics, got a, a"),
+        (["--robot", str(ROBOT), "--scan", "a b"], "a topic must consist of"),
+        (["--robot", str(ROBOT), "--scan", "a"], "as many scanners as there are scan topics, 1"),
+        (
+            ["--robot", str(ROBOT), *SCANS, "--no-camera", "--camera", "camera.yaml"],
+            "--no-camera and --camera exclude each other",
+        ),
+        (
+            ["--robot", str(ROBOT), *SCANS, "--no-camera", "--depth", "depth"],
+            "--no-camera and --depth exclude each other",
+        ),
     ],
 )
 def test_bad_input_is_refused_in_a_line(
@@ -282,6 +304,17 @@ def test_bad_input_is_refused_in_a_line(
     said = capsys.readouterr().err
     assert text in said
     assert said.splitlines()[-1].startswith("awarenav bridge: ")
+
+
+@pytest.mark.parametrize("bad", ["field_of_view_deg: [90, -90]", "yaw_deg: 200", "height_m: 0.2"])
+def test_a_robot_file_with_a_wrong_scanner_is_refused(
+    bad: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "robot.yaml"
+    scanner = f"scanners:\n  - position_base_m: [0.3, 0.0, 0.2]\n    {bad}\n"
+    path.write_text(ROBOT.read_text().split("scanners:")[0] + scanner)
+    assert main(["bridge", "--robot", str(path), "--scan", "scan"]) == 2
+    assert bad.split(":", maxsplit=1)[0] in capsys.readouterr().err
 
 
 def test_a_domain_in_the_environment_that_is_no_number_is_refused(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -13,6 +15,7 @@ pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 pytest.importorskip("mcap", reason="the extra ros2 is not installed")
 pytest.importorskip("rosbags", reason="the extra rosbag is not installed")
 
+from paths import ROOT
 from recorded_messages import recorded
 from rosbags.highlevel import AnyReader
 from scan_scenes import scan_message
@@ -20,6 +23,7 @@ from scan_scenes import scan_message
 from awarenav.cli import main
 from nav_adapter.ros2 import RobotFile
 from nav_adapter.ros2.conversions import to_time
+from nav_adapter.ros2.messages import Message
 from nav_adapter.ros2.messages.geometry_msgs import (
     Transform,
     TransformStamped,
@@ -133,33 +137,6 @@ def test_a_calibrated_prediction_leaves_the_limit(tmp_path: Path, robot_file: Pa
     assert limits[0] == limits[1] == limits[2] != []
 
 
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [
-        (None, "No such file"),
-        ("lag_per_s2: 1.5\nresponse_s: 0.9\n", "has no horizons_s and no std_factors"),
-        ("horizons_s: [1.0, 2.0]\nstd_factors: [1.1]\n", "must be equally long, got 2 and 1"),
-        ("inflation: {aware_radius_m: 0.5}\n", "unknown key 'inflation' in PredictionModel"),
-    ],
-)
-def test_what_is_no_calibrated_prediction_is_refused(
-    tmp_path: Path,
-    robot_file: Path,
-    content: str | None,
-    text: str,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    path = tmp_path / "prediction.yaml"
-    if content is not None:
-        path.write_text(content)
-    given = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
-    assert main([*given, "--bag", str(robot_file), "--prediction", str(path)]) == 2
-    said = capsys.readouterr().err
-    assert text in said
-    assert str(path) in said
-    assert "Traceback" not in said
-
-
 def test_what_a_map_file_holds_is_nobody(
     tmp_path: Path, robot_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -215,8 +192,6 @@ def test_depth_images_of_a_recording_are_read_and_a_bad_one_is_reported(
     said = capsys.readouterr().err
     assert "replayed 1.0 s: 25 frames, 23 depth images, 1 depth images refused" in said
     assert said.count("depth image refused and counted: the encoding of a depth image") == 1
-    assert main(["bridge", *arguments, "--scan", "scan", "--no-camera"]) == 2
-    assert "--no-camera and --depth exclude each other" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -244,9 +219,26 @@ def test_a_topic_that_the_recording_lacks_is_refused(
     assert "/odom (nav_msgs/msg/Odometry)" in said
 
 
-def test_what_is_no_recording_is_refused(
-    robot_file: Path, capsys: pytest.CaptureFixture[str]
+P = (50.0, 0.0, 32.0, 0.0, 0.0, 50.0, 24.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+def fisheye(image_topic: str) -> Iterator[tuple[str, float, Message]]:
+    """Yield the messages of a robot whose raw images are those of a fisheye."""
+    for topic, now_s, message in messages(camera=True):
+        sent: Message = message
+        if isinstance(message, CameraInfo):
+            sent = replace(message, distortion_model="equidistant", d=(0.1,) * 4, p=P)
+        yield image_topic if topic == "/camera/image_raw" else topic, now_s, sent
+
+
+@pytest.mark.parametrize("name", ["image_rect", "image_raw"])
+def test_rectified_images_of_a_fisheye_are_used_and_raw_ones_refused(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    given = ["--robot", str(robot_file), "--bag", str(robot_file), "--allow-simulator-networks"]
-    assert main(["bridge", *given]) == 2
-    assert "cannot read the recording" in capsys.readouterr().err
+    bag = recorded(tmp_path / "bag", fisheye(f"/camera/{name}"))
+    given = ["--robot", str(ROOT / "docs" / "nav2" / "robot.yaml"), "--bag", str(bag)]
+    given += ["--image", f"/camera/{name}", "--seconds", "0.4", "--allow-simulator-networks"]
+    assert main(["bridge", *given]) == 0
+    said = capsys.readouterr().err
+    assert f": {0 if name == 'image_raw' else 12} frames" in said
+    assert ("use their topic (image_rect)" in said) == (name == "image_raw")

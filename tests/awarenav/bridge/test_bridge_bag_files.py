@@ -225,8 +225,7 @@ def ros1_messages(prefix: str, store) -> Iterator[tuple[str, float, object]]:
             )
 
 
-@pytest.mark.parametrize("prefix", ["", "/", "robot1/"])
-@pytest.mark.parametrize("slash", ["", "/"])
+@pytest.mark.parametrize(("prefix", "slash"), [("", ""), ("", "/"), ("/", ""), ("robot1/", "/")])
 def test_topics_of_ros_1_without_a_slash_are_the_same(
     prefix: str, slash: str, tmp_path: Path, replay
 ) -> None:

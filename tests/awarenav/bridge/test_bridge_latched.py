@@ -11,6 +11,7 @@ from paths import ROOT
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
+from awarenav.bridge import _loop
 from awarenav.cli import main
 from nav_adapter.ros2 import READ, DdsNode, RobotFile, renamed
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
@@ -40,7 +41,7 @@ def test_a_reader_knows_publishers_that_it_cannot_hear(domain: int, transient_lo
     ("map_latched", "tf_latched", "texts"),
     [
         (False, True, ["the publisher of /map: its durability is volatile"]),
-        (None, False, ["no map yet on /map after 5 s", "the publisher of /robot1/tf_static: its"]),
+        (None, False, ["no map yet on /map after 1 s", "the publisher of /robot1/tf_static: its"]),
         (True, True, []),
     ],
     ids=["volatile map", "no map and volatile tf", "both as they should be"],
@@ -52,7 +53,9 @@ def test_a_bridge_says_why_a_latched_topic_is_silent(
     tf_latched: bool,
     texts: list[str],
     capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(_loop, "_LATCHED_AFTER_S", 1.0)
     path = tmp_path / "robot.yaml"
     docs = RobotFile.from_yaml(ROOT / "docs" / "nav2" / "robot.yaml")
     docs.model_copy(update={"scanners": None}).to_yaml(path)
@@ -66,7 +69,7 @@ def test_a_bridge_says_why_a_latched_topic_is_silent(
         info = MapMetaData(resolution=0.05, width=1, height=1)
         robot.publish(sent, OccupancyGrid(Header(frame_id="map"), info, b"\0"))
     given = ["--domain", str(domain), "--robot", str(path), "--no-camera", "--scan", "scan"]
-    given += ["--map", "map", "--tf", "/robot1/tf", "--seconds", "5.5"]
+    given += ["--map", "map", "--tf", "/robot1/tf", "--seconds", "1.5"]
     assert main(["bridge", *given]) == 0
     robot.close()
     said = capsys.readouterr().err

@@ -21,7 +21,6 @@ from rendered_image import odometry
 from rosbags.highlevel import AnyReader
 from scan_scenes import scan_message
 
-from awarenav.cli import main
 from nav_adapter.ros2 import PUBLISHED, READ, DdsNode, RobotFile, ScannerMount, renamed
 
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
@@ -91,51 +90,3 @@ def test_scans_on_dds_give_a_person_and_a_speed_limit(
     with AnyReader([recording]) as reader:
         recorded = {each.topic for each in reader.connections}
     assert {"/odom", "/scan_front", "/scan_rear"} <= recorded
-
-
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (["--no-camera"], "--no-camera needs a scanner"),
-        (["--map", "map"], "--map is for the scans"),
-        (["--scan", "a", "--scan", "b", "--scan", "c"], "--scan must name up to 2"),
-        (["--scan", "a", "--scan", "/a"], "different topics, got a, a"),
-        (["--scan", "a b"], "a topic must consist of"),
-        (["--scan", "a"], "as many scanners as there are scan topics, 1, or none"),
-    ],
-)
-def test_scanners_that_make_no_sense_are_refused(
-    arguments: list[str],
-    text: str,
-    domain: int,
-    robot_file: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    given = ["bridge", "--domain", str(domain), "--robot", str(robot_file), *arguments]
-    assert main(given) == 2
-    assert text in capsys.readouterr().err
-
-
-def test_a_calibration_without_a_camera_is_refused(
-    robot_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "camera.yaml"
-    path.write_text(
-        "image_width: 64\nimage_height: 48\n"
-        "camera_matrix: {rows: 3, cols: 3, data: [50, 0, 32, 0, 50, 24, 0, 0, 1]}\n"
-        "distortion_coefficients: {rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}\n"
-    )
-    given = ["--robot", str(robot_file), *SCANS, "--no-camera", "--camera", str(path)]
-    assert main(["bridge", *given]) == 2
-    assert "--no-camera and --camera exclude each other" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("bad", ["field_of_view_deg: [90, -90]", "yaw_deg: 200", "height_m: 0.2"])
-def test_a_robot_file_with_a_wrong_scanner_is_refused(
-    bad: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "robot.yaml"
-    scanner = f"scanners:\n  - position_base_m: [0.3, 0.0, 0.2]\n    {bad}\n"
-    path.write_text(ROBOT.read_text().split("scanners:")[0] + scanner)
-    assert main(["bridge", "--robot", str(path), "--scan", "scan"]) == 2
-    assert bad.split(":", maxsplit=1)[0] in capsys.readouterr().err

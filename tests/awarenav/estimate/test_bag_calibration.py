@@ -122,15 +122,6 @@ def test_what_the_user_gives_wins_over_an_unusable_calibration(tmp_path) -> None
     assert choice.of_size(320, 240).fx_px == Camera.from_yaml(mine).fx_px
 
 
-def test_what_the_user_gives_wins_in_a_folder_too(tmp_path) -> None:
-    cv2.imwrite(str(tmp_path / "000000.png"), numbered(0))
-    (tmp_path / "camera.yaml").write_text("image_width: 320\n")
-    source = open_source(str(tmp_path))
-    with pytest.raises(AwarenavError, match=r"camera\.yaml: lacks the key 'image_height'"):
-        CameraChoice.of_options(None, None, source, pytest.fail)
-    assert CameraChoice.of_options(None, 60.0, source, pytest.fail).known
-
-
 def test_a_file_is_for_the_rectified_images_of_a_rectified_topic(tmp_path) -> None:
     """The file of the calibrator holds both matrices."""
     path = tmp_path / "ost.yaml"

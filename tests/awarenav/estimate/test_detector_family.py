@@ -37,22 +37,20 @@ def unnamed(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_file_that_does_not_tell_is_asked_for(unnamed: Path) -> None:
-    with pytest.raises(PerceptionError, match="--detector rtmdet:FILE or yolox:FILE"):
-        choose_networks(str(unnamed), "shipped", "pnp")
-
-
 @pytest.mark.parametrize(("family", "layout"), [("rtmdet", "RTMDet"), ("yolox", "YOLOX with NMS")])
 def test_a_prefix_tells_it(unnamed: Path, family: str, layout: str) -> None:
     networks = choose_networks(f"{family}:{unnamed}", "shipped", "pnp")
     assert networks.detector.layout == layout  # type: ignore[union-attr]
 
 
-def test_a_prefix_that_does_not_go_with_the_outputs_is_refused(unnamed: Path) -> None:
-    with pytest.raises(PerceptionError, match="--detector rtmdet:FILE or yolox:FILE"):
-        choose_networks(f"ultralytics:{unnamed}", "shipped", "pnp")
-
-
-def test_other_prefixes_are_part_of_the_name(unnamed: Path) -> None:
-    with pytest.raises(AwarenavError, match="there is no file 'yolo:"):
-        choose_networks(f"yolo:{unnamed}", "shipped", "pnp")
+@pytest.mark.parametrize(
+    ("prefix", "error", "message"),
+    [
+        ("", PerceptionError, "--detector rtmdet:FILE or yolox:FILE"),
+        ("ultralytics:", PerceptionError, "--detector rtmdet:FILE or yolox:FILE"),
+        ("yolo:", AwarenavError, "there is no file 'yolo:"),
+    ],
+)
+def test_another_prefix_or_none_is_refused(unnamed: Path, prefix, error, message) -> None:
+    with pytest.raises(error, match=message):
+        choose_networks(f"{prefix}{unnamed}", "shipped", "pnp")

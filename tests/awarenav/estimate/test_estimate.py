@@ -5,22 +5,20 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import av
 import cv2
 import numpy as np
 import pytest
+from full_disk import files_up_to
 from numbered_images import CAMERA, HEIGHT, WIDTH, NumberReader, numbered
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.estimate import (
-    CameraChoice,
-    EstimateOptions,
-    estimate_command,
-    fixed_camera_pose,
-    scaled_camera,
-)
+from awarenav.estimate import CameraChoice, fixed_camera_pose
+from awarenav.estimate._camera import scaled_camera
+from awarenav.estimate._run import estimate_command
 from awarenav.estimate.command import estimate as command
 from awarenav.judge import judge_files
 from awarenav.records import read_records
@@ -44,9 +42,9 @@ def film(path: Path, count: int) -> Path:
     return path
 
 
-def options(*arguments: object) -> EstimateOptions:
+def options(*arguments: object) -> SimpleNamespace:
     with command.make_context("estimate", list(map(str, arguments))) as context:
-        return EstimateOptions(**context.params)
+        return SimpleNamespace(**context.params)
 
 
 def estimate(reader: NumberReader, *arguments: object) -> int:
@@ -138,16 +136,25 @@ def test_an_existing_file_is_neither_replaced_nor_mixed_with_other_settings(tmp_
     assert names(out) == ["000000.png"]
 
 
-def test_a_frame_with_an_incomplete_line_is_estimated_again(tmp_path):
-    out = tmp_path / "out.jsonl"
-    source = folder(tmp_path / "set", 3)
-    assert estimate(NumberReader(), source, "--out", out) == 0
-    whole = out.read_bytes()
-    out.write_bytes(whole[:-30])
+def test_torn_estimates_continue_and_damaged_ones_are_refused_by_line(tmp_path, capsys):
+    whole, out = tmp_path / "whole.jsonl", tmp_path / "out.jsonl"
+    source = folder(tmp_path / "set", 4)
+    assert estimate(NumberReader(), source, "--out", whole) == 0
+    data = whole.read_bytes()
+    lines = data.splitlines(keepends=True)
+    full_disk = files_up_to(len(lines[0]) + len(lines[1]) + 50)
+    with full_disk, pytest.raises(AwarenavError, match="the lines so far are kept"):
+        estimate(NumberReader(), source, "--out", out)
     reader = NumberReader()
     assert estimate(reader, source, "--out", out, "--resume") == 0
-    assert reader.seen == [2]
-    assert out.read_bytes() == whole
+    assert reader.seen == [2, 3]
+    assert out.read_bytes() == data
+    assert "the last line is unfinished, its frame is made again" in capsys.readouterr().err
+    out.write_bytes(b"".join([lines[0], lines[1][:30], *lines[2:]]))
+    before = out.read_bytes()
+    with pytest.raises(AwarenavError, match=r"out\.jsonl, line 2"):
+        estimate(reader, source, "--out", out, "--resume")
+    assert out.read_bytes() == before
 
 
 def test_ctrl_c_keeps_complete_lines_and_a_playable_video(tmp_path):
@@ -278,10 +285,12 @@ def test_a_fixed_camera_has_its_height_and_pitch(pitch_deg):
         (["{set}", "--camera", "absent.yaml"], "absent.yaml"),
         (["{set}", "--detector", "absent.onnx"], "--detector must be 'shipped', an ONNX file"),
         (["{set}", "--topic", "/image"], "--topic is for ROS recordings"),
+        (["{set}", "--detector", "{set}/cut.onnx"], "cut.onnx"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_2(tmp_path, capsys, arguments, message):
     source = folder(tmp_path / "set", 1)
+    (source / "cut.onnx").write_bytes(b"\x08\x07 cut off")
     arguments = [each.replace("{set}", str(source)) for each in arguments]
     out = tmp_path / "out.jsonl"
     assert main(["estimate", *arguments, "--out", str(out)]) == 2
@@ -289,20 +298,3 @@ def test_bad_input_is_one_line_and_exit_status_2(tmp_path, capsys, arguments, me
     assert message in error
     assert "Traceback" not in error
     assert not out.exists()
-
-
-def test_a_damaged_network_is_refused_before_anything_is_written(tmp_path, capsys):
-    source = folder(tmp_path / "set", 1)
-    network = tmp_path / "cut.onnx"
-    network.write_bytes(b"\x08\x07 cut off")
-    out = tmp_path / "out.jsonl"
-    arguments = ["estimate", source, "--detector", network, "--out", out]
-    assert main([str(each) for each in arguments]) == 2
-    assert "cut.onnx" in capsys.readouterr().err
-    assert not out.exists()
-
-
-@pytest.mark.parametrize("command", ["estimate", "judge"])
-def test_help_says_what_the_command_does(command, capsys):
-    assert main([command, "--help"]) == 0
-    assert "--out" in capsys.readouterr().out

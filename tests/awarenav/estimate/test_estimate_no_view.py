@@ -68,11 +68,3 @@ def test_a_continued_file_has_the_same_marks(tmp_path):
     assert estimate(NumberReader(), source, "--out", parts, "--resume") == 0
     assert parts.read_bytes() == whole.read_bytes()
     assert [frame.get("no_view") is None for frame in read_records(parts)] == [1, 1, 0, 1, 0]
-
-
-def test_a_recording_of_a_covered_camera_has_no_tracks(tmp_path):
-    records = recorded(tmp_path, "covered", [BLACK, BLACK, GREY])
-    assert [record["tracks"] for record in records] == [[], [], []]
-    recording = read_recording(tmp_path / "covered.jsonl")
-    assert not recording.frames
-    assert not track_recording(recording).histories

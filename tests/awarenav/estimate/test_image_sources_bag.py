@@ -62,8 +62,9 @@ def stamps(count: int) -> list[int]:
     return [10**9 + 50_000_000 * k for k in range(count)]
 
 
-@pytest.mark.parametrize("recorded", ["image_raw", "/image_raw", "front/image_raw"])
-@pytest.mark.parametrize("slash", ["", "/"])
+@pytest.mark.parametrize(
+    ("recorded", "slash"), [("image_raw", "/"), ("/image_raw", ""), ("front/image_raw", "/")]
+)
 def test_a_topic_without_a_leading_slash_is_the_same_topic(tmp_path, recorded, slash):
     info = recorded.replace("image_raw", "camera_info")
     images = [(t, image(numbered(k), "rgb8", t)) for k, t in enumerate(stamps(2))]
@@ -83,8 +84,9 @@ def test_a_topic_without_a_leading_slash_is_the_same_topic(tmp_path, recorded, s
     assert source.camera.fx_px == 300.0
 
 
-@pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
-@pytest.mark.parametrize("inside", [False, True], ids=["folder", "file"])
+@pytest.mark.parametrize(
+    ("plugin", "inside"), [(StoragePlugin.SQLITE3, True), (StoragePlugin.MCAP, False)]
+)
 def test_images_stamps_and_camera_come_from_the_recording(tmp_path, plugin, inside):
     late_ns = 7_000_000  # between the header's stamp and the recorder's
     images = [(t + late_ns, image(numbered(k), "rgb8", t)) for k, t in enumerate(stamps(6))]

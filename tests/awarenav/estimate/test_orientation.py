@@ -16,7 +16,8 @@ from PIL import Image
 from test_estimate import estimate
 
 from awarenav import AwarenavError
-from awarenav.estimate import open_source, read_image
+from awarenav.estimate import open_source
+from awarenav.estimate._pictures import read_image
 from awarenav.records import read_records
 from awarenav.video import VideoWriter
 from perception import Camera
@@ -55,11 +56,11 @@ def stored(path: Path, orientation: int, image: np.ndarray | None = None) -> Pat
 
 
 @pytest.mark.parametrize("suffix", ["jpg", "png", "webp", "tif"])
-@pytest.mark.parametrize("orientation", STORED)
-def test_a_picture_is_read_upright(tmp_path: Path, suffix: str, orientation: int) -> None:
-    read = read_image(stored(tmp_path / f"a.{suffix}", orientation))
-    assert read.shape == SHAPE
-    assert np.abs(read.astype(float) - scene()).mean() < 6.0
+def test_a_picture_is_read_upright(tmp_path: Path, suffix: str) -> None:
+    for orientation in STORED:
+        read = read_image(stored(tmp_path / f"a.{suffix}", orientation))
+        assert read.shape == SHAPE
+        assert np.abs(read.astype(float) - scene()).mean() < 6.0
 
 
 @pytest.mark.parametrize("kind", ["H", "I"])  # a short number as the standard wants, or a long one
@@ -107,7 +108,7 @@ def turned_folder(path: Path, orientation: int, camera: Camera | None) -> Path:
     return path
 
 
-@pytest.mark.parametrize("orientation", [2, 3, 4, 6, 8])
+@pytest.mark.parametrize("orientation", [3, 6])
 def test_a_calibration_that_may_be_for_the_pixels_as_stored_is_refused(tmp_path, orientation):
     sensor = CAMERA if orientation <= 4 else Camera.from_fov(HEIGHT, WIDTH, 1.0)
     source = turned_folder(tmp_path / "set", orientation, sensor)

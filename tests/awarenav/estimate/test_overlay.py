@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import av
 import cv2
@@ -18,10 +17,9 @@ from numbered_images import CAMERA, HEIGHT, WIDTH, numbered, standing_at
 from awarenav import drawing
 from awarenav.drawing import Font, awareness_colour
 from awarenav.errors import AwarenavError
-from awarenav.estimate import FrameEstimate, OverlayWriter, SourceFrame, draw_overlay, fit_image
-from awarenav.estimate._overlay import _draw_label, _Person
+from awarenav.estimate import FrameEstimate, OverlayWriter, SourceFrame
+from awarenav.estimate._overlay import _draw_label, _Person, draw_overlay, fit_image
 from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
-from tracking import PersonTrack
 
 CONE = AttentionCone()
 GREY = numbered(10)
@@ -109,7 +107,7 @@ def test_labels_of_people_who_stand_together_do_not_cover_each_other():
 finite = st.floats(-4.0, 4.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     x_m=finite,
     z_m=st.floats(0.05, 30.0),
@@ -132,15 +130,6 @@ def test_any_estimate_can_be_drawn(x_m, z_m, yaw, pitch, alpha, std, box, size):
     )
     drawn = draw_overlay(estimate(seen, keypoints=(keypoints,), image=image, camera=camera), CONE)
     assert drawn.shape == image.shape
-
-
-def test_a_person_without_a_box_or_behind_the_camera_does_no_harm():
-    boxless = PersonObservation(0.0, [0.0, 0.0, -2.0], np.eye(3), (0, 0, 1), None, None, 0.5, None)
-    track = PersonTrack(
-        7, 0.0, "confirmed", [1.0, 0.0], [0.0, 0.0], np.eye(4), 0.5, 0.1, 0.3, 1.75, 0.0
-    )
-    drawn = draw_overlay(estimate(boxless, tracks=(track,)), CONE)
-    assert drawn.shape == GREY.shape
 
 
 @pytest.mark.parametrize("plain", [False, True], ids=["as installed", "OpenCV 4"])
@@ -187,19 +176,20 @@ def test_videos_folders_and_single_images_are_written(tmp_path):
     assert not list(tmp_path.rglob("*.part"))
 
 
-def test_a_video_without_images_leaves_nothing_behind(tmp_path):
-    with OverlayWriter(tmp_path / "a.mp4", 5.0, CONE):
-        pass
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("name", ["a.gif", "a.png"])
-def test_other_files_are_refused(tmp_path, name):
-    with pytest.raises(AwarenavError, match=r"must be a \.mp4 file, a folder or 'none'"):
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("a.gif", r"must be a \.mp4 file, a folder or 'none'"),
+        ("a.png", r"must be a \.mp4 file, a folder or 'none'"),
+        ("file/deeper", "cannot make the folder"),
+    ],
+)
+def test_other_places_are_refused(tmp_path, name, message):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(AwarenavError, match=message):
         OverlayWriter(tmp_path / name, 5.0, CONE)
 
 
-def test_a_folder_that_cannot_be_made_is_named(tmp_path):
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(AwarenavError, match="cannot make the folder"):
-        OverlayWriter(Path(tmp_path / "file" / "deeper"), 5.0, CONE)
+def test_a_person_without_a_box_behind_the_camera_does_no_harm():
+    boxless = PersonObservation(0.0, [0.0, 0.0, -2.0], np.eye(3), (0, 0, 1), None, None, 0.5, None)
+    assert draw_overlay(estimate(boxless), CONE).shape == GREY.shape

@@ -107,7 +107,16 @@ def test_asked_for_they_are_named_on_stderr_and_in_every_line(photograph, capsys
 
 def test_renders_of_this_package_are_admitted_and_others_beside_them_are_not(tmp_path, capsys):
     folder = tmp_path / "set"
-    assert main(["render", "--frames", "2", "--scenes", "1", "--out", str(folder)]) == 0
+    folder.mkdir()
+    frames = [f"{number:06d}.png" for number in range(2)]
+    for number, name in enumerate(frames):
+        assert cv2.imwrite(str(folder / name), numbered(number))
+    lines = [
+        {"frame": name, "stamp_s": 0.0, "T_odom_camera": None, "people": []} for name in frames
+    ]
+    (folder / "truth.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    (folder / "render.yaml").write_text("frames: 2\n")
+    CAMERA.to_yaml(folder / "camera.yaml")
     out = tmp_path / "out.jsonl"
     assert main(["estimate", str(folder), "--out", str(out)]) == 0
     assert "renders only" not in capsys.readouterr().err

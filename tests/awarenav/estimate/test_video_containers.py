@@ -30,6 +30,8 @@ def recorded(path: Path, stamps_ms: np.ndarray, options: dict[str, str] | None =
         stream = container.add_stream(codec, rate=30)
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         stream.codec_context.time_base = Fraction(1, 1000)
+        if codec == "libvpx":
+            stream.options = {"deadline": "realtime", "cpu-used": "8"}
         for number, stamp_ms in enumerate(stamps_ms):
             frame = av.VideoFrame.from_ndarray(numbered(number), format="rgb24")
             frame.pts, frame.time_base = int(stamp_ms), Fraction(1, 1000)
@@ -44,8 +46,10 @@ def cut(path: Path, share: float) -> Path:
     return path
 
 
-@pytest.mark.parametrize("suffix", CONTAINERS)
-@pytest.mark.parametrize("stamps_ms", [STAMPS_MS, FROM_TEN_SECONDS_MS], ids=["varies", "late"])
+@pytest.mark.parametrize(
+    ("suffix", "stamps_ms"),
+    [*((suffix, STAMPS_MS) for suffix in CONTAINERS), ("mkv", FROM_TEN_SECONDS_MS)],
+)
 def test_a_whole_recording_is_read_without_a_problem(tmp_path, suffix, stamps_ms) -> None:
     source = open_source(str(recorded(tmp_path / f"a.{suffix}", stamps_ms)))
     frames = list(source.frames())
@@ -77,7 +81,7 @@ def test_a_recording_that_is_cut_off_is_a_problem(tmp_path, suffix) -> None:
     assert "it is cut off" in last.problem
 
 
-@pytest.mark.parametrize("suffix", CONTAINERS)
+@pytest.mark.parametrize("suffix", ["mkv", "ts"])
 def test_depth_by_frame_number_goes_with_any_container(tmp_path, suffix) -> None:
     path = recorded(tmp_path / f"a.{suffix}", STAMPS_MS)
     depth, out = tmp_path / "depth", tmp_path / "out.jsonl"

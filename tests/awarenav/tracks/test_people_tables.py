@@ -125,6 +125,10 @@ def test_both_commands_and_calibrate_refuse_other_units(text, message, tmp_path,
         ),
         (table().encode("utf-16"), "must be UTF-8"),
         ("t_s,id,x_m,y_m\n", "holds no rows"),
+        ("t_s,id,x_m,y_m\n0,1,2,far\n", "line 2: y_m must be a finite number, got 'far'"),
+        ("t_s,id,x_m,y_m\n0,1,2,3\n0,,2,3\n", "line 3: id is empty"),
+        ("t_s,id,x_m,y_m\n0,1,2\n", "line 2: y_m must be a finite number, got None"),
+        ("", "it must name t_s, id, x_m, y_m"),
     ],
 )
 def test_both_commands_refuse_the_same_tables(text, message, tmp_path: Path, capsys) -> None:
@@ -175,7 +179,7 @@ def test_a_calibration_from_python_refuses_them_as_well(speed_mps: float) -> Non
 
 def test_calibrate_refuses_numbers_of_frames_in_json_lines(tmp_path: Path, capsys) -> None:
     lines = []
-    for frame in range(200):
+    for frame in range(100):
         people = [
             {
                 "position_camera_m": [0.05 * frame - 4.0 + lane, 1.5, 4.0 + 3.0 * lane],

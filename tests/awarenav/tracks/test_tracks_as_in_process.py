@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from track_lines import pose
 
-from awarenav.errors import AwarenavError
 from awarenav.estimate import FrameEstimate, SourceFrame, estimate_record
-from awarenav.records import read_person, write_records
+from awarenav.records import write_records
 from awarenav.tracks import read_recording
 from perception import Camera, PersonObservation
 from tracking import PersonTracker
@@ -104,50 +103,3 @@ def test_every_field_of_an_observation_that_was_written_is_read(tmp_path):
                 "size_range_relative_std",
             ):
                 assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-6)
-
-
-def test_a_file_of_before_is_read_as_noise_of_each_image(tmp_path):
-    """Without the fields nothing is known of sizes; the tracks differ, so the fields matter."""
-    new = (
-        "range_lasting_relative_std",
-        "size_range_m",
-        "size_range_relative_std",
-        "awareness_reason",
-        "eyes_seen",
-    )
-    old = written(tmp_path, estimates(), without=new)
-    first = old[0][2][0]
-    assert (first.range_lasting_relative_std, first.size_range_m, first.eyes_seen) == (
-        0,
-        None,
-        False,
-    )
-    child = np.array([4.0, 0.8 - 0.3 * (FRAMES - 1) / RATE_HZ])
-    nearest = [
-        min(
-            np.linalg.norm(track.position_odom_m - child)
-            for track in tracks_of(each)[-1]
-            if track.status == "confirmed"
-        )
-        for each in (written(tmp_path, estimates()), old)
-    ]
-    assert nearest[0] < 0.2
-    assert nearest[1] > 0.5
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"range_lasting_relative_std": -0.1}, "range_lasting_relative_std"),
-        ({"size_range_m": 0.0, "size_range_relative_std": 0.1}, "size_range_m"),
-        ({"size_range_m": 3.0}, "must both be given"),
-        ({"size_range_relative_std": 0.1}, "must both be given"),
-        ({"awareness_reason": "face to small"}, "did you mean 'face too small'"),
-        ({"awareness_reason": ["no head pose"]}, "awareness_reason must be one of"),
-        ({"awareness_reason": "no head pose", "awareness": 0.5}, "must be null with an awareness"),
-        ({"eyes_seen": 1}, "eyes_seen must be true or false"),
-    ],
-)
-def test_a_value_that_is_not_valid_is_named(change, message):
-    with pytest.raises(AwarenavError, match=message):
-        read_person(change, "person 0")

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from awarenav.cli import main
-from awarenav.tracks import track_recording, tracks_figure
-from awarenav.tracks._positions import read_positions
-from awarenav.tracks._smoothed import distances_m, smoothed_path
+from awarenav.tracks import read_positions, track_recording, tracks_figure
+from awarenav.tracks._tracking import distances_m, smoothed_path
 from tracking.prediction import REGION_SHARE, PredictionModel
 
 STD_M = 0.1
@@ -86,28 +85,13 @@ def test_a_recording_that_is_too_short_is_refused(people, seconds, words, tmp_pa
     assert not out.exists()
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("t_s,id,x_m\n0,1,2\n", "the header misses y_m"),
-        ("t_s,id,x_m,y_m\n0,1,2,far\n", "line 2: y_m must be a finite number, got 'far'"),
-        ("t_s,id,x_m,y_m\n0,1,2,3\n0,,2,3\n", "line 3: id is empty"),
-        ("t_s,id,x_m,y_m\n0,1,2\n", "line 2: y_m must be a finite number, got None"),
-        ("t_s,id,x_m,y_m\n0,1,2,nan\n", "line 2: y_m"),
-        ("t_s,id,x_m,y_m,std_m\n0,1,2,3,0\n", "line 2: std_m must be above 0 m, got 0"),
-        ("", "it must name t_s, id, x_m, y_m and may name std_m, got nothing"),
-    ],
-)
-def test_positions_that_are_not_valid_are_refused_by_line(text, words, tmp_path, capsys):
-    (tmp_path / "a.csv").write_text(text)
-    assert calibrate(tmp_path / "a.csv", "--out", tmp_path / "p.yaml") == 2
-    assert words in capsys.readouterr().err
-
-
 def test_outputs_and_options_that_do_not_fit_are_refused(crowd, tmp_path, capsys):
+    std = tmp_path / "std.csv"
+    std.write_text("t_s,id,x_m,y_m,std_m\n0,1,2,3,0\n")
     for words, message in (
         ((crowd, "--out", tmp_path / "p.txt"), "--out must end in .yaml or .yml"),
         ((crowd, tmp_path / "none.csv"), "cannot read"),
+        ((std,), "line 2: std_m must be above 0 m, got 0"),
         ((crowd, "--longest", "0.1"), "0.1"),
     ):
         assert calibrate(*words) == 2

@@ -7,11 +7,10 @@ import pytest
 from track_lines import lines, pose, standing, walking
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate import track_record
+from awarenav.estimate._results import track_record
 from awarenav.records import write_records
 from awarenav.tracks import read_recording, track_recording, tracks_in_file
-from perception import Camera
-from tracking import PersonTracker, TrackerConfig
+from tracking import PersonTracker
 
 WALKERS = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0)]
 
@@ -82,20 +81,6 @@ def test_late_frames_within_the_lag_give_the_tracks_of_sorted_frames(tmp_path):
     assert any("late frames put back" in remark for remark in late.remarks)
 
 
-def test_a_recording_with_late_frames_ends_with_the_tracks_of_the_tracker(tmp_path):
-    records = lines(WALKERS, frames=30)
-    records[20], records[22] = records[22], records[20]
-    recording = recorded(tmp_path, records)
-    tracker = PersonTracker()
-    for frame in recording.frames:
-        tracks = tracker.update(frame.observations, frame.stamp_s, frame.T_odom_camera)
-    last = [each.samples[-1] for each in track_recording(recording).histories]
-    for track, sample in zip(tracks, last, strict=True):
-        assert sample.stamp_s == track.stamp_s
-        np.testing.assert_allclose(sample.position_odom_m, track.position_odom_m, atol=1e-9)
-        assert sample.awareness_lower == pytest.approx(track.awareness_lower, abs=1e-9)
-
-
 def test_frames_that_come_too_late_are_counted_and_change_nothing(tmp_path):
     records = lines(WALKERS, frames=30)
     without = [record for k, record in enumerate(records) if k != 5]
@@ -114,18 +99,6 @@ def test_a_frame_far_ahead_is_counted_and_changes_nothing(tmp_path):
     assert drawn(run) == drawn(track_recording(recorded(tmp_path, without, "without.jsonl")))
     assert "1 frame far ahead of those that follow: not used" in run.remarks
     assert len(run.camera_stamps_s) == len(without)
-
-
-def test_settings_and_field_of_view_reach_the_tracker(tmp_path):
-    gone = lines([standing(4.0, 0.0)], frames=60, hidden=lambda k, who: k > 10)
-    recording = recorded(tmp_path, gone)
-
-    def died_s(config=None, camera=None):
-        return track_recording(recording, config, camera).histories[0].died_s
-
-    assert died_s(TrackerConfig(max_coast_s=1.5)) < died_s() - 1.0
-    # Somebody in the middle of the picture, whom frames do not show, is not there.
-    assert died_s(camera=Camera.from_fov(640, 480, 1.2)) < died_s() - 1.0
 
 
 def test_the_path_of_the_camera_is_where_it_looks(tmp_path):
@@ -153,15 +126,6 @@ def test_ids_of_a_file_are_taken_as_they_are(tmp_path):
     for each, place in zip(run.histories, WALKERS, strict=True):
         expected = [place(stamp_s) for stamp_s in each.stamps_s]
         np.testing.assert_allclose(each.positions_odom_m, expected, atol=1e-9)
-
-
-def test_a_position_covariance_turns_with_the_camera(tmp_path):
-    records = lines([standing(0.0, 4.0)], frames=1, named=True, camera=lambda _: pose(0, 0, 1.1))
-    spread = np.diag([0.01, 0.02, 0.09])
-    records[0]["people"][0]["position_covariance_m2"] = spread.tolist()
-    (one,) = tracks_in_file(recorded(tmp_path, records)).histories
-    turn = pose(0, 0, 1.1)[:2, :3]
-    np.testing.assert_allclose(one.samples[0].position_covariance_m2, turn @ spread @ turn.T)
 
 
 def test_tracks_of_a_file_come_back_as_the_tracker_wrote_them(tmp_path):
@@ -209,8 +173,3 @@ def test_an_invalid_track_of_a_file_is_refused_by_frame(tmp_path, change, messag
     records[1]["tracks"] = [{**track, **change}]
     with pytest.raises(AwarenavError, match=f"frame '000001', track 0: {message}"):
         tracks_in_file(recorded(tmp_path, records))
-
-
-def test_a_file_without_ids_says_so(tmp_path):
-    with pytest.raises(AwarenavError, match="leave out --ids"):
-        tracks_in_file(recorded(tmp_path, lines(WALKERS)))

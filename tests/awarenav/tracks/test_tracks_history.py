@@ -42,17 +42,17 @@ def spans(seen, died_s=None):
     return [pytest.approx(span) for span in history(samples, died_s).unseen_spans()]
 
 
-def test_a_person_seen_in_every_frame_is_never_unseen():
-    assert spans([True] * 6) == []
-
-
-def test_an_unseen_span_goes_from_the_last_sight_to_the_next():
-    assert spans([True, True, False, False, True]) == [(0.1, 0.4)]
-
-
-def test_the_last_unseen_span_ends_with_the_track():
-    assert spans([True, False, False]) == [(0.0, 0.2)]
-    assert spans([True, False, False], died_s=0.3) == [(0.0, 0.3)]
+@pytest.mark.parametrize(
+    ("seen", "died_s", "expected"),
+    [
+        ([True] * 6, None, []),
+        ([True, True, False, False, True], None, [(0.1, 0.4)]),
+        ([True, False, False], None, [(0.0, 0.2)]),
+        ([True, False, False], 0.3, [(0.0, 0.3)]),
+    ],
+)
+def test_a_span_goes_from_the_last_sight_to_the_next_or_to_the_end(seen, died_s, expected):
+    assert spans(seen, died_s) == expected
 
 
 def test_a_pause_of_the_camera_is_time_unseen_and_an_interval_between_frames_is_not():

@@ -11,22 +11,25 @@ from hypothesis import strategies as st
 from track_lines import lines, pose, standing, walking
 
 from awarenav.records import write_records
-from awarenav.tracks import read_recording, track_recording, tracks_in_file
-from awarenav.tracks._positions import read_positions
+from awarenav.tracks import (
+    read_positions,
+    read_recording,
+    track_recording,
+    tracks_figure,
+    tracks_in_file,
+)
 from perception import Camera
 
 pytest.importorskip("matplotlib")
 
 from matplotlib.lines import Line2D
-from matplotlib.patches import Ellipse, Wedge
+from matplotlib.patches import Wedge
 
-from awarenav.tracks import (
+from awarenav.tracks._plot import (
     covariance_ellipse,
     path_arrows,
-    plan_limits,
     shown_tracks,
     track_colour,
-    tracks_figure,
     view_edges_rad,
 )
 
@@ -95,7 +98,7 @@ def test_arrows_point_where_people_walk_and_the_standing_have_none(tmp_path):
     assert path_arrows(other, 0.5) == []
 
 
-@pytest.mark.parametrize(("number", "columns"), [(1, 1), (6, 1), (7, 2), (20, 3)])
+@pytest.mark.parametrize(("number", "columns"), [(1, 1), (7, 2), (13, 3)])
 def test_every_track_has_a_panel_its_colour_and_its_number(tmp_path, number, columns):
     run = track_recording(recorded(tmp_path, lines(crowd(number), frames=12)))
     figure = tracks_figure(run, "crowd", camera=CAMERA)
@@ -104,6 +107,7 @@ def test_every_track_has_a_panel_its_colour_and_its_number(tmp_path, number, col
     assert len({round(each.get_position().x0, 6) for each in panels}) == columns
     assert {each.get_text() for each in plan.texts} >= {str(k + 1) for k in range(number)}
     assert len({track_colour(k) for k in range(number)}) == number
+    figure.canvas.draw()
     boxes = [each.get_position() for each in figure.axes]
     for index, box in enumerate(boxes):
         assert 0.0 <= box.x0 < box.x1 <= 1.0
@@ -113,7 +117,9 @@ def test_every_track_has_a_panel_its_colour_and_its_number(tmp_path, number, col
 
 def test_a_metre_is_as_long_along_x_as_along_y_and_every_track_is_inside(tmp_path):
     run = track_recording(recorded(tmp_path, lines([walking(2.0, -9.0, 0.1, 4.0)], frames=45)))
-    plan = tracks_figure(run, "tall").axes[0]
+    figure = tracks_figure(run, "tall")
+    figure.canvas.draw()
+    plan = figure.axes[0]
     box = plan.get_position()
     width, height = plan.figure.get_size_inches() * (box.width, box.height)
     (x_min, x_max), (y_min, y_max) = plan.get_xlim(), plan.get_ylim()
@@ -134,18 +140,6 @@ def test_tracks_without_a_panel_are_counted_in_a_note(tmp_path):
     assert {each.id for each in others} == {6, 7, 8, 9}
     note = "grey, without a panel: 1 never confirmed and 3 beyond the most that are shown"
     assert note in texts(tracks_figure(run, "crowd", most=5))
-
-
-def test_those_seen_most_often_come_first(tmp_path):
-    records = lines(crowd(3), frames=30, hidden=lambda k, who: who == 0 and k > 10)
-    shown, _ = shown_tracks(track_recording(recorded(tmp_path, records)).histories, 2)
-    assert [each.id for each in shown] == [2, 3]
-
-
-def test_an_empty_plot_says_that_there_are_no_people(tmp_path):
-    figure = tracks_figure(track_recording(recorded(tmp_path, lines([], frames=7))), "empty")
-    assert "no people in 7 frames" in texts(figure)
-    assert len(figure.axes) == 1
 
 
 def test_a_file_without_frames_gives_an_empty_plot(tmp_path):
@@ -197,16 +191,3 @@ def test_shaded_spans_are_those_in_which_nobody_saw_the_person(tmp_path):
     panel = tracks_figure(run, "gap").axes[1]
     spans = [(each.get_x(), each.get_x() + each.get_width()) for each in panel.patches]
     assert spans == [pytest.approx((1.4, 2.5))]
-
-
-def test_faint_tracks_have_no_ellipses_and_named_ones_have(tmp_path):
-    run = track_recording(recorded(tmp_path, lines([standing(3.0, 0.0)])))
-    plan = tracks_figure(run, "one").axes[0]
-    centres = [each.center for each in plan.patches if isinstance(each, Ellipse)]
-    assert len(centres) >= 3
-    assert np.allclose(centres, [3.0, 0.0], atol=0.05)
-
-
-def test_limits_span_three_metres_without_any_track(tmp_path):
-    run = track_recording(recorded(tmp_path, []))
-    assert plan_limits(run, []) == pytest.approx((-1.5, 1.5, -1.5, 1.5))

@@ -1,4 +1,4 @@
-"""The detector: whom it reports, once each, and what it keeps apart; candidates of two scanners."""
+"""The detector: whom it reports, once each; candidates of two scanners, and as observations."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ from perception.laser import (
     LegDetector,
     LegDetectorConfig,
     PersonCandidate,
+    Scanner,
     StaticMap,
     merge_candidates,
+    observations_of,
 )
+from tracking import PersonTracker, SensorConfig, TrackerConfig
 
 ONCE = LegDetectorConfig(learn=False)
 POST = (2.0, 0.5, 0.08)
@@ -96,12 +99,6 @@ def test_two_people_beside_each_other_stay_two() -> None:
     scan = laser_scan([*two_legs(2.0, 0.35), *two_legs(2.0, -0.35)])
     found = LegDetector(ONCE).detect(points_of(scan))
     assert sorted(places(found)[:, 1].round(1).tolist()) == pytest.approx([-0.35, 0.35], abs=0.1)
-
-
-def test_a_leg_alone_is_one_leg() -> None:
-    scan = laser_scan([(2.0, 0.0, 0.06)])
-    (found,) = LegDetector(ONCE, classifier=Says(0.9, 0.0)).detect(points_of(scan))
-    assert found.kind == "one_leg"
 
 
 def test_the_threshold_and_the_range_leave_people_out() -> None:
@@ -221,3 +218,50 @@ def test_the_order_of_the_scanners_does_not_matter(order, gap) -> None:
     home = merge_candidates(groups)
     mixed = merge_candidates([groups[k] for k in order])
     np.testing.assert_allclose(places(mixed), places(home), atol=1e-9)
+
+
+# --- candidates as observations -------------------------------------------------------------------
+
+
+SPREAD = np.array([[0.010, 0.004], [0.004, 0.030]])
+
+
+def spread_out(x: float, y: float, stamp_s: float = 5.0) -> PersonCandidate:
+    return PersonCandidate(stamp_s, (x, y), SPREAD, 0.8, "one_leg")
+
+
+@given(
+    st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-3.1, 3.1), st.booleans(), st.data()
+)
+def test_the_pose_brings_them_back_to_odom(x, y, yaw, upside_down, data) -> None:
+    T = Scanner.mounted(x, y, 0.2, yaw, upside_down=upside_down).T_base_scanner
+    where = data.draw(st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0)))
+    (made,) = observations_of([spread_out(*where)], T)
+    back = T[:3, :3] @ made.position_camera_m + T[:3, 3]
+    np.testing.assert_allclose(back, [*where, 1.3], atol=1e-9)
+    spread = T[:3, :3] @ made.position_covariance_m2 @ T[:3, :3].T
+    np.testing.assert_allclose(spread[:2, :2], SPREAD, atol=1e-12)
+    assert (made.stamp_s, made.score) == (5.0, 0.8)
+    assert made.gaze_camera is made.awareness is made.awareness_std is None
+
+
+def test_the_tracker_finds_them_where_they_are() -> None:
+    tracker = PersonTracker(sensors={"laser": SensorConfig(alignment_std_rad=0.0)})
+    T = Scanner.mounted(1.0, 2.0, 0.2, math.radians(135.0), upside_down=True).T_base_scanner
+    for tick in range(20):
+        stamp_s = 0.04 * tick
+        seen = observations_of([spread_out(3.0, -1.0, stamp_s)], T)
+        tracks = tracker.update(seen, stamp_s, T, sensor="laser")
+    (track,) = tracks
+    assert track.status == "confirmed"
+    np.testing.assert_allclose(track.position_odom_m, [3.0, -1.0], atol=1e-6)
+
+
+def test_candidates_of_two_scans_share_a_stamp_at_the_price_of_certainty() -> None:
+    here, older = observations_of([spread_out(1.0, 0.0), spread_out(2.0, 0.0, 4.9)], np.eye(4), 5.0)
+    assert here.stamp_s == older.stamp_s == 5.0
+    np.testing.assert_allclose(here.position_covariance_m2[:2, :2], SPREAD, atol=1e-12)
+    grown = SPREAD + 0.1**2 * np.eye(2)
+    np.testing.assert_allclose(older.position_covariance_m2[:2, :2], grown, atol=1e-12)
+    tracker = PersonTracker(TrackerConfig())
+    assert len(tracker.update((here, older), 5.0, np.eye(4))) == 2

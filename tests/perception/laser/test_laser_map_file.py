@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of
-from PIL import Image
 
 from perception import PerceptionError
 from perception.laser import LegDetector, LegDetectorConfig, MapCells, StaticMap
@@ -78,8 +77,9 @@ def test_brightness_counts_as_the_mode_says(keys, occupied, tmp_path: Path) -> N
     assert len(MapCells.from_yaml(deep).cells_m) == len(occupied)
 
 
-@pytest.mark.parametrize("keys", [{}, {"mode": "scale"}, {"mode": "raw"}, {"negate": 1}])
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+@pytest.mark.parametrize(
+    ("keys", "kind"), [({}, np.uint8), ({"mode": "raw"}, np.uint8), ({"negate": 1}, np.uint16)]
+)
 def test_transparent_pixels_are_unknown(keys: dict[str, object], kind: type, tmp_path) -> None:
     """As for nav2_map_server since 2025; where somebody stands is then no part of the map."""
     white, dark = np.iinfo(kind).max, {"raw": 90}.get(str(keys.get("mode")), 0)
@@ -87,15 +87,6 @@ def test_transparent_pixels_are_unknown(keys: dict[str, object], kind: type, tmp
     pixels[0, :, 3] = [white, white // 2, 0, white]
     cells = MapCells.from_yaml(written(tmp_path, pixels, "a.png", **keys))
     np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.65])
-
-
-@pytest.mark.parametrize("mode", ["P", "RGB"])
-def test_the_transparent_colour_of_a_png_is_unknown(mode: str, tmp_path: Path) -> None:
-    """Floor that a drawing program erased: black, and transparent."""
-    drawn = Image.fromarray(np.array([[0, 255], [100, 255]], np.uint8)).convert(mode)
-    drawn.save(tmp_path / "erased.png", transparency=(0, 0, 0) if mode == "RGB" else 0)
-    path = written(tmp_path, (tmp_path / "erased.png").read_bytes(), "erased.png")
-    assert not StaticMap.from_yaml(path, margin_m=0.0).occupied[1].any()
 
 
 @pytest.mark.parametrize("kind", [2, 3, 5, 6])
@@ -108,12 +99,6 @@ def test_netpbm_is_read_as_text_and_as_numbers(kind: int, tmp_path: Path) -> Non
         body = values.astype(np.uint8).tobytes()
     held = StaticMap.from_yaml(written(tmp_path, head + body, "hall.pnm"), margin_m=0.0)
     assert held.occupied[::-1].tolist() == (shades == 0).tolist()
-
-
-def test_bitmaps_of_netpbm_have_ones_for_black(tmp_path: Path) -> None:
-    for name, image in (("a.pbm", b"P1\n3 1\n100\n"), ("b.pbm", b"P4\n3 1\n\x80")):
-        held = StaticMap.from_yaml(written(tmp_path, image, name), margin_m=0.0)
-        assert held.occupied.tolist() == [[True, False, False]]
 
 
 def test_colours_count_by_their_mean(tmp_path: Path) -> None:
@@ -161,16 +146,6 @@ def test_a_turned_map_holds_its_cells_wherever_it_lies(
     assert not held.holds(in_odom(free)).any()
 
 
-def test_a_map_that_is_only_shifted_keeps_its_cells(tmp_path: Path) -> None:
-    pixels = (np.random.default_rng(4).random((7, 9)) * 255).astype(np.uint8)
-    path = written(tmp_path, pixels)
-    T = np.eye(4)
-    T[:2, 3] = 5.0, 6.0
-    here, there = StaticMap.from_yaml(path), StaticMap.from_yaml(path, T)
-    assert np.array_equal(here.occupied, there.occupied)
-    np.testing.assert_allclose(there.origin_odom_m - here.origin_odom_m, [5.0, 6.0])
-
-
 def test_an_empty_map_holds_nothing(tmp_path: Path) -> None:
     path = written(tmp_path, np.full((3, 3), 255, np.uint8), origin="[0, 0, 1.0]")
     assert not StaticMap.from_yaml(path).holds(np.zeros((1, 2))).any()
@@ -198,23 +173,16 @@ WHITE = np.full((2, 2), 255, np.uint8)
     ("keys", "text"),
     [
         ({"resolution": None}, "lacks the key 'resolution'"),
-        ({"negate": None}, "lacks the key 'negate'"),
         ({"occupied_tresh": 0.6}, "unknown key 'occupied_tresh'.*did you mean 'occupied_thresh'"),
-        ({"Mode": "scale"}, "unknown key 'Mode'.*did you mean 'mode'"),
         ({"mode": "binary"}, "mode must be one of trinary, scale, raw, got 'binary'"),
         ({"resolution": 0.0}, r"resolution must lie in \[0.005, 1\]"),
-        ({"resolution": "fine"}, "resolution must be a number"),
         ({"origin": "[0, 0]"}, r"origin must have shape \(3,\)"),
         ({"origin": "[0, 0, .nan]"}, "origin must be finite"),
-        ({"origin": "{x: 1}"}, "origin must be an array of numbers"),
         ({"negate": 2}, "negate must be 0 or 1"),
-        ({"negate": "[1]"}, "negate must be 0 or 1"),
         ({"occupied_thresh": 1.1}, "occupied_thresh must lie in"),
         ({"occupied_thresh": 0.1}, "free_thresh must be below occupied_thresh, got 0.196 and 0.1"),
-        ({"free_thresh": ".nan"}, "free_thresh must be finite"),
         ({"image": "gone.pgm"}, "cannot read the map's image .*gone.pgm: No such file"),
         ({"image": "[]"}, "image must be the path"),
-        ({"image": '"a\\0b"'}, "cannot read the map's image"),
     ],
 )
 def test_a_map_file_that_makes_no_sense_is_refused(keys, text: str, tmp_path: Path) -> None:
@@ -237,14 +205,11 @@ def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog
     ("image", "text"),
     [
         (b"", "damaged, or no PGM"),
-        (b"no image", "damaged, or no PGM"),
         (b"P5 3 1 255\n\x00\x32", "damaged, or no PGM"),
         (b"P5 9999999 9999999 255\n", "damaged, or no PGM"),
         (b"P5 2 1 100\n\x00\x64", "in which white is 100, not 255 or 65535; save it as PGM or PNG"),
-        (b"P2 2 1 255\n0 white\n", "damaged, or no PGM"),
         (b"\x89PNG" + bytes(22) + b"tRNS", "a grey PNG with a transparent grey; save it as"),
         (b"II*\0" + bytes(30), "a TIFF; save it as PGM or PNG"),
-        (b"MM\0*" + bytes(30), "a TIFF; save it as PGM or PNG"),
         (b"P7\nWIDTH 1\nHEIGHT 1\nDEPTH 1\nMAXVAL 15\nENDHDR\n\x0f", r"a PAM \(P7\); save it as"),
     ],
 )

@@ -1,7 +1,8 @@
-"""Small ONNX graphs in the layouts of detectors and pose networks, with known results.
+"""Small ONNX graphs in the layouts of detectors, pose and head networks, with known results.
 
 Some return fixed rows. Others depend on the image: the score of a detector's cell is the mean of
-one colour in it, and all keypoints of a pose network lie at the reddest point.
+one colour in it, all keypoints of a pose network lie at the reddest point, and a head pose network
+finds one bright disc on black.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ _TYPES = {
 # Names of weights in the heads of OpenMMLab's detectors.
 RTMDET_HEAD = "bbox_head.rtm_cls.0.weight"
 YOLOX_HEAD = "bbox_head.multi_level_conv_obj.0.weight"
+#: Diameter of the disc that a head pose network takes for a head.
+DISC_M = 0.20
 
 
 class Graph:
@@ -249,4 +252,68 @@ def red_point_pose(
         value, bins = outputs[axis]
         name = f"simcc_{axis}" if named else f"out_{place}"
         graph.output(value, name, (batch, 17, bins))
+    return graph.bytes()
+
+
+def disc_network(
+    rotation: Any = None,
+    *,
+    head: float = 1.0,
+    size: int = 64,
+    metadata: dict[str, str] | None = None,
+    side_log_std: float = 0.05,
+    rotation_std: float = 0.1,
+    batch: int | str = "N",
+) -> bytes:
+    """Return a network of awarenav's layout: the head is the disc, with a diameter of 0.20 m."""
+    graph = Graph("image", (batch, 3, size, size))
+    grey = graph.node("ReduceMean", "image", axes=[1], keepdims=1)
+    light = graph.node("Add", grey, graph.constant(2.0))  # black is −2 in the input
+    every = graph.constant([1, 2, 3], np.int64)
+    total = graph.node("ReduceSum", light, every, keepdims=1)
+    total = graph.node("Add", total, graph.constant(1e-6))
+    grid = (np.arange(size) + 0.5) / size
+    centre = []
+    for shape in ((1, 1, 1, size), (1, 1, size, 1)):
+        weighted = graph.node("Mul", light, graph.constant(grid.reshape(shape)))
+        moment = graph.node("ReduceSum", weighted, every, keepdims=1)
+        mean = graph.node("Div", moment, total)
+        centre.append(graph.node("Reshape", mean, graph.constant([-1, 1], np.int64)))
+    # The area of a white disc as a share of the crop, and from it the crop's side.
+    square = graph.node("Mul", total, graph.constant(4.0 / np.pi / (4.25 * size * size)))
+    side = graph.node("Div", graph.constant(DISC_M), graph.node("Sqrt", square))
+    side_m = graph.node("Reshape", side, graph.constant([-1], np.int64))
+    none = graph.node("Mul", side_m, graph.constant(0.0))
+    column = graph.node("Reshape", none, graph.constant([-1, 1], np.int64))
+    matrix = graph.node("Reshape", none, graph.constant([-1, 1, 1], np.int64))
+
+    def fixed_output(name: str, like: str, value: Any) -> None:
+        value = np.asarray(value)
+        graph.output(graph.node("Add", like, graph.constant(value)), name, ("N", *value.shape[1:]))
+
+    turn = np.eye(3) if rotation is None else np.asarray(rotation)
+    fixed_output("rotation", matrix, turn[None])
+    fixed_output("rotation_covariance", matrix, rotation_std**2 * np.eye(3)[None])
+    middle = graph.node("Concat", *centre, axis=1)
+    middles = graph.node("Unsqueeze", middle, graph.constant([1], np.int64))
+    keypoints = graph.node("Expand", middles, graph.constant([1, 5, 2], np.int64))
+    graph.output(keypoints, "keypoints", ("N", 5, 2))
+    fixed_output("keypoints_std", column, np.full((1, 5), 0.01))
+    fixed_output("visible", column, [(0.95, 0.9, 0.9, 0.8, 0.8)])
+    graph.output(middle, "centre", ("N", 2))
+    graph.output(side_m, "side_m", ("N",))
+    fixed_output("side_log_std", none, [side_log_std])
+    fixed_output("head", none, [head])
+    facts = {"awarenav_model": "head_pose", "awarenav_layout": "1", "crop_side_m": "0.40"}
+    return graph.bytes(facts | (metadata or {}))
+
+
+def full_range_network(output: Any, size: int = 224) -> bytes:
+    """Return a network of the 6DRepNet kind that always returns ``output``: (3, 3) or (6,)."""
+    output = np.asarray(output, dtype=np.float32)
+    graph = Graph("image", ("N", 3, size, size))
+    shape = graph.constant([-1, *[1] * output.ndim], np.int64)
+    nones = graph.node("Reshape", graph.zero(), shape)
+    answer = graph.node("Add", nones, graph.constant(output[None]))
+    graph.output(answer, "output", ("N", *output.shape))
     return graph.bytes()

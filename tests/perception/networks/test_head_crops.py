@@ -1,9 +1,10 @@
-"""Crops of heads and views along a ray: their content and geometry."""
+"""Crops of heads and views along a ray: their content, geometry and blur."""
 
 from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,6 +19,8 @@ from perception.networks.heads import (
     ray_axes,
     ray_focal_px,
 )
+from perception.networks.heads._crops import blur_lengths, uncertainty_factors
+from training.networks import Degradation, degrade
 
 DISTORTED = Camera(960, 600, 340.0, 345.0, 470.0, 310.0, [-0.15, 0.02, 0.001, -0.001, 0.0])
 WIDE = Camera.from_fov(960, 600, math.radians(120.0))
@@ -118,3 +121,48 @@ def test_ray_axes_are_the_smallest_rotation_onto_the_ray(x, y):
     angle = np.linalg.norm(Rotation.from_matrix(axes).as_rotvec())
     assert angle == pytest.approx(math.acos(min(ray[2], 1.0)), abs=1e-7)
     assert expected.magnitude() == pytest.approx(angle, abs=1e-6)
+
+
+# --- blur -----------------------------------------------------------------------------------------
+
+
+SHARP = 0.05
+
+
+def texture(size=64):
+    """Return a crop with shapes of all sizes, about as sharp as a camera draws them."""
+    rng = np.random.default_rng(0)
+    picture = np.zeros((size, size), np.float32)
+    for scale in (2, 4, 8, 16):
+        coarse = rng.normal(0.0, scale, (size // scale, size // scale)).astype(np.float32)
+        picture += cv2.resize(coarse, (size, size), interpolation=cv2.INTER_CUBIC)
+    picture = cv2.GaussianBlur(picture, (0, 0), 0.5)
+    picture = 128.0 + 40.0 * (picture - picture.mean()) / picture.std()
+    return np.repeat(np.clip(picture, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def moved(crop, length_px, angle_rad):
+    """Return the crop blurred by a motion."""
+    motion = Degradation(motion_px=length_px, motion_rad=angle_rad)
+    return degrade(crop, motion, np.random.default_rng(0))
+
+
+def length(crop):
+    return float(blur_lengths([crop])[0])
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 45.0, 137.0])
+def test_longer_blur_in_any_direction_gives_longer_lengths(angle_deg):
+    crop = texture()
+    lengths = [length(moved(crop, px, math.radians(angle_deg))) for px in (0.0, 5.0, 10.0, 20.0)]
+    assert lengths == sorted(lengths)
+    assert lengths[0] < SHARP < lengths[-1]
+    assert lengths[-1] > 1.2 * lengths[0]
+
+
+def test_the_factor_is_one_for_sharp_crops_and_grows_in_proportion_beyond():
+    crops = [texture(), moved(texture(), 14.0, 0.3), np.zeros((64, 64, 3), np.uint8)]
+    sharp, blurred, black = uncertainty_factors(crops)
+    assert sharp == 1.0
+    assert blurred == pytest.approx(blur_lengths(crops)[1] / SHARP)
+    assert black == pytest.approx(5.0)

@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from head_graphs import disc_network
 from hypothesis import given
 from hypothesis import strategies as st
-from onnx_graphs import colour_yolov8, red_point_pose
+from onnx_graphs import colour_yolov8, disc_network, red_point_pose
 
 from perception import Camera, PerceptionError
 from perception.networks import OnnxPersonDetector, OnnxPoseEstimator, PixelFormat, rgb_image
@@ -18,7 +17,6 @@ from perception.networks.heads import OnnxHeadPoseEstimator
 
 CAMERA = Camera.from_fov(64, 48, 1.0)
 sides = st.integers(1, 3000)
-IMAGENET = {"mean_rgb": (123.675, 116.28, 103.53), "std_rgb": (58.395, 57.12, 57.375)}
 
 
 @given(sides, sides, st.integers(8, 700), st.integers(8, 700), st.booleans())
@@ -83,29 +81,13 @@ def test_padding_is_grey_also_after_an_image_of_another_shape(centred: bool) -> 
     assert (blob[0][:, ~outside] == 255.0).all()
 
 
-def test_channels_are_in_the_order_of_the_network() -> None:
-    image = np.zeros((8, 8, 3), np.uint8)
-    image[...] = (10, 20, 30)
-    for bgr, order in ((False, (0, 1, 2)), (True, (2, 1, 0))):
-        for dtype in ("float32", "float16", "uint8"):
-            pixels = PixelFormat(**IMAGENET, bgr=bgr, dtype=dtype)
-            blob, _ = Letterbox(8, 8, pixels, centred=True).fill(image)
-            assert blob.dtype == dtype
-            values = (np.array([10, 20, 30]) - IMAGENET["mean_rgb"]) / IMAGENET["std_rgb"]
-            wanted = np.array([10, 20, 30]) if dtype == "uint8" else values
-            np.testing.assert_allclose(blob[0, :, 0, 0], wanted[list(order)], rtol=1e-3)
-
-
 @pytest.mark.parametrize(
     ("image", "words"),
     [
         (np.zeros((4, 4), np.uint8), "cvtColor"),
         (np.zeros((4, 4, 4), np.uint8), "fourth channel"),
-        (np.zeros((4, 4, 1), np.uint8), r"got uint8 of shape \(4, 4, 1\)"),
         (np.zeros((4, 4, 3), np.float32), "got float32"),
-        (np.zeros((0, 4, 3), np.uint8), "got 4 x 0"),
         (np.zeros((1, 40000, 3), np.uint8), "got 40000 x 1"),
-        ([[0, 0, 0]], "got list"),
         (None, "got NoneType"),
     ],
 )
@@ -127,11 +109,3 @@ def test_every_estimator_checks_its_image(run: Callable[[object], object]) -> No
     for image in (np.zeros((9, 9, 3)), None):
         with pytest.raises(PerceptionError, match="image_rgb must"):
             run(image)
-
-
-def test_views_of_an_image_are_read_correctly() -> None:
-    image = np.random.default_rng(0).integers(0, 256, (40, 60, 3), np.uint8)
-    letterbox = Letterbox(64, 64, PixelFormat(), centred=True)
-    for view in (image[..., ::-1], image[::-1], image[:, ::2], image.transpose(1, 0, 2)):
-        seen = letterbox.fill(rgb_image(view))[0].copy()
-        np.testing.assert_array_equal(seen, letterbox.fill(np.ascontiguousarray(view))[0])

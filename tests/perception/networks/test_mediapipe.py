@@ -1,67 +1,49 @@
-"""MediaPipe as a pose estimator; most tests need the extra and photographs."""
+"""MediaPipe as an estimator of poses and of eyes; tests with the package need its extra."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
+import math
 import re
 import sys
+from itertools import pairwise
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 from paths import SHARED
 
-from perception import PerceptionError, PersonDetection, PersonKeypoints, PoseEstimator
+from perception import Camera, HeadPose, PerceptionError, PersonDetection, PoseEstimator
+from perception.eyes import EyeEstimator
 from perception.installation import install_command
-from perception.layouts import LEFT_ANKLE, LEFT_SHOULDER, NOSE, RIGHT_ANKLE, RIGHT_SHOULDER
-from perception.networks import MediaPipePoseEstimator
+from perception.layouts import NOSE
+from perception.networks import MediaPipeEyeEstimator, MediaPipePoseEstimator
+from perception.networks.poses import iris_std_m
 from perception.networks.poses._mediapipe import _cropped, _face_scores, _in_image
+from perception.networks.poses._mediapipe_eyes import iris_offset
 
 IMAGES = SHARED / "images"
 TRUTH = IMAGES / "truth_coco_wholebody_mmpose.json"
-
-HAS_MEDIAPIPE = importlib.util.find_spec("mediapipe") is not None
-needs_mediapipe = pytest.mark.skipif(
-    not HAS_MEDIAPIPE, reason="mediapipe is not installed (the extra 'mediapipe')"
-)
-needs_images = pytest.mark.skipif(not TRUTH.is_file(), reason="no photographs beside the checkout")
+CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
+FRAME = np.zeros((480, 640, 3), np.uint8)
+FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 # Height of a head relative to the face from brows to chin, which the labels box.
 HEAD_OVER_FACE = 1.75
+needs_mediapipe = pytest.mark.skipif(
+    importlib.util.find_spec("mediapipe") is None,
+    reason="mediapipe is not installed (the extra 'mediapipe')",
+)
+needs_images = pytest.mark.skipif(not TRUTH.is_file(), reason="no photographs beside the checkout")
 
 
-@pytest.fixture(scope="module")
-def estimator():
-    with MediaPipePoseEstimator() as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def photographs():
-    """Return each labelled person with the image that shows them."""
-    truth = json.loads(TRUTH.read_text())
-    files = {image["id"]: f"coco_{image['file_name']}" for image in truth["images"]}
-    images = {
-        key: cv2.cvtColor(cv2.imread(str(IMAGES / name)), cv2.COLOR_BGR2RGB)
-        for key, name in files.items()
-    }
-    return [(images[person["image_id"]], person) for person in truth["annotations"]]
-
-
-def detection(person):
-    left, top, width, height = person["bbox"]
-    return PersonDetection([left, top, left + width, top + height], 1.0)
-
-
-def labelled(person):
-    return np.array(person["keypoints"], dtype=float).reshape(-1, 3)
-
-
-def test_a_broken_package_is_refused_with_the_name_of_the_extra(monkeypatch):
+@pytest.mark.parametrize("make", [MediaPipePoseEstimator, MediaPipeEyeEstimator])
+def test_a_broken_package_is_refused_with_the_name_of_the_extra(make, monkeypatch):
     monkeypatch.setitem(sys.modules, "mediapipe", None)
     monkeypatch.setitem(sys.modules, "mediapipe.python.solutions", None)
     with pytest.raises(PerceptionError, match=re.escape(install_command("mediapipe"))):
-        MediaPipePoseEstimator()
+        make()
 
 
 def turned_head(yaw_rad):
@@ -73,12 +55,9 @@ def turned_head(yaw_rad):
     return face @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]).T
 
 
-@pytest.mark.parametrize("yaw_deg", [0.0, 25.0, 40.0, 65.0, 90.0])
+@pytest.mark.parametrize("yaw_deg", [0.0, 25.0, 65.0, 90.0])
 def test_the_far_side_of_a_turned_face_has_lower_scores(yaw_deg):
-    to_the_right = turned_head(np.deg2rad(yaw_deg))
-    if yaw_deg:
-        assert to_the_right[0, 0] > 0.0  # the nose
-    nose, left_eye, right_eye, left_ear, right_ear = _face_scores(to_the_right)
+    nose, left_eye, right_eye, left_ear, right_ear = _face_scores(turned_head(np.deg2rad(yaw_deg)))
     assert (nose, right_eye, right_ear) == (1.0, 1.0, 1.0)
     assert left_ear == pytest.approx(np.clip((40.0 - yaw_deg) / 25.0, 0.0, 1.0))
     assert left_eye == pytest.approx(np.clip((80.0 - yaw_deg) / 30.0, 0.0, 1.0))
@@ -91,109 +70,155 @@ def test_points_of_a_crop_are_mapped_to_pixel_centres_of_the_image():
     crop, corner = _cropped(image, np.array([-5.0, 10.0, 30.2, 90.0]))
     assert crop.shape == (30, 30, 3)
     # The corner of the first pixel lies half a pixel before its centre.
-    assert _in_image(np.array([[0.0, 0.0], [1.0, 1.0]]), crop, corner).tolist() == [
-        [-0.5, 9.5],
-        [29.5, 39.5],
-    ]
-    assert _cropped(image, np.array([100.0, 0.0, 200.0, 40.0]))[0] is None
-    assert _cropped(image, np.array([5.0, 5.0, 5.0, 5.0]))[0] is None
+    mapped = _in_image(np.array([[0.0, 0.0], [1.0, 1.0]]), crop, corner)
+    assert mapped.tolist() == [[-0.5, 9.5], [29.5, 39.5]]
+    for box in ([100.0, 0.0, 200.0, 40.0], [5.0, 5.0, 5.0, 5.0]):
+        assert _cropped(image, np.array(box))[0] is None
 
 
-# --- with MediaPipe -----------------------------------------------------------------------------
+def landmarks(left=(0.0, 0.0), right=(0.0, 0.0), opening=0.03):
+    """Return 478 landmarks with eyes 0.1 wide, whose irises lie off the middle of the corners."""
+    marks = [SimpleNamespace(x=0.5, y=0.5) for _ in range(478)]
+    for iris, corners, lids, middle, off in (
+        (473, (362, 263), (386, 374), (0.6, 0.4), left),
+        (468, (133, 33), (159, 145), (0.4, 0.4), right),
+    ):
+        marks[iris] = SimpleNamespace(x=middle[0] + off[0], y=middle[1] + off[1])
+        for row, side in zip(corners, (-0.05, 0.05), strict=True):
+            marks[row] = SimpleNamespace(x=middle[0] + side, y=middle[1])
+        for row, side in zip(lids, (-0.5, 0.5), strict=True):
+            marks[row] = SimpleNamespace(x=middle[0], y=middle[1] + side * opening)
+    return marks
+
+
+def test_the_offset_is_the_mean_of_both_irises_and_closed_eyes_say_nothing():
+    found = iris_offset(landmarks(left=(0.01, -0.002), right=(0.02, 0.004)))
+    assert found == pytest.approx([0.015, 0.001])
+    for marks in (landmarks(opening=0.01), landmarks((math.nan, 0.0)), landmarks(opening=0.0)):
+        assert iris_offset(marks) is None
+
+
+def test_the_place_of_irises_is_less_certain_with_fewer_pixels():
+    stds = [iris_std_m(CAMERA.fx_px / distance) for distance in (0.7, 1.0, 1.5, 2.0, 2.5, 5.0)]
+    for near, far in pairwise(stds):
+        assert far[0] > near[0]
+        assert far[1] > near[1]
+    # Lids cover irises above and below, so less is known along the head's height.
+    assert all(along > 2.0 * across for across, along in stds[:3])
+
+
+# --- with MediaPipe: poses ----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def poses():
+    with MediaPipePoseEstimator() as opened:
+        yield opened
 
 
 @needs_mediapipe
-def test_it_is_a_pose_estimator(estimator):
-    assert isinstance(estimator, PoseEstimator)
-    assert estimator.estimate(np.zeros((48, 64, 3), np.uint8), ()) == ()
-
-
-@needs_mediapipe
-@pytest.mark.parametrize(
-    "box",
-    [[0, 0, 640, 480], [10, 10, 10, 10], [-50, -50, -10, -10], [600, 400, 700, 500], [3, 3, 7, 9]],
-)
-def test_a_box_without_a_person_gives_scores_of_0(estimator, box):
+@pytest.mark.parametrize("box", [[0, 0, 640, 480], [10, 10, 10, 10], [600, 400, 700, 500]])
+def test_a_box_without_a_person_gives_scores_of_0(poses, box):
+    assert isinstance(poses, PoseEstimator)
     image = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
-    (person,) = estimator.estimate(image, (PersonDetection(box, 0.5),))
-    assert isinstance(person, PersonKeypoints)
+    (person,) = poses.estimate(image, (PersonDetection(box, 0.5),))
     assert not person.scores.any()
     assert not person.face_evidence
 
 
 @needs_mediapipe
-@pytest.mark.parametrize(
-    "image",
-    [
-        np.zeros((48, 64), np.uint8),
-        np.zeros((48, 64, 3), np.float32),
-        np.zeros((0, 64, 3), np.uint8),
-        np.zeros((48, 64, 4), np.uint8),
-        None,
-    ],
-)
-def test_anything_but_an_rgb_image_is_refused(estimator, image):
-    with pytest.raises(PerceptionError, match="image_rgb"):
-        estimator.estimate(image, (PersonDetection([0, 0, 10, 10], 0.5),))
-
-
-@needs_mediapipe
-def test_a_closed_estimator_is_refused():
-    closed = MediaPipePoseEstimator()
-    closed.close()
-    closed.close()
-    with pytest.raises(PerceptionError, match="closed"):
-        closed.estimate(np.zeros((8, 8, 3), np.uint8), ())
-
-
-@needs_mediapipe
 @needs_images
-def test_faces_agree_with_the_labels(estimator, photographs):
-    errors = []
-    for image, person in photographs:
-        labels = labelled(person)
-        if not person["face_valid"]:
-            continue
-        (found,) = estimator.estimate(image, (detection(person),))
-        assert found.face_evidence
-        head_px = HEAD_OVER_FACE * person["face_box"][3]
-        error = np.linalg.norm(found.keypoints_px[:5] - labels[:5, :2], axis=1) / head_px
-        visible = labels[:5, 2] == 2
-        errors.extend(error[visible])
-        # An ear without a label must have a low score.
-        assert (found.scores[:5][labels[:5, 2] == 0] < 0.5).all()
+def test_faces_agree_with_the_labels_and_no_other_face_is_evidence(poses):
+    truth = json.loads(TRUTH.read_text())
+    files = {image["id"]: IMAGES / f"coco_{image['file_name']}" for image in truth["images"]}
+    errors, faces = [], 0
+    for person in truth["annotations"]:
+        image = cv2.cvtColor(cv2.imread(str(files[person["image_id"]])), cv2.COLOR_BGR2RGB)
+        labels = np.array(person["keypoints"], dtype=float).reshape(-1, 3)[:5]
+        left, top, width, height = person["bbox"]
+        box = PersonDetection([left, top, left + width, top + height], 1.0)
+        (found,) = poses.estimate(image, (box,))
+        if found.face_evidence:
+            faces += 1
+            assert (labels[:3, 2] == 2).all()
+        if person["face_valid"]:
+            assert found.face_evidence
+            head_px = HEAD_OVER_FACE * person["face_box"][3]
+            error = np.linalg.norm(found.keypoints_px[:5] - labels[:, :2], axis=1) / head_px
+            errors.extend(error[labels[:, 2] == 2])
+            # An ear without a label must have a low score.
+            assert (found.scores[:5][labels[:, 2] == 0] < 0.5).all()
+            # From the middle of the hips, y down.
+            assert np.abs(found.keypoints_root_m[11:13].mean(axis=0)).max() < 0.02
+            assert found.keypoints_root_m[NOSE, 1] < found.keypoints_root_m[5:7, 1].min()
+    assert faces >= 5
     assert len(errors) >= 15
     assert max(errors) <= 0.12
 
 
-@needs_mediapipe
-@needs_images
-def test_face_evidence_is_given_only_where_a_face_is_labelled(estimator, photographs):
-    """The labels have nose and both eyes, near the estimated ones."""
-    faces = 0
-    for image, person in photographs:
-        (found,) = estimator.estimate(image, (detection(person),))
-        if not found.face_evidence:
-            continue
-        faces += 1
-        labels = labelled(person)
-        assert (labels[:3, 2] == 2).all()
-        shoulders = np.linalg.norm(labels[LEFT_SHOULDER, :2] - labels[RIGHT_SHOULDER, :2])
-        error = np.linalg.norm(found.keypoints_px[:3] - labels[:3, :2], axis=1)
-        assert error.max() <= 0.25 * shoulders
-    assert faces >= 5
+# --- with MediaPipe: eyes -----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def eyes():
+    with MediaPipeEyeEstimator() as opened:
+        yield opened
+
+
+def head_at(distance_m, yaw_deg=0.0):
+    angle = math.radians(yaw_deg)
+    c, s = math.cos(angle), math.sin(angle)
+    turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return HeadPose([0.0, 0.0, distance_m], turn @ FACING, 1e-3 * np.eye(6), 0.5)
 
 
 @needs_mediapipe
-@needs_images
-def test_the_skeleton_has_camera_axes(estimator, photographs):
-    image, person = max(photographs, key=lambda pair: labelled(pair[1])[:17, 2].min())
-    (found,) = estimator.estimate(image, (detection(person),))
-    root = found.keypoints_root_m
-    assert np.abs(root[11:13].mean(axis=0)).max() < 0.02  # from the middle of the hips
-    assert root[NOSE, 1] < root[[LEFT_SHOULDER, RIGHT_SHOULDER], 1].min()  # y down
-    assert root[[LEFT_ANKLE, RIGHT_ANKLE], 1].min() > 0.4
-    pixels = found.keypoints_px - found.keypoints_px[11:13].mean(axis=0)
-    body = slice(5, 17)
-    assert np.corrcoef(root[body, 0], pixels[body, 0])[0, 1] > 0.8  # x right
-    assert root[NOSE, 2] < root[[3, 4], 2].mean()  # z away: the person faces the camera
+def test_it_is_an_eye_estimator_and_far_or_turned_heads_cost_no_run(eyes, monkeypatch):
+    assert isinstance(eyes, EyeEstimator)
+    assert eyes.estimate(FRAME, CAMERA, (None, head_at(1.5))) == (None, None)
+    monkeypatch.setattr(eyes, "_mesh", object())  # has no method to run
+    away = (head_at(3.0), head_at(1.5, yaw_deg=60.0), head_at(1.5, 180.0))
+    assert eyes.estimate(FRAME, CAMERA, away) == (None,) * 3
+
+
+@needs_mediapipe
+@pytest.mark.parametrize(
+    ("make", "rest"), [(MediaPipePoseEstimator, ()), (MediaPipeEyeEstimator, (CAMERA,))]
+)
+def test_a_closed_estimator_and_anything_but_an_rgb_image_are_refused(make, rest):
+    estimator = make()
+    with pytest.raises(PerceptionError, match="image_rgb"):
+        estimator.estimate(FRAME[..., 0], *rest, ())
+    estimator.close()
+    estimator.close()
+    with pytest.raises(PerceptionError, match="closed"):
+        estimator.estimate(FRAME, *rest, ())
+
+
+@needs_mediapipe
+@pytest.mark.parametrize("look", ["giulia", "daniel"])
+def test_eyes_of_a_rendered_worker_are_measured(eyes, look):
+    sim = pytest.importorskip("sim_tests")
+    pytest.importorskip("pybullet")
+    turns = np.radians([-16.0, 0.0, 16.0])
+    with sim.Warehouse() as warehouse:
+        worker = sim.Worker(warehouse, look=look)
+        renderer = sim.CameraRenderer(warehouse)
+        found, scores = [], []
+        for turn in turns:
+            worker.place((1.2, 0.0), math.pi, eye_yaw_rad=float(turn))
+            camera_z = float(worker.eyes_odom_m[2])
+            T_odom_camera = np.array(
+                [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, camera_z], [0, 0, 0, 1]], dtype=float
+            )
+            rotation = T_odom_camera[:3, :3].T @ worker.rotation_odom_head
+            nose = (worker.keypoints_odom_m[0] - T_odom_camera[:3, 3]) @ T_odom_camera[:3, :3]
+            head = HeadPose(nose, rotation, 1e-6 * np.eye(6), 0.5)
+            image = renderer.render(CAMERA, T_odom_camera).rgb
+            (seen,) = eyes.estimate(image, CAMERA, (head,))
+            assert seen is not None
+            found.append(seen.angles_rad[0])
+            scores.append((seen.angles_rad[0] - turn) ** 2 / seen.covariance_rad2[0, 0])
+    assert np.corrcoef(found, turns)[0, 1] > 0.95
+    assert 0.5 < np.polyfit(turns, found, 1)[0] < 1.5
+    assert max(scores) < 9.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -65,23 +64,6 @@ def test_each_pixel_of_a_crop_shows_its_place_in_the_image(box: tuple[float, ...
         seen = (out[within, channel].astype(float) - 50.0 + 0.375) * 4.0  # rounded down
         np.testing.assert_allclose(seen, place[within], atol=5.0)
         assert abs(float(np.mean(seen - place[within]))) < 1.0
-
-
-def test_a_small_crop_equals_the_affine_warp_of_openmmlab() -> None:
-    """The formulas are those of TopdownAffine without rotation: three points to three points."""
-    image = np.random.default_rng(0).integers(0, 256, (200, 300, 3), np.uint8)
-    box = np.array([101.5, 60.5, 151.5, 160.5])  # counted from the corner
-    centre = 0.5 * (box[:2] + box[2:]) - 0.5
-    width, height = 1.25 * (box[2:] - box[:2])
-    width = max(width, height * WIDTH / HEIGHT)
-    source = np.array([centre, centre - (0, width / 2), centre - (width / 2, 0)], np.float32)
-    target = np.array(
-        [(WIDTH / 2, HEIGHT / 2), (WIDTH / 2, (HEIGHT - WIDTH) / 2), (0, HEIGHT / 2)], np.float32
-    )
-    wanted = cv2.warpAffine(image, cv2.getAffineTransform(source, target), (WIDTH, HEIGHT))
-    out = np.empty((HEIGHT, WIDTH, 3), np.uint8)
-    PersonCrops(box[None], HEIGHT, WIDTH).cut(image, 0, out)
-    assert np.abs(out.astype(int) - wanted).max() <= 2
 
 
 def test_crops_outside_the_image_and_boxes_without_extent_are_found() -> None:

@@ -6,18 +6,17 @@ import pytest
 
 from awarenav.cli import main
 from sim_tests.actors.robot import RobotModel
-from sim_tests.demo import compare_policies
-from sim_tests.demo._demo import _crossings
+from sim_tests.demo._comparison import compare_policies, compared_scenarios
 from sim_tests.scenario import Scenario
 
 
 def test_without_options_the_crossings_are_the_shipped_ones() -> None:
     names = ("crossing_attentive", "crossing_distracted")
-    assert _crossings("", "") == tuple(Scenario.shipped(name) for name in names)
+    assert compared_scenarios("", "") == tuple(Scenario.shipped(name) for name in names)
 
 
 def test_the_crossings_have_the_robot_and_the_people_asked_for() -> None:
-    attentive, distracted = _crossings("omni", "recorded")
+    attentive, distracted = compared_scenarios("omni", "recorded")
     for scenario in (attentive, distracted):
         assert scenario.robot_model == RobotModel.shipped("omni")
         assert scenario.population == "recorded"

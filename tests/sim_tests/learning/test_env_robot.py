@@ -54,11 +54,6 @@ def test_an_episode_is_the_crossing_of_the_same_robot() -> None:
     assert all(abs(each.yaw_rate_radps) <= each.speed_mps / 1.3 + 1e-9 for each in states)
 
 
-def test_an_unknown_robot_is_refused() -> None:
-    with pytest.raises(SimError, match="did you mean 'omni'"):
-        CrossingEnv("crossing_from_left", robot="omny")
-
-
 def test_an_episode_is_the_crossing_among_the_same_people() -> None:
     env = CrossingEnv("being_overtaken", population="recorded", normalised_actions=False)
     env.reset(seed=2)
@@ -73,6 +68,17 @@ def test_an_episode_is_the_crossing_among_the_same_people() -> None:
     assert np.hypot(*(own.position_odom_m - first.position_odom_m)) > 0.5
 
 
-def test_an_unknown_population_is_refused() -> None:
-    with pytest.raises(SimError, match="classic, recorded, got 'modern'"):
-        CrossingEnv("late_glance", population="modern")
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"robot": "omny"}, "did you mean 'omni'"),
+        ({"population": "modern"}, "classic, recorded, got 'modern'"),
+        ({"reward": {"contacts": 1.0}}, "did you mean 'contact'"),
+        ({"control_hz": 0.0}, "control_hz must be in"),
+        ({"scenarios": []}, "at least one scenario"),
+        ({"render_view": "side"}, "render_view"),
+    ],
+)
+def test_wrong_arguments_are_refused(settings, message) -> None:
+    with pytest.raises(SimError, match=message):
+        CrossingEnv(**{"scenarios": "late_glance", **settings})

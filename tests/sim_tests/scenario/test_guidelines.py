@@ -12,7 +12,7 @@ from sim_tests.crossing.eyes._make_eyes import unusual_size_probability
 from sim_tests.scenario import SCENARIO_SETS, shipped_templates
 from sim_tests.scenario.catalogue import approach_statistics, template_problems
 from sim_tests.study.runs import named_templates
-from sim_tests.study.scenarios import AttentionCheck
+from sim_tests.study.scenarios._validate import AttentionCheck
 
 NAMES = shipped_scenarios("guidelines")
 # Short ones; the others take longer.

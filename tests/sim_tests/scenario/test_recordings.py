@@ -189,7 +189,7 @@ def test_the_command_says_what_people_do_and_so_does_the_report(
         "return.",
     )
     drawing = tmp_path / "fixed.png"
-    assert main(["scenario", "draw", files[0], "--out", str(drawing)]) == 0
+    assert main(["scenario", "show", files[0], "--out", str(drawing)]) == 0
     assert drawing.stat().st_size > 5000
     assert main(["scenario", "validate", *files]) == 0
     with pytest.raises(SimError, match="need recorded people"):

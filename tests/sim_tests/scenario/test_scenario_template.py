@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
-from sim_tests.scenario import read_distribution, shipped_templates
+from sim_tests.scenario import read_distribution
 
 BASE = {
     "name": "mine",
@@ -129,6 +129,7 @@ def test_given_values_replace_draws_and_the_others_are_medians():
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_shipped_templates_round_trip_through_text_and_pickle(name):
     shipped = ScenarioTemplate.shipped(name)
+    assert shipped.name == name
     assert ScenarioTemplate.from_text(shipped.to_text()) == shipped
     assert pickle.loads(pickle.dumps(shipped)) == shipped
     drawn = shipped.for_seed(5)
@@ -198,6 +199,9 @@ def test_files_that_are_not_scenarios_are_refused_by_name(tmp_path):
         ("a: [", r"mine\.yaml is not valid YAML"),
         ("- a", r"mine\.yaml must hold a mapping"),
         ("name: a\nextends: crossing_hal", "did you mean 'crossing_hall'"),
+        ("name: a\nduration_s: 5\nrobot: {goal_x_m: 3, gaol_y_m: 1}\n", "mean 'goal_y_m'"),
+        ("name: a\nduration_s: 5\nlayout: maze\nrobot: {goal_x_m: 3}\n", "'crossing', 'open'"),
+        ("name: a\nduration_s: -5\nrobot: {goal_x_m: 3}\n", "duration_s"),
     ):
         (tmp_path / "mine.yaml").write_text(text)
         with pytest.raises(SimError, match=message):
@@ -224,8 +228,12 @@ def test_a_crossing_starts_at_the_drawn_position():
     assert starts == pytest.approx(drawn, abs=1e-9)
 
 
-def test_every_shipped_template_is_named_after_its_file():
-    assert [each.name for each in shipped_templates()] == list(shipped_scenarios())
+def test_attentive_and_distracted_differ_only_in_the_gaze():
+    first, second = (Scenario.shipped(f"crossing_{who}") for who in ("attentive", "distracted"))
+    same = {"name": "", "description": "", "attention": "mixed", "workers": ()}
+    assert first.model_copy(update=same) == second.model_copy(update=same)
+    assert first.workers[0].path == second.workers[0].path
+    assert first.workers[0].gaze != second.workers[0].gaze
 
 
 def test_a_crossing_run_by_name_is_drawn_by_its_seed():

@@ -16,7 +16,7 @@ from sim_tests.study.measures import (
     MeasuredAttention,
     Trace,
 )
-from sim_tests.study.scenarios import AttentionCheck, check_attention
+from sim_tests.study.scenarios._validate import AttentionCheck, check_attention
 
 T_S = np.arange(0.0, 10.05, 0.1)
 

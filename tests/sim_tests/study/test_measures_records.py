@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from sim_tests import SimError
-from sim_tests.demo._tables import EPISODE_COLUMNS
+from sim_tests.demo._comparison import EPISODE_COLUMNS
 from sim_tests.study.measures import (
     RECORD_COLUMNS,
     EpisodeRecord,

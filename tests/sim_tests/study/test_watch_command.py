@@ -12,7 +12,6 @@ import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import pytest
 from paths import ROOT
@@ -21,7 +20,7 @@ from run_scenes import SHORT
 from awarenav.cli import main
 from sim_tests.actors.robot import RobotModel
 from sim_tests.study.runs import Conditions, plan_jobs, template_of
-from sim_tests.study.watch._watch import WatchOptions, _job
+from sim_tests.study.watch._watch import _job
 
 #: Three seconds of a robot on its way, with control at 20 Hz.
 WATCHED = (
@@ -111,12 +110,8 @@ def test_a_crossing_is_watched_with_another_robot_and_population() -> None:
     values = {"scenario": "late_glance", "perception": "truth", "seed": 3}
     usual = Conditions.taken_from(dict(values))
     conditions = Conditions.taken_from({**values, "robot": "omni", "population": "recorded"})
-    options = WatchOptions(
-        conditions=conditions, policy="blind", speed=1.0, port=0, wait=0.0, out=None,
-        no_camera=True, no_browser=True,
-    )  # fmt: skip
-    scenario = template_of(_job(options).scenario).for_seed(3)
+    scenario = template_of(_job(conditions, "blind").scenario).for_seed(3)
     assert scenario.robot_model == RobotModel.shipped("omni")
     assert scenario.population == "recorded"
     (own,) = plan_jobs(["late_glance"], ["blind"], [3], perception="truth")
-    assert _job(replace(options, conditions=usual)) == own
+    assert _job(usual, "blind") == own

@@ -1,0 +1,303 @@
+"""The camera of the bridge: from images, and depth images of their time, to tracks."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    FloorPlane,
+    PerceptionError,
+    PersonObservation,
+)
+from perception.arrays import FloatArray
+from perception.depth_image import MOST_APART_S
+from perception.errors import DepthImageError
+from perception.no_view import FROZEN, NoView, why_no_view
+from tracking import PersonTrack, TrackingError
+
+from .._errors import NavError
+from ._images import camera_of, depth_of, picture_of
+from ._shared import Refusals, Shared
+from .conversions import to_seconds
+from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
+
+# Uncertainty of the height and the tilt of a camera on a driving robot.
+_HEIGHT_STD_M = 0.05
+_TILT_STD_RAD = math.radians(2.0)
+# Depth images that are kept: a quarter of a second at 30 Hz.
+_KEPT: Final = 8
+
+
+@dataclass(frozen=True, eq=False)
+class StampedDepth:
+    """A depth image.
+
+    Attributes:
+        stamp_s: its time.
+        depth: (H, W) uint16 millimetres or float32 metres.
+    """
+
+    stamp_s: float
+    depth: NDArray[Any]
+
+
+class DepthReader:
+    """Keeps the latest depth images, and gives each picture the one nearest to it in time.
+
+    A depth image that cannot be used is refused, counted and reported; the picture is then seen
+    without. Only one that perception has used counts as heard.
+
+    Args:
+        shared: by the bridge's inputs.
+    """
+
+    def __init__(self, shared: Shared) -> None:
+        self._shared = shared
+        self._refusals = Refusals(shared, "depth image")
+        self._kept: deque[StampedDepth] = deque(maxlen=_KEPT)
+        self._used = 0
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of depth images that were used, and refused."""
+        return {"depth_images": self._used, "depth_images_refused": self._refusals.count}
+
+    def read(self, message: Image, now_s: float) -> bool:
+        """Keep a depth image; return False if it was refused."""
+        stamp_s = to_seconds(message.header.stamp)
+        try:
+            depth = depth_of(message)
+            with self._shared.lock:
+                self._shared.clock.check("depth_images", stamp_s, now_s, "its")
+                self._kept.append(StampedDepth(stamp_s, depth))
+        except NavError as problem:
+            self.refuse(str(problem), now_s)
+            return False
+        return True
+
+    def nearest(self, stamp_s: float) -> StampedDepth | None:
+        """Return the depth image of a picture; None if none is near enough in time."""
+        with self._shared.lock:
+            found = min(self._kept, key=lambda each: abs(each.stamp_s - stamp_s), default=None)
+        if found is None or abs(found.stamp_s - stamp_s) > MOST_APART_S:
+            return None
+        return found
+
+    def refuse(self, problem: str, now_s: float) -> None:
+        """Count a depth image that cannot be used, and report it if none was lately."""
+        self._refusals.add(problem, now_s)
+
+    def used(self, depth: StampedDepth) -> None:
+        """Note a depth image that perception has used; called with the lock."""
+        self._used += 1
+        self._shared.watch.saw_depth(depth.stamp_s)
+
+    def forget(self) -> None:
+        """Forget all depth images; called with the lock."""
+        self._kept.clear()
+        self._refusals.forget()
+
+
+@dataclass(frozen=True, eq=False)
+class PerceivedFrame:
+    """One frame: image, people and tracks. Immutable, so that threads can share it.
+
+    Attributes:
+        stamp_s: of the image.
+        tracks: all tracks at that time, or at that of a later scan.
+        image: (H, W, 3) uint8 RGB.
+        observations: one per person seen.
+        T_odom_camera: (4, 4) pose of the camera.
+        depth: the depth image that was used; None without one.
+        depth_problem: why a depth image was not used; empty if it was, or there was none.
+    """
+
+    stamp_s: float
+    tracks: tuple[PersonTrack, ...]
+    image: NDArray[np.uint8]
+    observations: tuple[PersonObservation, ...]
+    T_odom_camera: FloatArray
+    depth: StampedDepth | None = None
+    depth_problem: str = ""
+
+
+class ImageInput:
+    """The bridge's camera: from its images to tracks, from the first calibration on.
+
+    One thread at a time is in :meth:`read` or :meth:`calibrate`; others wait.
+
+    Args:
+        shared: by the bridge's inputs.
+        make_pipeline: makes the pipeline for a camera.
+        camera: calibration; None until :meth:`calibrate`.
+        rectified: whether the images are rectified: a calibration's P counts.
+        with_depth: whether there are depth images.
+
+    Attributes:
+        frame: the latest, or None before the first.
+        frames: number of images that were used.
+        depth: the depth images; None if there are none.
+    """
+
+    def __init__(
+        self,
+        shared: Shared,
+        make_pipeline: Callable[[Camera], AwarenessPipeline],
+        camera: Camera | None,
+        *,
+        rectified: bool = False,
+        with_depth: bool = False,
+    ) -> None:
+        self._shared, self._make_pipeline = shared, make_pipeline
+        self.frame: PerceivedFrame | None = None
+        self.frames = 0
+        self.depth = DepthReader(shared) if with_depth else None
+        self._busy = threading.Lock()
+        self._camera: Camera | None = None
+        self._info: CameraInfo | None = None
+        self._rectified = rectified
+        self._before: NDArray[np.uint8] | None = None
+        self._has_had_view = False
+        if camera is not None:
+            self._start(camera)
+
+    @property
+    def camera(self) -> Camera | None:
+        """The camera, or None while it is unknown. The pipeline exists as soon as it is known."""
+        return self._camera
+
+    def calibrate(self, message: CameraInfo) -> None:
+        """Make the pipeline from the first calibration; later ones are ignored.
+
+        Raises:
+            NavError, PerceptionError: for a calibration or networks that cannot be used.
+        """
+        with self._busy:
+            if self._camera is None:
+                self._start(camera_of(message, rectified=self._rectified))
+                self._info = message
+
+    def read(self, message: Image | CompressedImage, now_s: float) -> bool:
+        """Process one image; return True if it was used."""
+        shared = self._shared
+        stamp_s, frame_id = to_seconds(message.header.stamp), message.header.frame_id
+        try:
+            with shared.lock:
+                if self._camera is None:
+                    raise NavError("no camera_info yet: the image cannot be used")
+                shared.clock.check("images", stamp_s, now_s, "the image's")
+                restarts = shared.clock.restarts
+                T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
+            frame = self._process(
+                message, stamp_s, T_odom_camera, lambda: shared.clock.restarts == restarts
+            )
+        except (NavError, PerceptionError, TrackingError) as problem:
+            shared.warn(f"image: {problem}")
+            return False
+        with shared.lock:
+            if frame is None or shared.clock.restarts != restarts:
+                return False
+            self.frame = frame
+            self.frames += 1
+            T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
+            shared.watch.saw_image(stamp_s, self._camera, T_base_camera)
+            if self.depth is not None and frame.depth is not None:
+                self.depth.used(frame.depth)
+        if self.depth is not None and frame.depth_problem:
+            self.depth.refuse(frame.depth_problem, now_s)
+        return True
+
+    def forget(self) -> None:
+        """Forget the latest frame and all depth images; called with the lock."""
+        self.frame = None
+        if self.depth is not None:
+            self.depth.forget()
+
+    def _process(
+        self,
+        message: Image | CompressedImage,
+        stamp_s: float,
+        T_odom_camera: FloatArray,
+        is_current: Callable[[], bool],
+    ) -> PerceivedFrame | None:
+        """Return the frame of an image, or None if ``is_current`` says that it came too late.
+
+        A depth image that does not fit is left out, and the frame says why.
+
+        Raises:
+            NavError, PerceptionError, TrackingError: for an image that cannot be used, or shows
+                nothing (:func:`~perception.no_view.why_no_view`).
+        """
+        depth = None if self.depth is None else self.depth.nearest(stamp_s)
+        with self._busy:
+            image = picture_of(message)
+            self._fit(image.shape[1], image.shape[0])
+            no_view, self._before = why_no_view(image, self._before), image
+            if no_view and self._has_had_view:
+                raise _refusal(no_view)
+            self._has_had_view = no_view is None
+            floor, problem = _floor(T_odom_camera), ""
+            try:
+                given: dict[str, Any] = {}
+                if depth is not None:
+                    given = {"depth_m": depth.depth, "depth_stamp_s": depth.stamp_s}
+                observations = self._pipeline.process(image, stamp_s, floor=floor, **given)
+            except DepthImageError as cause:  # before any network has run
+                depth, problem = None, str(cause)
+                observations = self._pipeline.process(image, stamp_s, floor=floor)
+            # Of a camera that has never had a view, such as a stand-in with blank pictures, people
+            # who are found count; that nobody is found means nothing.
+            if no_view and not observations:
+                raise _refusal(no_view)
+            tracks = self._shared.tracker.update(observations, stamp_s, T_odom_camera, is_current)
+        if tracks is None:
+            return None
+        return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera, depth, problem)
+
+    def _fit(self, width_px: int, height_px: int) -> None:
+        """Make sure that the camera is that of images of this size.
+
+        Raises:
+            NavError: if the calibration is for other images.
+        """
+        camera, size_px = self._camera, (width_px, height_px)
+        assert camera is not None
+        if (camera.width_px, camera.height_px) == size_px:
+            return
+        if self._info is not None:  # the images may be the full ones in spite of roi and binning
+            camera = camera_of(self._info, rectified=self._rectified, image_size_px=size_px)
+        if (camera.width_px, camera.height_px) != size_px:
+            raise NavError(
+                f"the camera is calibrated for {camera.width_px} x {camera.height_px} px, but the "
+                f"images have {width_px} x {height_px} px"
+            )
+        self._start(camera)
+
+    def _start(self, camera: Camera) -> None:
+        self._pipeline = self._make_pipeline(camera)
+        self._shared.tracker.use_camera(camera)
+        self._camera = camera
+
+
+def _refusal(no_view: NoView) -> NavError:
+    hint = " (frozen? a simulated camera needs noise)" if no_view == FROZEN else ""
+    return NavError(f"the picture is no view: it is {no_view}{hint}")
+
+
+def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:
+    """Return the floor, z = 0 in odom, or None for a camera that is not above it."""
+    if T_odom_camera[2, 3] <= 0.0:
+        return None
+    return FloorPlane.from_pose(
+        T_odom_camera, height_std_m=_HEIGHT_STD_M, tilt_std_rad=_TILT_STD_RAD
+    )

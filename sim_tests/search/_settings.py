@@ -1,0 +1,191 @@
+"""The settings of a search, which a resumed search must repeat, and the command to run next."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from awarenav.files import atomic_path
+from perception.documents import parse_json, read_json
+
+from ..crossing import named_policy
+from ..crossing.eyes import Perception
+from ..scenario import ScenarioTemplate
+from ..study.runs import Conditions, named_templates, policy_text
+from ..world.errors import SimError
+
+# The files of every search, beside its results.
+_FILES: Final = ("study.log", "study.log.lock", "studies/*.log*")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchSettings:
+    """The settings that tuning and falsification share, as plain values.
+
+    Attributes:
+        policy_name: name of the policy in tables.
+        policy: YAML of the policy.
+        scenarios: YAML of the templates.
+        episodes: number of episodes; the search says of what.
+        perception: as for :func:`sim_tests.run_crossing`, such as ``"keypoints+scanner"``.
+        planner: ``"module:Class"``, empty for the reference planner.
+        seed: seed of the episodes, and of the search.
+        generation: trials per generation.
+    """
+
+    policy_name: str
+    policy: str
+    scenarios: tuple[str, ...]
+    episodes: int
+    perception: str
+    planner: str
+    seed: int
+    generation: int
+
+    @property
+    def templates(self) -> tuple[ScenarioTemplate, ...]:
+        """All scenarios."""
+        return tuple(ScenarioTemplate.from_text(text) for text in self.scenarios)
+
+
+def common_settings(policy: str, conditions: Conditions) -> dict[str, Any]:
+    """Return the settings of a policy and of conditions, but for the generation.
+
+    Args:
+        policy: name of a preset, or a YAML file.
+        conditions: of the command, with one planner and one set of sensors.
+
+    Raises:
+        SimError: an unknown scenario, camera or robot.
+        NavError: an unusable policy.
+    """
+    name, own_policy = named_policy(policy)
+    (planner,), (sensors,) = conditions.planner, conditions.sensors
+    templates = named_templates(
+        conditions.scenario, conditions.camera, conditions.population or "", conditions.robot
+    )
+    return {
+        "policy_name": name,
+        "policy": policy_text(own_policy),
+        "scenarios": tuple(each.to_text() for each in templates),
+        "episodes": conditions.episodes,
+        "perception": Perception.of(conditions.perception, sensors).name,
+        "planner": planner,
+        "seed": conditions.seed,
+    }
+
+
+def write_or_check_settings(
+    settings: SearchSettings,
+    path: Path,
+    search: str,
+    *,
+    resume: bool,
+    overwrite: bool = False,
+    results: Sequence[str] = (),
+    may_grow: Sequence[str] = (),
+) -> None:
+    """Write the settings of a new search, or check that a resumed search has the same.
+
+    Args:
+        settings: of the search.
+        path: the file; its folder is made when missing.
+        search: name of the search in messages: ``"tuning"`` or ``"falsification"``.
+        resume: continue the search in the folder.
+        overwrite: remove the search in the folder first.
+        results: patterns of the result files of the search, which ``overwrite`` removes.
+        may_grow: fields that may be larger than in the file.
+
+    Raises:
+        SimError: the folder holds a search and neither ``resume`` nor ``overwrite`` is True, it
+            holds none and ``resume`` is True, it holds results of something else, or the settings
+            differ.
+    """
+    folder = path.parent
+    text = json.dumps(asdict(settings), indent=1) + "\n"
+    old = [each for pattern in (*_FILES, *results) for each in sorted(folder.glob(pattern))]
+    if path.exists() and resume:
+        _compare(path, parse_json(text, path.name, SimError), may_grow)
+    elif path.exists() and not overwrite:
+        raise SimError(
+            f"{folder} already holds a {search}; give --resume to go on with it, --overwrite "
+            "to replace it, or another --out"
+        )
+    elif resume:
+        raise SimError(f"--resume: there is no {search} in {folder}, no {path.name}")
+    elif old and not path.exists():
+        raise SimError(
+            f"{folder} holds {old[0].name} but no {path.name}, so it is not the folder of a "
+            f"{search}; choose another --out"
+        )
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # several processes may write it
+    try:
+        if not resume:  # the old settings go last, so that a kill leaves what can be removed
+            for each in (*old, path):
+                each.unlink(missing_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except OSError as cause:
+        raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file that appears whole or not at all."""
+    with atomic_path(path, SimError) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+
+
+def print_verdict(text: str, next_command: str) -> None:
+    """Print a verdict in sentences, and the command to run next."""
+    print(f"Verdict: {text}\nNext: {next_command}")
+
+
+def episode_words(conditions: Conditions) -> list[str]:
+    """Return the words of the command line that repeat scenarios, people, sensors and planner."""
+    (planner,), (sensors,) = conditions.planner, conditions.sensors
+    words = ["--scenario", *conditions.scenario]
+    words += Perception.of(conditions.perception, sensors).options.split()
+    for name, value in (
+        ("--camera", conditions.camera),
+        ("--robot", conditions.robot),
+        ("--population", conditions.population),
+        ("--planner", planner),
+    ):
+        if value:
+            words += [name, value]
+    return words
+
+
+def command_text(*words: object) -> str:
+    """Return a command that a shell reads as these words."""
+    return shlex.join(["awarenav", *map(str, words)])
+
+
+def _compare(path: Path, now: dict[str, Any], may_grow: Sequence[str]) -> None:
+    """Raise SimError for the first setting that differs from the file."""
+    before = read_json(path, SimError)
+    if not isinstance(before, dict):
+        raise SimError(f"{path} must hold settings by name, got {before!r:.60}")
+    for name, value in now.items():
+        was = before.get(name)
+        if value == was or (name in may_grow and was is not None and value > was):
+            continue
+        more = " or more" if name in may_grow else ""
+        raise SimError(
+            f"{path.parent} was begun with another {name}: {_short(was)}, now {_short(value)}; "
+            f"give the same{more} again, or another --out"
+        )
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,244 @@
+"""The results of a falsification: its files, its table, and the verdict beside another policy."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from awarenav.errors import counted
+from awarenav.files import write_text
+
+from ...crossing import named_policy
+from ...study.measures import EpisodeRecord
+from ...study.runs import policy_of, policy_text, run_episode
+from ...world.errors import SimError
+from .._settings import write_csv
+from ._search import CONTACT_SCORE, Falsification, FalsifySettings
+from ._worst_cases import WorstCase
+
+#: Default of ``--against``, and the other policy for that one itself.
+_BASE: Final = "balanced"
+_BASE_OF_BASE: Final = "blind"
+
+
+def write_episodes(falsification: Falsification, path: Path) -> None:
+    """Write every episode of the search as CSV; the last column has the parameters as JSON."""
+    notes = (
+        *("min_margin_unaware_m", "min_separation_m", "contact_by"),
+        *("moving_contacts", "moving_contacts_unaware", "moving_contact_mps", "error"),
+    )
+    write_csv(
+        path,
+        ["scenario", "round", "trial", "score", *notes, "levers"],
+        (
+            [
+                *(each.scenario, each.round, each.trial.number, f"{each.score:.6f}"),
+                *("" if each.notes.get(note) is None else each.notes[note] for note in notes),
+                json.dumps(each.trial.parameters, sort_keys=True),
+            ]
+            for each in falsification.episodes
+        ),
+    )
+
+
+def write_summary(
+    falsification: Falsification,
+    cases: Sequence[WorstCase],
+    path: Path,
+    *,
+    verdict: str,
+    against: Mapping[str, EpisodeRecord],
+) -> None:
+    """Write the figures of a falsification as JSON.
+
+    Args:
+        falsification: the finished search.
+        cases: its worst cases.
+        path: the file.
+        verdict: the verdict in sentences.
+        against: records of the worst cases with another policy, by the name of the file.
+    """
+    scenarios = {}
+    for name in falsification.spaces:
+        scores = [each.score for each in falsification.episodes if each.scenario == name]
+        contacts = [row for row, each in enumerate(scores) if each <= CONTACT_SCORE]
+        scenarios[name] = {
+            "episodes": len(scores),
+            "contacts": len(contacts),
+            "first_contact_at": contacts[0] + 1 if contacts else None,
+            "lowest_score": round(min(scores), 6),
+        }
+    own = (
+        *("min_margin_unaware_m", "min_separation_m", "contact_by", "moving_contacts"),
+        *("moving_contacts_unaware", "speed_at_min_separation_mps", "awareness"),
+    )
+    others = ("policy", "min_margin_unaware_m", "min_separation_m", "moving_contacts", "error")
+    aware_mps = falsification.aware_speeds_mps
+    summary: dict[str, Any] = {
+        "policy": falsification.settings.policy_name,
+        "unsafe_no_floor": falsification.settings.unsafe_no_floor,
+        "episodes": len(falsification.episodes),
+        "contacts": falsification.contacts,
+        "contact_mps": round(falsification.contact_mps, 6),
+        "aware_contacts": len(aware_mps),
+        "aware_contact_mps": round(max(aware_mps, default=0.0), 6),
+        "without_result": falsification.errors,
+        "verdict": verdict,
+        "scenarios": scenarios,
+        "worst": [
+            {
+                "file": case.path.name,
+                "scenario": case.episode.scenario,
+                **{name: getattr(case.record, name) for name in own},
+                "replays": case.replays,
+                "against": None
+                if (other := against.get(case.path.name)) is None
+                else {name: getattr(other, name) for name in others},
+            }
+            for case in cases
+        ],
+    }
+    write_text(path, json.dumps(summary, indent=1, ensure_ascii=False) + "\n", SimError)
+
+
+def table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> list[str]:
+    """Return the worst cases and the totals as lines of text."""
+    lines = [
+        f"{'file':16s}{'scenario':24s}{'margin':>9s}{'separation':>12s}{'robot':>10s}"
+        f"  {'contact by':12s}{'awareness':16s}{'reaction':12s}"
+    ]
+    for case in cases:
+        record = case.record
+        lines.append(
+            f"{case.path.name:16s}{case.episode.scenario:24s}"
+            f"{_two_decimals(record.min_margin_unaware_m):>7s} m"
+            f"{_two_decimals(record.min_separation_m):>10s} m"
+            f"{_two_decimals(record.speed_at_min_separation_mps):>6s} m/s"
+            f"  {record.contact_by or '-':12s}{record.awareness or '-':16s}"
+            f"{record.reaction or '-':12s}" + ("" if case.replays else "  DOES NOT REPLAY")
+        )
+    contacts, episodes = falsification.contacts, len(falsification.episodes)
+    aware = len(falsification.aware_speeds_mps)
+    lines.append(
+        f"{contacts} of {counted(episodes, 'episode')} with a contact of the moving robot and a "
+        f"person who had not looked for 1 s; {aware} with a person who had."
+    )
+    if falsification.errors:
+        broken = counted(falsification.errors, "episode has", "episodes have")
+        lines.append(f"{broken} no result; episodes.csv says why.")
+    return lines
+
+
+def policy_against(given: str, settings: FalsifySettings) -> tuple[str, str] | None:
+    """Return the name and the YAML of the policy to compare with.
+
+    Args:
+        given: a preset or a YAML file; empty for ``balanced``, or ``blind`` for ``balanced``.
+        settings: settings of the falsification.
+
+    Returns:
+        None if the floor is taken away, which leaves nothing to compare.
+
+    Raises:
+        NavError: an unusable policy.
+    """
+    if settings.unsafe_no_floor:
+        return None
+    names = (given,) if given else (_BASE, _BASE_OF_BASE)
+    policies = [(name, policy_text(policy)) for name, policy in map(named_policy, names)]
+    own = policy_of(settings.policy)
+    return next((each for each in policies if policy_of(each[1]) != own), policies[-1])
+
+
+def records_against(
+    cases: Sequence[WorstCase], against: tuple[str, str] | None, settings: FalsifySettings
+) -> dict[str, EpisodeRecord]:
+    """Run the worst cases with another policy; return the records by the name of the file."""
+    if against is None:
+        return {}
+    name, policy = against
+    other = replace(settings, policy_name=name, policy=policy)
+    return {case.path.name: run_episode(other.job(case.scenario)) for case in cases}
+
+
+def verdict_text(
+    falsification: Falsification,
+    cases: Sequence[WorstCase],
+    others: Mapping[str, EpisodeRecord],
+) -> str:
+    """Return what the search has found about a policy, and what another one does there."""
+    name, episodes = falsification.settings.policy_name, len(falsification.episodes)
+    contacts, searched = falsification.contacts, counted(len(falsification.episodes), "episode")
+    if falsification.settings.unsafe_no_floor:
+        found = "finds" if contacts else "does not find"
+        return (
+            f"the search {found} contacts of a robot without its floor ({contacts} of {episodes})."
+        )
+    if contacts:
+        text = (
+            f"{name} is not safe enough: the moving robot and a person who had not looked touched "
+            f"in {contacts} of {searched}, at up to {falsification.contact_mps:.2f} m/s."
+        )
+    else:
+        text = (
+            f"no contact of the moving robot and a person who had not looked with {name} in "
+            f"{searched}. A search is not a sample, so this gives no rate."
+        )
+    return " ".join([text, _aware(falsification), *_comparison(name, cases, others)])
+
+
+def _aware(falsification: Falsification) -> str:
+    """Return the sentence about people who had looked, whom today's AMR does not spare either."""
+    speeds_mps = falsification.aware_speeds_mps
+    if not speeds_mps:
+        return "Nobody who had looked was touched by the moving robot either."
+    share = 100.0 * len(speeds_mps) / len(falsification.episodes)
+    return (
+        f"It touched people who had looked within 1 s in {len(speeds_mps)} ({share:.1f} %), at up "
+        f"to {max(speeds_mps):.2f} m/s; the same search with --policy scanner gives these figures "
+        "of today's AMR."
+    )
+
+
+def _comparison(
+    name: str, cases: Sequence[WorstCase], others: Mapping[str, EpisodeRecord]
+) -> list[str]:
+    """Return the sentences about the same situations with the other policy."""
+    pairs = [(case.record, others[case.path.name]) for case in cases if case.path.name in others]
+    pairs = [pair for pair in pairs if not any(record.error for record in pair)]
+    if not pairs:
+        return []
+    other = pairs[0][1].policy
+    touched = [
+        sum(record.moving_contacts > 0 for record in side) for side in zip(*pairs, strict=True)
+    ]
+    margins = [
+        (mine.min_margin_unaware_m, theirs.min_margin_unaware_m)
+        for mine, theirs in pairs
+        if mine.min_margin_unaware_m is not None and theirs.min_margin_unaware_m is not None
+    ]
+    better = sum(theirs > mine for mine, theirs in margins)
+    worse = sum(theirs < mine for mine, theirs in margins)
+    parts = [f"touches a person while it moves in {touched[1]} ({name} in {touched[0]})"]
+    if margins:
+        deepest = [min(side) for side in zip(*margins, strict=True)]
+        parts += [
+            f"keeps more margin in {better} and less in {worse}",
+            f"falls to {deepest[1]:.2f} m at worst ({name} to {deepest[0]:.2f} m)",
+        ]
+    return [
+        f"In the {counted(len(pairs), 'worst case')} of this search, {other} {_listed(parts)}.",
+        f"They were searched for {name}, so they show where it does worse, not how often.",
+    ]
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Return words as ``"a, b and c"``."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _two_decimals(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"

@@ -1,0 +1,379 @@
+"""A falsification: the search over several scenarios for the smallest separation margins.
+
+In one scenario the search is CMA-ES with restarts: a round that makes no more progress ends, and
+the next one starts elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import filelock
+import numpy as np
+
+from perception.documents import yaml_text
+
+from ...scenario import Scenario
+from ...study.measures import EpisodeRecord
+from ...study.runs import Job, policy_of, refuse_unusable_planner
+from ...world.errors import SimError
+from .._episodes import EpisodeRunner
+from .._settings import SearchSettings, write_or_check_settings
+from .._study import Optimizer, Outcome, ParameterValues, Range, SharedStudy, Trial
+from ._no_floor_planner import LABEL, PLANNER
+from ._scenario_space import ScenarioSpace
+
+#: Score of a contact with the moving robot that counts, below every margin.
+CONTACT_SCORE: Final = -10.0
+#: Score without a margin: the robot never moved near a person, or the episode has no result.
+NO_MARGIN_SCORE: Final = 10.0
+
+_SETTINGS_FILE: Final = "falsify.json"
+_RESULTS: Final = ("worst_*.yaml", "policy.yaml", "episodes.csv", "summary.json", "falsify.png")
+# Share of the episodes that go to all scenarios alike; the rest go to the worst of them.
+_FIRST_SHARE: Final = 0.5
+# One scenario in so many is among the worst.
+_WORST_ONE_IN: Final = 3
+# A round ends after at least this many generations, when the last few improve by less than this.
+_LEAST_GENERATIONS: Final = 8
+_LAST_GENERATIONS: Final = 4
+_LEAST_PROGRESS_M: Final = 0.02
+# Initial standard deviation of CMA-ES as a share of each range: the first round explores around the
+# scenario as written, later rounds cover the space.
+_FIRST_SPREAD: Final = 0.25
+_LATER_SPREAD: Final = 0.3
+# Figures of an episode that its trial keeps.
+_NOTES: Final = (
+    *("min_margin_unaware_m", "min_separation_m", "contact_by", "moving_contacts"),
+    *("moving_contacts_unaware", "moving_contact_mps", "speed_at_min_separation_mps"),
+    *("awareness", "reaction", "error"),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FalsifySettings(SearchSettings):
+    """The settings of a falsification; ``episodes`` is the least number of all together.
+
+    Attributes:
+        people: number of people of a scenario that are varied.
+        unsafe_no_floor: run the planner without the adapter's floor, on purpose.
+    """
+
+    people: int
+    unsafe_no_floor: bool = False
+
+    @property
+    def planner_of_jobs(self) -> str:
+        """The planner, or the one without the floor."""
+        return PLANNER if self.unsafe_no_floor else self.planner
+
+    def job(self, scenario: Scenario) -> Job:
+        """Return the job of a variation."""
+        return Job(
+            scenario=yaml_text(scenario.model_dump(mode="json")),
+            seed=self.seed,
+            policy_name=self.policy_name + (f" {LABEL}" if self.unsafe_no_floor else ""),
+            policy=self.policy,
+            planner=self.planner_of_jobs,
+            perception=self.perception,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SearchedEpisode:
+    """One episode of a search.
+
+    Attributes:
+        scenario: name of the template.
+        round: number of the round; every restart begins one.
+        trial: the trial of that round; its value is the :func:`score`.
+    """
+
+    scenario: str
+    round: int
+    trial: Trial
+
+    @property
+    def score(self) -> float:
+        """See :func:`score`."""
+        return self.trial.outcome.value or 0.0
+
+    @property
+    def notes(self) -> Mapping[str, Any]:
+        """Other figures of the episode."""
+        return self.trial.outcome.notes
+
+
+@dataclass(frozen=True, slots=True)
+class Falsification:
+    """The result of a falsification.
+
+    Attributes:
+        settings: its settings.
+        spaces: search spaces by scenario.
+        episodes: every episode, by scenario, in the order in which they were proposed.
+    """
+
+    settings: FalsifySettings
+    spaces: dict[str, ScenarioSpace]
+    episodes: tuple[SearchedEpisode, ...]
+
+    @property
+    def contacts(self) -> int:
+        """Number of episodes in which the moving robot touched a person who had not looked.
+
+        Without the floor, people who had looked count, too.
+        """
+        return sum(each.score <= CONTACT_SCORE for each in self.episodes)
+
+    @property
+    def contact_mps(self) -> float:
+        """The robot's highest speed at one of these contacts; 0 without any."""
+        return max(CONTACT_SCORE - min((each.score for each in self.episodes), default=0.0), 0.0)
+
+    @property
+    def aware_speeds_mps(self) -> list[float]:
+        """The robot's speed in each episode in which it moved and touched a person who had looked.
+
+        It is that at the fastest contact.
+        """
+        return [
+            float(each.notes.get("moving_contact_mps") or 0.0)
+            for each in self.episodes
+            if each.notes.get("moving_contacts", 0) > each.notes.get("moving_contacts_unaware", 0)
+        ]
+
+    @property
+    def errors(self) -> int:
+        """Number of episodes without a result."""
+        return sum(bool(each.notes.get("error")) for each in self.episodes)
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """The episodes of a falsification, in whole generations.
+
+    Attributes:
+        first: episodes in every scenario.
+        total_if_worst: episodes in each of the worst scenarios, the first ones included.
+        worst: number of the worst scenarios.
+    """
+
+    first: int
+    total_if_worst: int
+    worst: int
+
+    @classmethod
+    def of(cls, episodes: int, scenarios: int, generation: int) -> Budget:
+        """Return a budget of at least a number of episodes.
+
+        Raises:
+            SimError: fewer episodes than one generation per scenario.
+        """
+        if episodes < generation * scenarios:
+            raise SimError(
+                f"--episodes must be at least one generation of {generation} per scenario, "
+                f"{generation * scenarios} for {scenarios}, got {episodes}"
+            )
+        if scenarios == 1:
+            all_episodes = math.ceil(episodes / generation) * generation
+            return cls(all_episodes, all_episodes, 0)
+        worst = max(scenarios // _WORST_ONE_IN, 1)
+        first = max(int(_FIRST_SHARE * episodes / scenarios) // generation, 1) * generation
+        rest = max(episodes - first * scenarios, 0)
+        more = math.ceil(rest / (worst * generation)) * generation
+        return cls(first, first + more, worst)
+
+    def total(self, scenarios: int) -> int:
+        """Return the episodes of all scenarios together."""
+        return self.first * scenarios + (self.total_if_worst - self.first) * self.worst
+
+
+def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
+    """Return the score of an episode: the smallest separation margin at a moving robot, in metres.
+
+    The margin is that to people who have not looked at the robot for 1 s, or never. It lies within
+    (−10, 10]. A contact of the moving robot with them gives −10 less the robot's speed in m/s, so
+    that a faster contact scores lower. Who walks into whom does not matter. An episode without a
+    result gives 10.
+
+    Args:
+        record: the episode.
+        everybody: people who have looked count, too.
+    """
+    if record.error:
+        return NO_MARGIN_SCORE
+    if record.moving_contacts_unaware > 0:
+        return CONTACT_SCORE - (record.moving_contact_unaware_mps or 0.0)
+    if everybody and record.moving_contacts > 0:
+        return CONTACT_SCORE - (record.moving_contact_mps or 0.0)
+    margin_m = record.min_margin_m if everybody else record.min_margin_unaware_m
+    if margin_m is None:
+        return NO_MARGIN_SCORE
+    return min(max(margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE)
+
+
+def falsify(
+    settings: FalsifySettings, folder: Path, *, workers: int, resume: bool, overwrite: bool = False
+) -> Falsification:
+    """Search until all episodes have run.
+
+    The folder is made when missing. The result does not depend on the number of workers.
+
+    Raises:
+        SimError: settings that do not fit together, or another process that works in the folder.
+    """
+    templates = settings.templates
+    asks = policy_of(settings.policy).attention is not None
+    spaces = {each.name: ScenarioSpace(each, settings.people, asks=asks) for each in templates}
+    budget = Budget.of(settings.episodes, len(spaces), settings.generation)
+    refuse_unusable_planner(settings.planner, templates[0].median())
+    with _only_process(folder) if folder.is_dir() else nullcontext():  # a refusal makes no folder
+        write_or_check_settings(
+            settings,
+            folder / _SETTINGS_FILE,
+            "falsification",
+            resume=resume,
+            overwrite=overwrite,
+            results=_RESULTS,
+            may_grow=["episodes"],
+        )
+    with (
+        _only_process(folder),
+        EpisodeRunner(workers, "falsify", budget.total(len(spaces))) as runner,
+    ):
+        return _search(settings, folder, spaces, budget, runner)
+
+
+@contextmanager
+def _only_process(folder: Path) -> Iterator[None]:
+    """Refuse to go on while another process falsifies in the folder."""
+    try:
+        with filelock.FileLock(folder / ".lock", blocking=False):
+            yield
+    except filelock.Timeout as cause:
+        raise SimError(f"another process works on the falsification in {folder}") from cause
+
+
+def _search(
+    settings: FalsifySettings,
+    folder: Path,
+    spaces: dict[str, ScenarioSpace],
+    budget: Budget,
+    runner: EpisodeRunner,
+) -> Falsification:
+    """Search in all scenarios, then further in the worst of them."""
+    found: dict[str, list[SearchedEpisode]] = {}
+
+    def search_up_to(total: int, names: Sequence[str]) -> None:
+        for name in names:
+            found[name] = search(
+                name,
+                spaces[name].ranges,
+                spaces[name].neutral,
+                partial(_evaluated, settings, spaces[name], runner),
+                folder,
+                seed=settings.seed,
+                generation=settings.generation,
+                total=total,
+            )
+            done = sum(map(len, found.values()))
+            if runner.bar.n < done:  # episodes of an earlier process
+                runner.bar.update(done - runner.bar.n)
+
+    search_up_to(budget.first, list(spaces))
+    by_score = sorted(spaces, key=lambda name: min(each.score for each in found[name]))
+    search_up_to(budget.total_if_worst, by_score[: budget.worst])
+    return Falsification(settings, spaces, tuple(each for name in spaces for each in found[name]))
+
+
+def _evaluated(
+    settings: FalsifySettings,
+    space: ScenarioSpace,
+    runner: EpisodeRunner,
+    trials: Mapping[int, ParameterValues],
+) -> list[Outcome]:
+    """Return the outcomes of variations of one scenario, given their parameters by number."""
+    runner.bar.set_postfix_str(space.template.name)
+    records = runner.run([settings.job(space.scenario(values)) for values in trials.values()])
+    return [
+        Outcome(
+            score(record, everybody=settings.unsafe_no_floor),
+            notes={name: getattr(record, name) for name in _NOTES},
+        )
+        for record in records
+    ]
+
+
+def search(
+    name: str,
+    ranges: Mapping[str, Range],
+    neutral: ParameterValues,
+    evaluate: Callable[[Mapping[int, ParameterValues]], Sequence[Outcome]],
+    folder: Path,
+    *,
+    seed: int,
+    generation: int,
+    total: int,
+) -> list[SearchedEpisode]:
+    """Search one scenario for the smallest score, or continue, up to a number of episodes.
+
+    Args:
+        name: name of the scenario.
+        ranges: ranges of the parameters.
+        neutral: values of the scenario as written, where the first round starts; later rounds start
+            at points drawn from the seed.
+        evaluate: returns the outcomes of trials, given their parameters by number.
+        folder: folder of the search; every round has a study in it.
+        seed: seed of the search.
+        generation: episodes per generation.
+        total: a multiple of the generation.
+
+    Returns:
+        All episodes so far, in the order in which they were proposed.
+    """
+    found: list[SearchedEpisode] = []
+    round_ = 0
+    while len(found) < total:
+        rng = np.random.default_rng([seed, zlib.crc32(name.encode()), round_])
+        start = dict(neutral)
+        if round_ > 0:
+            shares = rng.random(len(ranges)).tolist()
+            start = {
+                key: (1.0 - share) * each.low + share * each.high
+                for share, (key, each) in zip(shares, ranges.items(), strict=True)
+            }
+        optimizer = Optimizer(
+            "cmaes",
+            ranges,
+            generation=generation,
+            seed=int(rng.integers(2**31)),
+            first=start,
+            spread=_FIRST_SPREAD if round_ == 0 else _LATER_SPREAD,
+        )
+        most = total - len(found)
+        study = SharedStudy(folder / "studies" / f"{name}-{round_:02d}.log", optimizer, most)
+        while len(trials := study.trials()) < most and not _has_converged(trials, generation):
+            study.evaluate(generation, evaluate)
+        found += [SearchedEpisode(name, round_, trial) for trial in trials]
+        round_ += 1
+    return found
+
+
+def _has_converged(trials: Sequence[Trial], generation: int) -> bool:
+    """Return whether the last generations of a round brought almost no progress."""
+    whole = len(trials) // generation
+    if len(trials) % generation or whole < _LEAST_GENERATIONS:
+        return False
+    values = np.array([trial.outcome.value for trial in trials], dtype=np.float64)
+    best = values.reshape(whole, generation).min(axis=1)
+    return bool(
+        best[-_LAST_GENERATIONS:].min() > best[:-_LAST_GENERATIONS].min() - _LEAST_PROGRESS_M
+    )

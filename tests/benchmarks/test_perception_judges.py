@@ -1,0 +1,243 @@
+"""Judges of perception: degraded pictures keep their truth, figures are counted right."""
+
+from __future__ import annotations
+
+import json
+
+import cv2
+import numpy as np
+import pytest
+from paths import SHARED
+from scipy.spatial.transform import Rotation
+
+from benchmarks.perception.__main__ import main
+from benchmarks.perception._degradations import HEADER, measure, meets, row_of
+from benchmarks.perception._photographs import (
+    LABELS,
+    PhotographResult,
+    aware_lines,
+    figures,
+    judge_folder,
+    matched,
+    read_labels,
+)
+from benchmarks.perception._pictures import CONDITIONS, degraded_picture, picture_sets, pictures
+from benchmarks.perception._sureness import axis_nees
+from benchmarks.perception._sureness import measure as measure_sureness
+from perception import HeadPose, PersonObservation
+from sim_tests.dataset import RenderConfig
+from training.networks import Recipe
+
+
+@pytest.fixture(scope="module")
+def shots():
+    config = picture_sets(3, 5)["plain"].model_copy(update={"width_px": 320, "height_px": 240})
+    return list(pictures(config))
+
+
+def test_pictures_are_held_out_from_training():
+    recipe = Recipe()
+    for config in picture_sets(20, 0).values():
+        assert isinstance(config, RenderConfig)
+        assert not set(config.layouts or ()) & set(recipe.layouts)
+        assert config.workers is None  # the shipped ones, which no network has seen
+        assert config.variants[1] < recipe.variants[0]
+    assert picture_sets(20, 0)["far"].max_range_m == 10.0
+    assert picture_sets(20, 0)["wide"].horizontal_fov_deg == 110.0
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_rolling_shutter_moves_boxes_and_keypoints_with_the_pixels(shots, number):
+    condition = next(each for each in CONDITIONS if "rolling" in each.name)
+    shear = condition.degradation(number).shutter_shear
+    for shot in shots:
+        _, record = degraded_picture(shot, condition, number, np.random.default_rng(0))
+        middle = 0.5 * (shot.rgb.shape[0] - 1)
+        before = {person["id"]: person for person in shot.record["people"]}
+        assert {person["id"] for person in record["people"]} <= set(before)
+        for person in record["people"]:
+            old = before[person["id"]]
+            for name, (u, v, _) in person["keypoints"].items():
+                u_old, v_old, _ = old["keypoints"][name]
+                assert v == pytest.approx(v_old)
+                assert u == pytest.approx(u_old + shear * (v_old - middle))
+            mask = shot.actors == shot.workers[person["id"]]
+            rows, columns = np.nonzero(mask)
+            moved = columns + shear * (rows - middle)
+            inside = (moved >= 0.0) & (moved <= shot.rgb.shape[1] - 1)
+            x0, y0, x1, y1 = person["box_xyxy_px"]
+            assert x0 == pytest.approx(moved[inside].min(), abs=1.6)
+            assert x1 == pytest.approx(moved[inside].max() + 1.0, abs=1.6)
+            assert (y0, y1) == pytest.approx((rows[inside].min(), rows[inside].max() + 1), abs=1.6)
+
+
+def test_another_background_keeps_every_pixel_of_people(shots):
+    condition = next(each for each in CONDITIONS if each.background)
+    for shot in shots:
+        rgb, record = degraded_picture(shot, condition, 0, np.random.default_rng(1))
+        people = shot.actors >= 0
+        np.testing.assert_array_equal(rgb[people], shot.rgb[people])
+        assert (rgb[~people] != shot.rgb[~people]).any(axis=1).mean() > 0.9
+        assert record == shot.record
+
+
+@pytest.mark.full
+def test_the_shipped_networks_find_people_and_a_row_says_so():
+    wanted = [each for each in CONDITIONS if each.name in ("clean", "motion blur 17 px")]
+    metrics = measure(wanted, 3, 2026)
+    assert list(metrics) == ["clean", "motion blur 17 px"]
+    clean = metrics["clean"]["overall"]
+    assert clean["recall"] >= 0.7
+    assert clean["head_median_deg"] < 12.0
+    assert metrics["motion blur 17 px"]["overall"]["people"] == clean["people"]
+    rows = [row_of(name, each) for name, each in metrics.items()]
+    assert all(row.count("|") == HEADER.splitlines()[0].count("|") for row in rows)
+
+
+def test_an_unknown_condition_is_refused_with_those_there_are(capsys):
+    with pytest.raises(SystemExit):
+        main(["degradations", "--conditions", "fog"])
+    message = capsys.readouterr().err
+    assert "no condition contains fog" in message
+    assert all(each.name in message for each in CONDITIONS)
+
+
+def test_bounds_are_those_of_every_figure():
+    good = {"head_median_deg": 6.0, "head_p90_deg": 20.0, "recall": 0.95, "false_aware": 0.005}
+    assert meets({"overall": good})
+    assert meets({"overall": {**good, "false_aware": None}})
+    for name, worse in (
+        ("head_median_deg", 6.1),
+        ("head_p90_deg", 20.1),
+        ("recall", 0.94),
+        ("false_aware", 0.006),
+        ("head_median_deg", None),
+    ):
+        assert not meets({"overall": {**good, name: worse}})
+
+
+# --- photographs ----------------------------------------------------------------------------------
+
+
+DEV = SHARED / "images" / "dev"
+
+
+def seen(box, alpha=None, score=0.8):
+    return PersonObservation(
+        stamp_s=0.0,
+        position_camera_m=np.array([0.0, 0.0, 3.0]),
+        position_covariance_m2=np.eye(3),
+        gaze_camera=None if alpha is None else np.array([0.0, 0.0, -1.0]),
+        awareness=alpha,
+        awareness_std=None if alpha is None else 0.1,
+        score=score,
+        box_xyxy_px=np.array(box, dtype=float),
+    )
+
+
+def test_each_box_matches_once_and_the_most_people_count():
+    truth = np.array([[0.0, 0.0, 10.0, 20.0], [6.0, 0.0, 16.0, 20.0]])
+    found = np.array([[3.0, 0.0, 13.0, 20.0], [0.0, 0.0, 10.0, 20.0], [50.0, 0.0, 60.0, 20.0]])
+    assert matched(truth, found) == ((0, 1), (1, 0))
+    assert matched(truth, np.zeros((0, 4))) == ()
+    assert matched(np.zeros((0, 4)), found) == ()
+    assert matched(truth[:1], found[:1], min_iou=0.6) == ()
+
+
+def test_figures_count_people_pictures_and_false_positives():
+    truth = np.array([[0.0, 0.0, 10.0, 20.0], [50.0, 0.0, 60.0, 20.0]])
+    results = [
+        PhotographResult("a.jpg", truth, (seen([0, 0, 10, 20]), seen([90, 0, 99, 9])), ((0, 0),)),
+        PhotographResult("b.jpg", np.zeros((0, 4)), (seen([1, 1, 9, 9], 0.7),), ()),
+    ]
+    assert figures(results) == {
+        "people": 2,
+        "pictures": 2,
+        "recall": 0.5,
+        "false_per_picture": 1.0,
+    }
+    (line,) = aware_lines(results)
+    assert line == "b.jpg: α = 0.70 ± 0.10, score 0.80, no labelled person at 1, 1, 9, 9"
+
+
+def test_bad_folders_are_refused(tmp_path, capsys):
+    with pytest.raises(ValueError, match=f"must hold photographs and {LABELS}"):
+        read_labels(tmp_path)
+    label = {"a.jpg": {"size": [9, 9], "people_xyxy_px": [[5, 5, 1, 1]]}}
+    (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"boxes of a\.jpg must be x0, y0, x1, y1"):
+        read_labels(tmp_path)
+    label["a.jpg"]["people_xyxy_px"] = [[1, 1, 5, 5]]
+    (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
+    with pytest.raises(SystemExit):
+        main(["photographs", str(tmp_path)])
+    assert "a.jpg must be a photograph that OpenCV reads" in capsys.readouterr().err
+
+
+def test_a_picture_of_noise_has_nobody(tmp_path, capsys):
+    noise = np.random.default_rng(0).integers(100, 156, (120, 160, 3), np.uint8)
+    cv2.imwrite(str(tmp_path / "n.png"), noise)
+    label = {"n.png": {"size": [160, 120], "people_xyxy_px": [[10, 10, 50, 110]]}}
+    (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
+    main(["photographs", str(tmp_path)])
+    text = capsys.readouterr().out
+    assert "1 people in 1 photographs: recall 0.00" in text
+    assert "nobody" in text
+
+
+@pytest.mark.full
+@pytest.mark.skipif(not DEV.is_dir(), reason="the photographs of ../shared are not here")
+def test_the_shipped_networks_on_photographs_are_measured_as_they_are():
+    """The networks know renders; keypoints confirm what the detector is unsure of."""
+    results = judge_folder(DEV)
+    found = figures(results)
+    assert (found["people"], found["pictures"]) == (19, 14)
+    assert found["recall"] > 0.6
+    assert found["false_per_picture"] <= 0.3
+
+
+# --- sureness of heads ----------------------------------------------------------------------------
+
+
+def _pose(rotation: np.ndarray, covariance: np.ndarray) -> HeadPose:
+    full = np.eye(6) * 1e-4
+    full[:3, :3] = covariance
+    return HeadPose(np.array([0.0, 0.0, 3.0]), rotation, full, 0.5)
+
+
+def test_errors_with_the_stated_covariance_have_a_nees_of_two():
+    rng = np.random.default_rng(3)
+    factor = np.array([[0.09, 0.0, 0.0], [0.03, 0.05, 0.0], [-0.02, 0.01, 0.07]])
+    nees, sigmas = [], []
+    for _ in range(4000):
+        rotation = Rotation.random(random_state=rng).as_matrix()
+        true = Rotation.from_rotvec(factor @ rng.normal(size=3)).as_matrix() @ rotation
+        value, sigma = axis_nees(_pose(rotation, factor @ factor.T), true[:, 1])
+        nees.append(value)
+        sigmas.append(sigma)
+    # The mean of 4000 values with variance 4 has a standard deviation of 0.03.
+    assert np.mean(nees) == pytest.approx(2.0, abs=0.13)
+    assert np.mean(np.array(nees) < 5.991) == pytest.approx(0.95, abs=0.012)
+    assert 0.03 < min(sigmas) < max(sigmas) < 0.1
+
+
+def test_a_turn_about_the_axis_itself_is_no_error_of_the_axis():
+    rotation = Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix()
+    rolled = rotation @ Rotation.from_rotvec([0.0, 0.7, 0.0]).as_matrix()
+    nees, sigma = axis_nees(_pose(rotation, np.eye(3) * 0.01), rolled[:, 1])
+    assert nees == pytest.approx(0.0, abs=1e-12)
+    assert sigma == pytest.approx(0.1)
+    turned = rotation @ Rotation.from_rotvec([0.2, 0.0, 0.0]).as_matrix()
+    assert axis_nees(_pose(rotation, np.eye(3) * 0.01), turned[:, 1])[0] == pytest.approx(4.0)
+
+
+@pytest.mark.full
+def test_heads_of_renders_are_judged_by_condition():
+    conditions = [each for each in CONDITIONS if each.name in ("clean", "5–10 m")]
+    groups = measure_sureness(conditions, 3, 11)
+    assert list(groups) == ["clean", "5–10 m", "faces under 20 px"]
+    far, small = groups["5–10 m"], groups["faces under 20 px"]
+    assert len(groups["clean"].nees) >= 2
+    # All faces beyond 5 m are small.
+    assert len(small.nees) >= len(far.nees) >= 2
+    assert all(value > 0.0 for group in groups.values() for value in group.sigma_deg)
