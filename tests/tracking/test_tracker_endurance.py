@@ -51,7 +51,7 @@ def test_the_tracks_are_valid_after_any_sequence(
 ) -> None:
     config = TrackerConfig(max_pause_s=1e12, new_clock_after_s=1e5, awareness=REMEMBERS)
     tracker = PersonTracker(config, view=view, sensors=sensors())
-    latest, ever, lower = 0.0, 0, {}
+    latest, lower = 0.0, {}
     for dt_s, crowd, sensor in sequence:
         now = latest + dt_s
         if sensor == LASER:
