@@ -44,7 +44,7 @@ DEFAULT_EYE_IN_HEAD_STD_RAD: Final = (math.radians(11.3), math.radians(3.4))
 
 
 class _Look(NamedTuple):
-    """What the face tells of one person.
+    """The evidence that the face of one person gives.
 
     Attributes:
         estimate: their awareness; None without evidence.

@@ -1,4 +1,4 @@
-"""Whose keypoints, and whether they confirm a person: a second network's word on the detector's.
+"""Keypoints: the person whom they belong to, and whether they confirm that there is one.
 
 One skeleton for each detection, and only one that a body could have. Boxes are (4,) left, top,
 right, bottom in pixels.

@@ -99,7 +99,7 @@ class AwarenessFilterConfig(StrictConfig):
 
 
 class TrackingConfig(StrictConfig):
-    """Base of configs whose constructor raises :class:`TrackingError`, as a saved state does."""
+    """Base of configs whose constructor raises :class:`TrackingError`."""
 
     if not TYPE_CHECKING:  # type checkers know the settings from the fields
 

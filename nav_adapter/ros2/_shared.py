@@ -1,4 +1,4 @@
-"""What the inputs of the bridge share, and how they refuse a message."""
+"""The parts that the inputs of the bridge share, and the one path of refusing a message."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _WARN_AGAIN_S: Final = 10.0
 
 @dataclass(frozen=True)
 class Shared:
-    """What the inputs of a bridge share.
+    """The parts that the inputs of a bridge share.
 
     Attributes:
         clock: of the bridge; used under the lock.

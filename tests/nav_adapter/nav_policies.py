@@ -1,8 +1,9 @@
-"""Random policies of every kind, and random robots."""
+"""Random policies of every kind, a custom one, and random robots."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from hypothesis import strategies as st
@@ -16,6 +17,21 @@ from nav_adapter.policies import (
     SafetyMargins,
     TimeBehaviour,
 )
+
+
+class Own:
+    """A custom policy with given values."""
+
+    def __init__(
+        self, radius: Callable[[float], float] = lambda _: 0.7, speed: float | None = 1.0
+    ) -> None:
+        self._radius, self._speed = radius, speed
+
+    def radius_m(self, awareness_lower: float) -> float:
+        return self._radius(awareness_lower)
+
+    def human_speed_mps(self, awareness_lower: float) -> float | None:
+        return self._speed
 
 
 @st.composite

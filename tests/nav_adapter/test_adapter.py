@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import policies, robots
+from nav_policies import Own, policies, robots
 from nav_scenes import (
     FLOOR_M,
     ROBOT,
@@ -89,21 +88,6 @@ def test_without_people_the_limit_is_the_robots_maximum() -> None:
     assert (result.speed_limit_mps, result.limited_by) == (1.5, "robot maximum")
     far = settled(0.0, position=(40.0, 0.0))
     assert (far.speed_limit_mps, far.limited_by) == (1.5, "robot maximum")
-
-
-class Own:
-    """A custom policy with given values."""
-
-    def __init__(
-        self, radius: Callable[[float], float] = lambda _: 0.7, speed: float | None = 1.0
-    ) -> None:
-        self._radius, self._speed = radius, speed
-
-    def radius_m(self, awareness_lower: float) -> float:
-        return self._radius(awareness_lower)
-
-    def human_speed_mps(self, awareness_lower: float) -> float | None:
-        return self._speed
 
 
 @pytest.mark.parametrize("radius", [0.0, -3.0, 0.39, 0.41, 5.0])

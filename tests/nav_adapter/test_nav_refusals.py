@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from nav_policies import Own
 from nav_scenes import ROBOT, constraints_of, numbers, person, robot_at, settled_update
 
 from nav_adapter import (
@@ -57,21 +58,6 @@ PLACES = np.zeros((2, 3, 2))
 STEERS = replace(ROBOT, drive="ackermann", min_turning_radius_m=1.4)
 OUTLINE_M = np.array([[0.36, 0.25], [-0.36, 0.25], [-0.36, -0.25], [0.36, -0.25]])
 CIRCLE = PersonObstacle(1, (3.0, 0.0), (0.0, 0.0), 0.5, 1.7, 0.0, ONE.obstacles[0].polygon)
-
-
-class Own:
-    """A custom policy with given values."""
-
-    def __init__(
-        self, radius: Callable[[float], float] = lambda _: 0.7, speed: float | None = 1.0
-    ) -> None:
-        self._radius, self._speed = radius, speed
-
-    def radius_m(self, awareness_lower: float) -> float:
-        return self._radius(awareness_lower)
-
-    def human_speed_mps(self, awareness_lower: float) -> float | None:
-        return self._speed
 
 
 def adapted(**policy: Any) -> NavAdapter:

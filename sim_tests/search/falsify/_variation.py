@@ -1,4 +1,4 @@
-"""What the variations of all people share: limits, parameters, bent paths and their clearance."""
+"""The part that all variations share: limits, parameters, bent paths and their clearance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the episodes of a command have: the one place that knows every axis of an experiment."""
+"""The conditions of a command's episodes: the one place that knows every axis of an experiment."""
 
 from __future__ import annotations
 
