@@ -12,7 +12,7 @@ run_path(str(_CLASH))["require_sole_owner"](__name__)
 from ._config import AwarenessFilterConfig, TrackerConfig
 from ._errors import TrackingError
 from ._sensors import SensorConfig
-from ._track import PersonTrack, TrackStatus
+from ._snapshot import PersonTrack, TrackStatus
 from ._tracker import PersonTracker
 from ._views import CameraView, RangedView, ScannerView, SurroundView, View
 

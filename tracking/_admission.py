@@ -9,7 +9,6 @@ differs from the others': its frames, or theirs, are refused, which is worth a w
 from __future__ import annotations
 
 import logging
-import math
 from dataclasses import dataclass
 
 from ._config import TrackerConfig
@@ -75,7 +74,7 @@ class Admission:
     def __init__(self, config: TrackerConfig, sensors: Sensors) -> None:
         self._config, self._sensors = config, sensors
         self.late_frames = self.early_frames = self.restarts = 0
-        self.refused = dict.fromkeys(sensors.names, 0)
+        self.refused = {sensor.name: 0 for sensor in sensors.all}
         self.forget()
 
     def forget(self) -> None:
@@ -100,7 +99,7 @@ class Admission:
             # The ids that the wrong frame gave are not used again.
             return Entry(leap.before.with_ids_from(history.latest.next_id), undone=leap)
         ahead_s = stamp_s - last_s
-        period_s = _known(history.latest.clocks[sensor.index].period_s)
+        period_s = history.latest.clocks[sensor.index].known_period_s
         leaps = ahead_s > max(config.max_lag_s, _LEAP_PERIODS * period_s)
         if ahead_s > config.max_pause_s:
             message = (
@@ -160,9 +159,9 @@ class Admission:
         if name in self._warned or not run.has_lasted(config.new_clock_after_s):
             return
         others = {
-            other: clock.stamp_s
-            for other, clock in zip(self._sensors.names, history.latest.clocks, strict=True)
-            if other != name and clock.stamp_s is not None
+            other.name: clock.stamp_s
+            for other, clock in zip(self._sensors.all, history.latest.clocks, strict=True)
+            if other.name != name and clock.stamp_s is not None
         }
         if not others:
             return
@@ -188,9 +187,5 @@ def _returns(leap: Leap, stamp_s: float, sensor: Sensor) -> bool:
     clock = leap.before.latest.clocks[sensor.index]
     if clock.stamp_s is None or leap.before.lateness_error(stamp_s) is not None:
         return False
-    follows_s = max(_FOLLOWS_S, _LEAP_PERIODS * _known(clock.period_s))
+    follows_s = max(_FOLLOWS_S, _LEAP_PERIODS * clock.known_period_s)
     return 0.0 <= stamp_s - clock.stamp_s <= follows_s
-
-
-def _known(period_s: float) -> float:
-    return period_s if math.isfinite(period_s) else 0.0

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import Final
 
 from ._errors import TrackingError
-from ._measurement import Frame
-from ._step import TrackerState
+from ._frame import Frame
+from ._state import State
 
 # Bounds memory, and the work for one late frame, at any frame rate.
 MAX_FRAMES: Final = 256
@@ -19,8 +19,7 @@ class History:
     """A state, the frames that came after it, and the state after each of them.
 
     The frames cover ``max_lag_s``. A late frame within that lag is inserted in its place, and the
-    states after it are computed again. States are immutable and share their arrays, so keeping them
-    costs no copying.
+    states after it are computed again. States are immutable.
 
     Args:
         advance: returns the state after one more frame.
@@ -30,18 +29,18 @@ class History:
 
     def __init__(
         self,
-        advance: Callable[[TrackerState, Frame], TrackerState],
+        advance: Callable[[State, Frame], State],
         max_lag_s: float,
-        base: TrackerState,
+        base: State,
     ) -> None:
         self._advance = advance
         self._max_lag_s = max_lag_s
         self._base = base
         self._frames: list[Frame] = []
-        self._states: list[TrackerState] = []
+        self._states: list[State] = []
 
     @property
-    def latest(self) -> TrackerState:
+    def latest(self) -> State:
         """The state after all frames."""
         return self._states[-1] if self._states else self._base
 
@@ -95,9 +94,9 @@ class History:
         self._states[place:] = states
         self._drop_old_frames()
 
-    def _replay(self, state: TrackerState, frames: Sequence[Frame]) -> list[TrackerState]:
+    def _replay(self, state: State, frames: Sequence[Frame]) -> list[State]:
         """Return the state after each of the frames."""
-        states: list[TrackerState] = []
+        states: list[State] = []
         for frame in frames:
             state = self._advance(state, frame)
             states.append(state)

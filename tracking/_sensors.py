@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from perception.arrays import FloatArray
 
-from ._association import Gates
-from ._clocks import FrameClock
 from ._config import TrackerConfig, TrackingConfig
 from ._errors import TrackingError
-from ._existence import tentative_gap_s
-from ._table import BoolArray, TrackTable
 from ._views import View
+from .clock import FrameClock
 
 #: The name of the sensor that every tracker has.
 CAMERA: Final = "camera"
@@ -65,23 +62,43 @@ class SensorConfig(TrackingConfig):
         return view
 
 
+class Gates(NamedTuple):
+    """Limits within which a match is possible, and within which it is ambiguous.
+
+    Attributes:
+        mahalanobis2: largest squared Mahalanobis distance (χ² with two degrees of freedom).
+        distance_m: largest distance.
+        miss_cost: cost of leaving a track and a measurement unmatched.
+        ambiguity_margin: a rival that costs at most this much more makes a match ambiguous, …
+        ambiguity_distance_m: … if it is no further away than this.
+    """
+
+    mahalanobis2: float
+    distance_m: float
+    miss_cost: float
+    ambiguity_margin: float
+    ambiguity_distance_m: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
     """A sensor as the steps of the tracker use it.
 
     Attributes:
         name: as in ``update(sensor=…)``.
-        index: its column in the table of tracks.
+        index: its place in the lists of a track.
         settings: as given.
-        config: the tracker's, with the detection probability and the miss cost of this sensor.
         gates: of its measurements.
+        log_missed: ln(1 − P_D), the evidence of a frame that should have shown a person.
+        pose_covariance: (3, 3) of the sensor's x, y and yaw on the robot; None if it is exact.
     """
 
     name: str
     index: int
     settings: SensorConfig
-    config: TrackerConfig
     gates: Gates
+    log_missed: float
+    pose_covariance: FloatArray | None
 
     @property
     def view(self) -> View | None:
@@ -89,39 +106,29 @@ class Sensor:
         view: View | None = self.settings.view
         return view
 
-    @property
-    def pose_covariance(self) -> FloatArray | None:
-        """(3, 3) of the sensor's x, y and yaw on the robot; None if it is exact."""
-        std = self.settings.alignment_std_rad
-        return np.diag([0.0, 0.0, std * std]) if std > 0.0 else None
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensors:
-    """All S sensors of a tracker, the camera first.
+    """All sensors of a tracker, the camera first.
 
     Attributes:
-        all: in the order of their columns.
-        names: of the sensors.
+        all: in the order of a track's lists.
         config: the tracker's settings.
-        has_view: (S,) True where the view is known.
-        faces: (S,) True for sensors that see faces.
-        several_faces: whether more than one does.
-        ranging: (S,) True for sensors that measure ranges.
-        mixed: whether some measure ranges and others do not.
+        faces: indices of the sensors that see faces.
+        ranging: indices of the sensors that measure ranges.
+        sizing: indices of those that do not.
     """
 
     all: tuple[Sensor, ...]
-    names: tuple[str, ...]
     config: TrackerConfig
-    has_view: BoolArray
-    faces: BoolArray
-    several_faces: bool
-    ranging: BoolArray
-    mixed: bool
+    faces: tuple[int, ...]
+    ranging: tuple[int, ...]
+    sizing: tuple[int, ...]
 
-    def __len__(self) -> int:
-        return len(self.all)
+    @property
+    def mixed(self) -> bool:
+        """Whether some measure ranges and others do not."""
+        return bool(self.ranging and self.sizing)
 
     def named(self, name: Any) -> Sensor:
         """Return the sensor of this name.
@@ -129,20 +136,16 @@ class Sensors:
         Raises:
             TrackingError: for a name that is not among them.
         """
-        if not isinstance(name, str) or name not in self.names:
-            raise TrackingError(
-                f"sensor must be one of {', '.join(map(repr, self.names))}, got {name!r:.80}"
-            )
-        return self.all[self.names.index(name)]
+        for sensor in self.all:
+            if sensor.name == name:
+                return sensor
+        names = ", ".join(repr(sensor.name) for sensor in self.all)
+        raise TrackingError(f"sensor must be one of {names}, got {name!r:.80}")
 
-    def tentative_gaps_s(self, clocks: Sequence[FrameClock]) -> FloatArray:
-        """Return (S,), the time after which each sensor gives up a tentative track."""
-        return np.array(
-            [
-                tentative_gap_s(clock.period_s, sensor.config)
-                for sensor, clock in zip(self.all, clocks, strict=True)
-            ]
-        )
+
+def longest_period_s(clocks: tuple[FrameClock, ...], which: tuple[int, ...]) -> float:
+    """Return the longest usual time between frames of these sensors; 0 where none is known."""
+    return max([clocks[index].known_period_s for index in which])
 
 
 def sensors_of(
@@ -180,46 +183,32 @@ def sensors_of(
         ),
         **others,
     }
-    found = []
-    for index, (name, one) in enumerate(settings.items()):
-        own = config
-        if name != CAMERA:
-            changes = {
-                "detection_probability": one.detection_probability,
-                "miss_cost": one.miss_cost,
-            }
-            own = config.model_copy(update=changes)
-        found.append(Sensor(name, index, one, own, gates_of(own)))
-    faces = _flags(one.sees_faces for one in settings.values())
-    ranging = _flags(one.measures_range for one in settings.values())
+    found = [
+        _sensor(name, index, one, config) for index, (name, one) in enumerate(settings.items())
+    ]
     return Sensors(
         all=tuple(found),
-        names=tuple(settings),
         config=config,
-        has_view=_flags(one.view is not None for one in settings.values()),
-        faces=faces,
-        several_faces=int(np.count_nonzero(faces)) > 1,
-        ranging=ranging,
-        mixed=bool(ranging.any() and not ranging.all()),
+        faces=tuple(one.index for one in found if one.settings.sees_faces),
+        ranging=tuple(one.index for one in found if one.settings.measures_range),
+        sizing=tuple(one.index for one in found if not one.settings.measures_range),
     )
 
 
-def gates_of(config: TrackerConfig) -> Gates:
-    """Return the gates that a config describes."""
-    return Gates(
-        # χ² with two degrees of freedom.
-        mahalanobis2=-2.0 * math.log1p(-config.gate_probability),
-        distance_m=config.gate_distance_m,
-        miss_cost=config.miss_cost,
-        ambiguity_margin=config.ambiguity_margin,
-        ambiguity_distance_m=config.ambiguity_distance_m,
+def _sensor(name: str, index: int, settings: SensorConfig, config: TrackerConfig) -> Sensor:
+    std = settings.alignment_std_rad
+    return Sensor(
+        name,
+        index,
+        settings,
+        Gates(
+            # χ² with two degrees of freedom.
+            mahalanobis2=-2.0 * math.log1p(-config.gate_probability),
+            distance_m=config.gate_distance_m,
+            miss_cost=settings.miss_cost,
+            ambiguity_margin=config.ambiguity_margin,
+            ambiguity_distance_m=config.ambiguity_distance_m,
+        ),
+        math.log1p(-settings.detection_probability),
+        np.diag([0.0, 0.0, std * std]) if std > 0.0 else None,
     )
-
-
-def seen_lately(tracks: TrackTable, which: BoolArray, stamp_s: float, within_s: float) -> BoolArray:
-    """Return (N,) True for tracks seen within this time by one of the sensors of ``which`` (S,)."""
-    return np.asarray((stamp_s - tracks.seen_stamps_s[:, which] <= within_s).any(axis=1))
-
-
-def _flags(values: Iterable[bool]) -> BoolArray:
-    return np.array(list(values), dtype=np.bool_)

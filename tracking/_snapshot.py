@@ -1,115 +1,209 @@
-"""The tracks at an instant as :class:`~tracking.PersonTrack` objects."""
+"""The tracks at an instant, as the tracker hands them to navigation."""
 
 from __future__ import annotations
 
-import math
-from typing import Final
+from dataclasses import dataclass, fields
+from typing import Any, Final, Literal, cast, get_args
 
 import numpy as np
 
-from ._awareness_update import belief_of
-from ._faces import face_period_s
+from perception.arrays import FloatArray, covariance_matrix, finite_array, finite_number, set_fields
+
+from ._errors import TrackingError
 from ._noticed import noticed
+from ._person import Track
+from ._presence import coasted_too_long, shown_empty, tentative_gap_s
 from ._sensors import Sensors
-from ._sizes import with_lasting
-from ._step import TrackerState, predicted
-from ._table import BoolArray, TrackTable
-from ._track import PersonTrack, TrackStatus, trusted_track
-from ._track_management import coasted_too_long, shown_empty
-from ._twins import reported
+from ._size import lever
+from ._state import State, face_period_s
 from .awareness_filter import drift_unseen, estimate
 
+TrackStatus = Literal["tentative", "confirmed", "coasting"]
 # A sensor is silent when no frame has come for this many of its usual intervals.
 _SILENT_PERIODS: Final = 2.5
 
 
-def snapshots(state: TrackerState, stamp_s: float, sensors: Sensors) -> tuple[PersonTrack, ...]:
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonTrack:
+    """An immutable snapshot of one tracked person, in the odom frame.
+
+    Attributes:
+        id: unique for the life of a tracker, never used again.
+        stamp_s: time of the state.
+        status: ``"tentative"`` (not confirmed yet), ``"confirmed"`` or ``"coasting"`` (not in the
+            latest frame, nor in that of another sensor that is not silent).
+        position_odom_m: (2,).
+        velocity_odom_mps: (2,).
+        covariance_odom: (4, 4), order x, y, vx, vy.
+        awareness: filtered α in [0, 1].
+        awareness_std: its standard deviation, ≥ 0.
+        awareness_lower: lower bound of α in [0, 1]; only this value may shrink an obstacle.
+        height_m: the person's assumed stature, > 0.
+        time_since_seen_s: ≥ 0, time since a frame of any sensor last showed this person.
+        place_empty: whether the sensor that last saw this person should have shown them for so
+            long that its next frame without them ends the track, and a scanner has seen through all
+            of their place. A camera never shows a place empty. If a track ends without it, the
+            person was out of sight and may still be there.
+        noticed: lower bound, in [0, 1], of the probability that this person has noticed the robot
+            by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
+    """
+
+    id: int
+    stamp_s: float
+    status: TrackStatus
+    position_odom_m: FloatArray
+    velocity_odom_mps: FloatArray
+    covariance_odom: FloatArray
+    awareness: float
+    awareness_std: float
+    awareness_lower: float
+    height_m: float
+    time_since_seen_s: float
+    place_empty: bool = False
+    noticed: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.status not in get_args(TrackStatus):
+            raise TrackingError(
+                f"status must be one of {', '.join(get_args(TrackStatus))}, got {self.status!r}"
+            )
+        if isinstance(self.id, bool) or int(self.id) != self.id:
+            raise TrackingError(f"id must be an integer, got {self.id!r}")
+
+        def number(name: str, low: float, high: float = float("inf")) -> float:
+            return finite_number(
+                name, getattr(self, name), TrackingError, minimum=low, maximum=high
+            )
+
+        set_fields(
+            self,
+            id=int(self.id),
+            stamp_s=finite_number("stamp_s", self.stamp_s, TrackingError),
+            position_odom_m=finite_array(
+                "position_odom_m", self.position_odom_m, (2,), TrackingError
+            ),
+            velocity_odom_mps=finite_array(
+                "velocity_odom_mps", self.velocity_odom_mps, (2,), TrackingError
+            ),
+            covariance_odom=covariance_matrix(
+                "covariance_odom", self.covariance_odom, 4, TrackingError
+            ),
+            awareness=number("awareness", 0.0, 1.0),
+            awareness_std=number("awareness_std", 0.0),
+            awareness_lower=number("awareness_lower", 0.0, 1.0),
+            height_m=finite_number(
+                "height_m", self.height_m, TrackingError, minimum=0.0, exclusive_minimum=True
+            ),
+            time_since_seen_s=number("time_since_seen_s", 0.0),
+            place_empty=bool(self.place_empty),
+            noticed=number("noticed", 0.0, 1.0),
+        )
+
+
+_SETTERS: Final = tuple(
+    cast(Any, getattr(PersonTrack, field.name)).__set__ for field in fields(PersonTrack)
+)
+
+
+def snapshots(state: State, stamp_s: float, sensors: Sensors) -> tuple[PersonTrack, ...]:
     """Return every track at ``stamp_s``, which is not before the state's own stamp.
 
     The time in between counts as unseen. It holds no frame that could have missed a person, so a
     tentative track is kept for ``confirm_window_s`` here, not only for ``max_tentative_gap_s``.
     """
-    tracks, config = state.tracks, sensors.config
-    if state.stamp_s is None or not len(tracks):
+    now_s, people = state.stamp_s, state.tracks
+    if now_s is None:
         return ()
-    if stamp_s > state.stamp_s:
-        tracks = tracks.take(~_expired(state, stamp_s, sensors))
-    tracks = tracks.take(reported(tracks))
-    if not len(tracks):
+    statuses = [_status(track, state, now_s) for track in people]
+    if stamp_s > now_s:
+        kept = [not _is_expired(track, stamp_s, state, sensors) for track in people]
+        statuses = [status for status, keep in zip(statuses, kept, strict=True) if keep]
+        moved = [track.copied() for track, keep in zip(people, kept, strict=True) if keep]
+        for track in moved:
+            track.predict(now_s, stamp_s, sensors.config)
+        people = tuple(moved)
+    if not people:
         return ()
-    current = _current(state, tracks)
-    if stamp_s > state.stamp_s:
-        tracks = predicted(tracks, state.stamp_s, stamp_s, config)
-    belief = belief_of(tracks)
-    faces = state.faces
-    # Frames of sensors that see no faces leave the belief where it was.
-    if faces.stamp_s is not None and stamp_s > faces.stamp_s:
-        belief = drift_unseen(
-            belief,
-            faces.stamp_s,
-            stamp_s,
-            tracks.evidence_stamps_s,
-            face_period_s(tracks, faces, state.clocks, sensors),
-            config.awareness,
-        )
-    estimated = estimate(belief, config.awareness)
-    covariances = with_lasting(tracks, state.origin_odom_m, state.origin_velocity_mps)
     # The snapshots share these arrays.
-    tracks.states.setflags(write=False)
+    states = np.array([(track.x, track.y, track.vx, track.vy) for track in people])
+    covariances = np.array([_covariance(track, state) for track in people]).reshape(-1, 4, 4)
+    states.setflags(write=False)
     covariances.setflags(write=False)
     return tuple(
-        map(
-            trusted_track,
-            tracks.ids.tolist(),
-            [stamp_s] * len(tracks),
-            _statuses(tracks.confirmed.tolist(), current.tolist()),
-            tracks.states[:, :2],
-            tracks.states[:, 2:],
-            covariances,
-            np.asarray(estimated.awareness).tolist(),
-            np.asarray(estimated.awareness_std).tolist(),
-            np.asarray(estimated.awareness_lower).tolist(),
-            [config.stature_m] * len(tracks),
-            (stamp_s - tracks.last_seen_s).tolist(),
-            _places_empty(state, tracks, sensors),
-            noticed(tracks, stamp_s, faces, state.clocks, sensors).tolist(),
+        _snapshot(track, status, numbers, spread, state, stamp_s, sensors)
+        for track, status, numbers, spread in zip(
+            people, statuses, states, covariances, strict=True
         )
     )
 
 
-def _expired(state: TrackerState, stamp_s: float, sensors: Sensors) -> BoolArray:
-    """Return (N,) True for tracks that are not reported at ``stamp_s`` any more."""
-    tracks, config = state.tracks, sensors.config
-    kept_s = np.maximum(sensors.tentative_gaps_s(state.clocks), config.confirm_window_s)
-    gaps_s = stamp_s - tracks.seen_stamps_s
-    unconfirmed = ~tracks.confirmed & (gaps_s > kept_s).all(axis=1)
-    stamps_s = np.full(len(sensors), stamp_s)
-    return unconfirmed | coasted_too_long(tracks, stamps_s, config, sensors.has_view)
+def _snapshot(
+    track: Track,
+    status: TrackStatus,
+    numbers: FloatArray,
+    covariance: FloatArray,
+    state: State,
+    stamp_s: float,
+    sensors: Sensors,
+) -> PersonTrack:
+    """Return a track at ``stamp_s`` without the checks of the constructor: a fifth of its time."""
+    belief, faces = track.belief, state.faces
+    # Frames of sensors that see no faces leave the belief where it was.
+    if faces.stamp_s is not None and stamp_s > faces.stamp_s:
+        period_s = face_period_s(track, faces, state.clocks, sensors)
+        belief = drift_unseen(
+            belief, faces.stamp_s, stamp_s, track.face_s, period_s, sensors.config.awareness
+        )
+    made = object.__new__(PersonTrack)
+    values = (
+        track.id,
+        stamp_s,
+        status,
+        numbers[:2],
+        numbers[2:],
+        covariance,
+        *estimate(belief, sensors.config.awareness),
+        sensors.config.stature_m,
+        stamp_s - track.last_seen_s,
+        shown_empty(track, state, sensors.config),
+        noticed(track, stamp_s, state, sensors),
+    )
+    for assign, value in zip(_SETTERS, values, strict=True):
+        assign(made, value)
+    return made
 
 
-def _places_empty(state: TrackerState, tracks: TrackTable, sensors: Sensors) -> list[bool]:
-    if state.stamp_s is None or not np.isfinite(tracks.passed_stamps_s).any():
-        return [False] * len(tracks)
-    empty: list[bool] = shown_empty(tracks, state.stamp_s, state.periods_s, sensors.config).tolist()
-    return empty
+def _covariance(track: Track, state: State) -> tuple[float, ...]:
+    """Return the covariance, row by row, with the lasting error of the range."""
+    if track.lasting_std and state.origin_m is not None:
+        track = track.copied()
+        b = lever(track, state.origin_m, state.origin_velocity_mps)
+        track.widen(b, track.lasting_std * track.lasting_std)
+    p01, p02, p03 = track.p01, track.p02, track.p03
+    p12, p13, p23 = track.p12, track.p13, track.p23
+    first, second = (track.p00, p01, p02, p03), (p01, track.p11, p12, p13)
+    return (*first, *second, p02, p12, track.p22, p23, p03, p13, p23, track.p33)
 
 
-def _current(state: TrackerState, tracks: TrackTable) -> BoolArray:
-    """Return (N,) True for people in the latest frame of a sensor that is not silent."""
-    current: BoolArray = tracks.last_seen_s == state.stamp_s
-    now_s = state.stamp_s
-    if len(state.clocks) < 2 or now_s is None:
-        return current
-    for index, clock in enumerate(state.clocks):
-        limit_s = _SILENT_PERIODS * clock.period_s
-        if clock.stamp_s is not None and now_s - clock.stamp_s <= limit_s < math.inf:
-            current = current | (tracks.seen_stamps_s[:, index] == clock.stamp_s)
-    return current
+def _is_expired(track: Track, stamp_s: float, state: State, sensors: Sensors) -> bool:
+    """Return whether a track is not reported at ``stamp_s`` any more."""
+    if track.confirmed:
+        return coasted_too_long(track, [stamp_s] * len(sensors.all), sensors)
+    return all(
+        stamp_s - seen_s
+        > max(tentative_gap_s(clock, sensor, sensors.config), sensors.config.confirm_window_s)
+        for sensor, clock, seen_s in zip(sensors.all, state.clocks, track.seen_s, strict=True)
+    )
 
 
-def _statuses(confirmed: list[bool], in_latest_frame: list[bool]) -> list[TrackStatus]:
-    """Return the status of each track."""
-    return [
-        "tentative" if not is_confirmed else "confirmed" if is_seen else "coasting"
-        for is_confirmed, is_seen in zip(confirmed, in_latest_frame, strict=True)
-    ]
+def _status(track: Track, state: State, now_s: float) -> TrackStatus:
+    """Return the status: confirmed in the latest frame of a sensor that is not silent."""
+    if not track.confirmed:
+        return "tentative"
+    if track.last_seen_s == now_s:
+        return "confirmed"
+    shown = any(
+        seen_s == clock.stamp_s and now_s - seen_s <= _SILENT_PERIODS * clock.known_period_s
+        for clock, seen_s in zip(state.clocks, track.seen_s, strict=True)
+    )
+    return "confirmed" if shown else "coasting"

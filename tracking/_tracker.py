@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from importlib import import_module
 from typing import Any
 
 from perception import PersonObservation
@@ -13,13 +12,14 @@ from perception.arrays import covariance_matrix, finite_number, rigid_transform
 from ._admission import Admission
 from ._config import TrackerConfig
 from ._errors import TrackingError
+from ._frame import Frame, measurements_of
 from ._history import History
-from ._measurement import Frame, measurements_of
 from ._sensors import CAMERA, SensorConfig, sensors_of
-from ._snapshot import snapshots
-from ._step import TrackerState, advance, nobody
-from ._track import PersonTrack
+from ._snapshot import PersonTrack, snapshots
+from ._state import State
+from ._step import advance
 from ._views import View
+from .clock import FrameClock
 
 
 class PersonTracker:
@@ -75,11 +75,8 @@ class PersonTracker:
         _check_view(view)
         self._config = config
         self._sensors = sensors_of(config, view, sensors)
-        # Association needs it; no frame of a running robot shall wait for this import.
-        import_module("scipy.optimize")
         self._admission = Admission(config, self._sensors)
-        start = nobody(config, self._sensors)
-        self._history = History(self._advance, config.max_lag_s, start)
+        self._history = History(self._advance, config.max_lag_s, self._nobody(1))
 
     @property
     def config(self) -> TrackerConfig:
@@ -103,8 +100,10 @@ class PersonTracker:
         state = self._history.latest
         now_s = state.stamp_s
         return {
-            name: math.inf if clock.stamp_s is None or now_s is None else now_s - clock.stamp_s
-            for name, clock in zip(self._sensors.names, state.clocks, strict=True)
+            sensor.name: math.inf
+            if clock.stamp_s is None or now_s is None
+            else now_s - clock.stamp_s
+            for sensor, clock in zip(self._sensors.all, state.clocks, strict=True)
         }
 
     @property
@@ -133,7 +132,7 @@ class PersonTracker:
 
     def reset(self) -> None:
         """Forget all tracks and the clock. Ids go on, and the counts stay."""
-        start = nobody(self._config, self._sensors, self._history.latest.next_id)
+        start = self._nobody(self._history.latest.next_id)
         self._history = History(self._advance, self._config.max_lag_s, start)
         self._admission.forget()
 
@@ -213,7 +212,11 @@ class PersonTracker:
             )
         return self._snapshots(stamp)
 
-    def _advance(self, state: TrackerState, frame: Frame) -> TrackerState:
+    def _nobody(self, next_id: int) -> State:
+        """Return the state before the first frame."""
+        return State((), (FrameClock(),) * len(self._sensors.all), next_id)
+
+    def _advance(self, state: State, frame: Frame) -> State:
         return advance(state, frame, self._sensors)
 
     def _snapshots(self, stamp_s: float) -> tuple[PersonTrack, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception import Camera
 from perception.arrays import (
@@ -18,10 +19,11 @@ from perception.arrays import (
 )
 
 from ._errors import TrackingError
-from ._table import BoolArray
 
 if TYPE_CHECKING:
     from perception.laser import ScanPoints
+
+BoolArray = NDArray[np.bool_]
 
 # Half the width of a person.
 _BODY_M: Final = 0.25

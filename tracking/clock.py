@@ -1,11 +1,12 @@
-"""Clocks that jump: stamps that do not follow the last ones, and when to believe them."""
+"""Stamps: the rate of a sequence of frames, and clocks that jump."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
+# Share of a new interval in the usual time between frames.
+_PERIOD_GAIN: Final = 0.2
 # Stamps may come slightly out of order.
 _DISORDER_S: Final = 0.5
 # Steps between stamps differ by this factor at most.
@@ -14,8 +15,44 @@ _ALIKE: Final = 2.0
 _LEAST_STAMPS: Final = 3
 
 
-@dataclass(frozen=True, slots=True)
-class JumpedClock:
+class FrameClock(NamedTuple):
+    """The stamps of a sequence of frames.
+
+    Attributes:
+        stamp_s: of the latest frame, or None before the first.
+        interval_s: between the latest two stamps that differ; infinite before there are two.
+        period_s: usual time between frames, smoothed over pauses; infinite before there are two.
+    """
+
+    stamp_s: float | None = None
+    interval_s: float = math.inf
+    period_s: float = math.inf
+
+    @property
+    def known_period_s(self) -> float:
+        """The usual time between frames; 0 where it is unknown."""
+        return self.period_s if self.period_s < math.inf else 0.0
+
+    def dt_s(self, stamp_s: float) -> float:
+        """Return the time from the latest frame to ``stamp_s``; 0 before the first frame."""
+        return 0.0 if self.stamp_s is None else stamp_s - self.stamp_s
+
+    def after(self, stamp_s: float) -> FrameClock:
+        """Return the clock after one more frame, whose stamp is not before the latest.
+
+        In the usual time a pause counts as two intervals.
+        """
+        dt_s, period_s = self.dt_s(stamp_s), self.period_s
+        if dt_s <= 0.0:
+            return FrameClock(stamp_s, self.interval_s, period_s)
+        if period_s < math.inf:
+            period_s += _PERIOD_GAIN * (min(dt_s, 2.0 * period_s) - period_s)
+        else:
+            period_s = dt_s
+        return FrameClock(stamp_s, dt_s, period_s)
+
+
+class JumpedClock(NamedTuple):
     """Refused stamps that follow one another: one clock, and perhaps the new one.
 
     Attributes:

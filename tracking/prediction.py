@@ -29,7 +29,7 @@ from pydantic import Field, model_validator
 from perception.arrays import FloatArray, finite_array
 
 from ._errors import TrackingError
-from ._track import PersonTrack
+from ._snapshot import PersonTrack
 from .config import StrictConfig
 
 #: Regions are ellipses of this many standard deviations.

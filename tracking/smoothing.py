@@ -17,7 +17,12 @@ from perception.installation import install_command
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
-from ._motion import process_noise, transition
+
+# The 2 × 2 patterns of one axis, for both x and y.
+_POSITION = np.kron(np.diag([1.0, 0.0]), np.eye(2))
+_VELOCITY = np.kron(np.diag([0.0, 1.0]), np.eye(2))
+_POSITION_FROM_VELOCITY = np.kron([[0.0, 1.0], [0.0, 0.0]], np.eye(2))
+_CROSS = _POSITION_FROM_VELOCITY + _POSITION_FROM_VELOCITY.T
 
 
 class SmoothedPath(NamedTuple):
@@ -78,9 +83,20 @@ def smooth(
     smoothed, narrowed, _, _ = KalmanFilter(dim_x=4, dim_z=2).rts_smoother(
         np.array(means),
         np.array(spreads),
-        [transition(step_s) for step_s in steps_s.tolist()],
-        [process_noise(step_s, density_m2ps3) for step_s in steps_s.tolist()],
+        [_transition(step_s) for step_s in steps_s.tolist()],
+        [_process_noise(step_s, density_m2ps3) for step_s in steps_s.tolist()],
     )
     # Rounding leaves the covariances asymmetric in the last digit.
     narrowed = 0.5 * (narrowed + narrowed.transpose(0, 2, 1))
     return SmoothedPath(stamps, np.asarray(smoothed), narrowed)
+
+
+def _transition(dt_s: float) -> FloatArray:
+    """Return F (4, 4) of a constant velocity over ``dt_s`` ≥ 0."""
+    return np.asarray(np.eye(4) + dt_s * _POSITION_FROM_VELOCITY)
+
+
+def _process_noise(dt_s: float, acceleration_density_m2ps3: float) -> FloatArray:
+    """Return Q (4, 4), the covariance that white acceleration adds over ``dt_s`` ≥ 0."""
+    pattern = dt_s**3 / 3.0 * _POSITION + dt_s**2 / 2.0 * _CROSS + dt_s * _VELOCITY
+    return np.asarray(acceleration_density_m2ps3 * pattern)

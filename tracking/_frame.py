@@ -1,0 +1,240 @@
+"""Frames as the tracker keeps them: checked at its door, with measurements in the odom frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Final
+
+from perception import PersonObservation
+from perception.arrays import FloatArray
+
+from ._config import TrackerConfig
+from ._errors import TrackingError
+from ._views import View
+from .awareness_filter import Evidence, evidence, trusted_std
+
+# Limits far beyond any place a robot drives; the squares of larger numbers may overflow.
+_MAX_POSITION_M: Final = 1e7
+_MAX_VARIANCE_M2: Final = 1e6
+_LEAST_RANGE_M: Final = 1e-3
+
+
+@dataclass(slots=True)
+class Spread:
+    """A symmetric 2 × 2 covariance on the floor plane.
+
+    Attributes:
+        xx: variance along x.
+        xy: covariance of x and y.
+        yy: variance along y.
+    """
+
+    xx: float
+    xy: float
+    yy: float
+
+    def plus(self, other: Spread) -> Spread:
+        """Return the sum of two covariances."""
+        return Spread(self.xx + other.xx, self.xy + other.xy, self.yy + other.yy)
+
+    def times(self, factor: float) -> Spread:
+        """Return the covariance with all its variances multiplied."""
+        return Spread(factor * self.xx, factor * self.xy, factor * self.yy)
+
+    def along(self, x: float, y: float) -> float:
+        """Return the variance along a direction, for a unit vector (x, y)."""
+        return self.xx * x * x + 2.0 * self.xy * x * y + self.yy * y * y
+
+    def distance2_and_log_det(self, x: float, y: float) -> tuple[float, float]:
+        """Return the squared Mahalanobis distance of an offset (x, y), and ln det."""
+        determinant = self.xx * self.yy - self.xy * self.xy
+        squared = self.yy * x * x - 2.0 * self.xy * x * y + self.xx * y * y
+        return squared / determinant, math.log(determinant)
+
+
+def outer(x: float, y: float, factor: float = 1.0) -> Spread:
+    """Return factor · v vᵀ of a vector v = (x, y)."""
+    return Spread(factor * x * x, factor * x * y, factor * y * y)
+
+
+@dataclass(slots=True, eq=False)
+class Measurement:
+    """One observation of a frame, checked and transformed to the odom frame.
+
+    Attributes:
+        x: in odom, on the floor plane.
+        y: in odom, on the floor plane.
+        noise_m2: covariance of x and y, positive definite.
+        evidence: of awareness; None for no evidence.
+        weak: whether the score is below ``weak_score``.
+        lasting_std: part of the range's relative standard deviation that lasts; it is not in
+            ``noise_m2`` (``_size``).
+        size_log: ln of the range by an adult's size over the range; None where unknown.
+        size_variance: of it, but for the size of the person.
+    """
+
+    x: float
+    y: float
+    noise_m2: Spread
+    evidence: Evidence | None = None
+    weak: bool = False
+    lasting_std: float = 0.0
+    size_log: float | None = None
+    size_variance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One frame of a sensor: its pose and the people it shows.
+
+    Attributes:
+        stamp_s: time of the frame.
+        T_odom_camera: (4, 4) pose of the camera, or of the other sensor.
+        measurements: of the people in the frame.
+        sensor: index of the sensor, 0 for the camera.
+        view: of this frame alone; None for that of the sensor.
+    """
+
+    stamp_s: float
+    T_odom_camera: FloatArray
+    measurements: list[Measurement]
+    sensor: int = 0
+    view: View | None = None
+
+    @property
+    def origin_odom_m(self) -> tuple[float, float]:
+        """The place of the sensor on the floor plane."""
+        return float(self.T_odom_camera[0, 3]), float(self.T_odom_camera[1, 3])
+
+
+def measurements_of(
+    observations: Iterable[PersonObservation],
+    stamp_s: float,
+    T_odom_camera: FloatArray,
+    pose_covariance_odom: FloatArray | None,
+    config: TrackerConfig,
+) -> list[Measurement]:
+    """Return the observations of the frame at ``stamp_s`` as measurements.
+
+    A position covariance is rotated with the camera, R Σ Rᵀ, and its x–y block is kept. The part
+    that lasts from frame to frame is taken out, since the filter takes errors for independent.
+    A pose covariance (3, 3) of the camera's x, y and yaw adds J Σ Jᵀ with J = [I, (t_y − p_y,
+    p_x − t_x)]: an error in yaw moves a person in proportion to their range.
+
+    Raises:
+        TrackingError: naming an observation that is not a ``PersonObservation``, has another stamp
+            than the frame, or lies out of bounds.
+    """
+    checked = _checked_observations(observations, stamp_s, config.stamp_tolerance_s)
+    to_x, to_y = T_odom_camera[:2].tolist()
+    pose = None if pose_covariance_odom is None else pose_covariance_odom.tolist()
+    return [
+        _measurement(f"observations[{index}]", one, to_x, to_y, pose, config)
+        for index, one in enumerate(checked)
+    ]
+
+
+def _measurement(
+    name: str,
+    one: PersonObservation,
+    to_x: list[float],
+    to_y: list[float],
+    pose: list[list[float]] | None,
+    config: TrackerConfig,
+) -> Measurement:
+    """Return an observation, given the two rows of T_odom_camera that lead to the floor plane."""
+    a, b, c = one.position_camera_m.tolist()
+    spread = one.position_covariance_m2.tolist()
+    ax, bx, cx, origin_x = to_x
+    ay, by, cy, origin_y = to_y
+    east, north = ax * a + bx * b + cx * c, ay * a + by * b + cy * c
+    # Σ times the two rows, then the rows times that.
+    by_x = [row[0] * ax + row[1] * bx + row[2] * cx for row in spread]
+    by_y = [row[0] * ay + row[1] * by + row[2] * cy for row in spread]
+    noise = Spread(
+        ax * by_x[0] + bx * by_x[1] + cx * by_x[2],
+        ax * by_y[0] + bx * by_y[1] + cx * by_y[2],
+        ay * by_y[0] + by * by_y[1] + cy * by_y[2],
+    )
+    lasting = one.range_lasting_relative_std
+    if lasting:
+        noise = noise.plus(outer(east, north, -lasting * lasting))
+    if pose is not None:
+        noise = noise.plus(_pose_noise(east, north, pose))
+    x, y = origin_x + east, origin_y + north
+    # Written so that NaN from an overflow is refused as well.
+    if not (abs(x) <= _MAX_POSITION_M and abs(y) <= _MAX_POSITION_M):
+        raise TrackingError(
+            f"{name} must lie within {_MAX_POSITION_M:g} m of the origin of odom, got {[x, y]} m"
+        )
+    if not noise.xx + noise.yy <= _MAX_VARIANCE_M2:
+        raise TrackingError(
+            f"{name}.position_covariance_m2 must sum to at most {_MAX_VARIANCE_M2:g} m² on the "
+            f"floor plane, the pose's share included, got {noise.xx + noise.yy:g} m²"
+        )
+    filtered = config.awareness
+    measured = Measurement(
+        x,
+        y,
+        with_noise_floor(noise, config.position_noise_floor_m),
+        evidence(one.awareness, trusted_std(one.awareness_std, filtered), filtered),
+        one.score < config.weak_score,
+        lasting,
+    )
+    if one.size_range_m is not None and one.size_range_relative_std is not None:
+        placed_m = max(math.sqrt(a * a + b * b + c * c), _LEAST_RANGE_M)
+        measured.size_log = math.log(one.size_range_m / placed_m)
+        measured.size_variance = one.size_range_relative_std**2
+    return measured
+
+
+def _checked_observations(
+    observations: Any, stamp_s: float, tolerance_s: float
+) -> tuple[PersonObservation, ...]:
+    """Return the observations after checking their types and stamps."""
+    try:
+        checked = tuple(observations)
+    except TypeError as cause:
+        raise TrackingError(
+            "observations must be an iterable of PersonObservation, got "
+            f"{type(observations).__name__}"
+        ) from cause
+    for index, one in enumerate(checked):
+        if not isinstance(one, PersonObservation):
+            raise TrackingError(
+                f"observations[{index}] must be a PersonObservation, got {type(one).__name__}"
+            )
+        if abs(one.stamp_s - stamp_s) > tolerance_s:
+            raise TrackingError(
+                f"observations[{index}].stamp_s = {one.stamp_s!r} s must be that of its frame, "
+                f"{stamp_s!r} s, within {tolerance_s:g} s"
+            )
+    return checked
+
+
+def _pose_noise(east_m: float, north_m: float, pose: list[list[float]]) -> Spread:
+    """Return the covariance that an uncertain pose adds at an offset from the sensor."""
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = pose
+    return Spread(
+        xx - 2.0 * north_m * xt + north_m * north_m * tt,
+        xy + east_m * xt - north_m * yt - east_m * north_m * tt,
+        yy + 2.0 * east_m * yt + east_m * east_m * tt,
+    )
+
+
+def with_noise_floor(spread_m2: Spread, floor_m: float) -> Spread:
+    """Return a covariance with no standard deviation below ``floor_m`` in any direction.
+
+    Eigenvalues below the floor are raised to it and the eigenvectors are kept, in closed form: the
+    result of a rotated covariance is the rotated result.
+    """
+    xx, xy, yy = spread_m2.xx, spread_m2.xy, spread_m2.yy
+    centre, radius = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
+    low, high, floor = centre - radius, centre + radius, floor_m * floor_m
+    if low >= floor:
+        return spread_m2
+    # A covariance below the floor in every direction becomes isotropic.
+    scale = (high - floor) / (high - low) if high > floor else 0.0
+    return Spread(floor + scale * (xx - low), scale * xy, floor + scale * (yy - low))

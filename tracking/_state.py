@@ -1,0 +1,148 @@
+"""The state of a tracker: all tracks, and what is known of the frames so far."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Final
+
+from ._config import TrackerConfig
+from ._frame import Frame
+from ._person import Track
+from ._sensors import Sensor, Sensors
+from ._views import View
+from .clock import FrameClock
+
+# Of two frames nearer to each other, the camera's velocity is not known.
+_LEAST_STEP_S: Final = 1e-3
+# A gap this long, or two frames, is an absence; a shorter one is a missed detection.
+_ABSENCE_S: Final = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """Everything that frames change. A state is immutable: each frame makes a new one.
+
+    Attributes:
+        tracks: at ``stamp_s`` in the order of their ids, and their awareness at that of ``faces``.
+        clocks: of each sensor's frames.
+        next_id: of the next track.
+        stamp_s: of the latest frame of any sensor, or None before the first.
+        faces: clock of the frames of all sensors that see faces.
+        origin_m: x and y of the latest sensor without measured ranges, or None before it.
+        origin_velocity_mps: of that sensor, from its latest two frames.
+    """
+
+    tracks: tuple[Track, ...]
+    clocks: tuple[FrameClock, ...]
+    next_id: int = 1
+    stamp_s: float | None = None
+    faces: FrameClock = field(default_factory=FrameClock)
+    origin_m: tuple[float, float] | None = None
+    origin_velocity_mps: tuple[float, float] = (0.0, 0.0)
+
+    def at(self, frame: Frame, sensor: Sensor) -> State:
+        """Return the state with the clocks, and the place of the camera, after a frame."""
+        index, stamp = sensor.index, frame.stamp_s
+        before, clocks = self.clocks[index], self.clocks
+        origin, velocity = self.origin_m, self.origin_velocity_mps
+        if not sensor.settings.measures_range:
+            x_m, y_m = frame.origin_odom_m
+            if origin is not None and before.dt_s(stamp) >= _LEAST_STEP_S:
+                dt_s = before.dt_s(stamp)
+                velocity = ((x_m - origin[0]) / dt_s, (y_m - origin[1]) / dt_s)
+            origin = (x_m, y_m)
+        return State(
+            self.tracks,
+            (*clocks[:index], before.after(stamp), *clocks[index + 1 :]),
+            self.next_id,
+            stamp,
+            self.faces.after(stamp) if sensor.settings.sees_faces else self.faces,
+            origin,
+            velocity,
+        )
+
+
+def seen_within(track: Track, which: Iterable[int], stamp_s: float, within_s: float) -> bool:
+    """Return whether one of these sensors has seen a person within this time."""
+    return any(stamp_s - track.seen_s[index] <= within_s for index in which)
+
+
+def absence_s(period_s: float) -> float:
+    """Return the shortest gap that counts as an absence, given the time between frames."""
+    return max(_ABSENCE_S, 2.5 * period_s)
+
+
+def evidence_interval_s(track: Track, stamp_s: float, clock: FrameClock, sensors: Sensors) -> float:
+    """Return the time that a face at ``stamp_s`` stands for, given the clock after its frame.
+
+    Two cameras whose frames come a millisecond apart must neither count as one fast camera, whose
+    frames are worth little, nor as two, whose frames are worth twice as much. So a frame stands for
+    the time since the last evidence about the same person, at most for the interval of its own
+    sensor.
+    """
+    since_s = stamp_s - track.face_s
+    if len(sensors.faces) < 2 or since_s <= 0.0:
+        # A second face at one stamp may only lower the bound, and counts in full for that.
+        return clock.interval_s
+    return min(since_s, clock.interval_s)
+
+
+def face_period_s(
+    track: Track, faces: FrameClock, clocks: tuple[FrameClock, ...], sensors: Sensors
+) -> float:
+    """Return the usual time between images of a person's face.
+
+    It is that of the sensor that gave the latest evidence, and the shortest of all where another
+    frame has shown the person since.
+
+    Args:
+        track: of the person.
+        faces: clock of the frames of all sensors that see faces.
+        clocks: of each sensor.
+        sensors: all sensors.
+    """
+    if len(sensors.faces) < 2:
+        return faces.period_s
+    gave = [index for index in sensors.faces if track.seen_s[index] == track.face_s]
+    return min([clocks[index].period_s for index in gave or sensors.faces], default=math.inf)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """One frame on its way through the tracker.
+
+    Attributes:
+        frame: the frame.
+        sensor: that took it.
+        sensors: all sensors.
+        earlier: the state before the frame.
+        state: with the clocks after it.
+    """
+
+    frame: Frame
+    sensor: Sensor
+    sensors: Sensors
+    earlier: State
+    state: State
+
+    @property
+    def config(self) -> TrackerConfig:
+        """The tracker's settings."""
+        return self.sensors.config
+
+    @property
+    def clock(self) -> FrameClock:
+        """The clock of the sensor, this frame included."""
+        return self.state.clocks[self.sensor.index]
+
+    @property
+    def dt_s(self) -> float:
+        """The time since the frame before of the same sensor."""
+        return self.earlier.clocks[self.sensor.index].dt_s(self.frame.stamp_s)
+
+    @property
+    def view(self) -> View | None:
+        """Where people can be seen in this frame; None if unknown."""
+        return self.sensor.view if self.frame.view is None else self.frame.view
