@@ -172,7 +172,12 @@ def _has_cholesky_factor(rows: list[list[float]]) -> bool:
 def rotation_matrix(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
     """Return a read-only (3, 3) rotation matrix: orthonormal, determinant +1."""
     array = finite_array(name, value, (3, 3), error)
-    a, b, c = array.tolist()
+    _check_rotation(name, array.tolist(), error)
+    return array
+
+
+def _check_rotation(name: str, rows: list[list[float]], error: type[ValueError]) -> None:
+    a, b, c = rows
     deviation = max(
         abs(_dot(a, a) - 1.0),
         abs(_dot(b, b) - 1.0),
@@ -188,7 +193,6 @@ def rotation_matrix(name: str, value: Any, error: type[ValueError] = PerceptionE
             f"{name} must be a rotation (orthonormal, determinant +1), got a deviation of "
             f"{deviation:g} and determinant {determinant:g}"
         )
-    return array
 
 
 def _dot(first: Sequence[float], second: Sequence[float]) -> float:
@@ -198,12 +202,10 @@ def _dot(first: Sequence[float], second: Sequence[float]) -> float:
 def rigid_transform(name: str, value: Any, error: type[ValueError] = PerceptionError) -> FloatArray:
     """Return a read-only (4, 4) rigid transform, translation in metres."""
     array = finite_array(name, value, (4, 4), error)
-    if any(
-        abs(given - wanted) > 1e-9
-        for given, wanted in zip(array[3].tolist(), _LAST_ROW, strict=True)
-    ):
-        raise error(f"{name} must have the last row (0, 0, 0, 1), got {array[3].tolist()}")
-    rotation_matrix(f"{name}[:3, :3]", array[:3, :3], error)
+    *rows, last = array.tolist()
+    if any(abs(given - wanted) > 1e-9 for given, wanted in zip(last, _LAST_ROW, strict=True)):
+        raise error(f"{name} must have the last row (0, 0, 0, 1), got {last}")
+    _check_rotation(f"{name}[:3, :3]", [row[:3] for row in rows], error)
     return array
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from functools import cached_property
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from pydantic import Field, ValidationError, model_validator
@@ -83,6 +86,16 @@ class AwarenessFilterConfig(StrictConfig):
     lower_bound_confidence: float = Field(default=0.9, ge=0.5, lt=1.0)
     """One-sided confidence of ``awareness_lower``."""
 
+    @cached_property
+    def prior_logit(self) -> float:
+        """Mean of the prior in logit(α)."""
+        return math.log(self.prior_awareness / (1.0 - self.prior_awareness))
+
+    @cached_property
+    def bound_sigmas(self) -> float:
+        """Standard deviations of logit(α) between mean and lower bound."""
+        return NormalDist().inv_cdf(self.lower_bound_confidence)
+
     @model_validator(mode="after")
     def _order_time_constants(self) -> AwarenessFilterConfig:
         constants = (
@@ -145,20 +158,12 @@ class TrackerConfig(TrackingConfig):
     detection_probability: float = Field(default=0.9, ge=0.01, le=0.999)
     """P_D, the share of frames that report a person in sight."""
 
-    detection_correlation_s: float = Field(default=0.15, ge=0.0, le=_MOST_S)
+    detection_correlation_s: float = Field(default=0.1, ge=0.0, le=_MOST_S)
     """Frames closer than this share their errors, clutter included, and count in proportion."""
 
     confirm_logit: float = Field(default=2.3, ge=-1e3, le=1e3)
     """A track is confirmed once the log-likelihood ratio of its detections to clutter exceeds this
-    minus ln(time between frames / 1 s), or by the next two settings."""
-
-    confirm_hits: int = Field(default=4, ge=1, le=20)
-    """A track is also confirmed once this many frames (distinct stamps) have shown the person
-    within ``confirm_window_s``."""
-
-    confirm_window_s: float = Field(default=0.5, ge=_LEAST_S, le=_MOST_S)
-    """Time for ``confirm_hits``; with a slow camera ``confirm_hits`` + 1 intervals of its frames if
-    that is more."""
+    minus ln(time between frames / 1 s)."""
 
     weak_score: float = Field(default=0.25, ge=0.0, le=1.0)
     """A detection with a score below this may continue a confirmed track that no other detection
@@ -181,29 +186,16 @@ class TrackerConfig(TrackingConfig):
     """Factor on the variance of a measured position whose match is ambiguous. When two people pass
     each other, a wrong match would otherwise reverse both velocities."""
 
-    max_tentative_gap_s: float = Field(default=0.12, ge=0.0, le=_MOST_S)
-    """A tentative track unseen for longer than this is deleted, or after as many missed frames in a
-    row as happen to 1 % of people by chance: two at the default ``detection_probability``."""
-
-    twin_distance_m: float = Field(default=0.5, ge=0.0, le=2.0)
-    """A track that was born no further than this from another may be its twin: a second track of
-    the same person, from a detector that reports people twice. 0 for no twins."""
-
-    twin_logit: float = Field(default=5.0, ge=1.0, le=1e3)
-    """A track counts as a twin, and is not reported, once it is exp(``twin_logit``) times likelier
-    to be one than another person, judged by the frames that show one of the two alone."""
-
     max_missed_s: float = Field(default=1.2, ge=_LEAST_S, le=_MOST_S)
-    """A confirmed track is deleted after this time in which frames should have shown it and did
-    not, which needs a view; or if it was last seen at an exit that the tracker has learned, and
-    walks away from the camera."""
+    """A confirmed track is deleted after this time in which frames should have shown the person and
+    did not, …"""
 
     max_coast_s: float = Field(default=3.0, ge=0.0, le=60.0)
-    """A confirmed track unseen for longer than this is deleted, whatever the reason, …"""
+    """… after this time in which none could, …"""
 
     max_standing_coast_s: float = Field(default=5.0, ge=0.0, le=120.0)
-    """… except that a person who stood still, and is out of view or hidden by another person, is
-    kept for this long. Needs a view, and counts where it exceeds ``max_coast_s``."""
+    """… or after this time if the person stood still, which needs a view. The three add up: half of
+    one and half of another end a track as well."""
 
     standing_speed_mps: float = Field(default=0.3, ge=0.0, le=100.0)
     """A person no faster than this, with a velocity consistent with 0, counts as standing."""

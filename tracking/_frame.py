@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
 
 from perception import PersonObservation
 from perception.arrays import FloatArray
@@ -19,6 +19,7 @@ from .awareness_filter import Evidence, evidence, trusted_std
 _MAX_POSITION_M: Final = 1e7
 _MAX_VARIANCE_M2: Final = 1e6
 _LEAST_RANGE_M: Final = 1e-3
+_DOUBLE_M: Final = 0.25
 
 
 @dataclass(slots=True)
@@ -85,8 +86,7 @@ class Measurement:
     size_variance: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class Frame(NamedTuple):
     """One frame of a sensor: its pose and the people it shows.
 
     Attributes:
@@ -107,6 +107,26 @@ class Frame:
     def origin_odom_m(self) -> tuple[float, float]:
         """The place of the sensor on the floor plane."""
         return float(self.T_odom_camera[0, 3]), float(self.T_odom_camera[1, 3])
+
+
+def without_doubles(measured: list[Measurement]) -> list[Measurement]:
+    """Return the measurements without those of people who have another.
+
+    Two bodies are not as near to each other as 0.25 m: the detector has reported one person twice.
+    The first is kept, with the lower awareness of both; a weak one yields to one that is not.
+    """
+    kept: list[Measurement] = []
+    for one in measured:
+        for place, other in enumerate(kept):
+            if (one.x - other.x) ** 2 + (one.y - other.y) ** 2 > _DOUBLE_M**2:
+                continue
+            best = one if other.weak and not one.weak else other
+            lower = min(filter(None, (one.evidence, other.evidence)), default=None)
+            kept[place] = replace(best, evidence=lower)
+            break
+        else:
+            kept.append(one)
+    return kept
 
 
 def measurements_of(
@@ -130,10 +150,12 @@ def measurements_of(
     checked = _checked_observations(observations, stamp_s, config.stamp_tolerance_s)
     to_x, to_y = T_odom_camera[:2].tolist()
     pose = None if pose_covariance_odom is None else pose_covariance_odom.tolist()
-    return [
-        _measurement(f"observations[{index}]", one, to_x, to_y, pose, config)
-        for index, one in enumerate(checked)
-    ]
+    return without_doubles(
+        [
+            _measurement(f"observations[{index}]", one, to_x, to_y, pose, config)
+            for index, one in enumerate(checked)
+        ]
+    )
 
 
 def _measurement(

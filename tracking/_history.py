@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Final
 
 from ._errors import TrackingError
@@ -68,7 +67,7 @@ class History:
     def with_ids_from(self, next_id: int) -> History:
         """Return a copy whose new tracks have this id or higher ones."""
         copied = self.copy()
-        latest = replace(self.latest, next_id=max(self.latest.next_id, next_id))
+        latest = self.latest._replace(next_id=max(self.latest.next_id, next_id))
         if copied._states:
             copied._states[-1] = latest
         else:

@@ -129,7 +129,10 @@ def _edges(
             first = bisect_left(places, track.x - gates.distance_m)
             near = columns[first : bisect_right(places, track.x + gates.distance_m)]
         for column in near:
-            sight = _sight(track, measured[column], ray, origin_m, gates)
+            given = measured[column]
+            if near is not columns and abs(given.y - track.y) > gates.distance_m:
+                continue
+            sight = _sight(track, given, ray, origin_m, gates)
             if sight is not None:
                 found.setdefault(row, {})[column] = sight
     return found
@@ -180,7 +183,8 @@ def _associate(
             for row, found in edges.items()
             if tracks[row].confirmed is confirmed
         }
-        owner.update(assigned(costs, gates.miss_cost))
+        if costs:
+            owner.update(assigned(costs, gates.miss_cost))
     partner = {row: column for column, row in owner.items()}
     for row, column in partner.items():
         match.sights[row] = edges[row][column]
@@ -215,14 +219,22 @@ def assigned(costs: dict[int, dict[int, float]], miss_cost: float) -> dict[int, 
     Jonker and Volgenant, Computing 38, 1987, 325-340.
 
     Args:
-        costs: of the columns that each row may have.
+        costs: of the columns that each row may have, below ``miss_cost``.
         miss_cost: of having none.
     """
+    claims: dict[int, int] = {}
+    for found in costs.values():
+        for column in found:
+            claims[column] = claims.get(column, 0) + 1
     row_of: dict[int, int] = {}
     column_of: dict[int, int] = {}
     row_price: dict[int, float] = {}
     column_price: dict[int, float] = {}
-    for start in costs:
+    for start, found in costs.items():
+        # A match whose row and column have no other is part of every best set.
+        if len(found) <= 1 and all(claims[column] == 1 for column in found):
+            row_of.update(dict.fromkeys(found, start))
+            continue
         row, reached = start, 0.0
         row_price[start] = 0.0
         distance: dict[int, float] = {}

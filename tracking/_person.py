@@ -36,12 +36,12 @@ class Track:
         confirmed: whether enough frames have shown the person.
         standing: whether the person stood still when last seen.
         born_s: stamp of the first frame that showed the person.
-        hits_s: stamps of the latest frames that did, at most ``confirm_hits``, oldest first.
+        last_seen_s: stamp of the latest frame that did.
         seen_s: of each sensor, stamp of the latest frame that showed the person; −∞ for none.
-        missed_s: of each sensor, time since then in which its frames should have shown them.
+        presence: of each sensor, log-odds that the person is there (``_presence``); −∞ until it has
+            seen them.
         passed_s: of each sensor, stamp of the latest frame if it has shown the person's place empty
             (:class:`~tracking.RangedView`); −∞ if it has not.
-        logit: log-likelihood ratio of a person to clutter, of the detections after the first.
         belief: of awareness.
         face_s: stamp of the latest evidence of awareness that was used; −∞ for none.
         looked_s: for how long the person has looked at the robot lately (``_noticed``).
@@ -65,15 +65,13 @@ class Track:
         self.p00, self.p01, self.p02, self.p03 = noise.xx, noise.xy, 0.0, 0.0
         self.p11, self.p12, self.p13 = noise.yy, 0.0, 0.0
         self.p22, self.p23, self.p33 = velocity_variance, 0.0, velocity_variance
-        self.confirmed = config.confirm_hits <= 1
-        self.standing = False
-        self.born_s = frame.stamp_s
-        self.hits_s = [frame.stamp_s]
+        self.confirmed = self.standing = False
+        self.born_s = self.last_seen_s = frame.stamp_s
         self.seen_s = [-math.inf] * sensors
         self.seen_s[frame.sensor] = frame.stamp_s
-        self.missed_s = [0.0] * sensors
+        self.presence = [-math.inf] * sensors
+        self.presence[frame.sensor] = 0.0
         self.passed_s = [-math.inf] * sensors
-        self.logit = 0.0
         self.belief: AwarenessBelief = prior(config.awareness)
         self.face_s = -math.inf
         self.looked_s = 0.0
@@ -90,16 +88,10 @@ class Track:
         """Return a track that goes on by itself."""
         copy = object.__new__(Track)
         copy.__dict__.update(self.__dict__)
-        copy.hits_s = self.hits_s[:]
         copy.seen_s = self.seen_s[:]
-        copy.missed_s = self.missed_s[:]
+        copy.presence = self.presence[:]
         copy.passed_s = self.passed_s[:]
         return copy
-
-    @property
-    def last_seen_s(self) -> float:
-        """Stamp of the latest frame of any sensor that showed the person."""
-        return self.hits_s[-1]
 
     @property
     def spread_m2(self) -> Spread:

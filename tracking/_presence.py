@@ -1,10 +1,18 @@
-"""Presence: whether a track is a person, and whether they are still there.
+"""Presence: the log-odds that a track is a person who is there.
 
-A track becomes a person by the log-likelihood ratio of its detections to clutter: the track score
-of Sittler (1964) with Wald's sequential test, as in Blackman and Popoli, "Design and Analysis of
-Modern Tracking Systems" (1999), chapter 6. A person is given up soon if frames should have shown
-them and did not. How surely a frame should have shown them depends on the view and on the people
-who stand in front.
+One number confirms, keeps and ends a track. Each frame of a sensor moves it:
+
+- a hit adds the log-likelihood ratio of the detection to clutter: the track score of Sittler (1964)
+  with Wald's sequential test, as in Blackman and Popoli, "Design and Analysis of Modern Tracking
+  Systems" (1999), chapter 6. Above a limit the track is a person, and each further hit says that
+  the person is there for sure;
+- a miss takes as much as the frame should have shown the person, by the sensor's view and the
+  people who stand in front;
+- time takes a little while the person cannot be seen: people also leave out of sight.
+
+Each sensor that has seen a person has its own number, and the largest counts. So a track is never
+given up sooner than it would be with one of the sensors alone, one of which may not see the person
+for a reason that its view does not know.
 """
 
 from __future__ import annotations
@@ -21,179 +29,213 @@ from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._person import Track
 from ._sensors import Sensor, Sensors
-from ._state import State, Step
+from ._state import CHEST_M, State, Step
 from ._views import RangedView
 from .clock import FrameClock
 
-# The share of people who are missed so often in a row that a tentative track gives them up.
-_GIVEN_UP: Final = 0.01
+# Log-odds that somebody is there whom a frame has just shown.
+_SURE: Final = 8.0 * math.log(10.0)
+# A tentative track outlives as many missed frames in a row as happen to 1 % of people.
+_GIVEN_UP: Final = 1.25 * math.log(0.01)
 # One frame counts for at most this share of max_missed_s, however long the pause before it.
 _MAX_SHARE_OF_ONE_FRAME: Final = 0.5
+# A detector may report a person twice, with a second place as near as this in this share of frames;
+# people who stand as near to another are detected in that share. Both places are as steady, so that
+# only hits and misses tell them apart.
+_BESIDE_M: Final = 0.5
+_DOUBLE_SHARE: Final = 0.33
+_BESIDE_SHARE: Final = 0.65
+_BESIDE_HIT: Final = math.log(_BESIDE_SHARE / _DOUBLE_SHARE)
+_BESIDE_MISS: Final = math.log((1.0 - _BESIDE_SHARE) / (1.0 - _DOUBLE_SHARE))
 # A place is empty if nobody is within so many standard deviations of where the person should be.
 _PLACE_SIGMAS: Final = 2.0
+# Rounding must not end a track one frame sooner.
+_ROUNDING: Final = 1e-9
 _TURN: Final = 2.0 * math.pi
 
 
-def evidence_of(distance2: float, log_det: float, sensor: Sensor) -> float:
-    """Return ln(P_D N(z; ẑ, S) / β) of a detection: of the track, or clutter.
+def record_hit(
+    track: Track, distance2: float, log_det: float, confirmed: Sequence[Track], step: Step
+) -> None:
+    """Take a frame that shows a track; it may confirm it.
 
-    β follows from ``miss_cost``.
+    By Wald's bound, clutter confirms at most exp(−logit) of the tracks that it starts. It starts
+    more of them per second with a faster camera, so the logit depends on the frame rate such that
+    the number of false people per second does not.
 
     Args:
+        track: corrected with the frame.
         distance2: squared Mahalanobis distance d² of the measurement.
         log_det: ln det S.
-        sensor: that took it.
+        confirmed: tracks that the frame shows as well; a second one beside them may be a double.
+        step: the frame.
     """
-    return 0.5 * (sensor.gates.miss_cost - distance2 - log_det) + sensor.log_missed
+    index, period_s = step.sensor.index, step.clock.period_s
+    track.seen_s[index] = track.last_seen_s = step.frame.stamp_s
+    track.standing = track.stands(step.config.standing_speed_mps)
+    if track.confirmed:
+        track.presence[index] = _SURE
+        return
+    gain = 0.5 * (step.sensor.gates.miss_cost - distance2 - log_det) + step.sensor.log_missed
+    if _is_beside(track, confirmed):
+        gain = min(gain, _BESIDE_HIT)
+    before = max(
+        _left(track, sensor, clock, step.frame.stamp_s, step.config)
+        for sensor, clock in zip(step.sensors.all, step.clocks_before, strict=True)
+    )
+    track.presence[index] = before + max(_weight(step.dt_s, step.config) * gain, 0.0)
+    if period_s < math.inf:
+        needed = step.config.confirm_logit - math.log(period_s)
+        if track.presence[index] >= needed:
+            track.confirmed, track.presence[index] = True, _SURE
 
 
-def weight_of(dt_s: float, config: TrackerConfig) -> float:
+def record_misses(tracks: list[Track], step: Step) -> None:
+    """Take a frame into the presence of the tracks that it does not show, after the frame.
+
+    The time since the sensor's previous frame counts in proportion to how surely this frame should
+    have shown the person. Only people in this frame can hide others.
+    """
+    index, stamp, dt_s = step.sensor.index, step.frame.stamp_s, step.dt_s
+    unseen = []
+    shown = []
+    for track in tracks:
+        track.passed_s[index] = -math.inf
+        if track.seen_s[index] == stamp:
+            shown.append(track)
+        else:
+            unseen.append(track)
+    if not unseen:
+        return
+    if dt_s > 0.0:
+        visibility = _visibility(unseen, shown, step)
+        confirmed = [track for track in shown if track.confirmed]
+        for track, visible in zip(unseen, visibility, strict=True):
+            if track.presence[index] > -math.inf:
+                track.presence[index] -= _loss(track, visible, dt_s, confirmed, step)
+    _record_empty_places([track for track in unseen if track.confirmed], step)
+
+
+def _loss(
+    track: Track, visible: float, dt_s: float, confirmed: Sequence[Track], step: Step
+) -> float:
+    """Return what a frame takes that should have shown a track by ``visible`` in [0, 1]."""
+    config, sensor = step.config, step.sensor
+    hidden_s = (1.0 - visible) * dt_s
+    lost = hidden_s * _fading_per_s(track, sensor, config)
+    # How much less likely the frame is with the person there, as a share of a person in full view.
+    probability = sensor.settings.detection_probability
+    share = math.log1p(-probability * visible) / sensor.log_missed
+    if track.confirmed:
+        counted_s = min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
+        return lost + share * counted_s * _SURE / config.max_missed_s
+    miss = _BESIDE_MISS if _is_beside(track, confirmed) else sensor.log_missed
+    return lost - share * _weight(dt_s, config) * miss
+
+
+def _weight(dt_s: float, config: TrackerConfig) -> float:
     """Return the weight of a frame ``dt_s`` after the one before, for tracks not confirmed yet.
 
     Frames closer than ``detection_correlation_s`` share their errors, clutter included. So a frame
     counts in proportion to the time that it stands for, and a faster camera adds no certainty. A
     second frame with one stamp adds nothing.
     """
-    if dt_s <= 0.0:
-        return 0.0
-    if config.detection_correlation_s <= 0.0:
-        return 1.0
-    return min(1.0, dt_s / config.detection_correlation_s)
+    if dt_s >= config.detection_correlation_s:
+        return 1.0 if dt_s > 0.0 else 0.0
+    return dt_s / config.detection_correlation_s
 
 
-def confirming_logit(period_s: float, config: TrackerConfig) -> float:
-    """Return the evidence that confirms a track, given the time between frames.
-
-    By Wald's bound, clutter confirms at most exp(−logit) of the tracks that it starts. It starts
-    more of them per second with a faster camera, so the logit depends on the frame rate such that
-    the number of false people per second does not.
-    """
-    return config.confirm_logit - math.log(period_s)
+def _fading_per_s(track: Track, sensor: Sensor, config: TrackerConfig) -> float:
+    """Return what each second takes in which a sensor cannot see a person."""
+    kept_s = config.max_coast_s
+    if track.standing and sensor.view is not None:
+        kept_s = max(config.max_standing_coast_s, kept_s)
+    return _SURE / max(kept_s, 1e-9)
 
 
-def record_hit(track: Track, step: Step) -> None:
-    """Take a frame that shows the person; it may confirm the track.
-
-    A second set of measurements with the same stamp is not another hit.
-    """
-    stamp, period_s, config = step.frame.stamp_s, step.clock.period_s, step.config
-    if track.hits_s[-1] < stamp:
-        track.hits_s = [*track.hits_s, stamp][-config.confirm_hits :]
-    track.seen_s[step.sensor.index] = stamp
-    track.standing = track.stands(config.standing_speed_mps)
-    if track.confirmed:
-        return
-    window_s = config.confirm_window_s
-    if period_s < math.inf:
-        window_s = max(window_s, (config.confirm_hits + 1) * period_s)
-        track.confirmed = track.logit >= confirming_logit(period_s, config)
-    enough = len(track.hits_s) == config.confirm_hits and stamp - track.hits_s[0] <= window_s
-    track.confirmed = track.confirmed or enough
-
-
-def tentative_gap_s(clock: FrameClock, sensor: Sensor, config: TrackerConfig) -> float:
-    """Return the time after which an unseen tentative track is deleted.
-
-    It covers as many frames in a row as miss a person in all but 1 % of cases, and at least
-    ``max_tentative_gap_s``.
-    """
-    frames = math.ceil(math.log(_GIVEN_UP) / sensor.log_missed - 1e-9)
-    return max(config.max_tentative_gap_s, (frames + 0.5) * clock.known_period_s)
-
-
-def coasted_too_long(track: Track, stamps_s: Sequence[float], sensors: Sensors) -> bool:
-    """Return whether no sensor has seen a person for too long, each judged at its own stamp."""
-    return all(
-        stamp_s - seen_s > _longest_coast_s(track, sensor, sensors.config)
-        for stamp_s, seen_s, sensor in zip(stamps_s, track.seen_s, sensors.all, strict=True)
+def _is_beside(track: Track, people: Sequence[Track]) -> bool:
+    """Return whether a track may be a double of one of these people."""
+    return any(
+        (track.x - other.x) ** 2 + (track.y - other.y) ** 2 <= _BESIDE_M**2
+        for other in people
+        if other is not track
     )
 
 
-def _longest_coast_s(track: Track, sensor: Sensor, config: TrackerConfig) -> float:
-    if track.standing and sensor.view is not None:
-        return max(config.max_standing_coast_s, config.max_coast_s)
-    return config.max_coast_s
+def _left(
+    track: Track, sensor: Sensor, clock: FrameClock, stamp_s: float, config: TrackerConfig
+) -> float:
+    """Return the log-odds of one sensor at a stamp before which no further frame of it has come.
 
-
-def is_expired(track: Track, stamp_s: float, state: State, sensors: Sensors) -> bool:
-    """Return whether a frame at ``stamp_s`` can no longer match a track of the state before.
-
-    A track that the last frame has left alive gets a chance in this one, however long the interval.
+    Its next frame, one usual interval after the last, may still show the person.
     """
+    presence = track.presence[sensor.index]
+    if presence == -math.inf or clock.stamp_s is None:
+        return -math.inf
+    silent_s = stamp_s - clock.stamp_s - min(clock.known_period_s, config.max_coast_s)
+    if silent_s <= 0.0:
+        return presence
+    return presence - silent_s * _fading_per_s(track, sensor, config)
+
+
+def is_over(track: Track, stamp_s: float, clocks: Sequence[FrameClock], sensors: Sensors) -> bool:
+    """Return whether a track has ended at a stamp, without frames since those of the clocks."""
     config = sensors.config
-    if not track.confirmed:
-        return stamp_s - track.last_seen_s > max(config.max_coast_s, config.max_tentative_gap_s)
-    stamps_s = [stamp_s - clock.known_period_s for clock in state.clocks]
-    return coasted_too_long(track, stamps_s, sensors)
-
-
-def is_over(track: Track, step: Step) -> bool:
-    """Return whether a frame that does not show a track ends it.
-
-    Each sensor judges by its own frames, and all must agree. So a track is never given up sooner
-    than it would be with one of the sensors alone. A sensor that has never seen a person agrees.
-    The others judge one usual interval before the frame, since their next one may show the person.
-    """
-    config, stamp = step.config, step.frame.stamp_s
-    for sensor, clock, seen_s in zip(
-        step.sensors.all, step.state.clocks, track.seen_s, strict=True
-    ):
-        gap_s = stamp - (0.0 if sensor is step.sensor else clock.known_period_s) - seen_s
+    for sensor, clock in zip(sensors.all, clocks, strict=True):
+        gone = 0.0
         if not track.confirmed:
-            lost = gap_s > tentative_gap_s(clock, sensor, config)
-        else:
-            lost = gap_s > _longest_coast_s(track, sensor, config)
-            lost = lost or track.missed_s[sensor.index] > config.max_missed_s
-        if not lost:
+            period_s = clock.known_period_s
+            gone = _GIVEN_UP * (_weight(period_s, config) if period_s > 0.0 else 1.0)
+        if _left(track, sensor, clock, stamp_s, config) >= gone - _ROUNDING:
             return False
     return True
 
 
-def record_misses(tracks: list[Track], step: Step) -> None:
-    """Take a frame into ``missed_s`` and ``passed_s`` of the tracks after it.
+def _visibility(unseen: list[Track], shown: list[Track], step: Step) -> list[float]:
+    """Return how surely a frame should have shown each of the tracks that it does not show.
 
-    The time since the sensor's previous frame counts in proportion to how surely this frame should
-    have shown the person. Only people in this frame can hide others. Without a view it is 0.
+    Evaluated at the track's position only, not over its uncertainty: an empty visible part of the
+    uncertain area does not rule out a person in the hidden part.
     """
-    frame, config, dt_s, view = step.frame, step.config, step.dt_s, step.view
-    index, stamp = step.sensor.index, frame.stamp_s
-    seen = []
-    unseen = []
-    for track in tracks:
-        track.passed_s[index] = -math.inf
-        if track.seen_s[index] == stamp:
-            track.missed_s[index] = 0.0
-            seen.append(track)
-        elif track.confirmed:
-            unseen.append(track)
-    if view is None or not unseen:
-        return
-    places = np.array([(track.x, track.y) for track in unseen])
-    if dt_s > 0.0:
-        share_s = min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
-        in_view = np.asarray(view.visibility(places, frame.T_odom_camera), dtype=np.float64)
-        if in_view.shape != (len(unseen),) or not ((in_view >= 0.0) & (in_view <= 1.0)).all():
-            raise TrackingError(
-                f"view.visibility must return one number in [0, 1] per position, {len(unseen)} in "
-                f"all, got shape {in_view.shape}: {in_view!r:.80}"
-            )
-        people = [(track.x, track.y) for track in seen]
-        for track, visible in zip(unseen, in_view.tolist(), strict=True):
-            if visible > 0.0:
-                place = (track.x, track.y)
-                share = unoccluded_share(place, people, frame.origin_odom_m, config.body_radius_m)
-                track.missed_s[index] += visible * share * share_s
-    if isinstance(view, RangedView):
-        # The place is as large as a body and two standard deviations of the position.
-        radii = [
-            config.body_radius_m
-            + _PLACE_SIGMAS * math.sqrt(larger_eigenvalue(track.p00, track.p01, track.p11))
+    if step.view is None:
+        field = step.state.fields[step.sensor.index]
+        in_view = [
+            field.sees(track, step.frame, step.sensor) if track.confirmed else 1.0
             for track in unseen
         ]
-        passed = view.passed(places, np.array(radii), frame.T_odom_camera).tolist()
-        for track, empty in zip(unseen, passed, strict=True):
-            if empty:
-                track.passed_s[index] = stamp
+    else:
+        places = np.array([(track.x, track.y) for track in unseen])
+        found = np.asarray(step.view.visibility(places, step.frame.T_odom_camera), np.float64)
+        if found.shape != (len(unseen),) or not ((found >= 0.0) & (found <= 1.0)).all():
+            raise TrackingError(
+                f"view.visibility must return one number in [0, 1] per position, {len(unseen)} in "
+                f"all, got shape {found.shape}: {found!r:.80}"
+            )
+        in_view = found.tolist()
+    people = [(track.x, track.y) for track in shown]
+    camera = (*step.frame.origin_odom_m, float(step.frame.T_odom_camera[2, 3]))
+    radius_m, stature_m = step.config.body_radius_m, step.config.stature_m
+    return [
+        visible
+        and visible * unoccluded_share((track.x, track.y), people, camera, radius_m, stature_m)
+        for track, visible in zip(unseen, in_view, strict=True)
+    ]
+
+
+def _record_empty_places(unseen: list[Track], step: Step) -> None:
+    """Note whose places the frame has shown empty: as large as a body and two σ of the position."""
+    if not unseen or not isinstance(step.view, RangedView):
+        return
+    body_m = step.config.body_radius_m
+    places = np.array([(track.x, track.y) for track in unseen])
+    radii = [
+        body_m + _PLACE_SIGMAS * math.sqrt(larger_eigenvalue(track.p00, track.p01, track.p11))
+        for track in unseen
+    ]
+    passed = step.view.passed(places, np.array(radii), step.frame.T_odom_camera).tolist()
+    for track, empty in zip(unseen, passed, strict=True):
+        if empty:
+            track.passed_s[step.sensor.index] = step.frame.stamp_s
 
 
 def shown_empty(track: Track, state: State, config: TrackerConfig) -> bool:
@@ -208,9 +250,9 @@ def shown_empty(track: Track, state: State, config: TrackerConfig) -> bool:
     if now_s is None or not track.confirmed or max(track.passed_s) == -math.inf:
         return False
     late_s = [1.5 * clock.known_period_s for clock in state.clocks]
-    last = track.seen_s.index(max(track.seen_s))
+    last = track.seen_s.index(track.last_seen_s)
     share_s = min(late_s[last], _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
-    if track.missed_s[last] + share_s <= config.max_missed_s:
+    if track.presence[last] >= share_s * _SURE / config.max_missed_s:
         return False
     return any(
         seen_s >= track.last_seen_s - config.max_missed_s and passed_s >= now_s - late
@@ -221,25 +263,30 @@ def shown_empty(track: Track, state: State, config: TrackerConfig) -> bool:
 def unoccluded_share(
     place_m: tuple[float, float],
     others_m: Sequence[tuple[float, float]],
-    camera_m: tuple[float, float],
+    camera_m: tuple[float, float, float],
     radius_m: float,
+    stature_m: float,
 ) -> float:
     """Return in [0, 1] the share of a body that no nearer body hides.
 
-    Bodies are upright cylinders, so each covers an interval of bearings on the floor plane. The
-    shares that several people hide are summed: two people side by side can hide a third completely.
+    Bodies are upright cylinders, so each covers an interval of bearings on the floor plane, as far
+    up as the people are tall: a camera high up sees a chest over their heads. The shares that
+    several people hide are summed: two people side by side can hide a third completely.
 
     Args:
         place_m: x and y of the body.
         others_m: of the other people.
-        camera_m: of the camera, in the same frame.
+        camera_m: x, y and height of the camera, in the same frame.
         radius_m: > 0, of every body.
+        stature_m: of every body.
     """
     bearing, distance, half = _interval(place_m, camera_m, radius_m)
-    hidden = 0.0
+    height_m, hidden = camera_m[2], 0.0
     for other in others_m:
         front, front_distance, front_half = _interval(other, camera_m, radius_m)
         if front_distance + radius_m > distance:
+            continue
+        if height_m + (CHEST_M - height_m) * front_distance / distance > stature_m:
             continue
         apart = abs((bearing - front + math.pi) % _TURN - math.pi)
         overlap = min(half, apart + front_half) - max(-half, apart - front_half)
@@ -248,7 +295,7 @@ def unoccluded_share(
 
 
 def _interval(
-    place_m: tuple[float, float], camera_m: tuple[float, float], radius_m: float
+    place_m: tuple[float, float], camera_m: tuple[float, float, float], radius_m: float
 ) -> tuple[float, float, float]:
     """Return bearing, distance and angular half-width of a body."""
     x, y = place_m[0] - camera_m[0], place_m[1] - camera_m[1]

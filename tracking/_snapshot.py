@@ -12,7 +12,7 @@ from perception.arrays import FloatArray, covariance_matrix, finite_array, finit
 from ._errors import TrackingError
 from ._noticed import noticed
 from ._person import Track
-from ._presence import coasted_too_long, shown_empty, tentative_gap_s
+from ._presence import is_over, shown_empty
 from ._sensors import Sensors
 from ._size import lever
 from ._state import State, face_period_s
@@ -108,15 +108,14 @@ _SETTERS: Final = tuple(
 def snapshots(state: State, stamp_s: float, sensors: Sensors) -> tuple[PersonTrack, ...]:
     """Return every track at ``stamp_s``, which is not before the state's own stamp.
 
-    The time in between counts as unseen. It holds no frame that could have missed a person, so a
-    tentative track is kept for ``confirm_window_s`` here, not only for ``max_tentative_gap_s``.
+    The time in between counts as unseen. It holds no frame that could have missed a person.
     """
     now_s, people = state.stamp_s, state.tracks
     if now_s is None:
         return ()
     statuses = [_status(track, state, now_s) for track in people]
     if stamp_s > now_s:
-        kept = [not _is_expired(track, stamp_s, state, sensors) for track in people]
+        kept = [not is_over(track, stamp_s, state.clocks, sensors) for track in people]
         statuses = [status for status, keep in zip(statuses, kept, strict=True) if keep]
         moved = [track.copied() for track, keep in zip(people, kept, strict=True) if keep]
         for track in moved:
@@ -183,17 +182,6 @@ def _covariance(track: Track, state: State) -> tuple[float, ...]:
     p12, p13, p23 = track.p12, track.p13, track.p23
     first, second = (track.p00, p01, p02, p03), (p01, track.p11, p12, p13)
     return (*first, *second, p02, p12, track.p22, p23, p03, p13, p23, track.p33)
-
-
-def _is_expired(track: Track, stamp_s: float, state: State, sensors: Sensors) -> bool:
-    """Return whether a track is not reported at ``stamp_s`` any more."""
-    if track.confirmed:
-        return coasted_too_long(track, [stamp_s] * len(sensors.all), sensors)
-    return all(
-        stamp_s - seen_s
-        > max(tentative_gap_s(clock, sensor, sensors.config), sensors.config.confirm_window_s)
-        for sensor, clock, seen_s in zip(sensors.all, state.clocks, track.seen_s, strict=True)
-    )
 
 
 def _status(track: Track, state: State, now_s: float) -> TrackStatus:

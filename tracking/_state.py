@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from ._config import TrackerConfig
 from ._frame import Frame
@@ -16,12 +15,56 @@ from .clock import FrameClock
 
 # Of two frames nearer to each other, the camera's velocity is not known.
 _LEAST_STEP_S: Final = 1e-3
+# Nearer people may be beside the robot, where no camera sees them.
+_NEAR_M: Final = 3.0
+#: Height of the point that represents a body.
+CHEST_M: Final = 1.2
 # A gap this long, or two frames, is an absence; a shorter one is a missed detection.
 _ABSENCE_S: Final = 0.5
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class State:
+class Field(NamedTuple):
+    """Where a sensor whose view is not known has seen people: around its axis, and how far.
+
+    Nearer than 3 m it need not see anybody: beside the robot it does not.
+
+    Attributes:
+        least_cosine: of the widest angle to the axis; 1 before anybody.
+        farthest_m: largest distance.
+    """
+
+    least_cosine: float = 1.0
+    farthest_m: float = 0.0
+
+    def after(self, tracks: Iterable[Track], frame: Frame, sensor: Sensor) -> Field:
+        """Return the field after a frame that shows these people."""
+        cosine, farthest_m = self
+        for track in tracks:
+            other, distance_m = _direction(track, frame, sensor)
+            cosine, farthest_m = min(cosine, other), max(farthest_m, distance_m)
+        return Field(cosine, farthest_m)
+
+    def sees(self, track: Track, frame: Frame, sensor: Sensor) -> float:
+        """Return 1 for a person where others have been seen, and 0 elsewhere."""
+        cosine, distance_m = _direction(track, frame, sensor)
+        inside = cosine >= self.least_cosine and _NEAR_M <= distance_m <= self.farthest_m
+        return 1.0 if inside else 0.0
+
+
+def _direction(track: Track, frame: Frame, sensor: Sensor) -> tuple[float, float]:
+    """Return the cosine of the angle between a person's chest and the axis, and the distance.
+
+    The axis of a camera is z, that of a scanner x.
+    """
+    axis = 0 if sensor.settings.measures_range else 2
+    T = frame.T_odom_camera[:3].tolist()
+    x, y, z = track.x - T[0][3], track.y - T[1][3], CHEST_M - T[2][3]
+    distance_m = math.sqrt(x * x + y * y + z * z)
+    along_m = x * T[0][axis] + y * T[1][axis] + z * T[2][axis]
+    return along_m / max(distance_m, 1e-9), distance_m
+
+
+class State(NamedTuple):
     """Everything that frames change. A state is immutable: each frame makes a new one.
 
     Attributes:
@@ -30,15 +73,17 @@ class State:
         next_id: of the next track.
         stamp_s: of the latest frame of any sensor, or None before the first.
         faces: clock of the frames of all sensors that see faces.
+        fields: where each sensor has seen people so far.
         origin_m: x and y of the latest sensor without measured ranges, or None before it.
         origin_velocity_mps: of that sensor, from its latest two frames.
     """
 
     tracks: tuple[Track, ...]
     clocks: tuple[FrameClock, ...]
+    fields: tuple[Field, ...]
     next_id: int = 1
     stamp_s: float | None = None
-    faces: FrameClock = field(default_factory=FrameClock)
+    faces: FrameClock = FrameClock()
     origin_m: tuple[float, float] | None = None
     origin_velocity_mps: tuple[float, float] = (0.0, 0.0)
 
@@ -56,6 +101,7 @@ class State:
         return State(
             self.tracks,
             (*clocks[:index], before.after(stamp), *clocks[index + 1 :]),
+            self.fields,
             self.next_id,
             stamp,
             self.faces.after(stamp) if sensor.settings.sees_faces else self.faces,
@@ -109,8 +155,7 @@ def face_period_s(
     return min([clocks[index].period_s for index in gave or sensors.faces], default=math.inf)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class Step(NamedTuple):
     """One frame on its way through the tracker.
 
     Attributes:
@@ -136,6 +181,14 @@ class Step:
     def clock(self) -> FrameClock:
         """The clock of the sensor, this frame included."""
         return self.state.clocks[self.sensor.index]
+
+    @property
+    def clocks_before(self) -> list[FrameClock]:
+        """The clocks before the frame, but with the usual time between frames after it."""
+        clocks = list(self.earlier.clocks)
+        own = clocks[self.sensor.index]
+        clocks[self.sensor.index] = own._replace(period_s=self.clock.period_s)
+        return clocks
 
     @property
     def dt_s(self) -> float:

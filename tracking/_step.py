@@ -10,14 +10,7 @@ from ._frame import Frame
 from ._match import Match, Sight, matched
 from ._noticed import held, remember_looks, remembers
 from ._person import Track
-from ._presence import (
-    evidence_of,
-    is_expired,
-    is_over,
-    record_hit,
-    record_misses,
-    weight_of,
-)
+from ._presence import is_over, record_hit, record_misses
 from ._sensors import Sensors
 from ._size import Taken, forget_size, learn_size
 from ._state import State, Step, evidence_interval_s, face_period_s, seen_within
@@ -33,12 +26,14 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     step = Step(frame, sensor, sensors, state, state.at(frame, sensor))
     tracks = _predicted(step)
     match = matched(tracks, step)
-    weight = weight_of(step.dt_s, sensors.config)
+    shown = [
+        track
+        for track, sight in zip(tracks, match.sights, strict=True)
+        if sight is not None and track.confirmed
+    ]
     for track, sight in zip(tracks, match.sights, strict=True):
         if sight is not None:
-            _correct(track, sight, weight, step)
-        elif track.seen_s[sensor.index] > -math.inf:
-            track.logit += weight * sensor.log_missed
+            _correct(track, sight, shown, step)
     next_id = _give_birth(tracks, match, step)
     for track, sight in zip(tracks, match.sights, strict=True):
         _see_size(track, sight, step)
@@ -49,20 +44,16 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     gone = {
         track.id
         for track, sight in zip(tracks, match.sights, strict=True)
-        if sight is None and is_over(track, step)
+        if sight is None and is_over(track, frame.stamp_s, step.state.clocks, sensors)
     }
     left = [track for track in tracks if track.id not in gone]
     gone = doubles(left, step)
-    after = step.state
-    return State(
-        tuple([track for track in left if track.id not in gone] if gone else left),
-        after.clocks,
-        next_id,
-        after.stamp_s,
-        after.faces,
-        after.origin_m,
-        after.origin_velocity_mps,
-    )
+    kept = [track for track in left if track.id not in gone] if gone else left
+    fields = step.state.fields
+    if step.view is None:
+        field = fields[sensor.index].after(shown, frame, sensor)
+        fields = (*fields[: sensor.index], field, *fields[sensor.index + 1 :])
+    return step.state._replace(tracks=tuple(kept), next_id=next_id, fields=fields)
 
 
 def _predicted(step: Step) -> list[Track]:
@@ -70,32 +61,36 @@ def _predicted(step: Step) -> list[Track]:
     state, stamp, previous = step.state, step.frame.stamp_s, step.earlier.stamp_s
     if previous is None or stamp <= previous:
         return [track.copied() for track in state.tracks]
-    tracks = []
+    tracks, clocks = [], step.clocks_before
     for track in state.tracks:
-        if not is_expired(track, stamp, state, step.sensors):
+        # A track that the last frame has left alive gets a chance, however long the interval.
+        if not is_over(track, stamp, clocks, step.sensors):
             moved = track.copied()
             moved.predict(previous, stamp, step.config)
             tracks.append(moved)
     return tracks
 
 
-def _correct(track: Track, sight: Sight, weight: float, step: Step) -> None:
-    """Correct a track with its measurement, and count the hit."""
-    sensors, sensor, taken, ray = step.sensors, step.sensor, sight.taken, sight.ray
+def _correct(track: Track, sight: Sight, confirmed: list[Track], step: Step) -> None:
+    """Correct a track with its measurement, and count the hit.
+
+    ``confirmed`` are the people whom the frame shows.
+    """
+    taken, ray = sight.taken, sight.ray
     expected = track.spread_m2
     dx, dy = taken.x - track.x, taken.y - track.y
     origin, has_looked = step.state.origin_m, track.looked_s > 0.0
     if has_looked:
-        sight.held = held(track, step.frame.stamp_s, step.state.clocks, sensors)
+        sight.held = held(track, step.frame.stamp_s, step.state.clocks, step.sensors)
     if origin is not None:
         taken.without_lasting(track, origin, step.state.origin_velocity_mps)
     if has_looked and not sight.by_ray:
         jump2 = expected.plus(taken.noise_m2).distance2_and_log_det(dx, dy)[0]
         sight.jumped = jump2 > _JUMP_CHI2
-    if not track.confirmed and weight > 0.0:
-        spread = track.spread_m2.plus(taken.noise_m2)
-        spread = spread.plus(ray.extra_m2) if ray is not None and sight.by_ray else spread
-        track.logit += weight * evidence_of(*spread.distance2_and_log_det(dx, dy), sensor)
+    spread = track.spread_m2.plus(taken.noise_m2)
+    if ray is not None and sight.by_ray:
+        spread = spread.plus(ray.extra_m2)
+    found = spread.distance2_and_log_det(dx, dy)
     # An ambiguous measurement has less weight and leaves more uncertainty.
     noise = taken.noise_m2
     if sight.ambiguous:
@@ -107,7 +102,7 @@ def _correct(track: Track, sight: Sight, weight: float, step: Step) -> None:
     if origin is not None:
         taken.pass_lasting(track, noise, origin)
     track.correct(taken.x, taken.y, noise)
-    record_hit(track, step)
+    record_hit(track, *found, confirmed, step)
 
 
 def _give_birth(tracks: list[Track], match: Match, step: Step) -> int:

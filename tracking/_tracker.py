@@ -16,7 +16,7 @@ from ._frame import Frame, measurements_of
 from ._history import History
 from ._sensors import CAMERA, SensorConfig, sensors_of
 from ._snapshot import PersonTrack, snapshots
-from ._state import State
+from ._state import Field, State
 from ._step import advance
 from ._views import View
 from .clock import FrameClock
@@ -214,7 +214,8 @@ class PersonTracker:
 
     def _nobody(self, next_id: int) -> State:
         """Return the state before the first frame."""
-        return State((), (FrameClock(),) * len(self._sensors.all), next_id)
+        count = len(self._sensors.all)
+        return State((), (FrameClock(),) * count, (Field(),) * count, next_id)
 
     def _advance(self, state: State, frame: Frame) -> State:
         return advance(state, frame, self._sensors)

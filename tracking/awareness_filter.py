@@ -9,8 +9,6 @@ it may fall but never rise, however the belief moves.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
-from statistics import NormalDist
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,7 +16,7 @@ import numpy as np
 from ._config import AwarenessFilterConfig
 
 # Nodes and weights for the expectation of a function of a standard normal variable.
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(11)
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(9)
 _GAUSS_HERMITE: Final = tuple(
     zip(_NODES.tolist(), (_WEIGHTS / _WEIGHTS.sum()).tolist(), strict=True)
 )
@@ -78,7 +76,7 @@ def sigmoid(value: float) -> float:
 
 def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
     """Return the belief for a person of whom nothing is known; its lower bound is α = 0."""
-    return AwarenessBelief(logit(config.prior_awareness), config.prior_std_logit**2)
+    return AwarenessBelief(config.prior_logit, config.prior_std_logit**2)
 
 
 def drift(
@@ -92,8 +90,11 @@ def drift(
     """
     if dt_s <= 0.0:
         return belief
-    prior_mean, prior_variance = logit(config.prior_awareness), config.prior_std_logit**2
-    z = _quantile(config.lower_bound_confidence)
+    prior_mean, prior_variance, z = (
+        config.prior_logit,
+        config.prior_std_logit**2,
+        config.bound_sigmas,
+    )
     offset, excess = belief.mean - prior_mean, belief.variance - prior_variance
     phi = math.exp(-dt_s / time_constant_s)
     phi2 = phi * phi
@@ -201,14 +202,14 @@ def measure(
     gain = belief.variance / (belief.variance + effective)
     corrected = belief.mean + gain * (measured.mean - belief.mean)
     remaining = belief.variance * (1.0 - gain)
-    bound = corrected - _quantile(config.lower_bound_confidence) * math.sqrt(remaining)
+    bound = corrected - config.bound_sigmas * math.sqrt(remaining)
     return AwarenessBelief(corrected, remaining, bound)
 
 
 def forget(belief: AwarenessBelief, config: AwarenessFilterConfig) -> AwarenessBelief:
     """Return the prior, with the lower of the belief's bound and the prior's bound."""
     fresh = prior(config)
-    prior_bound = fresh.mean - _quantile(config.lower_bound_confidence) * config.prior_std_logit
+    prior_bound = fresh.mean - config.bound_sigmas * config.prior_std_logit
     return AwarenessBelief(fresh.mean, fresh.variance, min(belief.bound, prior_bound))
 
 
@@ -222,14 +223,15 @@ def estimate(belief: AwarenessBelief, config: AwarenessFilterConfig) -> Filtered
     """
     # The sigmoid is (1 + tanh(x / 2)) / 2.
     half, spread = 0.5 * belief.mean, 0.5 * math.sqrt(belief.variance)
-    values = [(math.tanh(half + spread * node), weight) for node, weight in _GAUSS_HERMITE]
-    mean = sum([value * weight for value, weight in values])
-    second = sum([(value - mean) ** 2 * weight for value, weight in values])
+    middle = math.tanh(half)
+    mean = second = 0.0
+    for node, weight in _GAUSS_HERMITE:
+        # Relative to the median, so that a narrow belief keeps its digits.
+        value = math.tanh(half + spread * node) - middle
+        mean += weight * value
+        second += weight * value * value
     clip = config.clip_awareness
     lower = max((sigmoid(belief.bound) - clip) / (1.0 - clip), 0.0)
-    return FilteredAwareness(sigmoid(belief.mean), 0.5 * math.sqrt(second), lower)
-
-
-@lru_cache(maxsize=32)
-def _quantile(confidence: float) -> float:
-    return NormalDist().inv_cdf(confidence)
+    return FilteredAwareness(
+        sigmoid(belief.mean), 0.5 * math.sqrt(max(second - mean * mean, 0.0)), lower
+    )

@@ -175,7 +175,7 @@ def open_gates(config: TrackerConfig) -> TrackerConfig:
             "gate_probability": 1.0 - 1e-12,
             "gate_distance_m": 50.0,
             "miss_cost": 1e3,
-            "confirm_hits": 1,
+            "confirm_logit": -100.0,
         }
     )
 

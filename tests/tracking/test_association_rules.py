@@ -4,90 +4,63 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from perception.arrays import FloatArray
-from tracking._association import Gates, Wide, associate
-from tracking._sizes import Sized
+from tracking import TrackerConfig
+from tracking._frame import Frame, Measurement, Spread
+from tracking._match import assigned, matched
+from tracking._person import Track
+from tracking._sensors import sensors_of
+from tracking._state import Field, State, Step
+from tracking.clock import FrameClock
 
-GATES = Gates(
-    mahalanobis2=9.0,
-    distance_m=0.9,
+CONFIG = TrackerConfig(
+    gate_probability=0.99,
+    gate_distance_m=0.9,
     miss_cost=4.0,
     ambiguity_margin=3.0,
     ambiguity_distance_m=0.7,
 )
+SENSORS = sensors_of(CONFIG, None, None)
+GATE2 = -2.0 * math.log(0.01)
 
 
-@dataclass(frozen=True)
-class Scene:
-    """Up to four tracks and four measurements, close enough together to be confused."""
-
-    positions: FloatArray
-    covariances: FloatArray
-    confirmed: FloatArray
-    measured: FloatArray
-    noises: FloatArray
-    people: FloatArray | None
-    wide: Wide | None
-    sizes: Sized | None
+def measurement(rng: np.random.Generator, *, weak: bool) -> Measurement:
+    """Return a measurement near the origin, whose covariance is turned, of unequal axes."""
+    root = rng.uniform(-0.3, 0.3, (2, 2)) + 0.1 * np.eye(2)
+    (xx, xy), (_, yy) = (root @ root.T + 0.01 * np.eye(2)).tolist()
+    x, y = rng.uniform(-0.8, 0.8, 2).tolist()
+    return Measurement(x, y, Spread(xx, xy, yy), weak=weak)
 
 
-def covariances(rng: np.random.Generator, *shape: int) -> FloatArray:
-    """Return covariances (*shape, 2, 2) whose axes are turned and of different lengths."""
-    root = rng.uniform(-0.3, 0.3, (*shape, 2, 2)) + 0.1 * np.eye(2)
-    return np.asarray(root @ root.swapaxes(-1, -2) + 0.01 * np.eye(2))
-
-
-def scene(seed: int) -> Scene:
+def scene(seed: int) -> tuple[list[Track], Step]:
+    """Return up to four tracks and a frame with up to four measurements, near each other."""
     rng = np.random.default_rng(seed)
     n, m = rng.integers(1, 5, 2)
-    measured = rng.uniform(-0.8, 0.8, (m, 2))
-    wide = sizes = None
-    if seed % 3 == 1:
-        rows = rng.random(n) < 0.6
-        extra = np.zeros((n, 4, 4))
-        extra[:, :2, :2] = 2.0 * covariances(rng, n)
-        wide = Wide(rows, extra, rows[:, None] & (rng.random((n, m)) < 0.8), 1.5)
-    if seed % 3 == 2:
-        moved = measured[None] + rng.uniform(-0.1, 0.1, (n, m, 2))
-        scales = rng.uniform(0.7, 1.4, (n, m))
-        sizes = Sized(moved, scales, np.zeros((n, m)), 0.3 * covariances(rng, n, m))
-    return Scene(
-        rng.uniform(-0.8, 0.8, (n, 2)),
-        covariances(rng, n),
-        rng.random(n) < 0.6,
-        measured,
-        covariances(rng, m),
-        rng.integers(0, 3, n) if seed % 2 else None,
-        wide,
-        sizes,
-    )
+    frame = Frame(1.0, np.eye(4), [measurement(rng, weak=rng.random() < 0.25) for _ in range(m)])
+    tracks = [Track(row + 1, measurement(rng, weak=False), frame, 1, CONFIG) for row in range(n)]
+    for track in tracks:
+        track.confirmed = bool(rng.random() < 0.6)
+    state = State(tuple(tracks), (FrameClock(),), (Field(),))
+    return tracks, Step(frame, SENSORS.all[0], SENSORS, state, state)
 
 
-def costs_of(given: Scene) -> tuple[FloatArray, FloatArray]:
-    """Return the cost of each match, infinite where it passes no gate, and which need the wide."""
-    n, m = len(given.positions), len(given.measured)
-    costs, beyond = np.full((n, m), np.inf), np.zeros((n, m), dtype=bool)
-    for i, j in itertools.product(range(n), range(m)):
-        place, noise = given.measured[j], given.noises[j]
-        if given.sizes is not None:
-            place = given.sizes.positions_odom_m[i, j]
-            noise = noise * given.sizes.scales[i, j] ** 2 + given.sizes.extra[i, j]
-        offset, spread = place - given.positions[i], given.covariances[i] + noise
+def costs_of(tracks: list[Track], measured: list[Measurement]) -> FloatArray:
+    """Return the cost of each match, infinite where it does not pass both gates."""
+    costs = np.full((len(tracks), len(measured)), np.inf)
+    for (i, track), (j, one) in itertools.product(enumerate(tracks), enumerate(measured)):
+        noise, offset = one.noise_m2, np.array([one.x - track.x, one.y - track.y])
+        spread = np.array([[track.p00, track.p01], [track.p01, track.p11]])
+        spread += [[noise.xx, noise.xy], [noise.xy, noise.yy]]
         d2 = offset @ np.linalg.inv(spread) @ offset
-        if math.hypot(*offset) <= GATES.distance_m and d2 <= GATES.mahalanobis2:
+        if math.hypot(*offset) <= CONFIG.gate_distance_m and d2 <= GATE2:
             costs[i, j] = d2 + math.log(np.linalg.det(spread))
-        elif given.wide is not None and given.wide.near[i, j]:
-            spread = spread + given.wide.extra[i, :2, :2]
-            d2 = offset @ np.linalg.inv(spread) @ offset
-            if d2 <= GATES.mahalanobis2:
-                costs[i, j] = d2 + math.log(np.linalg.det(spread)) + given.wide.price
-                beyond[i, j] = True
-    return costs, beyond
+    return costs
 
 
 def best(costs: FloatArray, rows: list[int], columns: list[int]) -> dict[int, int]:
@@ -99,63 +72,84 @@ def best(costs: FloatArray, rows: list[int], columns: list[int]) -> dict[int, in
         if len({column for column in each if column is not None})
         == sum(column is not None for column in each)
     )
-    return min(sets, key=lambda each: sum(costs[pair] - GATES.miss_cost for pair in each.items()))
+    return min(sets, key=lambda each: sum(costs[pair] - CONFIG.miss_cost for pair in each.items()))
 
 
-def rivals_of(given: Scene, costs: FloatArray, matches: dict[int, int]) -> set[tuple[int, int]]:
+def rivals_of(
+    tracks: list[Track],
+    measured: list[Measurement],
+    costs: FloatArray,
+    matches: dict[int, int],
+    rows: list[int],
+    columns: list[int],
+) -> set[tuple[int, int]]:
     """Return the pairs of a track in doubt and the other track that it may be, or −1."""
     holder = {column: row for row, column in matches.items()}
     found = set()
-    for i, j in zip(*np.nonzero(np.isfinite(costs)), strict=True):
+    for i, j in itertools.product(rows, columns):
         owner = holder.get(j, -1)
-        same = given.people is not None and owner >= 0 and given.people[i] == given.people[owner]
-        if owner == i or same:
+        if owner == i or costs[i, j] == np.inf:
             continue
         if i in matches:
-            apart = math.dist(given.measured[j], given.measured[matches[i]])
-            close = apart <= GATES.ambiguity_distance_m
-            if close and costs[i, j] <= costs[i, matches[i]] + GATES.ambiguity_margin:
-                found.add((int(i), owner))
+            one, own = measured[j], measured[matches[i]]
+            close = math.hypot(one.x - own.x, one.y - own.y) <= CONFIG.ambiguity_distance_m
+            if close and costs[i, j] <= costs[i, matches[i]] + CONFIG.ambiguity_margin:
+                found.add((i, owner))
         if owner >= 0:
-            apart = math.dist(given.positions[i], given.positions[owner])
-            close = apart <= GATES.ambiguity_distance_m
-            if close and costs[i, j] <= costs[owner, j] + GATES.ambiguity_margin:
-                found.add((owner, int(i)))
+            one, own = tracks[i], tracks[owner]
+            close = math.hypot(one.x - own.x, one.y - own.y) <= CONFIG.ambiguity_distance_m
+            if close and costs[i, j] <= costs[owner, j] + CONFIG.ambiguity_margin:
+                found.add((owner, i))
     return found
 
 
 @pytest.mark.parametrize("first", range(0, 240, 40))
 def test_matches_follow_the_rules(first: int) -> None:
-    counts = {"matches": 0, "rivals": 0, "beyond": 0}
+    counts = {"matches": 0, "rivals": 0, "new": 0}
     for seed in range(first, first + 40):
-        given = scene(seed)
-        found = associate(
-            given.positions,
-            given.covariances,
-            given.confirmed,
-            given.measured,
-            given.noises,
-            GATES,
-            given.people,
-            given.wide,
-            given.sizes,
-        )
-        costs, beyond = costs_of(given)
-        # Confirmed tracks choose first.
-        rows, columns = range(len(given.positions)), range(len(given.measured))
-        matches = best(costs, [row for row in rows if given.confirmed[row]], list(columns))
-        left = [column for column in columns if column not in matches.values()]
-        matches |= best(costs, [row for row in rows if not given.confirmed[row]], left)
-        rivals = rivals_of(given, costs, matches)
-        pairs = list(zip(found.tracks.tolist(), found.measurements.tolist(), strict=True))
-        assert pairs == sorted(matches.items()), seed
-        assert found.wide.tolist() == [bool(beyond[pair]) for pair in pairs], seed
-        assert {tuple(pair) for pair in found.rivals.tolist()} == rivals, seed
+        tracks, step = scene(seed)
+        measured = step.frame.measurements
+        found = matched(tracks, step)
+        costs, rows = costs_of(tracks, measured), range(len(tracks))
+        strong = [j for j, one in enumerate(measured) if not one.weak]
+        weak = [j for j, one in enumerate(measured) if one.weak]
+        # Confirmed tracks choose first, then the others; the weak ones are left for the confirmed.
+        matches = best(costs, [row for row in rows if tracks[row].confirmed], strong)
+        left = [column for column in strong if column not in matches.values()]
+        matches |= best(costs, [row for row in rows if not tracks[row].confirmed], left)
+        rivals = rivals_of(tracks, measured, costs, matches, list(rows), strong)
+        rest = [row for row in rows if tracks[row].confirmed and row not in matches]
+        second = best(costs, rest, weak)
+        rivals |= rivals_of(tracks, measured, costs, second, rest, weak)
+        matches |= second
+        given = {row: sight.given for row, sight in enumerate(found.sights) if sight is not None}
+        assert {row: measured.index(one) for row, one in given.items()} == matches, seed
+        assert set(found.rivals) == rivals, seed
         doubted = {row for row, _ in rivals}
-        assert found.ambiguous.tolist() == [row in doubted for row, _ in pairs], seed
-        counts["matches"] += len(pairs)
+        ambiguous = {i for i, sight in enumerate(found.sights) if sight and sight.ambiguous}
+        assert ambiguous == doubted, seed
+        new = [measured[j] for j in strong if j not in matches.values()]
+        assert found.new == new, seed
+        counts["matches"] += len(matches)
         counts["rivals"] += len(rivals)
-        counts["beyond"] += int(found.wide.sum())
-    assert counts["matches"] > 20
-    assert counts["rivals"] > 10
-    assert counts["beyond"] > 0
+        counts["new"] += len(new)
+    assert min(counts.values()) > 10
+
+
+@given(
+    st.dictionaries(
+        st.integers(0, 4),
+        st.dictionaries(st.integers(0, 4), st.floats(-20.0, 9.9), max_size=4),
+        max_size=5,
+    )
+)
+def test_the_assignment_is_the_cheapest(costs: dict[int, dict[int, float]]) -> None:
+    table = np.full((5, 5), np.inf)
+    for row, found in costs.items():
+        for column, cost in found.items():
+            table[row, column] = cost - 10.0 + CONFIG.miss_cost
+    matches = best(table, sorted(costs), list(range(5)))
+    chosen = assigned(costs, 10.0)
+    assert len(set(chosen.values())) == len(chosen)
+    total = sum(costs[row][column] - 10.0 for column, row in chosen.items())
+    assert total == pytest.approx(sum(costs[pair[0]][pair[1]] - 10.0 for pair in matches.items()))

@@ -14,6 +14,7 @@ from scipy.stats import norm
 from tracking import AwarenessFilterConfig
 from tracking.awareness_filter import (
     AwarenessBelief,
+    Evidence,
     drift,
     drift_unseen,
     estimate,
@@ -101,10 +102,11 @@ def test_a_measurement_is_a_scalar_bayes_update(
     belief: AwarenessBelief, alpha: float, std: float, dt_s: float
 ) -> None:
     measured = evidence(alpha, std, CONFIG)
+    assert measured is not None
     mean, variance = measured
     variance = variance * max(1.0, CONFIG.evidence_correlation_s / dt_s)
     information = 1.0 / belief.variance + 1.0 / variance
-    after = measure(belief, *measured, dt_s, CONFIG)
+    after = measure(belief, measured, dt_s, CONFIG)
     assert after.variance == pytest.approx(1.0 / information)
     assert after.mean == pytest.approx(
         (belief.mean / belief.variance + mean / variance) / information, abs=1e-9
@@ -114,7 +116,9 @@ def test_a_measurement_is_a_scalar_bayes_update(
 
 @given(alpha=alphas, std=stds)
 def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, std: float) -> None:
-    mean, variance = evidence(alpha, std, CONFIG)
+    measured = evidence(alpha, std, CONFIG)
+    assert measured is not None
+    mean, variance = measured
     sigma = math.sqrt(variance)
     epsilon = CONFIG.clip_awareness
     assert sigma >= CONFIG.min_evidence_std_logit
@@ -128,35 +132,36 @@ def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, 
 def test_a_higher_alpha_is_higher_evidence(low: float, high: float, std: float) -> None:
     low, high = sorted((low, high))
     first, second = evidence(low, std, CONFIG), evidence(high, std, CONFIG)
-    assert first[0] <= second[0]
+    assert first is not None
+    assert second is not None
+    assert first.mean <= second.mean
 
 
 def test_a_confident_zero_is_confident_unawareness() -> None:
-    mean, variance = evidence(0.0, 0.05, CONFIG)
+    measured = evidence(0.0, 0.05, CONFIG)
+    assert measured is not None
+    mean, variance = measured
     # By the derivative at ε it would have almost no weight: σ = 0.05 / (0.02 · 0.98) = 2.6.
     assert sigmoid(mean + 2.0 * math.sqrt(variance)) < 0.1
-    after = estimate(measure(prior(CONFIG), mean, variance, 1.0, CONFIG), CONFIG)
+    after = estimate(measure(prior(CONFIG), measured, 1.0, CONFIG), CONFIG)
     assert after.awareness < CONFIG.prior_awareness
     assert after.awareness_std < 0.02
 
 
 def test_an_alpha_with_a_large_standard_deviation_is_no_evidence() -> None:
-    mean, variance = evidence(
-        np.array([1.0, 1.0, 1.0, np.nan]),
-        np.array([0.3, 1e9, CONFIG.max_evidence_std, np.nan]),
-        CONFIG,
-    )
-    assert np.isnan(mean).tolist() == [True, True, False, True]
-    assert np.isnan(variance).tolist() == [True, True, False, True]
+    assert evidence(1.0, CONFIG.max_evidence_std, CONFIG) is not None
+    assert evidence(1.0, 0.3, CONFIG) is None
+    assert evidence(1.0, 1e9, CONFIG) is None
+    assert evidence(None, None, CONFIG) is None
 
 
 @pytest.mark.parametrize("frames", [2, 40])
 def test_information_per_second_does_not_depend_on_the_frame_rate(frames: int) -> None:
     span_s = CONFIG.evidence_correlation_s
-    once = measure(prior(CONFIG), 1.0, 0.5, span_s, CONFIG)
+    once = measure(prior(CONFIG), Evidence(1.0, 0.5), span_s, CONFIG)
     many = prior(CONFIG)
     for _ in range(frames):
-        many = measure(many, 1.0, 0.5, span_s / frames, CONFIG)
+        many = measure(many, Evidence(1.0, 0.5), span_s / frames, CONFIG)
     assert many.mean == pytest.approx(once.mean)
     assert many.variance == pytest.approx(once.variance)
 
@@ -205,47 +210,39 @@ def test_the_prior_has_a_lower_bound_of_zero() -> None:
     assert estimate(prior(CONFIG), CONFIG).awareness == pytest.approx(CONFIG.prior_awareness)
 
 
-beliefs_of_one = st.builds(
-    lambda mean, variance: AwarenessBelief(
-        np.array([mean]), np.array([variance]), np.array([mean - Z * math.sqrt(variance)])
-    ),
-    st.floats(-8.0, 8.0),
-    st.floats(1e-4, CONFIG.prior_std_logit**2),
-)
 ages = st.floats(0.0, 1.0)
 periods = st.floats(0.02, 1.0) | st.just(math.inf)
 
 
-@given(belief=beliefs_of_one, age_s=ages, step_s=ages, period_s=periods)
+@given(belief=beliefs, age_s=ages, step_s=ages, period_s=periods)
 def test_the_bound_never_rises_while_unseen(
     belief: AwarenessBelief, age_s: float, step_s: float, period_s: float
 ) -> None:
-    stamps = np.array([-age_s])
-    after = drift_unseen(belief, 0.0, step_s, stamps, period_s, CONFIG)
+    after = drift_unseen(belief, 0.0, step_s, -age_s, period_s, CONFIG)
     assert after.bound <= belief.bound
     assert estimate(after, CONFIG).awareness_lower <= estimate(belief, CONFIG).awareness_lower
     # The grace changes how fast, and no more than that: the belief is between the two constants'.
     slow = drift(belief, step_s, CONFIG.evidence_time_constant_s, CONFIG)
     fast = drift(belief, step_s, CONFIG.unseen_time_constant_s, CONFIG)
-    low, high = sorted((float(slow.mean[0]), float(fast.mean[0])))
-    assert low - 1e-9 <= float(after.mean[0]) <= high + 1e-9
+    low, high = sorted((slow.mean, fast.mean))
+    assert low - 1e-9 <= after.mean <= high + 1e-9
 
 
-@given(belief=beliefs_of_one, age_s=ages, step_s=ages, share=st.floats(0.0, 1.0), period_s=periods)
+@given(belief=beliefs, age_s=ages, step_s=ages, share=st.floats(0.0, 1.0), period_s=periods)
 def test_drift_while_unseen_is_exact_in_time(
     belief: AwarenessBelief, age_s: float, step_s: float, share: float, period_s: float
 ) -> None:
-    stamps, middle_s = np.array([-age_s]), share * step_s
-    once = drift_unseen(belief, 0.0, step_s, stamps, period_s, CONFIG)
-    middle = drift_unseen(belief, 0.0, middle_s, stamps, period_s, CONFIG)
-    twice = drift_unseen(middle, middle_s, step_s, stamps, period_s, CONFIG)
+    middle_s = share * step_s
+    once = drift_unseen(belief, 0.0, step_s, -age_s, period_s, CONFIG)
+    middle = drift_unseen(belief, 0.0, middle_s, -age_s, period_s, CONFIG)
+    twice = drift_unseen(middle, middle_s, step_s, -age_s, period_s, CONFIG)
     for name in ("mean", "variance", "bound"):
         assert getattr(twice, name) == pytest.approx(getattr(once, name), abs=1e-9)
 
 
 def test_without_a_last_face_there_is_no_grace() -> None:
-    belief = AwarenessBelief(np.array([1.0]), np.array([1.0]), np.array([1.0 - Z]))
-    after = drift_unseen(belief, 0.0, 0.2, np.array([np.nan]), 0.1, CONFIG)
+    belief = AwarenessBelief(1.0, 1.0, 1.0 - Z)
+    after = drift_unseen(belief, 0.0, 0.2, -math.inf, 0.1, CONFIG)
     assert after.mean == drift(belief, 0.2, CONFIG.unseen_time_constant_s, CONFIG).mean
 
 
@@ -258,12 +255,12 @@ def test_the_grace_is_one_frame_within_limits(period_s: float, expected_s: float
 
 
 def test_a_sigma_is_moved_towards_the_typical_one_and_keeps_its_order() -> None:
-    reported = np.array([0.0, 0.02, 0.1, 0.2, CONFIG.max_evidence_std, 0.3, 1e9, np.nan])
-    trusted = trusted_std(reported, CONFIG)
-    assert np.isnan(trusted).tolist() == [False] * 5 + [True] * 3
+    reported = [0.0, 0.02, 0.1, 0.2, CONFIG.max_evidence_std]
+    trusted = [trusted_std(std, CONFIG) or 0.0 for std in reported]
+    assert [trusted_std(std, CONFIG) for std in (0.3, 1e9, None)] == [None] * 3
     assert trusted[2] == pytest.approx(CONFIG.typical_evidence_std)
-    assert (np.diff(trusted[:5]) > 0.0).all()
+    assert trusted == sorted(trusted)
     assert trusted[1] > reported[1]
     assert trusted[3] < reported[3]
     exact = AwarenessFilterConfig(reported_std_weight=1.0)
-    assert trusted_std(reported[:5], exact) == pytest.approx(reported[:5])
+    assert [trusted_std(std, exact) for std in reported] == pytest.approx(reported)

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from tracking._clocks import FrameClock
-from tracking.clock import JumpedClock
+from tracking.clock import FrameClock, JumpedClock
 
 MAX_PAUSE_S = 10.0
 

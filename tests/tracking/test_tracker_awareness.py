@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -113,13 +114,20 @@ def test_without_a_face_nobody_becomes_aware(blind: Shown) -> None:
 
 def test_evidence_from_before_confirmation_does_not_count() -> None:
     tracker = PersonTracker()
-    last = TrackerConfig().confirm_hits - 1
-    for step in range(last):
+    (track,) = tracker.update([observe((3, 0), 0.0, awareness=1.0)], 0.0, CAMERA)
+    step = 0
+    while True:
+        step += 1
+        (unaware,) = copy.deepcopy(tracker).update(
+            [observe((3, 0), step * PERIOD_S)], step * PERIOD_S, CAMERA
+        )
+        if unaware.status == "confirmed":
+            break
         now = step * PERIOD_S
         (track,) = tracker.update([observe((3, 0), now, awareness=1.0)], now, CAMERA)
         assert (track.status, track.awareness_lower) == ("tentative", 0.0)
-    (track,) = tracker.update([observe((3, 0), last * PERIOD_S)], last * PERIOD_S, CAMERA)
-    assert (track.status, track.awareness_lower) == ("confirmed", 0.0)
+    assert step > 1
+    assert unaware.awareness_lower == 0.0
 
 
 def test_repeated_frames_make_nobody_more_aware() -> None:

@@ -17,7 +17,7 @@ CONFIG = TrackerConfig(
     miss_cost=1e3,
     standing_speed_mps=0.0,
     position_noise_floor_m=0.01,
-    confirm_hits=1,
+    confirm_logit=-100.0,
 )
 NOISE_M2 = np.array([[0.02, 0.008], [0.008, 0.05]])
 

@@ -27,21 +27,12 @@ def walk(
     return tracks
 
 
-@pytest.mark.parametrize("period_s", [0.03, 0.8])
-@pytest.mark.parametrize("hits", [1, 3, 4])
-def test_confirm_hits_frames_confirm_at_any_rate(period_s: float, hits: int) -> None:
-    """Without evidence that could confirm sooner."""
-    tracker = PersonTracker(TrackerConfig(confirm_hits=hits, confirm_logit=100.0))
-    statuses = [walk(tracker, k, k + 1, period_s=period_s)[0].status for k in range(hits + 1)]
-    assert statuses == ["tentative"] * (hits - 1) + ["confirmed"] * 2
-
-
 @pytest.mark.parametrize("missed", [(), (1,), (2, 4)])
 def test_a_person_who_is_missed_now_and_then_is_still_confirmed(
     missed: tuple[int, ...],
 ) -> None:
     tracker = PersonTracker()
-    for step in range(CONFIG.confirm_hits + len(missed)):
+    for step in range(4 + 2 * len(missed)):
         now = step * PERIOD_S
         seen = [] if step in missed else [observe((3.0, 0.0), now)]
         (track,) = tracker.update(seen, now, CAMERA)
@@ -50,7 +41,7 @@ def test_a_person_who_is_missed_now_and_then_is_still_confirmed(
 
 def test_hits_too_far_apart_confirm_no_track() -> None:
     """One detection in four frames at one place is not enough for a person."""
-    tracker = PersonTracker(TrackerConfig(max_tentative_gap_s=1.0))
+    tracker = PersonTracker()
     for step in range(60):
         now = step * PERIOD_S
         tracker.update([observe((3.0, 0.0), now)] if step % 4 == 0 else [], now, CAMERA)
@@ -106,10 +97,7 @@ def test_a_tentative_track_outlives_two_missed_frames_and_is_deleted_soon(period
     tracker = PersonTracker()
     walk(tracker, 0, 1)
     kept = [len(tracker.update((), step * period_s, CAMERA)) for step in range(1, 10)]
-    deleted_s = period_s * (kept.index(0) + 1)
-    least_s = max(CONFIG.max_tentative_gap_s, 2.0 * period_s)
-    assert least_s < deleted_s <= least_s + period_s + 1e-9
-    assert not any(kept[kept.index(0) :])
+    assert kept == [1, 1] + [0] * 7
 
 
 def test_a_tentative_track_is_kept_while_no_frame_comes() -> None:
@@ -117,7 +105,7 @@ def test_a_tentative_track_is_kept_while_no_frame_comes() -> None:
     tracker = PersonTracker()
     walk(tracker, 0, 1)
     assert [track.status for track in tracker.predict(0.4)] == ["tentative"]
-    assert tracker.predict(CONFIG.confirm_window_s + 0.01) == ()
+    assert tracker.predict(1.0) == ()
     assert len(walk(tracker, 9, 10)) == 1
 
 
@@ -267,9 +255,9 @@ def test_clutter_confirms_hardly_any_track_at_any_frame_rate(rate_hz: float) -> 
 def test_more_evidence_confirms_later() -> None:
     """The hits that confirm never become fewer when ``confirm_logit`` grows."""
     needed = []
-    for logit in (-5.0, 0.0, 2.0, 5.0, 8.0, 100.0):
+    for logit in (-5.0, 0.0, 2.0, 5.0, 8.0, 20.0):
         tracker = PersonTracker(TrackerConfig(confirm_logit=logit))
-        for hits in range(1, 9):
+        for hits in range(1, 20):
             now = 0.2 * hits
             (track,) = tracker.update([observe((5.0, 0.3 * now), now)], now, CAMERA)
             if track.status == "confirmed":
@@ -277,7 +265,7 @@ def test_more_evidence_confirms_later() -> None:
         needed.append(hits)
     assert needed == sorted(needed)
     assert needed[0] == 2  # the first detection alone is no evidence against clutter
-    assert needed[-1] == TrackerConfig().confirm_hits
+    assert needed[-1] > 4
 
 
 @pytest.mark.parametrize("rate_hz", [1.0, 2.0])
@@ -346,3 +334,21 @@ def test_weak_detections_neither_start_nor_confirm_a_track() -> None:
     for frame in range(1, 20):
         assert all(track.status == "tentative" for track in feed(tracker, frame, 0.2))
     assert feed(tracker, 40, 0.2) == ()
+
+
+def test_a_faster_camera_confirms_no_more_clutter_a_second() -> None:
+    """The evidence that is needed grows as the logarithm of the frame rate."""
+    assert CONFIG.detection_correlation_s <= 0.1
+    needed = {}
+    for period_s in (0.1, 0.2):
+        config = TrackerConfig(confirm_logit=15.0)
+        while True:
+            tracker = PersonTracker(config)
+            tracker.update([observe((3.0, 0.0), 0.0)], 0.0, CAMERA)
+            (track,) = tracker.update([observe((3.0, 0.0), period_s)], period_s, CAMERA)
+            if track.status == "confirmed":
+                break
+            config = config.model_copy(update={"confirm_logit": config.confirm_logit - 0.01})
+        needed[period_s] = config.confirm_logit
+    # Twice as many tracks of clutter a second: each is confirmed half as often.
+    assert needed[0.2] < needed[0.1] + 1.0

@@ -1,4 +1,4 @@
-"""Views: people who should have been seen are deleted soon, others are kept; learned exits."""
+"""Views: people who should have been seen are deleted soon, others are kept."""
 
 from __future__ import annotations
 
@@ -108,11 +108,6 @@ def test_an_unseen_person_is_kept_for_the_expected_time(case: str, period_s: flo
     assert tracks[0].status == "confirmed"
     kept_s = kept_for_s(tracker, tracks[0].id, now, camera, others, period_s)
     assert kept_s == pytest.approx(expected_s, rel=0.08, abs=period_s + 1e-9)
-    if period_s > 0.1:
-        tracker = PersonTracker()  # without a view all are kept for the same time
-        watch(tracker, place, velocity, others_m=others)
-        kept_s = kept_for_s(tracker, tracks[0].id, now, camera, others, period_s)
-        assert kept_s == pytest.approx(COAST_S, abs=period_s + 1e-9)
 
 
 def test_no_false_track_stays_at_the_edge_of_the_view() -> None:
@@ -166,11 +161,11 @@ def test_a_standing_person_beside_the_robot_keeps_the_position() -> None:
             T = camera_at(0.6 * now, 0.0)
             ahead = 3.0 - 0.6 * now
             measured = rng.normal((3.0, 1.0), 0.1)
-            visible = ahead > 2.0
+            visible = ahead > 1.74  # as far as the view reaches
             people = [observe(measured, now, T_odom_camera=T)] if visible else []
             tracks = tracker.update(people, now, T)
         (track,) = tracks
-        assert track.time_since_seen_s > 9.5
+        assert track.time_since_seen_s > 9.0
         errors.append(track.position_odom_m - (3.0, 1.0))
         spreads.append(track.covariance_odom[:2, :2])
     distances = np.linalg.norm(errors, axis=1)
@@ -299,117 +294,45 @@ def test_a_person_missed_behind_the_robot_is_deleted_sooner_with_a_view_there() 
     assert kept["ahead"] > 2.9
 
 
-SPEED_MPS = 1.2
+# Place and velocity of somebody whom the last frames do not show, and how long they are kept
+# without a view: people are expected where people have been seen, and nobody nearer than 3 m.
+UNKNOWN_VIEW = {
+    "stands where others are": ((5.0, 0.0), (0.0, 0.0), MISSED_S),
+    "walks among the others": ((5.0, 1.0), (0.0, -0.5), MISSED_S),
+    "walks away": ((6.0, 0.0), (1.2, 0.0), COAST_S),
+    "walks out at the side": ((5.0, 1.9), (0.0, 1.2), COAST_S),
+    "stands beside the robot": ((2.0, 0.5), (0.0, 0.0), COAST_S),
+}
 
 
-class Passage:
-    """People who walk along x one after the other, and what the tracker says of the last one."""
-
-    def __init__(self, rng: np.random.Generator, camera: FloatArray | None = None) -> None:
-        self.tracker = PersonTracker()
-        self.camera = camera_at() if camera is None else camera
-        self._rng = rng
-        self._now = 0.0
-
-    def empty(self, seconds: float) -> None:
-        for _ in range(round(seconds / PERIOD_S)):
-            self._now += PERIOD_S
-            self.tracker.update((), self._now, self.camera)
-
-    def walk(
-        self,
-        from_m: float,
-        to_m: float,
-        *,
-        y_m: float = 0.0,
-        hidden_m: tuple[float, float] = (9e9, 9e9),
-    ) -> list[int]:
-        """Walk and return the ids, one for each frame that shows the person as confirmed."""
-        ids = []
-        steps = round(abs(to_m - from_m) / SPEED_MPS / PERIOD_S)
-        for x in np.linspace(from_m, to_m, steps):
-            self._now += PERIOD_S
-            place = np.array([x, y_m]) + self._rng.normal(0.0, 0.03, 2)
-            hidden = hidden_m[0] <= x <= hidden_m[1]
-            shown = [] if hidden else [observe(place, self._now, T_odom_camera=self.camera)]
-            tracks = self.tracker.update(shown, self._now, self.camera)
-            ids += [track.id for track in tracks if track.status == "confirmed"]
-        return ids
-
-    def kept_s(self) -> float:
-        """Return how long somebody who is not seen any more is kept."""
-        left_s = self._now
-        while self.tracker.update((), self._now + PERIOD_S, self.camera):
-            self._now += PERIOD_S
-            assert self._now < left_s + 60.0
-        self._now += PERIOD_S
-        return self._now - left_s
+@pytest.mark.parametrize("case", UNKNOWN_VIEW)
+def test_without_a_view_people_are_expected_where_people_have_been_seen(case: str) -> None:
+    place, velocity, expected_s = UNKNOWN_VIEW[case]
+    tracker, rest = PersonTracker(), ((6.0, -0.8), (5.0, -2.0))
+    now, tracks = watch(tracker, place, velocity, others_m=rest)
+    track = min(tracks, key=lambda one: math.dist(one.position_odom_m, place))
+    kept_s = kept_for_s(tracker, track.id, now, CAMERA, rest)
+    assert kept_s == pytest.approx(expected_s, rel=0.1, abs=0.11)
 
 
-def passage(seed: int, camera: FloatArray | None = None) -> Passage:
-    """Return a passage whose tracker has started already."""
-    place = Passage(np.random.default_rng(seed), camera)
-    place.empty(2.0)
-    return place
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_an_exit_is_learned_from_those_who_vanish_there(seed: int) -> None:
-    people = passage(seed)
+def test_a_camera_overhead_sees_people_behind_each_other() -> None:
+    high = camera_at(pitch_rad=math.pi / 2.0)
+    high[2, 3] = 8.0
+    front = ((2.0, 0.0),)
     kept = []
-    for _ in range(6):
-        people.walk(3.0, 8.0)
-        kept.append(people.kept_s())
-    # The first ones may be hidden, as far as the tracker knows.
-    assert kept[:3] == pytest.approx([CONFIG.max_coast_s] * 3, abs=0.11)
-    assert kept[3:] == pytest.approx([CONFIG.max_missed_s] * 3, abs=0.11)
+    for camera in (CAMERA, high):
+        tracker = PersonTracker(view=Everywhere())
+        for step in range(30):
+            now = step * PERIOD_S
+            shown = [observe(each, now, T_odom_camera=camera) for each in ((5.0, 0.0), *front)]
+            tracks = tracker.update(shown, now, camera)
+        last = max(tracks, key=lambda track: float(track.position_odom_m[0]))
+        kept.append(kept_for_s(tracker, last.id, now, camera, front))
+    assert kept == pytest.approx([STANDING_S, MISSED_S], abs=0.11)
 
 
-def test_people_who_appear_at_a_place_make_it_an_exit_too() -> None:
-    people = passage(0)
-    for _ in range(4):
-        people.walk(8.0, 4.0)
-        people.kept_s()
-    people.walk(4.0, 8.0)
-    assert people.kept_s() == pytest.approx(CONFIG.max_missed_s, abs=0.11)
+class Everywhere:
+    """A view in which everybody is seen."""
 
-
-@pytest.mark.parametrize("seed", range(2))
-def test_people_who_are_only_hidden_keep_their_ids_where_others_were_hidden(seed: int) -> None:
-    """A rack hides everybody for 2.5 s, always at the same place; they come out again."""
-    people = passage(seed)
-    for _ in range(4):
-        ids = people.walk(3.0, 11.0, hidden_m=(5.0, 5.0 + 2.5 * SPEED_MPS))
-        assert len(set(ids)) == 1
-        people.kept_s()
-
-
-def test_people_beside_the_robot_are_kept_wherever_others_have_left() -> None:
-    people = passage(1)
-    for _ in range(6):
-        people.walk(4.0, 1.5)
-        assert people.kept_s() == pytest.approx(CONFIG.max_coast_s, abs=0.11)
-
-
-def test_an_exit_holds_for_those_who_leave_by_it_only() -> None:
-    people = passage(2)
-    for _ in range(5):
-        people.walk(3.0, 8.0)
-        people.kept_s()
-    people.walk(3.0, 8.0, y_m=4.0)  # elsewhere
-    assert people.kept_s() == pytest.approx(CONFIG.max_coast_s, abs=0.11)
-    people.walk(12.0, 8.0)
-    assert people.kept_s() == pytest.approx(CONFIG.max_coast_s, abs=0.11)  # comes nearer
-
-
-def test_exits_move_with_the_camera() -> None:
-    """The view is the camera's, so the same place in the image is an exit after a turn."""
-    people = passage(3)
-    for _ in range(4):
-        people.walk(3.0, 8.0)
-        people.kept_s()
-    people.camera = camera_at(2.0, 1.0)
-    people.walk(5.0, 10.0, y_m=1.0)
-    assert people.kept_s() == pytest.approx(CONFIG.max_missed_s, abs=0.11)
-    people.walk(3.0, 8.0, y_m=1.0)  # 6 m ahead of the camera now, nobody has left there
-    assert people.kept_s() == pytest.approx(CONFIG.max_coast_s, abs=0.11)
+    def visibility(self, positions_odom_m: FloatArray, T_odom_camera: FloatArray) -> FloatArray:
+        return np.ones(len(positions_odom_m))

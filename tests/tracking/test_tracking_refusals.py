@@ -118,7 +118,7 @@ FRAMES: list[tuple[dict[str, Any], str]] = [
     ({"view": 3}, "view must have a method visibility"),
     *(
         ({"observations": (), "view": Answers(answer)}, r"one number in \[0, 1\] per position")
-        for answer in ([0.5, 0.5], [[1.0]], [2.0], [-0.1], [math.nan])
+        for answer in ([0.5] * 3, [[1.0] * 2], [2.0] * 2, [-0.1] * 2, [math.nan] * 2)
     ),
 ]
 
@@ -180,7 +180,7 @@ PATH = person(1.0)
 CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: PersonTracker().predict(math.nan), "stamp_s must be finite"),
     (lambda: watched().predict(0.1), r"predict at stamp_s = 0.1 s: the last frame was at 0.45\d*"),
-    (lambda: PersonTracker({"confirm_hits": 2}), "config must be a TrackerConfig, got dict"),
+    (lambda: PersonTracker({"weak_score": 0.2}), "config must be a TrackerConfig, got dict"),
     (lambda: both().update([], 0.0, laser_at(), sensor="lidar"), "'camera', 'laser', got 'lidar'"),
     (lambda: PersonTracker(sensors={"camera": SensorConfig()}), "names of their own, got 'cam"),
     (
@@ -195,7 +195,7 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: TrackerConfig(acceleration_density_m2ps3=0.0), "acceleration_density_m2ps3: "),
     (lambda: TrackerConfig(position_noise_floor_m=0.0), "position_noise_floor_m: "),
     (lambda: TrackerConfig(gate_probability=1.0), "gate_probability: "),
-    (lambda: TrackerConfig(confirm_hits=0), r"^TrackerConfig: confirm_hits: [^\n]*, got 0$"),
+    (lambda: TrackerConfig(max_missed_s=0), r"^TrackerConfig: max_missed_s: [^\n]*, got 0$"),
     (lambda: TrackerConfig(max_coast_s=math.inf), "max_coast_s: "),
     (lambda: TrackerConfig(initial_velocity_std_mps=math.nan), "initial_velocity_std_mps: "),
     (lambda: TrackerConfig(gate_distance_m=1e300), "gate_distance_m: "),
@@ -272,14 +272,14 @@ def test_without_filterpy_the_message_names_the_extra(monkeypatch: pytest.Monkey
 
 def test_an_unusable_file_is_refused_in_one_line_that_names_every_wrong_key(tmp_path: Path) -> None:
     path = tmp_path / "tracker.yaml"
-    path.write_text("confirm_hits: 0\ngate_probability: x\nawareness: {prior_awarenes: 0.1}\n")
+    path.write_text("max_missed_s: 0\ngate_probability: x\nawareness: {prior_awarenes: 0.1}\n")
     with pytest.raises(TrackingError) as caught:
         TrackerConfig.from_yaml(path)
     assert str(caught.value).splitlines() == [
         f"{path}: TrackerConfig: gate_probability: Input should be a valid number, unable to parse "
-        "string as a number, got 'x'; confirm_hits: Input should be greater than or equal to 1, "
-        "got 0; awareness: unknown key 'prior_awarenes' in AwarenessFilterConfig; did you mean "
-        "'prior_awareness'?"
+        "string as a number, got 'x'; max_missed_s: Input should be greater than or equal to "
+        "0.0001, got 0; awareness: unknown key 'prior_awarenes' in AwarenessFilterConfig; did you "
+        "mean 'prior_awareness'?"
     ]
     path.write_text("gate_distance_m: 1.0e+300\n", encoding="utf-8")
     with pytest.raises(TrackingError, match=r"tracker\.yaml: (?s:.)*gate_distance_m"):
