@@ -158,7 +158,7 @@ class TrackerConfig(TrackingConfig):
     detection_probability: float = Field(default=0.9, ge=0.01, le=0.999)
     """P_D, the share of frames that report a person in sight."""
 
-    detection_correlation_s: float = Field(default=0.1, ge=0.0, le=_MOST_S)
+    detection_correlation_s: float = Field(default=0.12, ge=0.0, le=_MOST_S)
     """Frames closer than this share their errors, clutter included, and count in proportion."""
 
     confirm_logit: float = Field(default=2.3, ge=-1e3, le=1e3)

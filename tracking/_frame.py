@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 from perception import PersonObservation
@@ -19,7 +19,6 @@ from .awareness_filter import Evidence, evidence, trusted_std
 _MAX_POSITION_M: Final = 1e7
 _MAX_VARIANCE_M2: Final = 1e6
 _LEAST_RANGE_M: Final = 1e-3
-_DOUBLE_M: Final = 0.25
 
 
 @dataclass(slots=True)
@@ -109,26 +108,6 @@ class Frame(NamedTuple):
         return float(self.T_odom_camera[0, 3]), float(self.T_odom_camera[1, 3])
 
 
-def without_doubles(measured: list[Measurement]) -> list[Measurement]:
-    """Return the measurements without those of people who have another.
-
-    Two bodies are not as near to each other as 0.25 m: the detector has reported one person twice.
-    The first is kept, with the lower awareness of both; a weak one yields to one that is not.
-    """
-    kept: list[Measurement] = []
-    for one in measured:
-        for place, other in enumerate(kept):
-            if (one.x - other.x) ** 2 + (one.y - other.y) ** 2 > _DOUBLE_M**2:
-                continue
-            best = one if other.weak and not one.weak else other
-            lower = min(filter(None, (one.evidence, other.evidence)), default=None)
-            kept[place] = replace(best, evidence=lower)
-            break
-        else:
-            kept.append(one)
-    return kept
-
-
 def measurements_of(
     observations: Iterable[PersonObservation],
     stamp_s: float,
@@ -150,12 +129,10 @@ def measurements_of(
     checked = _checked_observations(observations, stamp_s, config.stamp_tolerance_s)
     to_x, to_y = T_odom_camera[:2].tolist()
     pose = None if pose_covariance_odom is None else pose_covariance_odom.tolist()
-    return without_doubles(
-        [
-            _measurement(f"observations[{index}]", one, to_x, to_y, pose, config)
-            for index, one in enumerate(checked)
-        ]
-    )
+    return [
+        _measurement(f"observations[{index}]", one, to_x, to_y, pose, config)
+        for index, one in enumerate(checked)
+    ]
 
 
 def _measurement(

@@ -13,9 +13,12 @@ from ._person import Track
 from ._sensors import Gates
 from ._size import Taken, knows_size
 from ._state import Step
+from .awareness_filter import Evidence
 
 # How far a person may walk between two frames, in standard deviations of a new track's velocity.
 _REACH_SIGMAS: Final = 3.0
+# Two people are not as near to each other.
+_DOUBLE_M: Final = 0.25
 
 
 class Sight:
@@ -26,17 +29,19 @@ class Sight:
         cost: d² + ln det S.
         ray: of a track whose range the sensor does not share; None for others.
         by_ray: whether the match is possible by the ray alone, since its range disagrees.
+        evidence: of awareness; the lower one of a person whom the frame shows twice.
         ambiguous: whether the match may be another person's, as a rival is about as likely.
         jumped: whether the place is far from where the person was expected.
         held: whether a sensor without faces had seen the person without a gap before.
     """
 
-    __slots__ = ("ambiguous", "by_ray", "cost", "held", "jumped", "ray", "taken")
+    __slots__ = ("ambiguous", "by_ray", "cost", "evidence", "held", "jumped", "ray", "taken")
 
     def __init__(
         self, taken: Taken, cost: float, ray: Ray | None = None, *, by_ray: bool = False
     ) -> None:
         self.taken, self.cost, self.ray, self.by_ray = taken, cost, ray, by_ray
+        self.evidence = taken.given.evidence
         self.ambiguous = self.jumped = False
         self.held = True
 
@@ -102,9 +107,31 @@ def matched(tracks: list[Track], step: Step) -> Match:
                 if track.confirmed and match.sights[row] is None
             ]
             offer(left, [column for column, one in enumerate(measured) if one.weak])
-    used = {id(sight.given) for sight in match.sights if sight is not None}
-    match.new = [measured[column] for column in strong if id(measured[column]) not in used]
+    match.new = _new([measured[column] for column in strong], match, step.frame.origin_odom_m)
     return match
+
+
+def _new(
+    measured: list[Measurement], match: Match, origin_m: tuple[float, float]
+) -> list[Measurement]:
+    """Return the measurements that fit no track, without those that show somebody twice.
+
+    Of two of the same body the nearer one to the sensor counts.
+    """
+    taken = [sight.given for sight in match.sights if sight is not None]
+    used = {id(one) for one in taken}
+    left = [one for one in measured if id(one) not in used]
+    found: set[int] = set()
+    for one in sorted(left, key=lambda one: (math.dist((one.x, one.y), origin_m), one.x, one.y)):
+        if not any(is_same_body(one, other) for other in taken):
+            taken.append(one)
+            found.add(id(one))
+    return [one for one in left if id(one) in found]
+
+
+def is_same_body(first: Measurement, second: Measurement) -> bool:
+    """Return whether two places are nearer than two bodies: a detector reports one person twice."""
+    return (first.x - second.x) ** 2 + (first.y - second.y) ** 2 <= _DOUBLE_M**2
 
 
 def _edges(
@@ -195,6 +222,9 @@ def _associate(
             if holder == row:
                 continue
             own = match.sights[row] if row in partner else None
+            if own is not None and holder is None and is_same_body(sight.given, own.given):
+                own.evidence = _lower(own.evidence, sight.given.evidence)
+                continue
             # The track could have matched this measurement, …
             if own is not None and sight.cost <= own.cost + gates.ambiguity_margin:
                 a, b = measured[column], own.given
@@ -210,6 +240,13 @@ def _associate(
                 if (c.x - d.x) ** 2 + (c.y - d.y) ** 2 <= reach2:
                     match.rivals.append((holder, row))
                     other.ambiguous = True
+
+
+def _lower(first: Evidence | None, second: Evidence | None) -> Evidence | None:
+    """Return the lower awareness, or the only one."""
+    if first is None or second is None:
+        return first or second
+    return min(first, second)
 
 
 def assigned(costs: dict[int, dict[int, float]], miss_cost: float) -> dict[int, int]:

@@ -169,12 +169,12 @@ def _shared_with_rivals(tracks: list[Track], match: Match) -> dict[int, tuple[fl
 
 def _look(track: Track, sight: Sight | None, step: Step) -> float:
     """Return, in [0, 1], how certainly the frame shows a person who looks at the robot."""
-    if sight is None or sight.given.evidence is None or not step.sensor.settings.sees_faces:
+    if sight is None or sight.evidence is None or not step.sensor.settings.sees_faces:
         return 0.0
     if sight.by_ray or sight.given.weak or not track.confirmed:
         return 0.0
     # In standard deviations above α = 0.5, whose logit is 0; 2 Φ(σ) − 1.
-    mean, variance = sight.given.evidence
+    mean, variance = sight.evidence
     certainty = math.erf(math.sqrt(0.5) * mean / math.sqrt(variance))
     return certainty if certainty >= _LOOK else 0.0
 
@@ -184,9 +184,9 @@ def _looks_away(track: Track, sight: Sight | None, step: Step) -> bool:
 
     Whoever walks away looks where they go, and has to turn round first.
     """
-    if sight is None or sight.given.evidence is None:
+    if sight is None or sight.evidence is None:
         return False
-    mean, variance = sight.given.evidence
+    mean, variance = sight.evidence
     if mean > _AVERTED_LOGIT or mean > _AVERTED_SIGMAS * math.sqrt(variance):
         return False
     x, y = _towards(track, step)

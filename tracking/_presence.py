@@ -55,7 +55,7 @@ _TURN: Final = 2.0 * math.pi
 
 
 def record_hit(
-    track: Track, distance2: float, log_det: float, confirmed: Sequence[Track], step: Step
+    track: Track, distance2: float, log_det: float, shown: Sequence[Track], step: Step
 ) -> None:
     """Take a frame that shows a track; it may confirm it.
 
@@ -67,7 +67,7 @@ def record_hit(
         track: corrected with the frame.
         distance2: squared Mahalanobis distance d² of the measurement.
         log_det: ln det S.
-        confirmed: tracks that the frame shows as well; a second one beside them may be a double.
+        shown: all tracks that the frame shows; this may be the double of another.
         step: the frame.
     """
     index, period_s = step.sensor.index, step.clock.period_s
@@ -77,7 +77,7 @@ def record_hit(
         track.presence[index] = _SURE
         return
     gain = 0.5 * (step.sensor.gates.miss_cost - distance2 - log_det) + step.sensor.log_missed
-    if _is_beside(track, confirmed):
+    if _is_beside(track, shown, step):
         gain = min(gain, _BESIDE_HIT)
     before = max(
         _left(track, sensor, clock, step.frame.stamp_s, step.config)
@@ -109,16 +109,13 @@ def record_misses(tracks: list[Track], step: Step) -> None:
         return
     if dt_s > 0.0:
         visibility = _visibility(unseen, shown, step)
-        confirmed = [track for track in shown if track.confirmed]
         for track, visible in zip(unseen, visibility, strict=True):
             if track.presence[index] > -math.inf:
-                track.presence[index] -= _loss(track, visible, dt_s, confirmed, step)
+                track.presence[index] -= _loss(track, visible, dt_s, shown, step)
     _record_empty_places([track for track in unseen if track.confirmed], step)
 
 
-def _loss(
-    track: Track, visible: float, dt_s: float, confirmed: Sequence[Track], step: Step
-) -> float:
+def _loss(track: Track, visible: float, dt_s: float, shown: Sequence[Track], step: Step) -> float:
     """Return what a frame takes that should have shown a track by ``visible`` in [0, 1]."""
     config, sensor = step.config, step.sensor
     hidden_s = (1.0 - visible) * dt_s
@@ -129,7 +126,7 @@ def _loss(
     if track.confirmed:
         counted_s = min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
         return lost + share * counted_s * _SURE / config.max_missed_s
-    miss = _BESIDE_MISS if _is_beside(track, confirmed) else sensor.log_missed
+    miss = _BESIDE_MISS if _is_beside(track, shown, step) else sensor.log_missed
     return lost - share * _weight(dt_s, config) * miss
 
 
@@ -153,11 +150,20 @@ def _fading_per_s(track: Track, sensor: Sensor, config: TrackerConfig) -> float:
     return _SURE / max(kept_s, 1e-9)
 
 
-def _is_beside(track: Track, people: Sequence[Track]) -> bool:
-    """Return whether a track may be a double of one of these people."""
+def _is_beside(track: Track, shown: Sequence[Track], step: Step) -> bool:
+    """Return whether a track may be the double of one that is surer.
+
+    It is confirmed, older, or as old and nearer to the sensor.
+    """
+    x, y = step.frame.origin_odom_m
+
+    def age(one: Track) -> tuple[float, float]:
+        return one.born_s, math.hypot(one.x - x, one.y - y)
+
     return any(
         (track.x - other.x) ** 2 + (track.y - other.y) ** 2 <= _BESIDE_M**2
-        for other in people
+        and (other.confirmed or age(other) < age(track))
+        for other in shown
         if other is not track
     )
 

@@ -29,30 +29,30 @@ class Field(NamedTuple):
     Nearer than 3 m it need not see anybody: beside the robot it does not.
 
     Attributes:
-        least_cosine: of the widest angle to the axis; 1 before anybody.
+        widest_rad: largest angle to the axis.
         farthest_m: largest distance.
     """
 
-    least_cosine: float = 1.0
+    widest_rad: float = 0.0
     farthest_m: float = 0.0
 
     def after(self, tracks: Iterable[Track], frame: Frame, sensor: Sensor) -> Field:
         """Return the field after a frame that shows these people."""
-        cosine, farthest_m = self
+        widest_rad, farthest_m = self
         for track in tracks:
-            other, distance_m = _direction(track, frame, sensor)
-            cosine, farthest_m = min(cosine, other), max(farthest_m, distance_m)
-        return Field(cosine, farthest_m)
+            angle_rad, distance_m = _direction(track, frame, sensor)
+            widest_rad, farthest_m = max(widest_rad, angle_rad), max(farthest_m, distance_m)
+        return Field(widest_rad, farthest_m)
 
     def sees(self, track: Track, frame: Frame, sensor: Sensor) -> float:
         """Return 1 for a person where others have been seen, and 0 elsewhere."""
-        cosine, distance_m = _direction(track, frame, sensor)
-        inside = cosine >= self.least_cosine and _NEAR_M <= distance_m <= self.farthest_m
-        return 1.0 if inside else 0.0
+        angle_rad, distance_m = _direction(track, frame, sensor)
+        inside = angle_rad <= self.widest_rad
+        return 1.0 if inside and _NEAR_M <= distance_m <= self.farthest_m else 0.0
 
 
 def _direction(track: Track, frame: Frame, sensor: Sensor) -> tuple[float, float]:
-    """Return the cosine of the angle between a person's chest and the axis, and the distance.
+    """Return the angle between a person's chest and the axis, and the distance.
 
     The axis of a camera is z, that of a scanner x.
     """
@@ -61,7 +61,7 @@ def _direction(track: Track, frame: Frame, sensor: Sensor) -> tuple[float, float
     x, y, z = track.x - T[0][3], track.y - T[1][3], CHEST_M - T[2][3]
     distance_m = math.sqrt(x * x + y * y + z * z)
     along_m = x * T[0][axis] + y * T[1][axis] + z * T[2][axis]
-    return along_m / max(distance_m, 1e-9), distance_m
+    return math.acos(min(max(along_m / max(distance_m, 1e-9), -1.0), 1.0)), distance_m
 
 
 class State(NamedTuple):

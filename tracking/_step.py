@@ -26,11 +26,7 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     step = Step(frame, sensor, sensors, state, state.at(frame, sensor))
     tracks = _predicted(step)
     match = matched(tracks, step)
-    shown = [
-        track
-        for track, sight in zip(tracks, match.sights, strict=True)
-        if sight is not None and track.confirmed
-    ]
+    shown = [track for track, sight in zip(tracks, match.sights, strict=True) if sight is not None]
     for track, sight in zip(tracks, match.sights, strict=True):
         if sight is not None:
             _correct(track, sight, shown, step)
@@ -51,7 +47,8 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     kept = [track for track in left if track.id not in gone] if gone else left
     fields = step.state.fields
     if step.view is None:
-        field = fields[sensor.index].after(shown, frame, sensor)
+        people = [track for track in shown if track.confirmed]
+        field = fields[sensor.index].after(people, frame, sensor)
         fields = (*fields[: sensor.index], field, *fields[sensor.index + 1 :])
     return step.state._replace(tracks=tuple(kept), next_id=next_id, fields=fields)
 
@@ -71,10 +68,10 @@ def _predicted(step: Step) -> list[Track]:
     return tracks
 
 
-def _correct(track: Track, sight: Sight, confirmed: list[Track], step: Step) -> None:
+def _correct(track: Track, sight: Sight, shown: list[Track], step: Step) -> None:
     """Correct a track with its measurement, and count the hit.
 
-    ``confirmed`` are the people whom the frame shows.
+    ``shown`` are all tracks that the frame shows.
     """
     taken, ray = sight.taken, sight.ray
     expected = track.spread_m2
@@ -102,7 +99,7 @@ def _correct(track: Track, sight: Sight, confirmed: list[Track], step: Step) -> 
     if origin is not None:
         taken.pass_lasting(track, noise, origin)
     track.correct(taken.x, taken.y, noise)
-    record_hit(track, *found, confirmed, step)
+    record_hit(track, *found, shown, step)
 
 
 def _give_birth(tracks: list[Track], match: Match, step: Step) -> int:
@@ -140,7 +137,7 @@ def _see_face(track: Track, sight: Sight | None, step: Step) -> None:
     ambiguous = sight is not None and sight.ambiguous
     if step.sensor.settings.sees_faces:
         seen = sight is not None and not sight.given.weak and not ambiguous
-        evidence = sight.given.evidence if sight is not None and seen else None
+        evidence = sight.evidence if sight is not None and seen else None
         if sight is not None and sight.by_ray and step.sensors.mixed:
             evidence = None
         previous_s = step.earlier.faces.stamp_s

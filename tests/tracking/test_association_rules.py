@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from perception.arrays import FloatArray
 from tracking import TrackerConfig
 from tracking._frame import Frame, Measurement, Spread
-from tracking._match import assigned, matched
+from tracking._match import assigned, is_same_body, matched
 from tracking._person import Track
 from tracking._sensors import sensors_of
 from tracking._state import Field, State, Step
@@ -92,6 +92,8 @@ def rivals_of(
             continue
         if i in matches:
             one, own = measured[j], measured[matches[i]]
+            if owner < 0 and is_same_body(one, own):
+                continue
             close = math.hypot(one.x - own.x, one.y - own.y) <= CONFIG.ambiguity_distance_m
             if close and costs[i, j] <= costs[i, matches[i]] + CONFIG.ambiguity_margin:
                 found.add((i, owner))
@@ -128,8 +130,14 @@ def test_matches_follow_the_rules(first: int) -> None:
         doubted = {row for row, _ in rivals}
         ambiguous = {i for i, sight in enumerate(found.sights) if sight and sight.ambiguous}
         assert ambiguous == doubted, seed
-        new = [measured[j] for j in strong if j not in matches.values()]
-        assert found.new == new, seed
+        new: list[Measurement] = []
+        taken = [measured[j] for j in matches.values()]
+        for one in sorted(measured, key=lambda one: math.hypot(one.x, one.y)):
+            if one.weak or one in taken or any(is_same_body(one, other) for other in taken):
+                continue
+            taken.append(one)
+            new.append(one)
+        assert sorted(map(id, found.new)) == sorted(map(id, new)), seed
         counts["matches"] += len(matches)
         counts["rivals"] += len(rivals)
         counts["new"] += len(new)

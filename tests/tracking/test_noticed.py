@@ -257,7 +257,9 @@ def test_an_ambiguous_match_ends_it_and_takes_awareness() -> None:
     scene = attentive()
     before = scene.run(0.1, alpha=0.9)
     assert before.awareness_lower > 0.2
-    scene.run(0.3, camera=False, others=((3.05, 0.62),))
+    for y in np.arange(1.4, 0.6, -0.03):  # somebody else comes as near as a body allows
+        scene.run(0.04, alpha=0.9, others=((3.05, y),))
+    scene.run(0.1, camera=False, others=((3.05, 0.6),))
     assert scene.track.noticed == 0.0
     assert scene.track.awareness_lower == 0.0
 

@@ -119,23 +119,23 @@ def test_a_view_of_a_frame_holds_for_that_frame_also_when_frames_come_late() -> 
 
     hidden, free = view_of(ahead(25.0, 1.0)), view_of(np.full(720, 6.0))
     frames = [
-        (stamp_s, [legs(stamp_s)] if stamp_s < 1.99 else [], hidden if stamp_s < 3.49 else free)
-        for stamp_s in (0.05 * np.arange(90)).tolist()
+        (stamp_s, [legs(stamp_s)] if stamp_s < 1.99 else [], hidden if stamp_s < 2.99 else free)
+        for stamp_s in (0.05 * np.arange(70)).tolist()
     ]
     ordered, late = (
         PersonTracker(sensors={"laser": SensorConfig(view=ScannerView())}) for _ in range(2)
     )
-    swapped = [frames[k + 1 if k % 2 == 0 else k - 1] for k in range(90)]
+    swapped = [frames[k + 1 if k % 2 == 0 else k - 1] for k in range(70)]
     for tracker, given_frames in ((ordered, frames), (late, swapped)):
         for stamp_s, people, view in given_frames:
             tracker.update(people, stamp_s, np.eye(4), sensor="laser", view=view)
-    (one,), (other,) = ordered.predict(4.5), late.predict(4.5)
+    (one,), (other,) = ordered.predict(3.5), late.predict(3.5)
     assert np.array_equal(one.position_odom_m, other.position_odom_m)
     assert one.place_empty == other.place_empty
-    # Hidden for 1.5 s and missed for 1 s since: it is not yet given up.
+    # Hidden for 1 s and missed for 0.5 s since: it is not yet given up.
     assert not one.place_empty
     for step in range(8):
-        stamp_s = 4.5 + 0.05 * step
+        stamp_s = 3.5 + 0.05 * step
         tracks = ordered.update([], stamp_s, np.eye(4), sensor="laser", view=free)
     assert tracks == () or tracks[0].place_empty
 

@@ -132,7 +132,7 @@ def test_an_ambiguous_match_forgets_the_size():
     tracker = PersonTracker()
     stamps = np.arange(0.0, 1.0, 0.05)
     after_images(tracker, stamps, lasting=0.03, size_ratio=1.6)
-    two = [seen(PLACE_M + offset, 1.0, lasting=0.03, size_ratio=1.6) for offset in (-0.05, 0.05)]
+    two = [seen(PLACE_M + offset, 1.0, lasting=0.03, size_ratio=1.6) for offset in (-0.15, 0.15)]
     tracker.update(two, 1.0, camera_at())
     # With its size known, it would be in these images (the test of hidden feet).
     tracks = after_images(tracker, np.arange(1.05, 1.5, 0.05), ratio=1.6)

@@ -258,7 +258,7 @@ def test_an_ambiguous_match_ends_the_memory() -> None:
         tracker.update([observe((3.0, 0.0), now, awareness=0.95)], now, CAMERA)
     # Two people where there was one: either may be the one who looked.
     now += PERIOD_S
-    pair = [observe((3.0, y_m), now, awareness=0.95) for y_m in (-0.1, 0.1)]
+    pair = [observe((3.0, y_m), now, awareness=0.95) for y_m in (-0.15, 0.15)]
     assert all(track.awareness_lower < 0.1 for track in tracker.update(pair, now, CAMERA))
 
 

@@ -88,7 +88,7 @@ def test_the_tracks_are_valid_after_any_sequence(
             np.linalg.cholesky(track.covariance_odom)
             assert track.stamp_s == latest
             assert 0.0 <= track.awareness_lower <= track.awareness <= 1.0
-            assert track.status != "confirmed" or track.time_since_seen_s <= 1.1 + 1e-9
+            assert track.status != "confirmed" or track.time_since_seen_s <= 2.5 * 1.1 + 1e-6
             if track.status == "tentative":
                 assert track.noticed == track.awareness_lower == 0.0
         lower = {track.id: track.awareness_lower for track in tracks}

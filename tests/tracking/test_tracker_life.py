@@ -176,13 +176,13 @@ def test_an_ambiguous_match_has_less_weight() -> None:
     spreads = {}
     for factor in (1.0, 3.0):
         tracker = PersonTracker(TrackerConfig(ambiguous_noise_factor=factor, max_pause_s=1e3))
-        for apart_m in (0.05, 3.0):
+        for apart_m in (0.26, 3.0):
             for step in range(20):
                 now = step * PERIOD_S + 100.0 * apart_m
                 pair = [observe((3.0, y_m), now) for y_m in (0.0, apart_m)]
                 tracks = tracker.update(pair, now, CAMERA)
             spreads[factor, apart_m] = np.trace(tracks[0].covariance_odom)
-    assert spreads[3.0, 0.05] > 1.5 * spreads[1.0, 0.05]
+    assert spreads[3.0, 0.26] > 1.5 * spreads[1.0, 0.26]
     assert spreads[3.0, 3.0] == pytest.approx(spreads[1.0, 3.0])
 
 
@@ -338,9 +338,9 @@ def test_weak_detections_neither_start_nor_confirm_a_track() -> None:
 
 def test_a_faster_camera_confirms_no_more_clutter_a_second() -> None:
     """The evidence that is needed grows as the logarithm of the frame rate."""
-    assert CONFIG.detection_correlation_s <= 0.1
+    assert CONFIG.detection_correlation_s <= 0.2
     needed = {}
-    for period_s in (0.1, 0.2):
+    for period_s in (0.2, 0.4):
         config = TrackerConfig(confirm_logit=15.0)
         while True:
             tracker = PersonTracker(config)
@@ -351,4 +351,4 @@ def test_a_faster_camera_confirms_no_more_clutter_a_second() -> None:
             config = config.model_copy(update={"confirm_logit": config.confirm_logit - 0.01})
         needed[period_s] = config.confirm_logit
     # Twice as many tracks of clutter a second: each is confirmed half as often.
-    assert needed[0.2] < needed[0.1] + 1.0
+    assert needed[0.4] < needed[0.2] + 1.0

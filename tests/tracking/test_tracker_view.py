@@ -152,7 +152,7 @@ def test_one_frame_after_a_pause_deletes_nobody() -> None:
 def test_a_standing_person_beside_the_robot_keeps_the_position() -> None:
     """The robot passes a standing person: the position is kept, with a consistent covariance."""
     # Once the person is out of view, every fourth frame will do: the rate does not matter there.
-    stamps_s = [*np.arange(34) * PERIOD_S, *np.arange(36, 230, 4) * PERIOD_S]
+    stamps_s = [*np.arange(34) * PERIOD_S, *np.arange(36, 190, 4) * PERIOD_S]
     errors, spreads = [], []
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -165,7 +165,7 @@ def test_a_standing_person_beside_the_robot_keeps_the_position() -> None:
             people = [observe(measured, now, T_odom_camera=T)] if visible else []
             tracks = tracker.update(people, now, T)
         (track,) = tracks
-        assert track.time_since_seen_s > 9.0
+        assert track.time_since_seen_s > 7.0
         errors.append(track.position_odom_m - (3.0, 1.0))
         spreads.append(track.covariance_odom[:2, :2])
     distances = np.linalg.norm(errors, axis=1)

@@ -29,7 +29,7 @@ def test_whoever_may_be_a_stranger_has_not_noticed_the_robot() -> None:
         return second.noticed
 
     assert noticed(1.5) > 0.5
-    assert noticed(1.4, 1.6) == 0.0
+    assert noticed(1.35, 1.65) == 0.0
 
 
 def test_a_camera_that_puts_a_person_too_far_away_moves_no_scanned_place() -> None:
