@@ -111,7 +111,7 @@ class _Feet:
 def place_people(
     camera: Camera,
     detections: Sequence[PersonDetection],
-    people: Sequence[PersonKeypoints],
+    people: tuple[PersonKeypoints, ...],
     heads: Sequence[HeadPose | None],
     floor: FloorPlane | None,
     keypoint_std_px: float,

@@ -14,7 +14,7 @@ from .._camera import Camera
 from .._floor import FloorPlane
 from .._observation import PersonObservation
 from .._pipeline import AwarenessPipeline
-from ..arrays import ImageRgb
+from ..arrays import ImageRgb, check_image
 from ..errors import PerceptionError
 from ..matrices import mahalanobis2
 from ._lenses import FlatView, PanoramaLens, WideLens
@@ -161,14 +161,7 @@ class SurroundPipeline:
         Raises:
             PerceptionError: for an image of another size or type.
         """
-        wanted = (self.lens.height_px, self.lens.width_px, 3)
-        if not isinstance(image_rgb, np.ndarray) or image_rgb.dtype != np.uint8:
-            kind = getattr(image_rgb, "dtype", type(image_rgb).__name__)
-            raise PerceptionError(f"image_rgb must be a uint8 array of shape {wanted}, got {kind}")
-        if image_rgb.shape != wanted:
-            raise PerceptionError(
-                f"image_rgb must have the lens's shape {wanted}, got {image_rgb.shape}"
-            )
+        check_image(image_rgb, self.lens.height_px, self.lens.width_px)
         border = cv2.BORDER_WRAP if self._wraps else cv2.BORDER_CONSTANT
         return tuple(
             np.asarray(cv2.remap(image_rgb, *maps, cv2.INTER_LINEAR, borderMode=border))
