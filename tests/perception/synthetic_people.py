@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, Camera, HeadPose, PersonDetection, PersonKeypoints
+from perception import (
+    AttentionCone,
+    Camera,
+    HeadPose,
+    PersonDetection,
+    PersonKeypoints,
+    PnpHeadPoseEstimator,
+)
 from perception.anthropometry import EYES_HEAD_M, HEAD_TEMPLATE_M
 from perception.awareness import estimate_awareness
 
@@ -84,6 +91,14 @@ def person_at(
     chest = 0.7 * points[5:7].mean(axis=0) + 0.3 * points[11:13].mean(axis=0)
     eyes = points[0] + rotation @ EYES_HEAD_M * scale
     return SyntheticPerson(points, chest, rotation, eyes)
+
+
+class KnownShape(PnpHeadPoseEstimator):
+    """An estimator that takes all heads for ones of exactly the template's shape."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._shape_factor_m = None
 
 
 class Given:
