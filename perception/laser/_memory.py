@@ -54,9 +54,9 @@ _NEAR_LEGS: Final = np.array(
 class OccupancyMemory:
     """Remembers for how long each cell of the floor was occupied and free.
 
-    A cell becomes static after 1.5 s of returns. Returns that may belong to a person are not counted
-    and take back others, so that somebody who stands still is not forgotten. What stands where the
-    floor was free before anything was met there has come: it is no structure.
+    A cell becomes static after 1.5 s of returns. Returns that may belong to a person are not
+    counted and take back others, so that somebody who stands still is not forgotten. What stands
+    where the floor was free before anything was met there has come: it is no structure.
     """
 
     def __init__(self) -> None:
