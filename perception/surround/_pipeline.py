@@ -120,8 +120,7 @@ class SurroundPipeline:
         views: flat views to cut from an image, for example from :func:`ring_of_views`.
         make_pipeline: makes the pipeline for the camera of a view; default one with the shipped
             networks. It is called once for each camera object; the views with that camera share its
-            networks (:meth:`~perception.AwarenessPipeline.for_another_view`). Where it makes
-            pipelines without that method, it is called for each view.
+            networks (:meth:`~perception.AwarenessPipeline.for_another_view`).
 
     Raises:
         PerceptionError: without views, or from ``make_pipeline``.
@@ -137,17 +136,10 @@ class SurroundPipeline:
             raise PerceptionError("views must hold at least one view, got none")
         self.lens = lens
         self.views = tuple(views)
-        made: dict[int, AwarenessPipeline] = {}
-        self._pipelines: list[AwarenessPipeline] = []
-        for view in self.views:
-            if id(view.camera) not in made:
-                made[id(view.camera)] = make_pipeline(view.camera)
-            pipeline = made[id(view.camera)]
-            # A pipeline keeps people from one image of its view to the next.
-            if any(pipeline is other for other in self._pipelines):
-                anew = getattr(pipeline, "for_another_view", None)  # stand-ins may lack it
-                pipeline = make_pipeline(view.camera) if anew is None else anew()
-            self._pipelines.append(pipeline)
+        cameras = {id(view.camera): view.camera for view in self.views}
+        made = {key: make_pipeline(camera) for key, camera in cameras.items()}
+        # A pipeline keeps people from one image of its view to the next.
+        self._pipelines = [made[id(view.camera)].for_another_view() for view in self.views]
         self._maps = [
             # Fixed-point maps make cv2.remap several times faster.
             cv2.convertMaps(*view.sampling_maps(lens), cv2.CV_16SC2)
