@@ -295,8 +295,10 @@ def _with_range(people: Sequence[_Ranged]) -> list[PersonPlace]:
     spread = across @ covariance @ across + far[:, :, None] * far[:, None]
     spread = 0.5 * (spread + spread.swapaxes(1, 2))
     return [
-        PersonPlace(*place, each.found.lasting_std, each.size_range_m, each.size_range_relative_std)
-        for *place, each in zip(placed, spread, people, strict=True)
+        PersonPlace(
+            place, own, each.found.lasting_std, each.size_range_m, each.size_range_relative_std
+        )
+        for place, own, each in zip(placed, spread, people, strict=True)
     ]
 
 
