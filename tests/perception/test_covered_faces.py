@@ -22,7 +22,6 @@ from perception import (
 from perception.evidence import judge_face
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
-FRAME = np.zeros((960, 1280, 3), np.uint8)
 CONE = AttentionCone()
 EYE_STD_RAD = (0.2, 0.06)
 COUNT = 80
