@@ -36,16 +36,7 @@ def random_texture(rng: np.random.Generator, size_hw: tuple[int, int]) -> Image:
         rng: random generator.
         size_hw: height and width in pixels.
     """
-    kinds: tuple[Callable[..., Floats], ...] = (
-        _noise,
-        _noise,
-        _stripes,
-        _checks,
-        _cells,
-        _gradient,
-    )
-    kind = kinds[int(rng.integers(len(kinds)))]
-    out = _coloured(kind(rng, size_hw), rng)
+    out = _coloured(_KINDS[int(rng.integers(len(_KINDS)))](rng, size_hw), rng)
     if rng.random() < 0.4:
         other = _coloured(_KINDS[int(rng.integers(len(_KINDS)))](rng, size_hw), rng)
         mask = _noise(rng, size_hw)[..., None]
