@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ._walkers import FloatArray, WalkerSettings, walk
+from ._walkers import FloatArray, side_m, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,34 +62,34 @@ class SimulatedRecording:
 
 
 def record(
-    people: int,
-    frames: int,
-    rng: np.random.Generator,
-    sensor: SensorSettings = OPEN,
-    walkers: WalkerSettings | None = None,
+    people: int, frames: int, rng: np.random.Generator, sensor: SensorSettings = OPEN
 ) -> SimulatedRecording:
-    """Simulate a crowd and measure it."""
-    walkers = walkers or WalkerSettings()
+    """Simulate a crowd and measure it; clutter is uniform over the hall."""
     stamps_s = np.arange(frames) / sensor.rate_hz
-    truth = walk(people, stamps_s, rng, walkers)
+    truth = walk(people, stamps_s, rng)
+    return _measured(stamps_s, truth, np.zeros(2), np.full(2, side_m(people)), rng, sensor)
+
+
+def _measured(
+    stamps_s: FloatArray,
+    truth: FloatArray,
+    low_m: FloatArray,
+    high_m: FloatArray,
+    rng: np.random.Generator,
+    sensor: SensorSettings,
+) -> SimulatedRecording:
+    """Measure people (T, N, 4), with clutter in the rectangle from ``low_m`` to ``high_m``."""
+    people = truth.shape[1]
     visible = visible_spells(people, stamps_s, sensor, rng)
-    side_m = walkers.side_m(people)
+    area_m2 = float(np.prod(high_m - low_m))
     measured = []
-    for frame in range(frames):
+    for frame, now_m in enumerate(truth[:, :, :2]):
         shown = visible[frame] & (rng.random(people) >= sensor.miss_probability)
-        people_m = truth[frame, shown, :2] + rng.normal(
-            0.0, sensor.noise_std_m, (int(shown.sum()), 2)
-        )
-        count = int(rng.poisson(sensor.clutter_per_m2 * side_m**2))
-        clutter_m = rng.uniform(0.0, side_m, (count, 2))
+        people_m = now_m[shown] + rng.normal(0.0, sensor.noise_std_m, (int(shown.sum()), 2))
+        count = int(rng.poisson(sensor.clutter_per_m2 * area_m2))
+        clutter_m = rng.uniform(low_m, high_m, (count, 2))
         measured.append(rng.permutation(np.concatenate([people_m, clutter_m])))
-    return SimulatedRecording(
-        stamps_s,
-        truth,
-        visible,
-        tuple(measured),
-        sensor.noise_std_m,
-    )
+    return SimulatedRecording(stamps_s, truth, visible, tuple(measured), sensor.noise_std_m)
 
 
 def visible_spells(
@@ -141,23 +141,7 @@ def record_walks(
         ],
         axis=1,
     )
-    people = len(walks)
-    visible = visible_spells(people, stamps_s, sensor, rng)
     low_m = places.reshape(-1, 2).min(axis=0) - _MARGIN_M
     high_m = places.reshape(-1, 2).max(axis=0) + _MARGIN_M
-    area_m2 = float(np.prod(high_m - low_m))
-    measured = []
-    for frame, now in enumerate(places):
-        shown = visible[frame] & (rng.random(people) >= sensor.miss_probability)
-        seen_m = now[shown] + rng.normal(0.0, sensor.noise_std_m, (int(shown.sum()), 2))
-        count = int(rng.poisson(sensor.clutter_per_m2 * area_m2))
-        measured.append(
-            rng.permutation(np.concatenate([seen_m, rng.uniform(low_m, high_m, (count, 2))]))
-        )
-    return SimulatedRecording(
-        stamps_s,
-        np.concatenate([places, np.zeros_like(places)], axis=2),  # speeds are not judged
-        visible,
-        tuple(measured),
-        sensor.noise_std_m,
-    )
+    truth = np.concatenate([places, np.zeros_like(places)], axis=2)  # speeds are not judged
+    return _measured(stamps_s, truth, low_m, high_m, rng, sensor)
