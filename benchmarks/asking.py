@@ -1,4 +1,4 @@
-"""Looks that answer a request: ``python -m benchmarks.asking`` says how many are measured, how soon.
+"""True looks after requests, and how soon they are measured: ``python -m benchmarks.asking``.
 
 Each true look after a request for attention is compared with what the adapter made of it.
 """
