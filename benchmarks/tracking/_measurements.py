@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .._recordings import places_together
 from ._walkers import FloatArray, side_m, walk
 
 
@@ -108,20 +106,6 @@ def visible_spells(
     return visible
 
 
-def recordings_in(folder: Path) -> list[Path]:
-    """Return the CSV files of a folder in the order of their names; none if it does not exist."""
-    return sorted(folder.glob("*.csv"))
-
-
-def walks_of(path: Path) -> list[FloatArray]:
-    """Return (K, 3) t, x, y (s, m, m) of each person in a CSV of ``t_s, id, x_m, y_m``."""
-    samples: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    with path.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            samples[row["id"]].append((float(row["t_s"]), float(row["x_m"]), float(row["y_m"])))
-    return [np.array(walk) for walk in samples.values()]
-
-
 def record_walks(
     walks: Sequence[FloatArray], rng: np.random.Generator, sensor: SensorSettings
 ) -> SimulatedRecording:
@@ -130,17 +114,7 @@ def record_walks(
     Positions are interpolated linearly at the sensor's frame rate. Clutter is uniform over the
     rectangle that all walks need, and 1 m around it.
     """
-    start_s, end_s = max(walk[0, 0] for walk in walks), min(walk[-1, 0] for walk in walks)
-    stamps_s = np.arange(0.0, end_s - start_s, 1.0 / sensor.rate_hz)
-    places = np.stack(
-        [
-            np.column_stack(
-                [np.interp(start_s + stamps_s, walk[:, 0], walk[:, axis]) for axis in (1, 2)]
-            )
-            for walk in walks
-        ],
-        axis=1,
-    )
+    stamps_s, places = places_together(walks, sensor.rate_hz)
     low_m = places.reshape(-1, 2).min(axis=0) - _MARGIN_M
     high_m = places.reshape(-1, 2).max(axis=0) + _MARGIN_M
     truth = np.concatenate([places, np.zeros_like(places)], axis=2)  # speeds are not judged

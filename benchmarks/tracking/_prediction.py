@@ -24,7 +24,7 @@ from tracking.prediction import (
     predict_states,
 )
 
-from ._measurements import recordings_in, walks_of
+from .._recordings import recordings_in, walks_of
 from ._trackers import T_ODOM_CAMERA, observations
 from ._walkers import FloatArray, walk
 
