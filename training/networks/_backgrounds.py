@@ -28,10 +28,6 @@ class Backgrounds:
             for number in range(count)
         ]
 
-    def __len__(self) -> int:
-        """Return the number of pictures."""
-        return len(self._pictures)
-
     def random(self, rng: np.random.Generator) -> NDArray[np.uint8]:
         """Return one of the pictures."""
         return self._pictures[int(rng.integers(len(self._pictures)))]
