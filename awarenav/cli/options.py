@@ -140,12 +140,14 @@ def out_file(
 
 
 def plot_file(default: str, help: str) -> Decorator:
-    """Add ``--out``: the file of a plot, or ``none``.
+    """Add ``--out``: the file of a plot; None for ``none``.
 
-    Without matplotlib the default is ``none``, with a remark; a file that is asked for is an error.
+    Without matplotlib the default is none, with a remark; a file that is asked for is an error.
     """
 
-    def without_matplotlib(context: click.Context, parameter: click.Parameter, out: Path) -> Path:
+    def file_or_none(context: click.Context, parameter: click.Parameter, out: Path) -> Path | None:
+        if str(out) == "none":
+            return None
         chosen = context.get_parameter_source(str(parameter.name)) is not ParameterSource.DEFAULT
         if chosen or context.resilient_parsing or _is_installed("matplotlib"):
             return out
@@ -157,14 +159,14 @@ def plot_file(default: str, help: str) -> Decorator:
             f"{install_command('plot')}",
             file=sys.stderr,
         )
-        return Path("none")
+        return None
 
     return option(
         "--out",
         type=FilePath(),
         default=default,
         metavar="FILE.png|svg|pdf|none",
-        callback=without_matplotlib,
+        callback=file_or_none,
         help=f"{help} Needs matplotlib.",
     )
 

@@ -8,19 +8,8 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._findings import Finding, by_importance
-    from ._installation import installation_findings
-    from ._pictures import PictureFigures, picture_figures, picture_findings
-    from ._run import DoctorOptions, doctor_command
+    from ._pictures import picture_figures
 
-__all__ = [
-    "DoctorOptions",
-    "Finding",
-    "PictureFigures",
-    "by_importance",
-    "doctor_command",
-    "installation_findings",
-    "picture_figures",
-    "picture_findings",
-]
+__all__ = ["Finding", "by_importance", "picture_figures"]
 
 __getattr__ = lazy_page(__name__, __file__)

@@ -5,11 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Final
-
-from pydantic import Field
-
-from tracking.config import StrictConfig
+from typing import Any, Final
 
 from ..errors import AwarenavError
 from ..records import PersonRecord, people_by_frame, read_records
@@ -20,33 +16,16 @@ from ._metrics import PersonFrame, person_metrics
 #: The people of every frame, by the frame's name.
 Frames = dict[str, list[PersonRecord]]
 
+# Who has to be found: least height of the true box, and shares of the person, exclusive, that other
+# things hide or that lie outside the image. Others count neither as missed nor as false positives.
+_SETTINGS: Final = {"min_height_px": 40.0, "max_occlusion": 0.5, "max_truncation": 0.5}
 # Angles between the head's forward axis and the direction to the camera, degrees.
 _FACINGS_DEG: Final = (("front", 0.0, 60.0), ("profile", 60.0, 120.0), ("back", 120.0, 180.1))
 # Bins of range; the lower edge belongs to the bin.
 _RANGES_M: Final = ((0.0, 1.5), (1.5, 3.0), (3.0, 4.5), (4.5, 6.0), (6.0, math.inf))
 
 
-class JudgeConfig(StrictConfig):
-    """Limits for people who have to be found.
-
-    Other people count neither as missed nor as false positives.
-
-    Attributes:
-        min_height_px: least height of the true box.
-        max_occlusion: share of the person that other things hide, exclusive.
-        max_truncation: share of the person outside the image, exclusive.
-    """
-
-    error: ClassVar[type[ValueError]] = AwarenavError
-
-    min_height_px: float = Field(default=40.0, ge=0.0)
-    max_occlusion: float = Field(default=0.5, gt=0.0, le=1.0)
-    max_truncation: float = Field(default=0.5, gt=0.0, le=1.0)
-
-
-def judge_files(
-    truth: Path, estimates: Path, config: JudgeConfig | None = None, *, common: bool = False
-) -> dict[str, Any]:
+def judge_files(truth: Path, estimates: Path, *, common: bool = False) -> dict[str, Any]:
     """Compare a JSON Lines file of estimates with one of truth; see :func:`judge_frames`.
 
     Raises:
@@ -63,12 +42,10 @@ def judge_files(
             f"{truth} (frames {some[0]}, …) and {estimates} (frames {some[1] or 'none'}, …) have "
             "no frame in common: are they of the same images?"
         )
-    return judge_frames(true_frames, estimated, config, common=common)
+    return judge_frames(true_frames, estimated, common=common)
 
 
-def judge_frames(
-    truth: Frames, estimates: Frames, config: JudgeConfig | None = None, *, common: bool = False
-) -> dict[str, Any]:
+def judge_frames(truth: Frames, estimates: Frames, *, common: bool = False) -> dict[str, Any]:
     """Return all metrics: of detection, and of people who had to be found, by facing and range.
 
     ``"intervals"`` repeats the groups with the 95 % interval (low, high) of each metric that is an
@@ -79,10 +56,8 @@ def judge_frames(
         truth: the people of every frame.
         estimates: the estimated people of every frame. In a frame that is missing here, nobody was
             found; a frame that is missing in the truth is left out.
-        config: the people who had to be found.
         common: leaves out frames that are missing in ``estimates``.
     """
-    config = JudgeConfig() if config is None else config
     judged = [name for name in truth if name in estimates or not common]
     detection_frames: list[DetectionFrame] = []
     required_people: list[PersonFrame] = []
@@ -90,11 +65,10 @@ def judge_frames(
     false_positives = 0
     for name in judged:
         people, estimated = truth[name], estimates.get(name, [])
-        required = [_had_to_be_found(person, config) for person in people]
+        required = [_had_to_be_found(person) for person in people]
         detection_frames.append((people, required, estimated))
-        match = match_frame(people, required, estimated)
-        false_positives += len(match.false_positives)
-        partner = dict(match.pairs)
+        partner, ghosts = match_frame(people, required, estimated)
+        false_positives += ghosts
         for index, person in enumerate(people):
             estimate = estimated[partner[index]] if index in partner else None
             all_people.append(PersonFrame(person, estimate))
@@ -114,7 +88,7 @@ def judge_frames(
     detection = _detection_metrics(detection_frames, false_positives, overall)
     everybody = ("people", "found", "unaware_judged", "false_aware_count", "false_aware")
     return {
-        "settings": config.model_dump(),
+        "settings": dict(_SETTINGS),
         "frames": {
             "judged": len(judged),
             "without_estimates": sum(name not in estimates for name in judged),
@@ -156,11 +130,11 @@ def _detection_metrics(
     return metrics
 
 
-def _had_to_be_found(person: PersonRecord, config: JudgeConfig) -> bool:
+def _had_to_be_found(person: PersonRecord) -> bool:
     return (
-        person.height_px >= config.min_height_px
-        and person.occlusion < config.max_occlusion
-        and person.truncation < config.max_truncation
+        person.height_px >= _SETTINGS["min_height_px"]
+        and person.occlusion < _SETTINGS["max_occlusion"]
+        and person.truncation < _SETTINGS["max_truncation"]
     )
 
 
