@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -49,7 +48,7 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
             print(_indented(f"Note: {real.note}."))
         print(f"    trained on {real.training_domain}")
         print(f"    {real.url}")
-        print(f"    sha256 {_hash_text(store, real)}  {_real_state(store, real)}\n")
+        print(f"    sha256 {real.sha256}  {_real_state(store, real)}\n")
     print("Sets, all that a robot needs:\n")
     for each in store.catalogue.sets:
         print(f"  {each.name:16s}{each.detector}, {each.pose}, head from {each.head}")
@@ -90,7 +89,7 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
         for real in store.catalogue.models
         if store.is_fetched(real.name)
     ]
-    wrong = [name for name, state in states if not state.startswith("verified")]
+    wrong = [name for name, state in states if state != "verified"]
     if as_json:
         print(json_text(dict(states)), end="")
         return 1 if wrong else 0
@@ -102,7 +101,7 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
     return 1 if wrong else 0
 
 
-def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None) -> int:
+def fetch_command(names: Sequence[str], folder: Path | None) -> int:
     """Download networks, by their names or those of sets; return the exit status.
 
     The networks of a set are named in a file in the current folder, for ``--networks``.
@@ -115,28 +114,17 @@ def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None)
     sets = [each for each in store.catalogue.sets if each.name in names]
     members = {each.name: (each.detector, each.pose) for each in sets}
     singles = [single for name in names for single in members.get(name, (name,))]
-    if sha256 is not None and len(singles) > 1:
-        raise AwarenavError(f"--sha256 is for a single name, got {len(singles)}")
     wanted = [store.catalogue[name] for name in dict.fromkeys(singles)]
     for each in sets:
         _check_set_file(store, each)
     for model in wanted:
-        trusted = sha256 or store.expected_sha256(model.name)
-        path, downloaded = store.fetch(model.name, sha256=sha256)
+        path, downloaded = store.fetch(model.name)
         if not downloaded:
             print(f"{model.name}: already there and unaltered, {path}")
             continue
         print(f"{model.name}: {path} ({model.licence}, {model.publisher})")
         if model.note is not None:
             print(_indented(f"Note: {model.note}."))
-        if trusted is None:
-            print(
-                _indented(
-                    f"Its sha256 {store.expected_sha256(model.name)} was not known before: this "
-                    "first download was trusted, and later ones must match it."
-                ),
-                file=sys.stderr,
-            )
     for each in sets:
         write_text(Path(each.file), _set_text(store, each))
         print(f"{each.name}: written to {each.file}, for --networks of estimate and bridge")
@@ -176,14 +164,7 @@ def _real_state(store: ModelStore, model: RealModel) -> str:
         store.path(model.name)
     except AwarenavError as error:
         return f"WRONG: {error}"
-    return "verified" if model.sha256 is not None else "verified as first fetched"
-
-
-def _hash_text(store: ModelStore, model: RealModel) -> str:
-    if model.sha256 is not None:
-        return model.sha256
-    kept = store.expected_sha256(model.name)
-    return "not known before" if kept is None else f"{kept} (of the first download)"
+    return "verified"
 
 
 def _indented(text: str) -> str:

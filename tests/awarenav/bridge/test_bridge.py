@@ -19,7 +19,7 @@ pytest.importorskip("mcap", reason="the extra ros2 is not installed")
 from rendered_image import RenderedImage, odometry, rendered
 from rosbags.highlevel import AnyReader
 
-from awarenav.bridge import BridgeInputs, BridgeLoop, TopicPublisher
+from awarenav.bridge._loop import BridgeInputs, BridgeLoop, TopicPublisher
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import (

@@ -14,8 +14,9 @@ from track_lines import lines, pose, standing, walking
 
 from awarenav.cli import main
 from awarenav.records import write_records
-from awarenav.tracks import read_recording, track_recording
+from awarenav.tracks._recording import read_recording
 from awarenav.tracks._run import CSV_COLUMNS
+from awarenav.tracks._tracking import track_recording
 from perception import Camera
 from tracking import AwarenessFilterConfig, TrackerConfig
 

@@ -11,13 +11,9 @@ from hypothesis import strategies as st
 from track_lines import lines, pose, standing, walking
 
 from awarenav.records import write_records
-from awarenav.tracks import (
-    read_positions,
-    read_recording,
-    track_recording,
-    tracks_figure,
-    tracks_in_file,
-)
+from awarenav.tracks._plot import tracks_figure
+from awarenav.tracks._recording import read_positions, read_recording
+from awarenav.tracks._tracking import track_recording, tracks_in_file
 from perception import Camera
 
 pytest.importorskip("matplotlib")

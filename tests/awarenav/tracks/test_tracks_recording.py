@@ -10,8 +10,7 @@ from track_lines import lines, pose, standing
 
 from awarenav.errors import AwarenavError
 from awarenav.records import write_records
-from awarenav.tracks import read_recording
-from awarenav.tracks._recording import ASSUMED_POSITION_STD_M
+from awarenav.tracks._recording import ASSUMED_POSITION_STD_M, read_recording
 
 RECORDS = lines([standing(4.0, 1.0)], frames=4)
 

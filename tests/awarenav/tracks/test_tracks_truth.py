@@ -10,8 +10,9 @@ from track_lines import lines, standing, walking
 
 from awarenav.errors import AwarenavError
 from awarenav.records import write_records
-from awarenav.tracks import read_recording, tracks_in_file, truth_beside_tracks
-from awarenav.tracks._truth import match_truth, person_ids_text, true_people
+from awarenav.tracks._recording import read_recording
+from awarenav.tracks._tracking import tracks_in_file
+from awarenav.tracks._truth import match_truth, person_ids_text, true_people, truth_beside_tracks
 
 PEOPLE = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0), walking(7.0, 3.0, -0.5, 0.0)]
 
