@@ -34,7 +34,6 @@ __all__ = [
     "overwrite",
     "perception",
     "planner",
-    "planners",
     "plot_file",
     "policies",
     "policy",
@@ -44,7 +43,6 @@ __all__ = [
     "running",
     "scenarios",
     "seed",
-    "sensor_sets",
     "sensors",
     "workers",
 ]
@@ -214,25 +212,16 @@ def perception(
     )
 
 
-_SENSORS_HELP: Final = (
-    "Sensors of the robot: its camera, its laser scanners, or both. With scanners, --perception is "
-    "keypoints or pixels."
-)
-
-
-def sensors() -> Decorator:
-    """Add ``--sensors``: one set of sensors."""
-    return option("--sensors", type=OneOf(SENSOR_SETS), default="camera", help=_SENSORS_HELP)
-
-
-def sensor_sets() -> Decorator:
-    """Add ``--sensors``: one or more sets of sensors to compare."""
+def sensors(*, many: bool = False) -> Decorator:
+    """Add ``--sensors``: a set of sensors, or several to compare."""
+    several = " Several sets are compared." if many else ""
     return option(
         "--sensors",
-        many=True,
+        many=many,
         type=OneOf(SENSOR_SETS),
-        default=["camera"],
-        help=f"{_SENSORS_HELP} Several sets are compared.",
+        default=["camera"] if many else "camera",
+        help="Sensors of the robot: its camera, its laser scanners, or both. With scanners, "
+        f"--perception is keypoints or pixels.{several}",
     )
 
 
@@ -346,28 +335,17 @@ def faults() -> Decorator:
     )
 
 
-def planner() -> Decorator:
-    """Add ``--planner``: one local planner; empty for the reference planner."""
-    return option("--planner", metavar="MODULE:CLASS", **_planner_settings(REFERENCE_PLANNER))
-
-
-def planners() -> Decorator:
-    """Add ``--planner``: one or more local planners to compare; empty for the reference planner."""
+def planner(*, many: bool = False) -> Decorator:
+    """Add ``--planner``: a local planner, or several to compare; '' is the reference planner."""
     return option(
         "--planner",
-        many=True,
-        metavar="MODULE:CLASS...",
-        **_planner_settings([REFERENCE_PLANNER]),
-    )
-
-
-def _planner_settings(default: str | list[str]) -> dict[str, Any]:
-    return {
-        "default": default,
-        "callback": _without_reference,
-        "help": "Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
+        many=many,
+        metavar="MODULE:CLASS..." if many else "MODULE:CLASS",
+        default=[REFERENCE_PLANNER] if many else REFERENCE_PLANNER,
+        callback=_without_reference,
+        help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
         "class of yours, which gets the robot's profile, and static_boxes_odom_m if it takes that.",
-    }
+    )
 
 
 def _without_reference(context: click.Context, parameter: click.Parameter, value: Any) -> Any:

@@ -26,7 +26,7 @@ from perception.documents import read_yaml
 from perception.installation import install_command
 
 from ..errors import AwarenavError, MissingExtraError
-from ._sources import SourceFrame
+from ._sources import ImageSource, SourceFrame
 
 try:
     from rosbags.highlevel import AnyReader
@@ -219,7 +219,7 @@ class BagMessages:
             yield topic_name(connection.topic), recorded_ns * 1e-9, message
 
 
-class BagSource:
+class BagSource(ImageSource):
     """One image topic of a recording: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
 
     The stamp of a frame is that of its message's header. The ``camera_info`` topic beside the
@@ -249,12 +249,9 @@ class BagSource:
         except BaseException:
             self._bag.close()
             raise
-        self.count: int | None = self._bag.count(_IMAGES, self._topic) or None
-        self.rate_hz: float | None = None
+        self.count = self._bag.count(_IMAGES, self._topic) or None
         if self.count is not None and self.count > 1 and self._bag.duration_s > 0.0:
             self.rate_hz = (self.count - 1) / self._bag.duration_s
-        self.live = False
-        self.rendered = False
 
     @property
     def camera(self) -> Camera | None:

@@ -21,7 +21,7 @@ from ..files import check_output, check_plot, csv_number, json_text, write_text
 from ._history import TrackedRecording, TrackHistory, TrackSample
 from ._recording import Recording, is_positions, read_positions, read_recording
 from ._tracking import distances_m, smoothed_path, track_recording, tracks_in_file
-from ._truth import Truth, person_ids_text, truth_beside_tracks
+from ._truth import Truth, match_truth, person_ids_text, true_people
 
 #: Columns of the CSV file: one row per track and frame; empty for what is not known.
 CSV_COLUMNS: Final = (
@@ -79,7 +79,10 @@ def tracks_command(
             f"the camera jumps by {tracked.camera_jump_m:.1f} m from frame to frame: these look "
             "like single images, in which people cannot be tracked"
         )
-    beside = None if true is None else truth_beside_tracks(tracked.histories, true)
+    beside = None
+    if true is not None:
+        people = true_people(true)
+        beside = Truth(people, match_truth(tracked.histories, people))
     paths = _smoothed(tracked, settings) if smooth else {}
     if out is not None:
         title = _title(recording, tracked)
