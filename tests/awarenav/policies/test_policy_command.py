@@ -17,7 +17,6 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.installation import install_command
 from tracking import PersonTrack
 
-HEADS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 OWN = """
 inflation: {unaware_radius_m: 1.4, aware_radius_m: 0.5}
 speed: {unaware_below: 0.2, aware_above: 0.7, aware_human_speed_mps: 0.4}
@@ -40,12 +39,11 @@ def own(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("ending", list(HEADS))
-def test_a_drawing_is_a_whole_file_and_the_same_every_time(tmp_path, ending):
-    first, second = tmp_path / f"a{ending}", tmp_path / "new" / f"b{ending}"
+def test_a_drawing_is_a_whole_file_and_the_same_every_time(tmp_path):
+    first, second = tmp_path / "a.svg", tmp_path / "new" / "b.svg"
     for path in (first, second):
         assert main(["policy", "show", "blind", "--out", str(path)]) == 0
-    assert first.read_bytes().startswith(HEADS[ending])
+    assert first.read_bytes().startswith(b"<?xml")
     assert first.read_bytes() == second.read_bytes()
     assert not list(tmp_path.rglob("*.part"))
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from track_lines import lines, pose, standing, walking
+from track_lines import lines, pose, recorded, standing, walking
 
-from awarenav.records import write_records
 from awarenav.tracks._plot import tracks_figure
-from awarenav.tracks._recording import read_positions, read_recording
+from awarenav.tracks._recording import read_positions
 from awarenav.tracks._tracking import track_recording, tracks_in_file
 from perception import Camera
 
@@ -30,12 +29,6 @@ from awarenav.tracks._plot import (
 )
 
 CAMERA = Camera.from_fov(640, 480, math.radians(70.0))
-
-
-def recorded(tmp_path, records):
-    path = tmp_path / "estimates.jsonl"
-    write_records(path, records)
-    return read_recording(path)
 
 
 def crowd(number):

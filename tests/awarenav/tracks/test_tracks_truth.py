@@ -6,21 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from track_lines import lines, standing, walking
+from track_lines import lines, recorded, standing, walking
 
 from awarenav.errors import AwarenavError
-from awarenav.records import write_records
-from awarenav.tracks._recording import read_recording
 from awarenav.tracks._tracking import tracks_in_file
 from awarenav.tracks._truth import match_truth, person_ids_text, true_people
 
 PEOPLE = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0), walking(7.0, 3.0, -0.5, 0.0)]
-
-
-def recorded(tmp_path, records, name="truth.jsonl"):
-    path = tmp_path / name
-    write_records(path, records)
-    return read_recording(path)
 
 
 def test_the_truth_is_where_people_are_and_how_aware(tmp_path):
