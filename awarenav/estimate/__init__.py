@@ -17,8 +17,9 @@ if TYPE_CHECKING:
         ids_of_tracks,
     )
     from ._networks import NetworkChoice, admit_networks, choose_networks, running_options
+    from ._open_source import is_recording, open_source
     from ._overlay import OverlayWriter
-    from ._sources import ImageSource, SourceFrame, is_recording, open_source
+    from ._sources import ImageSource, SourceFrame
 
 __all__ = [
     "BagMessages",

@@ -26,9 +26,10 @@ from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
 from ._estimator import FrameEstimate, Networks, PeopleEstimator
 from ._networks import NetworkChoice, admit_networks, choose_networks, running_options
+from ._open_source import CAMERA_NUMBER, open_source
 from ._overlay import OverlayWriter
 from ._results import estimate_record, open_results, settings_hash
-from ._sources import CAMERA_NUMBER, ImageSource, SourceFrame, open_source
+from ._sources import ImageSource, SourceFrame
 
 # Frames that are read ahead, and how often a reading thread is asked whether it has ended.
 _AHEAD: Final = 4

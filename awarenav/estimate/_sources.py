@@ -1,8 +1,7 @@
-"""Sources of frames: images, folders, videos, cameras and streams, by what the user names."""
+"""Sources of frames: images, folders, videos, cameras and streams."""
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 import struct
@@ -34,10 +33,6 @@ _MISCOUNTED_SHARE: Final = 0.01
 # EXIF's numbers for the turns, in degrees, that OpenCV has made as a video file asks for.
 _ORIENTATIONS: Final = {90: 6, 180: 3, 270: 8}
 
-_BAG_SUFFIXES: Final = (".bag", ".db3", ".mcap")
-#: A camera's number, as a source.
-CAMERA_NUMBER: Final = re.compile("[0-9]{1,9}")
-_STREAM: Final = re.compile(r"^[a-z][a-z0-9+.-]*://")
 # First boxes of MP4 and its kin (ISO/IEC 14496-12), the containers that list their frames.
 _BOXES: Final = (b"ftyp", b"moov", b"mdat", b"moof", b"wide", b"free", b"skip", b"styp")
 _EBML, _SEGMENT = 0x1A45DFA3, 0x18538067
@@ -341,53 +336,3 @@ def _matroska_end(file: BinaryIO) -> int:
             return file.tell() + length
         file.seek(length, 1)
     return 0
-
-
-def open_source(text: str, *, topic: str | None = None) -> ImageSource:
-    """Open an image, a folder of images, a video, a camera, a stream or a recording.
-
-    Args:
-        text: a path, the number of a camera such as ``0``, or an address such as ``rtsp://…``.
-        topic: image topic of a recording; None if it has only one.
-
-    Raises:
-        AwarenavError: if there is no such source, or it cannot be read.
-    """
-    if _STREAM.match(text):
-        return open_video(text, live=True)
-    path = Path(text)
-    try:
-        exists = path.exists()
-    except OSError as cause:
-        raise AwarenavError(f"cannot read {text[:60]}…: {cause.strerror or cause}") from cause
-    if not exists and CAMERA_NUMBER.fullmatch(text):
-        return open_video(int(text), live=True)
-    if not exists:
-        raise AwarenavError(
-            f"no such file or folder: {text}{_nearest(path)}; SOURCE is an image, a folder of "
-            "images, a video, the number of a camera, the address of a stream or a ROS recording"
-        )
-    if is_recording(path):
-        from ._bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
-
-        return BagSource(path, topic)
-    if topic is not None:
-        raise AwarenavError(f"--topic is for ROS recordings; {text} is not one")
-    if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
-        return ImageFiles(path)
-    return open_video(text, live=False)
-
-
-def is_recording(path: Path) -> bool:
-    """Return whether a path is that of a ROS recording."""
-    if path.is_dir():
-        names = ("metadata.yaml", *(f"*{suffix}" for suffix in _BAG_SUFFIXES[1:]))
-        return any(next(path.glob(name), None) for name in names)
-    return path.suffix.lower() in _BAG_SUFFIXES
-
-
-def _nearest(path: Path) -> str:
-    if not path.parent.is_dir():
-        return ""
-    near = difflib.get_close_matches(path.name, [each.name for each in path.parent.iterdir()], n=1)
-    return f" (did you mean {path.parent / near[0]}?)" if near else ""

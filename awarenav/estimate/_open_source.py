@@ -1,0 +1,67 @@
+"""Opens the source of images that the user names."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from pathlib import Path
+from typing import Final
+
+from ..errors import AwarenavError
+from ._pictures import IMAGE_SUFFIXES
+from ._sources import ImageFiles, ImageSource, open_video
+
+_BAG_SUFFIXES: Final = (".bag", ".db3", ".mcap")
+#: A camera's number, as a source.
+CAMERA_NUMBER: Final = re.compile("[0-9]{1,9}")
+_STREAM: Final = re.compile(r"^[a-z][a-z0-9+.-]*://")
+
+
+def open_source(text: str, *, topic: str | None = None) -> ImageSource:
+    """Open an image, a folder of images, a video, a camera, a stream or a recording.
+
+    Args:
+        text: a path, the number of a camera such as ``0``, or an address such as ``rtsp://…``.
+        topic: image topic of a recording; None if it has only one.
+
+    Raises:
+        AwarenavError: if there is no such source, or it cannot be read.
+    """
+    if _STREAM.match(text):
+        return open_video(text, live=True)
+    path = Path(text)
+    try:
+        exists = path.exists()
+    except OSError as cause:
+        raise AwarenavError(f"cannot read {text[:60]}…: {cause.strerror or cause}") from cause
+    if not exists and CAMERA_NUMBER.fullmatch(text):
+        return open_video(int(text), live=True)
+    if not exists:
+        raise AwarenavError(
+            f"no such file or folder: {text}{_nearest(path)}; SOURCE is an image, a folder of "
+            "images, a video, the number of a camera, the address of a stream or a ROS recording"
+        )
+    if is_recording(path):
+        from ._bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
+
+        return BagSource(path, topic)
+    if topic is not None:
+        raise AwarenavError(f"--topic is for ROS recordings; {text} is not one")
+    if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
+        return ImageFiles(path)
+    return open_video(text, live=False)
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether a path is that of a ROS recording."""
+    if path.is_dir():
+        names = ("metadata.yaml", *(f"*{suffix}" for suffix in _BAG_SUFFIXES[1:]))
+        return any(next(path.glob(name), None) for name in names)
+    return path.suffix.lower() in _BAG_SUFFIXES
+
+
+def _nearest(path: Path) -> str:
+    if not path.parent.is_dir():
+        return ""
+    near = difflib.get_close_matches(path.name, [each.name for each in path.parent.iterdir()], n=1)
+    return f" (did you mean {path.parent / near[0]}?)" if near else ""
