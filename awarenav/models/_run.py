@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 import yaml
 
-from perception import PerceptionError
 from perception.shipped import shipped_models, verify_shipped_model
 
 from ..errors import AwarenavError, counted
@@ -150,18 +149,18 @@ def _check_set_file(store: ModelStore, chosen: NetworkSet) -> None:
 
 
 def _shipped_state(name: str) -> str:
-    try:
-        verify_shipped_model(name)
-    except PerceptionError as error:
-        return f"WRONG: {error}"
-    return "verified"
+    return _state(lambda: verify_shipped_model(name))
 
 
 def _real_state(store: ModelStore, model: RealModel) -> str:
     if not store.is_fetched(model.name):
         return "not fetched"
+    return _state(lambda: store.path(model.name))
+
+
+def _state(check: Callable[[], object]) -> str:
     try:
-        store.path(model.name)
+        check()
     except AwarenavError as error:
         return f"WRONG: {error}"
     return "verified"
