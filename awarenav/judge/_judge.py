@@ -23,7 +23,9 @@ Frames = dict[str, list[PersonRecord]]
 
 # Who has to be found: least height of the true box, and shares of the person, exclusive, that other
 # things hide or that lie outside the image. Others count neither as missed nor as false positives.
-_SETTINGS: Final = {"min_height_px": 40.0, "max_occlusion": 0.5, "max_truncation": 0.5}
+_MIN_HEIGHT_PX: Final = 40.0
+_MAX_OCCLUSION: Final = 0.5
+_MAX_TRUNCATION: Final = 0.5
 # Angles between the head's forward axis and the direction to the camera, degrees.
 _FACINGS_DEG: Final = (("front", 0.0, 60.0), ("profile", 60.0, 120.0), ("back", 120.0, 180.1))
 # Bins of range; the lower edge belongs to the bin.
@@ -60,7 +62,13 @@ def judge_files(truth: Path, estimates: Path, *, common: bool = False) -> dict[s
     return judge_frames(true_frames, estimated, common=common)
 
 
-def judge_frames(truth: Frames, estimates: Frames, *, common: bool = False) -> dict[str, Any]:
+def judge_frames(
+    truth: Frames,
+    estimates: Frames,
+    *,
+    common: bool = False,
+    min_height_px: float = _MIN_HEIGHT_PX,
+) -> dict[str, Any]:
     """Return all metrics: of detection, and of people who had to be found, by facing and range.
 
     ``"intervals"`` repeats the groups with the 95 % interval (low, high) of each metric that is an
@@ -72,6 +80,7 @@ def judge_frames(truth: Frames, estimates: Frames, *, common: bool = False) -> d
         estimates: the estimated people of every frame. In a frame that is missing here, nobody was
             found; a frame that is missing in the truth is left out.
         common: leaves out frames that are missing in ``estimates``.
+        min_height_px: least height of the true box of people who had to be found.
     """
     judged = [name for name in truth if name in estimates or not common]
     detection_frames: list[DetectionFrame] = []
@@ -80,7 +89,7 @@ def judge_frames(truth: Frames, estimates: Frames, *, common: bool = False) -> d
     false_positives = 0
     for name in judged:
         people, estimated = truth[name], estimates.get(name, [])
-        required = [_had_to_be_found(person) for person in people]
+        required = [_had_to_be_found(person, min_height_px) for person in people]
         detection_frames.append((people, required, estimated))
         partner, ghosts = match_frame(people, required, estimated)
         false_positives += ghosts
@@ -103,7 +112,11 @@ def judge_frames(truth: Frames, estimates: Frames, *, common: bool = False) -> d
     detection = _detection_metrics(detection_frames, false_positives, overall)
     everybody = ("people", "found", "unaware_judged", "false_aware_count", "false_aware")
     return {
-        "settings": dict(_SETTINGS),
+        "settings": {
+            "min_height_px": min_height_px,
+            "max_occlusion": _MAX_OCCLUSION,
+            "max_truncation": _MAX_TRUNCATION,
+        },
         "frames": {
             "judged": len(judged),
             "without_estimates": sum(name not in estimates for name in judged),
@@ -145,11 +158,11 @@ def _detection_metrics(
     return metrics
 
 
-def _had_to_be_found(person: PersonRecord) -> bool:
+def _had_to_be_found(person: PersonRecord, min_height_px: float) -> bool:
     return (
-        person.height_px >= _SETTINGS["min_height_px"]
-        and person.occlusion < _SETTINGS["max_occlusion"]
-        and person.truncation < _SETTINGS["max_truncation"]
+        person.height_px >= min_height_px
+        and person.occlusion < _MAX_OCCLUSION
+        and person.truncation < _MAX_TRUNCATION
     )
 
 
