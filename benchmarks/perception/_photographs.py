@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.errors import AwarenavError
-from awarenav.judge import JudgeConfig, judge_frames
+from awarenav.judge import judge_frames
 from awarenav.records import PersonRecord, read_person
 from perception import Camera
 
@@ -88,7 +88,7 @@ def read_rgb(path: Path) -> NDArray[np.uint8]:
 
 def figures(truth: People, found: People) -> str:
     """Return recall and false positives of all people, however small, in a line."""
-    metrics = judge_frames(truth, found, JudgeConfig(min_height_px=0.0))
+    metrics = judge_frames(truth, found, min_height_px=0.0)
     overall, false = metrics["overall"], metrics["detection"]["false_positives_per_frame"]
     recall = "–" if overall["recall"] is None else f"{overall['recall']:.2f}"
     return (
