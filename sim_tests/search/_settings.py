@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from awarenav.files import atomic_path
 from perception.documents import parse_json, read_json
 
 from ..crossing import named_policy
@@ -134,14 +132,6 @@ def write_or_check_settings(
         part.replace(path)
     except OSError as cause:
         raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
-
-
-def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file that appears whole or not at all."""
-    with atomic_path(path, SimError) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
 
 
 def print_verdict(text: str, next_command: str) -> None:

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from awarenav.errors import counted
-from awarenav.files import write_text
+from awarenav.files import write_csv, write_text
 
 from ...crossing import named_policy
 from ...study.measures import EpisodeRecord
 from ...study.runs import policy_of, policy_text, run_episode
 from ...world.errors import SimError
-from .._settings import write_csv
 from ._search import CONTACT_SCORE, Falsification, FalsifySettings
 from ._worst_cases import WorstCase
 
@@ -41,6 +40,7 @@ def write_episodes(falsification: Falsification, path: Path) -> None:
             ]
             for each in falsification.episodes
         ),
+        SimError,
     )
 
 

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from awarenav.errors import counted
-from awarenav.files import csv_number, write_text
+from awarenav.files import csv_number, write_csv, write_text
 
 from ...actors.behaviour import DEFAULT_POPULATION
 from ...study.measures import FEW_PAIRS, Interval, zero_of_n_upper
 from ...study.runs import policy_text
 from ...world.errors import SimError
-from .._settings import write_csv
 from .._study import importances
 from ._evaluation import FIGURES, OBJECTIVE, RISK
 from ._finalists import BEATS_BASE, REASONS, Candidate, level_of
@@ -247,7 +246,8 @@ def _write_trials(tuning: Tuning, path: Path) -> None:
                 *(repr(trial.parameters[name]) for name in tuning.ranges),
             ]
         )
-    write_csv(path, ["trial", "state", *FIGURES, *notes, "rank", *tuning.ranges], rows)
+    header = ["trial", "state", *FIGURES, *notes, "rank", *tuning.ranges]
+    write_csv(path, header, rows, SimError)
 
 
 def _figures(tuning: Tuning, candidate: Candidate) -> dict[str, Any]:
