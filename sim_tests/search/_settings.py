@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.files import write_text
 from perception.documents import parse_json, read_json
 
 from ..crossing import named_policy
@@ -134,9 +135,20 @@ def write_or_check_settings(
         raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
 
 
-def print_verdict(text: str, next_command: str) -> None:
-    """Print a verdict in sentences, and the command to run next."""
-    print(f"Verdict: {text}\nNext: {next_command}")
+def write_json(path: Path, data: Any) -> None:
+    """Write a JSON file that appears whole or not at all."""
+    write_text(path, json.dumps(data, indent=1, ensure_ascii=False) + "\n", SimError)
+
+
+def print_results(
+    file: Path, table: Sequence[str], verdict: str, next_command: str, *, as_json: bool
+) -> None:
+    """Print the file of the results, or a table, a verdict and the command to run next."""
+    if as_json:
+        print(file.read_text(encoding="utf-8"), end="")
+        return
+    print("\n".join(table))
+    print(f"Verdict: {verdict}\nNext: {next_command}\nWritten to {file.parent}")
 
 
 def episode_words(conditions: Conditions) -> list[str]:

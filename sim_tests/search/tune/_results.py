@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,9 +12,9 @@ from ...actors.behaviour import DEFAULT_POPULATION
 from ...study.measures import FEW_PAIRS, Interval, zero_of_n_upper
 from ...study.runs import policy_text
 from ...world.errors import SimError
+from .._settings import write_json
 from .._study import importances
-from ._evaluation import FIGURES, OBJECTIVE, RISK
-from ._finalists import BEATS_BASE, REASONS, Candidate, level_of
+from ._evaluation import BEATS_BASE, FIGURES, OBJECTIVE, REASONS, RISK, Candidate, level_of
 from ._plot import draw_tuning
 from ._tune import Tuning
 
@@ -37,10 +36,10 @@ def write_tuning(tuning: Tuning, folder: Path) -> None:
         for name, values in zip(FIGURES, (times_s, risks), strict=True)
     }
     _write_trials(tuning, folder / "trials.csv")
-    _write_json(folder / "importances.json", importance)
+    write_json(folder / "importances.json", importance)
     base = tuning.base
     rows = (*tuning.anchors, *tuning.chosen)
-    _write_json(
+    write_json(
         folder / "chosen.json",
         {
             "scenarios": _scenarios(tuning),
@@ -324,7 +323,3 @@ def _scenarios(tuning: Tuning) -> list[str]:
 
 def _ends(seeds: range) -> str:
     return f"{seeds[0]} to {seeds[-1]}"
-
-
-def _write_json(path: Path, data: Any) -> None:
-    write_text(path, json.dumps(data, indent=1, ensure_ascii=False) + "\n", SimError)
