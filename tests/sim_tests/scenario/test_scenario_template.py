@@ -214,20 +214,6 @@ def test_a_name_may_ask_for_a_version():
         ScenarioTemplate.shipped("crossing_from_left@2")
 
 
-def test_a_crossing_starts_at_the_drawn_position():
-    text = (
-        "name: short\nduration_s: 0.5\n"
-        "robot: {start_x_m: {uniform: {low: -1, high: 1}}, goal_x_m: 8}\n"
-    )
-    short = ScenarioTemplate.from_text(text)
-    starts = []
-    for seed in (1, 2):
-        result = run_crossing(short.for_seed(seed), policy="balanced", seed=seed)
-        starts.append(float(result.frames[0].robot_state.position_odom_m[0]))
-    drawn = [short.for_seed(seed).robot.start_x_m for seed in (1, 2)]
-    assert starts == pytest.approx(drawn, abs=1e-9)
-
-
 def test_attentive_and_distracted_differ_only_in_the_gaze():
     first, second = (Scenario.shipped(f"crossing_{who}") for who in ("attentive", "distracted"))
     same = {"name": "", "description": "", "attention": "mixed", "workers": ()}
