@@ -340,6 +340,10 @@ class _Race:
     def _risk(self) -> float:
         return self.settings.risk_beside(self.tuned[TODAY])
 
+    def _name_of(self, policy: AwarenessPolicy) -> str:
+        """Return the name of the base policy or the preset that a policy is; empty for none."""
+        return next((name for name, known in self.anchors.items() if known == policy), "")
+
     def _anchor(self, name: str) -> Candidate:
         """Return the base policy or a preset as a candidate."""
         policy = self.anchors[name]
@@ -348,9 +352,8 @@ class _Race:
     def _finalist(self, trial: Trial, names: tuple[str, ...]) -> Candidate:
         """Return a trial as a candidate; as the anchor whose policy it has, if there is one."""
         policy, label = self.space.policy(trial.parameters), _label(trial.number)
-        for name, known in self.anchors.items():
-            if known == policy:
-                return replace(self._anchor(name), names=names)
+        if anchor := self._name_of(policy):
+            return replace(self._anchor(anchor), names=names)
         tuned, held_out = self._tuned(label, policy), self._held_out(label, policy)
         return Candidate(names, trial.number, policy, tuned, held_out)
 
@@ -359,10 +362,9 @@ class _Race:
         policy = self.space.policy(parameters)
         evaluation = Evaluation(())
         reason: Dropped = ""
-        for name, known in self.anchors.items():
-            if known == policy:  # the first trial is the base policy
-                evaluation = self.tuned[name]
-        if not evaluation.records:
+        if anchor := self._name_of(policy):  # the first trial is the base policy
+            evaluation = self.tuned[anchor]
+        else:
             for seeds in stages(settings.tuning_seeds):
                 part = self._evaluate(label, policy, seeds, settings.tuning_templates)
                 if part.errors:

@@ -33,7 +33,7 @@ def test_shipped_scenarios_can_be_run_and_are_what_they_say(name):
     if name in BESIDE:
         return
     # Robot and people would come close if nobody reacted, but not at the start.
-    statistics = approach_statistics(template, 200)
+    statistics = approach_statistics(template, 100)
     assert statistics is not None
     assert statistics.conflict_share >= 0.8
     assert statistics.median_time_s > 2.0
