@@ -48,8 +48,8 @@ class RenderView:
     bottom: float
     width: int
     height: int
-    near_m: float
-    far_m: float
+    near_m: float = 0.05
+    far_m: float = 60.0
 
     @classmethod
     def of_rectangle(
@@ -58,9 +58,6 @@ class RenderView:
         T_odom_camera: Any,
         roi_xyxy_px: Any = None,
         size_px: tuple[int, int] | None = None,
-        *,
-        near_m: float = 0.05,
-        far_m: float = 60.0,
     ) -> RenderView:
         """Return the view of a rectangle of a camera's image.
 
@@ -70,8 +67,6 @@ class RenderView:
             roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels from the image's corner; None is
                 the whole image.
             size_px: samples per row and per column; None is one per pixel of the rectangle.
-            near_m: nothing nearer is drawn, > 0.
-            far_m: nothing farther is drawn.
 
         Raises:
             SimError: for a camera with distortion, an empty rectangle or a size below one sample.
@@ -106,8 +101,6 @@ class RenderView:
             bottom=(v_max - 0.5 - camera.cy_px) / camera.fy_px,
             width=int(width),
             height=int(height),
-            near_m=near_m,
-            far_m=far_m,
         )
 
     @property
