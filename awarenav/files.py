@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -81,6 +82,26 @@ def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError
     """
     with atomic_path(path, error) as part:
         part.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def write_csv(
+    path: Path,
+    header: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    error: type[AwarenavError] = AwarenavError,
+) -> None:
+    """Write a CSV file as :func:`write_text` does, with Unix line ends.
+
+    Raises:
+        AwarenavError: or ``error``, for a place that cannot be written.
+    """
+    with (
+        atomic_path(path, error) as part,
+        part.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 def printable(name: str) -> str:

@@ -130,10 +130,6 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
     },
     "Development": {
-        "bench": _Entry(
-            "sim_tests.demo.command:bench",
-            "Measure how fast crossings run.",
-        ),
         "completion": _Entry(
             "awarenav.cli._app:completion",
             "Print the completion script for a shell.",
