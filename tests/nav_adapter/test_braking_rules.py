@@ -68,11 +68,14 @@ def test_braking_suffices_where_no_instant_meets_the_reach(turn_rad: float) -> N
 
 
 @pytest.mark.parametrize(
-    ("speed_mps", "way_m"), [(0.5, 0.195), (1.45, 0.45), (2.0, 0.6), (-0.5, 0.195)]
+    ("speed_mps", "faster_mps2", "way_m"),
+    [(0.5, 1.0, 0.195), (1.45, 1.0, 0.45), (2.0, 1.0, 0.6), (-0.5, 1.0, 0.195), (0.5, 2.0, 0.24)],
 )
-def test_a_robot_drives_on_while_its_state_ages(speed_mps: float, way_m: float) -> None:
-    state = robot_at(speed_mps=speed_mps)
-    now, later = (straight_course_of(ROBOT, state, age_s) for age_s in (0.0, 0.3))
+def test_a_robot_drives_on_while_its_state_ages(
+    speed_mps: float, faster_mps2: float, way_m: float
+) -> None:
+    robot, state = replace(ROBOT, max_acceleration_mps2=faster_mps2), robot_at(speed_mps=speed_mps)
+    now, later = (straight_course_of(robot, state, age_s) for age_s in (0.0, 0.3))
     assert later.front_m - now.front_m == pytest.approx(way_m)
     assert later.radius_m - now.radius_m == pytest.approx(way_m)
     assert later.rear_m == now.rear_m

@@ -23,6 +23,15 @@ def test_braking_suffices_only_if_it_does_for_everybody(ids: tuple[int, int]) ->
     assert not both.braking_suffices
 
 
+@pytest.mark.parametrize("speed_mps", [0.0, 1.4])
+@pytest.mark.parametrize(("near", "far"), [(1, 2), (2, 1)])
+def test_the_limit_names_who_sets_it(near: int, far: int, speed_mps: float) -> None:
+    people = person(track_id=near, position=(2.0, 0.0)), person(track_id=far, position=(5.5, 1.0))
+    state = robot_at(speed_mps=speed_mps)
+    found = NavAdapter(AwarenessPolicy(), ROBOT).update(people, state, 0.0)
+    assert found.limited_by == f"track {near}: reach"
+
+
 def test_a_robot_that_stands_has_braked() -> None:
     touching = person(position=(0.5, 0.0), velocity=(-1.0, 0.0))
     constraints = NavAdapter(AwarenessPolicy(), ROBOT).update([touching], robot_at(), 0.0)

@@ -156,6 +156,14 @@ def test_time_0_counts_and_a_robot_may_leave_whoever_is_behind_it() -> None:
     assert limit_mps(person((0.9, math.pi), top=0.0), course(speed=-0.5)) < 0.5
 
 
+@pytest.mark.parametrize("distance_m", [0.9, 1.5, 3.0])
+def test_somebody_exactly_ahead_counts_like_somebody_a_hair_beside(distance_m: float) -> None:
+    ahead, beside = (person((distance_m, bearing), top=0.0) for bearing in (0.0, 1e-7))
+    straight = course(0.0)
+    assert limit_mps(ahead, straight) == pytest.approx(limit_mps(beside, straight), abs=1e-6)
+    assert limit_mps(ahead, straight) > 0.0
+
+
 @pytest.mark.parametrize("field", ["x_m", "velocity_y_mps", "speed_mps", "elapsed_s", "delay_s"])
 def test_numbers_that_are_not_finite_stop_the_robot(field: str) -> None:
     broken = person((2.0, 0.3))._replace(**{field: math.nan})
