@@ -15,10 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-pytest.importorskip("mcap", reason="the extra ros2 is not installed")
-
 from mcap.reader import make_reader
 from ros2_scenes import DEFINITIONS, STAMP_S, everything, loopback_environment, plain
 from rosbags.highlevel import AnyReader

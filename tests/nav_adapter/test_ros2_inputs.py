@@ -9,15 +9,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from bridge_scenes import INFO, START_S, Listener, image, nobody, odometry, tf
 from hypothesis import given
 from hypothesis import strategies as st
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
 from nav_scenes import finite
 from paths import ROOT
 from scipy.spatial.transform import Rotation
-from test_ros2_bridge import INFO, START_S, Listener, image, nobody, odometry
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import (
@@ -29,10 +26,9 @@ from nav_adapter.ros2 import (
     picture_of,
 )
 from nav_adapter.ros2.conversions import pose_matrix, to_time, yaw_quaternion
-from nav_adapter.ros2.messages.geometry_msgs import Quaternion, Transform, TransformStamped, Vector3
+from nav_adapter.ros2.messages.geometry_msgs import Quaternion
 from nav_adapter.ros2.messages.sensor_msgs import CompressedImage, Image, RegionOfInterest
 from nav_adapter.ros2.messages.std_msgs import Header
-from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import AwarenessPipeline, Camera
 
 RGB = np.random.default_rng(5).integers(0, 256, (4, 6, 3), dtype=np.uint8)
@@ -271,9 +267,9 @@ def picture(width: int, height: int, stamp_s: float = START_S) -> Image:
 def mounted(turn: Rotation, frame: str) -> Listener:
     """Return a bridge whose camera's frame is in tf, 1.4 m above the floor, turned like this."""
     nav = Listener(T_base_camera=None)
-    move = Transform(Vector3(0.2, 0.0, 1.4), Quaternion(*turn.as_quat().tolist()))
-    transforms = TFMessage((TransformStamped(Header(frame_id="base_link"), frame, move),))
-    nav.bridge.on_transforms(transforms, static=True)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = turn.as_matrix(), (0.2, 0.0, 1.4)
+    nav.bridge.on_transforms(tf("base_link", frame, T), static=True)
     nav.bridge.on_camera_info(INFO)
     nav.bridge.on_odometry(odometry(START_S))
     return nav

@@ -7,12 +7,9 @@ import pkgutil
 from functools import cache
 
 import pytest
+from cyclonedds.idl import Endianness
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
-from cyclonedds.idl import Endianness
 from ros2_receiver import made
 from ros2_scenes import typestore
 from rosbags.typesys import get_types_from_msg
