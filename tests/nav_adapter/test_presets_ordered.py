@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import reach_rules, robots
+from nav_policies import robots
 from nav_scenes import (
     ROBOT,
     crowds,
@@ -164,24 +164,6 @@ def test_beside_the_circle_of_anybody_the_robot_may_drive(
     """For every awareness, course and place along the edge."""
     policy = AwarenessPolicy.preset(name)
     assert passing_mps(policy, alpha, along_m, course_rad, side) >= PASSING_MPS - 0.02
-
-
-@settings(max_examples=25)
-@given(
-    robot=robots(),
-    rules=reach_rules(),
-    human_mps=finite(0.0, 1.8),
-    clearance_m=finite(0.1, 0.4),
-    more=finite(0.0, 0.5),
-)
-def test_the_radius_is_the_smallest_and_grows_with_the_persons_speed(
-    robot: RobotProfile, rules: ReachRules, human_mps: float, clearance_m: float, more: float
-) -> None:
-    radius_m = passing_radius_m(human_mps, rules, clearance_m, robot)
-    assert radius_m >= BODY_RADIUS_M + clearance_m
-    rounding = 0.01 * radius_m
-    assert passing_radius_m(human_mps + more, rules, clearance_m, robot) >= radius_m - rounding
-    assert passing_radius_m(human_mps, rules, clearance_m + more, robot) >= radius_m - rounding
 
 
 def test_a_robot_that_keeps_its_course_may_pass_somebody_aware_within_the_clearance() -> None:

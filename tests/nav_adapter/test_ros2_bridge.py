@@ -7,9 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bridge_scenes import INFO, MOUNT, START_S, TIMING, Listener, Seeing, image, odometry, tf
+from bridge_scenes import (
+    FRONT,
+    INFO,
+    MOUNT,
+    PERSON,
+    START_S,
+    TIMING,
+    Listener,
+    Seeing,
+    image,
+    odometry,
+    tf,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scan_scenes import scan_message
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import decode, encode
@@ -25,6 +38,9 @@ from nav_adapter.ros2.messages.geometry_msgs import (
 from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.messages.std_msgs import Header
 from perception import Camera
+from perception.laser import LegDetector
+
+DETECTOR = LegDetector()
 
 
 def test_the_robot_stands_until_all_input_has_come() -> None:
@@ -174,18 +190,19 @@ def test_impossible_odometry_is_refused(message: Odometry, text: str) -> None:
 
 @settings(max_examples=40)
 @given(
-    st.sampled_from(["odometry", "camera_info", "transforms", "image"]),
+    st.sampled_from(["odometry", "camera_info", "transforms", "image", "scan"]),
     st.lists(st.tuples(st.integers(4, 4000), st.integers(0, 255)), min_size=1, max_size=6),
 )
 def test_damaged_messages_never_crash_the_bridge_and_its_messages_are_valid(
     which: str, damage: list[tuple[int, int]]
 ) -> None:
-    nav = Listener(T_base_camera=None)
+    nav = Listener(T_base_camera=None, scanners=[FRONT], make_detector=lambda: DETECTOR)
     good = {
         "odometry": odometry(START_S),
         "camera_info": INFO,
         "transforms": tf("base_link", "camera", MOUNT),
         "image": image(START_S),
+        "scan": scan_message(START_S, [PERSON]),
     }
     for name, message in good.items():
         if name == which:
@@ -198,6 +215,8 @@ def test_damaged_messages_never_crash_the_bridge_and_its_messages_are_valid(
                 continue
         if name == "image":
             nav.bridge.on_image(message, START_S)
+        elif name == "scan":
+            nav.bridge.on_scan(0, message, START_S)
         else:
             getattr(nav.bridge, f"on_{name}")(message)
         nav.bridge.tick(START_S)

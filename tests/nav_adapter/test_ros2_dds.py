@@ -228,17 +228,6 @@ def test_the_mcap_library_reads_profile_schemas_and_index(recording: Path) -> No
     assert stamps[0] == round(STAMP_S * 1e9)
 
 
-def test_foxgloves_decoder_reads_it_too(recording: Path) -> None:
-    factory = pytest.importorskip(
-        "mcap_ros2.decoder", reason="mcap-ros2-support is not installed"
-    ).DecoderFactory()
-    with recording.open("rb") as stream:
-        decoded = list(make_reader(stream, decoder_factories=[factory]).iter_decoded_messages())
-    assert len(decoded) == len(sent_messages())
-    limits = [m.speed_limit for _, channel, _, m in decoded if channel.topic == "/speed_limit"]
-    assert limits == [dict(sent_messages())["/speed_limit"]["speed_limit"]] * 3
-
-
 def test_a_missing_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NavError, match="cannot write"):
         McapRecorder(tmp_path / "nowhere" / "run.mcap")

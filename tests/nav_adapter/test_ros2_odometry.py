@@ -376,7 +376,7 @@ def test_a_contradiction_that_comes_again_and_again_holds_longer_each_time() -> 
     """A robot that obeys sets off after each stop, with a twist that is always 0."""
     robot, x, began = Odometer(make_pipeline=lambda camera: unaware(30.0)), 0.0, []
     speed = 0.0
-    for tick in range(1200):
+    for tick in range(800):
         now = START_S + PERIOD_S * tick
         limit = robot.step(now, odometry(now, planar(x))).speed_limit_mps
         if speed == 0.0 < limit:
@@ -384,6 +384,6 @@ def test_a_contradiction_that_comes_again_and_again_holds_longer_each_time() -> 
         speed = max(0.0, min(speed + PERIOD_S, limit)) if limit else max(0.0, speed - PERIOD_S)
         x += PERIOD_S * speed
     pauses = np.diff(began)
-    assert 3 <= len(pauses) <= 6
+    assert len(pauses) == 3
     assert (np.diff(pauses) > 1.0).all()
     assert x < 6.0

@@ -18,13 +18,10 @@ from bridge_scenes import (
     scanning,
     tf,
 )
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scan_scenes import RAYS, planar, scan_message
 from scipy.spatial.transform import Rotation
 
-from nav_adapter import NavError
-from nav_adapter.ros2 import ScannerInput, ScannerMount, decode, encode
+from nav_adapter.ros2 import ScannerInput, ScannerMount
 from nav_adapter.ros2.conversions import yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
@@ -35,11 +32,8 @@ from nav_adapter.ros2.messages.geometry_msgs import (
     Vector3,
 )
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
-from nav_adapter.ros2.messages.sensor_msgs import LaserScan
 from nav_adapter.ros2.messages.std_msgs import Header
-from perception.laser import LegDetector
 
-DETECTOR = LegDetector()
 PERIOD_S = Robot.period_s
 
 
@@ -163,18 +157,6 @@ def test_a_scanner_that_is_not_level_is_refused() -> None:
     assert "level within 10 degrees, got a tilt of 20.0" in nav.warnings[-1]
 
 
-def test_a_clock_that_was_set_back_starts_scans_anew() -> None:
-    nav = Robot(FRONT, people=[PERSON])
-    nav.drive(START_S, 1.0)
-    (before,) = nav.bridge.tracks
-    constraints = nav.drive(START_S - 500.0, 3.0)
-    assert constraints[0].limited_by == "the clock went backward"
-    assert not constraints[-1].stale
-    (after,) = nav.bridge.tracks
-    assert after.id > before.id
-    assert after.stamp_s == pytest.approx(constraints[-1].stamp_s)
-
-
 def test_what_the_map_holds_is_nobody_until_the_map_moves_in_odom() -> None:
     """The map is turned and shifted in odom by localisation, which stamps it ahead."""
     T_odom_map = planar(1.0, -2.0, 0.7)
@@ -217,22 +199,3 @@ def test_a_map_whose_place_is_unknown_is_not_used() -> None:
     nav.bridge.on_transforms(tf("map", "odom", np.eye(4)))
     nav.drive(START_S + 1.2, 0.2)
     assert nav.warnings[2:] == ["the map is used"]
-
-
-@settings(max_examples=25)
-@given(st.lists(st.tuples(st.integers(4, 2400), st.integers(0, 255)), min_size=1, max_size=6))
-def test_damaged_scans_never_crash_the_bridge(damage: list[tuple[int, int]]) -> None:
-    data = bytearray(encode(scan_message(START_S, [PERSON])))
-    for place, value in damage:
-        data[4 + place % (len(data) - 4)] = value
-    nav = Listener(scanners=[FRONT], with_camera=False, make_detector=lambda: DETECTOR)
-    nav.bridge.on_odometry(odometry(START_S, speed=0.0))
-    try:
-        message = decode(LaserScan, bytes(data))
-    except NavError:
-        return
-    nav.bridge.on_scan(0, message, START_S)
-    nav.bridge.tick(START_S)
-    for messages in nav.heard.values():
-        for sent in messages:
-            encode(sent)

@@ -359,11 +359,3 @@ def test_a_robot_that_rolls_backwards_brakes_first() -> None:
     state = RobotState(0.0, (0.0, 0.0), 0.0, -0.5, 0.0)
     hard = replace(TURNS, max_deceleration_mps2=2.0)
     assert differential_drive((1.0, 0.0), state, hard, dt_s=0.1)[0] == pytest.approx(-0.3)
-
-
-def test_a_corner_is_at_most_the_root_of_two_faster_than_wanted() -> None:
-    state = RobotState(0.0, (0.0, 0.0), 0.0, 0.0, 0.0)
-    R = UNLIMITED.circumscribed_radius_m
-    for angle in np.linspace(-math.pi, math.pi, 73):
-        command = differential_drive((math.cos(angle), math.sin(angle)), state, UNLIMITED)
-        assert command[0] + abs(command[1]) * R <= math.sqrt(2.0) + ROUNDING
