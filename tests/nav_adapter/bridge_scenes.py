@@ -55,6 +55,10 @@ REAR = ScannerInput("scan_rear", ScannerMount(position_base_m=[-0.3, 0.0, 0.2], 
 PERSON = (2.5, 1.2)
 
 
+#: The topics that the tests of a robot read; to make the others takes longer than to drive.
+NEEDED = frozenset({"speed_limit", "collision_polygons", "alerts"})
+
+
 class NobodyThere:
     """A detector and a pose estimator that find nobody."""
 
@@ -191,7 +195,7 @@ class Robot(Listener):
     def __init__(self, *scanners: ScannerInput, people=(), **settings: Any) -> None:
         self.scanners, self.people = scanners, people
         self.silent: set[str] = set()
-        super().__init__(scanners=scanners, **settings)
+        super().__init__(scanners=scanners, **{"wanted": NEEDED.__contains__, **settings})
         if settings.get("with_camera", True):
             self.bridge.on_camera_info(INFO)
 

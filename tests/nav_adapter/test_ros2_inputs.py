@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -13,13 +12,11 @@ from bridge_scenes import INFO, START_S, Listener, image, nobody, odometry, tf
 from hypothesis import given
 from hypothesis import strategies as st
 from nav_scenes import finite
-from paths import ROOT
 from scipy.spatial.transform import Rotation
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import (
     CameraMount,
-    RobotFile,
     TransformBuffer,
     is_rectified,
     optical_problem,
@@ -215,15 +212,6 @@ def test_a_camera_mount_looks_in_its_direction() -> None:
     assert np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3))
     assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
     assert T[:3, 3].tolist() == [0.2, 0.1, 1.4]
-
-
-def test_the_robot_file_of_the_docs_is_valid(tmp_path: Path) -> None:
-    example = ROOT / "docs" / "nav2" / "robot.yaml"
-    robot = RobotFile.from_yaml(example)
-    assert robot.profile().max_speed_mps == 1.5
-    assert robot.camera is not None
-    robot.to_yaml(tmp_path / "robot.yaml")
-    assert RobotFile.from_yaml(tmp_path / "robot.yaml") == robot
 
 
 # Axes of an optical frame (right, down, ahead) in a body frame (ahead, left, up).

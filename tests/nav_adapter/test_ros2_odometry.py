@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from bridge_scenes import INFO, START_S, Listener, Seeing, image, tf
+from bridge_scenes import INFO, NEEDED, START_S, Listener, Seeing, image, tf
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scan_scenes import planar
@@ -58,7 +58,13 @@ class Odometer(Listener):
     """A bridge that gets odometry, tf and images."""
 
     def __init__(self, **settings) -> None:
-        super().__init__(**{"make_pipeline": lambda camera: unaware(1.8), **settings})
+        super().__init__(
+            **{
+                "make_pipeline": lambda camera: unaware(1.8),
+                "wanted": NEEDED.__contains__,
+                **settings,
+            }
+        )
         self.bridge.on_camera_info(INFO)
 
     def step(self, now_s: float, message: Odometry, *transforms: TFMessage):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
 
@@ -73,6 +73,7 @@ def test_where_nobody_limits_the_robot_it_turns_at_full_speed() -> None:
     assert unknown.yaw_rate_limit_radps(1.5) == math.inf
 
 
+@settings(max_examples=40)
 @given(tracks=crowds())
 def test_people_limit_the_fastest_point_as_they_limit_the_speed(
     tracks: tuple[PersonTrack, ...],
