@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -318,15 +319,15 @@ def test_the_limiting_rule_and_person_are_named(first: int) -> None:
         person(track_id=7, position=(3.5, 0.0)),
         person(track_id=first, position=(1.0, 0.0)),
     )
-    driving = robot_at(speed_mps=0.3)
-    field = AwarenessPolicy(reach=None)
-    for policy, rule in ((POLICY, "reach"), (field, "in the path")):
-        assert settled_update(tracks[:1], policy=policy, state=driving).limited_by == (
-            f"track 4: {rule}"
+    driving, field = robot_at(speed_mps=0.3), AwarenessPolicy(reach=None)
+    for state, (policy, rule) in product(
+        (driving, robot_at()), ((POLICY, "reach"), (field, "in the path"))
+    ):
+        one, all_three = (
+            settled_update(some, policy=policy, state=state) for some in (tracks[:1], tracks)
         )
-        assert settled_update(tracks, policy=policy, state=driving).limited_by == (
-            f"track {first}: {rule}"
-        )
+        assert one.limited_by == f"track 4: {rule}"
+        assert all_three.limited_by == f"track {first}: {rule}"
     # Somebody unaware farther away limits more than somebody aware near the robot.
     nearest_unaware = settled_update(
         (
