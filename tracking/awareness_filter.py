@@ -103,7 +103,7 @@ def drift(
     mean = prior_mean + phi * offset
     variance = prior_variance + phi * phi * excess
     before = belief.mean - z * np.sqrt(belief.variance)
-    after = mean - z * np.sqrt(np.maximum(variance, 0.0))
+    after = mean - z * np.sqrt(variance)
     lowest = np.minimum(np.minimum(belief.bound, before), after)
     # If mean and variance are both below the prior's, the bound falls while the variance grows and
     # then rises towards the prior. The turning point is where its derivative by φ is zero.
@@ -115,7 +115,7 @@ def drift(
         turns = (phi * phi < turn2) & (turn2 < 1.0)
         if np.any(turns):
             turn2 = np.where(turns, turn2, 1.0)
-            spread = np.sqrt(np.maximum(prior_variance + turn2 * excess, 0.0))
+            spread = np.sqrt(prior_variance + turn2 * excess)
             at_turn = prior_mean + np.sqrt(turn2) * offset - z * spread
             lowest = np.where(turns, np.minimum(lowest, at_turn), lowest)
     return AwarenessBelief(mean, variance, lowest)

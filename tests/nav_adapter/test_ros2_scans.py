@@ -8,14 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bridge_scenes import FRONT, START_S, Listener, odometry
 from hypothesis import given
 from hypothesis import strategies as st
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
 from scan_scenes import RAYS, planar, scan_message
-from test_ros2_bridge import START_S, Listener, odometry
-from two_sensor_scenes import FRONT
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import decode, encode, laser_scan_of, map_cells_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -122,6 +122,22 @@ def rivals_of(given: Scene, costs: FloatArray, matches: dict[int, int]) -> set[t
             if close and costs[i, j] <= costs[owner, j] + GATES.ambiguity_margin:
                 found.add((owner, int(i)))
     return found
+
+
+@pytest.mark.parametrize("tracks", [1, 2])
+@pytest.mark.parametrize(("margin", "distance_m"), [(0.25, 0.5), (0.24, 0.5), (0.25, 0.49)])
+def test_a_rival_at_the_very_edge_counts(tracks: int, margin: float, distance_m: float) -> None:
+    """With a spread of 1 m² the costs are squared distances, here 0 and 0.25."""
+    places = np.array([[0.0, 0.0], [0.5, 0.0]])
+    spread = np.broadcast_to(0.5 * np.eye(2), (2, 2, 2))
+    gates = replace(GATES, ambiguity_margin=margin, ambiguity_distance_m=distance_m)
+    measurements = 3 - tracks  # the second of the tracks, or of the measurements, is the rival
+    found = associate(
+        *(places[:tracks], spread[:tracks], np.ones(tracks, dtype=bool)),
+        *(places[:measurements], spread[:measurements], gates),
+    )
+    assert found.tracks.tolist() == found.measurements.tolist() == [0]
+    assert found.ambiguous.tolist() == [(margin, distance_m) == (0.25, 0.5)]
 
 
 @pytest.mark.parametrize("first", range(0, 240, 40))
