@@ -13,7 +13,8 @@ from social_scenes import formula_episode, random_episode, straight
 
 from sim_tests import SimError
 from sim_tests.study.social import read_track, social_measures, write_episode
-from sim_tests.study.social._episode import sides, velocities
+from sim_tests.study.social._episode import sides
+from sim_tests.study.social._files import _velocities
 
 HEADER = "timestamp,x,y,column,robot_x,robot_y,robot_yaw_rad\n"
 
@@ -114,7 +115,7 @@ def test_velocities_are_known_exactly_where_positions_are(presence):
     t_s = np.arange(float(len(presence)))
     gone = np.isnan(presence)
     positions = np.where(gone[:, None], np.nan, np.stack([2.0 * t_s, -t_s], axis=1))
-    found = velocities(t_s, positions)
+    found = _velocities(t_s, positions)
     assert np.array_equal(np.isnan(found[:, 0]), gone)
     for row in np.flatnonzero(~gone):
         near = row > 0 and not gone[row - 1]
