@@ -12,13 +12,14 @@ from typing import Final
 import numpy as np
 
 from sim_tests.study.measures import (
+    NOTHING,
     EpisodeRecord,
     Interval,
     bootstrap_interval,
     paired_difference,
     proportion_interval,
 )
-from sim_tests.study.report import NOTHING, Section, Table, write_page
+from sim_tests.study.report import Section, Table, write_page
 
 from ._measure import read_about, read_results
 from ._rows import RESULTS, Board, Row

@@ -38,7 +38,14 @@ _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
 
 
 def draw_camera_view(
-    picture: ImageRgb, camera: Camera, frame: CrossingFrame, stage: Stage, cone: AttentionCone
+    picture: ImageRgb,
+    camera: Camera,
+    frame: CrossingFrame,
+    stage: Stage,
+    cone: AttentionCone,
+    *,
+    box_scale: float = 1.0,
+    captions: bool = True,
 ) -> ImageRgb:
     """Draw boxes, gaze cones, α, radius and speed limit into an image of the robot's camera.
 
@@ -48,13 +55,16 @@ def draw_camera_view(
         frame: the frame to draw.
         stage: gives the position of the eyes, where the cone is drawn.
         cone: the attention cone.
+        box_scale: size of the images that boxes were observed in, over that of the scenario's
+            camera.
+        captions: also write the speed limit and its reason.
 
     Returns:
         A new image.
     """
     image: ImageRgb = picture.copy()
     rotation, origin = frame.T_odom_camera[:3, :3], frame.T_odom_camera[:3, 3]
-    scale = camera.width_px / stage.scenario.camera.width_px
+    scale = camera.width_px / (stage.scenario.camera.width_px * box_scale)
 
     def pixels(points_odom_m: FloatArray) -> FloatArray:
         return camera.project((points_odom_m - origin) @ rotation)
@@ -91,7 +101,8 @@ def draw_camera_view(
             if alpha is not None and spread is not None:
                 text = f"alpha {alpha:.2f} +- {spread:.2f}"
             _write(image, [text], (int(left) + 4, max(int(top) - 4, 18)), _TEXT_SIZE)
-    _write(image, _captions(frame), (8, 18), _TEXT_SIZE)
+    if captions:
+        _write(image, _captions(frame), (8, 18), _TEXT_SIZE)
     return image
 
 

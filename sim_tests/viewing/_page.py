@@ -18,7 +18,7 @@ from ..world.errors import SimError
 
 #: Most characters of pictures in a page; every second picture is left out until they fit.
 MOST_PICTURE_CHARACTERS: Final = 6_000_000
-_SCRIPTS: Final = ("plan.js", "camera.js", "charts.js", "player.js")
+_SCRIPTS: Final = ("plan.js", "charts.js", "player.js")
 
 
 def page_text(recording: Mapping[str, Any] | None, title: str) -> str:
@@ -96,7 +96,7 @@ def show_page(address: str) -> bool:
 def _thinned(states: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return the states with as many of their pictures as fit into a page."""
     kept = [index for index, state in enumerate(states) if "picture" in state]
-    while sum(len(states[i]["picture"]["jpeg"]) for i in kept) > MOST_PICTURE_CHARACTERS:
+    while sum(len(states[i]["picture"]) for i in kept) > MOST_PICTURE_CHARACTERS:
         kept = kept[::2]
     pictured = set(kept)
     return [

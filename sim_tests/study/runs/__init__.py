@@ -35,9 +35,16 @@ if TYPE_CHECKING:
         planner_parameters,
         refuse_unusable_planner,
     )
-    from ._replay import find_episode, recorder_of
+    from ._replay import box_scale_of, find_episode, recorder_of
     from ._run import run_jobs
-    from ._run_files import RunFiles, read_attempts, read_jobs, read_run
+    from ._run_files import (
+        RunFiles,
+        answering_note,
+        read_attempts,
+        read_jobs,
+        read_rows,
+        read_run,
+    )
 
 __all__ = [
     "KNOWN_PLANNERS",
@@ -46,7 +53,9 @@ __all__ = [
     "Job",
     "JobKey",
     "RunFiles",
+    "answering_note",
     "attempt",
+    "box_scale_of",
     "describe",
     "died",
     "fault_of",
@@ -64,6 +73,7 @@ __all__ = [
     "policy_text",
     "read_attempts",
     "read_jobs",
+    "read_rows",
     "read_run",
     "recorder_of",
     "refuse_unusable_planner",

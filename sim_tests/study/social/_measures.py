@@ -11,7 +11,7 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
-from ..measures import path_length_m
+from ..measures import path_length_m, success_weighted
 from ._episode import SocialEpisode
 from ._motion import (
     GymMotion,
@@ -25,7 +25,6 @@ from ._motion import (
     people_heading_changes_rad,
     people_motion,
     robot_motion,
-    success_weighted,
 )
 from ._social_force import SocialWork
 from ._spaces import (

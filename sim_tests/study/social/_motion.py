@@ -19,24 +19,6 @@ from ..measures import path_length_m
 from ._episode import SocialEpisode, wrapped
 
 
-def success_weighted(
-    success: bool | None, actual: float | None, best: float | None
-) -> float | None:
-    """Return S · l / max(p, l): SPL with lengths, STL with times.
-
-    Args:
-        success: S.
-        actual: p, the length or time of the episode; not used without success.
-        best: l > 0, that of the reference.
-
-    Returns:
-        None where success or reference is not known.
-    """
-    if success is None or best is None or best <= 0.0 or (success and actual is None):
-        return None
-    return best / max(actual or 0.0, best) if success else 0.0
-
-
 def heading_changes_rad(headings_rad: FloatArray) -> float:
     """Return the sum of the magnitudes of all changes between (N,) headings, each at most π."""
     return float(np.abs(wrapped(np.diff(headings_rad))).sum())
