@@ -21,13 +21,13 @@ MOST_PICTURE_CHARACTERS: Final = 6_000_000
 _SCRIPTS: Final = ("plan.js", "charts.js", "player.js")
 
 
-def page_text(recording: Mapping[str, Any] | None, title: str) -> str:
+def page_text(title: str, recording: Mapping[str, Any] | None = None) -> str:
     """Return a page.
 
     Args:
+        title: the page's title.
         recording: ``begin``, ``states``, ``outcome`` and ``note`` of a crossing; None for a page
             that receives them live from its server.
-        title: the page's title.
     """
     folder = resources.files("sim_tests.viewing") / "templates"
     data = json.dumps(
@@ -43,11 +43,6 @@ def page_text(recording: Mapping[str, Any] | None, title: str) -> str:
     # The odd pieces are the names of parts.
     pieces[1::2] = [parts[name] for name in pieces[1::2]]
     return "".join(pieces)
-
-
-def live_page(title: str) -> str:
-    """Return the page that receives its states from a server."""
-    return page_text(None, title)
 
 
 def write_page(
@@ -71,18 +66,9 @@ def write_page(
     """
     if not states:
         raise SimError(f"cannot write {path}: the crossing has no states")
-    recording = {
-        "begin": begin,
-        "states": _thinned(states),
-        "outcome": outcome,
-        "note": note,
-    }
-    write_text(path, page_text(recording, title_of(begin)), SimError)
-
-
-def title_of(begin: Mapping[str, Any]) -> str:
-    """Return the title of a crossing's page."""
-    return f"{begin['scenario']}, seed {begin['seed']}, policy {begin['policy']}"
+    title = f"{begin['scenario']}, seed {begin['seed']}, policy {begin['policy']}"
+    recording = {"begin": begin, "states": _thinned(states), "outcome": outcome, "note": note}
+    write_text(path, page_text(title, recording), SimError)
 
 
 def show_page(address: str) -> bool:

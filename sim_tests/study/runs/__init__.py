@@ -32,7 +32,6 @@ if TYPE_CHECKING:
         KNOWN_PLANNERS,
         make_planner,
         planner_label,
-        planner_parameters,
         refuse_unusable_planner,
     )
     from ._replay import box_scale_of, find_episode, recorder_of
@@ -68,7 +67,6 @@ __all__ = [
     "observed_episode",
     "plan_jobs",
     "planner_label",
-    "planner_parameters",
     "policy_of",
     "policy_text",
     "read_attempts",

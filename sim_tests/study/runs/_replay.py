@@ -56,7 +56,6 @@ _VIDEO_HZ: Final = 10
 _HEIGHT_PX: Final = 480
 _MAP_WIDTH_PX: Final = 720
 _MAP_MARGIN_M: Final = 3.0
-_MAP_PX_PER_M: Final = 60.0
 
 
 class ReplayPictures(AbstractContextManager["ReplayPictures"]):

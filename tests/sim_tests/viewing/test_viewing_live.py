@@ -9,7 +9,7 @@ import urllib.request
 
 import pytest
 
-from sim_tests.viewing import LivePage, live_page
+from sim_tests.viewing import LivePage, page_text
 from sim_tests.world.errors import SimError
 
 
@@ -90,7 +90,7 @@ def test_nobody_reads(page):
 
 
 def test_the_browser_follows_scrubs_and_keeps_a_live_crossing(chromium, recorder):
-    with LivePage(live_page("live")) as page:
+    with LivePage(page_text("live")) as page:
         chromium.events.clear()
         chromium.call("Page.navigate", url=page.url)
         assert page.wait_for_reader(10.0)

@@ -170,4 +170,4 @@ def test_a_page_without_states_or_a_place_is_refused(recorder, tmp_path):
 
 
 def test_the_page_of_a_live_crossing_holds_no_states():
-    assert '<script type="application/json" id="data">null</script>' in page_text(None, "x")
+    assert '<script type="application/json" id="data">null</script>' in page_text("x")
