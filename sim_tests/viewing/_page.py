@@ -82,7 +82,7 @@ def show_page(address: str) -> bool:
 def _thinned(states: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return the states with as many of their pictures as fit into a page."""
     kept = [index for index, state in enumerate(states) if "picture" in state]
-    while sum(len(states[i]["picture"]) for i in kept) > MOST_PICTURE_CHARACTERS:
+    while len(kept) > 1 and sum(len(states[i]["picture"]) for i in kept) > MOST_PICTURE_CHARACTERS:
         kept = kept[::2]
     pictured = set(kept)
     return [
