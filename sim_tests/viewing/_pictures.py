@@ -13,7 +13,7 @@ from perception import AttentionCone
 from ..crossing import CrossingFrame, Stage, draw_camera_view
 from ..world.camera import CameraRenderer
 
-_WIDTH_PX: Final = 640
+_WIDTH_PX: Final = 480
 _JPEG_QUALITY: Final = 75
 
 

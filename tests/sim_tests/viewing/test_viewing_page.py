@@ -44,7 +44,7 @@ def test_figures_and_drawings_are_those_of_the_state(chromium, page_file, record
         assert float(shown) == pytest.approx(state[f"{name}_mps"], abs=6e-3)
     rows = chromium.evaluate("document.getElementById('tracks').rows.length")
     assert rows == len(state["tracks"]) >= 1
-    assert chromium.evaluate("document.getElementById('camera').naturalWidth") == 640
+    assert chromium.evaluate("document.getElementById('camera').naturalWidth") == 480
     for name in ("plan", "alpha", "motion"):
         colours = chromium.evaluate(
             f"(() => {{const c = document.getElementById('{name}');"

@@ -63,8 +63,8 @@ def test_pictures_are_small_and_show_the_person_ahead_on_the_right(recorder):
     for picture in pictures:
         data = base64.b64decode(picture)
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-        assert image.shape[1] == 640
-        assert len(data) < 80_000
+        assert image.shape[1] == 480
+        assert len(data) < 60_000
 
 
 def test_boxes_of_smaller_images_are_drawn_where_the_person_is():
