@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from social_scenes import formula_episode, random_episode, straight
+from social_scenes import random_episode, straight_episode
 
 from sim_tests import SimError
 from sim_tests.study.social import read_track, social_measures, write_episode
@@ -68,7 +68,7 @@ def test_a_track_is_read_back_equal(tmp_path):
 
 
 def test_a_track_without_people_and_the_second_layout_are_read(tmp_path):
-    alone = formula_episode(np.arange(0.0, 2.0, 0.1), straight(1.0))
+    alone = straight_episode(np.arange(0.0, 2.0, 0.1))
     write_episode(tmp_path / "alone.csv", alone)
     assert read_track(tmp_path / "alone.csv").people == 0
     wide = "timestamp,robot_x,robot_y,x1,y1,x2,y2\n0,0,0,1,2,,\n1000000000,1,0,1,3,5,5\n"
@@ -105,7 +105,7 @@ def test_what_cannot_be_written_or_read_is_refused(tmp_path):
         write_episode(tmp_path / "x.json", boxed(), "socnav")
     with pytest.raises(SimError, match=r"cannot read .*none\.csv"):
         read_track(tmp_path / "none.csv")
-    aimless = formula_episode([0.0, 1.0], straight(1.0), goal_m=None)
+    aimless = straight_episode([0.0, 1.0], goal_m=None)
     with pytest.raises(SimError, match="needs the robot's goal"):
         write_episode(tmp_path / "x.json", aimless)
     assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from social_reference import reference_measures
-from social_scenes import formula_episode, random_episode, straight
+from social_scenes import random_episode, straight_episode
 
 from sim_tests import SimError
 from sim_tests.study.social import SOCIAL_MEASURES, Outcome, social_measures
@@ -45,9 +45,7 @@ def test_without_people_their_measures_do_not_apply():
 @given(st.booleans(), st.floats(1.0, 50.0), st.floats(1.0, 50.0), st.floats(1.0, 50.0))
 def test_spl_and_stl_are_shares_that_only_the_reference_reaches(success, length, best, time):
     outcome = Outcome(success, time, best, best)
-    episode = formula_episode(
-        [0.0, 1.0], straight(length), goal_m=np.array([length, 0.0]), outcome=outcome
-    )
+    episode = straight_episode([0.0, 1.0], length, outcome=outcome)
     measured = social_measures(episode)
     for name, actual in (("spl", length), ("stl", time)):
         assert 0.0 <= measured[name] <= 1.0
@@ -66,7 +64,7 @@ def test_spl_and_stl_are_shares_that_only_the_reference_reaches(success, length,
     ],
 )
 def test_an_episode_that_does_not_fit_together_is_refused(values, message):
-    episode = formula_episode([0.0, 1.0], straight(1.0), [straight(0.0, (3.0, 0.0))])
+    episode = straight_episode([0.0, 1.0], standing_m=[(3.0, 0.0)])
     fields = {name: getattr(episode, name) for name in type(episode).__dataclass_fields__}
     with pytest.raises(SimError, match=message):
         type(episode)(**{**fields, **values})

@@ -67,32 +67,40 @@ def test_pictures_are_small_and_show_the_person_ahead_on_the_right(recorder):
         assert len(data) < 60_000
 
 
-def test_boxes_of_smaller_images_are_drawn_where_the_person_is():
-    drawn = []
+def test_boxes_are_drawn_where_the_person_is():
+    drawn = {}
+
+    def with_boxes(frame, box):
+        seen = (replace(each, box_xyxy_px=box(each.box_xyxy_px)) for each in frame.observations)
+        return replace(frame, observations=tuple(seen))
 
     def observe(frame, stage):
         if drawn or not frame.observations:
             return
         camera = stage.scenario.camera.camera(1.0)
         picture = np.full((camera.height_px, camera.width_px, 3), 90, dtype=np.uint8)
-        halved = replace(
-            frame,
-            observations=tuple(
-                replace(each, box_xyxy_px=0.5 * each.box_xyxy_px) for each in frame.observations
-            ),
-        )
-        for each, scale in ((frame, 1.0), (halved, 0.5)):
-            drawn.append(
-                draw_camera_view(
-                    picture, camera, each, stage, AttentionCone(), box_scale=scale, captions=False
-                )
+        for name, box, scale in (
+            ("own", lambda box: box, 1.0),
+            ("of smaller images", lambda box: 0.5 * box, 0.5),
+            ("of another view", lambda box: box - [400.0, 0.0, 400.0, 0.0], 1.0),
+            ("none", lambda box: None, 1.0),
+        ):
+            drawn[name] = draw_camera_view(
+                picture,
+                camera,
+                with_boxes(frame, box),
+                stage,
+                AttentionCone(),
+                box_scale=scale,
+                captions=False,
             )
 
     scenario = ScenarioTemplate.from_text(SHORT).for_seed(0)
     run_crossing(scenario, policy="balanced", perception="keypoints", observer=observe)
-    assert np.array_equal(*drawn)
-    _, columns = np.nonzero((drawn[0] != 90).any(axis=2))
-    assert columns.mean() > 320  # the person stands ahead on the right
+    assert np.array_equal(drawn["own"], drawn["of smaller images"])
+    assert np.array_equal(drawn["of another view"], drawn["none"])
+    _, columns = np.nonzero((drawn["own"] != drawn["none"]).any(axis=2))
+    assert columns.min() > 320  # the person stands ahead on the right
 
 
 def test_a_renderer_that_fails_ends_the_pictures_and_not_the_crossing(monkeypatch):
