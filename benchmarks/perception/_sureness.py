@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from perception import (
     AwarenessPipeline,
@@ -29,7 +30,6 @@ from perception.arrays import FloatArray, ImageRgb
 from perception.networks.heads import OnnxHeadPoseEstimator
 from perception.shipped import HEAD, load_shipped
 
-from ._photographs import matched
 from ._pictures import Condition, chosen_conditions, degraded_pictures, pipeline_of
 
 HeadKind = Literal["network", "pnp"]
@@ -133,6 +133,25 @@ def axis_nees(pose: HeadPose, forward_camera: FloatArray) -> tuple[float, float]
     return (
         float(error @ np.linalg.solve(covariance, error)),
         math.sqrt(0.5 * float(np.trace(covariance))),
+    )
+
+
+def matched(
+    truth: FloatArray, found: FloatArray, min_iou: float = 0.5
+) -> tuple[tuple[int, int], ...]:
+    """Return pairs (truth, found) of boxes (T, 4) and (F, 4): the most, then the best overlaps."""
+    low = np.maximum(truth[:, None, :2], found[None, :, :2])
+    high = np.minimum(truth[:, None, 2:], found[None, :, 2:])
+    shared = np.prod(np.clip(high - low, 0.0, None), axis=2)
+    areas = [np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) for boxes in (truth, found)]
+    union = areas[0][:, None] + areas[1][None] - shared
+    iou = np.divide(shared, union, out=np.zeros_like(shared), where=union > 0.0)
+    good = iou >= min_iou
+    rows, columns = linear_sum_assignment(np.where(good, 10.0 + iou, 0.0), maximize=True)
+    return tuple(
+        (int(row), int(column))
+        for row, column in zip(rows, columns, strict=True)
+        if good[row, column]
     )
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         run_episode,
         seeded_crossing,
     )
-    from ._job import Attempt, Job, JobKey, describe
+    from ._job import Job, describe
     from ._parallel import in_parallel, tidy
     from ._plan import (
         fault_of,
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from ._planner_choice import (
         KNOWN_PLANNERS,
         make_planner,
-        planner_label,
         refuse_unusable_planner,
     )
     from ._replay import box_scale_of, find_episode, recorder_of
@@ -47,10 +46,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "KNOWN_PLANNERS",
-    "Attempt",
     "Conditions",
     "Job",
-    "JobKey",
     "RunFiles",
     "answering_note",
     "attempt",
@@ -66,7 +63,6 @@ __all__ = [
     "named_templates",
     "observed_episode",
     "plan_jobs",
-    "planner_label",
     "policy_of",
     "policy_text",
     "read_attempts",
