@@ -7,7 +7,7 @@ from typing import Any
 
 from awarenav.cli import FilePath, FolderPath, OneOf, argument, command, group, option, options
 
-#: Names of the formats of exported episodes; those of :data:`sim_tests.study.social.FORMATS`.
+#: Names of the formats of exported episodes; those of ``_files.FORMATS``.
 FORMAT_NAMES = ("socnav3", "navwareset")
 
 
