@@ -27,8 +27,9 @@ from perception import (
     PnpHeadPoseEstimator,
 )
 from perception.arrays import FloatArray, ImageRgb
+from perception.networks import OnnxModel
 from perception.networks.heads import OnnxHeadPoseEstimator
-from perception.shipped import HEAD, load_shipped
+from perception.shipped import HEAD
 
 from ._pictures import Condition, chosen_conditions, degraded_pictures, pipeline_of
 
@@ -171,7 +172,7 @@ def measure(
             heads = RecordingHeads(
                 PnpHeadPoseEstimator()
                 if head == "pnp"
-                else OnnxHeadPoseEstimator(load_shipped(HEAD, folder=folder))
+                else OnnxHeadPoseEstimator(OnnxModel.shipped(HEAD, folder=folder))
             )
             pipeline = pipeline_of(camera, folder, heads, _RENDERED_EYES_STD_RAD)
             pipelines[camera] = heads, pipeline
