@@ -89,7 +89,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Run one episode of a run again, with video, map or page.",
         ),
         "compare": _Entry(
-            "sim_tests.study.measures.command:compare",
+            "sim_tests.study.command:compare",
             "Print tables of finished runs, with confidence intervals.",
         ),
         "measures": _Entry(

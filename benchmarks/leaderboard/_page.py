@@ -11,13 +11,14 @@ from typing import Final
 import numpy as np
 
 from sim_tests.study.measures import (
+    NOTHING,
     EpisodeRecord,
     Interval,
     bootstrap_interval,
     paired_difference,
     proportion_interval,
 )
-from sim_tests.study.report import NOTHING, Table
+from sim_tests.study.report import Table
 
 from ._measure import read_about, read_results
 from ._rows import RESULTS, Board, Row
