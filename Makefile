@@ -38,7 +38,7 @@ lint: setup ## run ruff, the speller, the import contracts and strict type check
 	$(PY) -m mypy
 
 bench: setup ## measure the speed of crossings and of perception
-	$(AWARENAV) bench
+	$(PY) -m benchmarks.episode_cost
 	$(PY) -m benchmarks.perception_speed
 
 docs: setup ## build the documentation site in site/; a link that leads nowhere is an error

@@ -2,14 +2,53 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from .errors import AwarenavError
+
+# Formats of plots.
+_PLOTS: Final = (".png", ".svg", ".pdf")
+
+
+def check_output(
+    out: Path, suffixes: Sequence[str], inputs: Iterable[Path | None] = (), *, option: str = "--out"
+) -> None:
+    """Refuse a file of results before any work.
+
+    Args:
+        out: the file.
+        suffixes: one of which it must have; empty for any.
+        inputs: files that it must not replace; None for one that was not given.
+        option: of the command, for the message.
+
+    Raises:
+        AwarenavError: for another suffix, an input, or a folder.
+    """
+    if suffixes and out.suffix.lower() not in suffixes:
+        raise AwarenavError(f"{option} must end in {' or '.join(suffixes)}, got {out}")
+    if out.resolve() in {path.resolve() for path in inputs if path is not None}:
+        raise AwarenavError(f"{option} {out} would replace an input")
+    if out.is_dir():
+        raise AwarenavError(f"{option} must be a file, {out} is a folder")
+
+
+def check_plot(out: Path | None, inputs: Iterable[Path | None]) -> None:
+    """Refuse the file of a plot as :func:`check_output` does; None is no plot.
+
+    Raises:
+        AwarenavError: as there.
+    """
+    if out is None:
+        return
+    if out.suffix.lower() not in _PLOTS:
+        raise AwarenavError(f"--out must end in {', '.join(_PLOTS)} or be none, got {out}")
+    check_output(out, (), inputs)
 
 
 @contextmanager
@@ -43,6 +82,26 @@ def write_text(path: Path, text: str, error: type[AwarenavError] = AwarenavError
     """
     with atomic_path(path, error) as part:
         part.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def write_csv(
+    path: Path,
+    header: Sequence[str],
+    rows: Iterable[Sequence[object]],
+    error: type[AwarenavError] = AwarenavError,
+) -> None:
+    """Write a CSV file as :func:`write_text` does, with Unix line ends.
+
+    Raises:
+        AwarenavError: or ``error``, for a place that cannot be written.
+    """
+    with (
+        atomic_path(path, error) as part,
+        part.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
 
 
 def printable(name: str) -> str:

@@ -308,13 +308,17 @@ def people_by_frame(records: list[Record], path: Any) -> dict[str, list[PersonRe
         name = str(record["frame"])
         if name in frames:
             raise AwarenavError(f"{path}: two frames have the name {name!r}")
-        people = record["people"]
-        if not isinstance(people, list):
-            raise AwarenavError(
-                f"{path}, frame {name!r}: people must be a list, got {people!r:.60}"
-            )
-        frames[name] = [
-            read_person(person, f"{path}, frame {name!r}, person {index}")
-            for index, person in enumerate(people)
-        ]
+        frames[name] = read_people(record, f"{path}, frame {name!r}")
     return frames
+
+
+def read_people(record: Record, where: str) -> list[PersonRecord]:
+    """Return the people of a frame.
+
+    Raises:
+        AwarenavError: for a value that is not valid; the message begins with ``where``.
+    """
+    people = record["people"]
+    if not isinstance(people, list):
+        raise AwarenavError(f"{where}: people must be a list, got {people!r:.60}")
+    return [read_person(each, f"{where}, person {index}") for index, each in enumerate(people)]

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from ._camera import Camera
-from ._stages import HeadPose, HeadPoseEstimator, PersonKeypoints
+from ._stages import HeadPose, HeadPoseEstimator, PersonKeypoints, check_count
 from .arrays import FloatArray, ImageRgb
 from .errors import PerceptionError
 from .matrices import rotation_exp, rotation_log
@@ -59,11 +59,7 @@ class FusedHeadPoseEstimator:
         fused: list[HeadPose | None] = [None] * len(people)
         for estimator in self.estimators:
             heads = tuple(estimator.estimate(image_rgb, camera, people))
-            if len(heads) != len(people):
-                raise PerceptionError(
-                    f"{type(estimator).__name__} must return one result per person "
-                    f"({len(people)}), got {len(heads)}"
-                )
+            check_count(type(estimator).__name__, len(heads), len(people))
             for row, head in enumerate(heads):
                 known = fused[row]
                 fused[row] = head if known is None or head is None else fuse_heads(known, head)

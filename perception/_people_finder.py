@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 
 from . import layouts as kp
 from ._camera import Camera
-from ._stages import PersonDetection, PersonDetector, PersonKeypoints, PoseEstimator
+from ._stages import (
+    PersonDetection,
+    PersonDetector,
+    PersonKeypoints,
+    PoseEstimator,
+    check_count,
+)
 from .arrays import FloatArray, ImageRgb, finite_number
 from .confirmation import (
     FoundPerson,
@@ -27,7 +33,6 @@ from .confirmation import (
     keypoint_score,
     without_disowned,
 )
-from .errors import PerceptionError
 
 #: Longest permitted time between two looks of the detector.
 MAX_DETECT_EVERY_S: Final = 0.2
@@ -413,9 +418,3 @@ class PeopleFinder:
         people = tuple(self._pose.estimate(image_rgb, detections))
         check_count("pose_estimator", len(people), len(detections))
         return people
-
-
-def check_count(name: str, got: int, wanted: int) -> None:
-    """Raise PerceptionError unless an estimator returned one result per person."""
-    if got != wanted:
-        raise PerceptionError(f"{name} must return one result per person ({wanted}), got {got}")

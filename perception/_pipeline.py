@@ -12,7 +12,7 @@ import numpy as np
 from ._camera import Camera
 from ._floor import FloorPlane
 from ._observation import PersonObservation
-from ._people_finder import PeopleFinder, check_count
+from ._people_finder import PeopleFinder
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._stages import (
@@ -22,9 +22,10 @@ from ._stages import (
     PersonDetection,
     PersonDetector,
     PoseEstimator,
+    check_count,
 )
 from .anthropometry import UNUSUAL_SIZE_PROBABILITY
-from .arrays import FloatArray, ImageRgb, finite_array, finite_number
+from .arrays import FloatArray, ImageRgb, check_image, finite_array, finite_number
 from .awareness import AttentionCone, AwarenessEstimate, estimate_awareness
 from .body import DEFAULT_MIN_SCORE
 from .confirmation import FoundPerson, KeypointConfirmation
@@ -212,7 +213,7 @@ class AwarenessPipeline:
         """
         stamp_s = finite_number("stamp_s", stamp_s)
         floor = self._floor if floor is None else _checked_floor(floor)
-        self._check_image(image_rgb)
+        check_image(image_rgb, self.camera.height_px, self.camera.width_px)
         if depth_m is not None:
             shape = self.camera.height_px, self.camera.width_px
             depth_m = checked_depth(depth_m, shape, stamp_s, depth_stamp_s)
@@ -315,18 +316,6 @@ class AwarenessPipeline:
             gaze = _gaze(head, eyes[row]) if evidence.direction_known else None
             looks[row] = _Look(estimate, gaze, eyes_seen=eyes[row] is not None)
         return looks
-
-    def _check_image(self, image_rgb: Any) -> None:
-        wanted = (self.camera.height_px, self.camera.width_px, 3)
-        if not isinstance(image_rgb, np.ndarray):
-            raise PerceptionError(
-                f"image_rgb must be a uint8 array of shape {wanted}, got {type(image_rgb).__name__}"
-            )
-        if image_rgb.dtype != np.uint8 or image_rgb.shape != wanted:
-            raise PerceptionError(
-                f"image_rgb must be uint8 RGB of the camera's shape {wanted}, got "
-                f"{image_rgb.dtype} of shape {image_rgb.shape}"
-            )
 
 
 def _gaze(head: HeadPose, eyes: EyeGaze | None) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,10 +108,42 @@ class _Feet:
     log_std: list[float]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """What one frame shows of a person.
+
+    Attributes:
+        detection: their box.
+        keypoints: what is seen in it.
+        head: its pose, if it is known.
+        skeleton: the placed body; None without one.
+        by_box: the placement by the box; None where the skeleton's is surely more accurate.
+        feet: where the ankles would stand on a known floor.
+        chest: depth of the centre line in a depth image, and its standard deviation.
+    """
+
+    detection: PersonDetection
+    keypoints: PersonKeypoints
+    head: HeadPose | None
+    skeleton: BodyPlacement | None
+    by_box: Placement | None
+    feet: _Feet | None
+    chest: tuple[float, float] | None
+
+
+class _Ranged(NamedTuple):
+    """A first placement, the range by all cues, and that by the size of the skeleton alone."""
+
+    start: Placement
+    found: CombinedRange
+    size_range_m: float | None
+    size_range_relative_std: float | None
+
+
 def place_people(
     camera: Camera,
     detections: Sequence[PersonDetection],
-    people: Sequence[PersonKeypoints],
+    people: tuple[PersonKeypoints, ...],
     heads: Sequence[HeadPose | None],
     floor: FloorPlane | None,
     keypoint_std_px: float,
@@ -129,8 +161,7 @@ def place_people(
     """
     if not people:
         return ()
-    bodies = place_bodies(camera, people, keypoint_std_px, min_score)
-    box_placements = _place_by_boxes(camera, detections, bodies)
+    bodies = place_bodies(camera, tuple(people), keypoint_std_px, min_score)
     feet: Sequence[_Feet | None] = [None] * len(people)
     if floor is not None:
         feet = _feet_on_floor(floor, camera, detections, people, keypoint_std_px, min_score)
@@ -138,40 +169,13 @@ def place_people(
     if depth_m is not None:
         trunks = [None if body is None else _trunk_px(camera, body) for body in bodies]
         chests = chest_depths(depth_m, detections, people, trunks, min_score)
-    rows: list[int] = []
-    starts: list[Placement] = []
-    found: list[CombinedRange] = []
-    sizes: list[tuple[float, float] | None] = []
-    for row, (body_placement, by_box) in enumerate(zip(bodies, box_placements, strict=True)):
-        body, start = _first_placement(body_placement, by_box)
-        if start is None:
-            continue
-        range_cues = _range_cues(
-            camera,
-            detections[row],
-            people[row],
-            body,
-            start,
-            heads[row],
-            floor,
-            feet[row],
-            min_score,
-        )
-        by_size = range_cues[0]
-        if (chest := chests[row]) is not None:
-            range_cues.append(_chest_cue(start[0], *chest, bodies[row] is not None))
-        rows.append(row)
-        starts.append(start)
-        found.append(combined_range(range_cues, unusual_size_probability))
-        own = math.sqrt(by_size.log_std**2 - by_size.stature_std**2)
-        sizes.append(None if body is None else (float(np.linalg.norm(start[0])), own))
-    placed: list[PersonPlace | None] = [None] * len(people)
-    if starts:
-        for row, place, one, size in zip(
-            rows, _with_range(starts, found), found, sizes, strict=True
-        ):
-            placed[row] = PersonPlace(*place, one.lasting_std, *(size or (None, None)))
-    return tuple(placed)
+    by_boxes = _place_by_boxes(camera, detections, bodies)
+    everybody = map(_Seen, detections, people, heads, bodies, by_boxes, feet, chests)
+    ranged = [
+        _ranged(camera, each, floor, min_score, unusual_size_probability) for each in everybody
+    ]
+    places = iter(_with_range([each for each in ranged if each is not None]))
+    return tuple(None if each is None else next(places) for each in ranged)
 
 
 def _place_by_boxes(
@@ -191,16 +195,29 @@ def _place_by_boxes(
     return placements
 
 
-def _first_placement(
-    body: BodyPlacement | None, by_box: Placement | None
-) -> tuple[BodyPlacement | None, Placement | None]:
-    """Return the more accurate placement, and the body if it comes from the body."""
-    if body is None:
-        return None, by_box
+def _ranged(
+    camera: Camera, seen: _Seen, floor: FloorPlane | None, min_score: float, unusual: float
+) -> _Ranged | None:
+    """Return the placement of a person with the range of all cues; None if nothing places them."""
+    body, start = seen.skeleton, seen.by_box
     # An arm at the image's border gives a less accurate range than the height of its box.
-    if by_box is not None and _trace(body.position_covariance_m2) > _trace(by_box[1]):
-        return None, by_box
-    return body, (body.position_camera_m, body.position_covariance_m2)
+    if body is not None and (
+        start is None or _trace(body.position_covariance_m2) <= _trace(start[1])
+    ):
+        start = body.position_camera_m, body.position_covariance_m2
+    else:
+        body = None
+    if start is None:
+        return None
+    cues = _range_cues(camera, seen, body, start, floor, min_score)
+    by_size = cues[0]
+    if seen.chest is not None:
+        cues.append(_chest_cue(start[0], *seen.chest, seen.skeleton is not None))
+    found = combined_range(cues, unusual)
+    if body is None:
+        return _Ranged(start, found, None, None)
+    own = math.sqrt(by_size.log_std**2 - by_size.stature_std**2)
+    return _Ranged(start, found, float(np.linalg.norm(start[0])), own)
 
 
 def _trace(matrix: FloatArray) -> float:
@@ -209,16 +226,16 @@ def _trace(matrix: FloatArray) -> float:
 
 def _range_cues(
     camera: Camera,
-    detection: PersonDetection,
-    person: PersonKeypoints,
+    seen: _Seen,
     body: BodyPlacement | None,
     start: Placement,
-    head: HeadPose | None,
     floor: FloorPlane | None,
-    feet: _Feet | None,
     min_score: float,
 ) -> list[DepthCue]:
-    """Return the cues of body or box, head and feet for the range, relative to the start's."""
+    """Return the cues of body or box, head and feet for the range, relative to the start's.
+
+    The first one is that of the size of ``body``, or of the box for None.
+    """
     position, covariance = start
     x, y, z = position.tolist()
     squared = x * x + y * y + z * z
@@ -227,17 +244,17 @@ def _range_cues(
     outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
     stature = min(stature, STATURE_RELATIVE_STD, 0.99 * along)
     cues = [DepthCue(0.0, along, stature, outlier, *_UNUSUAL, 0.5, HIDDEN_OFFSET * (body is None))]
-    if (cue := _head_cue(position, person, body, head, floor)) is not None:
+    if (cue := _head_cue(position, seen, body, floor)) is not None:
         cues.append(cue)
     if floor is not None:
-        seen = person.scores[kp.BODY] >= min_score
-        if body is not None and feet is not None:
-            cue = _feet_cue(person, body, feet) or _legs_cue(body, seen, floor)
-        elif seen.any() and not seen[kp.ANKLES].any():
+        shown = seen.keypoints.scores[kp.BODY] >= min_score
+        if body is not None and seen.feet is not None:
+            cue = _feet_cue(seen.keypoints, body, seen.feet) or _legs_cue(body, shown, floor)
+        elif shown.any() and not shown[kp.ANKLES].any():
             # The feet are behind something or outside the image, and so is not the lower edge.
             cue = None
         else:
-            cue = _bottom_cue(camera, detection, position, floor)
+            cue = _bottom_cue(camera, seen.detection, position, floor)
         if cue is not None:
             cues.append(cue)
     return cues
@@ -263,11 +280,13 @@ def _chest_cue(position: FloatArray, depth_m: float, std_m: float, has_body: boo
     return DepthCue(value, std_m / depth_m, 0.0, *outlier)
 
 
-def _with_range(starts: Sequence[Placement], found: Sequence[CombinedRange]) -> list[Placement]:
+def _with_range(people: Sequence[_Ranged]) -> list[PersonPlace]:
     """Return the placements with the range of all cues together."""
-    position = np.array([start[0] for start in starts])
-    covariance = np.array([start[1] for start in starts])
-    log_range, log_std = np.array([(one.log_range, one.log_std) for one in found]).T
+    if not people:
+        return []
+    position = np.array([each.start[0] for each in people])
+    covariance = np.array([each.start[1] for each in people])
+    log_range, log_std = np.array([(e.found.log_range, e.found.log_std) for e in people]).T
     ratio = np.exp(log_range)[:, None]
     squared = (position * position).sum(axis=1)[:, None, None]
     across = ratio[..., None] * (_IDENTITY - position[:, :, None] * position[:, None] / squared)
@@ -275,21 +294,23 @@ def _with_range(starts: Sequence[Placement], found: Sequence[CombinedRange]) -> 
     far = log_std[:, None] * placed
     spread = across @ covariance @ across + far[:, :, None] * far[:, None]
     spread = 0.5 * (spread + spread.swapaxes(1, 2))
-    return list(zip(placed, spread, strict=True))
+    return [
+        PersonPlace(
+            place, own, each.found.lasting_std, each.size_range_m, each.size_range_relative_std
+        )
+        for place, own, each in zip(placed, spread, people, strict=True)
+    ]
 
 
 def _head_cue(
-    position: FloatArray,
-    person: PersonKeypoints,
-    body: BodyPlacement | None,
-    head: HeadPose | None,
-    floor: FloorPlane | None,
+    position: FloatArray, seen: _Seen, body: BodyPlacement | None, floor: FloorPlane | None
 ) -> DepthCue | None:
     """Return the cue of the head's measured range for the range of its body."""
+    head = seen.head
     if head is None or head.range_relative_std is None:
         return None
     centre = head.position_camera_m + head.rotation_camera_head @ HEAD_CENTRE_HEAD_M
-    if body is not None and person.lifted:
+    if body is not None and seen.keypoints.lifted:
         expected = float(body.keypoints_camera_m[:5, 2].mean())
         offset = _HEAD_OFFSET_STD_M
     else:

@@ -28,7 +28,7 @@ from .anthropometry import (
     HEAD_TEMPLATE_M,
 )
 from .arrays import FloatArray, finite_number
-from .body import DEFAULT_MIN_SCORE, BodyPlacement, metric_scale, place_bodies
+from .body import DEFAULT_MIN_SCORE, BodyPlacement, metric_scales, place_bodies
 from .errors import PerceptionError
 from .head_frame import lifted_head_model
 from .matrices import rotation_exp, rotation_log, skew
@@ -101,9 +101,6 @@ class PnpHeadPoseEstimator:
         head_model: ``"template"`` for the anatomical template, whose forward axis is the Frankfurt
             horizontal; ``"lifted"`` for the person's own lifted keypoints in the frame of the
             paper's printed formula (on an upright head a bias of about 36° downwards).
-        head_shape_spread: spread of head shapes about the template, as a multiple of that of adults
-            (:data:`~perception.anthropometry.HEAD_SHAPE_FACTOR_M`); 0 for heads that have exactly
-            the template's shape. It is part of the covariance. Lifted keypoints have none.
 
     Raises:
         PerceptionError: for an invalid value.
@@ -114,7 +111,6 @@ class PnpHeadPoseEstimator:
         keypoint_std_px: float = 1.0,
         min_score: float = DEFAULT_MIN_SCORE,
         head_model: HeadModel = "template",
-        head_shape_spread: float = 1.0,
     ) -> None:
         if head_model not in ("template", "lifted"):
             raise PerceptionError(f"head_model must be 'template' or 'lifted', got {head_model!r}")
@@ -123,9 +119,8 @@ class PnpHeadPoseEstimator:
         )
         self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
         self._head_model: HeadModel = head_model
-        spread = finite_number("head_shape_spread", head_shape_spread, minimum=0.0)
-        known = spread == 0.0 or head_model == "lifted"
-        self._shape_factor_m = None if known else spread * HEAD_SHAPE_FACTOR_M
+        # Heads differ in shape from the template; lifted keypoints are the person's own.
+        self._shape_factor_m = None if head_model == "lifted" else HEAD_SHAPE_FACTOR_M
 
     def estimate(
         self, image_rgb: Any, camera: Camera, people: tuple[PersonKeypoints, ...]
@@ -138,7 +133,7 @@ class PnpHeadPoseEstimator:
             people: keypoints of each person.
         """
         poses: list[HeadPose | None] = [None] * len(people)
-        bodies = place_bodies(camera, people, self._std_px, self._min_score)
+        bodies = place_bodies(camera, tuple(people), self._std_px, self._min_score)
         found = [
             self._head(camera, person, body, row)
             for row, (person, body) in enumerate(zip(people, bodies, strict=True))
@@ -215,7 +210,7 @@ class PnpHeadPoseEstimator:
         if self._head_model == "template":
             return HEAD_TEMPLATE_M
         neck_seen = person.scores[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]] >= self._min_score
-        scale = metric_scale(person, self._min_score)
+        (scale,) = metric_scales((person,), self._min_score)
         if scale is None or not (neck_seen.all() and seen[[0, 3, 4]].all()):
             return None
         points = scale.factor * person.keypoints_root_m[kp.BODY]

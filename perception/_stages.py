@@ -180,3 +180,9 @@ class HeadPoseEstimator(Protocol):
     ) -> tuple[HeadPose | None, ...]:
         """Return one head pose per person, in the same order; None where there is no evidence."""
         ...
+
+
+def check_count(name: str, got: int, wanted: int) -> None:
+    """Raise PerceptionError unless an estimator returned one result per person."""
+    if got != wanted:
+        raise PerceptionError(f"{name} must return one result per person ({wanted}), got {got}")

@@ -4,7 +4,8 @@ Limb lengths are distances between COCO keypoints of an adult of stature :data:`
 Where two sources define a limb alike, they are averaged: the body-segment fractions of Drillis and
 Contini (1966; reprinted in D. A. Winter, *Biomechanics and Motor Control of Human Movement*,
 table/figure 4.1), and 27 adult bodies of the parametric model ``anny`` 0.6.2 (its COCO keypoint
-definitions; body data of MakeHuman, CC0), measured by ``training/anthropometry.py``.
+definitions; body data of MakeHuman, CC0), measured by
+``training/anthropometry.py`` of commit 11d37c7.
 
 =============== ===================== ================ =========
 limb            Drillis–Contini / H   anny / H         used / H

@@ -228,6 +228,20 @@ def pixel_count(name: str, value: Any) -> int:
     return int(number)
 
 
+def check_image(image_rgb: Any, height_px: int, width_px: int) -> None:
+    """Raise PerceptionError unless this is the uint8 RGB image of a camera of this size."""
+    wanted = (height_px, width_px, 3)
+    if not isinstance(image_rgb, np.ndarray):
+        raise PerceptionError(
+            f"image_rgb must be a uint8 array of shape {wanted}, got {type(image_rgb).__name__}"
+        )
+    if image_rgb.dtype != np.uint8 or image_rgb.shape != wanted:
+        raise PerceptionError(
+            f"image_rgb must be uint8 RGB of the camera's shape {wanted}, got "
+            f"{image_rgb.dtype} of shape {image_rgb.shape}"
+        )
+
+
 def median_of(values: Iterable[float]) -> float:
     """Return the median of a few numbers, at least one; ``np.median`` takes ten times as long."""
     ordered = sorted(values)

@@ -68,10 +68,13 @@ class MetricScale:
     relative_std: float
 
 
-def metric_scale(
-    person: PersonKeypoints, min_score: float = DEFAULT_MIN_SCORE
-) -> MetricScale | None:
-    """Estimate the scale of ``person.keypoints_root_m`` from its limb lengths.
+# Head poses and positions of a frame need the scales of the same people, so they are cached, for as
+# many cameras as work side by side.
+@lru_cache(maxsize=8)
+def metric_scales(
+    people: tuple[PersonKeypoints, ...], min_score: float = DEFAULT_MIN_SCORE
+) -> tuple[MetricScale | None, ...]:
+    """Estimate the scale of each person's ``keypoints_root_m`` from the limb lengths.
 
     Each limb with both ends seen votes with the logarithm of (average length / lifted length). Its
     weight depends on how much the limb varies between adults of one stature, and Huber's weights
@@ -84,24 +87,8 @@ def metric_scale(
     count.
 
     Returns:
-        The scale; None for a skeleton without any limb.
+        A scale per person; None for a skeleton without any limb.
     """
-    return metric_scales((person,), min_score)[0]
-
-
-def metric_scales(
-    people: Sequence[PersonKeypoints], min_score: float = DEFAULT_MIN_SCORE
-) -> tuple[MetricScale | None, ...]:
-    """Estimate the scales of several people at once, each as :func:`metric_scale` does."""
-    return _metric_scales(tuple(people), min_score)
-
-
-# Head poses and positions of a frame need the scales of the same people, so they are cached, for as
-# many cameras as work side by side.
-@lru_cache(maxsize=8)
-def _metric_scales(
-    people: tuple[PersonKeypoints, ...], min_score: float
-) -> tuple[MetricScale | None, ...]:
     if not people:
         return ()
     hidden = np.array([person.scores[kp.BODY] for person in people]) < min_score
@@ -202,9 +189,10 @@ class BodyPlacement:
     keypoints_camera_m: FloatArray
 
 
+@lru_cache(maxsize=8)  # as metric_scales is
 def place_bodies(
     camera: Camera,
-    people: Sequence[PersonKeypoints],
+    people: tuple[PersonKeypoints, ...],
     keypoint_std_px: float,
     min_score: float = DEFAULT_MIN_SCORE,
 ) -> tuple[BodyPlacement | None, ...]:
@@ -224,15 +212,6 @@ def place_bodies(
         A placement per person; None if fewer than three keypoints are seen, the skeleton has no
         limb, or the body would lie behind the camera.
     """
-    return _place_bodies(camera, tuple(people), keypoint_std_px, min_score)
-
-
-# Head poses and positions of a frame need the same placements, so they are cached, for as many
-# cameras as work side by side.
-@lru_cache(maxsize=8)
-def _place_bodies(
-    camera: Camera, people: tuple[PersonKeypoints, ...], keypoint_std_px: float, min_score: float
-) -> tuple[BodyPlacement | None, ...]:
     scales = metric_scales(people, min_score)
     width = min((min(len(person.scores), _BODY_AND_FEET) for person in people), default=0)
     if not width:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Final
 
 from ._camera import Camera
@@ -35,7 +34,6 @@ __all__ = [
     "ShippedModel",
     "TrainingDomain",
     "detector_input_size",
-    "load_shipped",
     "shipped_detector",
     "shipped_head_pose_estimator",
     "shipped_model",
@@ -54,20 +52,13 @@ _DETECTOR_FOCAL_PX: Final = 224.0 / math.tan(math.radians(30.0))
 _DETECTOR_MAX_ENLARGEMENT: Final = 2.0
 
 
-def load_shipped(
-    name: str, settings: OnnxSettings | None = None, folder: Path | None = None
-) -> OnnxModel:
-    """Load a shipped network, as :meth:`OnnxModel.shipped` does."""
-    return OnnxModel.shipped(name, settings, folder)
-
-
 def shipped_detector(
     settings: OnnxSettings | None = None,
     camera: Camera | None = None,
     *,
     score_threshold: float = DEFAULT_SCORE_THRESHOLD,
 ) -> OnnxPersonDetector:
-    """Return the shipped person detector; errors as in :func:`load_shipped`.
+    """Return the shipped person detector; errors as in :meth:`OnnxModel.shipped`.
 
     Args:
         settings: providers and threads.
@@ -75,7 +66,7 @@ def shipped_detector(
         score_threshold: detections with a lower score are dropped.
     """
     return OnnxPersonDetector(
-        load_shipped(DETECTOR, settings),
+        OnnxModel.shipped(DETECTOR, settings),
         score_threshold=score_threshold,
         input_size_hw_px=None if camera is None else detector_input_size(camera),
     )
@@ -100,10 +91,10 @@ def detector_input_size(camera: Camera) -> tuple[int, int]:
 
 
 def shipped_pose_estimator(settings: OnnxSettings | None = None) -> OnnxPoseEstimator:
-    """Return the shipped body pose network; errors as in :func:`load_shipped`."""
-    return OnnxPoseEstimator(load_shipped(POSE, settings))
+    """Return the shipped body pose network; errors as in :meth:`OnnxModel.shipped`."""
+    return OnnxPoseEstimator(OnnxModel.shipped(POSE, settings))
 
 
 def shipped_head_pose_estimator(settings: OnnxSettings | None = None) -> OnnxHeadPoseEstimator:
-    """Return the shipped head pose network; errors as in :func:`load_shipped`."""
-    return OnnxHeadPoseEstimator(load_shipped(HEAD, settings))
+    """Return the shipped head pose network; errors as in :meth:`OnnxModel.shipped`."""
+    return OnnxHeadPoseEstimator(OnnxModel.shipped(HEAD, settings))

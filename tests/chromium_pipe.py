@@ -145,11 +145,12 @@ class Chromium:
         return found
 
     def requests(self) -> list[str]:
-        """Return the addresses that were requested since the page was opened."""
+        """Return the addresses that were requested since the page was opened, but data in it."""
         return [
-            event["params"]["request"]["url"]
+            address
             for event in self.events
             if event.get("method") == "Network.requestWillBeSent"
+            and not (address := event["params"]["request"]["url"]).startswith("data:")
         ]
 
     def close(self) -> None:

@@ -16,7 +16,7 @@ ROOM_M = (-6.0, -5.0, 8.0, 5.0)
 LEG_M, APART_M = 0.06, 0.22
 
 
-def planar(x_m: float, y_m: float, yaw_rad: float, z_m: float = 0.0) -> np.ndarray:
+def planar(x_m: float, y_m: float = 0.0, yaw_rad: float = 0.0, z_m: float = 0.0) -> np.ndarray:
     T = np.eye(4)
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     T[:2, :2] = [[cos, -sin], [sin, cos]]

@@ -14,17 +14,21 @@ from perception import PerceptionError
 from perception.shipped import ShippedModel, shipped_models
 
 _MANIFEST: Final = "manifest.json"
+# What an entry says; size and SHA-256 are those of the file.
+_TOLD: Final = ("name", "licence", "input", "summary", "training_domain")
 
 
-def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
-    """Write the manifest of the networks in ``folder``, and its facts into their cards.
+def update_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
+    """Write networks into the manifest of ``folder``, keep its others, and fill in their cards.
 
     Args:
-        folder: folder with ``name.onnx`` of each entry. In a card ``name.md``, if there is one, the
-            lines that begin with ``- sha256:``, ``- size_bytes:``, ``- licence:``, ``- input:`` and
-            ``- training_domain:`` are replaced; each must occur once.
+        folder: folder with ``name.onnx`` of each entry; one without a manifest gets one. In a card
+            ``name.md``, if there is one, the lines that begin with ``- sha256:``,
+            ``- size_bytes:``, ``- licence:``, ``- input:`` and ``- training_domain:`` are
+            replaced; each must occur once.
         entries: ``name``, ``licence``, ``input``, ``summary`` and ``training_domain`` of each
-            network; size and SHA-256 are computed from the file.
+            network; size and SHA-256 are computed from the file. An entry replaces that of the
+            same name.
 
     Returns:
         The path of the manifest. Each file is replaced as a whole, the manifest last.
@@ -32,9 +36,11 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
     Raises:
         PerceptionError: for a missing file, or a card without one of the lines.
     """
+    known = shipped_models(folder) if (folder / _MANIFEST).exists() else ()
+    told = {each.name: {key: str(getattr(each, key)) for key in _TOLD} for each in known}
     models = []
     cards: dict[Path, str] = {}
-    for entry in entries:
+    for entry in (told | {entry["name"]: dict(entry) for entry in entries}).values():
         path = folder / f"{entry['name']}.onnx"
         card = path.with_suffix(".md")
         try:
@@ -57,23 +63,6 @@ def write_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
     content = {"models": [asdict(model) for model in models]}
     _replace_file(manifest, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     return manifest
-
-
-def update_manifest(folder: Path, entries: Sequence[Mapping[str, str]]) -> Path:
-    """Write some networks into the manifest of ``folder``, and keep its other ones.
-
-    Args:
-        folder: see :func:`write_manifest`; a folder without a manifest gets one.
-        entries: as :func:`write_manifest` takes them. An entry replaces that of the same name.
-
-    Raises:
-        PerceptionError: as :func:`write_manifest`.
-    """
-    known = shipped_models(folder) if (folder / _MANIFEST).exists() else ()
-    told = ("name", "licence", "input", "summary", "training_domain")
-    new = {entry["name"]: entry for entry in entries}
-    kept = {model.name: {key: str(getattr(model, key)) for key in told} for model in known}
-    return write_manifest(folder, list({**kept, **new}.values()))
 
 
 def _with_facts(card: Path, text: str, model: ShippedModel) -> str:

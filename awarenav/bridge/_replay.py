@@ -102,7 +102,7 @@ def static_transforms(
             f"the recording has no /{inputs.tf.name}; it has {', '.join(sorted(have))}"
             + (f": --tf {hint}" if hint else "")
         )
-    return tuple(messages.of(f"/{inputs.tf_static.name}"))[::-1]
+    return tuple(messages.of([kind], f"/{inputs.tf_static.name}"))[::-1]
 
 
 def _namespace(topic: str) -> str:

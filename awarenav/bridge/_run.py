@@ -7,12 +7,10 @@ import re
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType
-from typing import Final, NoReturn
+from typing import Any, Final, NoReturn
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import (
@@ -27,7 +25,7 @@ from nav_adapter.ros2 import (
     renamed,
     scanner_inputs,
 )
-from perception import AttentionCone, AwarenessPipeline, Camera, PersonDetector
+from perception import AttentionCone, Camera
 from perception.arrays import finite_number
 from perception.laser import MapCells
 from perception.shipped import simulator_networks_warning
@@ -40,6 +38,7 @@ from ..estimate import (
     RecordingPoseEstimator,
     admit_networks,
     choose_networks,
+    running_options,
 )
 from ..policies import read_policy
 from ._loop import BridgeInputs, BridgeLoop, TopicPublisher
@@ -50,78 +49,35 @@ _SEND_TIME_S: Final = 0.1
 _MOST_SCANNERS: Final = 2
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeOptions:
-    """The options of ``awarenav bridge``."""
+def bridge_command(options: Any) -> int:
+    """Run the bridge until Ctrl-C, SIGTERM or ``--seconds``; return the exit status.
 
-    robot: Path
-    policy: str
-    prediction: Path | None = None
-    domain: int | None
-    rate: float
-    seconds: float | None
-    networks: Path | None
-    detector: str
-    pose: str
-    head: str
-    eyes: str
-    person_class: int | None = None
-    input_size: str | None = None
-    allow_simulator_networks: bool
-    threads: int | None
-    provider: str
-    provider_options: str
-    detect_every_s: float
-    image: str
-    compressed: bool
-    depth: str | None = None
-    camera_info: str
-    camera: Path | None
-    no_camera: bool
-    scan: tuple[str, ...]
-    map: str | None
-    map_frame: str
-    odom: str
-    tf: str = "tf"
-    odom_frame: str
-    base_frame: str
-    camera_frame: str
-    topic: tuple[str, ...]
-    only: tuple[str, ...]
-    percentage: bool
-    speed_mask: float | None
-    speed_mask_size: float
-    speed_mask_resolution: float
-    bag: Path | None
-    record: Path | None
-    rerun: Path | None
+    Args:
+        options: of the command line, as attributes.
 
-
-def bridge_command(options: BridgeOptions) -> int:
-    """Run the bridge until Ctrl-C, SIGTERM or ``--seconds``; return the exit status."""
+    Raises:
+        AwarenavError: for input that cannot be used.
+        NavError: for a policy, robot or topic that cannot be used.
+    """
     rate_hz = finite_number("--rate", options.rate, AwarenavError, minimum=1.0, maximum=200.0)
-    seconds = _seconds(options.seconds)
+    seconds = options.seconds
+    if seconds is not None:
+        seconds = finite_number("--seconds", seconds, AwarenavError, minimum=0.0)
     domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
     policy = read_policy(options.policy)
-    prediction = _prediction(options.prediction)
     published = _published_topics(
         options.topic, options.only, with_mask=options.speed_mask is not None
     )
     mask = _speed_mask(options, published)
     inputs = _inputs(options)
-    camera = (
-        None
-        if options.camera is None
-        else Camera.from_yaml(options.camera, rectified=inputs.rectified)
-    )
-    map_cells = _map_cells(options)
+    camera, map_cells, prediction = _files(options, inputs)
     scanners = scanner_inputs([topic.name for topic in inputs.scans], robot)
     networks, unfit = _networks(options)
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
 
-    cone, pose_estimator = AttentionCone(), RecordingPoseEstimator(networks.pose_estimator)
+    pose_estimator = RecordingPoseEstimator(networks.pose_estimator)
     with ExitStack() as stack:
         recorder = None
         if options.record is not None:
@@ -130,76 +86,74 @@ def bridge_command(options: BridgeOptions) -> int:
         if options.rerun is not None:
             from ._rerun import RerunRecorder  # noqa: PLC0415 - needs the extra viz
 
-            viewer = RerunRecorder(options.rerun, pose_estimator, cone.half_angle_rad)
+            half_angle_rad = AttentionCone().half_angle_rad
+            viewer = RerunRecorder(options.rerun, pose_estimator, half_angle_rad)
             stack.enter_context(viewer)
-
         if unfit:
             _log(f"{simulator_networks_warning(unfit)}: trust no awareness that comes from them")
         if scanners:
             _log("the shipped leg detector is made for simulated scans; see docs/laser.md")
-
-        def bridge_to(publisher: TopicPublisher | ReplayPublisher) -> AwarenessBridge:
-            bridge = AwarenessBridge(
-                policy,
-                robot.profile(),
-                publisher.publish,
-                frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
-                T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
-                camera=camera,
-                rectified=inputs.rectified,
-                with_camera=not options.no_camera,
-                with_depth=inputs.depth is not None,
-                scanners=scanners,
-                prediction=prediction,
-                percentage=options.percentage,
-                speed_mask=mask,
-                warn=_log,
-                wanted=publisher.wants,
-                make_pipeline=_pipeline_maker(networks, pose_estimator, cone),
-            )
-            if map_cells is not None:
-                bridge.on_map(map_cells)
-            return bridge
-
-        if options.bag is not None:
-            replayed = ReplayPublisher(published, recorder)
+        publisher: TopicPublisher | ReplayPublisher
+        if options.bag is None:
+            node = DdsNode(domain)
+            stack.callback(node.close)
+            publisher = TopicPublisher(node, published, recorder)
+        else:
+            publisher = ReplayPublisher(published, recorder)
             messages = recorded_messages(options.bag, inputs)
             stack.callback(messages.close)
-            bridge = bridge_to(replayed)
+        bridge = AwarenessBridge(
+            policy,
+            robot.profile(),
+            publisher.publish,
+            frames=Frames(options.odom_frame, options.base_frame, options.camera_frame),
+            T_base_camera=None if robot.camera is None else robot.camera.T_base_camera(),
+            camera=camera,
+            rectified=inputs.rectified,
+            with_camera=not options.no_camera,
+            with_depth=inputs.depth is not None,
+            scanners=scanners,
+            prediction=prediction,
+            percentage=options.percentage,
+            speed_mask=mask,
+            warn=_log,
+            wanted=publisher.wants,
+            make_pipeline=lambda camera: networks.pipeline(camera, pose_estimator),
+        )
+        if map_cells is not None:
+            bridge.on_map(map_cells)
+        if isinstance(publisher, ReplayPublisher):
+            static = static_transforms(messages, inputs, _log)
             replay = BagReplay(
-                messages,
-                bridge,
-                inputs,
-                rate_hz,
-                replayed,
-                static=static_transforms(messages, inputs, _log),
-                viewer=viewer,
+                messages, bridge, inputs, rate_hz, publisher, static=static, viewer=viewer
             )
             _log(f"replayed {replay.run(seconds, report=_log):.1f} s: {_summary(bridge)}")
             return 0
-        node = DdsNode(domain)
-        stack.callback(node.close)
-        publisher = TopicPublisher(node, published, recorder)
-        bridge = bridge_to(publisher)
         loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, viewer=viewer)
         stack.callback(_close, loop)
         _announce(domain, inputs, published)
         _run_until_interrupted(loop, bridge, seconds)
-        scans = f" and {counted(bridge.counts['scans'], 'scan')}" if inputs.scans else ""
-        _log(f"ended after {counted(loop.frames, 'frame')}{scans}; a stop was published")
     return 0
 
 
-def _networks(options: BridgeOptions) -> tuple[Networks, tuple[str, ...]]:
+def _files(
+    options: Any, inputs: BridgeInputs
+) -> tuple[Camera | None, MapCells | None, PredictionModel | None]:
+    """Return the camera, the map and the prediction in files; None for each that is not."""
+    camera = map_cells = prediction = None
+    if options.camera is not None:
+        camera = Camera.from_yaml(options.camera, rectified=inputs.rectified)
+    if _is_file(options.map):
+        map_cells = MapCells.from_yaml(options.map, options.map_frame)
+    if options.prediction is not None:
+        prediction = PredictionModel.from_calibration(options.prediction)
+    return camera, map_cells, prediction
+
+
+def _networks(options: Any) -> tuple[Networks, tuple[str, ...]]:
     """Return the networks, and the roles of those that have seen renders only."""
     choice = NetworkChoice.of_options(options)
-    networks = choose_networks(
-        **choice.model_dump(),
-        threads=options.threads,
-        provider=options.provider,
-        provider_options=options.provider_options.split(),
-        detect_every_s=options.detect_every_s,
-    )
+    networks = choose_networks(**choice.model_dump(), **running_options(options))
     if options.no_camera:
         return networks, ()
     return networks, admit_networks(
@@ -231,6 +185,8 @@ def _run_until_interrupted(
         signal.signal(signal.SIGTERM, before)
         bridge.stop(time.time(), "awarenav bridge has ended")
         time.sleep(_SEND_TIME_S)
+    scans = f" and {counted(bridge.counts['scans'], 'scan')}" if "scans" in bridge.counts else ""
+    _log(f"ended after {counted(loop.frames, 'frame')}{scans}; a stop was published")
 
 
 def _summary(bridge: AwarenessBridge) -> str:
@@ -248,35 +204,6 @@ def _close(loop: BridgeLoop) -> None:
         _log("perception does not end; the process ends without it")
 
 
-def _pipeline_maker(
-    networks: Networks, pose_estimator: RecordingPoseEstimator, cone: AttentionCone
-) -> Callable[[Camera], AwarenessPipeline]:
-    """Return a function that makes the pipeline for a camera."""
-
-    def make(camera: Camera) -> AwarenessPipeline:
-        detector = networks.detector
-        if not isinstance(detector, PersonDetector):
-            detector = detector(camera)
-        return AwarenessPipeline(
-            camera,
-            detector,
-            pose_estimator,
-            networks.head_pose_estimator,
-            cone,
-            **networks.settings,
-        )
-
-    return make
-
-
-def _prediction(path: Path | None) -> PredictionModel | None:
-    return None if path is None else PredictionModel.from_calibration(path)
-
-
-def _seconds(given: float | None) -> float | None:
-    return None if given is None else finite_number("--seconds", given, AwarenavError, minimum=0.0)
-
-
 def _domain(option: int | None) -> int:
     """Return the DDS domain of the option, else that of the environment."""
     if option is not None:
@@ -291,7 +218,7 @@ def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
     raise KeyboardInterrupt
 
 
-def _speed_mask(options: BridgeOptions, published: Mapping[str, Topic]) -> SpeedMaskSettings | None:
+def _speed_mask(options: Any, published: Mapping[str, Topic]) -> SpeedMaskSettings | None:
     """Return the settings of the speed mask, None without ``--speed-mask``."""
     if options.speed_mask is None:
         return None
@@ -335,14 +262,7 @@ def _is_file(map_option: str | None) -> bool:
     return map_option is not None and map_option.endswith((".yaml", ".yml"))
 
 
-def _map_cells(options: BridgeOptions) -> MapCells | None:
-    """Return the map in a file, None without one."""
-    if options.map is None or not _is_file(options.map):
-        return None
-    return MapCells.from_yaml(options.map, options.map_frame)
-
-
-def _inputs(options: BridgeOptions) -> BridgeInputs:
+def _inputs(options: Any) -> BridgeInputs:
     """Return the topics to read."""
     scans = tuple(renamed(READ["scan"], name) for name in options.scan)
     names = [topic.name for topic in scans]

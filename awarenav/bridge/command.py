@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, Final
 
 from ..cli import NUMBER, FilePath, Whole, command, option, options
@@ -209,6 +210,6 @@ def bridge(**values: Any) -> int:
     and RViz read. Needs no ROS. While an input is missing or late, the bridge publishes a stop and
     the reason. docs/nav2.md has the parameters to set in Nav2.
     """
-    from ._run import BridgeOptions, bridge_command  # noqa: PLC0415 - help needs no perception
+    from ._run import bridge_command  # noqa: PLC0415 - help needs no perception
 
-    return bridge_command(BridgeOptions(**values))
+    return bridge_command(SimpleNamespace(**values))

@@ -89,7 +89,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Run one episode of a run again, with video, map or page.",
         ),
         "compare": _Entry(
-            "sim_tests.study.measures.command:compare",
+            "sim_tests.study.command:compare",
             "Print tables of finished runs, with confidence intervals.",
         ),
         "measures": _Entry(
@@ -130,10 +130,6 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
     },
     "Development": {
-        "bench": _Entry(
-            "sim_tests.demo.command:bench",
-            "Measure how fast crossings run.",
-        ),
         "completion": _Entry(
             "awarenav.cli._app:completion",
             "Print the completion script for a shell.",

@@ -13,8 +13,7 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from ._command import Decorator, option
-from ._network_options import allow_simulator_networks, networks, running
-from ._types import POSITIVE, FilePath, FolderPath, OneOf, Whole, WordAndNumbers
+from ._types import POSITIVE, FilePath, FolderPath, Number, OneOf, Whole, WordAndNumbers
 
 __all__ = [
     "COMPLETE_POLICIES",
@@ -34,7 +33,6 @@ __all__ = [
     "overwrite",
     "perception",
     "planner",
-    "planners",
     "plot_file",
     "policies",
     "policy",
@@ -44,7 +42,6 @@ __all__ = [
     "running",
     "scenarios",
     "seed",
-    "sensor_sets",
     "sensors",
     "workers",
 ]
@@ -140,12 +137,14 @@ def out_file(
 
 
 def plot_file(default: str, help: str) -> Decorator:
-    """Add ``--out``: the file of a plot, or ``none``.
+    """Add ``--out``: the file of a plot; None for ``none``.
 
-    Without matplotlib the default is ``none``, with a remark; a file that is asked for is an error.
+    Without matplotlib the default is none, with a remark; a file that is asked for is an error.
     """
 
-    def without_matplotlib(context: click.Context, parameter: click.Parameter, out: Path) -> Path:
+    def file_or_none(context: click.Context, parameter: click.Parameter, out: Path) -> Path | None:
+        if str(out) == "none":
+            return None
         chosen = context.get_parameter_source(str(parameter.name)) is not ParameterSource.DEFAULT
         if chosen or context.resilient_parsing or _is_installed("matplotlib"):
             return out
@@ -157,14 +156,14 @@ def plot_file(default: str, help: str) -> Decorator:
             f"{install_command('plot')}",
             file=sys.stderr,
         )
-        return Path("none")
+        return None
 
     return option(
         "--out",
         type=FilePath(),
         default=default,
         metavar="FILE.png|svg|pdf|none",
-        callback=without_matplotlib,
+        callback=file_or_none,
         help=f"{help} Needs matplotlib.",
     )
 
@@ -212,25 +211,16 @@ def perception(
     )
 
 
-_SENSORS_HELP: Final = (
-    "Sensors of the robot: its camera, its laser scanners, or both. With scanners, --perception is "
-    "keypoints or pixels."
-)
-
-
-def sensors() -> Decorator:
-    """Add ``--sensors``: one set of sensors."""
-    return option("--sensors", type=OneOf(SENSOR_SETS), default="camera", help=_SENSORS_HELP)
-
-
-def sensor_sets() -> Decorator:
-    """Add ``--sensors``: one or more sets of sensors to compare."""
+def sensors(*, many: bool = False) -> Decorator:
+    """Add ``--sensors``: a set of sensors, or several to compare."""
+    several = " Several sets are compared." if many else ""
     return option(
         "--sensors",
-        many=True,
+        many=many,
         type=OneOf(SENSOR_SETS),
-        default=["camera"],
-        help=f"{_SENSORS_HELP} Several sets are compared.",
+        default=["camera"] if many else "camera",
+        help="Sensors of the robot: its camera, its laser scanners, or both. With scanners, "
+        f"--perception is keypoints or pixels.{several}",
     )
 
 
@@ -344,28 +334,17 @@ def faults() -> Decorator:
     )
 
 
-def planner() -> Decorator:
-    """Add ``--planner``: one local planner; empty for the reference planner."""
-    return option("--planner", metavar="MODULE:CLASS", **_planner_settings(REFERENCE_PLANNER))
-
-
-def planners() -> Decorator:
-    """Add ``--planner``: one or more local planners to compare; empty for the reference planner."""
+def planner(*, many: bool = False) -> Decorator:
+    """Add ``--planner``: a local planner, or several to compare; '' is the reference planner."""
     return option(
         "--planner",
-        many=True,
-        metavar="MODULE:CLASS...",
-        **_planner_settings([REFERENCE_PLANNER]),
-    )
-
-
-def _planner_settings(default: str | list[str]) -> dict[str, Any]:
-    return {
-        "default": default,
-        "callback": _without_reference,
-        "help": "Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
+        many=many,
+        metavar="MODULE:CLASS..." if many else "MODULE:CLASS",
+        default=[REFERENCE_PLANNER] if many else REFERENCE_PLANNER,
+        callback=_without_reference,
+        help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
         "class of yours, which gets the robot's profile, and static_boxes_odom_m if it takes that.",
-    }
+    )
 
 
 def _without_reference(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
@@ -378,3 +357,131 @@ def _without_reference(context: click.Context, parameter: click.Parameter, value
 def as_json(what: str = "the table") -> Decorator:
     """Add ``--json``: print the result as JSON."""
     return option("--json", "as_json", is_flag=True, help=f"Print {what} as JSON.")
+
+
+_NETWORKS: Final = "Networks"
+_NETWORK_OPTIONS: Final = (
+    option(
+        "--networks",
+        group=_NETWORKS,
+        type=FilePath(),
+        metavar="FILE",
+        help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
+    ),
+    option(
+        "--detector",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="shipped",
+        metavar="NAME|FILE",
+        help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
+        "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet). yolox:FILE, "
+        "rtmdet:FILE and ultralytics:FILE say what a file is that does not tell it.",
+    ),
+    option(
+        "--person-class",
+        group=_NETWORKS,
+        type=Whole(0),
+        show_default="the class that the network calls 'person', else 0",
+        metavar="N",
+        help="Number of the class of a --detector that counts as people, from 0.",
+    ),
+    option(
+        "--input-size",
+        group=_NETWORKS,
+        show_default="the network's own",
+        metavar="WxH",
+        help="Width and height, in pixels, of the input of a --detector that leaves them free.",
+    ),
+    option(
+        "--pose",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="shipped",
+        metavar="NAME|FILE",
+        help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
+        "lists, an ONNX file (RTMPose, RTMW, RTMW3D), or 'mediapipe' (needs the extra "
+        "'mediapipe').",
+    ),
+    option(
+        "--head",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="auto",
+        metavar="NAME|FILE",
+        help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
+        "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
+        "network, else 'pnp'.",
+    ),
+    option(
+        "--eyes",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="auto",
+        metavar="auto|mediapipe|none",
+        help="Eyes of people nearer than about 2.5 m: 'mediapipe' (needs the extra 'mediapipe'), "
+        "'none' (the gaze is the head's direction), or 'auto': 'mediapipe' with --pose mediapipe.",
+    ),
+)
+
+
+def networks(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--networks``, and the options that choose detector, pose, head and eyes."""
+    for add in reversed(_NETWORK_OPTIONS):
+        function = add(function)
+    return function
+
+
+_RUNNING_OPTIONS: Final = (
+    option(
+        "--threads",
+        group=_NETWORKS,
+        type=POSITIVE,
+        show_default="onnxruntime's own choice",
+        metavar="N",
+        help="Threads of each network.",
+    ),
+    option(
+        "--provider",
+        group=_NETWORKS,
+        type=OneOf(["cpu", "cuda", "tensorrt", "openvino", "coreml"]),
+        default="cpu",
+        help="Execution provider of onnxruntime that runs the networks.",
+    ),
+    option(
+        "--provider-options",
+        group=_NETWORKS,
+        default="",
+        show_default="none",
+        metavar="'KEY=VALUE ...'",
+        help="Options of that provider, separated by spaces, as 'trt_fp16_enable=True "
+        "trt_engine_cache_enable=True trt_engine_cache_path=DIR'.",
+    ),
+    option(
+        "--detect-every-s",
+        group=_NETWORKS,
+        type=Number(0.0, 0.2),
+        default=0.0,
+        metavar="S",
+        help="Longest time between two looks of the detector; boxes follow the keypoints in "
+        "between. 0 looks at every image.",
+    ),
+)
+
+
+def running(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of threads, providers and the time between looks of the detector."""
+    for add in reversed(_RUNNING_OPTIONS):
+        function = add(function)
+    return function
+
+
+def allow_simulator_networks() -> Decorator:
+    """Add ``--allow-simulator-networks``: networks of renders may see other images."""
+    return option(
+        "--allow-simulator-networks",
+        group=_NETWORKS,
+        is_flag=True,
+        help="Let networks that have seen renders only, such as the shipped ones, see other "
+        "images. All results say so.",
+    )

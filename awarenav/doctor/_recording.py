@@ -56,11 +56,11 @@ class _Recording:
         self.transforms: list[TFMessage] = []
         self.static: list[TFMessage] = []
         self.whole = True
-        with contextlib.closing(BagMessages(path, {}, {})) as recorded:
+        with contextlib.closing(BagMessages(path)) as recorded:
             self.has_images = any(kind in _IMAGES for _, kind in recorded.topics)
             kinds = {name: kind for name, kind in recorded.topics if kind in _KINDS}
             began_s = None
-            for topic, recorded_s, message in recorded.of_kinds(_KINDS):
+            for topic, recorded_s, message in recorded.of(_KINDS):
                 began_s = recorded_s if began_s is None else began_s
                 # A message of ROS 1 may have other fields: then nothing is known of it.
                 with contextlib.suppress(NavError, AttributeError, TypeError, ValueError):

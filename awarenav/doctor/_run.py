@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -55,26 +55,6 @@ _OFF_CENTRE: Final = 0.1
 _REMEDY_NETWORKS: Final = "awarenav models fetch robot, then --networks robot_networks.yaml"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DoctorOptions:
-    """The options of ``awarenav doctor``."""
-
-    source: str | None
-    out: Path
-    frames: int
-    topic: str | None
-    networks: Path | None
-    detector: str
-    pose: str
-    head: str
-    eyes: str
-    person_class: int | None = None
-    input_size: str | None = None
-    camera: Path | None
-    fov_deg: float | None
-    as_json: bool
-
-
 @dataclass(slots=True)
 class _Examined:
     """Figures and findings of the images of a source."""
@@ -88,8 +68,11 @@ class _Examined:
     best: FrameEstimate | None = None
 
 
-def doctor_command(options: DoctorOptions) -> int:
+def doctor_command(options: Any) -> int:
     """Print the findings; return the exit status: 1 if there are errors.
+
+    Args:
+        options: of the command line, as attributes.
 
     Raises:
         AwarenavError: for a source, networks or options that cannot be used.
@@ -109,8 +92,7 @@ def doctor_command(options: DoctorOptions) -> int:
     return 1 if errors else 0
 
 
-def _source_findings(options: DoctorOptions) -> list[Finding]:
-    assert options.source is not None
+def _source_findings(options: Any) -> list[Finding]:
     if not is_recording(Path(options.source)):
         return _image_findings(options)
     from ._recording import recording_findings  # noqa: PLC0415 - needs the extra rosbag
@@ -125,8 +107,7 @@ def _source_findings(options: DoctorOptions) -> list[Finding]:
         return [*findings, Finding.error("images", str(problem))]
 
 
-def _image_findings(options: DoctorOptions) -> list[Finding]:
-    assert options.source is not None
+def _image_findings(options: Any) -> list[Finding]:
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
         choice = NetworkChoice.of_options(options)
         networks = choose_networks(**choice.model_dump())
@@ -214,9 +195,7 @@ def _domain_finding(
     return Finding.fine("networks", f"trained on: {told}; the images are {kind}")
 
 
-def _calibration_finding(
-    camera: Camera | None, options: DoctorOptions, source: ImageSource
-) -> Finding:
+def _calibration_finding(camera: Camera | None, options: Any, source: ImageSource) -> Finding:
     fov_deg = options.fov_deg
     if camera is None and fov_deg is None:
         return Finding.error(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, Final
 
 from ..cli import NUMBER, POSITIVE, FilePath, argument, command, option, options
@@ -65,6 +66,6 @@ def doctor(**values: Any) -> int:
     minute of a ROS recording it also looks for blind scanners, for odometry that contradicts tf or
     itself, and for images in a frame that is not optical.
     """
-    from ._run import DoctorOptions, doctor_command  # noqa: PLC0415 - help needs no networks
+    from ._run import doctor_command  # noqa: PLC0415 - help needs no networks
 
-    return doctor_command(DoctorOptions(**values))
+    return doctor_command(SimpleNamespace(**values))

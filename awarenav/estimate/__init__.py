@@ -16,10 +16,9 @@ if TYPE_CHECKING:
         RecordingPoseEstimator,
         ids_of_tracks,
     )
-    from ._networks import NetworkChoice, admit_networks, choose_networks
+    from ._networks import NetworkChoice, admit_networks, choose_networks, running_options
     from ._open_source import is_recording, open_source
     from ._overlay import OverlayWriter
-    from ._results import estimate_record
     from ._sources import ImageSource, SourceFrame
 
 __all__ = [
@@ -35,11 +34,11 @@ __all__ = [
     "SourceFrame",
     "admit_networks",
     "choose_networks",
-    "estimate_record",
     "fixed_camera_pose",
     "ids_of_tracks",
     "is_recording",
     "open_source",
+    "running_options",
 ]
 
 __getattr__ = lazy_page(__name__, __file__)

@@ -26,7 +26,7 @@ from perception.documents import read_yaml
 from perception.installation import install_command
 
 from ..errors import AwarenavError, MissingExtraError
-from ._sources import SourceFrame
+from ._sources import ImageSource, SourceFrame
 
 try:
     from rosbags.highlevel import AnyReader
@@ -38,8 +38,7 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
     ) from cause
 
 
-_IMAGE: Final = "sensor_msgs/msg/Image"
-_COMPRESSED: Final = "sensor_msgs/msg/CompressedImage"
+_IMAGES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO: Final = "sensor_msgs/msg/CameraInfo"
 _TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
 # By then every mount has been sent.
@@ -121,93 +120,106 @@ def _explained(cause: Exception) -> str:
     return next((f"{text} ({why})" for said, why in _CAUSES.items() if said in text), text)
 
 
-def read_messages(
-    path: Path, reader: Any, connections: Sequence[Any]
-) -> Iterator[tuple[str, float, Any]]:
-    """Yield topic, time of recording (s) and message of some connections of an open recording.
-
-    Raises:
-        AwarenavError: for a message that cannot be read.
-    """
-    # The library takes none for all.
-    messages = reader.messages(connections=connections) if connections else iter(())
-    while True:
-        try:
-            connection, recorded_ns, raw = next(messages)
-            message = reader.deserialize(raw, connection.msgtype)
-        except StopIteration:
-            return
-        except Exception as cause:
-            raise AwarenavError(f"{path}: the rest cannot be read: {_explained(cause)}") from cause
-        yield topic_name(connection.topic), recorded_ns * 1e-9, message
-
-
 class BagMessages:
-    """Messages of some topics of a recording, in the order in which they were recorded.
+    """Messages of a recording, in the order in which they were recorded.
+
+    A topic that was recorded without a leading slash, as in ROS 1, is the same one.
 
     Args:
         path: of the recording, as in :func:`open_bag`.
-        required: the topics, ``/scan`` or similar, and their types, ``sensor_msgs/msg/LaserScan``.
-            A topic that was recorded without a leading slash is the same one.
+        required: topics, ``/scan`` or similar, and their types, ``sensor_msgs/msg/LaserScan``.
         optional: topics that the recording may lack.
 
     Attributes:
         topics: name and type of everything that was recorded.
+        duration_s: time from the first to the last message.
 
     Raises:
-        AwarenavError: for a file that is not a recording, or that lacks a topic of this type.
+        AwarenavError: for a file that is not a recording, or that lacks a required topic.
     """
 
     def __init__(
-        self, path: Path, required: Mapping[str, str], optional: Mapping[str, str]
+        self,
+        path: Path,
+        required: Mapping[str, str] | None = None,
+        optional: Mapping[str, str] | None = None,
     ) -> None:
         self._path, self._reader = path, open_bag(path)
+        self._wanted = {**(optional or {}), **(required or {})}
         connections = self._reader.connections
         self.topics = {(topic_name(each.topic), str(each.msgtype)) for each in connections}
-        for topic, kind in required.items():
+        self.duration_s = self._reader.duration * 1.0e-9
+        for topic, kind in (required or {}).items():
             if (topic, kind) not in self.topics:
                 self._reader.close()
                 known = ", ".join(f"{name} ({type_})" for name, type_ in sorted(self.topics))
                 raise AwarenavError(
                     f"{path} has no topic {topic} of type {kind}; it has {known or 'none'}"
                 )
-        wanted = {**optional, **required}
-        self._connections = [
-            each for each in connections if wanted.get(topic_name(each.topic)) == each.msgtype
-        ]
 
     def __iter__(self) -> Iterator[tuple[str, float, Any]]:
-        """Yield topic, time of recording (s) and message.
+        """Yield topic, time of recording (s) and message of the required and optional topics.
 
         Raises:
             AwarenavError: for a message that cannot be read.
         """
-        return read_messages(self._path, self._reader, self._connections)
+        return self._read(
+            [
+                each
+                for each in self._reader.connections
+                if self._wanted.get(topic_name(each.topic)) == each.msgtype
+            ]
+        )
 
-    def of(self, topic: str) -> Iterator[tuple[str, float, Any]]:
-        """Yield the messages of one topic, as iterating over all does.
-
-        Raises:
-            AwarenavError: for a message that cannot be read.
-        """
-        own = [each for each in self._connections if topic_name(each.topic) == topic]
-        return read_messages(self._path, self._reader, own)
-
-    def of_kinds(self, kinds: Collection[str]) -> Iterator[tuple[str, float, Any]]:
-        """Yield the messages of all topics of some types, whether they were asked for or not.
+    def of(self, kinds: Collection[str], *topics: str) -> Iterator[tuple[str, float, Any]]:
+        """Yield the messages of some types, of some topics or of all, as iterating does.
 
         Raises:
             AwarenavError: for a message that cannot be read.
         """
-        found = [each for each in self._reader.connections if each.msgtype in kinds]
-        return read_messages(self._path, self._reader, found)
+        return self._read(self._connections(kinds, topics))
+
+    def first(self, kinds: Collection[str], topic: str) -> Any:
+        """Return the first message of a topic; None if there is none.
+
+        Raises:
+            AwarenavError: if it cannot be read.
+        """
+        found = next(self.of(kinds, topic), None)
+        return None if found is None else found[2]
+
+    def count(self, kinds: Collection[str], topic: str) -> int:
+        """Return the number of messages of a topic; 0 also if the recording does not say it."""
+        return sum(each.msgcount for each in self._connections(kinds, [topic]))
 
     def close(self) -> None:
         """Close the recording."""
         self._reader.close()
 
+    def _connections(self, kinds: Collection[str], topics: Collection[str]) -> list[Any]:
+        return [
+            each
+            for each in self._reader.connections
+            if each.msgtype in kinds and (not topics or topic_name(each.topic) in topics)
+        ]
 
-class BagSource:
+    def _read(self, connections: Sequence[Any]) -> Iterator[tuple[str, float, Any]]:
+        # The library takes none for all.
+        messages = self._reader.messages(connections=connections) if connections else iter(())
+        while True:
+            try:
+                connection, recorded_ns, raw = next(messages)
+                message = self._reader.deserialize(raw, connection.msgtype)
+            except StopIteration:
+                return
+            except Exception as cause:
+                raise AwarenavError(
+                    f"{self._path}: the rest cannot be read: {_explained(cause)}"
+                ) from cause
+            yield topic_name(connection.topic), recorded_ns * 1e-9, message
+
+
+class BagSource(ImageSource):
     """One image topic of a recording: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
 
     The stamp of a frame is that of its message's header. The ``camera_info`` topic beside the
@@ -222,30 +234,24 @@ class BagSource:
     """
 
     def __init__(self, path: Path, topic: str | None = None) -> None:
-        self._path = path
-        self._reader = open_bag(path)
+        self._path, self._bag = path, BagMessages(path)
         try:
             self._topic = self._chosen_topic(topic)
-            self._connections = self._of(self._topic, _IMAGE, _COMPRESSED)
             self.rectified = is_rectified(self._topic)
             shown = None
             with contextlib.suppress(AwarenavError):  # a damaged image is told with its frame
-                shown = self._first(self._connections)
+                shown = self._bag.first(_IMAGES, self._topic)
             try:
                 self._camera: Camera | AwarenavError | None = self._read_camera(shown)
             except AwarenavError as refusal:  # only if nobody gives another calibration
                 self._camera = refusal
             self.notes = tuple(filter(None, [self._frame_note(shown)]))
         except BaseException:
-            self._reader.close()
+            self._bag.close()
             raise
-        self.count: int | None = sum(each.msgcount for each in self._connections) or None
-        duration_s = self._reader.duration * 1.0e-9
-        self.rate_hz: float | None = None
-        if self.count is not None and self.count > 1 and duration_s > 0.0:
-            self.rate_hz = (self.count - 1) / duration_s
-        self.live = False
-        self.rendered = False
+        self.count = self._bag.count(_IMAGES, self._topic) or None
+        if self.count is not None and self.count > 1 and self._bag.duration_s > 0.0:
+            self.rate_hz = (self.count - 1) / self._bag.duration_s
 
     @property
     def camera(self) -> Camera | None:
@@ -262,7 +268,7 @@ class BagSource:
         """Yield the images of the topic, numbered from 000000."""
         last_s, number = 0.0, 0
         try:
-            for _, recorded_s, message in self._messages(self._connections):
+            for _, recorded_s, message in self._bag.of(_IMAGES, self._topic):
                 stamp = message.header.stamp
                 # A driver without a clock sends zero.
                 stamp_s = float(stamp.sec) + 1.0e-9 * float(stamp.nanosec)
@@ -279,25 +285,17 @@ class BagSource:
 
     def close(self) -> None:
         """Close the recording."""
-        self._reader.close()
+        self._bag.close()
 
     def _chosen_topic(self, topic: str | None) -> str:
         """Return the image topic that was asked for, or the only one."""
-        images: list[str] = sorted(
-            {
-                each.topic
-                for each in self._reader.connections
-                if each.msgtype in (_IMAGE, _COMPRESSED)
-            }
-        )
+        images = sorted({name for name, kind in self._bag.topics if kind in _IMAGES})
         if not images:
-            raise AwarenavError(f"{self._path} has no topic of type {_IMAGE} or {_COMPRESSED}")
+            raise AwarenavError(f"{self._path} has no topic of type {' or '.join(_IMAGES)}")
         if topic is not None:
-            # Recordings of ROS 1 may lack the leading slash.
-            same = [each for each in images if topic_name(each) == topic_name(topic)]
-            if not same:
+            if topic_name(topic) not in images:
                 raise AwarenavError(f"--topic must be one of {', '.join(images)}, got {topic}")
-            return same[0]
+            return topic_name(topic)
         if len(images) > 1:
             raise AwarenavError(
                 f"{self._path} has several image topics: choose --topic {' | '.join(images)}"
@@ -311,12 +309,12 @@ class BagSource:
             if shown is not None:
                 height_px, width_px = picture_of(shown).shape[:2]
                 size_px = (width_px, height_px)
-        parts = topic_name(self._topic).split("/")
+        parts = self._topic.split("/")
         topics = [
             "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
         ]
         for topic in topics[:2]:  # beside image_raw, or beside the parent of image_raw/compressed
-            info = self._first(self._of(topic, _INFO))
+            info = self._bag.first([_INFO], topic)
             if info is None:
                 continue
             if _is_zero(info, "kK") and not (self.rectified and not _is_zero(info, "pP")):
@@ -333,32 +331,19 @@ class BagSource:
         Mounts are in /tf_static, those of ROS 1 in /tf, and both may have a namespace.
         """
         transforms = TransformBuffer()
-        known = [each for each in self._reader.connections if each.msgtype == _TRANSFORMS]
-        static = [each for each in known if each.topic.endswith("_static")]
+        topics = sorted(name for name, kind in self._bag.topics if kind == _TRANSFORMS)
+        static = [name for name in topics if name.endswith("_static")]
         # Damaged transforms, and those of ROS 1 with other fields, tell nothing.
         with contextlib.suppress(ValueError, TypeError, AttributeError):
             frame = str(shown.header.frame_id).lstrip("/")
-            for connections in (static, [each for each in known if each not in static]):
-                for _, _, message in islice(self._messages(connections), _MOST_TRANSFORMS):
+            for names in filter(None, (static, [name for name in topics if name not in static])):
+                found = self._bag.of([_TRANSFORMS], *names)
+                for _, _, message in islice(found, _MOST_TRANSFORMS):
                     for each in from_ros(TFMessage, message).transforms:
                         transforms.add_message(each, static=True)
                 if (root := transforms.root(frame)) != frame:
                     return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
         return ""
-
-    def _of(self, topic: str, *kinds: str) -> list[Any]:
-        """Return the connections of a topic."""
-        found = self._reader.connections
-        name = topic_name(topic)
-        return [each for each in found if topic_name(each.topic) == name and each.msgtype in kinds]
-
-    def _first(self, connections: list[Any]) -> Any:
-        """Return the first message of some connections; None if there is none."""
-        found = next(self._messages(connections), None)
-        return None if found is None else found[2]
-
-    def _messages(self, connections: Sequence[Any]) -> Iterator[tuple[str, float, Any]]:
-        return read_messages(self._path, self._reader, connections)
 
 
 def _is_zero(info: Any, names: str) -> bool:

@@ -27,7 +27,6 @@ class DepthFiles:
             a video or a recording a folder: names that are whole numbers are numbers of frames,
             which count from 0; other names are taken in their order, one for each frame.
         source: of the frames.
-        every: every N-th frame is used only; the others need no depth image.
         limit: most frames to use; None for all.
 
     Raises:
@@ -35,18 +34,16 @@ class DepthFiles:
             that does not fit its image; the message names the file.
     """
 
-    def __init__(
-        self, path: Path, source: ImageSource, *, every: int = 1, limit: int | None = None
-    ) -> None:
+    def __init__(self, path: Path, source: ImageSource, limit: int | None = None) -> None:
         self._path, self._by_number = path, not isinstance(source, ImageFiles)
         if source.live:
             raise AwarenavError("--depth is for files; a camera or stream has no depth images")
         if isinstance(source, ImageFiles):
-            used = source.files[::every][:limit]
+            used = source.files[:limit]
             self._files = _by_stem(path, source.files, used)
             _check(self._files[used[0].stem], read_image(used[0]).shape[:2])
         else:
-            self._files = _numbered(path, source.count, every, limit)
+            self._files = _numbered(path, source.count, limit)
             first = self._files[min(self._files, key=int)]
             _check(first, None)
 
@@ -115,7 +112,7 @@ def _by_stem(path: Path, images: tuple[Path, ...], used: Iterable[Path]) -> dict
     return files
 
 
-def _numbered(path: Path, count: int | None, every: int, limit: int | None) -> dict[str, Path]:
+def _numbered(path: Path, count: int | None, limit: int | None) -> dict[str, Path]:
     """Return the depth images of a video by the number of the frame."""
     found = _depth_files(path)
     if not all(each.stem.isdecimal() for each in found):
@@ -133,7 +130,7 @@ def _numbered(path: Path, count: int | None, every: int, limit: int | None) -> d
             raise AwarenavError(f"{files[number]} and {file} are of the same frame")
         files[number] = file
     if count is not None:
-        for index in list(range(0, count, every))[:limit]:
+        for index in range(count if limit is None else min(count, limit)):
             if str(index) not in files and surely_has(index, count):
                 raise AwarenavError(
                     f"{path} has no depth image of frame {index}, as {index:06d}.png; frames count "

@@ -61,6 +61,17 @@ class Networks:
     settings: dict[str, Any] = field(default_factory=dict)
     training_domains: dict[str, TrainingDomain | None] = field(default_factory=dict)
 
+    def pipeline(self, camera: Camera, pose_estimator: PoseEstimator) -> AwarenessPipeline:
+        """Return a pipeline for a camera, with a pose estimator around that of the networks."""
+        detector = self.detector
+        return AwarenessPipeline(
+            camera,
+            detector if isinstance(detector, PersonDetector) else detector(camera),
+            pose_estimator,
+            self.head_pose_estimator,
+            **self.settings,
+        )
+
 
 class RecordingPoseEstimator:
     """A :class:`~perception.PoseEstimator` that keeps the latest keypoints of another one.
@@ -243,14 +254,8 @@ class PeopleEstimator:
     def _process(self, camera: Camera, frame: SourceFrame) -> tuple[PersonObservation, ...]:
         pipeline = self._pipelines.get(camera)
         if pipeline is None:
-            detector = self._networks.detector
-            pipeline = self._pipelines[camera] = AwarenessPipeline(
-                camera,
-                detector if isinstance(detector, PersonDetector) else detector(camera),
-                self._pose_estimator,
-                self._networks.head_pose_estimator,
-                **self._networks.settings,
-            )
+            pipeline = self._networks.pipeline(camera, self._pose_estimator)
+            self._pipelines[camera] = pipeline
         assert frame.image_rgb is not None
         floor = self._floor(frame)
         if self._depth is None:

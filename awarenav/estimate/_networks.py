@@ -111,6 +111,16 @@ class NetworkChoice(StrictConfig):
         return cls.from_yaml(options.networks).model_copy(update=own)
 
 
+def running_options(options: Any) -> dict[str, Any]:
+    """Return what a command's options say of how networks run, for :func:`choose_networks`."""
+    return {
+        "threads": options.threads,
+        "provider": options.provider,
+        "provider_options": options.provider_options.split(),
+        "detect_every_s": options.detect_every_s,
+    }
+
+
 def choose_networks(
     detector: str = SHIPPED,
     pose: str = SHIPPED,

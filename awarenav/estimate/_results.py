@@ -15,6 +15,7 @@ from perception.layouts import COCO_NAMES, FOOT_NAMES, LEFT_SHOULDER, RIGHT_SHOU
 from tracking import PersonTrack
 
 from ..errors import AwarenavError
+from ..files import check_output
 from ..records import Record, RecordFile, continue_records, read_records, write_records
 from ._estimator import FrameEstimate
 
@@ -144,8 +145,7 @@ def open_results(
     Raises:
         AwarenavError: for an existing file that may not be replaced or cannot be continued.
     """
-    if path.is_dir():
-        raise AwarenavError(f"--out must be a file, {path} is a folder")
+    check_output(path, ())
     exists = path.exists()
     if exists and not resume and not overwrite:
         raise AwarenavError(

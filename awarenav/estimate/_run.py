@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-import math
+import queue
 import sys
+import threading
 import time
 from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,13 +25,15 @@ from ..errors import AwarenavError, counted
 from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
 from ._estimator import FrameEstimate, Networks, PeopleEstimator
-from ._networks import NetworkChoice, admit_networks, choose_networks
+from ._networks import NetworkChoice, admit_networks, choose_networks, running_options
 from ._open_source import CAMERA_NUMBER, open_source
 from ._overlay import OverlayWriter
 from ._results import estimate_record, open_results, settings_hash
 from ._sources import ImageSource, SourceFrame
-from ._threads import BackgroundWorker, FramePrefetcher
 
+# Frames that are read ahead, and how often a reading thread is asked whether it has ended.
+_AHEAD: Final = 4
+_POLL_S: Final = 0.1
 # A run ends if none of so many frames can be estimated.
 _FAILURES_BEFORE_ABORT: Final = 10
 # Further problems are only counted.
@@ -43,6 +50,59 @@ _SETTINGS: Final = (
     "camera_pitch_deg",
     "topic",
 )
+
+
+class FramePrefetcher(AbstractContextManager["FramePrefetcher"]):
+    """Iterates over the frames of a source, a few of which a thread reads ahead.
+
+    A live source never waits: its newest frame replaces one that was not taken yet. An error of the
+    source is raised here, after the frames before it. On exit the thread has ended, and reads the
+    source no more.
+
+    Args:
+        source: of the frames.
+        limit: most frames to take; None for all.
+    """
+
+    def __init__(self, source: ImageSource, limit: int | None = None) -> None:
+        self._source = source
+        self._limit = limit
+        self._queue: queue.Queue[SourceFrame | BaseException | None] = queue.Queue(
+            1 if source.live else _AHEAD
+        )
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._read, name="prefetch", daemon=True)
+        self._thread.start()
+
+    def __iter__(self) -> Iterator[SourceFrame]:
+        while (item := self._queue.get()) is not None:
+            if isinstance(item, BaseException):
+                raise item
+            yield item
+
+    def __exit__(self, *error: object) -> None:
+        self._stop.set()
+        while self._thread.is_alive():
+            with contextlib.suppress(
+                queue.Empty
+            ):  # a thread that waits for a free place then sees the stop
+                self._queue.get_nowait()
+            self._thread.join(_POLL_S)
+
+    def _read(self) -> None:
+        """Read frames into the queue until the end, the limit or an error (in the thread)."""
+        last: BaseException | None = None
+        try:
+            for frame in islice(self._source.frames(), self._limit):
+                if self._stop.is_set():
+                    break
+                if self._source.live and frame.image_rgb is not None:
+                    with contextlib.suppress(queue.Empty):
+                        self._queue.get_nowait()
+                self._queue.put(frame)
+        except BaseException as error:
+            last = error
+        self._queue.put(last)
 
 
 @dataclass(slots=True)
@@ -93,8 +153,7 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
         estimator, settings = _estimator(options, source, networks)
         overlay = None
         if options.overlay != "none":
-            rate_hz = (source.rate_hz or _SLIDESHOW_HZ) / options.every
-            single = source.count == 1
+            rate_hz, single = source.rate_hz or _SLIDESHOW_HZ, source.count == 1
             overlay = OverlayWriter(Path(options.overlay), rate_hz, AttentionCone(), single=single)
         results, done = open_results(
             options.out, settings, resume=options.resume, overwrite=options.overwrite
@@ -104,11 +163,11 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
             stack.enter_context(overlay)
         total = options.frames
         if source.count is not None:
-            every = math.ceil(source.count / options.every)
-            total = every if total is None else min(every, total)
-        frames = stack.enter_context(FramePrefetcher(source, options.every, options.frames))
+            total = source.count if total is None else min(source.count, total)
+        frames = stack.enter_context(FramePrefetcher(source, options.frames))
         bar = stack.enter_context(tqdm(total=total, desc="estimate", unit="frame", file=sys.stderr))
-        drawing = None if overlay is None else stack.enter_context(BackgroundWorker(overlay.add))
+        drawing = stack.enter_context(ThreadPoolExecutor(1, "overlay"))
+        drawn: Future[None] | None = None
         summary = _Summary()
         start_s = time.monotonic()
         for frame in frames:
@@ -121,8 +180,12 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
                 continue
             results.add(estimate_record(estimate, settings))
             summary.add(estimate)
-            if drawing is not None:
-                drawing.put(estimate)
+            if overlay is not None:  # one is drawn while the next is estimated
+                if drawn is not None:
+                    drawn.result()
+                drawn = drawing.submit(overlay.add, estimate)
+        if drawn is not None:
+            drawn.result()
         duration_s = time.monotonic() - start_s
     if summary.problems and not summary.frames and not done:
         raise AwarenavError(f"nothing could be estimated: {summary.problems[0]}")
@@ -136,7 +199,7 @@ def _estimator(
     """Return the estimator for a source, and the hash of all settings that change estimates."""
     depth = None
     if options.depth is not None:
-        depth = DepthFiles(options.depth, source, every=options.every, limit=options.frames)
+        depth = DepthFiles(options.depth, source, options.frames)
     cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, _log)
     if source.rectified and cameras.calibrated:
         _log("the images are rectified: P of the calibration counts, without distortion")
@@ -145,12 +208,7 @@ def _estimator(
     choice = NetworkChoice.of_options(options)
     if networks is None:
         networks = choose_networks(
-            **choice.model_dump(),
-            min_score=options.min_score,
-            threads=options.threads,
-            provider=options.provider,
-            provider_options=options.provider_options.split(),
-            detect_every_s=options.detect_every_s,
+            **choice.model_dump(), min_score=options.min_score, **running_options(options)
         )
     rendered, allowed = source.rendered, options.allow_simulator_networks
     unfit = admit_networks(networks, rendered=rendered, allowed=allowed)

@@ -6,11 +6,12 @@ import math
 import re
 import struct
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import BinaryIO, Final, Protocol
+from typing import BinaryIO, Final
 
 import cv2
 
@@ -61,12 +62,10 @@ class SourceFrame:
     orientation: int = 1
 
 
-class ImageSource(Protocol):
+class ImageSource(ABC):
     """A sequence of frames, with what the source knows about the camera.
 
     Attributes:
-        camera: its calibration, if the source has one; reading it raises an AwarenavError for one
-            that cannot be used.
         rectified: whether the images are rectified: P of a calibration counts, without distortion.
         notes: what is wrong with the frame of the images.
         count: number of frames, if known; the number that a video states may be wrong.
@@ -75,31 +74,34 @@ class ImageSource(Protocol):
         rendered: whether all frames are renders of this package.
     """
 
-    @property
-    def camera(self) -> Camera | None: ...
+    rectified = False
+    notes: tuple[str, ...] = ()
+    count: int | None = None
+    rate_hz: float | None = None
+    live = False
+    rendered = False
 
     @property
-    def notes(self) -> tuple[str, ...]: ...
+    def camera(self) -> Camera | None:
+        """The calibration, if the source has one.
 
-    rectified: bool
-    count: int | None
-    rate_hz: float | None
-    live: bool
-    rendered: bool
+        Raises:
+            AwarenavError: for a calibration that cannot be used.
+        """
+        return None
 
+    @abstractmethod
     def frames(self) -> Iterator[SourceFrame]:
         """Yield the frames; one that cannot be read has a ``problem`` and no image.
 
         If a source ends too early, its last frame is one with a ``problem``.
         """
-        ...
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027 - not every source holds something open
         """Release the device or file."""
-        ...
 
 
-class ImageFiles:
+class ImageFiles(ImageSource):
     """One image file, or all image files of a folder in the order of the numbers in their names.
 
     ``camera.yaml`` beside them is their camera. ``truth.jsonl`` beside them gives the stamp and the
@@ -131,11 +133,7 @@ class ImageFiles:
         self._files = sorted(files, key=natural_order)
         self._known = _stamps_and_poses(folder / _TRUTH)
         self._calibration = folder / _CAMERA
-        self.rectified = False
-        self.notes: tuple[str, ...] = ()
-        self.count: int | None = len(self._files)
-        self.rate_hz: float | None = None
-        self.live = False
+        self.count = len(self._files)
         self.rendered = (folder / _RENDER).exists() and all(
             each.name in self._known for each in self._files
         )
@@ -166,9 +164,6 @@ class ImageFiles:
             except AwarenavError as error:
                 yield SourceFrame(path.name, stamp_s, None, pose, str(error))
 
-    def close(self) -> None:
-        """Do nothing: no file is held open."""
-
 
 def natural_order(path: Path) -> tuple[tuple[tuple[int, int | str], ...], str]:
     """Return a sort key that counts numbers in a name as numbers: image9 before image10."""
@@ -193,7 +188,7 @@ def _stamps_and_poses(truth: Path) -> dict[str, tuple[float, FloatArray | None]]
     return known
 
 
-class VideoSource:
+class VideoSource(ImageSource):
     """Frames of a ``cv2.VideoCapture``: a file, a camera or a stream.
 
     The stamps of a file are those of its frames, also at a variable rate; those of a live source
@@ -220,17 +215,13 @@ class VideoSource:
         self._name = name
         self._capture = capture
         self.live = live
-        self.rendered = False
-        self.camera: Camera | None = None
-        self.rectified = False
-        self.notes: tuple[str, ...] = ()
         count = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         stated = not live and 0 < count < 1e9 and _lists_frames(Path(name))
-        self.count: int | None = int(count) if stated else None
+        self.count = int(count) if stated else None
         rate = capture.get(cv2.CAP_PROP_FPS)
         turn_deg = 0 if live else int(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
         self._orientation = _ORIENTATIONS.get(turn_deg, UPRIGHT)
-        self.rate_hz: float | None = rate if math.isfinite(rate) and 0.1 <= rate <= 1000.0 else None
+        self.rate_hz = rate if math.isfinite(rate) and 0.1 <= rate <= 1000.0 else None
 
     def frames(self) -> Iterator[SourceFrame]:
         """Yield frames numbered from 000000; after an early end, a frame with a ``problem``."""

@@ -42,7 +42,6 @@ _CAMERA: Final = "Camera"
     "of images; for a single image, into an image file.",
 )
 @option("--tracks", is_flag=True, help="Track people from frame to frame.")
-@option("--every", type=POSITIVE, default=1, metavar="N", help="Use every N-th frame only.")
 @option("--frames", type=POSITIVE, metavar="N", help="Stop after N frames.")
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
 @option(

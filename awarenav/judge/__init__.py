@@ -7,16 +7,9 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._judge import JudgeConfig, judge_files, judge_frames
-    from ._report import markdown_report
-    from ._requirements import requirements
+    from ._judge import judge_files, judge_frames
+    from ._report import requirements
 
-__all__ = [
-    "JudgeConfig",
-    "judge_files",
-    "judge_frames",
-    "markdown_report",
-    "requirements",
-]
+__all__ = ["judge_files", "judge_frames", "requirements"]
 
 __getattr__ = lazy_page(__name__, __file__)

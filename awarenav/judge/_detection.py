@@ -69,24 +69,9 @@ def _affinity(truth: Sequence[PersonRecord], estimates: Sequence[PersonRecord]) 
     return values
 
 
-@dataclass(frozen=True, slots=True)
-class FrameMatch:
-    """The matches in a frame, by index.
-
-    Attributes:
-        pairs: (truth, estimate) of everybody who was found.
-        missed: people who had to be found and were not.
-        false_positives: estimates of nobody; also a second estimate of a person.
-    """
-
-    pairs: tuple[tuple[int, int], ...]
-    missed: tuple[int, ...]
-    false_positives: tuple[int, ...]
-
-
 def match_frame(
     truth: Sequence[PersonRecord], required: Sequence[bool], estimates: Sequence[PersonRecord]
-) -> FrameMatch:
+) -> tuple[dict[int, int], int]:
     """Match one to one by the largest sum of affinities, people who had to be found first.
 
     An estimate is no false positive if at least half of its box lies on a person who did not have
@@ -96,24 +81,25 @@ def match_frame(
         truth: the people in the frame.
         required: for each of them, whether they had to be found.
         estimates: the estimated people.
+
+    Returns:
+        The index of the estimate of everybody who was found, by that of the person; and the number
+        of estimates of nobody, to which a second estimate of a person belongs.
     """
     values = _affinity(truth, estimates)
     bonus = np.where(np.asarray(required, dtype=bool), _REQUIRED_BONUS, 0.0)[:, None]
     good = values >= _MIN_AFFINITY
     rows, columns = linear_sum_assignment(np.where(good, values + bonus, 0.0), maximize=True)
-    pairs = [
-        (int(row), int(column))
+    found = {
+        int(row): int(column)
         for row, column in zip(rows, columns, strict=True)
         if good[row, column]
-    ]
-    found, used = {row for row, _ in pairs}, {column for _, column in pairs}
-    false_positives = [
-        column
-        for column in range(len(estimates))
-        if column not in used and not _covers_ignored(estimates[column], truth, required)
-    ]
-    missed = [row for row in range(len(truth)) if required[row] and row not in found]
-    return FrameMatch(tuple(pairs), tuple(missed), tuple(false_positives))
+    }
+    false_positives = sum(
+        column not in found.values() and not _covers_ignored(estimate, truth, required)
+        for column, estimate in enumerate(estimates)
+    )
+    return found, false_positives
 
 
 def _covers_ignored(

@@ -1,21 +1,39 @@
-"""The work of ``awarenav judge``, and its metrics as Markdown tables."""
+"""The work of ``awarenav judge``: what is asked of the metrics, and both as Markdown tables."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
-from pydantic import ValidationError
+from ..errors import counted
+from ..files import check_output, json_text, write_text
+from ._intervals import UNBOUNDED, Ends
+from ._judge import judge_files
 
-from tracking.config import complaints
+Verdict = Literal["yes", "no", "too few to tell"]
 
-from ..errors import AwarenavError, counted
-from ..files import json_text, write_text
-from ._intervals import Ends
-from ._judge import JudgeConfig, judge_files
-from ._requirements import interval_text, requirements, value_text
-
+# The project's requirements for its own networks on rendered people: title, group of metrics, key,
+# smallest and largest value that is asked, and unit. {gaze} is the head, or the gaze where the
+# truth knows no head. A normal error is within one standard deviation with probability 0.68.
+_ASKED: Final = (
+    ("detection AP50", "detection", "ap50", 0.97, math.inf, ""),
+    ("{gaze} direction error, median", "overall", "{gaze}_median_deg", -math.inf, 5.0, "°"),
+    ("{gaze} direction error, 90th percentile", "overall", "{gaze}_p90_deg", -math.inf, 15.0, "°"),
+    ("position error / range, median", "overall", "position_median", -math.inf, 0.04, "%"),
+    ("α mean absolute error", "overall", "awareness_mae", -math.inf, 0.08, ""),
+    ("α ≥ 0.5 where the truth is 0", "overall", "false_aware", -math.inf, 0.005, "%"),
+    (
+        "error of α within 1σ (truth or estimate in (0, 1))",
+        "overall",
+        "awareness_within_1sigma",
+        0.68 - 0.08,
+        0.68 + 0.08,
+        "%",
+    ),
+)
 # Rows of the table by group: title, key, unit.
 _GROUP_ROWS: Final = (
     ("people", "people", "n"),
@@ -38,8 +56,6 @@ _GROUP_ROWS: Final = (
     ("position in 1σ", "position_within_1sigma", "%"),
     ("position NEES (3)", "position_nees", ""),
 )
-
-
 # Rows of the table of what the groups do not show: title, group, key, unit.
 _OTHER_ROWS: Final = (
     (
@@ -59,14 +75,7 @@ _OTHER_ROWS: Final = (
 
 
 def judge_command(
-    truth: Path,
-    estimates: Path,
-    *,
-    out: Path | None,
-    as_json: bool,
-    common: bool,
-    gate: bool,
-    **settings: float,
+    truth: Path, estimates: Path, *, out: Path | None, as_json: bool, common: bool, gate: bool
 ) -> int:
     """Run the command; return the exit status.
 
@@ -77,23 +86,99 @@ def judge_command(
         as_json: prints all metrics instead of the report.
         common: leaves out frames without an estimate.
         gate: makes a requirement that is not met the status 1.
-        settings: of :class:`JudgeConfig`.
 
     Raises:
         AwarenavError: for files or options that cannot be used.
     """
-    if out is not None and out.suffix not in (".json", ".md"):
-        raise AwarenavError(f"--out must end in .json or .md, got {out}")
-    try:
-        config = JudgeConfig(**settings)
-    except ValidationError as cause:
-        raise AwarenavError(complaints(cause)) from cause
-    metrics = judge_files(truth, estimates, config, common=common)
+    if out is not None:
+        check_output(out, (".json", ".md"), (truth, estimates))
+    metrics = judge_files(truth, estimates, common=common)
     report = markdown_report(metrics)
     print(json_text(metrics) if as_json else report, end="")
     if out is not None:
-        write_text(out, report if out.suffix == ".md" else json_text(metrics))
+        write_text(out, report if out.suffix.lower() == ".md" else json_text(metrics))
     return 1 if gate and not all(each.met for each in requirements(metrics)) else 0
+
+
+@dataclass(frozen=True, slots=True)
+class Requirement:
+    """A requirement for a metric.
+
+    Attributes:
+        name: title of the metric.
+        value: the metric; None if nobody contributed to it.
+        low: smallest value that is asked.
+        high: largest value that is asked.
+        unit: "%", "°" or empty.
+        interval: the 95 % interval of the metric.
+    """
+
+    name: str
+    value: float | None
+    low: float
+    high: float
+    unit: str
+    interval: Ends = UNBOUNDED
+
+    @property
+    def met(self) -> bool:
+        """True if the metric itself lies between its limits, whatever its interval."""
+        return self.value is not None and self.low <= self.value <= self.high
+
+    @property
+    def verdict(self) -> Verdict:
+        """``"yes"`` or ``"no"`` if the whole interval meets or misses what is asked."""
+        low, high = self.interval
+        if self.value is None:
+            return "too few to tell"
+        if self.low <= low and high <= self.high:
+            return "yes"
+        return "no" if high < self.low or self.high < low else "too few to tell"
+
+    @property
+    def limits(self) -> str:
+        """The limits as text."""
+        low, high = (value_text(limit, self.unit) for limit in (self.low, self.high))
+        if self.low == -math.inf:
+            return f"≤ {high}"
+        return f"≥ {low}" if self.high == math.inf else f"{low} to {high}"
+
+
+def requirements(metrics: dict[str, Any]) -> list[Requirement]:
+    """Return the project's requirements with the metrics; ``--gate`` checks them."""
+    gaze = "head" if metrics["overall"]["head_count"] else "gaze"
+    asked = []
+    for title, group, name, low, high, unit in _ASKED:
+        key = name.format(gaze=gaze)
+        ends = metrics["intervals"][group].get(key, UNBOUNDED)
+        asked.append(
+            Requirement(title.format(gaze=gaze), metrics[group][key], low, high, unit, ends)
+        )
+    return asked
+
+
+def value_text(value: float | None, unit: str) -> str:
+    """Return a metric as text; the unit is "%", "°", "n" (a count) or empty."""
+    if value is None:
+        return "–"
+    if unit == "%":
+        return (
+            f"{100.0 * value:.1f} %"
+            if abs(value) >= 0.1 or value == 0
+            else f"{100.0 * value:.2f} %"
+        )
+    if unit == "°":
+        return f"{value:.1f}°"
+    return f"{value:.0f}" if unit == "n" else f"{value:.3f}"
+
+
+def interval_text(ends: Ends, unit: str) -> str:
+    """Return an interval as text, ``[3.1, 5.0]``; a question mark stands for an infinite end."""
+    low, high = (
+        "?" if math.isinf(end) else value_text(end, unit).removesuffix(unit).rstrip()
+        for end in ends
+    )
+    return f"[{low}, {high}]"
 
 
 def markdown_report(metrics: dict[str, Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..cli import NUMBER, FilePath, argument, command, option, options
+from ..cli import FilePath, argument, command, option, options
 
 
 @command(
@@ -20,27 +20,6 @@ from ..cli import NUMBER, FilePath, argument, command, option, options
 @argument("estimates", type=FilePath(), metavar="ESTIMATES.jsonl", help="Estimates of its frames.")
 @options.out_file(None, "Also write the report (.md) or all metrics (.json).", "FILE.md|json")
 @options.as_json("all metrics")
-@option(
-    "--min-height-px",
-    type=NUMBER,
-    default=40.0,
-    metavar="PX",
-    help="People whose box is less tall need not be found.",
-)
-@option(
-    "--max-occlusion",
-    type=NUMBER,
-    default=0.5,
-    metavar="SHARE",
-    help="People hidden to this share or more, from 0 to 1, need not be found.",
-)
-@option(
-    "--max-truncation",
-    type=NUMBER,
-    default=0.5,
-    metavar="SHARE",
-    help="People outside the image to this share or more, from 0 to 1, need not be found.",
-)
 @option(
     "--common",
     is_flag=True,

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._catalogue import Catalogue, NetworkSet, RealModel
-    from ._store import ModelStore, default_folder
+    from ._store import ModelStore
 
-__all__ = ["Catalogue", "ModelStore", "NetworkSet", "RealModel", "default_folder"]
+__all__ = ["ModelStore"]
 
 __getattr__ = lazy_page(__name__, __file__)

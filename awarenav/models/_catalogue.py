@@ -27,8 +27,8 @@ class RealModel(StrictConfig):
     url: str = Field(pattern=r"^https?://")
     #: Path of the ONNX file in the archive, or the end of it; None if the address is the file.
     member: str | None = None
-    #: Of the ONNX file; None if it is not known: then the first download sets it.
-    sha256: str | None = Field(None, pattern=r"^[0-9a-f]{64}$")
+    #: Of the ONNX file, also if it comes in an archive.
+    sha256: str = Field(pattern=r"^[0-9a-f]{64}$")
     #: Of the ONNX file, approximately.
     size_mb: float = Field(gt=0.0)
     licence: str

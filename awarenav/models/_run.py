@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 import yaml
 
-from perception import PerceptionError
 from perception.shipped import shipped_models, verify_shipped_model
 
 from ..errors import AwarenavError, counted
@@ -49,7 +47,7 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
             print(_indented(f"Note: {real.note}."))
         print(f"    trained on {real.training_domain}")
         print(f"    {real.url}")
-        print(f"    sha256 {_hash_text(store, real)}  {_real_state(store, real)}\n")
+        print(f"    sha256 {real.sha256}  {_real_state(store, real)}\n")
     print("Sets, all that a robot needs:\n")
     for each in store.catalogue.sets:
         print(f"  {each.name:16s}{each.detector}, {each.pose}, head from {each.head}")
@@ -90,7 +88,7 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
         for real in store.catalogue.models
         if store.is_fetched(real.name)
     ]
-    wrong = [name for name, state in states if not state.startswith("verified")]
+    wrong = [name for name, state in states if state != "verified"]
     if as_json:
         print(json_text(dict(states)), end="")
         return 1 if wrong else 0
@@ -102,7 +100,7 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
     return 1 if wrong else 0
 
 
-def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None) -> int:
+def fetch_command(names: Sequence[str], folder: Path | None) -> int:
     """Download networks, by their names or those of sets; return the exit status.
 
     The networks of a set are named in a file in the current folder, for ``--networks``.
@@ -115,28 +113,17 @@ def fetch_command(names: Sequence[str], sha256: str | None, folder: Path | None)
     sets = [each for each in store.catalogue.sets if each.name in names]
     members = {each.name: (each.detector, each.pose) for each in sets}
     singles = [single for name in names for single in members.get(name, (name,))]
-    if sha256 is not None and len(singles) > 1:
-        raise AwarenavError(f"--sha256 is for a single name, got {len(singles)}")
     wanted = [store.catalogue[name] for name in dict.fromkeys(singles)]
     for each in sets:
         _check_set_file(store, each)
     for model in wanted:
-        trusted = sha256 or store.expected_sha256(model.name)
-        path, downloaded = store.fetch(model.name, sha256=sha256)
+        path, downloaded = store.fetch(model.name)
         if not downloaded:
             print(f"{model.name}: already there and unaltered, {path}")
             continue
         print(f"{model.name}: {path} ({model.licence}, {model.publisher})")
         if model.note is not None:
             print(_indented(f"Note: {model.note}."))
-        if trusted is None:
-            print(
-                _indented(
-                    f"Its sha256 {store.expected_sha256(model.name)} was not known before: this "
-                    "first download was trusted, and later ones must match it."
-                ),
-                file=sys.stderr,
-            )
     for each in sets:
         write_text(Path(each.file), _set_text(store, each))
         print(f"{each.name}: written to {each.file}, for --networks of estimate and bridge")
@@ -162,28 +149,21 @@ def _check_set_file(store: ModelStore, chosen: NetworkSet) -> None:
 
 
 def _shipped_state(name: str) -> str:
-    try:
-        verify_shipped_model(name)
-    except PerceptionError as error:
-        return f"WRONG: {error}"
-    return "verified"
+    return _state(lambda: verify_shipped_model(name))
 
 
 def _real_state(store: ModelStore, model: RealModel) -> str:
     if not store.is_fetched(model.name):
         return "not fetched"
+    return _state(lambda: store.path(model.name))
+
+
+def _state(check: Callable[[], object]) -> str:
     try:
-        store.path(model.name)
+        check()
     except AwarenavError as error:
         return f"WRONG: {error}"
-    return "verified" if model.sha256 is not None else "verified as first fetched"
-
-
-def _hash_text(store: ModelStore, model: RealModel) -> str:
-    if model.sha256 is not None:
-        return model.sha256
-    kept = store.expected_sha256(model.name)
-    return "not known before" if kept is None else f"{kept} (of the first download)"
+    return "verified"
 
 
 def _indented(text: str) -> str:

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-import click
-
-from ..cli import argument, command, group, option, options
-
-_SHA256: Final = re.compile(r"[0-9a-fA-F]{64}")
+from ..cli import argument, command, group, options
 
 
 def _models_folder() -> Callable[..., Any]:
@@ -20,14 +15,6 @@ def _models_folder() -> Callable[..., Any]:
         "Folder of the downloaded networks.",
         show_default="$AWARENAV_MODELS, or awarenav/models in the user's cache",
     )
-
-
-def _hexadecimal(
-    context: click.Context, parameter: click.Parameter, text: str | None
-) -> str | None:
-    if text is not None and not _SHA256.fullmatch(text):
-        raise click.BadParameter(f"must be 64 hexadecimal digits, got {text!r}")
-    return None if text is None else text.lower()
 
 
 @group("models")
@@ -86,26 +73,18 @@ def verify(out: Path | None, *, as_json: bool) -> int:
     metavar="NAME...",
     help="Names of `models list`: of networks, or of a set of them.",
 )
-@option(
-    "--sha256",
-    callback=_hexadecimal,
-    metavar="HEX",
-    help="The sha256 that the ONNX file must have, for a single NAME.",
-)
 @_models_folder()
-def fetch(names: tuple[str, ...], sha256: str | None, out: Path | None) -> int:
+def fetch(names: tuple[str, ...], out: Path | None) -> int:
     """Download networks by the names that `awarenav models list` shows.
 
     A set such as 'robot' is all that a robot needs. It is written to robot_networks.yaml in the
     current folder, which --networks of `awarenav estimate` and `awarenav bridge` takes.
 
-    A file appears when it is complete and its sha256 is verified. If the catalogue has no sha256 of
-    a network, the first download is trusted: its sha256 is kept beside it, and later downloads must
-    match it.
+    A file appears when it is complete and its sha256 is that of the list.
     """
     from ._run import fetch_command  # noqa: PLC0415 - help needs no networks
 
-    return fetch_command(names, sha256, out)
+    return fetch_command(names, out)
 
 
 models.add_command(list_models)

@@ -21,25 +21,21 @@ _ROW_IN: Final = 3.4
 _LINE_COLOUR: Final = "#1f5f8b"
 _LIMIT_COLOUR: Final = "#6b7079"
 _AWARENESS: Final = np.linspace(0.0, 1.0, 26)
-_DISTANCES: Final = 61
+_DISTANCE_M: Final = np.linspace(0.0, 6.0, 61)
 # Index of the α at which contours are labelled.
 _LABELLED: Final = 3
 
 
-def policy_figure(
-    policies: Sequence[tuple[str, AwarenessPolicy]], robot: RobotProfile, farthest_m: float
-) -> Figure:
+def policy_figure(policies: Sequence[tuple[str, AwarenessPolicy]], robot: RobotProfile) -> Figure:
     """Draw one row per policy: radius, U, and maps of the limit for people ahead and beside.
 
     Args:
         policies: with their names.
         robot: whose speed is limited.
-        farthest_m: end of the distance axis.
     """
     figure = new_figure(_WIDTH_IN, _ROW_IN * len(policies) + 0.3, dpi=_DPI)
     rows = figure.subplots(len(policies), 4, squeeze=False, width_ratios=(1.0, 1.0, 1.3, 1.3))
-    distance_m = np.linspace(0.0, farthest_m, _DISTANCES)
-    effects = [effect_of(policy, robot, _AWARENESS, distance_m) for _, policy in policies]
+    effects = [effect_of(policy, robot, _AWARENESS, _DISTANCE_M) for _, policy in policies]
     max_radius_m = max(float(effect.radius_m.max()) for effect in effects)
     max_speed_mps = max(float(effect.human_speed_mps.max()) for effect in effects)
     for axes, (name, policy), effect in zip(rows, policies, effects, strict=True):
@@ -49,8 +45,8 @@ def policy_figure(
             axes[0].axhline(height_m, color=_LIMIT_COLOUR, ls="--", lw=1.0)
             axes[0].text(0.02, height_m, text, color=_LIMIT_COLOUR, va="bottom", fontsize=8)
         _draw_line(axes[1], effect.human_speed_mps, "U, human speed (m/s)", max_speed_mps)
-        _draw_limit(axes[2], effect.ahead_mps, distance_m, robot)
-        limit_map = _draw_limit(axes[3], effect.beside_mps, distance_m, robot)
+        _draw_limit(axes[2], effect.ahead_mps, robot)
+        limit_map = _draw_limit(axes[3], effect.beside_mps, robot)
         bar = figure.colorbar(limit_map, ax=axes[3], label="speed limit (m/s)")
         bar.ax.set_ylim(0.0, robot.max_speed_mps)
         axes[0].set_title(Path(name).name, loc="left", fontweight="bold")
@@ -68,14 +64,12 @@ def _draw_line(axes: Axes, values: FloatArray, label: str, highest: float) -> No
     axes.grid(alpha=0.25)
 
 
-def _draw_limit(
-    axes: Axes, limit_mps: FloatArray, distance_m: FloatArray, robot: RobotProfile
-) -> QuadMesh:
+def _draw_limit(axes: Axes, limit_mps: FloatArray, robot: RobotProfile) -> QuadMesh:
     """Draw the map of the speed limit (A, D) over awareness and distance."""
     limit = limit_mps.T
     limit_map = axes.pcolormesh(
         _AWARENESS,
-        distance_m,
+        _DISTANCE_M,
         limit,
         cmap="viridis",
         vmin=0.0,
@@ -88,9 +82,9 @@ def _draw_limit(
     unaware = limit[:, _LABELLED]
     met = [step for step in steps.tolist() if unaware[0] < step <= float(unaware.max())]
     if float(limit.max()) > float(limit.min()):
-        lines = axes.contour(_AWARENESS, distance_m, limit, steps, colors="white", linewidths=1.0)
+        lines = axes.contour(_AWARENESS, _DISTANCE_M, limit, steps, colors="white", linewidths=1.0)
         texts = ["stop", *(f"{step:.2f}" for step in steps[1:-1].tolist()), "maximum"]
-        places = [(_AWARENESS[_LABELLED], distance_m[int((unaware >= x).argmax())]) for x in met]
+        places = [(_AWARENESS[_LABELLED], _DISTANCE_M[int((unaware >= x).argmax())]) for x in met]
         fmt = dict(zip(lines.levels, texts, strict=True))
         if met:
             axes.clabel(lines, met, fmt=fmt, fontsize=8, manual=places)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,13 +10,10 @@ import numpy as np
 
 from nav_adapter import AwarenessPolicy, RobotProfile
 from nav_adapter.ros2 import RobotFile
-from perception.arrays import finite_number
 
-from ..errors import AwarenavError
-from ..files import json_text
+from ..files import check_plot, json_text
 from ._effect import BESIDE_M, effect_of
 
-_FORMATS: Final = (".png", ".svg", ".pdf")
 _AWARENESS: Final = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 _DISTANCES_M: Final = (1.0, 2.0, 3.0, 5.0)
 #: The robot of the tables in docs/policies.md.
@@ -30,46 +27,31 @@ ROBOT: Final = RobotProfile(
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ShowOptions:
-    """The options of ``awarenav policy show``."""
-
-    policies: tuple[str, ...]
-    out: Path
-    as_json: bool
-    robot: Path | None
-    max_speed: float | None
-    deceleration: float | None
-    reaction_time: float | None
-    farthest: float
-
-
-def show_command(options: ShowOptions) -> int:
+def show_command(
+    names: Sequence[str], out: Path | None, robot_file: Path | None, *, as_json: bool
+) -> int:
     """Run the command; return the exit status.
+
+    Args:
+        names: presets and YAML files of policies.
+        out: the drawing; None for none.
+        robot_file: the robot; None for that of docs/policies.md.
+        as_json: prints the tables as JSON.
 
     Raises:
         AwarenavError: for options that cannot be used; nothing is written then.
         NavError: for a policy or a robot that cannot be used.
     """
-    out = None if str(options.out) == "none" else options.out
-    if out is not None and out.suffix.lower() not in _FORMATS:
-        raise AwarenavError(f"--out must end in {', '.join(_FORMATS)} or be none, got {out}")
-    farthest_m = finite_number(
-        "--farthest (m)", options.farthest, AwarenavError, minimum=0.5, maximum=100.0
-    )
-    robot = _robot(options)
-    policies = [(name, read_policy(name)) for name in options.policies]
+    check_plot(out, map(Path, names))
+    robot = ROBOT if robot_file is None else RobotFile.from_yaml(robot_file).profile()
+    policies = [(name, read_policy(name)) for name in names]
     if out is not None:
-        if out.is_dir():
-            raise AwarenavError(f"--out must be a file, {out} is a folder")
-        if out.resolve() in {Path(name).resolve() for name in options.policies}:
-            raise AwarenavError(f"--out {out} would replace a policy")
         # Only the drawing needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
         from ._drawing import policy_figure  # noqa: PLC0415
 
-        save_figure(policy_figure(policies, robot, farthest_m), out)
-    if options.as_json:
+        save_figure(policy_figure(policies, robot), out)
+    if as_json:
         print(json_text({name: _table(policy, robot) for name, policy in policies}), end="")
         return 0
     for name, policy in policies:
@@ -120,25 +102,3 @@ def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list
         limits = table["limit_ahead_mps"][row] + table["limit_beside_mps"][row]
         lines.append("  ".join(cells + [f"{limit:5.2f}" for limit in limits]))
     return [*lines, ""]
-
-
-def _robot(options: ShowOptions) -> RobotProfile:
-    """Return the robot of the file, or that of the page, with the numbers of the options."""
-    robot = ROBOT if options.robot is None else RobotFile.from_yaml(options.robot).profile()
-    given = {
-        "max_speed_mps": ("--max-speed (m/s)", options.max_speed),
-        "max_deceleration_mps2": ("--deceleration (m/s²)", options.deceleration),
-        "reaction_time_s": ("--reaction-time (s)", options.reaction_time),
-    }
-    numbers: dict[str, Any] = {
-        name: finite_number(
-            option,
-            value,
-            AwarenavError,
-            minimum=0.0,
-            exclusive_minimum=name != "reaction_time_s",
-        )
-        for name, (option, value) in given.items()
-        if value is not None
-    }
-    return replace(robot, **numbers)

@@ -17,7 +17,7 @@ from perception.documents import read_yaml, yaml_text
 from tracking.config import complaints
 
 from ..errors import AwarenavError, counted
-from ..files import write_text
+from ..files import check_output, write_text
 from ._version_0_2 import (
     ACCELERATION_MPS2,
     ALERTS,
@@ -52,10 +52,7 @@ def upgrade_command(old: Path, out: Path | None) -> int:
         AwarenavError: for a file that is no policy of 0.2, or one that cannot be written.
     """
     if out is not None:
-        if out.suffix.lower() not in (".yaml", ".yml"):
-            raise AwarenavError(f"--out must end in .yaml or .yml, got {out}")
-        if out.resolve() == old.resolve():
-            raise AwarenavError(f"--out {out} would replace the old file")
+        check_output(out, (".yaml", ".yml"), [old])
     data = read_yaml(old, AwarenavError)
     try:
         upgrade = Upgrade(data)

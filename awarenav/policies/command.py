@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
-from ..cli import NUMBER, FilePath, argument, command, group, option, options
+from ..cli import FilePath, argument, command, group, option, options
 
 
 @group("policy")
@@ -39,29 +40,7 @@ def policy() -> None:
     metavar="FILE",
     help="A robot file, as `awarenav bridge` reads it.",
 )
-@option(
-    "--max-speed",
-    type=NUMBER,
-    show_default="1.5, or the file's",
-    metavar="M/S",
-    help="Maximum speed.",
-)
-@option(
-    "--deceleration",
-    type=NUMBER,
-    show_default="1.0, or the file's",
-    metavar="M/S²",
-    help="Braking.",
-)
-@option(
-    "--reaction-time",
-    type=NUMBER,
-    show_default="0.3, or the file's",
-    metavar="S",
-    help="Time until the robot brakes.",
-)
-@option("--farthest", type=NUMBER, default=6.0, metavar="M", help="End of the distance axis.")
-def show(**values: Any) -> int:
+def show(policies: tuple[str, ...], out: Path | None, robot: Path | None, *, as_json: bool) -> int:
     """Show a policy's effect for one person who stands, ahead of the robot or beside its way.
 
     Prints and draws the obstacle radius and U, the speed that the person may change to, over
@@ -69,9 +48,9 @@ def show(**values: Any) -> int:
     person beside the way stands 1.2 m from its middle. Distances run along the way, from the
     robot's front to the body. Frames have shown the person for a while, at an exactly known place.
     """
-    from ._show import ShowOptions, show_command  # noqa: PLC0415 - help needs no policies
+    from ._show import show_command  # noqa: PLC0415 - help needs no policies
 
-    return show_command(ShowOptions(**values))
+    return show_command(policies, out, robot, as_json=as_json)
 
 
 @command(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from tracking import TrackerConfig
 from tracking.calibration import HORIZONS_S, Calibration, FollowedPerson, calibrate
@@ -12,11 +12,9 @@ from tracking.prediction import REGION_SHARE
 from tracking.units import refuse_other_units
 
 from ..errors import AwarenavError
-from ..files import json_text, write_text
+from ..files import check_output, json_text, write_text
 from ._run import log, read_file
 from ._tracking import arrays_of, smoothed_path, track_recording
-
-_FORMATS: Final = (".yaml", ".yml")
 
 
 def calibrate_command(
@@ -28,10 +26,7 @@ def calibrate_command(
         AwarenavError: for input that cannot be used; nothing is written then.
         TrackingError: for settings that cannot be used, or recordings that are too short.
     """
-    if out.suffix.lower() not in _FORMATS:
-        raise AwarenavError(f"--out must end in {' or '.join(_FORMATS)}, got {out}")
-    if out.resolve() in {path.resolve() for path in (*files, config) if path is not None}:
-        raise AwarenavError(f"--out {out} would replace an input")
+    check_output(out, (".yaml", ".yml"), (*files, config))
     settings = None if config is None else TrackerConfig.from_yaml(config)
     people = [each for path in files for each in followed_people(path, settings)]
     horizons_s = sorted({*(each for each in HORIZONS_S if each < longest), longest})

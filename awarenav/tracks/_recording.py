@@ -17,7 +17,7 @@ from perception.arrays import FloatArray, finite_number, rigid_transform
 
 from ..errors import AwarenavError, counted
 from ..estimate import fixed_camera_pose
-from ..records import PersonRecord, Record, read_person, read_records
+from ..records import PersonRecord, Record, read_people, read_records
 from ._people_table import PersonRow, read_people_table
 
 #: Standard deviation per axis that is assumed for a position without a covariance.
@@ -126,15 +126,12 @@ def _frame(record: Record, where: str, counts: Counter[str]) -> RecordedFrame:
         if pose is None
         else rigid_transform(f"{where}: T_odom_camera", pose, AwarenavError)
     )
-    if not isinstance(record["people"], list):
-        raise AwarenavError(f"{where}: people must be a list, got {record['people']!r:.60}")
     observations, ids = [], []
-    for index, entry in enumerate(record["people"]):
-        person = read_person(entry, f"{where}, person {index}")
+    for index, person in enumerate(read_people(record, where)):
         observation = _observation(person, stamp_s, counts)
         if observation is not None:
             observations.append(observation)
-            ids.append(_id(entry.get("id"), f"{where}, person {index}"))
+            ids.append(_id(record["people"][index].get("id"), f"{where}, person {index}"))
     return RecordedFrame(
         name=str(record["frame"]),
         stamp_s=stamp_s,

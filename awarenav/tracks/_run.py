@@ -17,11 +17,11 @@ from tracking import TrackerConfig
 from tracking.smoothing import SmoothedPath
 
 from ..errors import AwarenavError, counted
-from ..files import csv_number, json_text, write_text
+from ..files import check_output, check_plot, csv_number, json_text, write_text
 from ._history import TrackedRecording, TrackHistory, TrackSample
 from ._recording import Recording, is_positions, read_positions, read_recording
 from ._tracking import distances_m, smoothed_path, track_recording, tracks_in_file
-from ._truth import Truth, person_ids_text, truth_beside_tracks
+from ._truth import Truth, match_truth, person_ids_text, true_people
 
 #: Columns of the CSV file: one row per track and frame; empty for what is not known.
 CSV_COLUMNS: Final = (
@@ -29,7 +29,6 @@ CSV_COLUMNS: Final = (
     *("x_std_m", "y_std_m", "awareness", "awareness_std", "awareness_lower"),
     *("measured_awareness", "measured_awareness_std"),
 )
-_FORMATS: Final = (".png", ".svg", ".pdf")
 _CAMERA: Final = "camera.yaml"
 # A camera that moves more than this from frame to frame takes single images.
 _MAX_CAMERA_STEP_M: Final = 2.0
@@ -38,7 +37,7 @@ _MOST_LINES: Final = 50
 
 def tracks_command(
     file: Path,
-    out: Path,
+    out: Path | None,
     *,
     as_json: bool,
     csv: Path | None,
@@ -56,11 +55,15 @@ def tracks_command(
         TrackingError: for settings that cannot be used.
         PerceptionError: for a calibration that cannot be used.
     """
-    plot = None if str(out) == "none" else out
     if camera is not None and is_positions(file):
         raise AwarenavError(f"--camera cannot be used with positions, got {file}")
-    _check_outputs(plot, csv, (file, truth, config, camera))
-    if plot is not None:
+    inputs = (file, truth, config, camera)
+    check_plot(out, inputs)
+    if csv is not None:
+        check_output(csv, (), inputs, option="--csv")
+        if out is not None and out.resolve() == csv.resolve():
+            raise AwarenavError(f"--out and --csv are the same file, {out}")
+    if out is not None:
         # Only the plot needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
         from ._plot import tracks_figure  # noqa: PLC0415
@@ -76,13 +79,16 @@ def tracks_command(
             f"the camera jumps by {tracked.camera_jump_m:.1f} m from frame to frame: these look "
             "like single images, in which people cannot be tracked"
         )
-    beside = None if true is None else truth_beside_tracks(tracked.histories, true)
+    beside = None
+    if true is not None:
+        people = true_people(true)
+        beside = Truth(people, match_truth(tracked.histories, people))
     paths = _smoothed(tracked, settings) if smooth else {}
-    if plot is not None:
+    if out is not None:
         title = _title(recording, tracked)
         save_figure(
             tracks_figure(tracked, title, camera=view, truth=beside, smoothed=paths, most=most),
-            plot,
+            out,
         )
     if csv is not None:
         _write_csv(csv, tracked.histories)
@@ -90,23 +96,9 @@ def tracks_command(
         print(json_text(_summaries(tracked.histories, beside)), end="")
     else:
         _print_table(tracked, beside)
-        if written := [str(path) for path in (plot, csv) if path is not None]:
+        if written := [str(path) for path in (out, csv) if path is not None]:
             print(f"Written to {' and '.join(written)}")
     return 0
-
-
-def _check_outputs(plot: Path | None, table: Path | None, inputs: Sequence[Path | None]) -> None:
-    """Refuse outputs with another suffix, or that would replace an input or each other."""
-    if plot is not None and plot.suffix.lower() not in _FORMATS:
-        raise AwarenavError(f"--out must end in {', '.join(_FORMATS)} or be none, got {plot}")
-    read = {path.resolve() for path in inputs if path is not None}
-    for name, path in (("--out", plot), ("--csv", table)):
-        if path is not None and path.resolve() in read:
-            raise AwarenavError(f"{name} {path} would replace an input")
-        if path is not None and path.is_dir():
-            raise AwarenavError(f"{name} must be a file, {path} is a folder")
-    if plot is not None and table is not None and plot.resolve() == table.resolve():
-        raise AwarenavError(f"--out and --csv are the same file, {plot}")
 
 
 def _camera(file: Path, given: Path | None) -> Camera | None:

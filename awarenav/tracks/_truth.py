@@ -58,16 +58,6 @@ class Truth:
     matches: dict[int, list[TruthMatch]]
 
 
-def truth_beside_tracks(histories: Sequence[TrackHistory], truth: Recording) -> Truth:
-    """Return the people of a truth file and the matches of tracks with them.
-
-    Raises:
-        AwarenavError: for people without ids.
-    """
-    people = true_people(truth)
-    return Truth(people, match_truth(histories, people))
-
-
 def true_people(truth: Recording) -> tuple[TruePerson, ...]:
     """Return the people of a truth file in the order of their ids.
 

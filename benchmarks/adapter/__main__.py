@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f"{TRAJECTORIES} × {TIMES} poses, {FIELD_PEOPLE} people: field {field['field']:.1f} ms, "
         f"with headings {field['headed']:.1f} ms, with speeds and yaw rates too "
         f"{field['driven']:.1f} ms, update pose by pose {field['updates']:.0f} ms; speed map of "
-        f"200 × 200 cells {field['map']:.1f} ms, of 100 × 100 {field['coarse map']:.1f} ms"
+        f"200 × 200 cells {field['map']:.1f} ms"
     )
 
     metrics = _metrics(costs, field)

@@ -23,8 +23,8 @@ def field_ms(repeats: int, seed: int) -> dict[str, float]:
     """Return the least processor milliseconds over the repeats.
 
     ``field`` is for positions alone, ``headed`` for headings too, ``driven`` for speeds and yaw
-    rates too, ``map`` for 200 × 200 cells, ``coarse map`` for 100 × 100, and ``updates`` for as
-    many calls of :meth:`NavAdapter.update` as the field has poses.
+    rates too, ``map`` for 200 × 200 cells, and ``updates`` for as many calls of
+    :meth:`NavAdapter.update` as the field has poses.
     """
     rng = np.random.default_rng([seed, PEOPLE])
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), ROBOT)
@@ -55,9 +55,6 @@ def field_ms(repeats: int, seed: int) -> dict[str, float]:
         ),
         "map": lambda: SpeedMap.around(
             constraints, [0.0, 0.0], size_m=SIDE_M, resolution_m=RESOLUTION_M
-        ),
-        "coarse map": lambda: SpeedMap.around(
-            constraints, [0.0, 0.0], size_m=SIDE_M, resolution_m=2.0 * RESOLUTION_M
         ),
         "updates": updates,
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ._measure import measure, read_results
-from ._page import leaderboard_page, ranked, write_leaderboard
+from ._page import leaderboard_page, ranked
 from ._rows import PAGE, RESULTS, Board, Row
 
 __all__ = [
@@ -15,5 +15,4 @@ __all__ = [
     "measure",
     "ranked",
     "read_results",
-    "write_leaderboard",
 ]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 from awarenav.errors import AwarenavError
 from benchmarks._harness import count, make_parser
 
 from ._measure import measure
-from ._page import leaderboard_page, write_leaderboard
+from ._page import leaderboard_page
 from ._rows import PAGE, RESULTS, Board
 
 
@@ -28,9 +27,6 @@ def main() -> int:
     )
     parser.add_argument("--again", action="store_true", help="measure the rows from the beginning")
     parser.add_argument("--page", action="store_true", help="measure nothing, write the page")
-    parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write the tables as one HTML page, too"
-    )
     options = parser.parse_args()
     try:
         board = Board.read()
@@ -38,8 +34,6 @@ def main() -> int:
         if not options.page:
             measure(board, rows, workers=options.workers, again=options.again)
         PAGE.write_text(leaderboard_page(board, RESULTS), encoding="utf-8")
-        if options.html:
-            write_leaderboard(board, options.html)
     except AwarenavError as error:
         print(f"leaderboard: {error}", file=sys.stderr)
         return 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,13 +11,14 @@ from typing import Final
 import numpy as np
 
 from sim_tests.study.measures import (
+    NOTHING,
     EpisodeRecord,
     Interval,
     bootstrap_interval,
     paired_difference,
     proportion_interval,
 )
-from sim_tests.study.report import NOTHING, Section, Table, write_page
+from sim_tests.study.report import Table
 
 from ._measure import read_about, read_results
 from ._rows import RESULTS, Board, Row
@@ -26,8 +26,6 @@ from ._rows import RESULTS, Board, Row
 _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
 _RANKED_DECIMALS: Final = 2
-# Marks of Markdown, and the address of a link.
-_MARKUP: Final = re.compile(r"[`*]|\[(\w+)\]\(\S+\)")
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 
 
@@ -114,23 +112,6 @@ def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
         # About 2.5 s of a core per episode with camera and scanners.
         minutes=max(round(scenarios * board.seeds * 2.5 / 60.0), 1),
     )
-
-
-def write_leaderboard(board: Board, path: Path, folder: Path = RESULTS) -> None:
-    """Write the tables as one HTML page without other files, like the report of a run."""
-    tables = leaderboard_tables(board, standings(board, folder), read_about(folder))
-    titles = {
-        "table": "Ranking",
-        "more": "More about each row",
-        "step_out": "Step-out impacts",
-        "parts": "By what people look at",
-    }
-    sections = []
-    for name, each in tables.items():
-        plain = [[_MARKUP.sub(r"\1", cell.text) for cell in row] for row in each.cells]
-        sections.append(Section(name, titles[name], tables=(Table(each.columns, plain),)))
-    lead = "Rows are policies with sensors and a planner; docs/what_it_wins.md has the definitions."
-    write_page(path, "Leaderboard", sections, lead=lead)
 
 
 def leaderboard_tables(

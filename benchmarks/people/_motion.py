@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +12,8 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from perception.arrays import FloatArray
+
+from .._recordings import places_together, walks_of
 
 #: Rate of the recordings; simulated people are sampled at the same rate.
 RATE_HZ: Final = 29.97
@@ -77,18 +77,8 @@ class Scene:
 
 def read_scene(path: Path) -> Scene:
     """Return the people of a CSV of ``t_s, id, x_m, y_m``, while all of them are there."""
-    samples: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    with path.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            samples[row["id"]].append((float(row["t_s"]), float(row["x_m"]), float(row["y_m"])))
-    walks = [np.array(walk) for walk in samples.values()]
-    start, end = max(walk[0, 0] for walk in walks), min(walk[-1, 0] for walk in walks)
-    stamps = np.arange(start, end, 1.0 / RATE_HZ)
-    places = [
-        np.column_stack([np.interp(stamps, walk[:, 0], walk[:, axis]) for axis in (1, 2)])
-        for walk in walks
-    ]
-    return Scene(np.stack(places), vehicle="no_vehicle" not in path.name)
+    _, places = places_together(walks_of(path), RATE_HZ)
+    return Scene(places.transpose(1, 0, 2), vehicle="no_vehicle" not in path.name)
 
 
 def noise_m(scenes: Sequence[Scene]) -> float:

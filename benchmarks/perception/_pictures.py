@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from awarenav.records import Record
 from perception import AwarenessPipeline, Camera, HeadPoseEstimator
 from perception.confirmation import KeypointConfirmation
-from perception.networks import OnnxPersonDetector, OnnxPoseEstimator
+from perception.networks import OnnxModel, OnnxPersonDetector, OnnxPoseEstimator
 from perception.networks.heads import OnnxHeadPoseEstimator
-from perception.shipped import DETECTOR, HEAD, POSE, detector_input_size, load_shipped
+from perception.shipped import DETECTOR, HEAD, POSE, detector_input_size
 from sim_tests.dataset import RenderConfig, RenderScene
 from sim_tests.world.camera import RenderedView
 from training.networks import Degradation, Recipe, degrade, random_background, rolling_shutter
@@ -241,12 +241,12 @@ def pipeline_of(
     return AwarenessPipeline(
         camera,
         OnnxPersonDetector(
-            load_shipped(DETECTOR, folder=folder),
+            OnnxModel.shipped(DETECTOR, folder=folder),
             score_threshold=confirmation.detector_threshold,
             input_size_hw_px=detector_input_size(camera),
         ),
-        OnnxPoseEstimator(load_shipped(POSE, folder=folder)),
-        OnnxHeadPoseEstimator(load_shipped(HEAD, folder=folder)) if head is None else head,
+        OnnxPoseEstimator(OnnxModel.shipped(POSE, folder=folder)),
+        OnnxHeadPoseEstimator(OnnxModel.shipped(HEAD, folder=folder)) if head is None else head,
         confirmation=confirmation,
         **options,
     )

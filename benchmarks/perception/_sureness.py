@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from perception import (
     AwarenessPipeline,
@@ -26,10 +27,10 @@ from perception import (
     PnpHeadPoseEstimator,
 )
 from perception.arrays import FloatArray, ImageRgb
+from perception.networks import OnnxModel
 from perception.networks.heads import OnnxHeadPoseEstimator
-from perception.shipped import HEAD, load_shipped
+from perception.shipped import HEAD
 
-from ._photographs import matched
 from ._pictures import Condition, chosen_conditions, degraded_pictures, pipeline_of
 
 HeadKind = Literal["network", "pnp"]
@@ -136,6 +137,25 @@ def axis_nees(pose: HeadPose, forward_camera: FloatArray) -> tuple[float, float]
     )
 
 
+def matched(
+    truth: FloatArray, found: FloatArray, min_iou: float = 0.5
+) -> tuple[tuple[int, int], ...]:
+    """Return pairs (truth, found) of boxes (T, 4) and (F, 4): the most, then the best overlaps."""
+    low = np.maximum(truth[:, None, :2], found[None, :, :2])
+    high = np.minimum(truth[:, None, 2:], found[None, :, 2:])
+    shared = np.prod(np.clip(high - low, 0.0, None), axis=2)
+    areas = [np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) for boxes in (truth, found)]
+    union = areas[0][:, None] + areas[1][None] - shared
+    iou = np.divide(shared, union, out=np.zeros_like(shared), where=union > 0.0)
+    good = iou >= min_iou
+    rows, columns = linear_sum_assignment(np.where(good, 10.0 + iou, 0.0), maximize=True)
+    return tuple(
+        (int(row), int(column))
+        for row, column in zip(rows, columns, strict=True)
+        if good[row, column]
+    )
+
+
 def measure(
     conditions: Sequence[Condition],
     frames: int,
@@ -152,7 +172,7 @@ def measure(
             heads = RecordingHeads(
                 PnpHeadPoseEstimator()
                 if head == "pnp"
-                else OnnxHeadPoseEstimator(load_shipped(HEAD, folder=folder))
+                else OnnxHeadPoseEstimator(OnnxModel.shipped(HEAD, folder=folder))
             )
             pipeline = pipeline_of(camera, folder, heads, _RENDERED_EYES_STD_RAD)
             pipelines[camera] = heads, pipeline

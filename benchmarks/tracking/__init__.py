@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ._judges import GATE_M, TrackedFrame, judge
 from ._measurements import OCCLUDED, OPEN, SimulatedRecording, record
-from ._walkers import WalkerSettings, walk
+from ._walkers import side_m, walk
 
 __all__ = [
     "GATE_M",
@@ -12,8 +12,8 @@ __all__ = [
     "OPEN",
     "SimulatedRecording",
     "TrackedFrame",
-    "WalkerSettings",
     "judge",
     "record",
+    "side_m",
     "walk",
 ]

@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from awarenav.baseline import MeasuredValue
-from tracking import TrackerConfig, TrackingError
 
-from .._harness import add_seed, bad_input, count, finish, make_parser, parse
+from .._harness import add_seed, count, finish, make_parser, parse
 from ._cost import cost_table, two_sensor_table
 from ._prediction import prediction_table
 from ._scores import rate_table, score_table
@@ -26,7 +25,6 @@ BASELINE: Final = Path(__file__).with_name("baseline.json")
 #: The baseline holds for runs of this size only.
 STANDARD_SEEDS, STANDARD_FRAMES = 10, 500
 PARTS: Final = ("scores", "rates", "cost", "prediction")
-TRACKERS: Final = ("ours", "naive", "norfair")
 #: Recorded people lie beside the repository, if anywhere; see README.md.
 RECORDINGS: Final = Path(__file__).resolve().parents[3] / "shared" / "data"
 
@@ -35,30 +33,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark; return 0 for success, 1 for a missed target, 2 for bad input."""
     parser = _parser()
     options, baseline = parse(parser, arguments)
-    try:
-        config = (
-            TrackerConfig() if options.config is None else TrackerConfig.from_yaml(options.config)
-        )
-    except TrackingError as error:
-        return bad_input(parser, error)
     missing = [name for name in ("motmetrics", "trackeval") if find_spec(name) is None]
     if missing and {"scores", "rates"} & set(options.parts):
         parser.error(
             f"{' and '.join(missing)} not found; see benchmarks/tracking/requirements.txt "
             "or leave out what they judge (--parts cost prediction)"
         )
-    makers: dict[str, Callable[[], Contender]] = {"ours": lambda: Ours(config), "naive": Naive}
+    makers: dict[str, Callable[[], Contender]] = {"ours": Ours, "naive": Naive}
     if find_spec("norfair") is not None:
         makers["norfair"] = Norfair
-    elif "norfair" in options.trackers:
+    else:
         print("left out, norfair: see benchmarks/tracking/requirements.txt", file=sys.stderr)
-    makers = {name: make for name, make in makers.items() if name in options.trackers}
     seeds = range(options.seed, options.seed + options.seeds)
     tables: dict[str, Callable[[], tuple[list[MeasuredValue], list[str]]]] = {
         "scores": lambda: score_table(options.people, options.frames, seeds, makers),
         "rates": lambda: rate_table(seeds, makers, options.recordings),
         "cost": lambda: cost_table(options.seed, makers),
-        "sensors": lambda: two_sensor_table(options.seed, config),
+        "sensors": lambda: two_sensor_table(options.seed),
         "prediction": lambda: prediction_table(options.recordings),
     }
     metrics: list[MeasuredValue] = []
@@ -69,8 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             metrics += found
             missed += off
     standard = (options.seed, options.seeds, options.frames) == (0, STANDARD_SEEDS, STANDARD_FRAMES)
-    if not standard or options.config is not None:
-        print("not compared with the baseline: it holds for the default seeds, frames and settings")
+    if not standard:
+        print("not compared with the baseline: it holds for the default seeds and frames")
         baseline = {}
     return finish(metrics, missed, baseline, options.out)
 
@@ -95,15 +86,14 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N",
         help="frames per run, 20 per second (default: 500)",
     )
-    for name, choices in (("--trackers", TRACKERS), ("--parts", PARTS)):
-        parser.add_argument(
-            name,
-            nargs="+",
-            choices=choices,
-            default=list(choices),
-            metavar="NAME",
-            help=f"some of {', '.join(choices)} (default: all)",
-        )
+    parser.add_argument(
+        "--parts",
+        nargs="+",
+        choices=PARTS,
+        default=list(PARTS),
+        metavar="NAME",
+        help=f"some of {', '.join(PARTS)} (default: all)",
+    )
     parser.add_argument(
         "--recordings",
         type=Path,
@@ -111,7 +101,6 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="CSV files of recorded people, t_s, id, x_m, y_m; left out if absent",
     )
-    parser.add_argument("--config", type=Path, metavar="FILE", help="TrackerConfig for ours (YAML)")
     add_seed(parser)
     return parser
 

@@ -90,7 +90,7 @@ def cost_ms(
     )
 
 
-def two_sensor_table(seed: int, config: TrackerConfig) -> tuple[list[MeasuredValue], list[str]]:
+def two_sensor_table(seed: int) -> tuple[list[MeasuredValue], list[str]]:
     """Print the processor time of an update with camera and scanner, against the camera alone.
 
     The scanner is as fast as the camera, and its frames lie between those of the camera. With two
@@ -98,15 +98,14 @@ def two_sensor_table(seed: int, config: TrackerConfig) -> tuple[list[MeasuredVal
     """
     rng = np.random.default_rng([seed, _TWO_SENSORS_PEOPLE])
     both = _frames_of_two(record(_TWO_SENSORS_PEOPLE, FRAMES, rng, OPEN))
-    memory = AwarenessFilterConfig(**{**config.awareness.model_dump(), "noticed_memory_s": 5.0})
-    noticing = config.model_copy(update={"awareness": memory})
+    noticing = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=5.0))
     scanner = {"laser": SensorConfig()}
     makers: dict[str, tuple[Callable[[], PersonTracker], list[_FrameOf]]] = {
         "camera": (
-            lambda: PersonTracker(config),
+            PersonTracker,
             [frame for frame in both if frame[2] == "camera"],
         ),
-        "camera and scanner": (lambda: PersonTracker(config, sensors=scanner), both),
+        "camera and scanner": (lambda: PersonTracker(sensors=scanner), both),
         "… and noticed": (lambda: PersonTracker(noticing, sensors=scanner), both),
     }
     least = {name: np.full(len(frames), np.inf) for name, (_, frames) in makers.items()}

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._walkers import FloatArray, WalkerSettings, walk
+from .._recordings import places_together
+from ._walkers import FloatArray, side_m, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,34 +60,34 @@ class SimulatedRecording:
 
 
 def record(
-    people: int,
-    frames: int,
-    rng: np.random.Generator,
-    sensor: SensorSettings = OPEN,
-    walkers: WalkerSettings | None = None,
+    people: int, frames: int, rng: np.random.Generator, sensor: SensorSettings = OPEN
 ) -> SimulatedRecording:
-    """Simulate a crowd and measure it."""
-    walkers = walkers or WalkerSettings()
+    """Simulate a crowd and measure it; clutter is uniform over the hall."""
     stamps_s = np.arange(frames) / sensor.rate_hz
-    truth = walk(people, stamps_s, rng, walkers)
+    truth = walk(people, stamps_s, rng)
+    return _measured(stamps_s, truth, np.zeros(2), np.full(2, side_m(people)), rng, sensor)
+
+
+def _measured(
+    stamps_s: FloatArray,
+    truth: FloatArray,
+    low_m: FloatArray,
+    high_m: FloatArray,
+    rng: np.random.Generator,
+    sensor: SensorSettings,
+) -> SimulatedRecording:
+    """Measure people (T, N, 4), with clutter in the rectangle from ``low_m`` to ``high_m``."""
+    people = truth.shape[1]
     visible = visible_spells(people, stamps_s, sensor, rng)
-    side_m = walkers.side_m(people)
+    area_m2 = float(np.prod(high_m - low_m))
     measured = []
-    for frame in range(frames):
+    for frame, now_m in enumerate(truth[:, :, :2]):
         shown = visible[frame] & (rng.random(people) >= sensor.miss_probability)
-        people_m = truth[frame, shown, :2] + rng.normal(
-            0.0, sensor.noise_std_m, (int(shown.sum()), 2)
-        )
-        count = int(rng.poisson(sensor.clutter_per_m2 * side_m**2))
-        clutter_m = rng.uniform(0.0, side_m, (count, 2))
+        people_m = now_m[shown] + rng.normal(0.0, sensor.noise_std_m, (int(shown.sum()), 2))
+        count = int(rng.poisson(sensor.clutter_per_m2 * area_m2))
+        clutter_m = rng.uniform(low_m, high_m, (count, 2))
         measured.append(rng.permutation(np.concatenate([people_m, clutter_m])))
-    return SimulatedRecording(
-        stamps_s,
-        truth,
-        visible,
-        tuple(measured),
-        sensor.noise_std_m,
-    )
+    return SimulatedRecording(stamps_s, truth, visible, tuple(measured), sensor.noise_std_m)
 
 
 def visible_spells(
@@ -108,20 +106,6 @@ def visible_spells(
     return visible
 
 
-def recordings_in(folder: Path) -> list[Path]:
-    """Return the CSV files of a folder in the order of their names; none if it does not exist."""
-    return sorted(folder.glob("*.csv"))
-
-
-def walks_of(path: Path) -> list[FloatArray]:
-    """Return (K, 3) t, x, y (s, m, m) of each person in a CSV of ``t_s, id, x_m, y_m``."""
-    samples: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
-    with path.open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            samples[row["id"]].append((float(row["t_s"]), float(row["x_m"]), float(row["y_m"])))
-    return [np.array(walk) for walk in samples.values()]
-
-
 def record_walks(
     walks: Sequence[FloatArray], rng: np.random.Generator, sensor: SensorSettings
 ) -> SimulatedRecording:
@@ -130,34 +114,8 @@ def record_walks(
     Positions are interpolated linearly at the sensor's frame rate. Clutter is uniform over the
     rectangle that all walks need, and 1 m around it.
     """
-    start_s, end_s = max(walk[0, 0] for walk in walks), min(walk[-1, 0] for walk in walks)
-    stamps_s = np.arange(0.0, end_s - start_s, 1.0 / sensor.rate_hz)
-    places = np.stack(
-        [
-            np.column_stack(
-                [np.interp(start_s + stamps_s, walk[:, 0], walk[:, axis]) for axis in (1, 2)]
-            )
-            for walk in walks
-        ],
-        axis=1,
-    )
-    people = len(walks)
-    visible = visible_spells(people, stamps_s, sensor, rng)
+    stamps_s, places = places_together(walks, sensor.rate_hz)
     low_m = places.reshape(-1, 2).min(axis=0) - _MARGIN_M
     high_m = places.reshape(-1, 2).max(axis=0) + _MARGIN_M
-    area_m2 = float(np.prod(high_m - low_m))
-    measured = []
-    for frame, now in enumerate(places):
-        shown = visible[frame] & (rng.random(people) >= sensor.miss_probability)
-        seen_m = now[shown] + rng.normal(0.0, sensor.noise_std_m, (int(shown.sum()), 2))
-        count = int(rng.poisson(sensor.clutter_per_m2 * area_m2))
-        measured.append(
-            rng.permutation(np.concatenate([seen_m, rng.uniform(low_m, high_m, (count, 2))]))
-        )
-    return SimulatedRecording(
-        stamps_s,
-        np.concatenate([places, np.zeros_like(places)], axis=2),  # speeds are not judged
-        visible,
-        tuple(measured),
-        sensor.noise_std_m,
-    )
+    truth = np.concatenate([places, np.zeros_like(places)], axis=2)  # speeds are not judged
+    return _measured(stamps_s, truth, low_m, high_m, rng, sensor)

@@ -24,7 +24,7 @@ from tracking.prediction import (
     predict_states,
 )
 
-from ._measurements import recordings_in, walks_of
+from .._recordings import recordings_in, walks_of
 from ._trackers import T_ODOM_CAMERA, observations
 from ._walkers import FloatArray, walk
 
@@ -139,11 +139,13 @@ class TrackedInstants(NamedTuple):
     later_m: FloatArray
 
 
-def track(
-    walks: Sequence[MeasuredWalk], noise_std_m: float, config: TrackerConfig | None = None
-) -> TrackedInstants:
-    """Track every person alone."""
-    tracker = PersonTracker(open_gates(config or TrackerConfig()))
+def track(walks: Sequence[MeasuredWalk], noise_std_m: float) -> TrackedInstants:
+    """Track every person alone, with gates wide open, since gates cut off the tails."""
+    tracker = PersonTracker(
+        TrackerConfig(
+            gate_probability=1.0 - 1e-12, gate_distance_m=50.0, miss_cost=1e3, confirm_logit=-100.0
+        )
+    )
     tiles = np.column_stack([_TILE_M * np.arange(len(walks)), np.zeros(len(walks))])
     stamps_s = max((each.stamps_s for each in walks), key=len)
     rows: list[tuple[FloatArray, FloatArray, FloatArray]] = []
@@ -166,18 +168,6 @@ def track(
                 state = np.concatenate([place, each.velocity_odom_mps])
                 rows.append((state, each.covariance_odom, later_m))
     return TrackedInstants(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def open_gates(config: TrackerConfig) -> TrackerConfig:
-    """Return the settings with gates wide open, since gates cut off the tails."""
-    return config.model_copy(
-        update={
-            "gate_probability": 1.0 - 1e-12,
-            "gate_distance_m": 50.0,
-            "miss_cost": 1e3,
-            "confirm_logit": -100.0,
-        }
-    )
 
 
 def _is_judged(stamp_s: float, dt_s: float) -> bool:

@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from awarenav.baseline import MeasuredValue
 
+from .._recordings import recordings_in, walks_of
 from ._judges import TrackingScores, judge
 from ._measurements import (
     OCCLUDED,
@@ -21,8 +22,6 @@ from ._measurements import (
     SimulatedRecording,
     record,
     record_walks,
-    recordings_in,
-    walks_of,
 )
 from ._trackers import Contender, run
 

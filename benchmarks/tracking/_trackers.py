@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +18,15 @@ from ._walkers import FloatArray
 #: Time for which every tracker keeps an unseen person: slightly more than the longest spell out of
 #: sight. Settings that the trackers do not share are tuned for each, on seeds that are not judged.
 MAX_UNSEEN_S = 1.2
+# Both peers: density of the white acceleration, and standard deviation of a new track's velocity.
+_ACCELERATION_DENSITY_M2PS3 = 0.05
+_VELOCITY_STD_MPS = 1.0
+# Naive: largest Mahalanobis distance of a measurement, and measurements that confirm a track.
+_GATE_SIGMA = 3.4
+_CONFIRM_HITS = 4
+# Norfair: largest distance of a measurement, and hits after the first that confirm a track.
+_DISTANCE_M = 0.8
+_INITIALIZATION_DELAY = 3
 
 #: A camera 8 m up that looks straight down: its x is odom's x, its y is against odom's y.
 T_ODOM_CAMERA = np.array(
@@ -89,19 +97,18 @@ class Ours:
 
     name = "ours"
 
-    def __init__(self, config: TrackerConfig | None = None) -> None:
-        # Without a view: people are unseen by chance here, so no track should be dropped sooner.
-        self._config = config or TrackerConfig()
-        self._tracker = PersonTracker(self._config)
+    def __init__(self) -> None:
+        self._tracker = PersonTracker()
         self._stamps_s: list[float] = []
         self._recording: SimulatedRecording | None = None
         self._seen: tuple[PersonObservation, ...] = ()
 
     def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
-        # Half an interval more, since the others round the time to frames.
+        # Half an interval more, since the others round the time to frames. Without a view: people
+        # are unseen by chance here, so no track should be dropped sooner.
         kept_s = MAX_UNSEEN_S + 0.5 * float(np.diff(recording.stamps_s).mean())
-        self._tracker = PersonTracker(self._config.model_copy(update={"max_coast_s": kept_s}))
+        self._tracker = PersonTracker(TrackerConfig(max_coast_s=kept_s))
         self._stamps_s = recording.stamps_s.tolist()
         self._recording = recording
 
@@ -125,26 +132,6 @@ class Ours:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class NaiveSettings:
-    """Settings, chosen on the tuning seeds like those of the other trackers.
-
-    Attributes:
-        gate_sigma: largest Mahalanobis distance between a measurement and its track.
-        acceleration_density_m2ps3: of the white acceleration.
-        velocity_std_mps: of a new track.
-        confirm_hits: measurements that confirm a track.
-        max_unseen_s: time after which an unseen track is dropped; a new one is dropped after one
-            frame.
-    """
-
-    gate_sigma: float = 3.4
-    acceleration_density_m2ps3: float = 0.05
-    velocity_std_mps: float = 1.0
-    confirm_hits: int = 4
-    max_unseen_s: float = MAX_UNSEEN_S
-
-
 class _Track:
     def __init__(self, number: int, kalman: KalmanFilter) -> None:
         self.number, self.kalman, self.hits, self.unseen = number, kalman, 1, 0
@@ -155,8 +142,7 @@ class Naive:
 
     name = "naive"
 
-    def __init__(self, settings: NaiveSettings | None = None) -> None:
-        self._settings = settings or NaiveSettings()
+    def __init__(self) -> None:
         self._tracks: list[_Track] = []
         self._next = 1
         self._recording: SimulatedRecording | None = None
@@ -164,11 +150,11 @@ class Naive:
     def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording."""
         self._tracks, self._next, self._recording = [], 1, recording
-        dt, q = float(np.diff(recording.stamps_s).mean()), self._settings.acceleration_density_m2ps3
+        dt = float(np.diff(recording.stamps_s).mean())
         self._dt_s = dt
         self._F = np.eye(4)
         self._F[0, 2] = self._F[1, 3] = dt
-        block = q * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
+        block = _ACCELERATION_DENSITY_M2PS3 * np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
         self._Q = np.kron(block, np.eye(2))
         self._R = recording.noise_std_m**2 * np.eye(2)
 
@@ -178,25 +164,26 @@ class Naive:
     def advance(self, frame: int) -> Any:
         """Take the next frame."""
         assert self._recording is not None
-        settings, measured = self._settings, self._recording.measured_m[frame]
+        measured = self._recording.measured_m[frame]
         for track in self._tracks:
             track.kalman.predict()
             track.unseen += 1
         free = list(range(len(measured)))
         for confirmed in (True, False):
-            tracks = [t for t in self._tracks if (t.hits >= settings.confirm_hits) == confirmed]
+            tracks = [t for t in self._tracks if (t.hits >= _CONFIRM_HITS) == confirmed]
             if tracks and free:
                 self._match(tracks, measured, free)
-        limit = round(settings.max_unseen_s / self._dt_s)
+        # A new track is dropped after one frame.
+        limit = round(MAX_UNSEEN_S / self._dt_s)
         self._tracks = [
             track
             for track in self._tracks
-            if track.unseen <= (limit if track.hits >= settings.confirm_hits else 1)
+            if track.unseen <= (limit if track.hits >= _CONFIRM_HITS else 1)
         ]
         for column in free:
             self._tracks.append(_Track(self._next, self._filter(measured[column])))
             self._next += 1
-        return [track for track in self._tracks if track.hits >= settings.confirm_hits]
+        return [track for track in self._tracks if track.hits >= _CONFIRM_HITS]
 
     def report(self, result: Any) -> TrackedFrame:
         """Return the confirmed tracks."""
@@ -207,13 +194,12 @@ class Naive:
 
     def _match(self, tracks: list[_Track], measured_m: Any, free: list[int]) -> None:
         """Assign measurements to tracks and remove them from the free ones."""
-        gate = self._settings.gate_sigma
         columns = list(free)
         distance = np.array([self._distances(t.kalman, measured_m[columns]) for t in tracks])
         for row, column in zip(
-            *linear_sum_assignment(np.minimum(distance, 2.0 * gate)), strict=True
+            *linear_sum_assignment(np.minimum(distance, 2.0 * _GATE_SIGMA)), strict=True
         ):
-            if distance[row, column] <= gate:
+            if distance[row, column] <= _GATE_SIGMA:
                 track = tracks[row]
                 track.kalman.update(measured_m[columns[column]])
                 track.hits, track.unseen = track.hits + 1, 0
@@ -228,30 +214,9 @@ class Naive:
     def _filter(self, position_m: Any) -> KalmanFilter:
         kalman = KalmanFilter(dim_x=4, dim_z=2)
         kalman.x = np.array([*position_m, 0.0, 0.0])
-        kalman.P = np.diag(
-            [self._R[0, 0], self._R[1, 1], *[self._settings.velocity_std_mps**2] * 2]
-        )
+        kalman.P = np.diag([self._R[0, 0], self._R[1, 1], *[_VELOCITY_STD_MPS**2] * 2])
         kalman.F, kalman.Q, kalman.H, kalman.R = self._F, self._Q, np.eye(2, 4), self._R
         return kalman
-
-
-@dataclass(frozen=True, slots=True)
-class NorfairSettings:
-    """Settings, tuned for this benchmark on seeds that are not judged (ranges in README.md).
-
-    Attributes:
-        distance_threshold_m: largest distance between a measurement and its track.
-        max_unseen_s: time after which an unseen track is dropped (norfair's hit counter).
-        initialization_delay: hits after the first that confirm a track.
-        acceleration_density_m2ps3: of the white acceleration; norfair adds it to the velocity.
-        velocity_std_mps: of a new track.
-    """
-
-    distance_threshold_m: float = 0.8
-    max_unseen_s: float = MAX_UNSEEN_S
-    initialization_delay: int = 3
-    acceleration_density_m2ps3: float = 0.05
-    velocity_std_mps: float = 1.0
 
 
 class Norfair:
@@ -259,29 +224,24 @@ class Norfair:
 
     name = "norfair"
 
-    def __init__(self, settings: NorfairSettings | None = None) -> None:
-        self._settings = settings or NorfairSettings()
-
     def begin(self, recording: SimulatedRecording) -> None:
         """Start over, on this recording; norfair counts frames, not seconds."""
         from norfair import Detection, Tracker  # noqa: PLC0415 - an optional peer
         from norfair.filter import OptimizedKalmanFilterFactory  # noqa: PLC0415
 
-        settings, dt_s = self._settings, float(np.diff(recording.stamps_s).mean())
+        dt_s = float(np.diff(recording.stamps_s).mean())
         self._tracker = Tracker(
             "euclidean",
-            distance_threshold=settings.distance_threshold_m,
+            distance_threshold=_DISTANCE_M,
             # norfair wants a counter above the delay, also for a slow camera.
-            hit_counter_max=max(
-                round(settings.max_unseen_s / dt_s), settings.initialization_delay + 1
-            ),
-            initialization_delay=settings.initialization_delay,
+            hit_counter_max=max(round(MAX_UNSEEN_S / dt_s), _INITIALIZATION_DELAY + 1),
+            initialization_delay=_INITIALIZATION_DELAY,
             past_detections_length=0,
             filter_factory=OptimizedKalmanFilterFactory(
                 R=recording.noise_std_m**2,
-                Q=settings.acceleration_density_m2ps3 * dt_s * dt_s**2,
+                Q=_ACCELERATION_DENSITY_M2PS3 * dt_s * dt_s**2,
                 pos_variance=recording.noise_std_m**2,
-                vel_variance=(settings.velocity_std_mps * dt_s) ** 2,
+                vel_variance=(_VELOCITY_STD_MPS * dt_s) ** 2,
             ),
         )
         self._detection, self._measured_m = Detection, recording.measured_m

@@ -7,7 +7,6 @@ desired velocity turns smoothly, so nobody changes direction from one frame to t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,39 +18,21 @@ FloatArray = NDArray[np.float64]
 _STEP_S = 0.025
 # Push of a wall on a person who touches it, and the distance over which it falls by e.
 _WALL_MPS2, _WALL_RANGE_M = 3.0, 0.3
+# Area of the square hall divided by the number of people.
+_AREA_PER_PERSON_M2 = 4.0
+# Mean and standard deviation over people of the preferred speed.
+_SPEED_MEAN_MPS, _SPEED_STD_MPS = 1.2, 0.2
+# Time constants: a person reaches the desired velocity, which follows a new goal.
+_RELAXATION_S, _TURN_S = 1.0, 1.5
+# Push of another person, the centre distance where it is strongest, and where it falls by e.
+_PUSH_MPS2, _PERSONAL_SPACE_M, _PUSH_RANGE_M = 1.5, 0.4, 0.5
+# A person who arrives stands for a while with this probability; shortest and longest stay.
+_STAND_PROBABILITY, _STAND_S = 0.4, (2.0, 6.0)
 
 
-@dataclass(frozen=True, slots=True)
-class WalkerSettings:
-    """Settings of the motion; the defaults are those of the benchmark.
-
-    Attributes:
-        area_per_person_m2: area of the square hall divided by the number of people.
-        speed_mean_mps: mean over people of the preferred walking speed.
-        speed_std_mps: standard deviation of that speed.
-        relaxation_s: time constant with which a person reaches the desired velocity.
-        turn_s: time constant with which the desired velocity follows a new goal.
-        personal_space_m: centre distance at which the push of another person is strongest.
-        push_mps2: acceleration of that push.
-        push_range_m: distance over which the push falls by e.
-        stand_probability: probability that a person who arrives stands for a while.
-        stand_s: shortest and longest stay.
-    """
-
-    area_per_person_m2: float = 4.0
-    speed_mean_mps: float = 1.2
-    speed_std_mps: float = 0.2
-    relaxation_s: float = 1.0
-    turn_s: float = 1.5
-    personal_space_m: float = 0.4
-    push_mps2: float = 1.5
-    push_range_m: float = 0.5
-    stand_probability: float = 0.4
-    stand_s: tuple[float, float] = (2.0, 6.0)
-
-    def side_m(self, people: int) -> float:
-        """Return the side of the square hall for a number of people."""
-        return float(np.sqrt(self.area_per_person_m2 * people))
+def side_m(people: int) -> float:
+    """Return the side of the square hall for a number of people."""
+    return float(np.sqrt(_AREA_PER_PERSON_M2 * people))
 
 
 class Walkers:
@@ -62,17 +43,13 @@ class Walkers:
         velocities_mps: (N, 2) now.
     """
 
-    def __init__(self, people: int, settings: WalkerSettings, rng: np.random.Generator) -> None:
-        self._settings, self._rng, self._people = settings, rng, people
-        self._side_m = settings.side_m(people)
+    def __init__(self, people: int, rng: np.random.Generator) -> None:
+        self._rng, self._people = rng, people
+        self._side_m = side_m(people)
         self.positions_m = self._starting_places()
-        self._speeds = np.clip(
-            rng.normal(settings.speed_mean_mps, settings.speed_std_mps, people), 0.5, 2.0
-        )
+        self._speeds = np.clip(rng.normal(_SPEED_MEAN_MPS, _SPEED_STD_MPS, people), 0.5, 2.0)
         self._goals_m = self._places(people)
-        self._stands_s = np.where(
-            rng.random(people) < 0.25, rng.uniform(*settings.stand_s, people), 0.0
-        )
+        self._stands_s = np.where(rng.random(people) < 0.25, rng.uniform(*_STAND_S, people), 0.0)
         self._desired_mps = self._velocity_to_goal()
         self.velocities_mps: FloatArray = self._desired_mps.copy()
 
@@ -104,18 +81,18 @@ class Walkers:
         return np.asarray(way * (speed / np.maximum(distance, 1e-9))[:, None])
 
     def _step(self, dt_s: float) -> None:
-        settings, rng = self._settings, self._rng
+        rng = self._rng
         self._stands_s = np.maximum(self._stands_s - dt_s, 0.0)
         arrived = (np.hypot(*(self._goals_m - self.positions_m).T) < 0.5) & (self._stands_s == 0.0)
         count = int(arrived.sum())
         if count:
-            stands = rng.random(count) < settings.stand_probability
-            self._stands_s[arrived] = np.where(stands, rng.uniform(*settings.stand_s, count), 0.0)
+            stands = rng.random(count) < _STAND_PROBABILITY
+            self._stands_s[arrived] = np.where(stands, rng.uniform(*_STAND_S, count), 0.0)
             self._goals_m[arrived] = self._places(count)
         self._desired_mps += (self._velocity_to_goal() - self._desired_mps) * min(
-            1.0, dt_s / settings.turn_s
+            1.0, dt_s / _TURN_S
         )
-        pull = (self._desired_mps - self.velocities_mps) / settings.relaxation_s
+        pull = (self._desired_mps - self.velocities_mps) / _RELAXATION_S
         # A standing person gives way less than a walking one.
         push = self._push() * np.where(self._stands_s > 0.0, 0.25, 1.0)[:, None]
         velocities = self.velocities_mps + (pull + push) * dt_s
@@ -127,7 +104,6 @@ class Walkers:
 
     def _push(self) -> FloatArray:
         """Return the acceleration (N, 2) of each person away from others and from the walls."""
-        settings = self._settings
         offset = self.positions_m[:, None] - self.positions_m[None]
         distance = np.hypot(offset[..., 0], offset[..., 1])
         np.fill_diagonal(distance, np.inf)
@@ -135,8 +111,8 @@ class Walkers:
         heading = self.velocities_mps / np.maximum(np.hypot(*self.velocities_mps.T)[:, None], 1e-9)
         cosine = -(offset * heading[:, None]).sum(axis=-1) / distance
         strength = (
-            settings.push_mps2
-            * np.exp(-np.maximum(distance - settings.personal_space_m, 0.0) / settings.push_range_m)
+            _PUSH_MPS2
+            * np.exp(-np.maximum(distance - _PERSONAL_SPACE_M, 0.0) / _PUSH_RANGE_M)
             * (0.65 + 0.35 * cosine)
         )
         away = offset / distance[..., None]
@@ -148,14 +124,9 @@ class Walkers:
         return np.asarray(push + wall)
 
 
-def walk(
-    people: int,
-    stamps_s: FloatArray,
-    rng: np.random.Generator,
-    settings: WalkerSettings | None = None,
-) -> FloatArray:
+def walk(people: int, stamps_s: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return the truth (T, N, 4) as x, y (m) and vx, vy (m/s) at increasing stamps."""
-    crowd = Walkers(people, settings or WalkerSettings(), rng)
+    crowd = Walkers(people, rng)
     crowd.advance(2.0)  # past the start, where no person has been pushed yet
     truth = np.empty((len(stamps_s), people, 4))
     for frame, stamp_s in enumerate(stamps_s):

@@ -9,8 +9,7 @@ an obstacle already ("Inside a circle").
 from __future__ import annotations
 
 from ._cost import people_cost
-from ._costmap import paint_costmap
-from ._costmap_painter import CostmapPainter
+from ._costmap import CostmapPainter, paint_costmap
 from ._horizon import PredictedPeople, predicted_circles, predicted_people
 from ._shapes import boxes, circles, points, polygons
 from ._speed_field import limited_by_at, speed_limit_at, time_cost

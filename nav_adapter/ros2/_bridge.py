@@ -6,6 +6,7 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from perception import AwarenessPipeline, Camera, PerceptionError
 from perception.arrays import FloatArray
@@ -21,13 +22,13 @@ from .._robot import RobotProfile, RobotState
 from ._alerts import sensor_status
 from ._clock import BridgeClock
 from ._image_input import ImageInput, PerceivedFrame
-from ._outgoing import Frames, Sender
+from ._outgoing import Frames, outgoing
 from ._poses import RobotPoses
 from ._scan_input import ScanInput, ScannerInput, ScanPerception
 from ._sensor_watch import CAMERA, SensorWatch
 from ._shared import Shared
 from ._shared_tracker import SharedTracker
-from ._speed_mask import SpeedMaskSettings
+from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
 from .messages.nav_msgs import OccupancyGrid, Odometry
@@ -102,7 +103,8 @@ class AwarenessBridge:
         wanted: Callable[[str], bool] = lambda key: True,
     ) -> None:
         self.frames = frames or Frames()
-        self._sender = Sender(publish, robot, self.frames, percentage=percentage, mask=speed_mask)
+        self._publish, self._robot, self._percentage = publish, robot, percentage
+        self._mask = None if speed_mask is None else SpeedMaskStream(speed_mask, self.frames.odom)
         self._with_camera, self._wanted = with_camera, wanted
         self._warn_user, self._warned = warn, ""
         if not with_camera and not scanners:
@@ -283,7 +285,7 @@ class AwarenessBridge:
                 sensors, news = self._sensors(constraints.stamp_s)
             for line in news:
                 self._warn_user(line)
-            self._sender.send(constraints, tracks, state, details, self._wanted, sensors)
+            self._send(constraints, tracks, state, self._wanted, details, sensors)
         return constraints
 
     def refuse(self, problem: str) -> None:
@@ -304,8 +306,29 @@ class AwarenessBridge:
         """Publish a stop, before the caller ends."""
         constraints = stopped(now_s, reason)
         with self._sending:
-            self._sender.send(constraints, (), None, {}, lambda key: True)
+            self._send(constraints, (), None, lambda key: True)
         return constraints
+
+    def _send(
+        self,
+        constraints: NavConstraints,
+        tracks: tuple[PersonTrack, ...],
+        state: RobotState | None,
+        wanted: Callable[[str], bool],
+        details: dict[str, str] | None = None,
+        sensors: DiagnosticStatus | None = None,
+    ) -> None:
+        """Publish the topics that are ``wanted``; the arguments are those of :func:`outgoing`."""
+        messages = outgoing(
+            *(constraints, tracks, self._robot, state, self.frames),
+            percentage=self._percentage,
+            wanted=wanted,
+            details=details,
+            sensors=sensors,
+        )
+        masks = () if self._mask is None else self._mask.messages(constraints, state, wanted)
+        for key, message in chain(messages, masks):
+            self._publish(key, message)
 
     def _constraints(self, now_s: float) -> NavConstraints:
         state, seen_s = self._poses.state, self._watch.stamp_s

@@ -13,7 +13,6 @@ from ._alerts import alerts
 from ._people import circle_objects, detections, markers, occupancy_grid, people, teb_obstacles
 from ._polygons import collision_polygons, stop_zone
 from ._speed_limit import speed_limit
-from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
 
@@ -41,7 +40,6 @@ def outgoing(
     frames: Frames,
     *,
     percentage: bool = False,
-    grid_m: float = 10.0,
     wanted: Callable[[str], bool] = lambda key: True,
     details: Mapping[str, str] | None = None,
     sensors: DiagnosticStatus | None = None,
@@ -68,7 +66,7 @@ def outgoing(
         yield "stop_zone", zone
     if robot_state is not None and wanted("grid"):
         center = robot_state.position_odom_m
-        yield "grid", occupancy_grid(constraints, center, size_m=grid_m, frame_id=odom)
+        yield "grid", occupancy_grid(constraints, center, frame_id=odom)
     if wanted("circles"):
         for circle in circle_objects(constraints, frame_id=odom):
             yield "circles", circle
@@ -80,54 +78,3 @@ def outgoing(
         yield "detections", detections(constraints, frame_id=odom)
     if wanted("markers"):
         yield "markers", markers(constraints, robot_state, frame_id=odom)
-
-
-class Sender:
-    """Makes and publishes the messages of one publication after the other.
-
-    Args:
-        publish: called with the key of a topic and a message.
-        robot: its profile.
-        frames: names of the frames.
-        percentage: as in :func:`speed_limit`.
-        mask: settings of the speed mask; None for no mask.
-    """
-
-    def __init__(
-        self,
-        publish: Callable[[str, Message], None],
-        robot: RobotProfile,
-        frames: Frames,
-        *,
-        percentage: bool,
-        mask: SpeedMaskSettings | None = None,
-    ) -> None:
-        self._publish, self._robot = publish, robot
-        self._frames, self._percentage = frames, percentage
-        self._mask = None if mask is None else SpeedMaskStream(mask, frames.odom)
-
-    def send(
-        self,
-        constraints: NavConstraints,
-        tracks: tuple[PersonTrack, ...],
-        state: RobotState | None,
-        details: dict[str, str],
-        wanted: Callable[[str], bool],
-        sensors: DiagnosticStatus | None = None,
-    ) -> None:
-        """Publish the topics that are ``wanted``; the arguments are those of :func:`outgoing`."""
-        for key, message in outgoing(
-            constraints,
-            tracks,
-            self._robot,
-            state,
-            self._frames,
-            percentage=self._percentage,
-            wanted=wanted,
-            details=details,
-            sensors=sensors,
-        ):
-            self._publish(key, message)
-        if self._mask is not None:
-            for key, message in self._mask.messages(constraints, state, wanted):
-                self._publish(key, message)

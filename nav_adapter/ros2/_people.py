@@ -53,6 +53,8 @@ _LARGEST_CELLS: Final = 4_000_000
 _LIFETIME: Final = Duration(1, 0)
 _STANDING_MPS: Final = 0.1
 _LINE_M: Final = 0.04
+# Width of shaft and head, and length of the head.
+_ARROW_M: Final = (0.06, 0.12, 0.15)
 _TEXT_M: Final = 0.25
 _WHITE: Final = ColorRGBA(1.0, 1.0, 1.0, 1.0)
 
@@ -224,76 +226,43 @@ def markers(
     ones. The limit and its reason are shown above the robot.
     """
     top = header(constraints.stamp_s, frame_id)
+
+    def shape(
+        name: str,
+        number: int,
+        kind: int,
+        scale: tuple[float, float, float],
+        color: ColorRGBA,
+        **more: Any,
+    ) -> Marker:
+        size = Vector3(*scale)
+        return Marker(top, name, number, kind, scale=size, color=color, lifetime=_LIFETIME, **more)
+
+    def label(name: str, number: int, x: float, y: float, z: float, text: str) -> Marker:
+        place, scale = Pose(Point(x, y, z)), (0.0, 0.0, _TEXT_M)
+        return shape(name, number, Marker.TEXT_VIEW_FACING, scale, _WHITE, pose=place, text=text)
+
     shapes = [Marker(top, action=Marker.DELETEALL)]
     for each in constraints.obstacles:
         (x, y), (vx, vy) = each.center_odom_m.tolist(), each.velocity_odom_mps.tolist()
-        color = awareness_color(each.awareness_lower)
-        ring = [Point(u, v, 0.02) for u, v, *_ in each.polygon.exterior.coords]
-        shapes.append(
-            Marker(
-                top,
-                "body",
-                each.track_id,
-                Marker.CYLINDER,
-                pose=Pose(Point(x, y, 0.5 * each.height_m)),
-                scale=Vector3(2.0 * BODY_RADIUS_M, 2.0 * BODY_RADIUS_M, each.height_m),
-                color=ColorRGBA(color.r, color.g, color.b, 0.6),
-                lifetime=_LIFETIME,
-            )
-        )
-        shapes.append(
-            Marker(
-                top,
-                "obstacle",
-                each.track_id,
-                Marker.LINE_STRIP,
-                scale=Vector3(_LINE_M, 0.0, 0.0),
-                color=color,
-                lifetime=_LIFETIME,
-                points=tuple(ring),
-            )
-        )
-        shapes.append(
-            Marker(
-                top,
-                "awareness",
-                each.track_id,
-                Marker.TEXT_VIEW_FACING,
-                pose=Pose(Point(x, y, each.height_m + _TEXT_M)),
-                scale=Vector3(0.0, 0.0, _TEXT_M),
-                color=_WHITE,
-                lifetime=_LIFETIME,
-                text=f"{each.track_id}: α ≥ {each.awareness_lower:.2f}",
-            )
-        )
+        number, color = each.track_id, awareness_color(each.awareness_lower)
+        body = 2.0 * BODY_RADIUS_M, 2.0 * BODY_RADIUS_M, each.height_m
+        middle = Pose(Point(x, y, 0.5 * each.height_m))
+        pale = ColorRGBA(color.r, color.g, color.b, 0.6)
+        ring = tuple(Point(u, v, 0.02) for u, v, *_ in each.polygon.exterior.coords)
+        alpha = f"{number}: α ≥ {each.awareness_lower:.2f}"
+        shapes += [
+            shape("body", number, Marker.CYLINDER, body, pale, pose=middle),
+            shape("obstacle", number, Marker.LINE_STRIP, (_LINE_M, 0.0, 0.0), color, points=ring),
+            label("awareness", number, x, y, each.height_m + _TEXT_M, alpha),
+        ]
         if math.hypot(vx, vy) > _STANDING_MPS:
-            shapes.append(
-                Marker(
-                    top,
-                    "velocity",
-                    each.track_id,
-                    Marker.ARROW,
-                    scale=Vector3(0.06, 0.12, 0.15),
-                    color=color,
-                    lifetime=_LIFETIME,
-                    points=(Point(x, y, 0.1), Point(x + vx, y + vy, 0.1)),
-                )
-            )
+            way = Point(x, y, 0.1), Point(x + vx, y + vy, 0.1)
+            shapes.append(shape("velocity", number, Marker.ARROW, _ARROW_M, color, points=way))
     if robot_state is not None:
         x, y = robot_state.position_odom_m.tolist()
-        shapes.append(
-            Marker(
-                top,
-                "limit",
-                0,
-                Marker.TEXT_VIEW_FACING,
-                pose=Pose(Point(x, y, 2.0)),
-                scale=Vector3(0.0, 0.0, _TEXT_M),
-                color=_WHITE,
-                lifetime=_LIFETIME,
-                text=f"{constraints.speed_limit_mps:.2f} m/s: {constraints.limited_by}",
-            )
-        )
+        limit = f"{constraints.speed_limit_mps:.2f} m/s: {constraints.limited_by}"
+        shapes.append(label("limit", 0, x, y, 2.0, limit))
     return MarkerArray(tuple(shapes))
 
 

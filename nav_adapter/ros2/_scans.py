@@ -72,9 +72,6 @@ class ScanMessages:
                 for a sweep that ends in the future because time_increment and scan_time disagree.
         """
         scan = laser_scan_of(message)
-        given, count = len(message.intensities), len(message.ranges)
-        if given not in (0, count):
-            self._say("intensities", f"{count} ranges but {given} intensities, which are not used")
         if message.time_increment < 0.0:
             self._say("time_increment", "time_increment is negative: the last ray is the oldest")
         sweep_s = scan.end_s - scan.stamp_s
@@ -112,7 +109,7 @@ def laser_scan_of(message: Any) -> LaserScan:
 
     Ray i is at angle_min + i · angle_increment; angle_max is only compared. Rays beyond a full turn
     count as those of the same direction, of which the nearer range is kept. A range_max above 250 m
-    is 250 m. Intensities of another number than the ranges are left out. A negative time_increment
+    is 250 m. A negative time_increment
     means that the last ray is the oldest; the scan is returned in the order of time.
 
     Args:
@@ -133,12 +130,10 @@ def laser_scan_of(message: Any) -> LaserScan:
         ray_s = finite_number("time_increment_s", message.time_increment)
         stamp_s = stamp.sec + 1e-9 * stamp.nanosec
         ranges = np.asarray(message.ranges, dtype=np.float64)
-        intensities = message.intensities if len(message.intensities) == count else None
         if ray_s < 0.0:
             first, increment = first + increment * (count - 1), -increment
             stamp_s += ray_s * (count - 1)
             ranges = ranges[::-1]
-            intensities = None if intensities is None else intensities[::-1]
         ranges = _one_turn(ranges, increment)
         scan = LaserScan(
             stamp_s,
@@ -148,7 +143,6 @@ def laser_scan_of(message: Any) -> LaserScan:
             message.range_min,
             min(message.range_max, _FARTHEST_M),
             abs(ray_s),
-            None if intensities is None else intensities[: len(ranges)],
         )
     except (PerceptionError, TypeError, ValueError) as problem:
         raise NavError(str(problem)) from problem

@@ -34,7 +34,6 @@ from perception.networks import OnnxModel
 from perception.shipped import (
     DETECTOR,
     POSE,
-    load_shipped,
     simulator_networks,
     simulator_networks_warning,
 )
@@ -256,7 +255,7 @@ def _pipelines(
     Networks of renders must be ``allowed``.
     """
     models = {
-        role: OnnxModel(file) if file else load_shipped(shipped)
+        role: OnnxModel(file) if file else OnnxModel.shipped(shipped)
         for role, file, shipped in (
             ("detector", detector_file, DETECTOR),
             ("pose", pose_file, POSE),

@@ -63,6 +63,8 @@ _TROLLEY_APART_M: Final = 1.2
 _TROLLEY_BEHIND_M: Final = 0.3
 _TROLLEY_STD_M: Final = 0.6
 _SURELY_M: Final = 1e-3
+# People farther away are not reported.
+_MAX_RANGE_M: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +74,6 @@ class LegDetectorConfig:
     Attributes:
         score_threshold: candidates with a lower score are dropped.
         range_noise_m: standard deviation of the scanner's ranges.
-        max_range_m: people farther away are not reported.
-        trolleys: report what has come and has the size of a trolley.
         learn: learn what stands still.
 
     Raises:
@@ -82,17 +82,11 @@ class LegDetectorConfig:
 
     score_threshold: float = 0.5
     range_noise_m: float = 0.015
-    max_range_m: float = 10.0
-    trolleys: bool = True
     learn: bool = True
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("score_threshold", 0.0, 1.0),
-            ("range_noise_m", 0.0, 0.2),
-            ("max_range_m", 0.1, 100.0),
-        ):
-            value = finite_number(name, getattr(self, name), minimum=low, maximum=high)
+        for name, high in (("score_threshold", 1.0), ("range_noise_m", 0.2)):
+            value = finite_number(name, getattr(self, name), minimum=0.0, maximum=high)
             set_fields(self, **{name: value})
 
 
@@ -177,10 +171,9 @@ class LegDetector:
         taken[left[chosen]] = True
         if config.learn:
             people_m = np.array(places).reshape(-1, 2)
-            if config.trolleys:
-                for number in _trolleys(clusters, taken, people_m):
-                    taken[number] = True
-                    candidates.append(_trolley(points.stamp_s, clusters, number))
+            for number in _trolleys(clusters, taken, people_m):
+                taken[number] = True
+                candidates.append(_trolley(points.stamp_s, clusters, number))
             self._found.append((points.stamp_s, people_m))
             legs = _surely_two_legs(clusters, hypotheses, judged[:, 0], chosen)
             if self._memory.is_due(points.stamp_s, scanner):
@@ -195,7 +188,7 @@ class LegDetector:
         return tuple(
             candidate
             for candidate in candidates
-            if math.dist(candidate.position_odom_m.tolist(), (x, y)) <= config.max_range_m
+            if math.dist(candidate.position_odom_m.tolist(), (x, y)) <= _MAX_RANGE_M
         )
 
     def _known(self, points_m: FloatArray, usable: NDArray[np.bool_]) -> NDArray[np.int64]:

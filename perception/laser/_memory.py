@@ -54,9 +54,8 @@ _NEAR_LEGS: Final = np.array(
 class OccupancyMemory:
     """Remembers for how long each cell of the floor was occupied and free.
 
-    A cell becomes static after 1.5 s of returns. Returns that may
-    belong to a person are not counted and take back others, so that somebody who stands still is
-    not forgotten. What stands
+    A cell becomes static after 1.5 s of returns. Returns that may belong to a person are not
+    counted and take back others, so that somebody who stands still is not forgotten. What stands
     where the floor was free before anything was met there has come: it is no structure.
     """
 
@@ -142,7 +141,6 @@ class OccupancyMemory:
         self, starts_m: FloatArray, ends_m: FloatArray, ranges_m: FloatArray
     ) -> NDArray[np.int32]:
         """Return the cells that rays pass before they meet something."""
-        reach = np.minimum(ranges_m - _BEFORE_M, _FREE_M)
         scale = 1.0 / _CELL_M
         first = (starts_m - self._origin) * scale
         unit = (ends_m - starts_m) * (scale / ranges_m)[:, None]

@@ -39,7 +39,6 @@ class LaserScan:
         range_min_m: shortest range that counts.
         range_max_m: longest range that counts.
         time_increment_s: time from one ray to the next; 0 for a sweep at one instant.
-        intensities: (N,) strength of each return in the device's own unit; None without.
 
     Raises:
         PerceptionError: for a wrong shape, limits in the wrong order, or more than a full turn.
@@ -52,7 +51,6 @@ class LaserScan:
     range_min_m: float
     range_max_m: float
     time_increment_s: float = 0.0
-    intensities: FloatArray | None = None
     # The range of a ray without a return, beside +inf; NaN if there is none.
     _nothing_m: float = field(init=False, repr=False)
 
@@ -77,14 +75,6 @@ class LaserScan:
         nothing = float(far.max()) if len(far) >= _NO_RETURN_RAYS else np.nan
         if np.count_nonzero(far == nothing) < _NO_RETURN_RAYS:
             nothing = np.nan
-        intensities = self.intensities
-        if intensities is not None:
-            intensities = _numbers("intensities", intensities)
-            if intensities.shape != ranges.shape:
-                raise PerceptionError(
-                    f"intensities must have the shape of ranges_m, {ranges.shape}, got "
-                    f"{intensities.shape}"
-                )
         set_fields(
             self,
             stamp_s=finite_number("stamp_s", self.stamp_s),
@@ -94,7 +84,6 @@ class LaserScan:
             range_min_m=low,
             range_max_m=high,
             time_increment_s=finite_number("time_increment_s", self.time_increment_s, minimum=0.0),
-            intensities=intensities,
             _nothing_m=nothing,
         )
 

@@ -7,24 +7,17 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, set_fields
+from ..arrays import FloatArray, finite_array, finite_number, set_fields
 from ..documents import read_yaml
 from ..errors import PerceptionError, did_you_mean
 
-_REQUIRED: Final = (
-    "image",
-    "resolution",
-    "origin",
-    "negate",
-    "occupied_thresh",
-    "free_thresh",
-)
+_REQUIRED: Final = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _MODES: Final = ("trinary", "scale", "raw")
 # Cells of an OccupancyGrid that count as occupied, in per cent.
 _OCCUPIED: Final = (65, 100)
@@ -38,22 +31,10 @@ _PNG_HEAD_BYTES: Final = 4096
 _LOG: Final = logging.getLogger("perception")
 
 
-class MapImage(NamedTuple):
-    """A map as its file has it.
+def _read_map_file(path: Path) -> tuple[FloatArray, float]:
+    """Return the middles (K, 2) of a file's occupied cells in the map's frame, and a cell's side.
 
-    Attributes:
-        occupied: (H, W) whether a cell is occupied; row 0 has the lowest y of the map.
-        origin: x and y of the lower left corner in metres, and the map's yaw in radians.
-        resolution_m: side of a cell.
-    """
-
-    occupied: NDArray[np.bool_]
-    origin: tuple[float, float, float]
-    resolution_m: float
-
-
-def read_map_file(path: Path) -> MapImage:
-    """Return the map of a file, as ``nav2_map_server`` reads it.
+    The file is read as ``nav2_map_server`` reads it.
 
     Raises:
         PerceptionError: the message names the file, says what it has and what is valid.
@@ -99,7 +80,10 @@ def read_map_file(path: Path) -> MapImage:
         percent[~opaque] = -1.0  # as nav2_map_server since 2025, in every mode
     cells = (percent >= _OCCUPIED[0]) & (percent <= _OCCUPIED[1])
     # The first row of an image is the highest of the map.
-    return MapImage(cells[::-1], (x, y, yaw), side_m)
+    row, column = cells[::-1].nonzero()
+    middles = (np.column_stack((column, row)) + 0.5) * side_m
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.asarray(middles @ np.array([[cos, sin], [-sin, cos]]) + (x, y)), side_m
 
 
 def _between(name: str, value: Any, low: float, high: float) -> float:
@@ -174,10 +158,6 @@ def _percent(
     return percent
 
 
-# The z axis of a level pose differs from that of odom by no more than its rounding.
-_LEVEL: Final = 1e-6
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class StaticMap:
     """A map of what stands still, in odom, for example a nav_msgs/OccupancyGrid.
@@ -213,37 +193,6 @@ class StaticMap:
             resolution_m=side,
             margin_m=margin,
         )
-
-    @classmethod
-    def from_yaml(
-        cls, path: str | Path, T_odom_map: Any = None, *, margin_m: float = 0.1
-    ) -> StaticMap:
-        """Return the map of a file that ROS's map_server reads (:meth:`MapCells.from_yaml`).
-
-        Args:
-            path: the YAML file; the image lies where it says.
-            T_odom_map: (4, 4) pose of the map's frame, turned about z only; None where it is odom.
-                A map that is turned, by this or by its own origin, is drawn anew into cells of the
-                same size.
-            margin_m: see :class:`StaticMap`.
-
-        Raises:
-            PerceptionError: for a file that cannot be used, or a pose that is not level.
-        """
-        margin = finite_number("margin_m", margin_m, minimum=0.0)
-        T = rigid_transform("T_odom_map", np.eye(4) if T_odom_map is None else T_odom_map)
-        if abs(T[2, 2] - 1.0) > _LEVEL:
-            raise PerceptionError(
-                "T_odom_map must be turned about z only, got a z axis of "
-                f"({T[0, 2]:g}, {T[1, 2]:g}, {T[2, 2]:g})"
-            )
-        given = read_map_file(Path(path))
-        x, y, yaw = given.origin
-        if yaw == 0.0 and np.array_equal(T[:2, :2], np.eye(2)):
-            corner = np.array([x, y]) + T[:2, 3]
-            return cls(given.occupied, corner, given.resolution_m, margin)
-        places = _cells_of(given) @ T[:2, :2].T + T[:2, 3]
-        return _drawn(places, given.resolution_m, margin)
 
     def holds(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) in odom belong to it; False outside the map."""
@@ -286,8 +235,7 @@ class MapCells:
             PerceptionError: for a file that cannot be read, missing or misspelt keys, values out of
                 range, or a damaged image.
         """
-        given = read_map_file(Path(path))
-        return cls(_cells_of(given), given.resolution_m, frame_id)
+        return cls(*_read_map_file(Path(path)), frame_id)
 
     def near(self, T_odom_map: FloatArray, centre_odom_m: FloatArray, reach_m: float) -> StaticMap:
         """Return the part of the map around a place, in odom.
@@ -306,27 +254,6 @@ class MapCells:
         occupied = np.zeros((extent, extent), dtype=bool)
         occupied[row, column] = True
         return StaticMap(occupied, origin, side_m)
-
-
-def _cells_of(given: MapImage) -> FloatArray:
-    """Return the middles (K, 2) of the occupied cells, in the map's frame."""
-    x, y, yaw = given.origin
-    row, column = given.occupied.nonzero()
-    cells = (np.column_stack((column, row)) + 0.5) * given.resolution_m
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return np.asarray(cells @ np.array([[cos, sin], [-sin, cos]]) + (x, y))
-
-
-def _drawn(places_m: FloatArray, side_m: float, margin_m: float) -> StaticMap:
-    """Return a map that holds these places (K, 2), with a border for the margin."""
-    if not len(places_m):
-        return StaticMap(np.zeros((1, 1), dtype=bool), np.zeros(2), side_m, margin_m)
-    border = math.ceil(margin_m / side_m) + 1
-    origin = places_m.min(axis=0) - (border + 0.5) * side_m
-    column, row = ((places_m - origin) / side_m).astype(np.int64).T
-    occupied = np.zeros((row.max() + border + 1, column.max() + border + 1), dtype=bool)
-    occupied[row, column] = True
-    return StaticMap(occupied, origin, side_m, margin_m)
 
 
 def _grown(occupied: NDArray[np.bool_], cells: int) -> NDArray[np.bool_]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, thread_time
@@ -21,7 +21,6 @@ from .._manifest import (
     verify_shipped_model,
 )
 from ..errors import PerceptionError
-from ._part_names import part_names
 from ._settings import PROVIDERS, OnnxSettings, short_name
 
 # The newer Linux wheels of ONNX Runtime report processes, sessions and models to their maker from
@@ -98,7 +97,6 @@ class OnnxModel:
         path: of the file; None if the content was given.
         inputs, outputs: in the order of the graph.
         metadata: of the file.
-        part_names: names of the weights and nodes.
         training_domain: what the network has seen in training, one of
             :data:`~perception.shipped.TRAINING_DOMAINS`; None if the file does not say it.
 
@@ -115,6 +113,7 @@ class OnnxModel:
         sha256: str | None = None,
     ) -> None:
         self.settings = OnnxSettings() if settings is None else settings
+        self._source = path_or_bytes
         self.path, content = _read(path_or_bytes)
         if sha256 is not None:
             self._check_sha256(content, sha256)
@@ -122,7 +121,6 @@ class OnnxModel:
         self.inputs = tuple(_tensor(entry) for entry in self._session.get_inputs())
         self.outputs = tuple(_tensor(entry) for entry in self._session.get_outputs())
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
-        self.part_names = part_names(content)
         self.training_domain = training_domain_of(content, self.metadata)
         self._names = [tensor.name for tensor in self.outputs]
 
@@ -173,6 +171,11 @@ class OnnxModel:
         """Options of each provider in use that differ from none, as ONNX Runtime reports them."""
         found: dict[str, dict[str, str]] = self._session.get_provider_options()
         return {short_name(name): options for name, options in found.items() if options}
+
+    def holds_any(self, words: Iterable[str]) -> bool:
+        """Return whether the file holds one of some words, such as a part of a weight's name."""
+        _, content = _read(self._source)
+        return any(word.encode() in content for word in words)
 
     def run(self, feeds: Mapping[str, NDArray[Any]], *, timed: bool = True) -> list[NDArray[Any]]:
         """Run the network on its named inputs and return the outputs in the order of ``outputs``.
@@ -226,8 +229,8 @@ class OnnxModel:
         options.log_severity_level = _LOG_ERRORS_ONLY
         if self.settings.intra_op_threads is not None:
             options.intra_op_num_threads = self.settings.intra_op_threads
-        spinning = "1" if self.settings.allow_spinning else "0"
-        options.add_session_config_entry("session.intra_op.allow_spinning", spinning)
+        # Idle threads that spin save microseconds, and take whole cores from other programs.
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         if "cpu" not in names:
             wanted.append((PROVIDERS["cpu"], {}))
         # Some exporters write the weights into files next to the graph. ONNX Runtime finds them
@@ -255,20 +258,17 @@ class OnnxModel:
 ModelSource: TypeAlias = OnnxModel | str | os.PathLike[str] | bytes
 
 
-def as_onnx_model(
-    model: ModelSource, settings: OnnxSettings | None, sha256: str | None
-) -> OnnxModel:
+def as_onnx_model(model: ModelSource, settings: OnnxSettings | None) -> OnnxModel:
     """Return the model, after loading it if needed.
 
     Raises:
-        PerceptionError: as :class:`OnnxModel`, and for settings or a SHA-256 given with a model
-            that is already loaded.
+        PerceptionError: as :class:`OnnxModel`, and for settings given with a loaded model.
     """
     if not isinstance(model, OnnxModel):
-        return OnnxModel(model, settings=settings, sha256=sha256)
-    if settings is not None or sha256 is not None:
+        return OnnxModel(model, settings=settings)
+    if settings is not None:
         raise PerceptionError(
-            "settings and sha256 are for loading a model: give them to OnnxModel, "
+            "settings are for loading a model: give them to OnnxModel, "
             f"not together with {model.name}, which is loaded already"
         )
     return model

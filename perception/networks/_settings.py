@@ -37,13 +37,10 @@ class OnnxSettings:
             CPU runs the operators that the other providers do not support.
         intra_op_threads: threads per operator, ≥ 1; None for ONNX Runtime's default, one per
             physical core.
-        allow_spinning: True lets idle threads wait in a busy loop. This saves some microseconds
-            per run but takes whole cores from the robot's other programs.
     """
 
     providers: tuple[Provider, ...] = ("cpu",)
     intra_op_threads: int | None = None
-    allow_spinning: bool = False
 
     def __post_init__(self) -> None:
         # tuple("cpu") would be three letters.

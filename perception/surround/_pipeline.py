@@ -14,7 +14,7 @@ from .._camera import Camera
 from .._floor import FloorPlane
 from .._observation import PersonObservation
 from .._pipeline import AwarenessPipeline
-from ..arrays import ImageRgb
+from ..arrays import ImageRgb, check_image
 from ..errors import PerceptionError
 from ..matrices import mahalanobis2
 from ._lenses import FlatView, PanoramaLens, WideLens
@@ -120,8 +120,7 @@ class SurroundPipeline:
         views: flat views to cut from an image, for example from :func:`ring_of_views`.
         make_pipeline: makes the pipeline for the camera of a view; default one with the shipped
             networks. It is called once for each camera object; the views with that camera share its
-            networks (:meth:`~perception.AwarenessPipeline.for_another_view`). Where it makes
-            pipelines without that method, it is called for each view.
+            networks (:meth:`~perception.AwarenessPipeline.for_another_view`).
 
     Raises:
         PerceptionError: without views, or from ``make_pipeline``.
@@ -137,17 +136,10 @@ class SurroundPipeline:
             raise PerceptionError("views must hold at least one view, got none")
         self.lens = lens
         self.views = tuple(views)
-        made: dict[int, AwarenessPipeline] = {}
-        self._pipelines: list[AwarenessPipeline] = []
-        for view in self.views:
-            if id(view.camera) not in made:
-                made[id(view.camera)] = make_pipeline(view.camera)
-            pipeline = made[id(view.camera)]
-            # A pipeline keeps people from one image of its view to the next.
-            if any(pipeline is other for other in self._pipelines):
-                anew = getattr(pipeline, "for_another_view", None)  # stand-ins may lack it
-                pipeline = make_pipeline(view.camera) if anew is None else anew()
-            self._pipelines.append(pipeline)
+        cameras = {id(view.camera): view.camera for view in self.views}
+        made = {key: make_pipeline(camera) for key, camera in cameras.items()}
+        # A pipeline keeps people from one image of its view to the next.
+        self._pipelines = [made[id(view.camera)].for_another_view() for view in self.views]
         self._maps = [
             # Fixed-point maps make cv2.remap several times faster.
             cv2.convertMaps(*view.sampling_maps(lens), cv2.CV_16SC2)
@@ -161,14 +153,7 @@ class SurroundPipeline:
         Raises:
             PerceptionError: for an image of another size or type.
         """
-        wanted = (self.lens.height_px, self.lens.width_px, 3)
-        if not isinstance(image_rgb, np.ndarray) or image_rgb.dtype != np.uint8:
-            kind = getattr(image_rgb, "dtype", type(image_rgb).__name__)
-            raise PerceptionError(f"image_rgb must be a uint8 array of shape {wanted}, got {kind}")
-        if image_rgb.shape != wanted:
-            raise PerceptionError(
-                f"image_rgb must have the lens's shape {wanted}, got {image_rgb.shape}"
-            )
+        check_image(image_rgb, self.lens.height_px, self.lens.width_px)
         border = cv2.BORDER_WRAP if self._wraps else cv2.BORDER_CONSTANT
         return tuple(
             np.asarray(cv2.remap(image_rgb, *maps, cv2.INTER_LINEAR, borderMode=border))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.drawing import awareness_colour, draw_disc, draw_line
-from perception import AttentionCone, Camera
+from perception import AttentionCone, Camera, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 
 from ._requests import RequestMemory, ShownRequest
@@ -38,7 +38,14 @@ _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
 
 
 def draw_camera_view(
-    picture: ImageRgb, camera: Camera, frame: CrossingFrame, stage: Stage, cone: AttentionCone
+    picture: ImageRgb,
+    camera: Camera,
+    frame: CrossingFrame,
+    stage: Stage,
+    cone: AttentionCone,
+    *,
+    box_scale: float = 1.0,
+    captions: bool = True,
 ) -> ImageRgb:
     """Draw boxes, gaze cones, α, radius and speed limit into an image of the robot's camera.
 
@@ -48,13 +55,16 @@ def draw_camera_view(
         frame: the frame to draw.
         stage: gives the position of the eyes, where the cone is drawn.
         cone: the attention cone.
+        box_scale: size of the images that boxes were observed in, over that of the scenario's
+            camera.
+        captions: also write the speed limit and its reason.
 
     Returns:
         A new image.
     """
     image: ImageRgb = picture.copy()
     rotation, origin = frame.T_odom_camera[:3, :3], frame.T_odom_camera[:3, 3]
-    scale = camera.width_px / stage.scenario.camera.width_px
+    scale = camera.width_px / (stage.scenario.camera.width_px * box_scale)
 
     def pixels(points_odom_m: FloatArray) -> FloatArray:
         return camera.project((points_odom_m - origin) @ rotation)
@@ -82,17 +92,27 @@ def draw_camera_view(
             if _drawable(axis):
                 draw_line(image, axis, colour, 2)
         if observation.box_xyxy_px is not None:
-            left, top, right, bottom = (observation.box_xyxy_px * scale).round().astype(int)
-            cv2.rectangle(
-                image, (int(left), int(top)), (int(right), int(bottom)), colour, 1, cv2.LINE_AA
-            )
-            alpha, spread = observation.awareness, observation.awareness_std
-            text = "no face seen"
-            if alpha is not None and spread is not None:
-                text = f"alpha {alpha:.2f} +- {spread:.2f}"
-            _write(image, [text], (int(left) + 4, max(int(top) - 4, 18)), _TEXT_SIZE)
-    _write(image, _captions(frame), (8, 18), _TEXT_SIZE)
+            box = observation.box_xyxy_px * scale
+            place = camera.project(observation.position_camera_m[None])[0]
+            apart = np.abs(place - box.reshape(2, 2).mean(axis=0))
+            # A box of another view of a camera with several is not in this image.
+            if (apart < 0.5 * np.array([camera.width_px, camera.height_px])).all():
+                _draw_box(image, box, observation)
+    if captions:
+        _write(image, _captions(frame), (8, 18), _TEXT_SIZE)
     return image
+
+
+def _draw_box(image: ImageRgb, box_xyxy_px: FloatArray, observation: PersonObservation) -> None:
+    """Draw the box of an observation with its α."""
+    left, top, right, bottom = box_xyxy_px.round().astype(int).tolist()
+    colour = awareness_colour(observation.awareness)
+    cv2.rectangle(image, (left, top), (right, bottom), colour, 1, cv2.LINE_AA)
+    alpha, spread = observation.awareness, observation.awareness_std
+    text = "no face seen"
+    if alpha is not None and spread is not None:
+        text = f"alpha {alpha:.2f} +- {spread:.2f}"
+    _write(image, [text], (left + 4, max(top - 4, 18)), _TEXT_SIZE)
 
 
 class TopView:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from awarenav.drawing import awareness_colour
 from awarenav.records import Record
 from perception import Camera
+from perception.arrays import ImageRgb
 
 from ..world.errors import SimError
 
@@ -26,40 +26,39 @@ _GAZE_M: Final = 0.45
 _NEAR_M: Final = 0.2
 
 
-def write_contact_sheet(
-    folder: Path, records: Sequence[Record], camera: Camera, path: Path
-) -> None:
-    """Write up to 24 evenly spaced images of ``folder`` with true boxes and gazes.
+def contact_sheet(folder: Path, records: Sequence[Record], camera: Camera) -> ImageRgb:
+    """Return up to 24 evenly spaced images of a folder as one, with true boxes and gazes.
 
     Boxes and gaze lines have the colour of the awareness score, from red to green.
+
+    Args:
+        folder: of the images.
+        records: the truth of all images, at least one.
+        camera: of the images.
 
     Raises:
         SimError: when an image cannot be read.
     """
     count = min(_COLUMNS * _ROWS, len(records))
-    chosen = [records[k * len(records) // count] for k in range(count)]
-    tiles = [_tile(folder, record, camera) for record in chosen]
-    if not tiles:
-        return
-    height = tiles[0].shape[0]
-    rows = -(-count // _COLUMNS)
+    chosen = (records[k * len(records) // count] for k in range(count))
+    tiles = [_framed(_tile(folder, each, camera), top=_GAP_PX, left=_GAP_PX) for each in chosen]
     columns = min(_COLUMNS, count)
-    sheet = np.full(
-        (rows * (height + _GAP_PX) + _GAP_PX, columns * (_WIDTH_PX + _GAP_PX) + _GAP_PX, 3),
-        255,
-        np.uint8,
+    tiles += [np.full_like(tiles[0], 255)] * (-count % columns)
+    rows = [cv2.hconcat(tiles[at : at + columns]) for at in range(0, len(tiles), columns)]
+    return _framed(cv2.vconcat(rows), bottom=_GAP_PX, right=_GAP_PX)
+
+
+def _framed(
+    image: Any, *, top: int = 0, bottom: int = 0, left: int = 0, right: int = 0
+) -> ImageRgb:
+    """Return an image with white borders, pixels."""
+    framed = cv2.copyMakeBorder(
+        image, top, bottom, left, right, cv2.BORDER_CONSTANT, value=(255, 255, 255)
     )
-    for number, tile in enumerate(tiles):
-        row, column = divmod(number, _COLUMNS)
-        top, left = _GAP_PX + row * (height + _GAP_PX), _GAP_PX + column * (_WIDTH_PX + _GAP_PX)
-        sheet[top : top + height, left : left + _WIDTH_PX] = tile
-    encoded, data = cv2.imencode(".png", sheet[..., ::-1])
-    if not encoded:
-        raise SimError(f"cannot encode {path.name}")
-    path.write_bytes(data.tobytes())
+    return np.asarray(framed, dtype=np.uint8)
 
 
-def _tile(folder: Path, record: Record, camera: Camera) -> NDArray[np.uint8]:
+def _tile(folder: Path, record: Record, camera: Camera) -> ImageRgb:
     image = cv2.imread(str(folder / str(record["frame"])), cv2.IMREAD_COLOR)
     if image is None:
         raise SimError(f"cannot read {folder / str(record['frame'])}")
@@ -77,7 +76,7 @@ def _tile(folder: Path, record: Record, camera: Camera) -> NDArray[np.uint8]:
 
 
 def _draw_gaze(
-    tile: NDArray[np.uint8],
+    tile: ImageRgb,
     person: Record,
     camera: Camera,
     scale: float,

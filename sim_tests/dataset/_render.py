@@ -23,7 +23,7 @@ from perception import Camera
 
 from ..world.errors import SimError
 from ._config import RenderConfig
-from ._contact_sheet import write_contact_sheet
+from ._contact_sheet import contact_sheet
 
 _TRUTH: Final = "truth.jsonl"
 _SETTINGS: Final = "render.yaml"
@@ -104,7 +104,7 @@ def render(
     for part in out.glob("*.json"):
         if _MADE.fullmatch(part.name):
             part.unlink()
-    write_contact_sheet(out, records, config.camera, out / _SHEET)
+    _write_png(out / _SHEET, contact_sheet(out, records, config.camera))
     return truth
 
 

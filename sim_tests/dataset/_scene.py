@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -40,10 +39,8 @@ _ACTIVITIES: Final = ("none", "carry_box", "phone")
 _ACTIVITY_SHARES: Final = (0.64, 0.18, 0.18)
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
-    x_m: float
-    y_m: float
+# The place of a person: x, y (m) in odom.
+_Place = tuple[float, float]
 
 
 class RenderScene(AbstractContextManager["RenderScene"]):
@@ -146,9 +143,7 @@ class RenderScene(AbstractContextManager["RenderScene"]):
                 f"{config.max_range_m:g} m in front of a camera; use shorter ranges"
             )
         for row, place in zip(chosen.tolist(), places, strict=False):
-            random_pose(
-                self.workers[row], (place.x_m, place.y_m), T_odom_camera[:3, 3], rng, config.eyes
-            )
+            random_pose(self.workers[row], place, T_odom_camera[:3, 3], rng, config.eyes)
         return T_odom_camera
 
     def _camera_pose(self, rng: np.random.Generator) -> tuple[FloatArray, float]:
@@ -187,11 +182,11 @@ class RenderScene(AbstractContextManager["RenderScene"]):
             if not inside or _clearance_m(boxes, x, y) < _PERSON_CLEARANCE_M:
                 continue
             may_overlap = rng.random() < _OVERLAP_SHARE
-            if any(_collide(place, _Place(x, y), origin, may_overlap) for place in places):
+            if any(_collide(place, (x, y), origin, may_overlap) for place in places):
                 continue
             if not may_hide and _blocked(boxes, (float(origin[0]), float(origin[1])), (x, y)):
                 continue
-            places.append(_Place(x, y))
+            places.append((x, y))
             if len(places) == wanted:
                 break
         return places
@@ -276,14 +271,14 @@ def _pose_matrix(
 
 def _collide(first: _Place, second: _Place, origin: FloatArray, may_overlap: bool) -> bool:
     """Return whether two people stand too close, or overlap as seen from the camera."""
-    if math.hypot(first.x_m - second.x_m, first.y_m - second.y_m) < _PERSON_SPACING_M:
+    if math.dist(first, second) < _PERSON_SPACING_M:
         return True
     a, b = (
         (
-            math.atan2(p.y_m - origin[1], p.x_m - origin[0]),
-            _HALF_WIDTH_M / math.hypot(p.x_m - origin[0], p.y_m - origin[1]),
+            math.atan2(y - origin[1], x - origin[0]),
+            _HALF_WIDTH_M / math.hypot(x - origin[0], y - origin[1]),
         )
-        for p in (first, second)
+        for x, y in (first, second)
     )
     return not may_overlap and abs(math.remainder(a[0] - b[0], math.tau)) < a[1] + b[1]
 

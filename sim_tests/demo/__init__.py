@@ -1,1 +1,1 @@
-"""The demonstration and the speed benchmark: ``awarenav demo`` and ``awarenav bench``."""
+"""The demonstration: ``awarenav demo``."""

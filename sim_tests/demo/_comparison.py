@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from tqdm import tqdm
 
-from awarenav.files import csv_number, write_text
+from awarenav.files import csv_number, write_csv
 from perception.arrays import ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult, run_crossing
@@ -24,22 +22,11 @@ from ._portraits import PortraitRecorder
 
 #: Policies that ignore awareness: α says nothing about what the robot does.
 WITHOUT_AWARENESS: Final = ("blind", "scanner")
+#: Attributes of :class:`~sim_tests.CrossingResult` in the columns of ``episodes.csv``.
 EPISODE_COLUMNS: Final = (
-    "scenario",
-    "seed",
-    "policy",
-    "planner",
-    "perception",
-    "success",
-    "contact",
-    "contact_by",
-    "min_separation_m",
-    "time_to_goal_s",
-    "max_speed_within_2m_mps",
-    "min_margin_m",
-    "violation_time_s",
-    "contacts",
-    "duration_s",
+    *("scenario", "seed", "policy", "planner", "perception", "success", "contact", "contact_by"),
+    *("min_separation_m", "time_to_goal_s", "max_speed_within_2m_mps", "min_margin_m"),
+    *("violation_time_s", "contacts", "duration_s"),
 )
 
 
@@ -161,30 +148,17 @@ def delay_won_back(rows: Sequence[ComparisonRow]) -> float | None:
 
 def write_episodes(path: Path, results: Iterable[CrossingResult]) -> None:
     """Write ``episodes.csv``, one row per crossing; the file appears whole or not at all."""
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(EPISODE_COLUMNS)
-    for result in results:
-        writer.writerow(
-            [
-                result.scenario,
-                str(result.seed),
-                result.policy,
-                result.planner,
-                result.perception,
-                str(result.success).lower(),
-                str(result.contact).lower(),
-                result.contact_by,
-                csv_number(result.min_separation_m),
-                csv_number(result.time_to_goal_s),
-                csv_number(result.max_speed_within_2m_mps),
-                csv_number(result.min_margin_m),
-                csv_number(result.violation_time_s),
-                str(len(result.contacts)),
-                csv_number(result.duration_s),
-            ]
-        )
-    write_text(path, text.getvalue(), SimError)
+    rows = ([_cell(getattr(result, name)) for name in EPISODE_COLUMNS] for result in results)
+    write_csv(path, EPISODE_COLUMNS, rows, SimError)
+
+
+def _cell(value: Any) -> object:
+    """Return the cell of a value: truth in small letters, a number with six decimals, a count."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return len(value)
+    return csv_number(value) if value is None or isinstance(value, float) else value
 
 
 def lowest_bound(frame: CrossingFrame) -> float | None:

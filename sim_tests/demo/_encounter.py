@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from tqdm import tqdm
 
-from awarenav.files import csv_number, write_text
+from awarenav.files import csv_number, write_csv
 from awarenav.video import VideoWriter
 from nav_adapter import AwarenessPolicy
-from perception import AttentionCone, Camera, PersonObservation
+from perception import AttentionCone, Camera
 from perception.arrays import ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult, Stage, TopView, draw_camera_view, run_crossing
 from ..scenario import Scenario
 from ..world.camera import CameraRenderer
 from ..world.errors import SimError
-from ._encounter_plot import CAMERA_PERIOD_S, CASES, CaseImages, EncounterCase, plot_encounter
+from ._encounter_plot import (
+    CAMERA_PERIOD_S,
+    CASES,
+    CaseImages,
+    EncounterCase,
+    EncounterValues,
+    observed_values,
+    plot_encounter,
+    true_values,
+)
 
 _VIDEO_HZ: Final = 15
 _VIEW_SCALE: Final = 1.0 / 3.0
@@ -128,11 +135,7 @@ def _eye_view(stage: Stage, like: Camera) -> ImageRgb:
     return CameraRenderer(stage.warehouse).rgb(camera, pose)
 
 
-# Of a row of a table of the encounter: α, d_fwd (m), d_lat (m); None where nothing is known.
-_Values = tuple[float | None, float | None, float | None]
-
-
-def case_values(result: CrossingResult) -> list[tuple[EncounterCase, str, _Values]]:
+def case_values(result: CrossingResult) -> list[tuple[EncounterCase, str, EncounterValues]]:
     """Return α, d_fwd and d_lat of each case, for the truth and for the perception.
 
     The observation is that of the image closest in time to the case.
@@ -146,8 +149,8 @@ def case_values(result: CrossingResult) -> list[tuple[EncounterCase, str, _Value
             if off <= CAMERA_PERIOD_S and result.frames[number].observation_of(0) is not None
         ]
         observation = result.frames[min(seen)[1]].observation_of(0) if seen else None
-        rows.append((case, "truth", _true_values(result.frames[int(np.argmin(off_s))])))
-        rows.append((case, result.perception, _observed_values(observation)))
+        rows.append((case, "truth", true_values(result.frames[int(np.argmin(off_s))])))
+        rows.append((case, result.perception, observed_values(observation)))
     return rows
 
 
@@ -173,23 +176,13 @@ def _write_table(path: Path, result: CrossingResult) -> None:
 
     A frame without an observation, or without evidence of awareness, has empty cells.
     """
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("t_s", "perception", "awareness", "d_fwd_m", "d_lat_m"))
-    for frame in result.frames:
-        observed = _observed_values(frame.observation_of(0))
-        for name, values in (("truth", _true_values(frame)), (result.perception, observed)):
-            writer.writerow([csv_number(frame.t_s), name, *(csv_number(each) for each in values)])
-    write_text(path, text.getvalue(), SimError)
-
-
-def _true_values(frame: CrossingFrame) -> _Values:
-    true = frame.truth[0]
-    return true.awareness, true.d_fwd_m, true.d_lat_m
-
-
-def _observed_values(observation: PersonObservation | None) -> _Values:
-    if observation is None:
-        return None, None, None
-    right_m, _, forward_m = observation.position_camera_m.tolist()
-    return observation.awareness, forward_m, -right_m
+    rows = (
+        [csv_number(frame.t_s), name, *map(csv_number, values)]
+        for frame in result.frames
+        for name, values in (
+            ("truth", true_values(frame)),
+            (result.perception, observed_values(frame.observation_of(0))),
+        )
+    )
+    header = ("t_s", "perception", "awareness", "d_fwd_m", "d_lat_m")
+    write_csv(path, header, rows, SimError)

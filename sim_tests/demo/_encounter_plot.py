@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -11,6 +11,7 @@ import numpy as np
 
 from awarenav.drawing import awareness_colour
 from awarenav.figures import Axes, new_figure
+from perception import PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult
@@ -19,7 +20,6 @@ from ..crossing.eyes import PIXEL_RATE_HZ
 _TRUTH_COLOUR: Final = "#1f4e79"
 _PERCEPTION_COLOUR: Final = "#d9822b"
 _BOUND_COLOUR: Final = "#7fb77e"
-
 
 #: Longest time between two images of the slowest camera of an encounter, with a margin.
 CAMERA_PERIOD_S: Final = 1.1 / PIXEL_RATE_HZ
@@ -54,14 +54,27 @@ class CaseImages:
     eye_view: ImageRgb
 
 
-@dataclass(frozen=True, slots=True)
-class _Panel:
-    """A quantity of the encounter over time: truth, perception and the paper's value."""
+#: α, d_fwd (m) and d_lat (m, left positive); None where nothing is known.
+EncounterValues = tuple[float | None, float | None, float | None]
+_TITLES: Final = (
+    "awareness score α",
+    "forward distance d_fwd (m)",
+    "lateral offset d_lat (m), left positive",
+)
 
-    title: str
-    true: Callable[[CrossingFrame], float | None]
-    observed: Callable[[CrossingFrame], float | None]
-    of_case: Callable[[EncounterCase], float]
+
+def true_values(frame: CrossingFrame) -> EncounterValues:
+    """Return the true values of the worker."""
+    true = frame.truth[0]
+    return true.awareness, true.d_fwd_m, true.d_lat_m
+
+
+def observed_values(observation: PersonObservation | None) -> EncounterValues:
+    """Return the values of an observation of the worker; all None for no observation."""
+    if observation is None:
+        return None, None, None
+    right_m, _, forward_m = observation.position_camera_m.tolist()
+    return observation.awareness, forward_m, -right_m
 
 
 def plot_encounter(path: Path, result: CrossingResult, images: Sequence[CaseImages]) -> None:
@@ -82,29 +95,24 @@ def plot_encounter(path: Path, result: CrossingResult, images: Sequence[CaseImag
             title = f"({column + 1}) {case_images.case.t_s:.2f} s: {case_images.case.meaning}"
             _show_image(axes, image, title if side == 0 else "", name)
             _colour_frame(axes, case_images.frame.truth[0].awareness)
-    panels = (
-        _Panel(
-            "awareness score α",
-            lambda f: f.truth[0].awareness,
-            lambda f: None if (o := f.observation_of(0)) is None else o.awareness,
-            lambda c: c.awareness,
-        ),
-        _Panel(
-            "forward distance d_fwd (m)",
-            lambda f: f.truth[0].d_fwd_m,
-            _observed_position(lambda p: float(p[2])),
-            lambda c: c.d_fwd_m,
-        ),
-        _Panel(
-            "lateral offset d_lat (m), left positive",
-            lambda f: f.truth[0].d_lat_m,
-            _observed_position(lambda p: -float(p[0])),
-            lambda c: c.d_lat_m,
-        ),
-    )
-    for index, panel in enumerate(panels):
+    time = np.array([frame.t_s for frame in result.frames])
+    true = np.array([true_values(frame) for frame in result.frames], dtype=float)
+    seen = [observed_values(frame.observation_of(0)) for frame in result.frames]
+    observed = np.array(seen, dtype=float)
+    paper = [(case.awareness, case.d_fwd_m, case.d_lat_m) for case in CASES]
+    for index, title in enumerate(_TITLES):
         axes = figure.add_subplot(grid[1, 2 * index : 2 * index + 2])
-        _plot_panel(axes, panel, result, with_bound=index == 0)
+        label = f"from {result.perception}"
+        with_gaps = _with_gaps(time, observed[:, index])
+        axes.plot(*with_gaps, color=_PERCEPTION_COLOUR, lw=0.7, label=label)
+        if index == 0:
+            _plot_bound(axes, result, time)
+        axes.plot(time, true[:, index], color=_TRUTH_COLOUR, lw=1.4, label="truth")
+        _mark_cases(axes, [values[index] for values in paper])
+        axes.set_title(title, fontsize=10, loc="left")
+        axes.set_xlabel("time (s)")
+        axes.grid(alpha=0.25)
+        axes.legend(fontsize=8, loc="best")
     figure.savefig(path, dpi=110)
 
 
@@ -123,26 +131,10 @@ def _colour_frame(axes: Axes, awareness: float) -> None:
         spine.set_linewidth(2.0)
 
 
-def _plot_panel(axes: Axes, panel: _Panel, result: CrossingResult, *, with_bound: bool) -> None:
-    time = np.array([frame.t_s for frame in result.frames])
-    axes.plot(
-        *_with_gaps(time, _values(result, panel.observed)),
-        color=_PERCEPTION_COLOUR,
-        lw=0.7,
-        label=f"from {result.perception}",
-    )
-    if with_bound:
-        _plot_bound(axes, result, time)
-    axes.plot(time, _values(result, panel.true), color=_TRUTH_COLOUR, lw=1.4, label="truth")
-    axes.plot(
-        [case.t_s for case in CASES],
-        [panel.of_case(case) for case in CASES],
-        "o",
-        mfc="none",
-        mec="black",
-        ms=8,
-        label="paper",
-    )
+def _mark_cases(axes: Axes, paper: Sequence[float]) -> None:
+    """Mark the times of the cases, and the paper's value at each."""
+    times = [case.t_s for case in CASES]
+    axes.plot(times, paper, "o", mfc="none", mec="black", ms=8, label="paper")
     for number, case in enumerate(CASES, start=1):
         axes.axvline(case.t_s, color="0.8", lw=0.8, zorder=0)
         axes.annotate(
@@ -154,36 +146,16 @@ def _plot_panel(axes: Axes, panel: _Panel, result: CrossingResult, *, with_bound
             fontsize=8,
             color="0.35",
         )
-    axes.set_title(panel.title, fontsize=10, loc="left")
-    axes.set_xlabel("time (s)")
-    axes.grid(alpha=0.25)
-    axes.legend(fontsize=8, loc="best")
 
 
 def _plot_bound(axes: Axes, result: CrossingResult, time: FloatArray) -> None:
     """Plot the highest lower bound of all tracks, which the robot acts on."""
-    lower = _values(
-        result, lambda f: max((track.awareness_lower for track in f.tracks), default=None)
+    highest = (
+        max((each.awareness_lower for each in f.tracks), default=None) for f in result.frames
     )
+    lower = np.array([np.nan if each is None else each for each in highest])
     axes.fill_between(time, 0.0, lower, color=_BOUND_COLOUR, alpha=0.45, lw=0, label="lower bound")
     axes.set_ylim(-0.02, 1.05)
-
-
-def _values(result: CrossingResult, pick: Callable[[CrossingFrame], float | None]) -> FloatArray:
-    """Return one number per frame, NaN where there is none."""
-    return np.array([np.nan if (v := pick(f)) is None else v for f in result.frames], dtype=float)
-
-
-def _observed_position(
-    pick: Callable[[FloatArray], float],
-) -> Callable[[CrossingFrame], float | None]:
-    """Return a function of a frame that picks from the first worker's observed position."""
-
-    def of(frame: CrossingFrame) -> float | None:
-        observation = frame.observation_of(0)
-        return None if observation is None else pick(observation.position_camera_m)
-
-    return of
 
 
 def _with_gaps(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,10 +1,10 @@
-"""The commands ``awarenav demo`` and ``awarenav bench``."""
+"""The command ``awarenav demo``."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from awarenav.cli import FilePath, command, option, options
+from awarenav.cli import command, option, options
 
 
 @command(
@@ -50,32 +50,3 @@ def demo(
         as_json=as_json,
     )
     return 0
-
-
-@command(
-    "bench",
-    examples=["awarenav bench --baseline baseline.json", "awarenav bench --out baseline.json"],
-    exit_status={
-        0: "Success.",
-        1: "A metric is worse than the baseline by more than its tolerance.",
-        2: "Bad input.",
-    },
-    epilog="Needs the extra 'sim'.",
-)
-@option(
-    "--baseline",
-    type=FilePath(),
-    default="benchmarks/baseline.json",
-    metavar="FILE",
-    help="Baseline to compare with, if the file exists.",
-)
-@options.out_file(None, "Write the metrics as a baseline.")
-@options.as_json()
-def bench(baseline: Path, out: Path | None, *, as_json: bool) -> int:
-    """Measure the speed of crossings, against real time and against bare physics.
-
-    Compares the metrics with a baseline.
-    """
-    from ._bench import bench_command  # noqa: PLC0415 - help needs no simulator
-
-    return bench_command(baseline, out, as_json=as_json)

@@ -105,11 +105,6 @@ class ScenarioTemplate:
         return self._median.name
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names that mean this scenario: its own and, fitted to a robot, also the one without."""
-        return tuple(dict.fromkeys((self.name, str(self._data["name"]))))
-
-    @property
     def version(self) -> int:
         """Number that grows with every change after which results cannot be compared."""
         return self._median.version

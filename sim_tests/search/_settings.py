@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from awarenav.files import atomic_path
+from awarenav.files import write_text
 from perception.documents import parse_json, read_json
 
 from ..crossing import named_policy
@@ -136,17 +135,20 @@ def write_or_check_settings(
         raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
 
 
-def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file that appears whole or not at all."""
-    with atomic_path(path, SimError) as part, part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
+def write_json(path: Path, data: Any) -> None:
+    """Write a JSON file that appears whole or not at all."""
+    write_text(path, json.dumps(data, indent=1, ensure_ascii=False) + "\n", SimError)
 
 
-def print_verdict(text: str, next_command: str) -> None:
-    """Print a verdict in sentences, and the command to run next."""
-    print(f"Verdict: {text}\nNext: {next_command}")
+def print_results(
+    file: Path, table: Sequence[str], verdict: str, next_command: str, *, as_json: bool
+) -> None:
+    """Print the file of the results, or a table, a verdict and the command to run next."""
+    if as_json:
+        print(file.read_text(encoding="utf-8"), end="")
+        return
+    print("\n".join(table))
+    print(f"Verdict: {verdict}\nNext: {next_command}\nWritten to {file.parent}")
 
 
 def episode_words(conditions: Conditions) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
 from ..world.errors import SimError
-from .measures import EpisodeRecord, nondeterminism_notes, summarise, table_text
+from .measures import nondeterminism_notes, short_text, summarise
 from .runs import Conditions, RunFiles, run_jobs, sample_jobs
 
 
@@ -63,10 +62,11 @@ def crossings_command(options: CrossingsOptions) -> int:
             "crossings", options.out, policy=options.policy, sample=options.sample
         ),
     )
+    summary = summarise(records)
     if options.as_json:
-        print(json_text([asdict(row) for row in summarise(records).policies]), end="")
+        print(json_text([asdict(row) for row in summary.policies]), end="")
     else:
-        print(_short_table(records))
+        print(short_text(summary))
         print(f"\nWritten to {options.out}: episodes.csv with {counted(len(records), 'episode')}")
     for note in nondeterminism_notes(records):
         print(note, file=sys.stderr)
@@ -82,38 +82,6 @@ def crossings_command(options: CrossingsOptions) -> int:
     if not options.no_report:
         _write_report(options.out, as_json=options.as_json)
     return 1 if failed else 0
-
-
-def _short_table(records: Iterable[EpisodeRecord]) -> str:
-    """Return a table with one line per policy (and planner, perception, fault if several)."""
-    header = (
-        "policy",
-        "episodes",
-        "success",
-        "contacts",
-        "time lost s",
-        "least m",
-        "step-out",
-        "failed",
-    )
-    rows: list[Sequence[str]] = []
-    for row in summarise(records).policies:
-        ran = row.episodes - row.errors
-        lost, least = row.means["time_lost_s"], row.worst.get("min_separation_m")
-        step_out = row.means["step_out_unaware"]
-        rows.append(
-            (
-                row.variant,
-                str(row.episodes),
-                f"{100.0 * row.success.value:.0f} %" if row.episodes else "–",
-                str(round(row.moving_contact.value * row.moving_contact.n)) if ran else "–",
-                f"{lost.value:.2f}" if lost.n else "–",
-                "–" if least is None else f"{least:.2f}",
-                f"{step_out.value:.1f}" if step_out.n else "–",
-                str(row.errors),
-            )
-        )
-    return table_text(header, rows)
 
 
 def _write_report(out: Path, *, as_json: bool) -> None:

@@ -1,10 +1,10 @@
-"""The command ``awarenav crossings``."""
+"""The commands ``awarenav crossings`` and ``awarenav compare``."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from awarenav.cli import NUMBER, POSITIVE, command, option, options
+from awarenav.cli import NUMBER, POSITIVE, FilePath, argument, command, option, options
 
 
 @command(
@@ -27,9 +27,9 @@ from awarenav.cli import NUMBER, POSITIVE, command, option, options
 )
 @options.scenarios("that have a planner")
 @options.policies(["blind", "balanced"])
-@options.planners()
+@options.planner(many=True)
 @options.perception()
-@options.sensor_sets()
+@options.sensors(many=True)
 @options.camera()
 @options.robot()
 @options.population()
@@ -77,3 +77,42 @@ def crossings(**values: Any) -> int:
     from .runs import Conditions  # noqa: PLC0415
 
     return crossings_command(CrossingsOptions(conditions=Conditions.taken_from(values), **values))
+
+
+@command(
+    "compare",
+    examples=[
+        "awarenav compare crossings",
+        "awarenav compare monday tuesday --baseline balanced --out both.csv",
+    ],
+    exit_status={0: "Success.", 2: "Bad input."},
+    epilog="docs/simulation.md defines every metric.",
+)
+@argument(
+    "runs",
+    nargs=-1,
+    required=True,
+    type=FilePath(),
+    metavar="DIR|FILE...",
+    help="Folders of runs, or files episodes.csv or .parquet.",
+)
+@option("--baseline", default="blind", metavar="NAME", help="Policy to compare with.")
+@option(
+    "--level",
+    type=NUMBER,
+    default=0.95,
+    metavar="X",
+    help="Confidence level of the intervals, between 0 and 1.",
+)
+@options.seed(" They are those of the bootstrap.")
+@options.out_file(None, "Also write the episodes of all runs into one file.", "FILE.csv|parquet")
+@options.as_json("the summary")
+def compare(**values: Any) -> int:
+    """Print success, time lost, contacts and separation per policy, with confidence intervals.
+
+    Compares every policy with the baseline on the same scenarios and seeds. A run may be
+    unfinished.
+    """
+    from ._compare import compare_command  # noqa: PLC0415 - help needs no statistics
+
+    return compare_command(**values)

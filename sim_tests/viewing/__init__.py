@@ -8,7 +8,7 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._live import LivePage
-    from ._page import live_page, page_text, show_page, write_page
+    from ._page import page_text, show_page, write_page
     from ._pictures import CameraPictures
     from ._recorder import CrossingRecorder
     from ._states import Episode, begin_of, outcome_text, state_of
@@ -19,7 +19,6 @@ __all__ = [
     "Episode",
     "LivePage",
     "begin_of",
-    "live_page",
     "outcome_text",
     "page_text",
     "show_page",

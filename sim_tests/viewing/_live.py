@@ -21,8 +21,8 @@ class LivePage(AbstractContextManager["LivePage"]):
     """Serves a page and the stream of its events at ``/`` and ``/states`` on loopback.
 
     The stream follows the standard of server-sent events. Its events are ``begin`` (hall, robot and
-    names), messages (states) and ``end`` (outcome). A reader that comes late gets all events from
-    the beginning, one that comes back continues after its ``Last-Event-ID``.
+    names), messages (states) and ``end`` (outcome). Every reader gets all of them from the
+    beginning.
 
     Args:
         page: the HTML text.
@@ -98,8 +98,7 @@ class LivePage(AbstractContextManager["LivePage"]):
         text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
         kind = f"event: {event}\n" if event else ""
         with self._changed:
-            lines = f"id: {len(self._events)}\n{kind}data: {text}\n\n"
-            self._events.append(lines.encode("utf-8"))
+            self._events.append(f"{kind}data: {text}\n\n".encode())
             self._changed.notify_all()
 
     def _answer(self, request: BaseHTTPRequestHandler) -> None:
@@ -120,8 +119,6 @@ class LivePage(AbstractContextManager["LivePage"]):
             request.send_error(404)
 
     def _stream(self, request: BaseHTTPRequestHandler) -> None:
-        last = request.headers.get("Last-Event-ID", "")
-        sent = int(last) + 1 if last.isdecimal() else 0
         request.send_response(200)
         request.send_header("Content-Type", "text/event-stream; charset=utf-8")
         request.send_header("Cache-Control", "no-store")
@@ -132,7 +129,7 @@ class LivePage(AbstractContextManager["LivePage"]):
             self._opened += 1
             self._changed.notify_all()
         try:
-            self._follow(request, sent)
+            self._follow(request)
         except OSError:  # the reader is gone
             return
         finally:
@@ -140,8 +137,9 @@ class LivePage(AbstractContextManager["LivePage"]):
                 self._readers -= 1
                 self._changed.notify_all()
 
-    def _follow(self, request: BaseHTTPRequestHandler, sent: int) -> None:
-        """Write all events from number ``sent`` on, until the last."""
+    def _follow(self, request: BaseHTTPRequestHandler) -> None:
+        """Write all events until the last."""
+        sent = 0
         while True:
             with self._changed:
                 begun = time.monotonic()

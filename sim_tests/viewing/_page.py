@@ -18,16 +18,16 @@ from ..world.errors import SimError
 
 #: Most characters of pictures in a page; every second picture is left out until they fit.
 MOST_PICTURE_CHARACTERS: Final = 6_000_000
-_SCRIPTS: Final = ("plan.js", "camera.js", "charts.js", "player.js")
+_SCRIPTS: Final = ("plan.js", "charts.js", "player.js")
 
 
-def page_text(recording: Mapping[str, Any] | None, title: str) -> str:
+def page_text(title: str, recording: Mapping[str, Any] | None = None) -> str:
     """Return a page.
 
     Args:
+        title: the page's title.
         recording: ``begin``, ``states``, ``outcome`` and ``note`` of a crossing; None for a page
             that receives them live from its server.
-        title: the page's title.
     """
     folder = resources.files("sim_tests.viewing") / "templates"
     data = json.dumps(
@@ -43,11 +43,6 @@ def page_text(recording: Mapping[str, Any] | None, title: str) -> str:
     # The odd pieces are the names of parts.
     pieces[1::2] = [parts[name] for name in pieces[1::2]]
     return "".join(pieces)
-
-
-def live_page(title: str) -> str:
-    """Return the page that receives its states from a server."""
-    return page_text(None, title)
 
 
 def write_page(
@@ -71,18 +66,9 @@ def write_page(
     """
     if not states:
         raise SimError(f"cannot write {path}: the crossing has no states")
-    recording = {
-        "begin": begin,
-        "states": _thinned(states),
-        "outcome": outcome,
-        "note": note,
-    }
-    write_text(path, page_text(recording, title_of(begin)), SimError)
-
-
-def title_of(begin: Mapping[str, Any]) -> str:
-    """Return the title of a crossing's page."""
-    return f"{begin['scenario']}, seed {begin['seed']}, policy {begin['policy']}"
+    title = f"{begin['scenario']}, seed {begin['seed']}, policy {begin['policy']}"
+    recording = {"begin": begin, "states": _thinned(states), "outcome": outcome, "note": note}
+    write_text(path, page_text(title, recording), SimError)
 
 
 def show_page(address: str) -> bool:
@@ -96,7 +82,7 @@ def show_page(address: str) -> bool:
 def _thinned(states: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return the states with as many of their pictures as fit into a page."""
     kept = [index for index, state in enumerate(states) if "picture" in state]
-    while sum(len(states[i]["picture"]["jpeg"]) for i in kept) > MOST_PICTURE_CHARACTERS:
+    while len(kept) > 1 and sum(len(states[i]["picture"]) for i in kept) > MOST_PICTURE_CHARACTERS:
         kept = kept[::2]
     pictured = set(kept)
     return [

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Final
 
 from awarenav.errors import not_one_of
-from perception.arrays import FloatArray, finite_number
+from perception.arrays import FloatArray
 
 from .bullet import pybullet
 from .errors import SimError
@@ -15,7 +15,6 @@ from .hall import WarehouseLayout
 from .render import RENDERERS, RendererName, VisualActor, Visuals
 
 GRAVITY_MPS2: Final = 9.81
-DEFAULT_PHYSICS_DT_S: Final = 1.0 / 240.0
 
 # Collision groups. People are placed, not simulated, so they collide with robots only. Bit 1 is
 # Bullet's own group of ray tests: they hit every body whose mask has this bit.
@@ -34,45 +33,39 @@ class Warehouse(AbstractContextManager["Warehouse"]):
 
     Args:
         layout: the hall; None is the shipped layout ``"crossing"``.
-        physics_dt_s: length of one step, in (0, 1/60].
         renderer: ``"tiny"``, ``"gl"`` or ``"auto"``, the renderer of :attr:`visuals`.
         variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:
         layout: as given.
-        physics_dt_s: as given.
+        variant: as given.
+        steps: number of physics steps since the start.
         client: PyBullet's id of this world; −1 once it is closed.
         obstacle_boxes_odom: (N, 4) x_min, y_min, x_max, y_max of racks, walls and props, metres.
 
     Raises:
-        SimError: for a step that is not in range, an unknown renderer, and after :meth:`close`.
+        SimError: for an unknown renderer, and after :meth:`close`.
     """
+
+    #: Length of one step.
+    physics_dt_s: Final = 1.0 / 240.0
 
     def __init__(
         self,
         layout: WarehouseLayout | None = None,
-        physics_dt_s: float = DEFAULT_PHYSICS_DT_S,
         *,
         renderer: RendererName = "tiny",
         variant: int = 0,
     ) -> None:
-        self.physics_dt_s = finite_number(
-            "physics_dt_s",
-            physics_dt_s,
-            SimError,
-            minimum=0.0,
-            maximum=1.0 / 60.0,
-            exclusive_minimum=True,
-        )
         if renderer not in RENDERERS:
             raise SimError(not_one_of("renderer", renderer, RENDERERS))
         self.layout = WarehouseLayout.named("crossing") if layout is None else layout
         self._renderer: RendererName = renderer
-        self._variant = variant
+        self.variant = variant
         self._visuals: Visuals | None = None
         self._actors: list[VisualActor] = []
         self.obstacle_boxes_odom: FloatArray = self.layout.obstacle_boxes_odom
-        self._steps = 0
+        self.steps = 0
         self.client: int = pybullet.connect(pybullet.DIRECT)
         if self.client < 0:
             raise SimError("PyBullet could not start another physics world")
@@ -94,7 +87,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         if self._visuals is None:
             if self.client < 0:
                 raise SimError("the warehouse is closed: it has no visuals any more")
-            self._visuals = Visuals(self.layout, self._renderer, self._variant)
+            self._visuals = Visuals(self.layout, self._renderer, self.variant)
             for actor in self._actors:
                 self._visuals.add_actor(actor)
         return self._visuals
@@ -114,11 +107,6 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         """The actors in the order of their numbers."""
         return tuple(self._actors)
 
-    @property
-    def variant(self) -> int:
-        """The number of the scenery's variant."""
-        return self._variant
-
     def __exit__(
         self,
         kind: type[BaseException] | None,
@@ -136,21 +124,16 @@ class Warehouse(AbstractContextManager["Warehouse"]):
             self.client = -1
 
     @property
-    def steps(self) -> int:
-        """The number of physics steps since the start."""
-        return self._steps
-
-    @property
     def time_s(self) -> float:
         """The simulated time since the start, a whole number of steps."""
-        return self._steps * self.physics_dt_s
+        return self.steps * self.physics_dt_s
 
     def step(self) -> None:
         """Advance the physics by ``physics_dt_s``."""
         if self.client < 0:
             raise SimError("the warehouse is closed: it cannot step any more")
         pybullet.stepSimulation(physicsClientId=self.client)
-        self._steps += 1
+        self.steps += 1
 
     def _add_floor(self) -> None:
         shape = pybullet.createCollisionShape(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from awarenav.errors import AwarenavError
@@ -33,18 +31,22 @@ def test_a_file_stays_as_it_is_byte_for_byte_but_for_an_unfinished_line(tmp_path
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (WHOLE.replace('"stamp_s": 0.1,', "", 1), "line 3: a frame needs the keys"),
+        (WHOLE.replace('"stamp_s": 0.1,', "", 1), "line 3: a frame needs the keys frame, stamp_s"),
         (WHOLE.replace('"people": []}\n', '"peo', 1), "line 1"),
         (WHOLE + WHOLE[: WHOLE.index("\n") + 1], "two frames have the name '000000.png'"),
         ("dear diary,\ntoday\n", "line 1"),
+        (None, r"truth\.jsonl"),
     ],
+    ids=["key", "cut line", "twice", "prose", "absent"],
 )
 def test_a_damaged_file_is_refused_and_left_alone(tmp_path, text, message):
     path = tmp_path / "truth.jsonl"
-    path.write_text(text)
-    with pytest.raises(AwarenavError, match=message):
-        continue_records(path)
-    assert path.read_text() == text
+    if text is not None:
+        path.write_text(text)
+    for read in (continue_records, read_records) if "two" not in message else (continue_records,):
+        with pytest.raises(AwarenavError, match=message):
+            read(path)
+    assert text is None or path.read_text() == text
 
 
 def test_a_file_that_cannot_be_opened_is_said(tmp_path):
@@ -52,43 +54,13 @@ def test_a_file_that_cannot_be_opened_is_said(tmp_path):
         RecordFile(tmp_path / "absent" / "lines")
 
 
-def test_records_survive_writing_and_reading(tmp_path: Path) -> None:
+@pytest.mark.parametrize("cut", [0, 2, 40])
+def test_an_incomplete_last_line_is_left_out_and_the_others_are_read(tmp_path, cut) -> None:
     path = tmp_path / "truth.jsonl"
     write_records(path, FRAMES)
-    assert read_records(path) == FRAMES
     assert [entry.name for entry in tmp_path.iterdir()] == ["truth.jsonl"]
-
-
-@pytest.mark.parametrize("cut", [1, 40])
-def test_an_incomplete_last_line_is_left_out_and_the_others_are_read(
-    tmp_path: Path, cut: int
-) -> None:
-    path = tmp_path / "truth.jsonl"
-    write_records(path, FRAMES)
-    text = path.read_text("utf-8").rstrip("\n")
-    path.write_text(text[:-cut], "utf-8")
-    assert read_records(path) == FRAMES[:-1]
-
-
-def test_a_broken_line_in_the_middle_is_refused_by_number(tmp_path: Path) -> None:
-    path = tmp_path / "truth.jsonl"
-    lines = [record_line(frame) for frame in FRAMES]
-    lines[2] = lines[2][:20] + "\n"
-    path.write_text("".join(lines), "utf-8")
-    with pytest.raises(AwarenavError, match="line 3"):
-        read_records(path)
-
-
-def test_a_line_that_is_not_a_frame_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "truth.jsonl"
-    path.write_text('{"frame": "a.png"}\n', "utf-8")
-    with pytest.raises(AwarenavError, match="needs the keys frame, stamp_s"):
-        read_records(path)
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(AwarenavError, match=r"nothing\.jsonl"):
-        read_records(tmp_path / "nothing.jsonl")
+    path.write_text(WHOLE[: len(WHOLE) - cut])
+    assert read_records(path) == (FRAMES[:-1] if cut else FRAMES)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import cv2
 import numpy as np
@@ -10,21 +11,21 @@ import pytest
 from paths import SHARED
 from scipy.spatial.transform import Rotation
 
+from awarenav.errors import AwarenavError
+from awarenav.records import read_person
 from benchmarks.perception.__main__ import main
 from benchmarks.perception._degradations import HEADER, measure, meets, row_of
 from benchmarks.perception._photographs import (
     LABELS,
-    PhotographResult,
     aware_lines,
     figures,
-    judge_folder,
-    matched,
+    find_people,
     read_labels,
 )
 from benchmarks.perception._pictures import CONDITIONS, degraded_picture, picture_sets, pictures
-from benchmarks.perception._sureness import axis_nees
+from benchmarks.perception._sureness import axis_nees, matched
 from benchmarks.perception._sureness import measure as measure_sureness
-from perception import HeadPose, PersonObservation
+from perception import HeadPose
 from sim_tests.dataset import RenderConfig
 from training.networks import Recipe
 
@@ -122,19 +123,6 @@ def test_bounds_are_those_of_every_figure():
 DEV = SHARED / "images" / "dev"
 
 
-def seen(box, alpha=None, score=0.8):
-    return PersonObservation(
-        stamp_s=0.0,
-        position_camera_m=np.array([0.0, 0.0, 3.0]),
-        position_covariance_m2=np.eye(3),
-        gaze_camera=None if alpha is None else np.array([0.0, 0.0, -1.0]),
-        awareness=alpha,
-        awareness_std=None if alpha is None else 0.1,
-        score=score,
-        box_xyxy_px=np.array(box, dtype=float),
-    )
-
-
 def test_each_box_matches_once_and_the_most_people_count():
     truth = np.array([[0.0, 0.0, 10.0, 20.0], [6.0, 0.0, 16.0, 20.0]])
     found = np.array([[3.0, 0.0, 13.0, 20.0], [0.0, 0.0, 10.0, 20.0], [50.0, 0.0, 60.0, 20.0]])
@@ -145,27 +133,24 @@ def test_each_box_matches_once_and_the_most_people_count():
 
 
 def test_figures_count_people_pictures_and_false_positives():
-    truth = np.array([[0.0, 0.0, 10.0, 20.0], [50.0, 0.0, 60.0, 20.0]])
-    results = [
-        PhotographResult("a.jpg", truth, (seen([0, 0, 10, 20]), seen([90, 0, 99, 9])), ((0, 0),)),
-        PhotographResult("b.jpg", np.zeros((0, 4)), (seen([1, 1, 9, 9], 0.7),), ()),
-    ]
-    assert figures(results) == {
-        "people": 2,
-        "pictures": 2,
-        "recall": 0.5,
-        "false_per_picture": 1.0,
-    }
-    (line,) = aware_lines(results)
-    assert line == "b.jpg: α = 0.70 ± 0.10, score 0.80, no labelled person at 1, 1, 9, 9"
+    def person(*box, **more):
+        return read_person({"box_xyxy_px": box, **more}, "a person")
+
+    truth = {"a.jpg": [person(0, 0, 10, 20), person(50, 0, 60, 20)], "b.jpg": []}
+    aware = person(1, 1, 9, 9, awareness=0.7, awareness_std=0.1, score=0.8)
+    found = {"a.jpg": [person(0, 0, 10, 20), person(90, 0, 99, 9)], "b.jpg": [aware]}
+    said = figures(truth, found)
+    assert said.startswith("2 people in 2 photographs: recall 0.50 ")
+    assert "false positives a picture 1.00 " in said
+    assert aware_lines(found) == ["b.jpg: α = 0.70 ± 0.10, score 0.80, at 1, 1, 9, 9"]
 
 
 def test_bad_folders_are_refused(tmp_path, capsys):
-    with pytest.raises(ValueError, match=f"must hold photographs and {LABELS}"):
+    with pytest.raises(AwarenavError, match=f"must hold photographs and {LABELS}"):
         read_labels(tmp_path)
-    label = {"a.jpg": {"size": [9, 9], "people_xyxy_px": [[5, 5, 1, 1]]}}
+    label = {"a.jpg": {"size": [9, 9], "people_xyxy_px": [[5, 5, 1]]}}
     (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
-    with pytest.raises(ValueError, match=r"boxes of a\.jpg must be x0, y0, x1, y1"):
+    with pytest.raises(AwarenavError, match=r"a\.jpg: box_xyxy_px"):
         read_labels(tmp_path)
     label["a.jpg"]["people_xyxy_px"] = [[1, 1, 5, 5]]
     (tmp_path / LABELS).write_text(json.dumps(label), encoding="utf-8")
@@ -189,11 +174,12 @@ def test_a_picture_of_noise_has_nobody(tmp_path, capsys):
 @pytest.mark.skipif(not DEV.is_dir(), reason="the photographs of ../shared are not here")
 def test_the_shipped_networks_on_photographs_are_measured_as_they_are():
     """The networks know renders; keypoints confirm what the detector is unsure of."""
-    results = judge_folder(DEV)
-    found = figures(results)
-    assert (found["people"], found["pictures"]) == (19, 14)
-    assert found["recall"] > 0.6
-    assert found["false_per_picture"] <= 0.3
+    truth = read_labels(DEV)
+    said = figures(truth, find_people(DEV, list(truth)))
+    assert said.startswith("19 people in 14 photographs: ")
+    recall, false = (float(each) for each in re.findall(r" (0\.\d\d) \(", said))
+    assert recall > 0.6
+    assert false <= 0.3
 
 
 # --- sureness of heads ----------------------------------------------------------------------------

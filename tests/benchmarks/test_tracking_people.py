@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 from paths import ROOT
 
-from benchmarks.tracking import (
-    OCCLUDED,
-    OPEN,
-    WalkerSettings,
-    record,
-    walk,
-)
+from benchmarks.tracking import OCCLUDED, OPEN, record, side_m, walk
 from benchmarks.tracking._prediction import (
     CONSTANT_VELOCITY,
     figures,
@@ -34,10 +28,9 @@ def truth() -> np.ndarray:
 
 
 def test_people_walk_stand_and_stay_inside_and_apart(truth: np.ndarray) -> None:
-    side_m = WalkerSettings().side_m(20)
     speed = np.hypot(truth[..., 2], truth[..., 3])
     assert truth[..., :2].min() > -0.5
-    assert truth[..., :2].max() < side_m + 0.5
+    assert truth[..., :2].max() < side_m(20) + 0.5
     assert speed.max() < 2.6
     assert 0.4 < np.median(speed) < 1.4
     assert (speed < 0.1).mean() > 0.02
@@ -49,7 +42,7 @@ def test_people_walk_stand_and_stay_inside_and_apart(truth: np.ndarray) -> None:
 
 def test_misses_and_clutter_are_as_frequent_as_set() -> None:
     recording = record(20, 600, np.random.default_rng(1), OPEN)
-    area_m2 = WalkerSettings().side_m(20) ** 2
+    area_m2 = side_m(20) ** 2
     counts = np.array([len(measured) for measured in recording.measured_m])
     variance = 20 * 0.9 * 0.1 + OPEN.clutter_per_m2 * area_m2
     expected = 20 * 0.9 + OPEN.clutter_per_m2 * area_m2

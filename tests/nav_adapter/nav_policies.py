@@ -1,15 +1,16 @@
-"""Random policies of every kind, a custom one, and random robots."""
+"""Random policies of every kind, a custom one, random robots, and histories of people."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
-from nav_scenes import finite
+from nav_scenes import crowds, finite, robot_at
 
-from nav_adapter import AwarenessPolicy, RobotProfile
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
 from nav_adapter.policies import (
     InterpolatedHumanSpeed,
     InterpolatedInflation,
@@ -17,6 +18,7 @@ from nav_adapter.policies import (
     SafetyMargins,
     TimeBehaviour,
 )
+from tracking import PersonTrack
 
 
 class Own:
@@ -109,3 +111,50 @@ def robots(draw: st.DrawFn) -> RobotProfile:
         max_deceleration_mps2=draw(finite(0.3, 3.0)),
         reaction_time_s=draw(finite(0.0, 0.8)),
     )
+
+
+#: Time step, speed and yaw rate of the robot, and its people relative to the stamp.
+Walk = list[tuple[float, float, float, tuple[PersonTrack, ...]]]
+STEPS_S = st.sampled_from([0.05, 0.1, 0.25, 0.7])
+
+
+@st.composite
+def histories(draw: st.DrawFn, most_steps: int, *, complete: bool = False) -> Walk:
+    """The same people in every update, who look, notice and coast.
+
+    Some disappear and come back, unless it is ``complete``.
+    """
+    people = draw(crowds(max_size=2))
+    walk = []
+    for dt in draw(st.lists(STEPS_S, min_size=2, max_size=most_steps)):
+        present = tuple(
+            replace(
+                track,
+                stamp_s=-draw(st.sampled_from([0.0, 0.0, 0.03])),
+                status=draw(st.sampled_from(["confirmed", "confirmed", "coasting"])),
+                time_since_seen_s=draw(st.sampled_from([0.0, 0.0, 0.0, 0.4])),
+                awareness_lower=draw(st.sampled_from([0.0, 0.15, 0.55, 0.9]) | finite(0.0, 1.0)),
+                noticed=draw(st.sampled_from([0.0, 0.9])),
+            )
+            for track in people
+            if complete or draw(st.integers(0, 9))
+        )
+        yaw_radps = draw(st.just(0.0) | finite(-1.0, 1.0))
+        walk.append((dt, draw(finite(-1.5, 1.5)), yaw_radps, present))
+    return walk
+
+
+def driven(
+    policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, *, perceived: bool = True
+) -> list[NavConstraints]:
+    """Return the constraints of every update; perception is up to date if ``perceived``."""
+    adapter, now, results = NavAdapter(policy, robot), 0.0, []
+    for dt, speed_mps, yaw_radps, people in walk:
+        now += dt
+        tracks = tuple(replace(track, stamp_s=track.stamp_s + now) for track in people)
+        state = replace(
+            robot_at(now, heading_rad=0.3, speed_mps=speed_mps), yaw_rate_radps=yaw_radps
+        )
+        stamp_s = now if perceived else None
+        results.append(adapter.update(tracks, state, now, perception_stamp_s=stamp_s))
+    return results

@@ -229,19 +229,6 @@ def test_one_new_track_stands_for_one_person() -> None:
     assert [each.track_id for each in after.obstacles] == [-2, 1, 2, 3]
 
 
-def test_a_robot_may_have_set_off_since_its_state() -> None:
-    """It stood 0.4 s ago, and may have driven ½ · 1 m/s² · (0.4 s)² = 0.08 m since."""
-
-    def limit(age_s: float, at: tuple[float, float]) -> float:
-        state = robot_at(-age_s)
-        track = person(position=at)
-        nav = adapter()
-        return nav.update([track], state, 0.0, perception_stamp_s=0.0).speed_limit_mps
-
-    assert limit(0.4, (3.0, 0.0)) == pytest.approx(limit(0.0, (2.92, 0.0)), abs=0.01)
-    assert limit(0.4, (3.0, 0.0)) < limit(0.0, (3.0, 0.0)) - 0.02
-
-
 def test_after_a_silence_an_id_is_first_sight_for_the_speed() -> None:
     unaware = (
         adapter().update([person(position=(2.2, 0))], robot_at(speed_mps=1.2), 0.0).speed_limit_mps
@@ -265,16 +252,3 @@ def test_a_person_once_confirmed_is_kept_although_the_track_was_tentative_at_las
     after = nav.update([], robot_at(2.05), 2.05)
     assert [each.track_id for each in after.obstacles] == [1]
     assert after.speed_limit_mps <= before.speed_limit_mps + 1e-9
-
-
-def test_repeated_frames_shrink_no_sooner() -> None:
-    radii = []
-    for repeats in (1, 2, 5):
-        nav = adapter()
-        for frame in range(5):
-            for again in range(repeats):
-                now = 0.2 * frame + 0.2 * again / repeats
-                track = person(0.2 * frame, awareness_lower=0.95)
-                result = nav.update([track], robot_at(now), now)
-        radii.append(result.obstacles[0].radius_m)
-    assert radii == pytest.approx([radii[0]] * 3)

@@ -58,6 +58,11 @@ def test_a_weak_belief_counts_nothing(noticed: float) -> None:
     assert numbers(constraints(noticing(person(), noticed))) == numbers(UNAWARE)
 
 
+def test_a_belief_of_one_half_counts() -> None:
+    (obstacle,) = constraints(noticing(person(), 0.5)).obstacles
+    assert obstacle.awareness_lower == 0.6
+
+
 @pytest.mark.parametrize("policy", ["conservative", "assertive", "blind"])
 def test_policies_without_the_rule_ignore_it(policy: str) -> None:
     preset = with_rule(AwarenessPolicy.preset(policy), None)

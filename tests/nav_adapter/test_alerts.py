@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from nav_scenes import ROBOT, crowds, finite, person, robot_at
 
 from nav_adapter import Alert, AwarenessPolicy, NavAdapter, NavConstraints, NavError
+from nav_adapter.policies import AlertRules
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -35,6 +36,22 @@ def test_a_nearer_person_gets_a_louder_alert(x_m: float, kind: str | None) -> No
         assert alert.reason == (
             f"track 1: unaware (lower bound 0.00), closest approach of 0.0 m in {x_m:.1f} s"
         )
+
+
+@pytest.mark.parametrize("gap_m", [0.45, 0.55])
+def test_people_whom_the_robot_passes_within_half_a_metre_are_warned(gap_m: float) -> None:
+    beside_m = ROBOT.circumscribed_radius_m + BODY_RADIUS_M + gap_m
+    assert bool(warned(person(position=(2.0, beside_m)))) is (gap_m < 0.5)
+
+
+@pytest.mark.parametrize("kind", ["light", "voice", "horn"])
+def test_people_are_warned_up_to_30_s_before(kind: str) -> None:
+    times = dict.fromkeys(("light_within_s", "voice_within_s", "horn_within_s"), 0.0)
+    rules = AlertRules(**{**times, f"{kind}_within_s": 30.0})
+    (alert,) = warned(person(position=(29.9, 0.0)), policy=AwarenessPolicy(alerts=rules))
+    assert alert.kind == kind
+    with pytest.raises(ValueError, match=f"(?s){kind}_within_s.*equal to 30 "):
+        AlertRules(**{**times, f"{kind}_within_s": 30.1})
 
 
 def test_a_crossing_course_in_closed_form() -> None:

@@ -234,20 +234,6 @@ def test_a_robot_inside_an_obstacle_gets_out_in_time(
     assert np.hypot(*apart) >= 1.0 + ROBOT_RADIUS_M - 1e-6
 
 
-@given(circles=some_circles(1, 1), velocity=VELOCITIES)
-def test_the_share_scales_the_change_of_velocity(
-    circles: list[Circle], velocity: tuple[float, float]
-) -> None:
-    constraints = constraints_of(*circles)
-    whole, half = (
-        half_planes(constraints, (0, 0), velocity, ROBOT_RADIUS_M, share=share)[0]
-        for share in (1.0, 0.5)
-    )
-    now = whole[:2] @ velocity
-    np.testing.assert_allclose(half[:2], whole[:2])
-    assert half[2] - now == pytest.approx(0.5 * (whole[2] - now), abs=1e-9)
-
-
 def test_half_planes_agree_with_the_authors_library() -> None:
     """RVO2, through its Python binding; its share is always one half."""
     pyrvo = pytest.importorskip("pyrvo", reason="pyrvo comes with the extra dev")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +9,6 @@ import pytest
 from hypothesis import given
 from nav_policies import human_speeds, inflations, policies
 from nav_scenes import finite
-from paths import ROOT
 from pydantic import ValidationError
 
 from nav_adapter import AwarenessPolicy, NavError
@@ -124,14 +121,3 @@ def test_any_object_with_the_needs_of_a_policy_will_do() -> None:
     assert config.awareness.memory_s == 2.0
     with pytest.raises(TrackingError, match="policy must be an AwarenessPolicy, got str"):
         TrackerConfig.for_policy("balanced")  # type: ignore[arg-type]
-
-
-def test_no_code_passes_a_part_of_what_a_policy_needs() -> None:
-    folders = ("docs", "examples", "perception", "nav_adapter", "awarenav", "sim_tests")
-    files = [ROOT / "README.md"]
-    for folder, kind in itertools.product(folders, ("py", "md", "ipynb")):
-        files += (ROOT / folder).rglob(f"*.{kind}")
-    printed = [path for path in files if "TrackerConfig.for_policy(policy)" in path.read_text()]
-    assert {"README.md", "planners.md", "plug_into_planner.py"} <= {path.name for path in printed}
-    parts = re.compile(r"awareness=\w*policy\w*\.filter")
-    assert [path.name for path in files if parts.search(path.read_text())] == []

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import reach_rules, robots
+from nav_policies import Walk, driven, histories, robots
 from nav_scenes import (
     ROBOT,
-    crowds,
     finite,
     person,
     policy_radius_m,
@@ -22,11 +21,10 @@ from nav_scenes import (
     settled_update,
 )
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
+from nav_adapter import AwarenessPolicy, RobotProfile
 from nav_adapter.limit import passing_radius_m
 from nav_adapter.policies import ReachRules
 from perception.anthropometry import BODY_RADIUS_M
-from tracking import PersonTrack
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 #: The first of each pair is at least as careful at every instant.
@@ -38,49 +36,12 @@ ORDERED = (
     ("blind", "assertive"),
 )
 ROUNDING = 1e-9
-#: Time step, speed and yaw rate of the robot, and its people relative to the stamp.
-Walk = list[tuple[float, float, float, tuple[PersonTrack, ...]]]
-
-
-@st.composite
-def walks(draw: st.DrawFn) -> Walk:
-    """The same people in every update, who come, look, notice, coast, jump and disappear."""
-    people = draw(crowds(max_size=2))
-    steps = draw(st.lists(st.sampled_from([0.05, 0.1, 0.25, 0.7]), min_size=2, max_size=12))
-    walk = []
-    for dt in steps:
-        present = tuple(
-            replace(
-                track,
-                stamp_s=-draw(st.sampled_from([0.0, 0.0, 0.03])),
-                status=draw(st.sampled_from(["confirmed", "confirmed", "coasting"])),
-                time_since_seen_s=draw(st.sampled_from([0.0, 0.0, 0.0, 0.4])),
-                awareness_lower=draw(st.sampled_from([0.0, 0.15, 0.55, 0.9]) | finite(0.0, 1.0)),
-                noticed=draw(st.sampled_from([0.0, 0.9])),
-            )
-            for track in people
-            if draw(st.integers(0, 9))
-        )
-        yaw_radps = draw(st.just(0.0) | finite(-1.0, 1.0))
-        walk.append((dt, draw(finite(-1.5, 1.5)), yaw_radps, present))
-    return walk
-
-
-def run(policy: AwarenessPolicy, robot: RobotProfile, walk: Walk) -> list[NavConstraints]:
-    adapter, now, results = NavAdapter(policy, robot), 0.0, []
-    for dt, speed_mps, yaw_radps, people in walk:
-        now += dt
-        tracks = tuple(replace(track, stamp_s=track.stamp_s + now) for track in people)
-        state = replace(robot_at(now, heading_rad=0.3, speed_mps=speed_mps))
-        state = replace(state, yaw_rate_radps=yaw_radps)
-        results.append(adapter.update(tracks, state, now, perception_stamp_s=now))
-    return results
 
 
 @settings(max_examples=40)
-@given(robot=st.just(ROBOT) | robots(), walk=walks())
+@given(robot=st.just(ROBOT) | robots(), walk=histories(12))
 def test_presets_are_ordered_at_every_instant(robot: RobotProfile, walk: Walk) -> None:
-    results = {name: run(AwarenessPolicy.preset(name), robot, walk) for name in PRESETS}
+    results = {name: driven(AwarenessPolicy.preset(name), robot, walk) for name in PRESETS}
     for careful, bold in ORDERED:
         for a, b in zip(results[careful], results[bold], strict=True):
             assert a.speed_limit_mps <= b.speed_limit_mps + ROUNDING, (careful, bold)
@@ -164,24 +125,6 @@ def test_beside_the_circle_of_anybody_the_robot_may_drive(
     """For every awareness, course and place along the edge."""
     policy = AwarenessPolicy.preset(name)
     assert passing_mps(policy, alpha, along_m, course_rad, side) >= PASSING_MPS - 0.02
-
-
-@settings(max_examples=25)
-@given(
-    robot=robots(),
-    rules=reach_rules(),
-    human_mps=finite(0.0, 1.8),
-    clearance_m=finite(0.1, 0.4),
-    more=finite(0.0, 0.5),
-)
-def test_the_radius_is_the_smallest_and_grows_with_the_persons_speed(
-    robot: RobotProfile, rules: ReachRules, human_mps: float, clearance_m: float, more: float
-) -> None:
-    radius_m = passing_radius_m(human_mps, rules, clearance_m, robot)
-    assert radius_m >= BODY_RADIUS_M + clearance_m
-    rounding = 0.01 * radius_m
-    assert passing_radius_m(human_mps + more, rules, clearance_m, robot) >= radius_m - rounding
-    assert passing_radius_m(human_mps, rules, clearance_m + more, robot) >= radius_m - rounding
 
 
 def test_a_robot_that_keeps_its_course_may_pass_somebody_aware_within_the_clearance() -> None:

@@ -5,18 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
-from test_ros2_bridge import image
-from two_sensor_scenes import FRONT, PERIOD_S, Attentive, Robot
+from bridge_scenes import FRONT, START_S, Robot, attentive, image
 
 from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.sensor_msgs import CompressedImage
 from nav_adapter.ros2.messages.std_msgs import Header
 
 HEIGHT, WIDTH = 48, 64
-START_S = 1000.0
+PERIOD_S = Robot.period_s
 BLACK = bytes(HEIGHT * WIDTH * 3)
 GREY = bytes([118]) * len(BLACK)
 FROZEN = image(0.0).data
@@ -51,7 +47,7 @@ class BlindedRobot(Robot):
     [(BLACK, "black"), (GREY, "of one colour"), (FROZEN, "the same picture as before")],
 )
 def test_the_robot_stops_as_if_the_camera_were_silent(picture, reason, compressed) -> None:
-    robot, silent = (BlindedRobot(make_pipeline=lambda camera: Attentive()) for _ in range(2))
+    robot, silent = (BlindedRobot(make_pipeline=attentive) for _ in range(2))
     robot.compressed = compressed
     assert robot.drive(START_S, 1.0)[-1].speed_limit_mps > 0.3
     # The first of the frozen pictures is a view.
@@ -69,7 +65,7 @@ def test_the_robot_stops_as_if_the_camera_were_silent(picture, reason, compresse
 
 
 def test_the_camera_is_back_with_its_first_view() -> None:
-    robot = BlindedRobot(make_pipeline=lambda camera: Attentive())
+    robot = BlindedRobot(make_pipeline=attentive)
     robot.drive(START_S, 1.0)
     robot.picture = BLACK
     robot.drive(START_S + 1.0, 1.5)
@@ -81,7 +77,7 @@ def test_the_camera_is_back_with_its_first_view() -> None:
 def test_one_picture_that_is_sent_twice_costs_nothing() -> None:
     limits = []
     for twice in (False, True):
-        robot = BlindedRobot(make_pipeline=lambda camera: Attentive())
+        robot = BlindedRobot(make_pipeline=attentive)
         robot.drive(START_S, 1.0)
         if twice:
             robot.picture = image(START_S + 1.0 - PERIOD_S).data
@@ -94,7 +90,7 @@ def test_one_picture_that_is_sent_twice_costs_nothing() -> None:
 
 
 def test_beside_scanners_a_black_camera_makes_everybody_unaware() -> None:
-    robot = BlindedRobot(FRONT, people=[(3.2, -0.2)], make_pipeline=lambda camera: Attentive())
+    robot = BlindedRobot(FRONT, people=[(3.2, -0.2)], make_pipeline=attentive)
     robot.drive(START_S, 2.0)
     robot.picture = BLACK
     blind = robot.drive(START_S + 2.0, 2.0)[-1]

@@ -3,103 +3,44 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from bridge_scenes import (
+    FRONT,
+    INFO,
+    MOUNT,
+    PERSON,
+    START_S,
+    TIMING,
+    Listener,
+    Seeing,
+    image,
+    odometry,
+    tf,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_scenes import ROBOT
+from scan_scenes import scan_message
 
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
-from nav_adapter import AwarenessPolicy, NavError
-from nav_adapter.ros2 import (
-    SLOWEST_MPS,
-    STOP_POLYGON_ID,
-    AwarenessBridge,
-    CameraMount,
-    decode,
-    encode,
-)
-from nav_adapter.ros2.conversions import to_time, yaw_quaternion
+from nav_adapter import NavError
+from nav_adapter.ros2 import decode, encode
+from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.geometry_msgs import (
-    Point,
     Pose,
     PoseWithCovariance,
     Quaternion,
-    Transform,
-    TransformStamped,
     Twist,
     TwistWithCovariance,
     Vector3,
 )
 from nav_adapter.ros2.messages.nav_msgs import Odometry
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
 from nav_adapter.ros2.messages.std_msgs import Header
-from nav_adapter.ros2.messages.tf2_msgs import TFMessage
-from perception import AwarenessPipeline, Camera, PersonObservation
+from perception import Camera
+from perception.laser import LegDetector
 
-START_S = 1000.0
-MOUNT = CameraMount(position_base_m=[0.2, 0.0, 1.4]).T_base_camera()
-INFO = CameraInfo(
-    Header(to_time(START_S), "camera"), 48, 64, k=(50.0, 0.0, 32.0, 0.0, 50.0, 24.0, 0.0, 0.0, 1.0)
-)
-
-
-class NobodyThere:
-    """A detector and a pose estimator that find nobody."""
-
-    def detect(self, image_rgb):
-        return ()
-
-    def estimate(self, image_rgb, *_):
-        return ()
-
-
-def nobody(camera: Camera) -> AwarenessPipeline:
-    none = NobodyThere()
-    return AwarenessPipeline(camera, detector=none, pose_estimator=none, head_pose_estimator=none)
-
-
-def odometry(stamp_s: float, x: float = 0.0, yaw: float = 0.0, speed: float = 0.5) -> Odometry:
-    return Odometry(
-        Header(to_time(stamp_s), "odom"),
-        "base_link",
-        PoseWithCovariance(Pose(Point(x, 0.0, 0.0), yaw_quaternion(yaw))),
-        TwistWithCovariance(Twist(Vector3(speed, 0.0, 0.0))),
-    )
-
-
-def image(stamp_s: float, data: bytes | None = None) -> Image:
-    """Return a picture of noise, another one for each stamp, or one of the bytes given."""
-    header = Header(to_time(stamp_s), "camera")
-    noise = np.random.default_rng(round(1e6 * stamp_s)).bytes(48 * 192)
-    return Image(header, 48, 64, "rgb8", 0, 192, noise if data is None else data)
-
-
-class Listener:
-    """A bridge whose published messages are kept."""
-
-    def __init__(self, **settings) -> None:
-        self.heard = defaultdict(list)
-        self.warnings: list[str] = []
-        self.bridge = AwarenessBridge(
-            AwarenessPolicy.preset("balanced"),
-            ROBOT,
-            lambda key, message: self.heard[key].append(message),
-            warn=self.warnings.append,
-            **{"T_base_camera": MOUNT, "make_pipeline": nobody, **settings},
-        )
-
-    def standing(self) -> bool:
-        """Return whether the last tick stops the robot, by limit and polygon alike."""
-        polygon = self.heard["collision_polygons"][-1]
-        assert polygon.polygon.id == STOP_POLYGON_ID
-        near = all(abs(corner.x) < 1.0 for corner in polygon.polygon.polygon.points)
-        assert near == (self.heard["speed_limit"][-1].speed_limit == SLOWEST_MPS)
-        return near
+DETECTOR = LegDetector()
 
 
 def test_the_robot_stands_until_all_input_has_come() -> None:
@@ -121,7 +62,6 @@ def test_the_robot_stands_until_all_input_has_come() -> None:
 def test_a_silent_source_stops_the_robot_until_it_returns(silent: str) -> None:
     nav = Listener()
     nav.bridge.on_camera_info(INFO)
-    stop_after_s = AwarenessPolicy.preset("balanced").timing.stop_after_s
     stood_from = None
     for tick in range(100):
         now = START_S + 0.05 * tick
@@ -135,7 +75,7 @@ def test_a_silent_source_stops_the_robot_until_it_returns(silent: str) -> None:
             stood_from = now
             assert "stale data" in constraints.limited_by
     assert stood_from is not None
-    assert stood_from - (START_S + 1.0) <= stop_after_s + 0.051
+    assert stood_from - (START_S + 1.0) <= TIMING.stop_after_s + 0.051
     assert not nav.standing()
 
 
@@ -166,27 +106,9 @@ def test_unwanted_messages_are_not_made() -> None:
     assert nav.standing()
 
 
-class OneApproaching:
-    """Perception of one person who walks at the robot and never looks at it."""
-
-    def process(self, image_rgb, stamp_s, *, floor=None):
-        ahead_m = 6.0 - 1.1 * (stamp_s - START_S)
-        return (
-            PersonObservation(
-                stamp_s=stamp_s,
-                position_camera_m=np.array([0.0, 0.2, ahead_m]),
-                position_covariance_m2=np.diag([0.01, 0.01, 0.01]),
-                gaze_camera=np.array([0.0, 0.0, 1.0]),
-                awareness=0.0,
-                awareness_std=0.05,
-                score=0.9,
-                box_xyxy_px=None,
-            ),
-        )
-
-
 def test_every_alert_is_in_one_message() -> None:
-    nav = Listener(make_pipeline=lambda camera: OneApproaching())
+    approaching = Seeing(lambda now: 6.0 - 1.1 * (now - START_S), 0.0)
+    nav = Listener(make_pipeline=lambda camera: approaching)
     nav.bridge.on_camera_info(INFO)
     asked = []
     for tick in range(100):
@@ -216,11 +138,7 @@ def test_the_pose_of_the_camera_can_come_from_tf() -> None:
     nav.bridge.on_odometry(odometry(START_S, x=2.0))
     assert not nav.bridge.on_image(image(START_S), START_S)
     assert "no transform between 'camera' and 'odom'" in nav.warnings[-1]
-    optical = Quaternion(-0.5, 0.5, -0.5, 0.5)
-    mounted = TransformStamped(
-        Header(frame_id="base_link"), "camera", Transform(Vector3(0.2, 0.0, 1.4), optical)
-    )
-    nav.bridge.on_transforms(TFMessage((mounted,)), static=True)
+    nav.bridge.on_transforms(tf("base_link", "camera", MOUNT), static=True)
     assert nav.bridge.on_image(image(START_S), START_S)
     assert nav.bridge.frame is not None
     T = nav.bridge.frame.T_odom_camera
@@ -270,25 +188,21 @@ def test_impossible_odometry_is_refused(message: Odometry, text: str) -> None:
     assert nav.standing()
 
 
-def _mount() -> TFMessage:
-    move = Transform(Vector3(0.2, 0.0, 1.4), Quaternion(-0.5, 0.5, -0.5, 0.5))
-    return TFMessage((TransformStamped(Header(frame_id="base_link"), "camera", move),))
-
-
 @settings(max_examples=40)
 @given(
-    st.sampled_from(["odometry", "camera_info", "transforms", "image"]),
+    st.sampled_from(["odometry", "camera_info", "transforms", "image", "scan"]),
     st.lists(st.tuples(st.integers(4, 4000), st.integers(0, 255)), min_size=1, max_size=6),
 )
 def test_damaged_messages_never_crash_the_bridge_and_its_messages_are_valid(
     which: str, damage: list[tuple[int, int]]
 ) -> None:
-    nav = Listener(T_base_camera=None)
+    nav = Listener(T_base_camera=None, scanners=[FRONT], make_detector=lambda: DETECTOR)
     good = {
         "odometry": odometry(START_S),
         "camera_info": INFO,
-        "transforms": _mount(),
+        "transforms": tf("base_link", "camera", MOUNT),
         "image": image(START_S),
+        "scan": scan_message(START_S, [PERSON]),
     }
     for name, message in good.items():
         if name == which:
@@ -301,6 +215,8 @@ def test_damaged_messages_never_crash_the_bridge_and_its_messages_are_valid(
                 continue
         if name == "image":
             nav.bridge.on_image(message, START_S)
+        elif name == "scan":
+            nav.bridge.on_scan(0, message, START_S)
         else:
             getattr(nav.bridge, f"on_{name}")(message)
         nav.bridge.tick(START_S)

@@ -4,76 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
+from bridge_scenes import MOUNT, START_S, Robot, Seeing, odometry, tf
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_ros2_bridge import INFO, START_S, Listener, image, odometry
 
 from nav_adapter.ros2 import TransformBuffer
-from nav_adapter.ros2.conversions import pose_matrix, to_time, yaw_quaternion
-from nav_adapter.ros2.messages.geometry_msgs import (
-    Quaternion,
-    Transform,
-    TransformStamped,
-    Vector3,
-)
-from nav_adapter.ros2.messages.std_msgs import Header
-from nav_adapter.ros2.messages.tf2_msgs import TFMessage
-from perception import PersonObservation
 from tracking.prediction import PredictionModel
 
 PERIOD_S = 0.05
-HERE = pose_matrix((0.0, 0.0, 0.0), yaw_quaternion(0.0))
 
 
-def transform(parent: str, child: str, stamp_s: float) -> TFMessage:
-    optical = Quaternion(-0.5, 0.5, -0.5, 0.5)
-    move = Transform(Vector3(0.2, 0.0, 1.4), optical)
-    return TFMessage((TransformStamped(Header(to_time(stamp_s), parent), child, move),))
+class Mounted(Robot):
+    """A robot that drives, and hears once where its camera is."""
 
-
-class OneStanding:
-    """Perception of one person 4 m ahead."""
-
-    def process(self, image_rgb, stamp_s, *, floor=None):
-        return (
-            PersonObservation(
-                stamp_s=stamp_s,
-                position_camera_m=np.array([0.0, 0.2, 4.0]),
-                position_covariance_m2=np.diag([0.01, 0.01, 0.01]),
-                gaze_camera=None,
-                awareness=None,
-                awareness_std=None,
-                score=0.9,
-                box_xyxy_px=None,
-            ),
-        )
-
-
-class Robot(Listener):
-    """A bridge that gets odometry and images on one clock, and its camera's mount once."""
+    period_s, speed_mps = PERIOD_S, 0.5
 
     def __init__(self, **settings) -> None:
         super().__init__(T_base_camera=None, **settings)
-        self.bridge.on_camera_info(INFO)
-        self.bridge.on_transforms(transform("base_link", "camera", START_S), static=True)
-
-    def step(self, now_s: float):
-        self.bridge.on_odometry(odometry(now_s), now_s)
-        self.bridge.on_image(image(now_s), now_s)
-        return self.bridge.tick(now_s)
-
-    def drive(self, start_s: float, seconds: float) -> list:
-        return [self.step(start_s + PERIOD_S * tick) for tick in range(round(seconds / PERIOD_S))]
-
-    def details(self) -> dict[str, str]:
-        return {pair.key: pair.value for pair in self.heard["alerts"][-1].status[0].values}
+        self.bridge.on_transforms(tf("base_link", "camera", MOUNT), static=True)
 
 
 def test_a_clock_step_of_10_ms_back_changes_nothing() -> None:
-    robot = Robot()
+    robot = Mounted()
     robot.drive(START_S, 1.0)
     last_s = START_S + 1.0 - PERIOD_S
     # The second reading after the step, of a rate so fast that the clock has not caught up.
@@ -90,7 +42,7 @@ def test_a_clock_step_of_10_ms_back_changes_nothing() -> None:
 @settings(max_examples=8)
 @given(st.floats(0.0, 3600.0), st.floats(-3600.0, 3600.0))
 def test_static_transforms_survive_any_clock_step(before_s: float, step_s: float) -> None:
-    robot = Robot(wanted={"speed_limit", "collision_polygons"}.__contains__)
+    robot = Mounted(wanted={"speed_limit", "collision_polygons"}.__contains__)
     robot.drive(START_S + before_s + 3600.0, 0.2)
     # tf_static is latched: it does not come again.
     constraints = robot.drive(START_S + before_s + 3600.2 + step_s, 3.0)
@@ -99,7 +51,7 @@ def test_static_transforms_survive_any_clock_step(before_s: float, step_s: float
 
 
 def test_a_clock_that_was_set_back_starts_the_buffers_anew_after_1_s() -> None:
-    robot = Robot(make_pipeline=lambda camera: OneStanding())
+    robot = Mounted(make_pipeline=lambda camera: Seeing(4.0))
     robot.drive(START_S, 1.0)
     (before,) = robot.bridge.tracks
     new_s = START_S - 500.0
@@ -120,12 +72,12 @@ def test_a_clock_that_was_set_back_starts_the_buffers_anew_after_1_s() -> None:
 
 def test_after_a_clock_step_the_limit_rises_slowly_and_the_prediction_stays() -> None:
     """The way to start anew is the adapter's own; a new adapter would allow 1.5 m/s at once."""
-    eyes = OneStanding()
+    eyes = Seeing(4.0)
     prediction = PredictionModel(lag_per_s2=0.5)
-    robot = Robot(make_pipeline=lambda camera: eyes, prediction=prediction)
+    robot = Mounted(make_pipeline=lambda camera: eyes, prediction=prediction)
     before = robot.drive(START_S, 2.0)[-1].speed_limit_mps
     assert 0.0 < before < 1.4
-    eyes.process = lambda *_, **__: ()  # nobody is seen after the step
+    eyes.gone = True  # nobody is seen after the step
     constraints = robot.drive(START_S - 500.0, 3.0)
     limits = [each.speed_limit_mps for each in constraints]
     first = next(index for index, limit in enumerate(limits) if limit > 0.0)
@@ -137,7 +89,7 @@ def test_after_a_clock_step_the_limit_rises_slowly_and_the_prediction_stays() ->
 
 
 def test_one_wrong_reading_of_the_clock_does_not_delete_people() -> None:
-    robot = Robot()
+    robot = Mounted()
     robot.drive(START_S, 1.0)
     frame = robot.bridge.frame
     assert robot.bridge.tick(START_S - 100.0).limited_by == "the clock went backward"
@@ -147,7 +99,7 @@ def test_one_wrong_reading_of_the_clock_does_not_delete_people() -> None:
 
 
 def test_one_odometry_message_from_the_future_does_not_block_the_next_ones() -> None:
-    robot = Robot()
+    robot = Mounted()
     robot.drive(START_S, 1.0)
     now_s = START_S + 1.0
     robot.bridge.on_odometry(odometry(now_s + 3600.0, x=50.0), now_s)
@@ -164,7 +116,7 @@ def test_one_odometry_message_from_the_future_does_not_block_the_next_ones() -> 
 
 
 def test_without_a_time_odometry_from_the_future_is_dropped_by_the_next_tick() -> None:
-    robot = Robot()
+    robot = Mounted()
     robot.drive(START_S, 1.0)
     now_s = START_S + 1.0
     robot.bridge.on_odometry(odometry(now_s + 3600.0))
@@ -176,7 +128,7 @@ def test_without_a_time_odometry_from_the_future_is_dropped_by_the_next_tick() -
 
 
 def test_odometry_slightly_ahead_is_used() -> None:
-    robot = Robot()
+    robot = Mounted()
     robot.drive(START_S, 1.0)
     now_s = START_S + 1.0
     robot.bridge.on_odometry(odometry(now_s + 0.049), now_s)
@@ -186,26 +138,26 @@ def test_odometry_slightly_ahead_is_used() -> None:
 
 
 def test_transforms_from_the_future_are_refused_and_counted() -> None:
-    robot = Robot()
+    robot = Mounted()
     now_s = START_S
-    robot.bridge.on_transforms(transform("odom", "base_link", now_s + 3600.0), now_s)
+    robot.bridge.on_transforms(tf("odom", "base_link", MOUNT, now_s + 3600.0), now_s)
     assert robot.bridge.counts["transforms_from_future"] == 1
     assert "transforms: the stamp is 3600.000 s ahead" in robot.warnings[-1]
     # Localisation stamps map -> odom ahead on purpose: neither used nor counted.
-    robot.bridge.on_transforms(transform("map", "odom", now_s + 1.0), now_s)
+    robot.bridge.on_transforms(tf("map", "odom", MOUNT, now_s + 1.0), now_s)
     assert robot.bridge.counts["transforms_from_future"] == 1
     assert robot.drive(now_s, 1.0)[-1].limited_by == "robot maximum"
 
 
 def test_the_buffer_forgets_moving_transforms_only() -> None:
-    buffer = TransformBuffer()
-    buffer.add("base_link", "camera", 0.0, HERE, static=True)
+    buffer, here = TransformBuffer(), np.eye(4)
+    buffer.add("base_link", "camera", 0.0, here, static=True)
     for stamp_s in (1.0, 2.0, 3.0):
-        buffer.add("odom", "base_link", stamp_s, HERE)
+        buffer.add("odom", "base_link", stamp_s, here)
     assert buffer.forget(after_s=3.0) == 0
     assert buffer.forget(after_s=2.0) == 1
-    assert (buffer.lookup("odom", "camera", 2.0) == HERE).all()
+    assert (buffer.lookup("odom", "camera", 2.0) == here).all()
     assert buffer.forget() == 2
-    assert (buffer.lookup("base_link", "camera", 99.0) == HERE).all()
+    assert (buffer.lookup("base_link", "camera", 99.0) == here).all()
     with pytest.raises(Exception, match="no transform between"):
         buffer.lookup("odom", "camera", 2.0)

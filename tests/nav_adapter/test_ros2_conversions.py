@@ -9,9 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
 from nav_scenes import ROBOT, crowds, finite, person, robot_at
 from shapely import affinity
 from shapely.geometry import Point as ShapelyPoint

@@ -6,20 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bridge_scenes import INFO, PATIENCE_S, START_S, Listener, image, odometry
 
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
-from test_ros2_bridge import INFO, START_S, Listener, image, odometry
-from test_ros2_perception_thread import PATIENCE_S
-
-from nav_adapter import AwarenessPolicy, NavError
+from nav_adapter import NavError
 from nav_adapter.ros2 import PerceptionThread, depth_of
 from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.sensor_msgs import Image
 from nav_adapter.ros2.messages.std_msgs import Header
 from perception import AwarenessPipeline, Camera, PersonDetection, PersonKeypoints
-
-TIMING = AwarenessPolicy.preset("balanced").timing
 
 
 def depth_image(stamp_s: float, depth: np.ndarray | None = None, *, padding: int = 0) -> Image:

@@ -7,19 +7,15 @@ import pkgutil
 from functools import cache
 
 import pytest
+from cyclonedds.idl import Endianness
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
-from cyclonedds.idl import Endianness
 from ros2_receiver import made
 from ros2_scenes import typestore
 from rosbags.typesys import get_types_from_msg
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import PUBLISHED, READ, decode, encode, messages
-from nav_adapter.ros2._dds import topic_type
+from nav_adapter.ros2 import decode, encode, messages
 from nav_adapter.ros2._message import FieldType, field_types
 from nav_adapter.ros2.messages import Message, definition, ros_type
 from nav_adapter.ros2.messages.builtin_interfaces import Time
@@ -156,17 +152,3 @@ def test_every_truncated_message_is_refused() -> None:
 def test_values_that_do_not_fit_are_refused(message: Message) -> None:
     with pytest.raises(NavError, match=f"{ros_type(type(message))} cannot be encoded"):
         encode(message)
-
-
-@pytest.mark.parametrize("topic", [*PUBLISHED.values(), *READ.values()], ids=lambda each: each.name)
-def test_type_names_are_mangled_as_ros_2_does(topic) -> None:
-    package, _, name = ros_type(topic.message).split("/")
-    assert topic_type(topic.message).__idl_typename__ == f"{package}::msg::dds_::{name}_"
-
-
-def test_messages_are_immutable_values() -> None:
-    first, second = OccupancyGrid(data=b"\x01"), OccupancyGrid(data=b"\x01")
-    assert first == second
-    assert hash(first) == hash(second)
-    with pytest.raises(AttributeError):
-        first.data = b""  # type: ignore[misc]

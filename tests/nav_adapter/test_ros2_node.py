@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import subprocess
 import sys
-import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -14,13 +13,10 @@ from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
+from bridge_scenes import INFO, PATIENCE_S, Network, image, odometry
 from paths import ROOT
 from ros2_scenes import everything, plain, typestore
 from scan_scenes import scan_message
-from test_ros2_bridge import INFO, image, odometry
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, RobotFile, ScannerMount, node
@@ -81,9 +77,6 @@ def test_without_ros_the_program_prints_one_line() -> None:
     assert "Traceback" not in done.stderr
 
 
-PATIENCE_S = 20.0
-
-
 class StandInNode:
     """The part of rclpy's Node that the node calls."""
 
@@ -118,16 +111,6 @@ class StandInNode:
 
     def create_timer(self, period_s: float, callback: Callable[[], None]) -> None:
         self.period_s, self.timer = period_s, callback
-
-
-class SlowNetwork:
-    def __init__(self) -> None:
-        self.entered, self.open = threading.Event(), threading.Event()
-
-    def process(self, image_rgb, stamp_s, *, floor=None):
-        self.entered.set()
-        assert self.open.wait(PATIENCE_S)
-        return ()
 
 
 @pytest.fixture
@@ -237,7 +220,8 @@ def test_the_node_takes_a_calibrated_prediction_or_refuses_the_file(
 
 
 def test_the_node_publishes_while_perception_is_busy(node_module: Any) -> None:
-    network = SlowNetwork()
+    network = Network()
+    network.close()
     node_module._pipelines = lambda *files, allowed: lambda camera: network
     ros_node = node_module.AwarenessNode()
 

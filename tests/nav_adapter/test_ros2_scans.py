@@ -8,14 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from bridge_scenes import FRONT, START_S, Listener, odometry
 from hypothesis import given
 from hypothesis import strategies as st
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
 from scan_scenes import RAYS, planar, scan_message
-from test_ros2_bridge import START_S, Listener, odometry
-from two_sensor_scenes import FRONT
 
 from nav_adapter import NavError
 from nav_adapter.ros2 import decode, encode, laser_scan_of, map_cells_of
@@ -41,7 +37,6 @@ def test_a_scan_keeps_its_values_through_cdr_to_single_precision() -> None:
     assert len(scan) == RAYS
     assert scan.stamp_s == pytest.approx(12.5)
     assert scan.end_s == pytest.approx(12.5 + 5e-5 * (RAYS - 1), abs=1e-6)
-    assert scan.intensities is None
     np.testing.assert_allclose(scan.ranges_m, SCAN.ranges, rtol=1e-6)
     np.testing.assert_allclose(scan.angles_rad[[0, -1]], np.radians([-135.0, 135.0]), atol=1e-4)
 
@@ -202,10 +197,9 @@ def test_rays_beyond_a_full_turn_keep_the_nearer_range(extra: int) -> None:
     assert scan.angles_rad[near] == pytest.approx(2.0 * PI / 450 * extra, abs=1e-3)
 
 
-def test_no_limit_of_range_and_odd_intensities_cost_nothing() -> None:
-    scan = laser_scan_of(replace(HEADED, range_max=math.inf, intensities=(1.0, 2.0)))
+def test_no_limit_of_range_costs_nothing() -> None:
+    scan = laser_scan_of(replace(HEADED, range_max=math.inf))
     assert scan.range_max_m == 250.0
-    assert scan.intensities is None
     assert scan.ranges_m == pytest.approx(HEADED.ranges)
 
 
@@ -297,10 +291,11 @@ def test_sweeps_that_go_on_while_others_begin_are_named(scan_time: float) -> Non
 
 def test_corrections_are_said_once() -> None:
     nav = Listener(scanners=[FRONT], with_camera=False)
+    nav.bridge.on_odometry(odometry(START_S - 0.1, speed=0.0), START_S - 0.1)
     for tick in range(5):
         now_s = START_S + 0.1 * tick
         nav.bridge.on_odometry(odometry(now_s, speed=0.0), now_s)
-        message = replace(scan_message(now_s, [PLACE]), intensities=(1.0,))
+        message = replace(scan_message(now_s, [PLACE]), time_increment=-1e-5)
         assert nav.bridge.on_scan(0, message, now_s)
     (warning,) = nav.warnings
-    assert "541 ranges but 1 intensities, which are not used" in warning
+    assert "time_increment is negative: the last ray is the oldest" in warning

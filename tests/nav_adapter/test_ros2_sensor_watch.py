@@ -96,32 +96,6 @@ def test_without_a_camera_scanners_must_see_ahead() -> None:
     assert watch.stamp_s == 1.5
 
 
-def test_losses_and_returns_are_told_once() -> None:
-    watch = looking()
-    assert watch.missing == "one"
-    scanned(watch, 0, 0.0, 0.0, 270.0)
-    scanned(watch, 1, 0.0, 180.0, 270.0)
-    assert watch.missing is None
-    assert watch.news(0.4) == []
-    watch.saw_image(0.5, CAMERA, AHEAD)
-    scanned(watch, 1, 0.5, 180.0, 270.0)
-    assert watch.lost(0.6) == ("one",)
-    assert watch.news(0.6) == ["one has been silent for 0.6 s: camera and two go on"]
-    assert watch.news(0.7) == []
-    assert watch.news(1.2) == [
-        "camera has been silent for 0.7 s: the robot stops",
-        "two has been silent for 0.7 s: the robot stops",
-    ]
-    scanned(watch, 0, 1.3, 0.0, 270.0)
-    assert watch.news(1.3) == ["one is back"]
-    assert watch.ages_s(1.3) == pytest.approx({"camera": 0.8, "one": 0.0, "two": 0.8})
-    watch.forget()
-    assert watch.missing == "camera"
-    assert watch.news(2.0) == []
-    assert watch.stamp_s is None
-    assert np.isinf(list(watch.ages_s(2.0).values())).all()
-
-
 def test_a_blind_sector_is_as_old_as_the_last_scan_that_saw_it() -> None:
     watch = SensorWatch(("one", "two"), with_camera=False, lost_after_s=0.5)
     scanned(watch, 0, 1.0, 0.0, 270.0)
@@ -139,31 +113,3 @@ def test_a_blind_sector_is_as_old_as_the_last_scan_that_saw_it() -> None:
     scanned(watch, 0, 1.6, 0.0, 270.0, (-70.0, -30.0))
     scanned(watch, 1, 1.5, 0.0, 270.0)
     assert watch.stamp_s == 1.5
-
-
-def test_a_blind_scanner_is_told_with_its_sector_once_it_has_lasted() -> None:
-    watch = SensorWatch(("one",), with_camera=False, lost_after_s=0.5)
-    assert watch.missing_text == "no scan yet from 'one'"
-    scanned(watch, 0, 0.0, 0.0, 270.0)
-    for tick in range(1, 6):
-        scanned(watch, 0, 0.1 * tick, 0.0, 270.0, (-20.0, 60.0))
-        assert watch.news(0.1 * tick) == []
-    scanned(watch, 0, 0.7, 0.0, 270.0, (-20.0, 60.0))
-    assert watch.news(0.7) == ["one: blind from -20° to 60°: the robot stops"]
-    scanned(watch, 0, 0.8, 0.0, 270.0, (-135.0, 135.0))
-    assert watch.news(0.8) == []
-    assert watch.news(1.3) == ["one: blind (most of its rays have no answer): the robot stops"]
-    assert watch.lost(1.3) == ("one",)
-    scanned(watch, 0, 1.4, 0.0, 270.0)
-    assert watch.news(1.4) == ["one is back"]
-    assert watch.blind_text == ""
-    assert watch.stamp_s == 1.4
-
-
-def test_a_scanner_that_has_never_measured_anything_has_not_been_heard() -> None:
-    watch = SensorWatch(("scan",), with_camera=False, lost_after_s=0.5)
-    for tick in range(8):
-        scanned(watch, 0, 0.1 * tick, 0.0, 270.0, (-135.0, 135.0))
-    assert watch.stamp_s is None
-    assert watch.missing_text == "no scan yet from 'scan'"
-    assert watch.news(0.8) == ["scan: blind (most of its rays have no answer): the robot stops"]

@@ -7,12 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from nav_scenes import person, robot_at
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
+from bridge_scenes import INFO, START_S, Listener, image, odometry
+from nav_scenes import ROBOT, person, robot_at
 from numpy.typing import NDArray
-from test_ros2_bridge import INFO, ROBOT, START_S, Listener, image, odometry
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, RobotState
 from nav_adapter.exporters import speed_limit_at

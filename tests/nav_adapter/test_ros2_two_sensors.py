@@ -6,12 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
-
+from bridge_scenes import (
+    FRONT,
+    INFO,
+    PERSON,
+    REAR,
+    START_S,
+    TIMING,
+    Listener,
+    Robot,
+    attentive,
+    image,
+    odometry,
+    scanning,
+)
 from scan_scenes import scan_message
-from test_ros2_bridge import INFO, START_S, Listener, image, odometry
-from two_sensor_scenes import FRONT, PERIOD_S, PERSON, REAR, TIMING, Attentive, Robot
 
 from nav_adapter import NavError
 from nav_adapter.ros2.messages.diagnostic_msgs import DiagnosticStatus
@@ -52,8 +61,8 @@ def test_somebody_whom_only_a_scanner_sees_is_a_person_and_unaware() -> None:
 
 
 def test_a_person_before_both_sensors_is_one_and_a_scan_takes_no_awareness() -> None:
-    alone = Robot(make_pipeline=lambda camera: Attentive())
-    both = Robot(FRONT, people=[(3.2, -0.2)], make_pipeline=lambda camera: Attentive())
+    alone = Robot(make_pipeline=attentive)
+    both = Robot(FRONT, people=[(3.2, -0.2)], make_pipeline=attentive)
     lower = []
     for nav in (alone, both):
         nav.drive(START_S, 1.0)
@@ -64,9 +73,8 @@ def test_a_person_before_both_sensors_is_one_and_a_scan_takes_no_awareness() -> 
 
 
 def test_a_lost_scanner_leaves_the_camera_as_it_is_alone_and_says_so() -> None:
-    network = Attentive()
-    alone = Robot(make_pipeline=lambda camera: network)
-    both = Robot(FRONT, people=[(3.2, -0.2), (1.0, 2.5)], make_pipeline=lambda camera: network)
+    alone = Robot(make_pipeline=attentive)
+    both = Robot(FRONT, people=[(3.2, -0.2), (1.0, 2.5)], make_pipeline=attentive)
     before = [nav.drive(START_S, 1.6)[-1] for nav in (alone, both)]
     assert [len(each.obstacles) for each in before] == [1, 2]
     both.silent.add("scan_front")
@@ -89,7 +97,7 @@ def test_a_lost_scanner_leaves_the_camera_as_it_is_alone_and_says_so() -> None:
 
 
 def test_a_lost_camera_makes_everybody_unaware_and_a_scanner_goes_on() -> None:
-    nav = Robot(FRONT, people=[(3.2, -0.2)], make_pipeline=lambda camera: Attentive())
+    nav = Robot(FRONT, people=[(3.2, -0.2)], make_pipeline=attentive)
     (obstacle,) = nav.drive(START_S, 1.6)[-1].obstacles
     assert obstacle.awareness_lower > 0.5
     aware_mps = nav.drive(START_S + 1.6, 0.4)[-1].speed_limit_mps
@@ -129,7 +137,7 @@ def test_losing_everything_stops_the_robot_and_says_so() -> None:
     nav.drive(START_S, 1.0)
     nav.silent |= {"camera", "scan_front"}
     for constraints in nav.drive(START_S + 1.0, 3.0):
-        silent_s = constraints.stamp_s - (START_S + 1.0 - PERIOD_S)
+        silent_s = constraints.stamp_s - (START_S + 1.0 - Robot.period_s)
         if silent_s > TIMING.stop_after_s + 0.02:
             assert nav.standing()
             assert "stale data" in constraints.limited_by
@@ -139,8 +147,7 @@ def test_losing_everything_stops_the_robot_and_says_so() -> None:
 
 
 def test_scanners_alone_need_no_camera() -> None:
-    nav = Robot(FRONT, people=[PERSON], with_camera=False)
-    nav.silent.add("camera")
+    nav = scanning(people=[PERSON])
     nav.bridge.on_camera_info(INFO)
     constraints = nav.drive(START_S, 1.0)[-1]
     assert nav.bridge.camera is None
@@ -155,11 +162,8 @@ def test_scanners_alone_need_no_camera() -> None:
 
 
 def test_a_scanner_alone_that_looks_back_is_not_enough() -> None:
-    nav = Robot(
-        replace(REAR, mount=REAR.mount.model_copy(update={"field_of_view_deg": [-90.0, 90.0]})),
-        with_camera=False,
-    )
-    nav.silent.add("camera")
+    narrow = REAR.mount.model_copy(update={"field_of_view_deg": [-90.0, 90.0]})
+    nav = scanning(replace(REAR, mount=narrow))
     assert nav.drive(START_S, 0.5)[-1].limited_by == "no sensor sees what is ahead"
     assert nav.standing()
 
@@ -185,7 +189,7 @@ def test_a_scanner_with_a_wrong_clock_does_not_stop_the_camera() -> None:
     nav.drive(START_S, 1.0)
     nav.silent.add("scan_front")
     for tick in range(50):
-        now = START_S + 1.0 + PERIOD_S * tick
+        now = START_S + 1.0 + Robot.period_s * tick
         constraints = nav.step(now)
         assert not nav.bridge.on_scan(0, scan_message(now - 4.0), now)
     assert not constraints.stale

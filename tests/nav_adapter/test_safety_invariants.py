@@ -8,70 +8,34 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_policies import policies, robots
+from nav_policies import STEPS_S, Walk, driven, histories, policies, robots
 from nav_scenes import crowds, finite, moved_person, moved_robot, numbers, robot_at
 from shapely.geometry import Point
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
 from perception.anthropometry import BODY_RADIUS_M
-from tracking import PersonTrack
 
 ROUNDING = 1e-9
 # Random histories of crowds, robots and policies take long to generate.
 FEW = settings(max_examples=20)
 
-Walk = list[tuple[float, float, tuple[PersonTrack, ...]]]
-
 
 @st.composite
 def walks(draw: st.DrawFn) -> Walk:
-    """Updates: time step, speed of the robot, and people relative to the stamp."""
-    steps = draw(st.lists(st.sampled_from([0.05, 0.1, 0.25, 0.7]), min_size=1, max_size=6))
-    return [(dt, draw(finite(-1.5, 1.5)), draw(crowds())) for dt in steps]
+    """Updates with other people in each of them."""
+    steps = draw(st.lists(STEPS_S, min_size=1, max_size=6))
+    return [(dt, draw(finite(-1.5, 1.5)), 0.0, draw(crowds())) for dt in steps]
 
 
-@st.composite
-def followed(draw: st.DrawFn) -> Walk:
-    """The same few people in every update, mostly seen, so that awareness has an effect."""
-    people = draw(crowds(max_size=2))
-    steps = draw(st.lists(st.sampled_from([0.05, 0.1, 0.25, 0.7]), min_size=2, max_size=10))
-    return [
-        (
-            dt,
-            draw(finite(-1.5, 1.5)),
-            tuple(
-                replace(
-                    track,
-                    stamp_s=0.0,
-                    status=draw(st.sampled_from(["confirmed", "confirmed", "coasting"])),
-                    time_since_seen_s=draw(st.sampled_from([0.0, 0.0, 0.0, 0.4])),
-                    awareness_lower=draw(finite(0.0, 1.0)),
-                )
-                for track in people
-            ),
-        )
-        for dt in steps
-    ]
-
-
-def run(
-    policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, *, perceived: bool = False
-) -> list[NavConstraints]:
-    adapter, now, results = NavAdapter(policy, robot), 0.0, []
-    for dt, speed, people in walk:
-        now += dt
-        tracks = tuple(replace(track, stamp_s=track.stamp_s + now) for track in people)
-        state = robot_at(now, heading_rad=0.3, speed_mps=speed)
-        stamp_s = now if perceived else None
-        results.append(adapter.update(tracks, state, now, perception_stamp_s=stamp_s))
-    return results
+def run(policy: AwarenessPolicy, robot: RobotProfile, walk: Walk) -> list[NavConstraints]:
+    return driven(policy, robot, walk, perceived=False)
 
 
 @FEW
 @given(policy=policies(), robot=robots(), walk=walks())
 def test_floor_and_ceiling(policy: AwarenessPolicy, robot: RobotProfile, walk: Walk) -> None:
     margins = policy.margins
-    for (_, _, people), result in zip(walk, run(policy, robot, walk), strict=True):
+    for (*_, people), result in zip(walk, run(policy, robot, walk), strict=True):
         assert {track.id for track in people} <= {o.track_id for o in result.obstacles}
         assert 0.0 <= result.speed_limit_mps <= robot.max_speed_mps
         assert result.reachable_speed_limit_mps >= result.speed_limit_mps
@@ -89,7 +53,7 @@ def test_never_faster_than_a_protective_field_straight_ahead(
 ) -> None:
     """Whatever the policy, the robot stops before the body of somebody in its straight path."""
     result = run(policy, robot, walk)[-1]
-    _, speed, people = walk[-1]
+    _, speed, _, people = walk[-1]
     along = np.array([np.cos(0.3), np.sin(0.3)]) * (1.0 if speed > -0.05 else -1.0)
     corners = robot.footprint_m[:, 0] * (1.0 if speed > -0.05 else -1.0)
     a, T = robot.max_deceleration_mps2, robot.reaction_time_s
@@ -115,15 +79,15 @@ def test_no_policy_is_looser_than_the_protective_field_alone(
 
 
 @FEW
-@given(policy=policies(), robot=robots(), walk=followed(), data=st.data())
+@given(policy=policies(), robot=robots(), walk=histories(10, complete=True), data=st.data())
 def test_more_awareness_never_means_more_room_or_less_speed(
     policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, data: st.DataObject
 ) -> None:
     """Over whole histories, with lower bounds that are smaller in every update."""
     share = data.draw(st.lists(finite(0.0, 1.0), min_size=len(walk), max_size=len(walk)))
     lower = [
-        (dt, v, tuple(replace(t, awareness_lower=s * t.awareness_lower) for t in people))
-        for s, (dt, v, people) in zip(share, walk, strict=True)
+        (*motion, tuple(replace(t, awareness_lower=s * t.awareness_lower) for t in people))
+        for s, (*motion, people) in zip(share, walk, strict=True)
     ]
     _assert_ordered(run(policy, robot, lower), run(policy, robot, walk))
 
@@ -137,10 +101,10 @@ def _assert_ordered(careful: list[NavConstraints], bold: list[NavConstraints]) -
 
 
 @FEW
-@given(policy=policies(), robot=robots(), walk=followed())
+@given(policy=policies(), robot=robots(), walk=histories(10, complete=True))
 def test_every_rate_is_bounded(policy: AwarenessPolicy, robot: RobotProfile, walk: Walk) -> None:
     results, rate = run(policy, robot, walk), policy.timing.shrink_rate_mps
-    for (dt, speed, _), before, after in zip(walk[1:], results, results[1:], strict=False):
+    for (dt, speed, *_), before, after in zip(walk[1:], results, results[1:], strict=False):
         for was, now in zip(before.obstacles, after.obstacles, strict=True):
             # A sighting counts for the time since the last one, up to ``fresh_within_s``.
             counted_s = max(dt, policy.timing.fresh_within_s)
@@ -169,7 +133,7 @@ def test_rotating_and_shifting_the_world_changes_no_constraint(
     shift: tuple[float, float],
 ) -> None:
     here, there, now = NavAdapter(policy, robot), NavAdapter(policy, robot), 0.0
-    for dt, speed, people in walk:
+    for dt, speed, _, people in walk:
         now += dt
         tracks = tuple(replace(track, stamp_s=track.stamp_s + now) for track in people)
         state = robot_at(now, speed_mps=speed)
@@ -192,10 +156,10 @@ def test_the_order_of_people_does_not_matter(
     policy: AwarenessPolicy, robot: RobotProfile, walk: Walk, order: object
 ) -> None:
     shuffled = []
-    for dt, speed, people in walk:
+    for dt, speed, _, people in walk:
         mixed = list(people)
         order.shuffle(mixed)
-        shuffled.append((dt, speed, tuple(mixed)))
+        shuffled.append((dt, speed, 0.0, tuple(mixed)))
     for one, other in zip(run(policy, robot, walk), run(policy, robot, shuffled), strict=True):
         assert numbers(one) == numbers(other)
         assert one.alerts == other.alerts
@@ -205,7 +169,7 @@ def test_the_order_of_people_does_not_matter(
 @given(
     policy=policies(),
     robot=robots(),
-    walk=followed(),
+    walk=histories(10, complete=True),
     age=finite(0.0, 3.0),
     share=finite(0.0, 1.0),
 )
@@ -216,7 +180,7 @@ def test_stale_is_never_looser_than_fresh(
     after = []
     for late in (0.0, age):
         adapter, now = NavAdapter(policy, robot), 0.0
-        for dt, speed, people in walk:
+        for dt, speed, _, people in walk:
             now += dt
             tracks = tuple(replace(track, stamp_s=now) for track in people)
             state = robot_at(now, speed_mps=speed)

@@ -53,18 +53,6 @@ def test_speed_is_the_root_of_the_protective_separation(
         assert speed == pytest.approx(brentq(spare, 0.0, 100.0, xtol=1e-13), abs=1e-9)
 
 
-@given(low=finite(-1.0, 20.0), more=finite(0.0, 5.0), human=finite(0.0, 3.0), **SETTINGS)
-def test_the_limit_never_falls_with_separation_or_rises_with_human_speed(
-    low: float, more: float, human: float, **settings: float
-) -> None:
-    assert max_speed_mps(low + more, human, **settings) >= max_speed_mps(low, human, **settings)
-    # Two roots of nearly equal size may differ by rounding.
-    assert (
-        max_speed_mps(low, human + more, **settings)
-        <= max_speed_mps(low, human, **settings) + 1e-12
-    )
-
-
 def test_the_limit_broadcasts_and_is_0_where_it_must_be() -> None:
     limits = max_speed_mps(
         np.array([[-1.0], [0.58], [np.nan], [4.0]]),

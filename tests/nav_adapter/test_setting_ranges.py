@@ -47,6 +47,12 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
         "voice_within_s": (3.5, 0.0, 30.0),
         "horn_within_s": (2.0, 0.0, 30.0),
     },
+    "attention": {
+        "min_gain_s": (0.5, 0.0, 10.0),
+        "pause_s": (2.0, 1.0, 60.0),
+        "per_minute": (6, 1, 60),
+        "within_m": (8.0, 0.0, 30.0),
+    },
 }
 OPEN = {
     ("inflation", "aware_above", "low"),
@@ -55,6 +61,7 @@ OPEN = {
     ("inflation", "aware_radius_m", "low"),
     ("speed", "aware_above", "low"),
     ("speed", "unaware_below", "high"),
+    ("attention", "within_m", "low"),
     *(("timing", name, "low") for name in RANGES["timing"] if name != "hold_s"),
 }
 
@@ -67,6 +74,8 @@ def test_defaults_and_ranges(part: str) -> None:
     found = {}
     for name, schema in type(settings).model_json_schema()["properties"].items():
         one: dict[str, Any] = {**schema, **schema.get("anyOf", [{}])[0]}
+        if one["type"] == "array":
+            continue
         low, high = (one.get(key, one.get(f"exclusive{key.title()}")) for key in KEYS)
         found[name] = (getattr(settings, name), low, high)
         for key, end in zip(KEYS, ("low", "high"), strict=True):

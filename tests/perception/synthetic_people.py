@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone, Camera, HeadPose, PersonDetection, PersonKeypoints
+from perception import (
+    AttentionCone,
+    Camera,
+    HeadPose,
+    PersonDetection,
+    PersonKeypoints,
+    PnpHeadPoseEstimator,
+)
 from perception.anthropometry import EYES_HEAD_M, HEAD_TEMPLATE_M
 from perception.awareness import estimate_awareness
 
@@ -25,7 +32,6 @@ FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 _SHOULDER, _ELBOW, _WRIST = (0.007, 0.175, 0.537), (0.025, 0.363, 0.313), (0.193, 0.501, 0.168)
 _HIP, _KNEE, _ANKLE = (0.013, 0.099, 0.0), (0.022, 0.156, -0.424), (-0.003, 0.197, -0.849)
 _NOSE = (0.151, 0.0, 0.734)
-_FLOOR_UP = -0.93
 # Upright, facing the camera: forward = −z, left = +x, up = −y of the camera.
 _CAMERA_FROM_BODY = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]])
 # From the head frame (x down, y forward, z right) to forward, left, up of the body.
@@ -84,6 +90,14 @@ def person_at(
     chest = 0.7 * points[5:7].mean(axis=0) + 0.3 * points[11:13].mean(axis=0)
     eyes = points[0] + rotation @ EYES_HEAD_M * scale
     return SyntheticPerson(points, chest, rotation, eyes)
+
+
+class KnownShape(PnpHeadPoseEstimator):
+    """An estimator that takes all heads for ones of exactly the template's shape."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._shape_factor_m = None
 
 
 class Given:

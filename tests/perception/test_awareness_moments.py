@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from synthetic_people import FACING, awareness_of
 
 from perception import AttentionCone, HeadPose
 from perception.anthropometry import EYES_HEAD_M
@@ -15,8 +18,6 @@ from perception.eyes import EyeGaze
 CONE = AttentionCone()
 DRAWS = 20_000
 EYE_STD_RAD = (0.12, 0.06)
-# Head axes as columns: x down, y towards the camera, z to the person's right.
-FACING = np.stack([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]], axis=1)
 
 
 def some_head(rng: np.random.Generator) -> HeadPose:
@@ -90,3 +91,19 @@ def test_awareness_is_the_moments_of_the_score(with_eyes: bool, count: int) -> N
         drawn = by_drawing(rng, head, points, extra[row], seen[row], eyes[row])
         pair = found[row].awareness, found[row].awareness_std
         assert pair == pytest.approx(drawn, abs=0.012), row
+
+
+def test_errors_that_turn_head_and_place_together_about_the_robot_cost_nothing() -> None:
+    """A turn about the camera moves gaze and line of sight alike, so the angle between them stays.
+
+    The signs of what a turn does to the gaze, to the eyes' place and to the line of sight must fit.
+    """
+    place = np.array([0.3, -0.2, 0.6])
+    for axis, yaw in product(np.eye(3), (0.0, 0.5, -0.8)):
+        rotation = Rotation.from_euler("y", yaw).as_matrix() @ FACING
+        turn = np.concatenate([axis, np.cross(axis, place)])
+        covariance = 0.05**2 * np.outer(turn, turn) + 1e-12 * np.eye(6)
+        alpha, std = awareness_of(HeadPose(place, rotation, covariance, 0.0))
+        nominal = CONE.score(place + rotation @ EYES_HEAD_M, rotation[:, 1], np.zeros(3))
+        assert alpha == pytest.approx(nominal, abs=1e-3)
+        assert std < 2e-3

@@ -15,7 +15,7 @@ CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
 
 def scale_of(person):
     """Return the factor from the skeleton's unit to metres."""
-    placed = place_bodies(CAMERA, [person], 1.0)[0].keypoints_camera_m
+    placed = place_bodies(CAMERA, (person,), 1.0)[0].keypoints_camera_m
     return np.ptp(placed[:, 1]) / np.ptp(person.keypoints_root_m[:, 1])
 
 
@@ -39,7 +39,7 @@ def relative_errors(*, lift_std_m, unit, stature_m=1.74, count=200, seed=0):
             stature_m=stature_m,
         )
         seen = person.keypoints(CAMERA, 1.0, rng, lift_std_m=lift_std_m, unit=unit)
-        body = place_bodies(CAMERA, [inside(seen)], 1.0)[0]
+        body = place_bodies(CAMERA, (inside(seen),), 1.0)[0]
         error = np.linalg.norm(body.position_camera_m - person.chest_camera_m)
         errors.append(error / np.linalg.norm(person.chest_camera_m))
     return np.array(errors)
@@ -74,8 +74,8 @@ def test_one_outlier_hardly_moves_the_body():
     pixels = np.array(keypoints.keypoints_px)
     pixels[10] += (250.0, -180.0)
     outlier = PersonKeypoints(pixels, keypoints.keypoints_root_m, keypoints.scores, "coco")
-    moved = place_bodies(CAMERA, [outlier], 1.0)[0].position_camera_m
-    still = place_bodies(CAMERA, [keypoints], 1.0)[0].position_camera_m
+    moved = place_bodies(CAMERA, (outlier,), 1.0)[0].position_camera_m
+    still = place_bodies(CAMERA, (keypoints,), 1.0)[0].position_camera_m
     assert np.linalg.norm(moved - still) < 0.06
 
 
@@ -84,7 +84,7 @@ def test_a_body_with_two_keypoints_has_no_position():
     scores = np.zeros(17)
     scores[[5, 6]] = 1.0
     two = PersonKeypoints(person.keypoints_px, person.keypoints_root_m, scores, "coco")
-    assert place_bodies(CAMERA, [two], 1.0)[0] is None
+    assert place_bodies(CAMERA, (two,), 1.0)[0] is None
 
 
 def test_a_body_of_which_only_the_head_is_seen_has_a_larger_covariance():
@@ -93,7 +93,7 @@ def test_a_body_of_which_only_the_head_is_seen_has_a_larger_covariance():
     head_only = PersonKeypoints(
         person.keypoints_px, person.keypoints_root_m, np.r_[np.ones(5), np.zeros(12)], "coco"
     )
-    whole, head = (place_bodies(CAMERA, [seen], 1.0)[0] for seen in (person, head_only))
+    whole, head = (place_bodies(CAMERA, (seen,), 1.0)[0] for seen in (person, head_only))
     error = head.position_camera_m - truth.chest_camera_m
     assert error @ np.linalg.solve(head.position_covariance_m2, error) < 7.81
     assert head.position_covariance_m2[2, 2] > 2.0 * whole.position_covariance_m2[2, 2]

@@ -34,11 +34,6 @@ def keypoints(*scores):
     return PersonKeypoints(np.zeros((17, 2)), np.zeros((17, 3)), values, "coco")
 
 
-@given(probabilities)
-def test_neutral_keypoints_leave_the_score_as_it_is(score):
-    assert RULE.score(detection(score), keypoints(NEUTRAL)) == pytest.approx(score, abs=2e-4)
-
-
 @given(probabilities, probabilities, probabilities, probabilities)
 def test_the_score_grows_with_the_detectors_and_with_the_keypoints(first, second, low, high):
     first, second = sorted((first, second))

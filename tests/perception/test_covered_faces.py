@@ -10,11 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from synthetic_people import FACING, Given, awareness_of, person_at
+from synthetic_people import FACING, awareness_of, person_at
 
 from perception import (
     AttentionCone,
-    AwarenessPipeline,
     Camera,
     HeadPose,
     PersonKeypoints,
@@ -23,10 +22,9 @@ from perception import (
 from perception.evidence import judge_face
 
 CAMERA = Camera.from_fov(1280, 960, math.radians(60.0))
-FRAME = np.zeros((960, 1280, 3), np.uint8)
 CONE = AttentionCone()
 EYE_STD_RAD = (0.2, 0.06)
-COUNT = 150
+COUNT = 80
 # Scores of nose, left eye, right eye, left ear, right ear.
 COVERED = {
     "cup": (0, 1, 1, 1, 1),
@@ -128,13 +126,6 @@ def _face_on_the_hair(keypoints, rng):
         spread = rng.normal(0.0, 0.06 * np.linalg.norm(across), 2)
         pixels[row] = middle + aside * across + up * above + spread
     return replace(keypoints, keypoints_px=pixels)
-
-
-def test_a_face_without_a_nose_in_the_pipeline():
-    for row, (_, keypoints) in enumerate(people(7500, COVERED["cup"], count=30)):
-        known = Given([keypoints])
-        (person,) = AwarenessPipeline(CAMERA, known, known).process(FRAME, float(row))
-        assert person.awareness > 0.3
 
 
 @pytest.mark.parametrize(

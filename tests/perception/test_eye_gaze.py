@@ -153,12 +153,6 @@ def head_off(yaw_deg, std_rad=0.05):
     return head_at(math.radians(yaw_deg), eyes_at=(0.0, 0.0, 1.5), covariance=covariance)
 
 
-@given(st.floats(-70.0, 70.0), st.floats(0.0, 0.2))
-def test_eyes_that_are_not_known_change_nothing_to_the_bit(yaw_deg, std_rad):
-    head = head_off(yaw_deg, std_rad)
-    assert awareness(head, (None,)) == awareness(head, ())
-
-
 @given(st.floats(-70.0, 70.0), st.floats(-0.1, 0.1))
 def test_a_measurement_that_says_nothing_never_raises_awareness(yaw_deg, eye_yaw):
     head = head_off(yaw_deg)

@@ -78,7 +78,7 @@ def test_the_range_is_that_of_cues_that_err_together(range_m: float, head_std: f
     truth = person_at((0.2, 0.1, range_m), stature_m=1.74)
     person = truth.keypoints(CAMERA, 0.0, np.random.default_rng(0))
     alone = observed(person, None)
-    body = place_bodies(CAMERA, [person], KEYPOINT_STD_PX)[0]
+    body = place_bodies(CAMERA, (person,), KEYPOINT_STD_PX)[0]
     assert body is not None
     # A head where the body has it, so that the two agree and only their errors count.
     rotation = truth.rotation_camera_head

@@ -84,14 +84,6 @@ def test_a_person_who_looks_at_any_point_of_the_robot_is_aware():
     assert two_points.awareness > 0.95
 
 
-def test_the_back_of_a_head_is_unaware_with_certainty():
-    person = person_at((0.0, 0.4, 3.0), body_yaw_rad=math.pi)
-    ears_only = np.r_[np.zeros(3), np.ones(14)]
-    (seen,) = processed(known(person, seen=ears_only))
-    assert seen.awareness == 0.0
-    assert seen.awareness_std < 0.05
-
-
 def test_a_head_of_unknown_direction_is_no_evidence_unless_it_shows_no_face():
     person = person_at((0.0, 0.4, 3.0))
     covariance = np.diag([math.radians(30.0) ** 2] * 3 + [0.01**2] * 3)

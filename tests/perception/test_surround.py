@@ -331,25 +331,3 @@ def test_one_pipeline_for_several_cameras_is_not_shared_either() -> None:
     # Somebody new is found within the detector's interval.
     for index in range(10, 16):
         assert headings_seen(pipeline, index, 0.0, 90.0) == [0, 90]
-
-
-def test_a_pipeline_for_another_view_shares_networks_and_knows_nobody() -> None:
-    networks = Networks()
-    first = AwarenessPipeline(VIEW, networks, networks, detect_every_s=0.2)
-
-    def picture(index: int, *, with_person: bool) -> np.ndarray:
-        image = hall(index, 240, 320)
-        image[100:180, 150:170] = _BODY if with_person else 90
-        return image
-
-    for index in range(2):
-        (seen,) = first.process(picture(index, with_person=True), index / RATE_HZ)
-    assert networks.looks == 1
-    second = first.for_another_view()
-    assert second.camera is first.camera
-    assert second.process(picture(2, with_person=False), 2 / RATE_HZ) == ()
-    assert networks.looks == 2
-    # The first one still carries its person.
-    (again,) = first.process(picture(2, with_person=True), 2 / RATE_HZ)
-    assert networks.looks == 2
-    np.testing.assert_allclose(again.position_camera_m, seen.position_camera_m, atol=0.05)

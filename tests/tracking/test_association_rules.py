@@ -105,6 +105,25 @@ def rivals_of(
     return found
 
 
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize(("margin", "distance_m"), [(0.25, 0.5), (0.24, 0.5), (0.25, 0.49)])
+def test_a_rival_at_the_very_edge_counts(count: int, margin: float, distance_m: float) -> None:
+    """With a spread of 1 m² the costs are squared distances, here 0 and 0.25."""
+    config = CONFIG.model_copy(
+        update={"ambiguity_margin": margin, "ambiguity_distance_m": distance_m}
+    )
+    sensors, half = sensors_of(config, None, None), Spread(0.5, 0.0, 0.5)
+    places = [Measurement(x, 0.0, half) for x in (0.0, 0.5)]
+    # The second of the tracks, or of the measurements, is the rival.
+    frame = Frame(1.0, np.eye(4), places[: 3 - count])
+    tracks = [Track(row + 1, places[row], frame, 1, config) for row in range(count)]
+    state = State(tuple(tracks), (FrameClock(),), (Field(),))
+    found = matched(tracks, Step(frame, sensors.all[0], sensors, state, state))
+    (sight,) = [each for each in found.sights if each is not None]
+    assert sight.given is places[0]
+    assert sight.ambiguous == ((margin, distance_m) == (0.25, 0.5))
+
+
 @pytest.mark.parametrize("first", range(0, 240, 40))
 def test_matches_follow_the_rules(first: int) -> None:
     counts = {"matches": 0, "rivals": 0, "new": 0}

@@ -14,11 +14,11 @@ from sim_tests.actors.body import JOINTS, Worker, load_worker
 from sim_tests.dataset import RenderConfig
 from sim_tests.world import Warehouse
 from training.networks import random_background, random_texture
-from training.networks._backgrounds import Backgrounds
 from training.networks._figures import Figure
 from training.networks._looks import FEET, HANDS, HEAD, LOWER, UPPER, parts_of_texture
 from training.networks._postures import POSTURES, random_posture
 from training.networks._scenes import TrainingScene
+from training.networks._textures import Backgrounds
 
 
 @pytest.fixture(scope="module")

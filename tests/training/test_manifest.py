@@ -8,7 +8,7 @@ import pytest
 
 from perception import PerceptionError
 from perception.shipped import ShippedModel, shipped_models, verify_shipped_model
-from training.manifest import update_manifest, write_manifest
+from training.manifest import update_manifest
 
 CARD = """# Something
 
@@ -43,7 +43,7 @@ ENTRY = {
 
 def test_the_manifest_and_the_card_are_written_from_the_file(folder):
     digest = hashlib.sha256(b"weights").hexdigest()
-    write_manifest(folder, [ENTRY])
+    update_manifest(folder, [ENTRY])
     assert shipped_models(folder) == (
         ShippedModel("thing", digest, 7, "Apache-2.0", "1×3×8×8", "Does one thing.", "renders"),
     )
@@ -51,12 +51,12 @@ def test_the_manifest_and_the_card_are_written_from_the_file(folder):
     assert f"- sha256: {digest}\n- size_bytes: 7\n- licence: Apache-2.0\n- input: 1×3×8×8" in card
     assert card.replace(digest, "not exported yet").replace("7", "not exported yet") == CARD
     first = (folder / "thing.md").read_bytes(), (folder / "manifest.json").read_bytes()
-    write_manifest(folder, [ENTRY])
+    update_manifest(folder, [ENTRY])
     assert first == ((folder / "thing.md").read_bytes(), (folder / "manifest.json").read_bytes())
     (folder / "thing.onnx").write_bytes(b"other weights")
     with pytest.raises(PerceptionError, match="altered"):
         verify_shipped_model("thing", folder)
-    write_manifest(folder, [ENTRY])
+    update_manifest(folder, [ENTRY])
     assert verify_shipped_model("thing", folder) == folder / "thing.onnx"
 
 
@@ -70,14 +70,14 @@ def test_the_manifest_and_the_card_are_written_from_the_file(folder):
 def test_nothing_is_written_for_a_card_without_the_lines(folder, old, new, message):
     (folder / "thing.md").write_text(CARD.replace(old, new), encoding="utf-8")
     with pytest.raises(PerceptionError, match=message):
-        write_manifest(folder, [ENTRY])
+        update_manifest(folder, [ENTRY])
     assert not (folder / "manifest.json").exists()
 
 
 def test_nothing_is_written_for_a_missing_file(folder):
     before = (folder / "thing.md").read_bytes()
     with pytest.raises(PerceptionError, match=r"cannot read .*other\.onnx"):
-        write_manifest(folder, [ENTRY, ENTRY | {"name": "other"}])
+        update_manifest(folder, [ENTRY, ENTRY | {"name": "other"}])
     assert (folder / "thing.md").read_bytes() == before
     assert not (folder / "manifest.json").exists()
 

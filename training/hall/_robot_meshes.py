@@ -91,42 +91,39 @@ def _body(wheel_gap_m: float = 0.06) -> Iterator[Mesh]:
     x, y = _HALF_LENGTH_M, _HALF_WIDTH_M
     inner = y - wheel_gap_m
     # The chassis is narrow between the wheels, and as wide as the cover ahead and behind.
-    yield box((0.0, 0.0, 0.27), (0.36, 2.0 * inner, 0.34), _dark_sides())
+    yield _solid((0.0, 0.0, 0.27), (0.36, 2.0 * inner, 0.34), "dark")
     for side in (1.0, -1.0):
         middle = side * (x - 0.095)
-        yield box(
-            (middle, 0.0, 0.11), (0.19, 2.0 * y, 0.08), dict.fromkeys(_SIDE_FACES, _region("dark"))
-        )  # bumper
+        yield _solid((middle, 0.0, 0.11), (0.19, 2.0 * y, 0.08), "dark")  # bumper
         yield box(
             (middle - side * 0.005, 0.0, 0.275), (0.18, 2.0 * y - 0.02, 0.25), _shell_sides(side)
         )
-        yield box(
-            (middle, 0.0, 0.165),
-            (0.186, 2.0 * y - 0.006, 0.03),
-            dict.fromkeys(_SIDE_FACES, _region("rubber")),
-        )
+        yield _solid((middle, 0.0, 0.165), (0.186, 2.0 * y - 0.006, 0.03), "rubber")
     yield from _shell(x, y, 0.06, 0.40, 0.435, "dark")
     yield from _shell(x - 0.006, y - 0.006, 0.06, 0.435, 0.455, "glow")
     yield from _shell(x, y, 0.06, 0.455, 0.545, "shell")
     yield from _shell(x - 0.012, y - 0.012, 0.05, 0.545, 0.556, "trim")
     yield _lid(x - 0.012, y - 0.012, 0.05, 0.556, "deck")
-    under = quad([(-x, -y, 0.4), (-x, y, 0.4), (x, y, 0.4), (x, -y, 0.4)], _region("dark"))
-    yield under
+    yield quad([(-x, -y, 0.4), (-x, y, 0.4), (x, y, 0.4), (x, -y, 0.4)], _region("dark"))
     for side in (1.0, -1.0):  # name plate on the cover's sides
-        face = [
-            (-0.24, -0.001, 0.46),
-            (0.24, -0.001, 0.46),
-            (0.24, -0.001, 0.54),
-            (-0.24, -0.001, 0.54),
-        ]
+        face = [(-0.24, 0.46), (0.24, 0.46), (0.24, 0.54), (-0.24, 0.54)]
         yield quad(
-            [(-side * px, side * (y + 0.002), pz) for px, _, pz in face],
+            [(-side * px, side * (y + 0.002), pz) for px, pz in face],
             AMR_ATLAS.region("flank", (0.02, 0.38, 0.9, 0.84)),
         )
 
 
-def _dark_sides() -> dict[str, Region]:
-    return dict.fromkeys(_SIDE_FACES, _region("dark"))
+def _solid(
+    center: tuple[float, float, float],
+    size: tuple[float, float, float],
+    sides: str,
+    top: str = "",
+    under: str = "",
+) -> Mesh:
+    """Return a box with one atlas cell on its sides; no top or underside unless they are named."""
+    regions = dict.fromkeys(_SIDE_FACES, _region(sides))
+    regions |= {face: _region(name) for face, name in (("+z", top), ("-z", under)) if name}
+    return box(center, size, regions)
 
 
 def _shell_sides(side: float) -> dict[str, Region]:
@@ -156,18 +153,9 @@ def _deck() -> Iterator[Mesh]:
         yield tube(
             [(0.24, py, 0.6, 0.018, 0.018), (0.24, py, 0.578, 0.02, 0.02)], 8, _region("red")
         )
-    sides = dict.fromkeys(_SIDE_FACES, _region("tote_side"))
-    yield box((-0.12, 0.0, 0.706), (0.40, 0.42, 0.298), sides)
-    yield box(
-        (-0.12, 0.0, 0.866),
-        (0.42, 0.44, 0.03),
-        {**dict.fromkeys(_SIDE_FACES, _region("lid")), "+z": _region("lid"), "-z": _region("lid")},
-    )
-    yield box(
-        (-0.12, 0.0, 0.885),
-        (0.34, 0.36, 0.01),
-        {**dict.fromkeys(_SIDE_FACES, _region("lid")), "+z": _region("tote")},
-    )
+    yield _solid((-0.12, 0.0, 0.706), (0.40, 0.42, 0.298), "tote_side")
+    yield _solid((-0.12, 0.0, 0.866), (0.42, 0.44, 0.03), "lid", "lid", "lid")
+    yield _solid((-0.12, 0.0, 0.885), (0.34, 0.36, 0.01), "lid", "tote")
 
 
 def _post() -> Iterator[Mesh]:
@@ -179,15 +167,7 @@ def _post() -> Iterator[Mesh]:
         [(0.12, 0.0, 0.60, 0.032, 0.032), (0.12, 0.0, 0.556, 0.05, 0.05)], 10, _region("dark")
     )
     top = CAMERA_HEIGHT_M
-    yield box(
-        (0.118, 0.0, top),
-        (0.06, 0.17, 0.05),
-        {
-            **dict.fromkeys(_SIDE_FACES, _region("dark")),
-            "+z": _region("dark"),
-            "-z": _region("dark"),
-        },
-    )
+    yield _solid((0.118, 0.0, top), (0.06, 0.17, 0.05), "dark", "dark", "dark")
     for py in (-0.055, 0.055):
         yield quad(
             [
@@ -201,7 +181,7 @@ def _post() -> Iterator[Mesh]:
     yield tube(
         [(0.1, 0.0, 1.45, 0.016, 0.016), (0.1, 0.0, 1.425, 0.018, 0.018)], 8, _region("glow")
     )
-    yield box((0.075, 0.0, 1.02), (0.05, 0.03, 0.03), _dark_sides())
+    yield _solid((0.075, 0.0, 1.02), (0.05, 0.03, 0.03), "dark")
     bar = tube([(0, 0, 0.1, 0.013, 0.013), (0, 0, -0.1, 0.013, 0.013)], 8, _region("rubber"))
     yield bar.transformed(_Z_TO_Y, (0.05, 0.0, 1.02))
 
@@ -209,7 +189,7 @@ def _post() -> Iterator[Mesh]:
 def _casters() -> Iterator[Mesh]:
     for py in (-0.15, 0.15):
         yield ellipsoid((-0.27, py, 0.04), (0.04, 0.025, 0.04), 10, 6, _region("rubber"))
-        yield box((-0.27, py, 0.075), (0.05, 0.06, 0.03), _dark_sides())
+        yield _solid((-0.27, py, 0.075), (0.05, 0.06, 0.03), "dark")
 
 
 def _wheel(side: float) -> Mesh:

@@ -103,14 +103,6 @@ def main() -> None:
         "--device", default=AUTO, help="auto, cpu, cuda or cuda:N (default: %(default)s)"
     )
     parser.add_argument(
-        "--from",
-        dest="start",
-        type=Path,
-        metavar="FOLDER",
-        help="folder of exported networks; training goes on from those that are there (default: "
-        "from nothing)",
-    )
-    parser.add_argument(
         "--long",
         action="store_true",
         help="train the head network as long as the shipped one, for a GPU with many cores",
@@ -130,10 +122,6 @@ def main() -> None:
         torch_device(chosen.device)
     except ValueError as cause:
         parser.error(str(cause))
-    starts = {} if chosen.start is None else _starts(chosen.start)
-    if chosen.start is not None and not starts:
-        files = ", ".join(f"{name}.onnx" for name in _FILES.values())
-        parser.error(f"--from must be a folder with one of {files}, got {chosen.start}")
     cv2.setNumThreads(1)
     work: Path = chosen.work
     shards, check = work / "shards", work / "shards_check"
@@ -145,17 +133,10 @@ def main() -> None:
         make_shards(held_out, others, check, chosen.processes)
     for name, train in _TRAINERS.items():
         if name in stages:
-            start = starts.get(name)
-            train(Run(recipe, shards, check, work / "checkpoints", chosen.device, start))
+            train(Run(recipe, shards, check, work / "checkpoints", chosen.device))
     if "export" in stages:
         names = set(_TRAINERS) & set(stages) or set(_TRAINERS)
         _export(recipe, check, work / "checkpoints", chosen.out, names)
-
-
-def _starts(folder: Path) -> dict[str, Path]:
-    """Return the files of exported networks in a folder, by stage."""
-    files = {stage: folder / f"{name}.onnx" for stage, name in _FILES.items()}
-    return {stage: path for stage, path in files.items() if path.is_file()}
 
 
 def _crowd(recipe: Recipe, folder: Path) -> tuple[str, ...]:

@@ -49,16 +49,6 @@ class Clutter:
         self.actor: int = warehouse.add_actor(self)
 
     @property
-    def height_m(self) -> float:
-        """Top of the shape above its origin."""
-        return float(self._mesh.vertices_m[:, 2].max())
-
-    @property
-    def base_m(self) -> float:
-        """Bottom of the shape below its origin."""
-        return -float(self._mesh.vertices_m[:, 2].min())
-
-    @property
     def radius_m(self) -> float:
         """Radius of a sphere about the origin that holds the shape."""
         return self._radius_m

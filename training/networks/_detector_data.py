@@ -24,12 +24,12 @@ from ._augment import (
     warp,
     within_rectangle,
 )
-from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked_images
 from ._degradation import random_degradation, rolling_shutter
 from ._detector_net import HEIGHT, WIDTH
 from ._samples import DIRECTIONS, layered_picture
 from ._shard_file import read_shards
+from ._textures import Backgrounds
 
 #: Number to which the people of an image are padded in a batch.
 MAX_PEOPLE: Final = 8

@@ -14,13 +14,11 @@ from ._detector_data import DetectorData
 from ._detector_net import GRID, DetectorNet, cells
 from ._fit import fit
 from ._recipe import Run
-from ._start import start_from, unseen
 
 _CANDIDATES: Final = 10
 _ALPHA, _BETA = 0.5, 6.0
 
-# Highest learning rate from nothing, and from a trained network.
-_LEARNING_RATES: Final = (2e-3, 1e-3)
+_LEARNING_RATE: Final = 2e-3  # the highest
 
 
 def train_detector(run: Run) -> nn.Module:
@@ -30,19 +28,15 @@ def train_detector(run: Run) -> nn.Module:
     data = DetectorData(run.shards, recipe.seed, recipe.backgrounds)
     check = DetectorData(run.held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.frames)} images for training, {check.stills} held out", flush=True)
-    net = DetectorNet()
-    if run.start is not None:
-        batches = unseen(lambda step: normalised(data.batch(step)["image"]))
-        start_from(net, run.start, batches)
     return fit(
         "detector",
-        net,
+        DetectorNet(),
         data.batch,
         detector_loss,
         steps=recipe.detector_steps,
         folder=run.checkpoints,
         device=run.device,
-        learning_rate=run.learning_rate(*_LEARNING_RATES),
+        learning_rate=_LEARNING_RATE,
         judge=lambda net: judge_detector(net, check),
     )
 

@@ -24,12 +24,12 @@ from ._augment import (
     warp,
     with_surroundings,
 )
-from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked
 from ._degradation import degrade, random_degradation
 from ._head_sample import LEAST_SEEN, SIZE, HeadSample, cropped
 from ._samples import HEAD_SIDE_M, ImageSample, Patch, PersonTruth, layered_picture
 from ._shard_file import read_shards
+from ._textures import Backgrounds
 
 #: Part of an image kept around a head, as a share of the crop's side.
 _REACH: Final = 0.95

@@ -15,12 +15,9 @@ from ._fit import fit
 from ._head_data import LATE, HeadData
 from ._head_net import BINS, SPAN, HeadNet, averaged, head_rotation, keypoint_means, spread_factor
 from ._recipe import Run
-from ._start import start_from, unseen
 
 MEAN, STD = 120.0, 60.0
 _DEGREES_OF_FREEDOM = 5.0
-# Highest learning rate from a trained network, which 1.5e-3 would undo.
-_RATE_FROM_TRAINED = 6e-4
 _WEIGHT_DECAY = 0.03
 
 
@@ -31,13 +28,9 @@ def train_head(run: Run) -> nn.Module:
     data = HeadData(run.shards, recipe.seed, recipe.backgrounds)
     check = HeadData(run.held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.heads)} heads for training, {len(check.heads)} held out", flush=True)
-    net = HeadNet()
-    if run.start is not None:
-        batches = unseen(lambda step: normalised(data.batch(step, LATE)["image"]))
-        start_from(net, run.start, batches)
     return fit(
         "head",
-        net,
+        HeadNet(),
         lambda step: data.batch(
             step, step / recipe.head_steps, recipe.head_batch, recipe.head_crops
         ),
@@ -45,7 +38,7 @@ def train_head(run: Run) -> nn.Module:
         steps=recipe.head_steps,
         folder=run.checkpoints,
         device=run.device,
-        learning_rate=run.learning_rate(recipe.head_rate, _RATE_FROM_TRAINED),
+        learning_rate=recipe.head_rate,
         weight_decay=_WEIGHT_DECAY,
         average_over=1000,
         judge=lambda net: judge_head(net, check),

@@ -23,12 +23,12 @@ from ._augment import (
     with_surroundings,
     within_rectangle,
 )
-from ._backgrounds import Backgrounds
 from ._batch import Batch, stacked
 from ._degradation import random_degradation
 from ._pose_net import HEIGHT, WIDTH
 from ._samples import PersonTruth, layered_picture
 from ._shard_file import read_shards
+from ._textures import Backgrounds
 
 _SWAP: Final = [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
 _PADDING: Final = 1.25

@@ -15,14 +15,12 @@ from ._fit import fit
 from ._pose_data import PoseData
 from ._pose_net import BINS_X, BINS_Y, BINS_Z, SPLIT, PoseNet, z_bins, z_metres
 from ._recipe import Run
-from ._start import start_from, unseen
 
 MEAN: Final = (123.675, 116.28, 103.53)
 STD: Final = (58.395, 57.12, 57.375)
 _SIGMA_XY_BINS: Final = 3.0
 _SIGMA_Z_BINS: Final = 2.5
-# Highest learning rate from nothing, and from a trained network.
-_LEARNING_RATES: Final = (2e-3, 1e-3)
+_LEARNING_RATE: Final = 2e-3  # the highest
 
 
 def train_pose(run: Run) -> nn.Module:
@@ -32,19 +30,15 @@ def train_pose(run: Run) -> nn.Module:
     data = PoseData(run.shards, recipe.seed, recipe.backgrounds)
     check = PoseData(run.held_out, recipe.seed, recipe.check_backgrounds)
     print(f"{len(data.people)} people for training, {len(check.people)} held out", flush=True)
-    net = PoseNet()
-    if run.start is not None:
-        batches = unseen(lambda step: normalised(data.batch(step)["image"]))
-        start_from(net, run.start, batches)
     return fit(
         "pose",
-        net,
+        PoseNet(),
         data.batch,
         pose_loss,
         steps=recipe.pose_steps,
         folder=run.checkpoints,
         device=run.device,
-        learning_rate=run.learning_rate(*_LEARNING_RATES),
+        learning_rate=_LEARNING_RATE,
         judge=lambda net: judge_pose(net, check),
     )
 

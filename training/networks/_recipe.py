@@ -30,7 +30,7 @@ class Recipe:
         head_steps: optimiser steps.
         head_batch: crops of a step.
         head_crops: crops of it that are cut from one photographed head.
-        head_rate: highest learning rate from nothing.
+        head_rate: highest learning rate.
     """
 
     seed: int = 0
@@ -96,8 +96,6 @@ class Run:
         held_out: folder of the data of other people, for figures.
         checkpoints: folder of the checkpoints and logs.
         device: see :func:`._fit.torch_device`.
-        start: file of an exported network of the same type that training goes on from; None is
-            training from nothing.
     """
 
     recipe: Recipe
@@ -105,8 +103,3 @@ class Run:
     held_out: Path
     checkpoints: Path
     device: str
-    start: Path | None = None
-
-    def learning_rate(self, from_nothing: float, from_trained: float) -> float:
-        """Return the highest learning rate: a trained network asks for a lower one."""
-        return from_nothing if self.start is None else from_trained

@@ -18,6 +18,8 @@ Floats = NDArray[np.float32]
 Image = NDArray[np.uint8]
 
 _PALETTE: Final = (2, 6)
+# Size of the stored backgrounds.
+_BACKGROUND_HW: Final = (300, 384)
 # Colours of wood, concrete, plants, skin and sky, in which real scenery is richer than in others.
 _NATURAL: Final = np.array(
     [
@@ -36,16 +38,7 @@ def random_texture(rng: np.random.Generator, size_hw: tuple[int, int]) -> Image:
         rng: random generator.
         size_hw: height and width in pixels.
     """
-    kinds: tuple[Callable[..., Floats], ...] = (
-        _noise,
-        _noise,
-        _stripes,
-        _checks,
-        _cells,
-        _gradient,
-    )
-    kind = kinds[int(rng.integers(len(kinds)))]
-    out = _coloured(kind(rng, size_hw), rng)
+    out = _coloured(_KINDS[int(rng.integers(len(_KINDS)))](rng, size_hw), rng)
     if rng.random() < 0.4:
         other = _coloured(_KINDS[int(rng.integers(len(_KINDS)))](rng, size_hw), rng)
         mask = _noise(rng, size_hw)[..., None]
@@ -88,6 +81,31 @@ def random_background(rng: np.random.Generator, size_hw: tuple[int, int]) -> Ima
     if rng.random() < 0.5:
         out = np.asarray(cv2.GaussianBlur(out, (0, 0), rng.uniform(0.4, 2.5)), dtype=np.uint8)
     return out
+
+
+class Backgrounds:
+    """Random pictures without people; every training step takes random parts of them.
+
+    Args:
+        count: number of pictures, ≥ 1.
+        seed: of all of them.
+    """
+
+    def __init__(self, count: int, seed: int) -> None:
+        if count < 1:
+            raise ValueError(f"count must be at least 1, got {count}")
+        self._pictures = [
+            random_background(np.random.default_rng([seed, 51, number]), _BACKGROUND_HW)
+            for number in range(count)
+        ]
+
+    def random(self, rng: np.random.Generator) -> NDArray[np.uint8]:
+        """Return one of the pictures."""
+        return self._pictures[int(rng.integers(len(self._pictures)))]
+
+    def sometimes(self, rng: np.random.Generator, share: float) -> NDArray[np.uint8] | None:
+        """Return one of the pictures with this probability, else None."""
+        return self.random(rng) if rng.random() < share else None
 
 
 def _noise(

@@ -97,15 +97,16 @@ def calibration_feeds(images: Path, models: Mapping[str, Path]) -> dict[str, lis
     return {name: model.feeds for name, model in loaded.items()}
 
 
-def quantise(source: Path, feeds: Sequence[Feeds], out: Path, *, full_range: bool = False) -> None:
+def quantise(source: Path, feeds: Sequence[Feeds], out: Path) -> None:
     """Write a network with 8-bit weights and activations; its metadata stay.
+
+    Weights use 7 of their bits: processors without VNNI (older x86) add pairs of products in 16
+    bits, which 8 bits overflow without a message.
 
     Args:
         source: the ONNX file.
         feeds: inputs from which the ranges of the activations come.
         out: file to write.
-        full_range: weights have 8 bits and not 7. Processors without VNNI (older x86) add
-            pairs of products in 16 bits, which 8 bits overflow without a message.
 
     Raises:
         ValueError: for a network that has 8 bits already.
@@ -124,7 +125,7 @@ def quantise(source: Path, feeds: Sequence[Feeds], out: Path, *, full_range: boo
             per_channel=True,
             activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,
-            reduce_range=not full_range,
+            reduce_range=True,
             calibrate_method=CalibrationMethod.MinMax,
             op_types_to_quantize=[*_HEAVY, *_BETWEEN],
             nodes_to_exclude=_outer_nodes(folded),
@@ -233,11 +234,6 @@ def main() -> None:
     parser.add_argument("--models", type=Path, help="folder of the networks (default: the shipped)")
     parser.add_argument("--out", type=Path, required=True, help="folder of the 8-bit networks")
     parser.add_argument(
-        "--full-range",
-        action="store_true",
-        help="8 bits of weight in place of 7, for processors with VNNI or of Arm",
-    )
-    parser.add_argument(
         "--undo",
         action="store_true",
         help="write networks that have 8 bits in floating point, with their rounded weights, for "
@@ -266,7 +262,7 @@ def main() -> None:
             shutil.copy(path, out)
             print(f"{out}: as it was, in 8 bits already")
             continue
-        quantise(path, feeds[name], out, full_range=chosen.full_range)
+        quantise(path, feeds[name], out)
         before, after = run_ms(path, feeds[name]), run_ms(out, feeds[name])
         print(f"{out}: {before:.2f} ms -> {after:.2f} ms ({before / after:.1f} times as fast)")
 

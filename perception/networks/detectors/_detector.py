@@ -58,7 +58,6 @@ class OnnxPersonDetector:
             None takes it from the names of weights and nodes and, for Ultralytics, from the
             metadata, and refuses such a network if they do not tell.
         settings: providers and threads, for a model that is not loaded yet.
-        sha256: expected SHA-256 of the file, for a model that is not loaded yet.
 
     Raises:
         PerceptionError: for a file that cannot be loaded, an unknown layout (the message says what
@@ -74,7 +73,6 @@ class OnnxPersonDetector:
         person_class: int | None = None,
         family: str | None = None,
         settings: OnnxSettings | None = None,
-        sha256: str | None = None,
     ) -> None:
         self._score_threshold = finite_number(
             "score_threshold", score_threshold, minimum=0.0, maximum=1.0
@@ -83,7 +81,7 @@ class OnnxPersonDetector:
             raise PerceptionError(
                 f"person_class must be a whole number of at least 0 or None, got {person_class!r}"
             )
-        self.model = as_onnx_model(path, settings, sha256)
+        self.model = as_onnx_model(path, settings)
         self.input_size_hw_px = _detector_input_size(self.model, input_size_hw_px, family)
         self._layout = self._recognise(person_class, checked_family(family))
         self._letterbox = Letterbox(

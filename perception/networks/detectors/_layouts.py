@@ -242,11 +242,7 @@ def _dets(trial: TrialRun) -> DetectorLayout:
 
 def family_of(model: OnnxModel) -> str | None:
     """Return ``"rtmdet"`` or ``"yolox"`` by the names of its parts; None if they do not tell."""
-    found = [
-        family
-        for family, words in _FAMILY_WORDS.items()
-        if any(word in name for name in model.part_names for word in words)
-    ]
+    found = [family for family, words in _FAMILY_WORDS.items() if model.holds_any(words)]
     return found[0] if len(found) == 1 else None
 
 

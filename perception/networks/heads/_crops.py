@@ -8,7 +8,7 @@ towards the head.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
@@ -131,21 +131,8 @@ def head_crop(
     """
     u, v = finite_array("centre_px", centre_px, (2,)).tolist()
     side = finite_number("side_px", side_px, minimum=0.0, exclusive_minimum=True)
-    matrix = (1.0, 0.0, 0.0, 1.0) if stretch is None else stretch.ravel().tolist()
-    return _cut(image_rgb, u, v, side, size, matrix)
-
-
-def _cut(
-    image_rgb: NDArray[np.uint8],
-    u: float,
-    v: float,
-    side: float,
-    size: int,
-    stretch: Sequence[float],
-) -> NDArray[np.uint8]:
-    """Do the work of :func:`head_crop` for checked numbers; ``stretch`` is row by row."""
     height, width = image_rgb.shape[:2]
-    xx, xy, yx, yy = stretch
+    xx, xy, yx, yy = (1.0, 0.0, 0.0, 1.0) if stretch is None else stretch.ravel().tolist()
     across, down = side * (abs(xx) + abs(xy)), side * (abs(yx) + abs(yy))
     if not (u + 0.5 * across > -1.0 and u - 0.5 * across < width + 1.0) or not (
         v + 0.5 * down > -1.0 and v - 0.5 * down < height + 1.0
@@ -242,11 +229,9 @@ class HeadCrops:
 
     def cut(self, image_rgb: ImageRgb, row: int, size: int) -> NDArray[np.uint8]:
         """Cut crop ``row`` out of the image and scale it to ``size`` × ``size`` pixels."""
-        u, v = self.centre_px[row].tolist()
-        side = float(self.side_px[row])
-        if not (math.isfinite(u + v + side) and side > 0.0):
-            return head_crop(image_rgb, (u, v), side, size)  # it says what is wrong
-        return _cut(image_rgb, u, v, side, size, self.stretch[row].ravel().tolist())
+        return head_crop(
+            image_rgb, self.centre_px[row], float(self.side_px[row]), size, self.stretch[row]
+        )
 
 
 _Grey = NDArray[np.float32]

@@ -68,7 +68,6 @@ class OnnxHeadPoseEstimator:
         path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`; None
             for the shipped network.
         settings: providers and threads, for a model that is not loaded yet.
-        sha256: expected SHA-256 of the file, for a model that is not loaded yet.
         min_score: keypoints with a lower score are not used to find the head.
 
     Raises:
@@ -84,14 +83,13 @@ class OnnxHeadPoseEstimator:
         path: ModelSource | None = None,
         *,
         settings: OnnxSettings | None = None,
-        sha256: str | None = None,
         min_score: float = DEFAULT_MIN_SCORE,
     ) -> None:
         self._min_score = finite_number("min_score", min_score, minimum=0.0, maximum=1.0)
         if path is None:
             path = OnnxModel.shipped(HEAD, settings)
             settings = None
-        self.model = as_onnx_model(path, settings, sha256)
+        self.model = as_onnx_model(path, settings)
         self.layout = recognise(self.model)
 
     def estimate(

@@ -47,7 +47,7 @@ def locate_heads(
     """
     if not people:
         return ()
-    scales = metric_scales(people, min_score)
+    scales = metric_scales(tuple(people), min_score)
     pixels = np.array([person.keypoints_px[kp.BODY] for person in people])
     seen = np.array([person.scores[kp.BODY] for person in people]) >= min_score
     fitted = _weak_perspective(people, pixels, seen).tolist()

@@ -10,18 +10,15 @@ from ._crops import PersonCrops
 from ._estimator import OnnxPoseEstimator
 from ._lift import lift_keypoints, metres_per_pixel
 from ._mediapipe import MediaPipePoseEstimator
-from ._mediapipe_eyes import MediaPipeEyeEstimator, iris_std_m
-from ._simcc import simcc_confidence, simcc_depth_m, simcc_peaks
+from ._mediapipe_eyes import MediaPipeEyeEstimator
+from ._simcc import simcc_peaks
 
 __all__ = [
     "MediaPipeEyeEstimator",
     "MediaPipePoseEstimator",
     "OnnxPoseEstimator",
     "PersonCrops",
-    "iris_std_m",
     "lift_keypoints",
     "metres_per_pixel",
-    "simcc_confidence",
-    "simcc_depth_m",
     "simcc_peaks",
 ]

@@ -54,7 +54,6 @@ class OnnxPoseEstimator:
         path: the ONNX file, its bytes, or a loaded :class:`~perception.networks.OnnxModel`.
         input_size_hw_px: (height, width) for a network that leaves its input size free.
         settings: providers and threads, for a model that is not loaded yet.
-        sha256: expected SHA-256 of the file, for a model that is not loaded yet.
 
     Raises:
         PerceptionError: for a file that cannot be loaded, an unknown layout (the message says what
@@ -67,9 +66,8 @@ class OnnxPoseEstimator:
         *,
         input_size_hw_px: tuple[int, int] | None = None,
         settings: OnnxSettings | None = None,
-        sha256: str | None = None,
     ) -> None:
-        self.model = as_onnx_model(path, settings, sha256)
+        self.model = as_onnx_model(path, settings)
         self._padding = metadata_number(self.model, "box_padding", BOX_PADDING)
         # Data sets place keypoints differently on the body, so limbs differ in length.
         self._limb_scale = metadata_number(self.model, "limb_scale", 1.0)

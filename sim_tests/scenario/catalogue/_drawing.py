@@ -8,15 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from awarenav.figures import (
-    Axes,
-    Circle,
-    Figure,
-    MultipleLocator,
-    Polygon,
-    Wedge,
-    new_figure,
-)
+from awarenav.figures import Axes, Circle, Figure, MultipleLocator, Polygon, Wedge, new_figure
 from perception.arrays import FloatArray
 
 from ...actors.behaviour import PersonSpec, RecordedPath, read_recordings
@@ -74,22 +66,15 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
     if template.parameters():
         for seed in range(_DRAWS):
             for spec in _everybody(template.for_seed(seed)):
-                axes.plot(*_route(spec).T, color=_colour(spec), lw=0.5, alpha=0.35)
+                axes.plot(*_route(spec).T, color=_looks(spec)[0], lw=0.5, alpha=0.35)
     for spec in people:
         _draw_person(axes, spec, now_s, robot_m)
     for path in recorded:
         _draw_recorded(axes, path)
     handles, labels = axes.get_legend_handles_labels()
     shown = dict(zip(labels, handles, strict=True))  # each label once
-    figure.legend(
-        shown.values(),
-        shown.keys(),
-        loc="outside upper center",
-        ncols=4,
-        fontsize=7.5,
-        frameon=False,
-        columnspacing=1.2,
-    )
+    style: dict[str, Any] = {"ncols": 4, "fontsize": 7.5, "frameon": False, "columnspacing": 1.2}
+    figure.legend(shown.values(), shown.keys(), loc="outside upper center", **style)
     return figure
 
 
@@ -126,10 +111,8 @@ def _window(
 def _hall_corners(scenario: Scenario) -> Iterator[FloatArray]:
     """Yield the corners (N, 2) of racks and props."""
     for rack in scenario.layout.racks:
-        x, y, *_ = rack.box_odom_m
-        yield np.array([x, y]) + [rack.length_m, rack.width_m] * np.array(
-            [[0, 0], [1, 0], [1, 1], [0, 1]]
-        )
+        x0, y0, x1, y1 = rack.box_odom_m
+        yield np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
     for prop in scenario.layout.props:
         yield from (np.asarray(corners) for corners in prop.corners_odom_m)
 
@@ -140,22 +123,13 @@ def _draw_robot(axes: Axes, scenario: Scenario, now_s: float) -> FloatArray:
     times = np.arange(0.0, scenario.duration_s, _DOT_STEP_S)
     path = robot_plan(task, times, robot)
     arrived = 1 + int(np.flatnonzero((path == path[-1]).all(axis=1))[0])
-    axes.plot(
-        [task.start_x_m, task.goal_x_m], [task.start_y_m, task.goal_y_m], color=_ROBOT, lw=1.6
-    )
+    ends = np.array([[task.start_x_m, task.start_y_m], [task.goal_x_m, task.goal_y_m]])
+    axes.plot(*ends.T, color=_ROBOT, lw=1.6)
     _draw_times(axes, path[:arrived], times[:arrived], _ROBOT, (0, -9))
-    axes.plot(
-        [task.goal_x_m],
-        [task.goal_y_m],
-        "s",
-        color=_ROBOT,
-        mfc="white",
-        ms=7,
-        zorder=4,
-        label="robot's goal",
-    )
+    goal: dict[str, Any] = {"mfc": "white", "ms": 7, "zorder": 4, "label": "robot's goal"}
+    axes.plot(*ends[1:].T, "s", color=_ROBOT, **goal)
     here = robot_plan(task, np.array([now_s]), robot)[0]
-    heading = math.atan2(task.goal_y_m - task.start_y_m, task.goal_x_m - task.start_x_m)
+    heading = math.atan2(*(ends[1] - ends[0])[::-1].tolist())
     cos, sin = math.cos(heading), math.sin(heading)
     outline = robot.footprint_m @ np.array([[cos, sin], [-sin, cos]]) + here
     axes.add_patch(Polygon(outline, fc=_ROBOT, ec="black", lw=0.8, zorder=5))
@@ -238,10 +212,6 @@ def _draw_sector(
     if dashed:
         look = {"fc": "none", "alpha": 0.8, "ls": "--"}
     axes.add_patch(Wedge((x, y), _SECTOR_M, first, last, ec=colour, lw=0.9, zorder=2, **look))
-
-
-def _colour(spec: PersonSpec) -> str:
-    return _looks(spec)[0]
 
 
 def _looks(spec: PersonSpec) -> tuple[str, str]:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from awarenav.errors import counted
-from awarenav.files import write_text
+from awarenav.files import write_csv
 
 from ...crossing import named_policy
 from ...study.measures import EpisodeRecord
 from ...study.runs import policy_of, policy_text, run_episode
 from ...world.errors import SimError
-from .._settings import write_csv
+from .._settings import write_json
 from ._search import CONTACT_SCORE, Falsification, FalsifySettings
 from ._worst_cases import WorstCase
 
@@ -41,6 +41,7 @@ def write_episodes(falsification: Falsification, path: Path) -> None:
             ]
             for each in falsification.episodes
         ),
+        SimError,
     )
 
 
@@ -101,7 +102,7 @@ def write_summary(
             for case in cases
         ],
     }
-    write_text(path, json.dumps(summary, indent=1, ensure_ascii=False) + "\n", SimError)
+    write_json(path, summary)
 
 
 def table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> list[str]:

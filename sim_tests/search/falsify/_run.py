@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...study.runs import Conditions
-from .._settings import command_text, common_settings, episode_words, print_verdict
+from .._settings import command_text, common_settings, episode_words, print_results
 from ._plot import draw_falsification
 from ._results import (
     policy_against,
@@ -61,13 +61,10 @@ def run_falsify(
     text = verdict_text(found, cases, others)
     write_summary(found, cases, out / "summary.json", verdict=text, against=others)
     draw_falsification(found, cases, out / "falsify.png")
-    if as_json:
-        print((out / "summary.json").read_text(encoding="utf-8"), end="")
-    else:
-        print("\n".join(table_lines(found, cases)))
-        rival = against or (other[0] if other else "")
-        print_verdict(text, _next_command(found, conditions, policy, rival, out))
-        print(f"Written to {out}")
+    rival = against or (other[0] if other else "")
+    following = _next_command(found, conditions, policy, rival, out)
+    table = table_lines(found, cases)
+    print_results(out / "summary.json", table, text, following, as_json=as_json)
     return 1 if found.contacts else 0
 
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, Final
 
 from awarenav.errors import counted
-from awarenav.files import csv_number, write_text
+from awarenav.files import csv_number, write_csv, write_text
 
 from ...actors.behaviour import DEFAULT_POPULATION
 from ...study.measures import FEW_PAIRS, Interval, zero_of_n_upper
 from ...study.runs import policy_text
 from ...world.errors import SimError
-from .._settings import write_csv
+from .._settings import write_json
 from .._study import importances
-from ._evaluation import FIGURES, OBJECTIVE, RISK
-from ._finalists import BEATS_BASE, REASONS, Candidate, level_of
+from ._evaluation import BEATS_BASE, FIGURES, OBJECTIVE, REASONS, RISK, Candidate, level_of
 from ._plot import draw_tuning
 from ._tune import Tuning
 
@@ -38,10 +36,10 @@ def write_tuning(tuning: Tuning, folder: Path) -> None:
         for name, values in zip(FIGURES, (times_s, risks), strict=True)
     }
     _write_trials(tuning, folder / "trials.csv")
-    _write_json(folder / "importances.json", importance)
+    write_json(folder / "importances.json", importance)
     base = tuning.base
     rows = (*tuning.anchors, *tuning.chosen)
-    _write_json(
+    write_json(
         folder / "chosen.json",
         {
             "scenarios": _scenarios(tuning),
@@ -247,7 +245,8 @@ def _write_trials(tuning: Tuning, path: Path) -> None:
                 *(repr(trial.parameters[name]) for name in tuning.ranges),
             ]
         )
-    write_csv(path, ["trial", "state", *FIGURES, *notes, "rank", *tuning.ranges], rows)
+    header = ["trial", "state", *FIGURES, *notes, "rank", *tuning.ranges]
+    write_csv(path, header, rows, SimError)
 
 
 def _figures(tuning: Tuning, candidate: Candidate) -> dict[str, Any]:
@@ -324,7 +323,3 @@ def _scenarios(tuning: Tuning) -> list[str]:
 
 def _ends(seeds: range) -> str:
     return f"{seeds[0]} to {seeds[-1]}"
-
-
-def _write_json(path: Path, data: Any) -> None:
-    write_text(path, json.dumps(data, indent=1, ensure_ascii=False) + "\n", SimError)

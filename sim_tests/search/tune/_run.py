@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...scenario import ScenarioTemplate
 from ...study.runs import Conditions
-from .._settings import command_text, common_settings, episode_words, print_verdict
-from ._finalists import BEATS_BASE
+from .._settings import command_text, common_settings, episode_words, print_results
+from ._evaluation import BEATS_BASE
 from ._policy_space import read_ranges, shipped_ranges
 from ._results import is_undecided, table_lines, verdict_text, write_tuning
 from ._tune import TuneSettings, Tuning, held_out_scenarios, tune
@@ -20,7 +20,6 @@ def run_tune(
     conditions: Conditions,
     policy: str,
     ranges: Path | None,
-    hold_out_scenarios: Sequence[str],
     workers: int,
     out: Path,
     resume: bool,
@@ -43,28 +42,21 @@ def run_tune(
         **common,
         **fields,
         ranges={key: each.model_dump(mode="json") for key, each in searched.items()},
-        hold_out_scenarios=held_out_scenarios(hold_out_scenarios, templates),
+        hold_out_scenarios=held_out_scenarios(templates),
     )
     given = {"--policy": policy, "--ranges": ranges, "--workers": workers, "--out": out}
 
     def report(tuning: Tuning) -> None:
         write_tuning(tuning, out)
-        if as_json:
-            print((out / "chosen.json").read_text(encoding="utf-8"), end="")
-            return
-        print("\n".join(table_lines(tuning)))
-        following = _next_command(tuning, conditions, given, hold_out_scenarios)
-        print_verdict(verdict_text(tuning), following)
+        following = _next_command(tuning, conditions, given)
+        table, verdict = table_lines(tuning), verdict_text(tuning)
+        print_results(out / "chosen.json", table, verdict, following, as_json=as_json)
 
     tune(settings, out, workers=workers, resume=resume, overwrite=overwrite, report=report)
-    if not as_json:
-        print(f"Written to {out}")
     return 0
 
 
-def _next_command(
-    tuning: Tuning, conditions: Conditions, given: Mapping[str, Any], hold_out: Sequence[str]
-) -> str:
+def _next_command(tuning: Tuning, conditions: Conditions, given: Mapping[str, Any]) -> str:
     """Return the next command: falsify the winner, or go on with more seeds or more trials."""
     settings, out = tuning.settings, given["--out"]
     if tuning.winner is not None:
@@ -87,7 +79,6 @@ def _next_command(
             words += [name, value]
     return command_text(
         *words,
-        *("--hold-out-scenarios", *hold_out),
         *("--generation", settings.generation, "--sampler", settings.sampler),
         *("--seed", settings.seed, "--workers", given["--workers"], "--out", out, "--resume"),
     )

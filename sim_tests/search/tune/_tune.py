@@ -9,7 +9,7 @@ from typing import Any, Final, cast
 
 import filelock
 
-from awarenav.errors import counted, not_one_of
+from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
 from ...crossing import named_policy
@@ -22,8 +22,20 @@ from ...world.errors import SimError
 from .._episodes import EpisodeRunner
 from .._settings import SearchSettings, write_or_check_settings
 from .._study import Optimizer, Outcome, ParameterValues, SamplerName, SharedStudy, Trial
-from ._evaluation import OBJECTIVE, RISK, Dropped, Evaluation, dropped, stages
-from ._finalists import BEATS_BASE, PLACES, Candidate, level_of, merged, named_winner
+from ._evaluation import (
+    BEATS_BASE,
+    OBJECTIVE,
+    PLACES,
+    RISK,
+    Candidate,
+    Dropped,
+    Evaluation,
+    dropped,
+    level_of,
+    merged,
+    named_winner,
+    stages,
+)
 from ._policy_space import PolicyRange, PolicySpace
 
 _SETTINGS_FILE: Final = "tune.json"
@@ -31,9 +43,6 @@ _RESULTS: Final = (
     *("evaluations/*.csv", "evaluations/.*.lock", "trials.csv", "importances.json"),
     *("chosen.json", "chosen/*.yaml", "tuning.png"),
 )
-#: Values of ``--hold-out-scenarios`` beside names.
-THIRD: Final = "third"
-NONE: Final = "none"
 # Distance from the first tuning seed to the first held-out seed.
 _HELD_OUT_OFFSET: Final = 1_000_000
 # Evaluated beside the trials.
@@ -111,33 +120,14 @@ class TuneSettings(SearchSettings):
         )
 
 
-def held_out_scenarios(
-    given: Sequence[str], templates: Sequence[ScenarioTemplate]
-) -> tuple[str, ...]:
-    """Return the names of the scenarios that no trial runs.
+def held_out_scenarios(templates: Sequence[ScenarioTemplate]) -> tuple[str, ...]:
+    """Return the names of the scenarios that no trial runs: every third, the second of three first.
 
-    Args:
-        given: names, with or without the robot's; ``"third"`` for every third scenario, the second
-            of three first, in the order of what people look at (attentive, mixed, unaware) and of
-            the names; or ``"none"``. Of fewer than three scenarios, ``"third"`` holds none out.
-        templates: all scenarios of the tuning.
-
-    Raises:
-        SimError: an unknown name, or no scenario is left to tune on.
+    They are in the order of what people look at (attentive, mixed, unaware) and of the names. Of
+    fewer than three scenarios none is held out.
     """
     names = [each.name for each in sorted(templates, key=lambda each: (each.attention, each.name))]
-    if tuple(given) == (NONE,):
-        return ()
-    if tuple(given) == (THIRD,):
-        return tuple(names[1::3]) if len(names) >= 3 else ()
-    meant = {also: each.name for each in templates for also in each.names}
-    for name in given:
-        if name not in meant:
-            raise SimError(not_one_of("--hold-out-scenarios", name, (THIRD, NONE, *names)))
-    chosen = {meant[name] for name in given}
-    if len(chosen) == len(names):
-        raise SimError("--hold-out-scenarios must leave a scenario to tune on, got all of them")
-    return tuple(name for name in names if name in chosen)
+    return tuple(names[1::3]) if len(names) >= 3 else ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -350,6 +340,10 @@ class _Race:
     def _risk(self) -> float:
         return self.settings.risk_beside(self.tuned[TODAY])
 
+    def _name_of(self, policy: AwarenessPolicy) -> str:
+        """Return the name of the base policy or the preset that a policy is; empty for none."""
+        return next((name for name, known in self.anchors.items() if known == policy), "")
+
     def _anchor(self, name: str) -> Candidate:
         """Return the base policy or a preset as a candidate."""
         policy = self.anchors[name]
@@ -358,9 +352,8 @@ class _Race:
     def _finalist(self, trial: Trial, names: tuple[str, ...]) -> Candidate:
         """Return a trial as a candidate; as the anchor whose policy it has, if there is one."""
         policy, label = self.space.policy(trial.parameters), _label(trial.number)
-        for name, known in self.anchors.items():
-            if known == policy:
-                return replace(self._anchor(name), names=names)
+        if anchor := self._name_of(policy):
+            return replace(self._anchor(anchor), names=names)
         tuned, held_out = self._tuned(label, policy), self._held_out(label, policy)
         return Candidate(names, trial.number, policy, tuned, held_out)
 
@@ -369,10 +362,9 @@ class _Race:
         policy = self.space.policy(parameters)
         evaluation = Evaluation(())
         reason: Dropped = ""
-        for name, known in self.anchors.items():
-            if known == policy:  # the first trial is the base policy
-                evaluation = self.tuned[name]
-        if not evaluation.records:
+        if anchor := self._name_of(policy):  # the first trial is the base policy
+            evaluation = self.tuned[anchor]
+        else:
             for seeds in stages(settings.tuning_seeds):
                 part = self._evaluate(label, policy, seeds, settings.tuning_templates)
                 if part.errors:

@@ -48,15 +48,6 @@ from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, opt
     help="Held-out seeds, on which the presets and the chosen policies are compared.",
 )
 @option(
-    "--hold-out-scenarios",
-    many=True,
-    default=["third"],
-    metavar="NAME...|third|none",
-    shell_complete=options.COMPLETE_SCENARIOS,
-    help="Scenarios that no trial runs, but the comparison on held-out seeds does: names, 'none', "
-    "or every 'third' by attention and name (of at least three).",
-)
-@option(
     "--generation",
     type=POSITIVE,
     default=6,
@@ -102,9 +93,9 @@ def tune(**values: Any) -> int:
     Varies the numbers of --policy. The risk is that of step-outs: impacts with unaware people who
     set off at any time. Trials run few episodes first, and end when an interval shows that they
     are above the risk or lose to --policy. A policy with which a moving robot and a person touched
-    is not chosen. Ends with a verdict against --policy on held-out seeds and scenarios, and the
-    next command. Writes study.log, trials.csv, tuning.png, importances.json, chosen.json, and
-    chosen/*.yaml with their results on the held-out seeds.
+    is not chosen. Ends with a verdict against --policy on held-out seeds and on every third
+    scenario, which no trial runs, and the next command. Writes study.log, trials.csv, tuning.png,
+    importances.json, chosen.json, and chosen/*.yaml with their results on the held-out seeds.
     """
     from ...study.runs import Conditions  # noqa: PLC0415 - help needs no simulator
     from ._run import run_tune  # noqa: PLC0415

@@ -10,8 +10,8 @@ from awarenav.errors import counted
 from awarenav.files import json_text, write_text
 
 from ...world.errors import SimError
-from ..measures import EpisodeRecord, read_rows
-from ..runs import Conditions, RunFiles, policy_text, run_jobs
+from ..measures import EpisodeRecord
+from ..runs import Conditions, RunFiles, policy_text, read_rows, run_jobs
 from ._family import TODAY, family, sensors_of_today
 from ._frontier import frontier_of
 from ._plot import draw_frontier

@@ -6,7 +6,8 @@ from typing import Final
 
 from awarenav.errors import counted
 
-from ..measures import Interval
+from ..measures import NOTHING, Interval
+from ..report import Table
 from ._frontier import Frontier, Worth
 
 # The policy of the sentences, chosen beforehand: that of `balanced`.
@@ -27,22 +28,22 @@ _HEADER: Final = (
 def frontier_text(frontier: Frontier) -> str:
     """Return the frontier as Markdown: the sentences, the episodes and a table."""
     worth = {each.member.name: each for each in frontier.worth}
-    rows = [_HEADER, ("---",) * len(_HEADER)]
+    rows = []
     for point in frontier.points:
         own, member = worth.get(point.name), point.member
         rows.append(
             (
                 f"`{point.name}`",
-                "–" if member is None else f"{member.speed_mps:g}",
-                "–" if member is None else _KINDS[member.kind],
+                NOTHING if member is None else f"{member.speed_mps:g}",
+                NOTHING if member is None else _KINDS[member.kind],
                 point.time_lost_s.text(),
                 point.time_over_today.text(),
                 point.step_out_unaware.text(),
-                "–" if own is None else own.at_equal_risk_s.text(),
-                "–" if own is None else own.at_equal_time.text(),
+                NOTHING if own is None else own.at_equal_risk_s.text(),
+                NOTHING if own is None else own.at_equal_time.text(),
             )
         )
-    table = "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    table = Table(dict.fromkeys(_HEADER, ""), rows).markdown()
     episodes = (
         f"{counted(frontier.episodes, 'episode')} of each policy in "
         f"{counted(frontier.scenarios, 'scenario')}; 95 % intervals. Impacts: step-out impacts "

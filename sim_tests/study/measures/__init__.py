@@ -1,4 +1,4 @@
-"""Metrics of crossings, their statistics over many episodes, and ``awarenav compare``."""
+"""Metrics of crossings, and their statistics over many episodes."""
 
 from __future__ import annotations
 
@@ -21,30 +21,44 @@ if TYPE_CHECKING:
         resampled_interval,
         resampled_means,
     )
-    from ._compare import answering_note
     from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
-    from ._driving import path_length_m
-    from ._interval import FEW_PAIRS, Interval, proportion_interval, zero_of_n_upper
+    from ._driving import path_length_m, success_weighted
+    from ._interval import (
+        FEW_PAIRS,
+        NOTHING,
+        THIN,
+        Interval,
+        number_text,
+        percent,
+        proportion_interval,
+        zero_of_n_upper,
+    )
     from ._measure import measure
     from ._pairs import (
         paired,
         paired_difference,
+        paired_ratio,
         violates_more,
-        violation_excess,
-        violation_excess_of_time,
-        won_back,
     )
     from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric
     from ._record_file import (
         RECORD_COLUMNS,
         read_records,
-        read_rows,
         record_row,
         write_records,
     )
     from ._step_out import StepOut, step_out_impacts
-    from ._summary import BASELINE, Comparison, Summary, SummaryRow, Variant, labels, summarise
-    from ._summary_text import nondeterminism_notes, summary_text, table_text
+    from ._summary import (
+        BASELINE,
+        Comparison,
+        Summary,
+        SummaryRow,
+        Variant,
+        labels,
+        summarise,
+        summarise_sources,
+    )
+    from ._summary_text import nondeterminism_notes, short_text, summary_text, table_text
     from ._trace import Trace
 
 __all__ = [
@@ -54,10 +68,12 @@ __all__ = [
     "COLUMNS",
     "FEW_PAIRS",
     "METRICS",
+    "NOTHING",
     "OVERSHOOT_MPS",
     "RATIOS",
     "RECORD_COLUMNS",
     "SHARES",
+    "THIN",
     "UNAWARE_UP_TO",
     "UNCONFIRMED",
     "Comparison",
@@ -71,7 +87,6 @@ __all__ = [
     "SummaryRow",
     "Trace",
     "Variant",
-    "answering_note",
     "bootstrap_interval",
     "fastest_point_excess_mps",
     "labels",
@@ -79,24 +94,26 @@ __all__ = [
     "measure",
     "measured_part",
     "nondeterminism_notes",
+    "number_text",
     "paired",
     "paired_difference",
+    "paired_ratio",
     "path_length_m",
+    "percent",
     "proportion_interval",
     "ratio_interval",
     "read_records",
-    "read_rows",
     "record_row",
     "resampled_interval",
     "resampled_means",
+    "short_text",
     "step_out_impacts",
+    "success_weighted",
     "summarise",
+    "summarise_sources",
     "summary_text",
     "table_text",
     "violates_more",
-    "violation_excess",
-    "violation_excess_of_time",
-    "won_back",
     "write_records",
     "zero_of_n_upper",
 ]

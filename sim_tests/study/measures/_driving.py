@@ -21,20 +21,22 @@ def path_length_m(positions_m: FloatArray) -> float:
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
-def success_weighted_path_length(
-    success: bool, path_m: float, shortest_m: float | None
+def success_weighted(
+    success: bool | None, actual: float | None, best: float | None
 ) -> float | None:
-    """Return SPL of one episode: S · l / max(p, l) (Anderson et al. 2018, equation 1).
+    """Return S · l / max(p, l): SPL of lengths (Anderson et al. 2018, equation 1), STL of times.
 
     Args:
         success: S.
-        path_m: p ≥ 0, the driven length.
-        shortest_m: l, the driven length of the same task without people; None if unknown, which
-            makes SPL None.
+        actual: p ≥ 0, the length or time of the episode; not used without success.
+        best: l, that of the same task without people.
+
+    Returns:
+        None where success or ``best`` is not known.
     """
-    if shortest_m is None or shortest_m <= 0.0:
+    if success is None or best is None or best <= 0.0 or (success and actual is None):
         return None
-    return shortest_m / max(path_m, shortest_m) if success else 0.0
+    return best / max(actual or 0.0, best) if success else 0.0
 
 
 def count_stops(

@@ -12,6 +12,12 @@ from perception.arrays import finite_number
 
 from ...world.errors import SimError
 
+#: A narrow space that breaks no line, before a sign of per cent.
+THIN: Final = "\N{NARROW NO-BREAK SPACE}"
+#: What stands for a number that there is not.
+NOTHING: Final = "–"
+# Shares this near to 0 or 1 are 0 or 1.
+_ROUNDING: Final = 1e-12
 #: With fewer pairs, the bootstrap interval is too narrow, and no effect counts as shown.
 FEW_PAIRS: Final = 20
 
@@ -44,6 +50,22 @@ class Interval:
         """True if the interval is finite on both sides."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
+    @property
+    def count(self) -> int:
+        """Number of episodes behind a share."""
+        return round(self.value * self.n) if self.n else 0
+
+    def share_text(self) -> str:
+        """Return a share of episodes as ``"0 of 23 (≤ 12 %)"``: the count, and the interval."""
+        if not self.n:
+            return NOTHING
+        ends = f"{100.0 * self.low:.1f}–{100.0 * self.high:.1f}{THIN}%"
+        if self.value == 0.0:
+            ends = f"≤ {percent(self.high)}"
+        elif self.value == 1.0:
+            ends = f"≥ {percent(self.low)}"
+        return f"{self.count} of {self.n} ({ends})"
+
     def text(self, decimals: int = 2, scale: float = 1.0) -> str:
         """Return ``"1.23 [1.01, 1.50]"``, ``"1.23 [?]"`` without bounds, a dash without a value.
 
@@ -52,7 +74,7 @@ class Interval:
             scale: multiplies the value and both ends; 100 for per cent.
         """
         if not self.known:
-            return "–"
+            return NOTHING
         value = number_text(self.value * scale, decimals)
         if not self.bounded:
             return f"{value} [?]"
@@ -60,10 +82,24 @@ class Interval:
         return f"{value} [{low}, {high}]"
 
 
-def number_text(value: float, decimals: int) -> str:
-    """Return a number with the given decimals; a negative zero loses its sign."""
+def number_text(value: float | None, decimals: int = 2) -> str:
+    """Return a number with the given decimals, without the sign of a negative zero.
+
+    None, NaN and infinity are a dash.
+    """
+    if value is None or not math.isfinite(value):
+        return NOTHING
     text = f"{value:.{decimals}f}"
     return text.lstrip("-") if float(text) == 0.0 else text
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent, with more decimals near 0 and 1: 0.9975 is no 100 %."""
+    if not math.isfinite(share):
+        return NOTHING
+    rest = min(abs(share), abs(1.0 - abs(share)))
+    decimals = 0 if rest >= 0.1 or rest < _ROUNDING else 1 if rest >= 0.01 else 2
+    return f"{100.0 * share:.{decimals}f}{THIN}%"
 
 
 def zero_of_n_upper(n: int, level: float = 0.95) -> float:

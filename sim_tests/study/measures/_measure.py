@@ -23,7 +23,7 @@ from ._driving import (
     count_stops,
     path_length_m,
     peak_deceleration_and_jerk,
-    success_weighted_path_length,
+    success_weighted,
 )
 from ._record import Awareness, EpisodeRecord
 from ._record_file import rounded
@@ -105,7 +105,7 @@ def measure(
                 result.time_to_goal_s, result.duration_s, time_without_people_s
             ),
             path_length_m=path_m,
-            spl=success_weighted_path_length(result.success, path_m, length_without_people_m),
+            spl=success_weighted(result.success, path_m, length_without_people_m),
             speed_at_min_separation_mps=speed_then,
             min_time_to_collision_s=min_time_to_collision_s(trace, outline),
             post_encroachment_s=post_encroachment_s(trace, outline),

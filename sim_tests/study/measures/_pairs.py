@@ -63,87 +63,38 @@ def paired_difference(
     return replace(interval, left_out=len(pairs) - len(kept))
 
 
-def won_back(
-    blind: Iterable[EpisodeRecord],
-    policy: Iterable[EpisodeRecord],
+def paired_ratio(
+    base: Iterable[EpisodeRecord],
+    other: Iterable[EpisodeRecord],
+    field: str,
+    over: str,
     rng: np.random.Generator | None = None,
     level: float = 0.95,
+    *,
+    sign: float = 1.0,
 ) -> Interval:
-    """Return the share that ``policy`` wins back of the time that ``blind`` loses.
+    """Return Σ (``other`` − ``base``) of a field over Σ of a field of ``base``, over pairs.
 
-    The share is Σ (lost by blind − lost by policy) / Σ lost by blind over pairs. It is not a mean
-    of shares, in which an episode that lost almost no time would weigh as much as any other.
-    Resamples are drawn within scenarios.
+    It is not a mean of shares, in which an episode that lost almost no time would weigh as much as
+    any other. Resamples are drawn within scenarios. Pairs in which a field is None on either side
+    are left out and counted.
 
     Args:
-        blind: episodes of the baseline policy.
-        policy: episodes of the other policy.
+        base: episodes of one policy.
+        other: episodes of the other policy.
+        field: a number of :class:`EpisodeRecord`, whose differences are summed.
+        over: the field of ``base`` whose sum they are divided by.
         rng: draws the resamples; None for a generator with seed 0.
         level: confidence of the interval.
+        sign: −1 for the differences ``base`` − ``other``.
 
     Returns:
-        The share; NaN if ``blind`` loses no time. Pairs without a known time without people are
-        left out.
+        The ratio; NaN if ``over`` is 0 in every episode of ``base``.
 
     Raises:
         SimError: one side has an episode twice.
     """
-    return _ratio_of_sums(paired(blind, policy), "time_lost_s", "time_lost_s", -1.0, rng, level)
-
-
-def violation_excess(
-    blind: Iterable[EpisodeRecord],
-    policy: Iterable[EpisodeRecord],
-    rng: np.random.Generator | None = None,
-    level: float = 0.95,
-) -> Interval:
-    """Return the additional violation time of ``policy``, relative to that of ``blind``.
-
-    It is Σ (violation of policy − of blind) / Σ violation of blind over pairs; 0.02 is 2 % more.
-
-    Returns:
-        The ratio; NaN if ``blind`` never violates the margin. Use
-        :func:`violation_excess_of_time` then.
-    """
-    return _ratio_of_sums(
-        paired(blind, policy), "violation_time_s", "violation_time_s", 1.0, rng, level
-    )
-
-
-def violation_excess_of_time(
-    blind: Iterable[EpisodeRecord],
-    policy: Iterable[EpisodeRecord],
-    rng: np.random.Generator | None = None,
-    level: float = 0.95,
-) -> Interval:
-    """Return the additional violation time of ``policy``, relative to the duration of ``blind``."""
-    return _ratio_of_sums(paired(blind, policy), "violation_time_s", "duration_s", 1.0, rng, level)
-
-
-def violates_more(
-    blind: Iterable[EpisodeRecord], policy: Iterable[EpisodeRecord], level: float = 0.95
-) -> Interval:
-    """Return the share of pairs in which ``policy`` violates the margin longer than ``blind``.
-
-    Its interval is exact.
-    """
-    pairs = _with_numbers(paired(blind, policy), "violation_time_s")
-    more = sum(
-        (second.violation_time_s or 0.0) > (first.violation_time_s or 0.0) + _SAME_TIME_S
-        for first, second in pairs
-    )
-    return proportion_interval(more, len(pairs), level)
-
-
-def _ratio_of_sums(
-    pairs: tuple[Pair, ...],
-    field: str,
-    over: str,
-    sign: float,
-    rng: np.random.Generator | None,
-    level: float,
-) -> Interval:
-    """Return Σ sign · (policy − blind) of ``field``, divided by Σ of ``over`` of blind."""
+    pairs = paired(base, other)
     kept = _with_numbers(_with_numbers(pairs, field), over)
     interval = ratio_interval(
         [sign * (getattr(second, field) - getattr(first, field)) for first, second in kept],
@@ -153,6 +104,21 @@ def _ratio_of_sums(
         strata=_scenarios(kept),
     )
     return replace(interval, left_out=len(pairs) - len(kept))
+
+
+def violates_more(
+    base: Iterable[EpisodeRecord], other: Iterable[EpisodeRecord], level: float = 0.95
+) -> Interval:
+    """Return the share of pairs in which ``other`` violates the margin longer than ``base``.
+
+    Its interval is exact.
+    """
+    pairs = _with_numbers(paired(base, other), "violation_time_s")
+    more = sum(
+        (second.violation_time_s or 0.0) > (first.violation_time_s or 0.0) + _SAME_TIME_S
+        for first, second in pairs
+    )
+    return proportion_interval(more, len(pairs), level)
 
 
 def _with_numbers(pairs: Sequence[Pair], field: str) -> tuple[Pair, ...]:

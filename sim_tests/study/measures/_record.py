@@ -32,8 +32,6 @@ class Metric:
         meaning: one sentence.
         decimals: to print.
         share: a share of episodes, printed in per cent.
-        from_zero: the axis of a plot includes 0.
-        says_better: a plot says which direction is better.
     """
 
     name: str
@@ -43,8 +41,6 @@ class Metric:
     meaning: str
     decimals: int = 2
     share: bool = False
-    from_zero: bool = True
-    says_better: bool = True
 
 
 def _column(meaning: str, default: Any = MISSING) -> Any:
@@ -59,7 +55,6 @@ def _measure(
     better: Literal["lower", "higher", "neither"] = "lower",
     default: int | None = None,
     decimals: int = 2,
-    says_better: bool = True,
 ) -> Any:
     """Return a field of a record that is a measure; :class:`Metric` describes the arguments.
 
@@ -70,7 +65,6 @@ def _measure(
         "meaning": meaning,
         "better": better,
         "decimals": decimals,
-        "says_better": says_better,
     }
     return field(default=default, metadata=about)
 
@@ -102,7 +96,6 @@ class EpisodeRecord:
         "Smallest separation",
         "Smallest distance between the surfaces of robot and person.",
         better="higher",
-        says_better=False,
     )
     time_to_goal_s: float | None = _measure("Time to goal", "Time until the goal was reached.")
     max_speed_within_2m_mps: float | None = _measure(
@@ -365,7 +358,6 @@ SHARES: Final = _by_name(
         "Share of episodes in which the goal was reached and the robot moved into nobody; one "
         "that failed counts as not reached.",
         share=True,
-        from_zero=False,
     ),
     Metric(
         "moving_contacts",

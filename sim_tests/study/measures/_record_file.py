@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 from awarenav.errors import did_you_mean
 from awarenav.files import atomic_path
-from perception.documents import read_json
 from perception.installation import install_command
 
 from ...world.errors import SimError
@@ -43,29 +42,6 @@ REQUIRED_COLUMNS: Final = tuple(
     field.name for field in fields(EpisodeRecord) if field.default is MISSING
 )
 _PARQUET: Final = ".parquet"
-
-
-def read_rows(folder: Path | str) -> tuple[EpisodeRecord, ...]:
-    """Return the episodes of a run that have ended, in the order of its jobs.
-
-    Args:
-        folder: of a run, finished or not; or a table of episodes, CSV or Parquet.
-
-    Raises:
-        SimError: there is no run, or a file that is not of one; the message names it.
-    """
-    path = Path(folder)
-    if not path.is_dir():
-        return read_records(path)
-    table, ended = path / "episodes.csv", sorted((path / "episodes").glob("*.json"))
-    if ended and not _is_complete(path / "run.json"):  # a killed run has no table, or an old one
-        return tuple(_read_episode(each) for each in ended)
-    if not table.is_file():
-        raise SimError(
-            f"{path} holds no {table.name}; give the folder that `awarenav crossings --out DIR` "
-            "wrote"
-        )
-    return read_records(table)
 
 
 def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:
@@ -118,22 +94,6 @@ def write_records(path: Path | str, records: Iterable[EpisodeRecord]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(RECORD_COLUMNS)
         writer.writerows(record_row(record) for record in records)
-
-
-def _is_complete(path: Path) -> bool:
-    """Return True if a ``run.json`` says that every episode of its run has ended."""
-    try:
-        about = read_json(path, SimError)
-    except SimError:
-        return False
-    return isinstance(about, dict) and about.get("state") == "complete"
-
-
-def _read_episode(path: Path) -> EpisodeRecord:
-    try:
-        return EpisodeRecord(**read_json(path, SimError)["record"])
-    except (TypeError, KeyError) as cause:
-        raise SimError(f"{path} is not the file of an episode: {cause}") from cause
 
 
 def _parquet() -> Any:

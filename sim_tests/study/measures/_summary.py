@@ -17,10 +17,8 @@ from ._interval import Interval, proportion_interval
 from ._pairs import (
     paired,
     paired_difference,
+    paired_ratio,
     violates_more,
-    violation_excess,
-    violation_excess_of_time,
-    won_back,
 )
 from ._record import METRICS, RATIOS, EpisodeRecord
 
@@ -381,10 +379,14 @@ def _comparison(
         baseline=baseline,
         part=part,
         pairs=len(paired(base, group)),
-        won_back=won_back(base, group, rng, level),
+        won_back=paired_ratio(base, group, "time_lost_s", "time_lost_s", rng, level, sign=-1.0),
         time_lost_s=paired_difference(base, group, "time_lost_s", rng, level),
-        violation_excess=violation_excess(base, group, rng, level),
-        violation_excess_of_time=violation_excess_of_time(base, group, rng, level),
+        violation_excess=paired_ratio(
+            base, group, "violation_time_s", "violation_time_s", rng, level
+        ),
+        violation_excess_of_time=paired_ratio(
+            base, group, "violation_time_s", "duration_s", rng, level
+        ),
         violates_more=violates_more(base, group, level),
         min_separation_m=paired_difference(base, group, "min_separation_m", rng, level),
         step_out_unaware=paired_difference(base, group, "step_out_unaware", rng, level),

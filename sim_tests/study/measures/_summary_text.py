@@ -8,7 +8,7 @@ from typing import TypeVar
 from awarenav.errors import counted
 
 from ._awareness import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
-from ._interval import Interval, number_text
+from ._interval import NOTHING, Interval, number_text, percent
 from ._record import METRICS, RATIOS, EpisodeRecord
 from ._summary import Comparison, Summary, SummaryRow
 
@@ -68,6 +68,21 @@ def table_text(header: Sequence[str], rows: Iterable[Sequence[str]], left: int =
     return "\n".join([line_text(lines[0]), rule, *(line_text(line) for line in lines[1:])])
 
 
+def short_text(summary: Summary) -> str:
+    """Return the table of policies that the end of a run prints."""
+    columns: dict[str, Callable[[SummaryRow], str]] = {
+        "policy": lambda row: row.variant,
+        "episodes": lambda row: str(row.episodes),
+        "success": lambda row: percent(row.success.value),
+        "contacts": _moving_contacts,
+        "time lost s": _mean("time_lost_s", bounds=False),
+        "least m": _worst("min_separation_m"),
+        "step-out": _mean("step_out_unaware", bounds=False),
+        "failed": lambda row: str(row.errors),
+    }
+    return _table(summary.policies, columns)
+
+
 def _titled(title: str, table: str) -> str:
     return f"{title}\n\n{table}"
 
@@ -91,9 +106,9 @@ def _safety_table(rows: Sequence[SummaryRow]) -> str:
         rows,
         {
             "policy": lambda row: row.variant,
-            "contact, moving": lambda row: _share_text(row.moving_contact),
-            "by robot": lambda row: _share_text(row.robot_contact),
-            "by person": lambda row: _share_text(row.person_contact),
+            "contact, moving": lambda row: row.moving_contact.share_text(),
+            "by robot": lambda row: row.robot_contact.share_text(),
+            "by person": lambda row: row.person_contact.share_text(),
             "least m": _worst("min_separation_m"),
             "margin m": _worst("min_margin_m"),
             "violated s": _worst("violation_time_s"),
@@ -145,7 +160,7 @@ def _comparison_table(comparisons: Sequence[Comparison]) -> str:
             "time lost s": lambda each: _signed(each.time_lost_s),
             "violation %": lambda each: _signed(each.violation_excess, 0, 100.0),
             "% of time": lambda each: _signed(each.violation_excess_of_time, 2, 100.0),
-            "longer violation": lambda each: _share_text(each.violates_more),
+            "longer violation": lambda each: each.violates_more.share_text(),
         },
         left=3,
     )
@@ -196,31 +211,17 @@ def _worst(name: str) -> Callable[[SummaryRow], str]:
     decimals = METRICS[name].decimals
 
     def cell(row: SummaryRow) -> str:
-        value = row.worst.get(name)
-        return "–" if value is None else number_text(value, decimals)
+        return number_text(row.worst.get(name), decimals)
 
     return cell
 
 
 def _successes(row: SummaryRow) -> str:
-    return f"{round(row.success.value * row.episodes)} of {row.episodes}"
+    return f"{row.success.count} of {row.episodes}"
 
 
 def _moving_contacts(row: SummaryRow) -> str:
-    share = row.moving_contact
-    return str(round(share.value * share.n)) if share.n else "–"
-
-
-def _share_text(share: Interval) -> str:
-    """Return ``"3 of 200 (≤ 4.3 %)"``: the count, and the upper end of the exact interval."""
-    if not share.n:
-        return "–"
-    count = round(share.value * share.n)
-    return f"{count} of {share.n} (≤ {_percent(share.high)})"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 0.0995 else f"{100.0 * share:.0f} %"
+    return str(row.moving_contact.count) if row.moving_contact.n else NOTHING
 
 
 def _signed(interval: Interval, decimals: int = 2, scale: float = 1.0) -> str:
@@ -235,8 +236,8 @@ def _notes(summary: Summary) -> list[str]:
         "margin S − S_p, relative to that of the other, and to the time that it takes. least,\n"
         "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
         "person and the moving robot touched, by any cause. step-out: step-out impacts\n"
-        "with unaware people. (≤ x %): upper end of the exact interval. [?]: too few for an\n"
-        "interval. docs/simulation.md defines all figures."
+        "with unaware people. (…): the exact interval. [?]: too few for an interval.\n"
+        "docs/simulation.md defines all figures."
     ]
     if any(row.part == UNCONFIRMED for row in summary.attentions):
         notes.append(

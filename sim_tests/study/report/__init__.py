@@ -8,9 +8,9 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._compare import compare_planners
-    from ._page import NOTHING, Section, Table, write_page
+    from ._page import Table
     from ._write import write_report
 
-__all__ = ["NOTHING", "Section", "Table", "compare_planners", "write_page", "write_report"]
+__all__ = ["Table", "compare_planners", "write_report"]
 
 __getattr__ = lazy_page(__name__, __file__)

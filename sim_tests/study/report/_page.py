@@ -7,20 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Final
 
 from awarenav.files import write_text
 from perception.installation import install_command
 
 from ...world.errors import SimError
-from ..measures import Interval
-
-#: What stands in a cell without a value.
-NOTHING: Final = "–"
-#: A narrow space that breaks no line, before a sign of per cent.
-THIN: Final = "\N{NARROW NO-BREAK SPACE}"
-# Shares this near to 0 or 1 are 0 or 1.
-_ROUNDING: Final = 1e-12
+from ..measures import Interval, number_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,21 +167,10 @@ def write_page(
     write_text(path, page, SimError)
 
 
-def percent(share: float) -> str:
-    """Return a share in per cent, with more decimals near 0 and 1: 0.9975 is no 100 %."""
-    if not math.isfinite(share):
-        return NOTHING
-    rest = min(abs(share), abs(1.0 - abs(share)))
-    decimals = 0 if rest >= 0.1 or rest < _ROUNDING else 1 if rest >= 0.01 else 2
-    return f"{100.0 * share:.{decimals}f}{THIN}%"
-
-
 def number_cell(value: float | None, decimals: int = 2, *, bad: bool = False) -> Cell:
     """Return the cell of a number; a dash for None, NaN and infinity."""
-    if value is None or not math.isfinite(value):
-        return Cell(NOTHING)
-    rounded = round(value, decimals) + 0.0  # a negative zero loses its sign
-    return Cell(f"{rounded:.{decimals}f}", value, bad)
+    known = value is not None and math.isfinite(value)
+    return Cell(number_text(value, decimals), value if known else None, bad and known)
 
 
 def interval_cell(interval: Interval, decimals: int = 2, scale: float = 1.0) -> Cell:
@@ -197,25 +178,7 @@ def interval_cell(interval: Interval, decimals: int = 2, scale: float = 1.0) -> 
     return Cell(interval.text(decimals, scale), interval.value if interval.known else None)
 
 
-def share_cell(share: Interval, *, bad_from: float = math.inf, bad_below: float = 0.0) -> Cell:
-    """Return the cell of a share of episodes, as ``"0 of 23 (≤ 12 %)"``.
-
-    Args:
-        share: the share.
-        bad_from: a share of at least so much is bad news.
-        bad_below: so is one below this.
-    """
-    if not share.n:
-        return Cell(NOTHING)
-    ends = f"{100.0 * share.low:.1f}–{100.0 * share.high:.1f}{THIN}%"
-    if share.value == 0.0:
-        ends = f"≤ {percent(share.high)}"
-    elif share.value == 1.0:
-        ends = f"≥ {percent(share.low)}"
-    bad = share.value >= bad_from or share.value < bad_below
-    return Cell(f"{hits(share)} of {share.n} ({ends})", share.value, bad)
-
-
-def hits(share: Interval) -> int:
-    """Return the number of episodes behind a share."""
-    return round(share.value * share.n) if share.n else 0
+def share_cell(share: Interval, *, bad_from: float = math.inf) -> Cell:
+    """Return the cell of a share of episodes; at least ``bad_from`` is bad news."""
+    value = share.value if share.n else None
+    return Cell(share.share_text(), value, value is not None and value >= bad_from)

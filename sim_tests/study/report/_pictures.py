@@ -16,7 +16,7 @@ from perception.arrays import FloatArray
 from ...crossing import STANDING_SPEED_MPS, CrossingFrame, Stage, TopView, draw_camera_view
 from ...world.camera import CameraRenderer
 from ..measures import EpisodeRecord
-from ..runs import Job, observed_episode
+from ..runs import Job, box_scale_of, observed_episode
 
 _WIDTH_PX: Final = 540
 _JPEG_QUALITY: Final = 80
@@ -37,8 +37,9 @@ class _Drawn(Exception):  # noqa: N818 - no error
 class _WorstInstant:
     """An observer that draws the first instant at which a moving robot's margin is this small."""
 
-    def __init__(self, margin_m: float) -> None:
+    def __init__(self, margin_m: float, box_scale: float) -> None:
         self._margin_m = margin_m
+        self._box_scale = box_scale
         self._frames: list[CrossingFrame] = []
         self.least_m = float("inf")
         self.camera: Image | None = None
@@ -60,7 +61,9 @@ class _WorstInstant:
         spec = stage.scenario.camera
         camera = spec.camera(_WIDTH_PX / spec.width_px)
         picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
-        self.camera = draw_camera_view(picture, camera, frame, stage, cone)
+        self.camera = draw_camera_view(
+            picture, camera, frame, stage, cone, box_scale=self._box_scale
+        )
         worker = int(np.argmin(frame.margins_m))
         middle = 0.5 * (frame.robot_state.position_odom_m + frame.truth[worker].position_odom_m)
         size_px = (camera.width_px, camera.height_px)
@@ -84,7 +87,7 @@ def pictures_of(job: Job, record: EpisodeRecord) -> tuple[tuple[tuple[str, str],
     """
     if record.min_margin_m is None:
         return (), "No picture: the robot never moved near anybody."
-    instant = _WorstInstant(record.min_margin_m)
+    instant = _WorstInstant(record.min_margin_m, box_scale_of(job))
     with contextlib.suppress(_Drawn):
         observed_episode(job, instant)
     if instant.camera is None or instant.plan is None:

@@ -9,13 +9,14 @@ from typing import Final
 from perception.anthropometry import BODY_RADIUS_M
 
 from ..measures import (
+    NOTHING,
     OVERSHOOT_MPS,
     EpisodeRecord,
     paired,
     paired_difference,
     proportion_interval,
 )
-from ._page import NOTHING, Cell, Row, Section, Table, interval_cell, number_cell, share_cell
+from ._page import Cell, Row, Section, Table, interval_cell, number_cell, share_cell
 from ._results import Arm, Results
 from ._run import Episode, Run
 

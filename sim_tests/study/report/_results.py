@@ -14,6 +14,7 @@ from ..measures import (
     BASELINE,
     FEW_PAIRS,
     OVERSHOOT_MPS,
+    THIN,
     Comparison,
     Interval,
     Summary,
@@ -22,10 +23,10 @@ from ..measures import (
     labels,
     measured_part,
     paired,
+    percent,
     proportion_interval,
     summarise,
 )
-from ._page import THIN, hits, percent
 from ._run import Episode, Run
 
 #: The policy that knows the truth: a bound, and no candidate.
@@ -169,7 +170,7 @@ def moving_contacts(episodes: Sequence[Episode]) -> Interval:
 
 def _contacts(ran: Sequence[Episode]) -> str:
     share = moving_contacts(ran)
-    touched, total = hits(share), counted(share.n, "episode")
+    touched, total = share.count, counted(share.n, "episode")
     if not touched:
         return (
             f"The moving robot touched nobody in {total}; a true rate of up to "

@@ -12,8 +12,8 @@ from urllib.parse import quote
 from awarenav.errors import counted
 
 from ...world.errors import SimError
-from ..measures import Conduct, EpisodeRecord, read_rows
-from ..runs import Job, RunFiles, read_attempts, read_jobs, read_run
+from ..measures import Conduct, EpisodeRecord
+from ..runs import Job, RunFiles, read_attempts, read_jobs, read_rows, read_run
 
 #: Key in ``run.json`` of the policy with wider radii, by which planners are probed.
 WIDE_KEY: Final = "wide_policy"

@@ -13,16 +13,16 @@ from perception.documents import parse_yaml
 from ...world.errors import SimError
 from ..measures import (
     METRICS,
+    NOTHING,
     RATIOS,
     UNCONFIRMED,
     SummaryRow,
-    answering_note,
     measured_part,
     paired_difference,
 )
-from ..runs import Job
+from ..runs import Job, answering_note
 from ._charts import episode_chart, risk_chart
-from ._page import NOTHING, Cell, Row, Section, Table, hits, interval_cell, number_cell, share_cell
+from ._page import Cell, Row, Section, Table, interval_cell, number_cell, share_cell
 from ._results import Arm, Results, moving_contacts
 from ._run import Episode, Run
 
@@ -93,7 +93,7 @@ def _arm_row(arm: Arm) -> Row:
         arm.name,
         share_cell(row.success),
         share_cell(row.moving_contact, bad_from=1e-9),
-        number_cell(hits(row.robot_contact), 0, bad=hits(row.robot_contact) > 0),
+        number_cell(row.robot_contact.count, 0, bad=row.robot_contact.count > 0),
         interval_cell(row.means["time_lost_s"], 1),
         interval_cell(row.means["violation_time_s"]),
         _worst(row, "min_margin_m"),
@@ -160,9 +160,9 @@ def scenarios_section(results: Results, jobs: Iterable[Job]) -> Section:
         others = sum(measured_part(record) != label for record in own)
         found = [rows.get((scenario, arm.name)) for arm in arms]
         touched = {
-            arm.name: hits(row.moving_contact)
+            arm.name: row.moving_contact.count
             for arm, row in zip(arms, found, strict=True)
-            if row is not None and hits(row.moving_contact)
+            if row is not None and row.moving_contact.count
         }
         backs = (results.against(arm, scenario, scenario=True) for arm in compared)
         lines.append(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         run_episode,
         seeded_crossing,
     )
-    from ._job import Attempt, Job, JobKey, describe
+    from ._job import Job, describe
     from ._parallel import in_parallel, tidy
     from ._plan import (
         fault_of,
@@ -31,22 +31,27 @@ if TYPE_CHECKING:
     from ._planner_choice import (
         KNOWN_PLANNERS,
         make_planner,
-        planner_label,
-        planner_parameters,
         refuse_unusable_planner,
     )
-    from ._replay import find_episode, recorder_of
+    from ._replay import box_scale_of, find_episode, recorder_of
     from ._run import run_jobs
-    from ._run_files import RunFiles, read_attempts, read_jobs, read_run
+    from ._run_files import (
+        RunFiles,
+        answering_note,
+        read_attempts,
+        read_jobs,
+        read_rows,
+        read_run,
+    )
 
 __all__ = [
     "KNOWN_PLANNERS",
-    "Attempt",
     "Conditions",
     "Job",
-    "JobKey",
     "RunFiles",
+    "answering_note",
     "attempt",
+    "box_scale_of",
     "describe",
     "died",
     "fault_of",
@@ -58,12 +63,11 @@ __all__ = [
     "named_templates",
     "observed_episode",
     "plan_jobs",
-    "planner_label",
-    "planner_parameters",
     "policy_of",
     "policy_text",
     "read_attempts",
     "read_jobs",
+    "read_rows",
     "read_run",
     "recorder_of",
     "refuse_unusable_planner",

@@ -19,7 +19,7 @@ import numpy as np
 
 from nav_adapter import RobotProfile
 
-from ...crossing.planner import CostmapPlanner, LocalPlanner, SamplingPlanner, StraightOn
+from ...crossing.planner import CostmapPlanner, LocalPlanner, StraightOn
 from ...scenario import Scenario
 from ...world.errors import SimError
 
@@ -196,18 +196,6 @@ def _refuse_unknown_settings(
             f"planner {planner!r} has no argument {unknown[0]!r}; it has "
             f"{', '.join(map(repr, names)) or 'none'}"
         )
-
-
-def planner_parameters(planner: str) -> Mapping[str, inspect.Parameter]:
-    """Return the parameters of a planner's class or function; empty if it has no signature.
-
-    Raises:
-        SimError: as :func:`import_planner`.
-    """
-    if not planner:
-        return inspect.signature(SamplingPlanner).parameters
-    signature = import_planner(planner).signature
-    return MappingProxyType({}) if signature is None else signature.parameters
 
 
 @lru_cache(maxsize=64)

@@ -41,13 +41,12 @@ from ..measures import (
     RECORD_COLUMNS,
     EpisodeRecord,
     nondeterminism_notes,
-    read_rows,
     record_row,
 )
 from ._episode import observed_episode
 from ._job import Job, describe, record_key
 from ._plan import job_key, template_of
-from ._run_files import RunFiles, read_jobs
+from ._run_files import RunFiles, read_jobs, read_rows
 
 Image = NDArray[np.uint8]
 
@@ -57,7 +56,6 @@ _VIDEO_HZ: Final = 10
 _HEIGHT_PX: Final = 480
 _MAP_WIDTH_PX: Final = 720
 _MAP_MARGIN_M: Final = 3.0
-_MAP_PX_PER_M: Final = 60.0
 
 
 class ReplayPictures(AbstractContextManager["ReplayPictures"]):
@@ -66,12 +64,14 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
     Args:
         map_path: PNG file of the map.
         video_path: MP4 file of the robot's camera beside the map; None for no video.
+        box_scale: as for :func:`~sim_tests.crossing.draw_camera_view`.
 
     Attributes:
         written: paths of the files that have been written.
     """
 
-    def __init__(self, map_path: Path, video_path: Path | None) -> None:
+    def __init__(self, map_path: Path, video_path: Path | None, box_scale: float) -> None:
+        self._box_scale = box_scale
         self._map_path = map_path
         self._video_path = video_path
         self._cone = AttentionCone()
@@ -125,7 +125,9 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         spec = stage.scenario.camera
         camera = spec.camera(_HEIGHT_PX / spec.height_px)
         camera_image = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
-        camera_view = draw_camera_view(camera_image, camera, frame, stage, self._cone)
+        camera_view = draw_camera_view(
+            camera_image, camera, frame, stage, self._cone, box_scale=self._box_scale
+        )
         image = np.hstack([camera_view, above])
         image = image[:, : image.shape[1] // 2 * 2]  # the codec needs an even width
         if self._video is None:
@@ -179,7 +181,8 @@ def _replay(options: ReplayOptions, number: int, job: Job, out: Path) -> tuple[S
             written = [path]
         else:
             video = None if options.no_video else path.with_suffix(".mp4")
-            with ReplayPictures(path.with_suffix(".png"), video) as pictures:
+            drawn = ReplayPictures(path.with_suffix(".png"), video, box_scale_of(job))
+            with drawn as pictures:
                 result, record = _observed(job, pictures.add, bar)
                 pictures.finish()
             written = pictures.written
@@ -219,9 +222,15 @@ def recorder_of(
         on_state: likewise.
     """
     episode = Episode(**job_key(job)._asdict())
-    scaled = Perception.named(job.perception).kind == "pixels"
-    pictures = CameraPictures(boxes_are_scaled=scaled, share=share) if camera else None
+    pictures = CameraPictures(box_scale=box_scale_of(job), share=share) if camera else None
     return CrossingRecorder(episode, pictures=pictures, on_begin=on_begin, on_state=on_state)
+
+
+def box_scale_of(job: Job) -> float:
+    """Return the size of the images of a job's boxes, over that of its scenario's camera."""
+    if Perception.named(job.perception).kind != "pixels":
+        return 1.0
+    return template_of(job.scenario).for_seed(job.seed).camera.picture_scale
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:

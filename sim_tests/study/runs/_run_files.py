@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from perception.documents import parse_json, read_json, read_lines
 
 from ...world.errors import SimError
-from ..measures import Conduct, EpisodeRecord
+from ..measures import Conduct, EpisodeRecord, read_records
 from ._job import JOB_FIELDS, Attempt, Job
+
+# Hearing.answers of sim_tests.actors.behaviour, whose import needs the simulator.
+DEFAULT_ANSWERS: Final = 0.5
+_ANSWERS: Final = re.compile(r"(?:^|,)\s*answers\s*=\s*([^,\s]+)")
 
 
 class RunFiles:
@@ -84,6 +90,30 @@ def read_run(folder: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
+def read_rows(folder: Path | str) -> tuple[EpisodeRecord, ...]:
+    """Return the episodes of a run that have ended, in the order of its jobs.
+
+    Args:
+        folder: of a run, finished or not; or a table of episodes, CSV or Parquet.
+
+    Raises:
+        SimError: there is no run, or a file that is not of one; the message names it.
+    """
+    path = Path(folder)
+    if not path.is_dir():
+        return read_records(path)
+    table = RunFiles(path).episodes
+    # A killed run has no table, or an old one.
+    if read_run(path).get("state") != "complete" and (ended := read_attempts(path)):
+        return tuple(attempt.record for attempt in ended.values())
+    if not table.is_file():
+        raise SimError(
+            f"{path} holds no {table.name}; give the folder that `awarenav crossings --out DIR` "
+            "wrote"
+        )
+    return read_records(table)
+
+
 def read_attempts(folder: Path) -> dict[int, Attempt]:
     """Return the outcome of every episode that has ended, by its number.
 
@@ -117,3 +147,24 @@ def not_of_this_run(path: Path, reason: str) -> SimError:
         f"{path} is not the file of an episode of this run ({reason}): move it away, and "
         "--resume runs its episode again"
     )
+
+
+def answering_note(about: Any) -> str:
+    """Return a sentence on the probability with which simulated people answer a request.
+
+    Args:
+        about: content of ``run.json``.
+
+    Returns:
+        The sentence; empty where the settings of the run are not known.
+    """
+    settings = about.get("settings") if isinstance(about, Mapping) else None
+    if not isinstance(settings, Mapping):
+        return ""
+    population = str(settings.get("population") or "")
+    found = _ANSWERS.search(population)
+    if found is not None:
+        share, source = found[1], f"population {population}"
+    else:
+        share, source = f"{DEFAULT_ANSWERS:g}", "the default, unless a scenario has its own"
+    return f"Simulated people answer a request that they hear with probability {share} ({source})."

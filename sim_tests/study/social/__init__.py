@@ -8,18 +8,15 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._episode import Outcome, SocialEpisode
-    from ._files import FORMATS, read_track, write_episode
-    from ._measures import SOCIAL_MEASURES, SocialMeasure, social_measures
-    from ._recorder import EpisodeRecorder, episode_of
+    from ._files import read_track, write_episode
+    from ._measures import SOCIAL_MEASURES, social_measures
+    from ._recorder import EpisodeRecorder
 
 __all__ = [
-    "FORMATS",
     "SOCIAL_MEASURES",
     "EpisodeRecorder",
     "Outcome",
     "SocialEpisode",
-    "SocialMeasure",
-    "episode_of",
     "read_track",
     "social_measures",
     "write_episode",

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number, set_fields
@@ -165,62 +166,18 @@ class SocialEpisode:
         by at most 0.3 m/s for at least 80 % of the time for which both are there. A group is a set
         of people who are linked so, directly or through others.
         """
-        group_of = list(range(self.people))
-        for one in range(self.people):
-            for other in range(one):
-                if self._together(one, other):
-                    old, new = group_of[one], group_of[other]
-                    group_of = [new if each == old else each for each in group_of]
-        found = [
-            tuple(person for person in range(self.people) if group_of[person] == group)
-            for group in dict.fromkeys(group_of)
-        ]
-        return tuple(each for each in found if len(each) > 1)
-
-    def _together(self, one: int, other: int) -> bool:
-        both = self.present[:, one] & self.present[:, other]
-        if not both.any():
-            return False
-        apart = np.linalg.norm(self.people_m[both, one] - self.people_m[both, other], axis=1)
-        differ = np.linalg.norm(self.people_mps[both, one] - self.people_mps[both, other], axis=1)
-        near = (apart <= _TOGETHER_M) & (differ <= _TOGETHER_MPS)
-        return float(near.mean()) >= _TOGETHER_SHARE
-
-
-def velocities(t_s: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return velocities of the shape of ``positions``, by differences to the instant before.
-
-    The first instant after an absence takes the velocity of the next. Absent instants keep NaN, and
-    a single instant has velocity 0.
-    """
-    found = np.zeros_like(positions)
-    if len(t_s) > 1:
-        steps = np.diff(t_s).reshape(-1, *[1] * (positions.ndim - 1))
-        found[1:] = np.diff(positions, axis=0) / steps
-        found[0] = np.nan
-    for row in range(len(t_s) - 2, -1, -1):
-        found[row] = np.where(np.isnan(found[row]), found[row + 1], found[row])
-    return np.where(np.isnan(positions), np.nan, np.nan_to_num(found))
-
-
-def headings_of(velocities_mps: FloatArray, slowest_mps: float = 0.05) -> FloatArray:
-    """Return the directions of motion; below ``slowest_mps``, the last direction before.
-
-    Args:
-        velocities_mps: (N, ..., 2).
-        slowest_mps: a slower body keeps its heading.
-
-    Returns:
-        (N, ...) radians; a body that has not moved yet faces along its first motion, or along x.
-    """
-    headings = np.arctan2(velocities_mps[..., 1], velocities_mps[..., 0])
-    speeds = np.hypot(velocities_mps[..., 0], velocities_mps[..., 1])
-    headings = np.where(speeds > slowest_mps, headings, np.nan)
-    for rows in (range(1, len(headings)), range(len(headings) - 2, -1, -1)):
-        for row in rows:
-            near = headings[row - 1 if rows.step > 0 else row + 1]
-            headings[row] = np.where(np.isnan(headings[row]), near, headings[row])
-    return np.nan_to_num(headings)
+        if not self.people:
+            return ()
+        both = self.present[:, :, None] & self.present[:, None, :]
+        apart, differ = (
+            np.linalg.norm(each[:, :, None] - each[:, None, :], axis=-1)
+            for each in (self.people_m, self.people_mps)
+        )
+        near = both & (apart <= _TOGETHER_M) & (differ <= _TOGETHER_MPS)
+        share = near.sum(axis=0) / np.maximum(both.sum(axis=0), 1)
+        _, group_of = connected_components(share >= _TOGETHER_SHARE)
+        groups = (np.flatnonzero(group_of == group) for group in np.unique(group_of))
+        return tuple(tuple(each.tolist()) for each in groups if len(each) > 1)
 
 
 def sides(boxes_m: Sequence[Sequence[float]] | FloatArray) -> FloatArray:

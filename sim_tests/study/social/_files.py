@@ -19,10 +19,11 @@ import numpy as np
 
 from awarenav.errors import MissingExtraError, not_one_of
 from awarenav.files import write_text
+from perception.arrays import FloatArray
 from perception.installation import install_command
 
 from ...world.errors import SimError
-from ._episode import SocialEpisode, headings_of, velocities, wrapped
+from ._episode import SocialEpisode, wrapped
 
 #: The ends of the files of each format.
 FORMATS: Final = {"socnav3": ".json", "navwareset": ".csv"}
@@ -31,6 +32,8 @@ _CELL_M: Final = 0.1
 _MARGIN_M: Final = 2.0
 # The text of NavWareSet takes 0.4 m for both bodies together.
 _NAVWARE_RADIUS_M: Final = 0.2
+# A slower body of a track keeps its heading.
+_MOVES_MPS: Final = 0.05
 
 
 def format_of(path: Path) -> str:
@@ -156,6 +159,18 @@ def _navwareset_text(episode: SocialEpisode) -> str:
     return "\n".join(lines) + "\n"
 
 
+def import_pandas(what: str) -> Any:
+    """Return pandas; raise MissingExtraError, which names what needs it, if it is missing."""
+    try:
+        import pandas as pd  # noqa: PLC0415 - an optional dependency
+    except ImportError as cause:
+        raise MissingExtraError(
+            f"{what} needs pandas, which is not installed; it is part of the extra 'bench': "
+            + install_command("bench")
+        ) from cause
+    return pd
+
+
 def read_track(path: Path) -> SocialEpisode:
     """Return the episode of a NavWareSet track, with rows of people or of x1, y1, x2, y2, ….
 
@@ -166,13 +181,7 @@ def read_track(path: Path) -> SocialEpisode:
         SimError: the file cannot be read, or does not have these columns.
         MissingExtraError: pandas is not installed.
     """
-    try:
-        import pandas as pd  # noqa: PLC0415 - an optional dependency
-    except ImportError as cause:
-        raise MissingExtraError(
-            "reading tracks of NavWareSet needs pandas, which is not installed; it is part of the "
-            f"extra 'bench': {install_command('bench')}"
-        ) from cause
+    pd = import_pandas("reading tracks of NavWareSet")
     try:
         table = pd.read_csv(path, skipinitialspace=True)
         needed = ["timestamp", "robot_x", "robot_y", *(("x", "y") if "column" in table else ())]
@@ -198,8 +207,8 @@ def read_track(path: Path) -> SocialEpisode:
         raise SimError(f"cannot read {path}: {cause.strerror or cause}") from cause
     except (ValueError, TypeError) as cause:
         raise SimError(f"{path} is not a NavWareSet track: {str(cause).strip()}") from cause
-    robot_mps, people_mps = velocities(t_s, robot_m[:, :2]), velocities(t_s, people_m)
-    heading = robot_m[:, 2] if robot_m.shape[1] == 3 else headings_of(robot_mps)
+    robot_mps, people_mps = _velocities(t_s, robot_m[:, :2]), _velocities(t_s, people_m)
+    heading = robot_m[:, 2] if robot_m.shape[1] == 3 else _headings(robot_mps)
     rates = wrapped(np.diff(heading)) / np.diff(t_s)
     return SocialEpisode(
         t_s=t_s,
@@ -208,10 +217,36 @@ def read_track(path: Path) -> SocialEpisode:
         robot_mps=robot_mps,
         yaw_rate_radps=np.concatenate([rates[:1], rates]) if len(rates) else np.zeros(1),
         people_m=people_m,
-        people_heading_rad=np.where(np.isnan(people_m[..., 0]), np.nan, headings_of(people_mps)),
+        people_heading_rad=np.where(np.isnan(people_m[..., 0]), np.nan, _headings(people_mps)),
         people_mps=people_mps,
         robot_size_m=(2.0 * _NAVWARE_RADIUS_M, 2.0 * _NAVWARE_RADIUS_M),
         robot_radius_m=_NAVWARE_RADIUS_M,
         person_radius_m=_NAVWARE_RADIUS_M,
         name=path.stem,
     )
+
+
+def _velocities(t_s: FloatArray, positions_m: FloatArray) -> FloatArray:
+    """Return velocities of the shape of ``positions_m``, by differences to the instant before.
+
+    The first instant after an absence takes the velocity of the next. Absent instants keep NaN, and
+    a single instant has velocity 0.
+    """
+    pd = import_pandas("a track")
+    course = pd.DataFrame(positions_m.reshape(len(t_s), -1))
+    steps_s = np.diff(t_s, prepend=np.nan)
+    found = course.diff().div(steps_s, axis=0).bfill().fillna(0.0).where(course.notna())
+    return np.asarray(found).reshape(positions_m.shape)
+
+
+def _headings(velocities_mps: FloatArray) -> FloatArray:
+    """Return the (N, ...) directions of (N, ..., 2) motions, radians.
+
+    A slow body keeps its heading; one that has not moved yet faces along its first motion, or along
+    x.
+    """
+    pd = import_pandas("a track")
+    headings = np.arctan2(velocities_mps[..., 1], velocities_mps[..., 0])
+    moves = np.hypot(velocities_mps[..., 0], velocities_mps[..., 1]) > _MOVES_MPS
+    known = pd.DataFrame(np.where(moves, headings, np.nan).reshape(len(headings), -1))
+    return np.asarray(known.ffill().bfill().fillna(0.0)).reshape(headings.shape)

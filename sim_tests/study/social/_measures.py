@@ -11,7 +11,7 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
-from ..measures import path_length_m
+from ..measures import path_length_m, success_weighted
 from ._episode import SocialEpisode
 from ._motion import (
     GymMotion,
@@ -22,11 +22,9 @@ from ._motion import (
     hunav_people_speed_mps,
     irregularity_radpm,
     mean_goal_angle_rad,
-    mean_of,
     people_heading_changes_rad,
-    people_tracks,
-    robot_track,
-    success_weighted,
+    people_motion,
+    robot_motion,
 )
 from ._social_force import SocialWork
 from ._spaces import (
@@ -139,13 +137,8 @@ _GENERAL: Final = _named(
     ("time_to_collision_s", "TTC", "higher", min_disc_ttc_s),
     *_zones("{}_s", "time in {} distance", zone_s, intrusion=False),
     ("human_delay_s", "human delay", "lower", lambda e: e.outcome.human_delay_s),
-    (
-        "people_acceleration_mps2",
-        "Aavg, of people",
-        "lower",
-        lambda e: mean_of(people_tracks(e).acceleration),
-    ),
-    ("people_jerk_mps3", "Javg, of people", "lower", lambda e: mean_of(people_tracks(e).jerk)),
+    ("people_acceleration_mps2", "Aavg, of people", "lower", lambda e: people_motion(e)[0]),
+    ("people_jerk_mps3", "Javg, of people", "lower", lambda e: people_motion(e)[1]),
     (
         "people_heading_changes_rad",
         "cumulative heading changes, of people",
@@ -205,8 +198,8 @@ _GYM: Final = _named(
 _NAVWARE: Final = _named(
     "NavWareSet",
     ("speed_mps", "Vavg", "neither", _mean_speed),
-    ("acceleration_mps2", "Aavg", "lower", lambda e: mean_of(robot_track(e).acceleration)),
-    ("jerk_mps3", "Javg", "lower", lambda e: mean_of(robot_track(e).jerk)),
+    ("acceleration_mps2", "Aavg", "lower", lambda e: robot_motion(e)[0]),
+    ("jerk_mps3", "Javg", "lower", lambda e: robot_motion(e)[1]),
     ("path_length_m", "PLavg", "lower", lambda e: path_length_m(e.robot_m)),
     ("psc_percent", "PSC, of the notebook", "lower", navware_psc_percent),
     ("compliance_percent", "PSC, of the text", "higher", navware_compliance_percent),

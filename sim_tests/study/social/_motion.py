@@ -7,32 +7,16 @@ the page says which of the two is computed here.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
 from ..measures import path_length_m
 from ._episode import SocialEpisode, wrapped
-
-
-def success_weighted(
-    success: bool | None, actual: float | None, best: float | None
-) -> float | None:
-    """Return S · l / max(p, l): SPL with lengths, STL with times.
-
-    Args:
-        success: S.
-        actual: p, the length or time of the episode; not used without success.
-        best: l > 0, that of the reference.
-
-    Returns:
-        None where success or reference is not known.
-    """
-    if success is None or best is None or best <= 0.0 or (success and actual is None):
-        return None
-    return best / max(actual or 0.0, best) if success else 0.0
 
 
 def heading_changes_rad(headings_rad: FloatArray) -> float:
@@ -76,58 +60,50 @@ def mean_goal_angle_rad(episode: SocialEpisode) -> float | None:
     return float(np.abs(wrapped(angles[away])).mean())
 
 
-@dataclass(frozen=True, slots=True)
-class TrackMotion:
-    """Sums over tracks from which NavWareSet's averages follow: Σ |x| dt and Σ dt.
+def navware_motion(
+    t_s: FloatArray, tracks: Iterable[tuple[NDArray[np.bool_], FloatArray]]
+) -> tuple[float | None, float | None]:
+    """Return NavWareSet's mean |acceleration| (m/s²) and |jerk| (m/s³) of tracks, weighted by time.
 
-    Attributes:
-        acceleration: (Σ |a| dt, Σ dt), m/s and s.
-        jerk: (Σ |j| dt, Σ dt), m/s² and s.
+    Speed belongs to an interval; acceleration is the change to the interval before, over the later
+    interval's duration; jerk likewise.
+
+    Args:
+        t_s: (N,) times.
+        tracks: of each body, (N,) whether it is there, and (N, 2) positions.
+
+    Returns:
+        None for tracks that are too short.
     """
-
-    acceleration: tuple[float, float]
-    jerk: tuple[float, float]
-
-    @classmethod
-    def of(cls, t_s: FloatArray, positions_m: FloatArray) -> TrackMotion:
-        """Return the sums of one track of (N,) times and (N, 2) positions.
-
-        Speed belongs to an interval; acceleration is the change to the interval before, over the
-        later interval's duration; jerk likewise.
-        """
-        dt = np.diff(t_s)
-        speed = np.hypot(*np.diff(positions_m, axis=0).T) / dt
+    sums = np.zeros(4)  # Σ |a| dt, Σ dt, Σ |j| dt, Σ dt
+    for there, positions_m in tracks:
+        dt = np.diff(t_s[there])
+        speed = np.hypot(*np.diff(positions_m[there], axis=0).T) / dt
         acceleration = np.diff(speed) / dt[1:]
         jerk = np.diff(acceleration) / dt[2:]
-        return cls(
-            (float((np.abs(acceleration) * dt[1:]).sum()), float(dt[1:].sum())),
-            (float((np.abs(jerk) * dt[2:]).sum()), float(dt[2:].sum())),
-        )
-
-
-def robot_track(episode: SocialEpisode) -> TrackMotion:
-    """Return the motion of the robot."""
-    return TrackMotion.of(episode.t_s, episode.robot_m)
-
-
-def people_tracks(episode: SocialEpisode) -> TrackMotion:
-    """Return the motion of all people together, each over the times at which they are there."""
-    tracks = [
-        TrackMotion.of(episode.t_s[there], episode.people_m[there, person])
-        for person, there in enumerate(episode.present.T)
-    ]
-    return TrackMotion(
-        (
-            sum(each.acceleration[0] for each in tracks),
-            sum(each.acceleration[1] for each in tracks),
-        ),
-        (sum(each.jerk[0] for each in tracks), sum(each.jerk[1] for each in tracks)),
+        sums += [
+            (np.abs(acceleration) * dt[1:]).sum(),
+            dt[1:].sum(),
+            (np.abs(jerk) * dt[2:]).sum(),
+            dt[2:].sum(),
+        ]
+    accelerations, accelerated_s, jerks, jerked_s = sums.tolist()
+    return (
+        accelerations / accelerated_s if accelerated_s > 0.0 else None,
+        jerks / jerked_s if jerked_s > 0.0 else None,
     )
 
 
-def mean_of(sums: tuple[float, float]) -> float | None:
-    """Return the time-weighted mean of :class:`TrackMotion`; None for tracks that are too short."""
-    return sums[0] / sums[1] if sums[1] > 0.0 else None
+def robot_motion(episode: SocialEpisode) -> tuple[float | None, float | None]:
+    """Return :func:`navware_motion` of the robot."""
+    always = np.ones(len(episode.t_s), dtype=np.bool_)
+    return navware_motion(episode.t_s, [(always, episode.robot_m)])
+
+
+def people_motion(episode: SocialEpisode) -> tuple[float | None, float | None]:
+    """Return :func:`navware_motion` of all people, each over the times at which they are there."""
+    tracks = zip(episode.present.T, np.moveaxis(episode.people_m, 1, 0), strict=True)
+    return navware_motion(episode.t_s, tracks)
 
 
 def people_heading_changes_rad(episode: SocialEpisode) -> float | None:

@@ -58,27 +58,24 @@ def social_force(
     return np.where(acts[..., None], force, 0.0)
 
 
-def nearest_wall_points_m(points_m: FloatArray, walls_m: FloatArray) -> FloatArray:
-    """Return the (N, 2) points of (W, 4) walls, W ≥ 1, that are nearest to (N, 2) points."""
+def obstacle_force_mps2(points_m: FloatArray, radius_m: float, walls_m: FloatArray) -> FloatArray:
+    """Return the (N,) magnitudes of the force of the nearest wall on discs at (N, 2) points.
+
+    Args:
+        points_m: (N, 2) centres.
+        radius_m: of the discs.
+        walls_m: (W, 4) straight walls; without any, the force is 0.
+    """
+    if not len(walls_m):
+        return np.zeros(len(points_m))
     start, along = walls_m[:, :2], walls_m[:, 2:] - walls_m[:, :2]
     length2 = (along**2).sum(axis=1)
     to = points_m[:, None, :] - start
     share = (to * along).sum(axis=-1) / np.where(length2 > 0.0, length2, 1.0)
     feet = start + np.clip(share, 0.0, 1.0)[..., None] * along
-    apart = np.linalg.norm(points_m[:, None, :] - feet, axis=-1)
-    found: FloatArray = feet[np.arange(len(points_m)), np.argmin(apart, axis=1)]
-    return found
-
-
-def obstacle_force(points_m: FloatArray, radius_m: float, walls_m: FloatArray) -> FloatArray:
-    """Return the (N, 2) forces (m/s²) of the nearest wall on discs at (N, 2) points; 0 without."""
-    if not len(walls_m):
-        return np.zeros_like(points_m)
-    away = points_m - nearest_wall_points_m(points_m, walls_m)
-    distance = np.linalg.norm(away, axis=-1)
-    strength = _OBSTACLE_MPS2 * np.exp(-(distance - radius_m) / _OBSTACLE_RANGE_M)
-    force: FloatArray = (strength / np.where(distance > 0.0, distance, 1.0))[:, None] * away
-    return force
+    distance = np.linalg.norm(points_m[:, None, :] - feet, axis=-1).min(axis=1)
+    strength: FloatArray = _OBSTACLE_MPS2 * np.exp(-(distance - radius_m) / _OBSTACLE_RANGE_M)
+    return np.where(distance > 0.0, strength, 0.0)  # on the wall it has no direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +104,9 @@ class SocialWork:
         people, people_mps = episode.people_m, episode.people_mps
         on_people = np.where(there, social_force(robot, robot_mps, people, people_mps), 0.0)
         on_robot = np.where(there, social_force(people, people_mps, robot, robot_mps), 0.0)
-        walls = obstacle_force(episode.robot_m, episode.robot_radius_m, episode.walls_m)
-        walls_sum = float(np.linalg.norm(walls, axis=-1).sum())
+        walls_sum = float(
+            obstacle_force_mps2(episode.robot_m, episode.robot_radius_m, episode.walls_m).sum()
+        )
         people_sum = float(np.linalg.norm(on_people, axis=-1).sum())
         together = float(np.linalg.norm(on_robot.sum(axis=1), axis=-1).sum())
         return cls(

@@ -2,49 +2,36 @@
 
 from __future__ import annotations
 
-import csv
-import io
+import math
 import sys
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from tqdm import tqdm
 
 from awarenav.errors import counted
-from awarenav.files import csv_number, json_text, write_text
+from awarenav.files import json_text, write_text
 
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, Variant, labels, table_text
 from ..runs import Job, RunFiles, attempt, find_episode, in_parallel, read_jobs
-from ._files import FORMATS, format_of, read_track, write_episode
+from ._files import FORMATS, format_of, import_pandas, read_track, write_episode
 from ._measures import SOCIAL_MEASURES, social_measures
 from ._recorder import episode_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Columns of ``social.csv`` before those of the measures.
 KEY_COLUMNS: Final = (
     *("source", "episode", "scenario", "seed", "policy", "planner", "perception", "fault"),
     "error",
 )
-_DECIMALS: Final = 3
+# The column of what a mean is over; it is in no file.
+_LABEL: Final = "mean over"
 # Failures that are printed.
 _SHOWN: Final = 20
-
-
-@dataclass(frozen=True, slots=True)
-class MeasuredEpisode:
-    """The measures of one episode: a row of ``social.csv``.
-
-    Attributes:
-        key: text of each of :data:`KEY_COLUMNS`.
-        label: heading of its column in the table of means.
-        values: by the names of the measures; empty for an episode that broke off.
-    """
-
-    key: dict[str, str]
-    label: str
-    values: dict[str, float | None]
 
 
 def measure_sources(
@@ -57,36 +44,31 @@ def measure_sources(
 
     Raises:
         SimError: a source is neither the folder of a run nor a file with an episode.
+        MissingExtraError: pandas is not installed.
     """
     if out is not None and out.suffix != ".csv":
         raise SimError(f"--out must be a .csv file, got {out}")
     jobs = {path: read_jobs(path) for path in sources if path.is_dir()}
-    rows = [_measured_file(path) for path in sources if path not in jobs]
+    frames = import_pandas("awarenav measures")
+    rows = [_row_of_file(path) for path in sources if path not in jobs]
     for path, planned in jobs.items():
-        rows += _measured_run(path, planned, workers)
+        rows += _rows_of_run(path, planned, workers)
+    table = frames.DataFrame(rows, columns=[_LABEL, *KEY_COLUMNS, *SOCIAL_MEASURES])
     if out is None and len(sources) == 1 and jobs:
         out = RunFiles(sources[0]).social
     if out is not None:
-        write_text(out, social_csv(rows), SimError)
-    means = _means(rows)
-    print(json_text(means).rstrip() if as_json else _table(means))
+        numbers = table.drop(columns=_LABEL).to_csv(index=False, float_format="%.6f")
+        write_text(out, numbers, SimError)
+    groups = table[table["error"] == ""].groupby(_LABEL, sort=False)[list(SOCIAL_MEASURES)]
+    counts = groups.size().reindex(table[_LABEL].unique(), fill_value=0)
+    means = groups.mean().reindex(counts.index)
+    print(_json(counts, means) if as_json else _text(counts, means))
     if out is not None and not as_json:
-        print(f"\nWritten: {out} with {counted(len(rows), 'episode')}")
-    failures = [row for row in rows if row.key["error"]]
-    for row in failures[:_SHOWN]:
-        print(f"episode {row.key['episode']}: {row.key['error']}", file=sys.stderr)
-    return 1 if failures else 0
-
-
-def social_csv(rows: Iterable[MeasuredEpisode]) -> str:
-    """Return the text of ``social.csv``: one row per episode, six decimals, empty for None."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*KEY_COLUMNS, *SOCIAL_MEASURES])
-    for row in rows:
-        numbers = [csv_number(row.values.get(name)) for name in SOCIAL_MEASURES]
-        writer.writerow([*(row.key[name] for name in KEY_COLUMNS), *numbers])
-    return text.getvalue()
+        print(f"\nWritten: {out} with {counted(len(table), 'episode')}")
+    failures = table[table["error"] != ""]
+    for episode, error in failures[["episode", "error"]].head(_SHOWN).itertuples(index=False):
+        print(f"episode {episode}: {error}", file=sys.stderr)
+    return 1 if len(failures) else 0
 
 
 def export_episode(folder: Path, episode: str, format: str | None, out: Path | None) -> int:
@@ -111,13 +93,13 @@ def export_episode(folder: Path, episode: str, format: str | None, out: Path | N
     return 0
 
 
-def _measured_file(path: Path) -> MeasuredEpisode:
+def _row_of_file(path: Path) -> dict[str, Any]:
     episode = read_track(path)
     key = {**dict.fromkeys(KEY_COLUMNS, ""), "source": str(path), "episode": episode.name}
-    return MeasuredEpisode(key, path.name, social_measures(episode))
+    return {_LABEL: path.name, **key, **social_measures(episode)}
 
 
-def _measured_run(folder: Path, jobs: Sequence[Job], workers: int | None) -> list[MeasuredEpisode]:
+def _rows_of_run(folder: Path, jobs: Sequence[Job], workers: int | None) -> list[dict[str, Any]]:
     """Run all episodes of a run again and measure them."""
     by_number: dict[int, tuple[EpisodeRecord, dict[str, float | None]]] = {}
     with tqdm(total=len(jobs), desc="measures", unit="episode", file=sys.stderr) as bar:
@@ -127,15 +109,13 @@ def _measured_run(folder: Path, jobs: Sequence[Job], workers: int | None) -> lis
     measured = [by_number[number] for number in range(len(jobs))]
     label = labels(Variant.of(record) for record, _ in measured)
     return [
-        MeasuredEpisode(
-            {
-                "source": str(folder),
-                "episode": str(number),
-                **{name: str(getattr(record, name)) for name in KEY_COLUMNS[2:]},
-            },
-            label[Variant.of(record)],
-            values,
-        )
+        {
+            _LABEL: label[Variant.of(record)],
+            "source": str(folder),
+            "episode": str(number),
+            **{name: getattr(record, name) for name in KEY_COLUMNS[2:]},
+            **values,
+        }
         for number, (record, values) in enumerate(measured)
     ]
 
@@ -152,31 +132,25 @@ def _measured_job(job: Job) -> tuple[EpisodeRecord, dict[str, float | None]]:
     return record, social_measures(episode)
 
 
-def _means(rows: Sequence[MeasuredEpisode]) -> dict[str, Any]:
+def _json(counts: pd.Series[int], means: pd.DataFrame) -> str:
     """Return the number of episodes and the mean of each measure, for each label."""
-    means: dict[str, Any] = {}
-    for label in dict.fromkeys(row.label for row in rows):
-        own = [row for row in rows if row.label == label and row.values]
-        known = {
-            name: [value for row in own if (value := row.values[name]) is not None]
-            for name in SOCIAL_MEASURES
-        }
-        means[label] = {
-            "episodes": len(own),
-            "means": {name: sum(v) / len(v) if v else None for name, v in known.items()},
-        }
-    return means
+    known = means.astype(object).where(means.notna(), None)
+    found = {
+        label: {"episodes": int(counts[label]), "means": known.loc[label].to_dict()}
+        for label in counts.index
+    }
+    return json_text(found).rstrip()
 
 
-def _table(means: dict[str, Any]) -> str:
+def _text(counts: pd.Series[int], means: pd.DataFrame) -> str:
     """Return the means as a table: a row for each measure, a column for each label."""
-
-    def text(value: float | None) -> str:
-        return "–" if value is None else f"{value:.{_DECIMALS}f}"
-
-    rows = [["episodes", "", "", *(str(each["episodes"]) for each in means.values())]]
+    rows = [["episodes", "", "", *map(str, counts)]]
     rows += [
-        [name, measure.source, measure.published, *(text(m["means"][name]) for m in means.values())]
+        [name, measure.source, measure.published, *map(_number, means[name])]
         for name, measure in SOCIAL_MEASURES.items()
     ]
-    return table_text(("mean of", "source", "its name there", *means), rows, left=3)
+    return table_text(("mean of", "source", "its name there", *counts.index), rows, left=3)
+
+
+def _number(value: float) -> str:
+    return "–" if math.isnan(value) else f"{value:.3f}"

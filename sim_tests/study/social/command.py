@@ -7,7 +7,7 @@ from typing import Any
 
 from awarenav.cli import FilePath, FolderPath, OneOf, argument, command, group, option, options
 
-#: Names of the formats of exported episodes; those of :data:`sim_tests.study.social.FORMATS`.
+#: Names of the formats of exported episodes; those of ``_files.FORMATS``.
 FORMAT_NAMES = ("socnav3", "navwareset")
 
 
@@ -20,7 +20,7 @@ FORMAT_NAMES = ("socnav3", "navwareset")
     ],
     exit_status={0: "Success.", 1: "An episode broke off with an error.", 2: "Bad input."},
     epilog="docs/social_measures.md defines every measure and names its source. The episodes of a "
-    "run are run again, which takes as long as the run.",
+    "run are run again, which takes as long as the run. Needs the extra 'bench'.",
 )
 @argument(
     "sources",

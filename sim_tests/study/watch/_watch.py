@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
-from ...viewing import LivePage, live_page, outcome_text, show_page, write_page
+from ...viewing import LivePage, outcome_text, page_text, show_page, write_page
 from ...world.errors import SimError
 from ..runs import (
     Conditions,
@@ -48,7 +48,7 @@ def watch_command(
     key = job_key(job)
     if out is not None and not out.parent.is_dir():
         raise SimError(f"cannot write {out}: there is no folder {out.parent}")
-    with LivePage(live_page(f"awarenav watch: {key.scenario}"), port) as page:
+    with LivePage(page_text(f"awarenav watch: {key.scenario}"), port) as page:
         print(f"{describe(key)}\nWatch it at {page.url} (Ctrl-C ends it)", flush=True)
         if not no_browser:
             show_page(page.url)

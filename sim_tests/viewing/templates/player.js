@@ -16,12 +16,21 @@
     const state = states[index];
     drawPlan(find("plan"), begin, states, index, layers);
     if (state) {
-      const pictured = drawCamera(find("camera"), begin, states, index, layers, request);
-      if (pictured) find("note").hidden = true;
+      showPicture(states, index);
       figures(state);
     }
     drawAlpha(find("alpha"), begin, states, index, chosenTrack());
     drawMotion(find("motion"), begin, states, index);
+  }
+
+  // The newest picture up to a state.
+  function showPicture(states, index) {
+    let at = index;
+    while (at >= 0 && !states[at].picture) at -= 1;
+    if (at < 0) return;
+    const address = `data:image/jpeg;base64,${states[at].picture}`;
+    if (find("camera").src !== address) find("camera").src = address;
+    find("note").hidden = true;
   }
 
   function chosenTrack() {
@@ -132,6 +141,7 @@
   function takeBegin(begin) {
     player.begin = begin;
     find("title").textContent = begin.scenario;
+    find("camera").style.aspectRatio = String(begin.picture_aspect);
     find("facts").textContent = [`seed ${begin.seed}`, `policy ${begin.policy}`, begin.planner,
       begin.perception, begin.fault && `fault ${begin.fault}`].filter(Boolean).join(" · ");
     find("play").disabled = false;
@@ -156,7 +166,6 @@
     const stream = new EventSource("states");
     stream.addEventListener("begin", (event) => {
       player.states.length = 0;
-      CAMERA.bitmaps.clear();
       takeBegin(JSON.parse(event.data));
       find("status").className = "live";
       find("status").textContent = "Live";

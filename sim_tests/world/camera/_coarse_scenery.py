@@ -37,17 +37,14 @@ class CoarseSceneryRenderer:
         warehouse: the warehouse to render.
         divisor: side of a block of scenery in pixels, ≥ 1; it must divide the image's width and
             height.
-        renderer: renders both; None is a :class:`CameraRenderer` with its defaults.
     """
 
-    def __init__(
-        self, warehouse: Warehouse, divisor: int, renderer: CameraRenderer | None = None
-    ) -> None:
+    def __init__(self, warehouse: Warehouse, divisor: int) -> None:
         if divisor < 1:
             raise SimError(f"divisor must be a whole number from 1, got {divisor!r}")
         self._warehouse = warehouse
         self._divisor = divisor
-        self._renderer = CameraRenderer(warehouse) if renderer is None else renderer
+        self._renderer = CameraRenderer(warehouse)
 
     def render(self, camera: Camera, T_odom_camera: Any) -> RenderedView:
         """Render the whole image.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception import Camera
-from perception.arrays import FloatArray, finite_number
+from perception.arrays import FloatArray
 
 from .._warehouse import Warehouse
 from ..errors import SimError
@@ -51,8 +51,6 @@ class CameraRenderer:
         warehouse: the warehouse to render.
         lighting: the hall's lighting; None is ``bright_led``.
         shadows: whether actors cast shadows on the floor; None is the lighting's own setting.
-        near_m: nothing nearer is drawn, > 0.
-        far_m: nothing farther is drawn, > near_m.
         supersampling: n averages n × n samples per pixel, 1 to 8. Depth and ids are never
             averaged. They come from one sample: at the pixel's centre for an odd n, half a sample
             right of and below it for an even n.
@@ -64,8 +62,6 @@ class CameraRenderer:
         *,
         lighting: Lighting | None = None,
         shadows: bool | None = None,
-        near_m: float = 0.05,
-        far_m: float = 60.0,
         supersampling: int = 1,
     ) -> None:
         self._warehouse = warehouse
@@ -75,12 +71,6 @@ class CameraRenderer:
         levels = np.arange(256)[:, None] * np.asarray(light.colour_rgb)
         self._tint = (
             None if light.colour_rgb == (1.0, 1.0, 1.0) else np.rint(levels).astype(np.uint8)[None]
-        )
-        self._near_m = finite_number(
-            "near_m", near_m, SimError, minimum=0.0, exclusive_minimum=True
-        )
-        self._far_m = finite_number(
-            "far_m", far_m, SimError, minimum=self._near_m, exclusive_minimum=True
         )
         if supersampling not in range(1, _MAX_SUPERSAMPLING + 1):
             raise SimError(
@@ -101,7 +91,7 @@ class CameraRenderer:
         size_px: tuple[int, int] | None = None,
     ) -> FloatArray:
         """Return the depth (h, w) along the optical axis; arguments as in :meth:`render`."""
-        view = self._view(camera, T_odom_camera, roi_xyxy_px, size_px)
+        view = RenderView.of_rectangle(camera, T_odom_camera, roi_xyxy_px, size_px)
         return self._draw(view, None).depth_m
 
     def render(
@@ -128,7 +118,7 @@ class CameraRenderer:
         Raises:
             SimError: for a camera with distortion, an empty rectangle or a size below one pixel.
         """
-        view = self._view(camera, T_odom_camera, roi_xyxy_px, size_px)
+        view = RenderView.of_rectangle(camera, T_odom_camera, roi_xyxy_px, size_px)
         factor = self._supersampling
         if factor == 1:
             drawing = self._draw(view, only, shadows=self._light.shadows)
@@ -149,22 +139,6 @@ class CameraRenderer:
             rgb = np.asarray(cv2.LUT(rgb, self._tint), dtype=np.uint8)
         actors = self._warehouse.visuals.actor_numbers(drawing.body_ids)
         return RenderedView(rgb, drawing.depth_m, drawing.body_ids, actors)
-
-    def _view(
-        self,
-        camera: Camera,
-        T_odom_camera: Any,
-        roi_xyxy_px: Any,
-        size_px: tuple[int, int] | None,
-    ) -> RenderView:
-        return RenderView.of_rectangle(
-            camera,
-            T_odom_camera,
-            roi_xyxy_px,
-            size_px,
-            near_m=self._near_m,
-            far_m=self._far_m,
-        )
 
     def _draw(
         self, view: RenderView, only: AbstractSet[int] | None, *, shadows: bool = False

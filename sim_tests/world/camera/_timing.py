@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
 import numpy as np
@@ -81,21 +80,12 @@ class FrameClock:
         return True, self._timing.delivery_s(now, self._rng)
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class _Delivery:
-    """The delivery of one frame; deliveries are ordered by time, then stamp, then number."""
-
-    delivery_s: float
-    stamp_s: float
-    number: int
-
-
 class FrameQueue(Generic[FrameT]):
     """A queue of frames that have been captured but not delivered; it returns each frame once."""
 
     def __init__(self) -> None:
-        self._deliveries: list[_Delivery] = []
-        self._frames: dict[int, FrameT] = {}
+        # Delivery, stamp and number, by which frames are ordered, and the frame.
+        self._heap: list[tuple[float, float, int, FrameT]] = []
         self._count = 0
 
     def put(self, stamp_s: float, delivery_s: float | None, frame: FrameT) -> None:
@@ -104,17 +94,16 @@ class FrameQueue(Generic[FrameT]):
             return
         stamp = finite_number("stamp_s", stamp_s, SimError)
         arrival = finite_number("delivery_s", delivery_s, SimError, minimum=stamp)
-        heapq.heappush(self._deliveries, _Delivery(arrival, stamp, self._count))
-        self._frames[self._count] = frame
+        heapq.heappush(self._heap, (arrival, stamp, self._count, frame))
         self._count += 1
 
     def take(self, now_s: float) -> tuple[FrameT, ...]:
         """Remove and return the frames that have arrived by ``now_s``, in order of arrival."""
         arrived = []
-        while self._deliveries and self._deliveries[0].delivery_s <= now_s + _TOLERANCE_S:
-            arrived.append(self._frames.pop(heapq.heappop(self._deliveries).number))
+        while self._heap and self._heap[0][0] <= now_s + _TOLERANCE_S:
+            arrived.append(heapq.heappop(self._heap)[-1])
         return tuple(arrived)
 
     def __len__(self) -> int:
         """Return the number of frames that are still to be delivered."""
-        return len(self._deliveries)
+        return len(self._heap)

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception import Camera
 from perception.arrays import FloatArray, finite_array, rigid_transform
 
 from ..errors import SimError
+
+# The software renderer works in single precision: a sample may round to a box's edge.
+_SLACK_TANGENT: Final = 1e-4
+_SLACK_M: Final = 1e-3
+_UNIT_CORNERS: Final = np.array(
+    [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,8 +48,8 @@ class RenderView:
     bottom: float
     width: int
     height: int
-    near_m: float
-    far_m: float
+    near_m: float = 0.05
+    far_m: float = 60.0
 
     @classmethod
     def of_rectangle(
@@ -50,9 +58,6 @@ class RenderView:
         T_odom_camera: Any,
         roi_xyxy_px: Any = None,
         size_px: tuple[int, int] | None = None,
-        *,
-        near_m: float = 0.05,
-        far_m: float = 60.0,
     ) -> RenderView:
         """Return the view of a rectangle of a camera's image.
 
@@ -62,8 +67,6 @@ class RenderView:
             roi_xyxy_px: (4,) u_min, v_min, u_max, v_max in pixels from the image's corner; None is
                 the whole image.
             size_px: samples per row and per column; None is one per pixel of the rectangle.
-            near_m: nothing nearer is drawn, > 0.
-            far_m: nothing farther is drawn.
 
         Raises:
             SimError: for a camera with distortion, an empty rectangle or a size below one sample.
@@ -98,8 +101,6 @@ class RenderView:
             bottom=(v_max - 0.5 - camera.cy_px) / camera.fy_px,
             width=int(width),
             height=int(height),
-            near_m=near_m,
-            far_m=far_m,
         )
 
     @property
@@ -140,3 +141,33 @@ class RenderView:
         out[2, 3] = -2.0 * far * near / (far - near)
         out[3, 2] = -1.0
         return [float(value) for value in out.T.flat]
+
+
+def box_corners(boxes_m: FloatArray) -> FloatArray:
+    """Return the corners (N, 8, 3) of axis-aligned boxes (N, 2, 3), low and high corner."""
+    low, high = boxes_m[:, None, 0], boxes_m[:, None, 1]
+    return np.asarray(low + _UNIT_CORNERS * (high - low))
+
+
+def to_camera(view: RenderView, corners_odom_m: FloatArray) -> FloatArray:
+    """Return corners (N, 8, 3) in the view's optical frame."""
+    rotation, origin = view.T_odom_camera[:3, :3], view.T_odom_camera[:3, 3]
+    flat = corners_odom_m.reshape(-1, 3) @ rotation - origin @ rotation
+    return np.asarray(flat.reshape(corners_odom_m.shape))
+
+
+def in_view(view: RenderView, corners_camera_m: FloatArray) -> NDArray[np.bool_]:
+    """Return (N,) False for a box (N, 8, 3) that no sample of the image can fall on.
+
+    It lies nearer or farther than everything drawn, or beyond one side plane of the frustum.
+    """
+    x, y, z = corners_camera_m[..., 0], corners_camera_m[..., 1], corners_camera_m[..., 2]
+    slack = _SLACK_TANGENT * np.abs(z) + _SLACK_M
+    return np.asarray(
+        (z.max(axis=1) >= view.near_m - _SLACK_M)
+        & (z.min(axis=1) <= view.far_m + _SLACK_M)
+        & (x - view.left * z > -slack).any(axis=1)
+        & (x - view.right * z < slack).any(axis=1)
+        & (y - view.top * z > -slack).any(axis=1)
+        & (y - view.bottom * z < slack).any(axis=1)
+    )

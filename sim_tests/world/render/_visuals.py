@@ -19,8 +19,7 @@ from ..hall import Colour, Lighting, Mesh, WarehouseLayout, scenery, scenery_tex
 from ._backend import RENDERERS, Drawing, RenderBackend, RendererName, texture_key
 from ._backend_gl import GlBackend, gl_works
 from ._backend_tiny import TinyBackend
-from ._culling import box_corners, in_view, to_camera
-from ._view import RenderView
+from ._view import RenderView, box_corners, in_view, to_camera
 
 _WHITE: Final[Colour] = (1.0, 1.0, 1.0)
 
@@ -56,8 +55,8 @@ class VisualActor(Protocol):
 class Visuals(AbstractContextManager["Visuals"]):
     """The render world, a PyBullet client of its own without physics; use it in a ``with`` block.
 
-    Scenery stands still; actors move. Before each image, :meth:`prepare` hides the bodies that the
-    image cannot show: those outside the frustum or between the samples. It never changes the image.
+    Scenery stands still; actors move. Before each image, :meth:`prepare` hides the actors outside
+    the frustum, which never changes the image.
 
     Args:
         layout: the hall whose scenery is built; None leaves the world empty.
@@ -86,8 +85,7 @@ class Visuals(AbstractContextManager["Visuals"]):
         self._built: set[int] = set()
         self._shown_actors: set[int] = set()
         self._static_bodies: list[int] = []
-        self._static_corners: FloatArray = np.zeros((0, 8, 3))
-        self._static_shown: NDArray[np.bool_] = np.zeros(0, dtype=bool)
+        self._statics_shown = True
         self._actor_numbers = np.full(1, -1, dtype=np.int32)
         try:
             if layout is not None:
@@ -184,12 +182,9 @@ class Visuals(AbstractContextManager["Visuals"]):
 
     def add_static(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
         """Add a piece of scenery in odom; return PyBullet's id of its body."""
-        body = self.add_body(self.shape(mesh, colour, texture))
-        bounds = np.array([mesh.vertices_m.min(axis=0), mesh.vertices_m.max(axis=0)])
-        self._static_bodies.append(body)
-        self._static_corners = np.concatenate([self._static_corners, box_corners(bounds[None])])
-        self._static_shown = np.append(self._static_shown, True)
-        return body
+        self._show_statics(True)
+        self._static_bodies.append(self.add_body(self.shape(mesh, colour, texture)))
+        return self._static_bodies[-1]
 
     def add_actor(self, actor: VisualActor) -> int:
         """Add something that moves; return its number in :attr:`RenderedView.actors`."""
@@ -210,7 +205,7 @@ class Visuals(AbstractContextManager["Visuals"]):
         self._backend.reveal(body)
 
     def prepare(self, view: RenderView, only: AbstractSet[int] | None = None) -> None:
-        """Hide the bodies that the view cannot show, and pose every actor in view.
+        """Pose the actors in view, and hide the others.
 
         Args:
             view: the view of the next image.
@@ -218,17 +213,10 @@ class Visuals(AbstractContextManager["Visuals"]):
         """
         if self.client < 0:
             raise SimError("the render world is closed: it cannot draw any more")
-        corners = self._static_corners if only is None else self._static_corners[:0]
-        statics = len(corners)
-        if self._actors:
-            bounds = np.array([actor.bounds_odom_m() for actor in self._actors], dtype=np.float64)
-            corners = np.concatenate([corners, box_corners(bounds)])
-        in_camera = to_camera(view, corners)
-        shown = in_view(view, in_camera)
-        self._show_statics(
-            shown[:statics] if only is None else np.zeros(len(self._static_bodies), dtype=bool)
-        )
-        self._show_actors(view, shown[statics:], in_camera[statics:], only)
+        self._show_statics(only is None)
+        bounds = np.array([actor.bounds_odom_m() for actor in self._actors], dtype=np.float64)
+        in_camera = to_camera(view, box_corners(bounds.reshape(-1, 2, 3)))
+        self._show_actors(view, in_view(view, in_camera), in_camera, only)
 
     def draw(self, view: RenderView, light: Lighting) -> Drawing:
         """Draw the bodies that are not hidden; :meth:`prepare` is called with the view before."""
@@ -240,13 +228,11 @@ class Visuals(AbstractContextManager["Visuals"]):
         # Id −1 is the last row, which stands for "nothing".
         return np.asarray(self._actor_numbers[body_ids])
 
-    def _show_statics(self, shown: NDArray[np.bool_]) -> None:
-        for row in np.flatnonzero(shown != self._static_shown).tolist():
-            if shown[row]:
-                self._backend.reveal(self._static_bodies[row])
-            else:
-                self._backend.hide(self._static_bodies[row])
-        self._static_shown = shown
+    def _show_statics(self, shown: bool) -> None:
+        if shown != self._statics_shown:
+            for body in self._static_bodies:
+                (self._backend.reveal if shown else self._backend.hide)(body)
+            self._statics_shown = shown
 
     def _show_actors(
         self,

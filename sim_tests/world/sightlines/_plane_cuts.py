@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ._sight_lines import PlacedSurface
-from ._triangles import CLUSTER, TriangleSet, joined_sets
+from ._triangles import CLUSTER, clusters_of, joined_sets, parts_of
 
 
 def cut_surfaces(
@@ -42,15 +42,15 @@ def cut_surfaces(
     met = _meet(joined.piece_boxes_m, normals, offsets)
     counts = joined.counts[met]
     piece = np.repeat(met, counts)
-    cluster = np.arange(len(piece)) + np.repeat(
-        joined.starts[met] - np.cumsum(counts) + counts, counts
-    )
+    cluster = clusters_of(joined.starts[met], counts)
     near = _meet(joined.boxes_m[..., cluster], normals[piece], offsets[piece])
     if not near.size:
         return nothing
     piece, cluster = piece[near], cluster[near]
-    corners = _corners(sets, cluster)
     rows = len(cluster)
+    corners = np.empty((rows, 3, 3, CLUSTER))
+    for triangles, part, own in parts_of(sets, cluster):
+        triangles.corners_m.take(own, axis=0, out=corners[part], mode="clip")
     heights = normals[piece, None] @ corners.reshape(rows, 3, 3 * CLUSTER)
     heights = heights.reshape(rows, 3, CLUSTER) - offsets[piece, None, None]
     one, two, three = (heights > 0.0).transpose(1, 0, 2)
@@ -77,16 +77,3 @@ def _meet(boxes_m: FloatArray, normals: FloatArray, offsets_m: FloatArray) -> ND
     away = (turned * (low + high)).sum(axis=0) - 2.0 * offsets_m
     half = (np.abs(turned) * (high - low)).sum(axis=0)
     return np.flatnonzero(np.abs(away) <= half)
-
-
-def _corners(sets: Sequence[TriangleSet], cluster: NDArray[np.int64]) -> FloatArray:
-    """Return the corners (N, 3, 3, 16) of clusters, numbered through all sets in order."""
-    corners = np.empty((len(cluster), 3, 3, CLUSTER))
-    begin, first = 0, 0
-    for triangles in sets:
-        end = int(np.searchsorted(cluster, first + triangles.clusters))
-        if end > begin:
-            rows = cluster[begin:end] - first
-            triangles.corners_m.take(rows, axis=0, out=corners[begin:end], mode="clip")
-        begin, first = end, first + triangles.clusters
-    return corners

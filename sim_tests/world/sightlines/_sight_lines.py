@@ -17,11 +17,13 @@ from ._triangles import (
     CLUSTER,
     SIDES,
     TriangleSet,
+    clusters_of,
     inverse_of,
     joined_sets,
     meet_boxes,
     meet_own_boxes,
     meet_triangles,
+    parts_of,
 )
 
 # Added to the radii of bounding spheres, against rounding of lines that just touch one.
@@ -144,24 +146,16 @@ def _blocked_by(
     piece = piece[pairs]
     # Each pair is combined with every cluster of triangles of its piece.
     counts = joined.counts[piece]
-    pair = np.repeat(pairs, counts)
-    skipped = joined.starts[piece] - np.cumsum(counts) + counts
-    cluster = np.arange(len(pair)) + np.repeat(skipped, counts)
+    pair, cluster = np.repeat(pairs, counts), clusters_of(joined.starts[piece], counts)
     boxes = joined.boxes_m[..., cluster]
     met = np.flatnonzero(meet_own_boxes(eyes[:, pair], inverse[:, pair], boxes))
     pair, cluster = pair[met], cluster[met]
     if not cluster.size:
         return blocked
     edges, planes = np.empty((len(cluster), 6, SIDES)), np.empty((len(cluster), 4, CLUSTER))
-    # Pairs are in the order of the pieces, and so of the sets.
-    begin, first = 0, 0
-    for triangles in sets:
-        end = int(np.searchsorted(cluster, first + triangles.clusters))
-        if end > begin:
-            rows = cluster[begin:end] - first
-            triangles.edges.take(rows, axis=0, out=edges[begin:end], mode="clip")
-            triangles.planes.take(rows, axis=0, out=planes[begin:end], mode="clip")
-        begin, first = end, first + triangles.clusters
+    for triangles, part, rows in parts_of(sets, cluster):
+        triangles.edges.take(rows, axis=0, out=edges[part], mode="clip")
+        triangles.planes.take(rows, axis=0, out=planes[part], mode="clip")
     blocked[line[pair[meet_triangles(edges, planes, eye[pair], along[pair])]]] = True
     return blocked
 

@@ -10,7 +10,7 @@ their common edge, so no line passes through a seam.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
@@ -226,3 +226,25 @@ def joined_sets(sets: tuple[TriangleSet, ...]) -> JoinedSets:
         counts,
         np.concatenate([triangles.boxes_m for triangles in sets], axis=2),
     )
+
+
+def clusters_of(starts: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the clusters of pieces one after the other: from each start as many as its count."""
+    return np.arange(int(counts.sum())) + np.repeat(starts - np.cumsum(counts) + counts, counts)
+
+
+def parts_of(
+    sets: Sequence[TriangleSet], clusters: NDArray[np.int64]
+) -> Iterator[tuple[TriangleSet, slice, NDArray[np.int64]]]:
+    """Yield each set that has some of the clusters, where these are, and their rows in the set.
+
+    Args:
+        sets: the sets.
+        clusters: (N,) numbered through all sets, those of each set together and in their order.
+    """
+    begin, first = 0, 0
+    for triangles in sets:
+        end = int(np.searchsorted(clusters, first + triangles.clusters))
+        if end > begin:
+            yield triangles, slice(begin, end), clusters[begin:end] - first
+        begin, first = end, first + triangles.clusters

@@ -13,7 +13,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from awarenav.bridge import BridgeInputs, BridgeLoop, TopicPublisher
+from awarenav.bridge._loop import BridgeInputs, BridgeLoop, TopicPublisher
 from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import PUBLISHED, READ, AwarenessBridge, CameraMount, DdsNode, RobotFile
 from perception import Camera, PersonObservation

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -17,51 +16,14 @@ pytest.importorskip("rosbags", reason="the extra rosbag is not installed")
 
 from paths import ROOT
 from recorded_messages import recorded
+from robot_recording import PERSON, START_S, messages
 from rosbags.highlevel import AnyReader
-from scan_scenes import scan_message
 
 from awarenav.cli import main
 from nav_adapter.ros2 import RobotFile
-from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages import Message
-from nav_adapter.ros2.messages.geometry_msgs import (
-    Transform,
-    TransformStamped,
-    Twist,
-    TwistWithCovariance,
-    Vector3,
-)
-from nav_adapter.ros2.messages.nav_msgs import Odometry
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
-from nav_adapter.ros2.messages.std_msgs import Header
-from nav_adapter.ros2.messages.tf2_msgs import TFMessage
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
 from tracking.prediction import PredictionModel
-
-START_S, SECONDS, PERSON = 1000.0, 3.0, (2.5, 1.2)
-
-
-def messages(*, camera: bool = False, depth: bool = False):
-    """Yield topic, time of recording and message of a standing robot with one scanner."""
-    move = Transform(Vector3(0.3, 0.0, 0.2))
-    mounted = TransformStamped(Header(frame_id="base_link"), "scanner", move)
-    yield "/tf_static", START_S, TFMessage((mounted,))
-    for tick in range(round(SECONDS / 0.04)):
-        now = START_S + 0.04 * tick
-        twist = TwistWithCovariance(Twist(Vector3(0.0, 0.0, 0.0)))
-        yield "/odom", now, Odometry(Header(to_time(now), "odom"), "base_link", twist=twist)
-        yield "/scan", now + 0.01, scan_message(now, [PERSON])
-        if camera:
-            header = Header(to_time(now), "camera")
-            k = (50.0, 0.0, 32.0, 0.0, 50.0, 24.0, 0.0, 0.0, 1.0)
-            yield "/camera/camera_info", now, CameraInfo(header, 48, 64, k=k)
-            picture = Image(header, 48, 64, "rgb8", 0, 192, os.urandom(48 * 192))
-            yield "/camera/image_raw", now + 0.01, picture
-        if depth:  # it comes after its picture; the one before is near enough in time
-            far = np.full((48, 64), 3000 if tick != 10 else 30, "<u2" if tick != 10 else "u1")
-            encoding = "16UC1" if tick != 10 else "mono8"
-            step = 64 * far.itemsize
-            sent = Image(Header(to_time(now), "camera"), 48, 64, encoding, 0, step, far.tobytes())
-            yield "/camera/depth", now + 0.03, sent
 
 
 def published(path: Path) -> list[tuple[float, str, object]]:

@@ -7,13 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from paths import ROOT
 
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
 from awarenav.bridge import _loop
 from awarenav.cli import main
-from nav_adapter.ros2 import READ, DdsNode, RobotFile, renamed
+from nav_adapter.ros2 import READ, DdsNode, renamed
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
@@ -48,7 +47,7 @@ def test_a_reader_knows_publishers_that_it_cannot_hear(domain: int, transient_lo
 )
 def test_a_bridge_says_why_a_latched_topic_is_silent(
     domain: int,
-    tmp_path: Path,
+    robot_file: Path,
     map_latched: bool | None,
     tf_latched: bool,
     texts: list[str],
@@ -56,9 +55,6 @@ def test_a_bridge_says_why_a_latched_topic_is_silent(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(_loop, "_LATCHED_AFTER_S", 1.0)
-    path = tmp_path / "robot.yaml"
-    docs = RobotFile.from_yaml(ROOT / "docs" / "nav2" / "robot.yaml")
-    docs.model_copy(update={"scanners": None}).to_yaml(path)
     robot = DdsNode(domain)
     tf_static = replace(TF_STATIC, transient_local=tf_latched)
     robot.advertise(tf_static)
@@ -68,7 +64,7 @@ def test_a_bridge_says_why_a_latched_topic_is_silent(
         robot.advertise(sent)
         info = MapMetaData(resolution=0.05, width=1, height=1)
         robot.publish(sent, OccupancyGrid(Header(frame_id="map"), info, b"\0"))
-    given = ["--domain", str(domain), "--robot", str(path), "--no-camera", "--scan", "scan"]
+    given = ["--domain", str(domain), "--robot", str(robot_file), "--no-camera", "--scan", "scan"]
     given += ["--map", "map", "--tf", "/robot1/tf", "--seconds", "1.5"]
     assert main(["bridge", *given]) == 0
     robot.close()

@@ -11,7 +11,7 @@ pytest.importorskip("pybullet", reason="the extra sim is not installed")
 
 from rendered_image import odometry, rendered
 
-from awarenav.bridge import RerunRecorder, cone_lines
+from awarenav.bridge._rerun import RerunRecorder, cone_lines
 from awarenav.errors import AwarenavError
 from awarenav.estimate import RecordingPoseEstimator
 from nav_adapter import AwarenessPolicy

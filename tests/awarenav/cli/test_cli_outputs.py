@@ -144,7 +144,7 @@ def test_commands_are_completed_with_their_help_and_without_importing_them():
     ("words", "names"),
     [
         (["models", ""], ["list", "verify", "fetch"]),
-        (["models", "fetch", "--sh"], ["--sha256"]),
+        (["models", "fetch", "--ou"], ["--out"]),
         (["crossings", "--scenario", "crowd"], ["crowd_of_eight"]),
         (["crossings", "--policy", "b"], ["balanced", "blind"]),
         (["crossings", "--policy", "sc"], ["scanner"]),

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from paths import SHARED
 
 from awarenav.cli import main
-from awarenav.doctor import Finding, by_importance, picture_figures
+from awarenav.doctor._findings import Finding, by_importance
+from awarenav.doctor._pictures import picture_figures
 from awarenav.models import ModelStore
 from perception import _manifest
 from perception.shipped import shipped_models

@@ -95,13 +95,6 @@ def test_a_video_is_estimated_and_drawn(tmp_path):
         assert len(list(video.decode(video=0))) == 12
 
 
-def test_every_and_frames_select_frames_of_the_source(tmp_path):
-    out = tmp_path / "out.jsonl"
-    source = folder(tmp_path / "set", 10)
-    assert estimate(NumberReader(), source, "--out", out, "--every", 3, "--frames", 3) == 0
-    assert names(out) == ["000000.png", "000003.png", "000006.png"]
-
-
 def test_tracks_give_people_an_id(tmp_path):
     out = tmp_path / "out.jsonl"
     assert estimate(NumberReader(), film(tmp_path / "a.mp4", 10), "--out", out, "--tracks") == 0

@@ -11,7 +11,8 @@ from numbered_images import CAMERA, NumberReader, numbered
 from test_estimate import estimate
 
 from awarenav.records import read_records
-from awarenav.tracks import read_recording, track_recording
+from awarenav.tracks._recording import read_recording
+from awarenav.tracks._tracking import track_recording
 
 
 def folder_of(path: Path, images: list[np.ndarray]) -> Path:

@@ -14,8 +14,8 @@ from numbered_images import number_of, numbered
 from awarenav.errors import AwarenavError
 from awarenav.estimate import SourceFrame, open_source
 from awarenav.estimate._pictures import as_rgb, read_image
+from awarenav.estimate._run import FramePrefetcher
 from awarenav.estimate._sources import ImageFiles, VideoSource
-from awarenav.estimate._threads import BackgroundWorker, FramePrefetcher
 from awarenav.video import VideoWriter
 from perception import Camera
 
@@ -200,13 +200,10 @@ class Counting:
             raise self._error
 
 
-@pytest.mark.parametrize(
-    ("options", "names"), [({}, range(50)), ({"every": 20, "limit": 2}, (0, 20))]
-)
-def test_prefetching_keeps_every_frame_in_order(options, names):
-    source = Counting(50)
-    with FramePrefetcher(source, **options) as frames:
-        assert [frame.name for frame in frames] == [str(number) for number in names]
+@pytest.mark.parametrize(("limit", "count"), [(None, 50), (2, 2)])
+def test_prefetching_keeps_every_frame_in_order(limit, count):
+    with FramePrefetcher(Counting(50), limit) as frames:
+        assert [frame.name for frame in frames] == [str(number) for number in range(count)]
 
 
 def test_prefetching_stays_a_few_frames_ahead_and_stops_when_closed():
@@ -229,22 +226,3 @@ def test_a_live_source_gives_its_newest_frame():
     with FramePrefetcher(source) as frames:
         assert source.go_on.wait(10.0)
         assert [frame.name for frame in frames][-1] == "99"
-
-
-def test_background_work_is_done_in_order_and_its_error_is_raised():
-    done: list[int] = []
-    with BackgroundWorker(done.append) as behind:
-        for number in range(100):
-            behind.put(number)
-    assert done == list(range(100))
-
-    def fail(number):
-        raise OSError("disk full")
-
-    def hand_over():
-        with BackgroundWorker(fail) as behind:
-            for number in range(100):
-                behind.put(number)
-
-    with pytest.raises(OSError, match="disk full"):
-        hand_over()

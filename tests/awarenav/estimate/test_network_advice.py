@@ -1,4 +1,4 @@
-"""Messages about a user's networks advise options that the commands have."""
+"""Networks of the user: messages advise options that the commands have, and these work."""
 
 from __future__ import annotations
 
@@ -13,22 +13,28 @@ from numbered_images import CAMERA, numbered
 from onnx import TensorProto, helper, numpy_helper
 
 from awarenav.cli import main
-from awarenav.estimate import NetworkChoice
+from awarenav.errors import AwarenavError
+from awarenav.estimate import NetworkChoice, choose_networks
+from perception import PerceptionError
 
 COMMANDS = ("estimate", "bridge", "doctor")
 SQUARE = (1, 3, 640, 640)
 
 
 def network(
-    path: Path, output: np.ndarray, shape: tuple[int | str, ...], names: str | None = None
+    path: Path, shape: tuple[int | str, ...], names: str | None = None, **outputs: np.ndarray
 ) -> Path:
     """Write a network that returns the same numbers for every image."""
+    kinds = {each: helper.np_dtype_to_tensor_dtype(array.dtype) for each, array in outputs.items()}
     graph = helper.make_graph(
-        [helper.make_node("Identity", ["numbers"], ["out"])],
+        [helper.make_node("Identity", [f"{each}_numbers"], [each]) for each in outputs],
         "graph",
         [helper.make_tensor_value_info("images", TensorProto.FLOAT, shape)],
-        [helper.make_tensor_value_info("out", TensorProto.FLOAT, output.shape)],
-        [numpy_helper.from_array(output.astype(np.float32), "numbers")],
+        [
+            helper.make_tensor_value_info(each, kinds[each], array.shape)
+            for each, array in outputs.items()
+        ],
+        [numpy_helper.from_array(array, f"{each}_numbers") for each, array in outputs.items()],
     )
     opset = helper.make_opsetid("", 17)
     model = helper.make_model(graph, opset_imports=[opset], ir_version=8)
@@ -38,12 +44,16 @@ def network(
     return path
 
 
+def zeros(*shape: int) -> np.ndarray:
+    return np.zeros(shape, np.float32)
+
+
 def two_classes(path: Path) -> Path:
-    return network(path, np.zeros((1, 6, 8400)), SQUARE, "{0: 'forklift', 1: 'pedestrian'}")
+    return network(path, SQUARE, "{0: 'forklift', 1: 'pedestrian'}", out=zeros(1, 6, 8400))
 
 
 def free(path: Path) -> Path:
-    return network(path, np.zeros((1, 84, 8400)), ("n", 3, "h", "w"))
+    return network(path, ("n", 3, "h", "w"), out=zeros(1, 84, 8400))
 
 
 @pytest.fixture
@@ -111,9 +121,35 @@ def test_the_advice_works(tmp_path, picture, capsys, make, given) -> None:
 def test_a_pose_network_of_free_size_has_advice_that_can_be_taken(
     tmp_path, picture, capsys
 ) -> None:
-    pose = network(tmp_path / "p.onnx", np.zeros((1, 133, 576)), ("n", 3, "h", "w"))
+    pose = network(tmp_path / "p.onnx", ("n", 3, "h", "w"), out=zeros(1, 133, 576))
     out = ["--out", tmp_path / "o.jsonl", "--allow-simulator-networks"]
     status, text = said(capsys, picture, "--pose", pose, *out)
     assert status == 2
     assert "export it with a fixed size" in text
     assert "input_size" not in text
+
+
+@pytest.fixture
+def unnamed(tmp_path: Path) -> Path:
+    """A detector with the outputs dets and labels, and no name that tells its family."""
+    labels = np.zeros((1, 1), np.int64)
+    return network(tmp_path / "end2end.onnx", (1, 3, 64, 64), dets=zeros(1, 1, 5), labels=labels)
+
+
+@pytest.mark.parametrize(("family", "layout"), [("rtmdet", "RTMDet"), ("yolox", "YOLOX with NMS")])
+def test_a_prefix_tells_it(unnamed: Path, family: str, layout: str) -> None:
+    networks = choose_networks(f"{family}:{unnamed}", "shipped", "pnp")
+    assert networks.detector.layout == layout  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("prefix", "error", "message"),
+    [
+        ("", PerceptionError, "--detector rtmdet:FILE or yolox:FILE"),
+        ("ultralytics:", PerceptionError, "--detector rtmdet:FILE or yolox:FILE"),
+        ("yolo:", AwarenavError, "there is no file 'yolo:"),
+    ],
+)
+def test_another_prefix_or_none_is_refused(unnamed: Path, prefix, error, message) -> None:
+    with pytest.raises(error, match=message):
+        choose_networks(f"{prefix}{unnamed}", "shipped", "pnp")

@@ -14,12 +14,7 @@ from hypothesis import strategies as st
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.judge import (
-    _detection,
-    judge_files,
-    judge_frames,
-    requirements,
-)
+from awarenav.judge import _detection, judge_files, judge_frames, requirements
 from awarenav.judge._detection import precision_with_interval
 from awarenav.records import people_by_frame, read_person, write_records
 
@@ -47,9 +42,9 @@ def frames(*people_of_frames):
     ]
 
 
-def judged(truth, estimates, config=None, **options):
+def judged(truth, estimates, **options):
     return judge_frames(
-        people_by_frame(truth, "truth"), people_by_frame(estimates, "estimates"), config, **options
+        people_by_frame(truth, "truth"), people_by_frame(estimates, "estimates"), **options
     )
 
 
@@ -331,31 +326,24 @@ def test_the_gate_fails_for_estimates_that_are_not_good_enough(tmp_path, capsys)
     assert "**no**" in capsys.readouterr().out
 
 
+BAD = {**person(0), "awareness": 1.5}
+OTHERS = [{**record, "frame": "b" + record["frame"]} for record in TRUTH]
+
+
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("truth", "estimates", "message"),
     [
-        ({"box_xyxy_px": [0, 0, 1]}, "person 0: box_xyxy_px must have shape"),
-        ({"awareness": 1.5}, r"awareness must lie in \[0, 1\]"),
-        ({"position_covariance_m2": [[1, 2, 0], [0, 1, 0], [0, 0, 1]]}, "symmetric"),
+        (
+            TRUTH,
+            frames([person(0)], [BAD]),
+            r"'000001.png', person 0: awareness must lie in \[0, 1",
+        ),
+        (TRUTH, OTHERS, "no frame in common"),
+        ([], TRUTH, "has no frame"),
+        (TRUTH, [TRUTH[0], TRUTH[0]], "two frames have the name"),
     ],
+    ids=["value", "other images", "empty", "twice"],
 )
-def test_invalid_values_are_refused_by_frame_and_person(tmp_path, change, message):
-    bad = frames([person(0)], [{**person(0), **change}])
-    paths = files(tmp_path, frames([person(0)], [person(0)]), bad)
-    with pytest.raises(
-        AwarenavError, match=f"'000001.png', {message}" if "person" in message else message
-    ):
-        judge_files(Path(paths[0]), Path(paths[1]))
-
-
-def test_files_of_different_images_are_refused(tmp_path):
-    others = [{**record, "frame": "b" + record["frame"]} for record in TRUTH]
-    truth, estimates = files(tmp_path, TRUTH, others)
-    with pytest.raises(AwarenavError, match="no frame in common"):
-        judge_files(Path(truth), Path(estimates))
-    truth, estimates = files(tmp_path, [], TRUTH)
-    with pytest.raises(AwarenavError, match="has no frame"):
-        judge_files(Path(truth), Path(estimates))
-    truth, estimates = files(tmp_path, TRUTH, [TRUTH[0], TRUTH[0]])
-    with pytest.raises(AwarenavError, match="two frames have the name"):
-        judge_files(Path(truth), Path(estimates))
+def test_files_that_cannot_be_judged_are_refused(tmp_path, truth, estimates, message):
+    with pytest.raises(AwarenavError, match=message):
+        judge_files(*map(Path, files(tmp_path, truth, estimates)))

@@ -17,7 +17,7 @@ from awarenav.judge._intervals import (
     rate_interval,
     share_interval,
 )
-from awarenav.judge._requirements import Requirement
+from awarenav.judge._report import Requirement
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.installation import install_command
 from tracking import PersonTrack
 
-HEADS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 OWN = """
 inflation: {unaware_radius_m: 1.4, aware_radius_m: 0.5}
 speed: {unaware_below: 0.2, aware_above: 0.7, aware_human_speed_mps: 0.4}
@@ -40,12 +39,11 @@ def own(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("ending", list(HEADS))
-def test_a_drawing_is_a_whole_file_and_the_same_every_time(tmp_path, ending):
-    first, second = tmp_path / f"a{ending}", tmp_path / "new" / f"b{ending}"
+def test_a_drawing_is_a_whole_file_and_the_same_every_time(tmp_path):
+    first, second = tmp_path / "a.svg", tmp_path / "new" / "b.svg"
     for path in (first, second):
         assert main(["policy", "show", "blind", "--out", str(path)]) == 0
-    assert first.read_bytes().startswith(HEADS[ending])
+    assert first.read_bytes().startswith(b"<?xml")
     assert first.read_bytes() == second.read_bytes()
     assert not list(tmp_path.rglob("*.part"))
 
@@ -99,26 +97,13 @@ def test_the_table_is_what_the_adapter_gives(own, tmp_path, with_file, capsys):
         assert shown[1] == pytest.approx(radius_m, abs=0.0051)
 
 
-def test_a_number_replaces_that_of_the_robot_file(own, tmp_path, capsys):
-    path = tmp_path / "robot.yaml"
-    path.write_text(ROBOT_FILE, encoding="utf-8")
-    arguments = ["policy", "show", str(own), "--out", "none", "--json", "--robot", str(path)]
-    assert main([*arguments, "--max-speed", "0.9"]) == 0
-    (table,) = json.loads(capsys.readouterr().out).values()
-    assert np.max(table["limit_ahead_mps"]) == 0.9
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["balancd"], "did you mean 'balanced'"),
         (["nowhere.yaml"], "cannot read nowhere.yaml"),
         (["balanced", "--out", "drawing.gif"], "--out must end in .png, .svg, .pdf or be none"),
-        (["balanced", "--max-speed", "0"], "--max-speed (m/s) must lie in (0, inf)"),
-        (["balanced", "--deceleration", "nan"], "--deceleration (m/s²) must be finite"),
-        (["balanced", "--reaction-time", "-1"], "--reaction-time (s) must lie in [0, inf)"),
         (["balanced", "--robot", "nowhere.yaml"], "cannot read nowhere.yaml"),
-        (["balanced", "--farthest", "0"], "--farthest (m) must lie in [0.5, 100]"),
     ],
 )
 def test_bad_input_is_refused_in_one_line(arguments, message, tmp_path, monkeypatch, capsys):

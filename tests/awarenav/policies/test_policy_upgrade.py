@@ -247,7 +247,7 @@ def test_the_old_file_is_never_replaced(tmp_path, capsys):
     old = tmp_path / "old.yaml"
     old.write_text("{}", encoding="utf-8")
     assert main(["policy", "upgrade", str(old), "--out", str(old)]) == 2
-    assert "would replace the old file" in capsys.readouterr().err
+    assert "would replace an input" in capsys.readouterr().err
     assert main(["policy", "upgrade", str(old), "--out", str(tmp_path / "new.txt")]) == 2
     assert old.read_text(encoding="utf-8") == "{}"
 

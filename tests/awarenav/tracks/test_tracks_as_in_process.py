@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from track_lines import pose
 
-from awarenav.estimate import FrameEstimate, SourceFrame, estimate_record
+from awarenav.estimate import FrameEstimate, SourceFrame
+from awarenav.estimate._results import estimate_record
 from awarenav.records import write_records
-from awarenav.tracks import read_recording
+from awarenav.tracks._recording import read_recording
 from perception import Camera, PersonObservation
 from tracking import PersonTracker
 

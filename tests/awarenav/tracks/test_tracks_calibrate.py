@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from awarenav.cli import main
-from awarenav.tracks import read_positions, track_recording, tracks_figure
-from awarenav.tracks._tracking import distances_m, smoothed_path
+from awarenav.tracks._plot import tracks_figure
+from awarenav.tracks._recording import read_positions
+from awarenav.tracks._tracking import distances_m, smoothed_path, track_recording
 from tracking.prediction import REGION_SHARE, PredictionModel
 
 STD_M = 0.1

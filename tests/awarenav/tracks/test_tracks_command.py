@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,8 +12,9 @@ from track_lines import lines, pose, standing, walking
 
 from awarenav.cli import main
 from awarenav.records import write_records
-from awarenav.tracks import read_recording, track_recording
+from awarenav.tracks._recording import read_recording
 from awarenav.tracks._run import CSV_COLUMNS
+from awarenav.tracks._tracking import track_recording
 from perception import Camera
 from tracking import AwarenessFilterConfig, TrackerConfig
 
@@ -165,34 +164,6 @@ def test_bad_input_is_refused_and_nothing_is_written(
     assert message in error
     assert "Traceback" not in error
     assert sorted(tmp_path.iterdir()) == before
-
-
-def test_only_the_plot_needs_matplotlib(estimates):
-    script = (
-        "import sys; sys.modules['matplotlib'] = None; from awarenav.cli import main; "
-        "assert main(['tracks', 'estimates.jsonl', '--out', 'none']) == 0; "
-        "sys.exit(main(['tracks', 'estimates.jsonl', '--out', 'out.png']))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=estimates.parent,
-        env={"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 2, done.stderr
-    assert "id  born" in done.stdout
-    assert "needs matplotlib" in done.stderr
-
-
-def test_the_page_about_tracking_shows_code_that_runs():
-    page = (ROOT / "docs" / "tracking.md").read_text("utf-8")
-    blocks = re.findall(r"```python\n(.*?)```", page, re.S)
-    assert blocks
-    for block in blocks:
-        exec(compile(block, "docs/tracking.md", "exec"), {})
 
 
 def test_the_page_about_tracking_names_settings_that_exist():

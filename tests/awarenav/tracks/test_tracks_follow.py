@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from track_lines import lines, pose, standing, walking
+from track_lines import lines, pose, recorded, standing, walking
 
 from awarenav.errors import AwarenavError
 from awarenav.estimate._results import track_record
-from awarenav.records import write_records
-from awarenav.tracks import read_recording, track_recording, tracks_in_file
+from awarenav.tracks._tracking import track_recording, tracks_in_file
 from tracking import PersonTracker
 
 WALKERS = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0)]
-
-
-def recorded(tmp_path, records, name="estimates.jsonl"):
-    path = tmp_path / name
-    write_records(path, records)
-    return read_recording(path)
 
 
 def drawn(run):

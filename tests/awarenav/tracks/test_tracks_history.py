@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from awarenav.tracks import HistoryBuilder, TrackHistory, TrackSample
+from awarenav.tracks._history import HistoryBuilder, TrackHistory, TrackSample
 
 
 def sample(stamp_s, *, seen=True, status="confirmed", is_frame=True, awareness=0.5):

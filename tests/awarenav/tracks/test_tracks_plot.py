@@ -8,16 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from track_lines import lines, pose, standing, walking
+from track_lines import lines, pose, recorded, standing, walking
 
-from awarenav.records import write_records
-from awarenav.tracks import (
-    read_positions,
-    read_recording,
-    track_recording,
-    tracks_figure,
-    tracks_in_file,
-)
+from awarenav.tracks._plot import tracks_figure
+from awarenav.tracks._recording import read_positions
+from awarenav.tracks._tracking import track_recording, tracks_in_file
 from perception import Camera
 
 pytest.importorskip("matplotlib")
@@ -34,12 +29,6 @@ from awarenav.tracks._plot import (
 )
 
 CAMERA = Camera.from_fov(640, 480, math.radians(70.0))
-
-
-def recorded(tmp_path, records):
-    path = tmp_path / "estimates.jsonl"
-    write_records(path, records)
-    return read_recording(path)
 
 
 def crowd(number):

@@ -6,25 +6,18 @@ import json
 
 import numpy as np
 import pytest
-from track_lines import lines, pose, standing
+from track_lines import lines, pose, recorded, standing
 
 from awarenav.errors import AwarenavError
 from awarenav.records import write_records
-from awarenav.tracks import read_recording
-from awarenav.tracks._recording import ASSUMED_POSITION_STD_M
+from awarenav.tracks._recording import ASSUMED_POSITION_STD_M, read_recording
 
 RECORDS = lines([standing(4.0, 1.0)], frames=4)
 
 
-def read(tmp_path, records):
-    path = tmp_path / "estimates.jsonl"
-    write_records(path, records)
-    return read_recording(path)
-
-
 def test_a_person_lands_where_they_stand(tmp_path):
     records = lines([standing(4.0, 1.0)], frames=3, camera=lambda t: pose(t, -t, 0.4 * t))
-    for frame in read(tmp_path, records).frames:
+    for frame in recorded(tmp_path, records).frames:
         np.testing.assert_allclose(frame.positions_odom_m(), [[4.0, 1.0]], atol=1e-12)
 
 
@@ -46,7 +39,7 @@ def test_blank_lines_are_not_incomplete_lines(tmp_path):
 
 
 def test_without_any_pose_the_camera_is_fixed(tmp_path):
-    recording = read(tmp_path, [{**each, "T_odom_camera": None} for each in RECORDS])
+    recording = recorded(tmp_path, [{**each, "T_odom_camera": None} for each in RECORDS])
     assert all((each.T_odom_camera[:2, 3] == 0.0).all() for each in recording.frames)
     # Level and looking along odom x: the camera's right is odom's −y, its forward is odom's x.
     np.testing.assert_allclose(recording.frames[0].T_odom_camera[:3, :3], pose()[:3, :3])
@@ -54,7 +47,9 @@ def test_without_any_pose_the_camera_is_fixed(tmp_path):
 
 
 def test_a_frame_without_a_pose_among_others_is_left_out(tmp_path):
-    recording = read(tmp_path, [RECORDS[0], {**RECORDS[1], "T_odom_camera": None}, *RECORDS[2:]])
+    recording = recorded(
+        tmp_path, [RECORDS[0], {**RECORDS[1], "T_odom_camera": None}, *RECORDS[2:]]
+    )
     assert [each.stamp_s for each in recording.frames] == [0.0, 0.2, 0.3]
     assert recording.remarks == (
         "1 frame without T_odom_camera left out, since other frames have one",
@@ -67,7 +62,7 @@ def with_person(**change):
 
 
 def test_a_truth_file_has_neither_scores_nor_covariances(tmp_path):
-    recording = read(tmp_path, with_person(position_covariance_m2=None, awareness_std=0.0))
+    recording = recorded(tmp_path, with_person(position_covariance_m2=None, awareness_std=0.0))
     (seen,) = recording.frames[0].observations
     assert seen.score == 1.0
     np.testing.assert_allclose(seen.position_covariance_m2, ASSUMED_POSITION_STD_M**2 * np.eye(3))
@@ -76,14 +71,14 @@ def test_a_truth_file_has_neither_scores_nor_covariances(tmp_path):
 
 
 def test_awareness_without_a_standard_deviation_is_no_evidence(tmp_path):
-    recording = read(tmp_path, with_person(awareness=1.0, awareness_std=None))
+    recording = recorded(tmp_path, with_person(awareness=1.0, awareness_std=None))
     (seen,) = recording.frames[0].observations
     assert (seen.awareness, seen.awareness_std) == (None, None)
     assert "counts as no evidence" in recording.remarks[0]
 
 
 def test_a_person_without_a_position_is_left_out(tmp_path):
-    recording = read(tmp_path, with_person(position_camera_m=None))
+    recording = recorded(tmp_path, with_person(position_camera_m=None))
     assert recording.frames[0].observations == ()
     assert recording.remarks == ("1 observation without position_camera_m left out",)
 
@@ -118,4 +113,4 @@ def test_a_person_without_a_position_is_left_out(tmp_path):
 )
 def test_an_invalid_value_is_refused_with_its_frame_and_person(tmp_path, change, message):
     with pytest.raises(AwarenavError, match=f"estimates.jsonl, frame '000000'{message}"):
-        read(tmp_path, [{**RECORDS[0], **change}])
+        recorded(tmp_path, [{**RECORDS[0], **change}])

@@ -6,20 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from track_lines import lines, standing, walking
+from track_lines import lines, recorded, standing, walking
 
 from awarenav.errors import AwarenavError
-from awarenav.records import write_records
-from awarenav.tracks import read_recording, tracks_in_file, truth_beside_tracks
+from awarenav.tracks._tracking import tracks_in_file
 from awarenav.tracks._truth import match_truth, person_ids_text, true_people
 
 PEOPLE = [walking(4.0, -2.0, 0.0, 1.0), standing(5.0, 1.0), walking(7.0, 3.0, -0.5, 0.0)]
-
-
-def recorded(tmp_path, records, name="truth.jsonl"):
-    path = tmp_path / name
-    write_records(path, records)
-    return read_recording(path)
 
 
 def test_the_truth_is_where_people_are_and_how_aware(tmp_path):
@@ -34,8 +27,8 @@ def test_the_truth_is_where_people_are_and_how_aware(tmp_path):
 
 def test_every_track_is_the_person_that_it_follows(tmp_path):
     truth = recorded(tmp_path, lines(PEOPLE, named=True))
-    beside = truth_beside_tracks(tracks_in_file(truth).histories, truth)
-    for id, matched in beside.matches.items():
+    matches = match_truth(tracks_in_file(truth).histories, true_people(truth))
+    for id, matched in matches.items():
         assert {person for _, person, _ in matched} == {id}
         assert len(matched) == 40
         assert person_ids_text(matched) == str(id)
@@ -86,8 +79,8 @@ def test_truth_with_another_stamp_is_not_matched(tmp_path):
 def test_truth_without_awareness_gives_nan(tmp_path):
     records = lines([standing(4.0, 0.0)], named=True, awareness=lambda t: None)
     truth = recorded(tmp_path, records)
-    beside = truth_beside_tracks(tracks_in_file(truth).histories, truth)
-    assert all(math.isnan(alpha) for _, _, alpha in beside.matches[0])
+    matches = match_truth(tracks_in_file(truth).histories, true_people(truth))
+    assert all(math.isnan(alpha) for _, _, alpha in matches[0])
 
 
 def test_a_truth_without_ids_is_refused(tmp_path):

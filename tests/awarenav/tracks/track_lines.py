@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from awarenav.records import write_records
+from awarenav.tracks._recording import Recording, read_recording
 
 Place = Callable[[float], tuple[float, float]]
 
@@ -79,3 +83,11 @@ def standing(x_m: float, y_m: float) -> Place:
 def walking(x_m: float, y_m: float, vx_mps: float, vy_mps: float) -> Place:
     """Someone who walks straight on."""
     return lambda stamp_s: (x_m + vx_mps * stamp_s, y_m + vy_mps * stamp_s)
+
+
+def recorded(
+    folder: Path, records: list[dict[str, Any]], name: str = "estimates.jsonl"
+) -> Recording:
+    """Write lines into a file, and read it."""
+    write_records(folder / name, records)
+    return read_recording(folder / name)

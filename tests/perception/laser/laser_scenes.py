@@ -50,9 +50,10 @@ def laser_scan(
     seed=0,
     stamp_s=0.0,
     origin=(0.0, 0.0),
+    room=ROOM,
 ) -> LaserScan:
     angles = math.radians(low) + step * np.arange(rays)
-    ranges = ranges_of(circles, angles, origin)
+    ranges = ranges_of(circles, angles, origin, room)
     ranges = ranges + noise * np.random.default_rng(seed).normal(size=rays)
     return LaserScan(stamp_s, math.radians(low), step, ranges, 0.05, 20.0)
 

@@ -12,7 +12,6 @@ from laser_scenes import laser_scan, points_of, two_legs
 
 from perception.laser import (
     CUTOUT,
-    HYPOTHESIS_FEATURES,
     Clusters,
     Hypotheses,
     LaserScan,
@@ -74,13 +73,6 @@ def test_somebody_who_came_to_a_wall_is_apart_from_it() -> None:
     assert np.count_nonzero(legs_of(apart)) >= 1
     # Without the knowledge of where the floor was free nothing is divided.
     assert len(divided(points, np.minimum(known, 0)).starts) == len(whole.starts)
-
-
-@pytest.mark.parametrize("ranges", [[np.nan] * 5, [1.0] + [np.nan] * 4, [np.inf] * 5])
-def test_scans_of_nothing_give_no_hypothesis(ranges) -> None:
-    points = points_of(LaserScan(0.0, 0.0, 0.01, ranges, 0.05, 20.0))
-    found = judged(points)
-    assert found.features.shape == (0, HYPOTHESIS_FEATURES)
 
 
 @settings(max_examples=30)

@@ -104,12 +104,17 @@ def test_two_people_beside_each_other_stay_two() -> None:
 def test_the_threshold_and_the_range_leave_people_out() -> None:
     scan = laser_scan(two_legs(3.0, 0.0))
     says = Says(0.0, 0.6)
-    for config, count in (
-        (ONCE, 1),
-        (replace(ONCE, score_threshold=0.7), 0),
-        (replace(ONCE, max_range_m=2.5), 0),
+    near, far = (
+        laser_scan(two_legs(x, 0.0), low=-20.0, step=1e-3, room=(-15.0, -15.0, 15.0, 15.0))
+        for x in (9.5, 10.5)
+    )
+    for seen, config, count in (
+        (scan, ONCE, 1),
+        (scan, replace(ONCE, score_threshold=0.7), 0),
+        (near, ONCE, 1),
+        (far, ONCE, 0),
     ):
-        assert len(LegDetector(config, classifier=says).detect(points_of(scan))) == count
+        assert len(LegDetector(config, classifier=says).detect(points_of(seen))) == count
 
 
 def test_what_the_map_holds_is_no_person() -> None:
@@ -156,11 +161,8 @@ def test_what_comes_and_has_the_size_of_a_trolley_is_one() -> None:
     assert found.kind == "trolley"
     assert np.linalg.norm(found.position_odom_m - (2.5, 0.0)) < 0.5
     assert np.linalg.eigvalsh(found.covariance_m2).min() >= 0.2
-    # Parked from the start it is none, and neither where trolleys are not asked for.
+    # Parked from the start it is none.
     assert watched(LegDetector(classifier=Says(0.0, 0.0)), [trolley], 0.0, 3.0) == ()
-    quiet = LegDetector(LegDetectorConfig(trolleys=False), classifier=Says(0.0, 0.0))
-    watched(quiet, [], 0.0, 2.0)
-    assert watched(quiet, [trolley], 2.0, 3.0) == ()
 
 
 def test_somebody_behind_a_trolley_is_placed_behind_what_is_seen_of_it() -> None:

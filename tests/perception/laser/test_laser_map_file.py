@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of
 
 from perception import PerceptionError
-from perception.laser import LegDetector, LegDetectorConfig, MapCells, StaticMap
+from perception.laser import LegDetector, LegDetectorConfig, MapCells
 
 KEYS = {
     "image": "hall.pgm",
@@ -44,12 +44,8 @@ def middles(pixels: np.ndarray, side: float = 0.1) -> np.ndarray:
 def test_the_lowest_row_of_the_image_lies_at_the_origin(tmp_path: Path) -> None:
     pixels = np.full((4, 6), 254, np.uint8)
     pixels[3, 0] = pixels[0, 5] = 0  # lower left, upper right
-    held = StaticMap.from_yaml(written(tmp_path, pixels), margin_m=0.0)
-    assert held.occupied.shape == (4, 6)
-    assert np.argwhere(held.occupied).tolist() == [[0, 0], [3, 5]]
-    assert held.origin_odom_m.tolist() == [-1.0, -2.0]
-    places = np.array([[-0.95, -1.95], [-0.45, -1.65], [-0.95, -1.65]])
-    assert held.holds(places).tolist() == [True, True, False]
+    cells = MapCells.from_yaml(written(tmp_path, pixels)).cells_m
+    np.testing.assert_allclose(cells, [[-0.95, -1.95], [-0.45, -1.65]])
 
 
 @pytest.mark.parametrize(
@@ -97,14 +93,8 @@ def test_netpbm_is_read_as_text_and_as_numbers(kind: int, tmp_path: Path) -> Non
     body = b"\n".join(b" ".join(b"%d" % v for v in row) for row in values) + b"\n"
     if kind in (5, 6):
         body = values.astype(np.uint8).tobytes()
-    held = StaticMap.from_yaml(written(tmp_path, head + body, "hall.pnm"), margin_m=0.0)
-    assert held.occupied[::-1].tolist() == (shades == 0).tolist()
-
-
-def test_colours_count_by_their_mean(tmp_path: Path) -> None:
-    pixels = np.array([[[0, 0, 255], [0, 0, 0], [255, 255, 255], [30, 60, 200]]], np.uint8)
-    cells = MapCells.from_yaml(written(tmp_path, pixels, "colours.png"))
-    np.testing.assert_allclose(cells.cells_m[:, 0], [-0.95, -0.85])
+    cells = MapCells.from_yaml(written(tmp_path, head + body, "hall.pnm")).cells_m
+    np.testing.assert_allclose(cells, [[-0.75, -1.95], [-0.95, -1.85]])
 
 
 @settings(max_examples=15, deadline=None)
@@ -133,8 +123,8 @@ def test_a_turned_map_holds_its_cells_wherever_it_lies(
     def in_odom(places: np.ndarray) -> np.ndarray:
         return (places @ rotation.T + origin[:2]) @ T[:2, :2].T + T[:2, 3]
 
-    held = StaticMap.from_yaml(path, T, margin_m=0.1)
     places = middles(walls)
+    held = MapCells.from_yaml(path).near(T, in_odom(middles(walls | True)).mean(axis=0), 1.0)
     assert held.holds(in_odom(places)).all()
     # Every point of an occupied cell belongs to it, though its cells are drawn anew.
     for corner in (-0.049, 0.049):
@@ -144,12 +134,6 @@ def test_a_turned_map_holds_its_cells_wherever_it_lies(
         away = np.linalg.norm(free[:, None] - places, axis=2).min(axis=1)
         free = free[away > 0.1 * (1.0 + 2.5 * math.sqrt(2.0))]
     assert not held.holds(in_odom(free)).any()
-
-
-def test_an_empty_map_holds_nothing(tmp_path: Path) -> None:
-    path = written(tmp_path, np.full((3, 3), 255, np.uint8), origin="[0, 0, 1.0]")
-    assert not StaticMap.from_yaml(path).holds(np.zeros((1, 2))).any()
-    assert MapCells.from_yaml(path).cells_m.shape == (0, 2)
 
 
 def test_a_post_on_the_map_is_nobody(tmp_path: Path) -> None:
@@ -162,7 +146,7 @@ def test_a_post_on_the_map_is_nobody(tmp_path: Path) -> None:
     for x, y, _ in posts:
         row, column = len(pixels) - 1 - round((y + 2.0) / 0.1 - 0.5), round((x + 1.0) / 0.1 - 0.5)
         pixels[row - 1 : row + 2, column - 1 : column + 2] = 0
-    known = StaticMap.from_yaml(written(tmp_path, pixels))
+    known = MapCells.from_yaml(written(tmp_path, pixels)).near(np.eye(4), np.zeros(2), 5.0)
     assert LegDetector(once, static_map=known).detect(points) == ()
 
 
@@ -195,9 +179,7 @@ def test_a_map_file_that_makes_no_sense_is_refused(keys, text: str, tmp_path: Pa
 def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog) -> None:
     """As map_server does; tools that draw maps add keys of their own."""
     path = written(tmp_path, WHITE, cost_scaling=1, image_type="grid", resolution="5e-2")
-    held = StaticMap.from_yaml(path)
-    assert held.origin_odom_m.tolist() == [-1.0, -2.0]
-    assert held.resolution_m == 0.05
+    assert MapCells.from_yaml(path).resolution_m == 0.05
     assert caplog.messages == [f"{path}: not read: 'cost_scaling', 'image_type'"]
 
 
@@ -215,7 +197,7 @@ def test_other_keys_are_not_read_and_a_warning_names_them(tmp_path: Path, caplog
 )
 def test_a_damaged_image_is_refused(image: bytes, text: str, tmp_path: Path) -> None:
     with pytest.raises(PerceptionError, match=text):
-        StaticMap.from_yaml(written(tmp_path, image))
+        MapCells.from_yaml(written(tmp_path, image))
 
 
 @settings(max_examples=15, deadline=None)
@@ -237,8 +219,4 @@ def test_a_file_that_is_no_map_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "list.yaml"
     path.write_text("[1, 2]\n")
     with pytest.raises(PerceptionError, match=r"list\.yaml must hold the keys image, resolution"):
-        StaticMap.from_yaml(path)
-    tilted = np.eye(4)
-    tilted[1:3, 1:3] = [[0.8, -0.6], [0.6, 0.8]]
-    with pytest.raises(PerceptionError, match="turned about z only"):
-        StaticMap.from_yaml(written(tmp_path, WHITE), tilted)
+        MapCells.from_yaml(path)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laser_scenes import laser_scan, points_of, pose, two_legs
 
-from perception.laser import LaserScan, LegDetector, RobotMotion, Scanner, scan_points, sight_of
+from perception.laser import LaserScan, LegDetector, RobotMotion, Scanner, scan_points
 
 STEP = math.radians(0.5)
 HOME = RobotMotion(0.0, np.eye(4))
@@ -29,11 +29,24 @@ def scan_of(ranges, **changes) -> LaserScan:
     return LaserScan(**{**fields, **changes})
 
 
-def test_special_ranges_mean_what_rep_117_says() -> None:
-    scan = scan_of([np.nan, np.inf, -np.inf, 0.05, 0.1, 10.0, 10.01, 3.0])
-    assert scan.measured.tolist() == [False] * 4 + [True, True, False, True]
-    # Free as far as the range, to the limit without a return, unknown for the rest.
-    assert scan.free_of(scan.measured).tolist() == [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0]
+@pytest.mark.parametrize(
+    ("ranges", "low", "high", "measured", "free"),
+    [
+        # As REP-117 says: free as far as the range, to the limit without a return, else unknown.
+        (
+            [np.nan, np.inf, -np.inf, 0.05, 0.1, 10.0, 10.01, 3.0], 0.1, 10.0,
+            [0, 0, 0, 0, 1, 1, 0, 1], [0.0, 10.0, 0.0, 0.0, 0.1, 10.0, 0.0, 3.0],
+        ),
+        # Several rays of range_max met nothing.
+        ([4.0, 4.0, 3.0, 4.0], 0.1, 4.0, [0, 0, 1, 0], [4.0, 4.0, 3.0, 4.0]),
+        # 0 is no measurement, whatever range_min is.
+        ([0.0, 0.05, 2.0, 0.0], 0.0, 4.0, [0, 1, 1, 0], [0.0, 0.05, 2.0, 0.0]),
+    ],
+)  # fmt: skip
+def test_special_ranges_have_their_meaning(ranges, low, high, measured, free) -> None:
+    scan = scan_of(ranges, range_min_m=low, range_max_m=high)
+    assert scan.measured.tolist() == [bool(each) for each in measured]
+    assert scan.free_of(scan.measured).tolist() == free
 
 
 def test_a_mounted_scanner_turns_and_lifts_its_points() -> None:
@@ -151,21 +164,6 @@ def seen_near_the_limit(nothing_m: float) -> int:
 )
 def test_somebody_near_range_max_is_found_as_among_rays_of_infinity(nothing_m: float) -> None:
     assert seen_near_the_limit(nothing_m) >= 0.9 * seen_near_the_limit(math.inf) > 30
-
-
-def test_rays_of_range_max_met_nothing() -> None:
-    scan = scan_of([4.0, 4.0, 3.0, 4.0], range_max_m=RANGE_MAX_M)
-    assert scan.no_return.tolist() == [True, True, False, True]
-    assert scan.measured.tolist() == [False, False, True, False]
-    assert scan.free_of(scan.measured).tolist() == [4.0, 4.0, 3.0, 4.0]
-
-
-def test_rays_of_0_measured_nothing_whatever_range_min_is() -> None:
-    scan = LaserScan(0.0, 0.0, 0.01, [0.0, 0.05, 2.0, 0.0], 0.0, RANGE_MAX_M)
-    assert scan.measured.tolist() == [False, True, True, False]
-    assert scan.free_of(scan.measured).tolist() == [0.0, 0.05, 2.0, 0.0]
-    dead = sight_of(LaserScan(0.0, 0.0, 0.01, [0.0] * 90, 0.0, 4.0), Scanner.mounted(0.0, 0.0, 0.2))
-    assert dead.blind_text == "blind (most of its rays have no answer)"
 
 
 def test_a_wall_at_range_max_is_still_a_wall() -> None:

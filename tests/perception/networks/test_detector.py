@@ -20,8 +20,8 @@ from onnx_graphs import (
 )
 
 from perception import PerceptionError, PersonDetector
-from perception.networks import OnnxPersonDetector
-from perception.networks.detectors import LetterboxGeometry
+from perception.networks import OnnxPersonDetector, PixelFormat
+from perception.networks.detectors import Letterbox, LetterboxGeometry
 
 SIZE = HEIGHT, WIDTH = 256, 320
 CELLS = cell_count(*SIZE)
@@ -186,17 +186,6 @@ def test_overlapping_boxes_are_suppressed_and_the_highest_score_comes_first() ->
     assert [round(p.score, 3) for p in picky.detect(image)] == [0.9]
 
 
-def test_random_outputs_give_a_bounded_number_of_valid_boxes() -> None:
-    rng = np.random.default_rng(0)
-    rows = rng.normal(0.0, 1e3, (1, 5, CELLS))
-    people = OnnxPersonDetector(fixed({"output0": rows}, SIZE), score_threshold=0.0)
-    found = people.detect(np.zeros((480, 640, 3), np.uint8))
-    assert 0 < len(found) <= 1000
-    boxes = np.array([person.box_xyxy_px for person in found])
-    assert (boxes >= 0.0).all()
-    assert (boxes <= (640, 480, 640, 480)).all()
-
-
 def test_several_threads_may_share_a_detector() -> None:
     detector = OnnxPersonDetector(colour_yolov8(*SIZE), score_threshold=0.999)
     images = np.zeros((2, 512, 640, 3), np.uint8)
@@ -309,12 +298,6 @@ def test_dets_and_labels_of_an_unknown_network_are_asked_for(part: str) -> None:
     assert OnnxPersonDetector(graph, input_size_hw_px=SIZE, family="rtmdet").layout == "RTMDet"
 
 
-def test_only_rtmdet_has_an_input_size_of_its_own() -> None:
-    assert OnnxPersonDetector(colour_dets(320, 320)).input_size_hw_px == (320, 320)
-    with pytest.raises(PerceptionError, match="input_size_hw_px"):
-        OnnxPersonDetector(colour_dets(320, 320, YOLOX_HEAD))
-
-
 def test_rows_of_one_class_are_not_read_as_raw_yolox() -> None:
     rows = np.zeros((1, CELLS, 6))  # a row for each cell, as an NMS of fixed size leaves them
     rows[0, :2, :4] = BOXES
@@ -398,5 +381,53 @@ def test_a_free_input_size_comes_from_metadata_or_the_caller() -> None:
     with pytest.raises(PerceptionError, match=r"give it with input_size_hw_px=\(height, width\)"):
         OnnxPersonDetector(undescribed)
     assert OnnxPersonDetector(undescribed, input_size_hw_px=SIZE).layout == "YOLOv8"
+    # Only RTMDet has one of its own.
+    assert OnnxPersonDetector(colour_dets(320, 320)).input_size_hw_px == (320, 320)
+    with pytest.raises(PerceptionError, match="input_size_hw_px"):
+        OnnxPersonDetector(colour_dets(320, 320, YOLOX_HEAD))
     square = fixed({"out": np.zeros((1, 84, 8400))}, ("h", "w"), metadata={"imgsz": "640"})
     assert OnnxPersonDetector(square).input_size_hw_px == (640, 640)
+
+
+# --- the input ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("size", "input_size"),
+    [((640, 480), (320, 256)), ((100, 75), (320, 256)), ((77, 200), (64, 64))],
+)
+def test_scaling_is_bilinear_between_pixel_centres(
+    size: tuple[int, int], input_size: tuple[int, int]
+) -> None:
+    """An image of noise shows a shift of a tenth of a pixel."""
+    width, height = size
+    image = np.random.default_rng(0).integers(0, 256, (height, width, 3), np.uint8)
+    letterbox = Letterbox(input_size[1], input_size[0], PixelFormat(), centred=True)
+    blob, geometry = letterbox.fill(image)
+    (columns, rows), (left, top) = geometry.scaled_px, geometry.corner_px
+
+    def interpolated(values: np.ndarray, count: int) -> np.ndarray:
+        """Interpolate along the first axis at the centres of ``count`` pixels of equal size."""
+        places = (np.arange(count) + 0.5) * len(values) / count - 0.5
+        flat = values.reshape(len(values), -1).T
+        lines = [np.interp(places, np.arange(len(values)), line) for line in flat]
+        return np.stack(lines, axis=1).reshape(count, *values.shape[1:])
+
+    wanted = interpolated(interpolated(image, rows).transpose(1, 0, 2), columns)
+    found = blob[0, :, top : top + rows, left : left + columns]
+    np.testing.assert_allclose(found, wanted.transpose(2, 1, 0), atol=1.5)
+
+
+@pytest.mark.parametrize("centred", [True, False])
+def test_padding_is_grey_also_after_an_image_of_another_shape(centred: bool) -> None:
+    letterbox = Letterbox(64, 64, PixelFormat(), centred=centred)
+    white = np.full((64, 20, 3), 255, np.uint8)
+    letterbox.fill(white)
+    blob, geometry = letterbox.fill(np.ascontiguousarray(white.transpose(1, 0, 2)))
+    (width, height), (left, top) = geometry.scaled_px, geometry.corner_px
+    assert (width, height) == (64, 20)
+    assert top == (22 if centred else 0)
+    outside = np.ones((64, 64), bool)
+    outside[top : top + height, left : left + width] = False
+    assert (blob[0][:, outside] == 114.0).all()
+    assert (blob[0][:, ~outside] == 255.0).all()

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from perception import Camera
 from perception.networks.heads import (
-    crop_to_image,
     head_crop,
     looking_at,
     ray_axes,
@@ -65,13 +64,6 @@ def test_a_crop_across_the_border_is_grey_outside_the_image():
     crop = head_crop(image, (-0.5, 239.5), 64.0)
     assert (crop[:, :31] == 114).all()
     assert (crop[:, 33:] == 255).all()
-
-
-def test_points_of_a_crop_are_mapped_to_the_image():
-    corner = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0)
-    np.testing.assert_allclose(corner, [6.0, 16.0])
-    stretched = crop_to_image(np.zeros(2), np.array([10.0, 20.0]), 8.0, np.diag([2.0, 0.5]))
-    np.testing.assert_allclose(stretched, [2.0, 18.0])
 
 
 @pytest.mark.parametrize("camera", [WIDE, DISTORTED], ids=["pinhole", "distorted"])

@@ -7,7 +7,6 @@ import json
 import math
 import re
 import sys
-from itertools import pairwise
 from types import SimpleNamespace
 
 import cv2
@@ -20,8 +19,7 @@ from perception.eyes import EyeEstimator
 from perception.installation import install_command
 from perception.layouts import NOSE
 from perception.networks import MediaPipeEyeEstimator, MediaPipePoseEstimator
-from perception.networks.poses import iris_std_m
-from perception.networks.poses._mediapipe import _cropped, _face_scores, _in_image
+from perception.networks.poses._mediapipe import _face_scores
 from perception.networks.poses._mediapipe_eyes import iris_offset
 
 IMAGES = SHARED / "images"
@@ -65,17 +63,6 @@ def test_the_far_side_of_a_turned_face_has_lower_scores(yaw_deg):
     assert mirrored == pytest.approx([nose, right_eye, left_eye, right_ear, left_ear])
 
 
-def test_points_of_a_crop_are_mapped_to_pixel_centres_of_the_image():
-    image = np.zeros((40, 60, 3), np.uint8)
-    crop, corner = _cropped(image, np.array([-5.0, 10.0, 30.2, 90.0]))
-    assert crop.shape == (30, 30, 3)
-    # The corner of the first pixel lies half a pixel before its centre.
-    mapped = _in_image(np.array([[0.0, 0.0], [1.0, 1.0]]), crop, corner)
-    assert mapped.tolist() == [[-0.5, 9.5], [29.5, 39.5]]
-    for box in ([100.0, 0.0, 200.0, 40.0], [5.0, 5.0, 5.0, 5.0]):
-        assert _cropped(image, np.array(box))[0] is None
-
-
 def landmarks(left=(0.0, 0.0), right=(0.0, 0.0), opening=0.03):
     """Return 478 landmarks with eyes 0.1 wide, whose irises lie off the middle of the corners."""
     marks = [SimpleNamespace(x=0.5, y=0.5) for _ in range(478)]
@@ -96,15 +83,6 @@ def test_the_offset_is_the_mean_of_both_irises_and_closed_eyes_say_nothing():
     assert found == pytest.approx([0.015, 0.001])
     for marks in (landmarks(opening=0.01), landmarks((math.nan, 0.0)), landmarks(opening=0.0)):
         assert iris_offset(marks) is None
-
-
-def test_the_place_of_irises_is_less_certain_with_fewer_pixels():
-    stds = [iris_std_m(CAMERA.fx_px / distance) for distance in (0.7, 1.0, 1.5, 2.0, 2.5, 5.0)]
-    for near, far in pairwise(stds):
-        assert far[0] > near[0]
-        assert far[1] > near[1]
-    # Lids cover irises above and below, so less is known along the head's height.
-    assert all(along > 2.0 * across for across, along in stds[:3])
 
 
 # --- with MediaPipe: poses ----------------------------------------------------------------------

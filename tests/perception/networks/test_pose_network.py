@@ -357,6 +357,6 @@ def test_the_pipeline_places_a_lifted_body(distance_m: float, yaw_deg: float) ->
     for depths, limit in ((points[None, :, 2], 0.06), (None, 0.12)):
         skeleton = lift_keypoints(pixels[None], depths, np.ones((1, 17)))[0]
         person = PersonKeypoints(pixels, skeleton, np.ones(17), "coco")
-        (found,) = place_bodies(camera, [person], 1.0)
+        (found,) = place_bodies(camera, (person,), 1.0)
         assert found is not None
         assert np.linalg.norm(found.position_camera_m - true) < limit * distance_m

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from perception import AttentionCone
 from sim_tests import Scenario
-from sim_tests.actors.behaviour import PersonOutcome
+from sim_tests.actors.behaviour import PersonMotion, PersonOutcome
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing import Stage
 from sim_tests.crossing._metrics import SafetyMeter
@@ -22,16 +23,28 @@ class StageRun:
 
     times_s: np.ndarray
     people: np.ndarray  # (T, P, 4) x, y, vx, vy
-    headings: np.ndarray  # (T, P)
-    heads: np.ndarray  # (T, P) yaw
+    angles: np.ndarray  # (T, P, 5) heading, yaw and pitch of head and of eyes
     robot: np.ndarray  # (T, 2)
+    awareness: np.ndarray  # (T, P); 0 unless it was asked for
     outcomes: tuple[PersonOutcome, ...]
     meter: SafetyMeter
+
+    @property
+    def places(self) -> np.ndarray:
+        """(T, P, 2) places of the people."""
+        return self.people[:, :, :2]
 
     @property
     def speeds(self) -> np.ndarray:
         """(T, P) speeds of the people."""
         return np.hypot(self.people[:, :, 2], self.people[:, :, 3])
+
+    @property
+    def off_robot_deg(self) -> np.ndarray:
+        """(T, P) how far the heads point past the robot's base."""
+        offset = self.robot[:, None] - self.places
+        off = self.angles[..., :2].sum(axis=2) - np.arctan2(offset[..., 1], offset[..., 0])
+        return np.abs(np.degrees(np.angle(np.exp(1j * off))))
 
     def crossing(self, person: int = 0) -> tuple[float, float]:
         """Return the time of crossing y = 0 upwards, and x ahead of the robot's centre then."""
@@ -48,9 +61,14 @@ def run_stage(
     seed: int = 0,
     layout: str = "open",
     robot: dict[str, float] | None = None,
+    asks_at_s: tuple[float, ...] | None = None,
+    asks: int = 0,
     **scenario: Any,
 ) -> StageRun:
-    """Run a stage with a robot that drives straight ahead."""
+    """Run a stage with a robot that drives straight ahead.
+
+    With ``asks_at_s`` it asks a person by voice at these times, and true awareness is recorded.
+    """
     task = {"goal_x_m": 12.0, **(robot or {})}
     case = Scenario.model_validate(
         {
@@ -63,7 +81,8 @@ def run_stage(
         }
     )
     meter = SafetyMeter(NOVA_CARTER)
-    times, rows, headings, heads, places = [], [], [], [], []
+    cone = AttentionCone()
+    times, rows, angles, places, awareness = [], [], [], [], []
     offsets = np.zeros(len(case.workers))
     with Stage(case, offsets, np.random.default_rng(seed)) as stage:
         stage.amr.command(robot_mps, 0.0)
@@ -72,20 +91,30 @@ def run_stage(
             motions = stage.motions
             times.append(stage.t_s)
             rows.append([[*m.position_odom_m, *m.velocity_odom_mps] for m in motions])
-            headings.append([m.heading_odom_rad for m in motions])
-            heads.append([m.head_yaw_rad for m in motions])
+            angles.append([_angles(motion) for motion in motions])
             places.append(stage.amr.T_odom_base[:2, 3].copy())
+            awareness.append([0.0] * len(motions))
+            if asks_at_s is not None:
+                views = stage.truth(cone, stage.amr.T_odom_camera)
+                awareness[-1] = [view.awareness for view in views]
+                if any(abs(stage.t_s - t_s) < 0.5 * DT_S for t_s in asks_at_s):
+                    stage.request("voice", motions[asks].position_odom_m)
             stage.advance((tick + 1) * DT_S, meter)
         outcomes = stage.outcomes
     return StageRun(
         np.array(times),
         np.array(rows),
-        np.array(headings),
-        np.array(heads),
+        np.array(angles),
         np.array(places),
+        np.array(awareness),
         outcomes,
         meter,
     )
+
+
+def _angles(motion: PersonMotion) -> tuple[float, ...]:
+    head = motion.heading_odom_rad, motion.head_yaw_rad, motion.head_pitch_rad
+    return (*head, motion.eye_yaw_rad, motion.eye_pitch_rad)
 
 
 def crosser(reaction: str | None, **fields: Any) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worker_looks import LOOKS
+from worker_looks import LOOKS, slip_m
 
 from sim_tests.actors.body import JOINTS, Gait, load_worker, skeleton, worker_names
 
@@ -43,21 +43,6 @@ def _shoe(gait: Gait, side: str, foot: np.ndarray) -> np.ndarray:
     return foot[:, None, :3] + np.stack([cos * ahead - sin * y, sin * ahead + cos * y, up], axis=-1)
 
 
-def _slip_m(shoe: np.ndarray, touching_m: float = 0.004) -> float:
-    """Return the longest slide of any point of a sole (N, V, 3) while it touches the floor."""
-    worst, touched = 0.0, np.zeros(shoe.shape[1], dtype=bool)
-    start = shoe[0, :, :2].copy()
-    for frame in shoe:
-        touches = frame[:, 2] < touching_m
-        new = touches & ~touched
-        start[new] = frame[new, :2]
-        if touches.any():
-            moved = np.linalg.norm(frame[touches, :2] - start[touches], axis=1)
-            worst = max(worst, float(moved.max()))
-        touched = touches
-    return worst
-
-
 @pytest.mark.parametrize("name", LOOKS)
 @pytest.mark.parametrize("speed_mps", SPEEDS_MPS)
 def test_soles_do_not_slide_sink_or_float(name: str, speed_mps: float) -> None:
@@ -66,7 +51,7 @@ def test_soles_do_not_slide_sink_or_float(name: str, speed_mps: float) -> None:
     lowest = []
     for side, foot in (("left", feet[:, 0]), ("right", feet[:, 1])):
         shoe = _shoe(gait, side, foot)
-        assert _slip_m(shoe) < 0.03
+        assert slip_m(shoe) < 0.03
         lowest.append(shoe[..., 2].min(axis=1))
         assert lowest[-1].min() > -0.005  # no sole below the floor
     assert np.minimum(*lowest).max() < 0.005  # and always one sole on the floor

@@ -24,14 +24,6 @@ def noticed_s(run):
     return outcome.noticed_s
 
 
-def off_robot_deg(run):
-    """Return (T,) how far the head points past the robot's base."""
-    offset = run.robot - run.people[:, 0, :2]
-    to_robot = np.arctan2(offset[:, 1], offset[:, 0])
-    off = run.headings[:, 0] + run.heads[:, 0] - to_robot
-    return np.abs(np.degrees(np.angle(np.exp(1j * off))))
-
-
 @pytest.mark.parametrize("after_s", [0.0, 1.0, 2.5])
 def test_somebody_who_halts_stands_until_the_lapse_and_sets_off_then(after_s):
     """``start_s`` comes too late, or too early, for when the person sets off."""
@@ -69,7 +61,7 @@ def test_after_the_lapse_the_head_turns_away_or_stays_on_the_robot(looks_away):
     run = run_stage([person], robot_mps=0.0, seconds=5.0)
     before = (run.times_s > noticed_s(run) + 0.6) & (run.times_s < noticed_s(run) + 1.0)
     after = run.times_s > noticed_s(run) + 2.0
-    off = off_robot_deg(run)
+    off = run.off_robot_deg[:, 0]
     assert off[before].max() < 15.0
     assert (off[after].min() > 30.0) if looks_away else (off[after].max() < 15.0)
 

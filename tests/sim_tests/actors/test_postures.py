@@ -21,20 +21,12 @@ from sim_tests.actors.body import (
     STAYING,
     Activity,
     Worker,
-    load_worker,
     skin_points,
-    worker_names,
 )
-from sim_tests.world import Warehouse
 
 PELVIS = -1
 WRISTS = [kp.LEFT_WRIST, kp.RIGHT_WRIST]
 PASSING_M = 0.02
-
-
-@pytest.fixture(scope="module")
-def workers(hall: Warehouse) -> dict[str, Worker]:
-    return {name: Worker(hall, load_worker(name).stature_m, look=name) for name in worker_names()}
 
 
 def _limb(joint: int) -> str:

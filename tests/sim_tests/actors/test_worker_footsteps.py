@@ -9,20 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from worker_looks import slip_m
 
 from perception import layouts as kp
 from sim_tests.actors.behaviour import WorkerScript
 from sim_tests.actors.body import (
     JOINTS,
     Worker,
-    load_worker,
-    worker_names,
 )
 from sim_tests.scenario import Scenario, shipped_scenarios
-from sim_tests.world import Warehouse
 
 HZ = 40.0
-TOUCHING_M = 0.004
 ANKLES = [JOINTS.index(f"{side}_ankle") for side in ("left", "right")]
 
 
@@ -70,11 +67,6 @@ WALKS = {
 ALWAYS = ("straight, 1.2 m/s", "a tight curve", "starting and stopping", "about-turn")
 
 
-@pytest.fixture(scope="module")
-def workers(hall: Warehouse) -> dict[str, Worker]:
-    return {name: Worker(hall, load_worker(name).stature_m, look=name) for name in worker_names()}
-
-
 def _times(walk: WorkerScript) -> np.ndarray:
     keys = [key.t_s for key in (*walk.path, *walk.heading)]
     return np.arange(min(keys) - 1.0, max(keys) + 1.5, 1.0 / HZ)
@@ -103,18 +95,6 @@ def _simulate(worker: Worker, walk: WorkerScript) -> tuple[np.ndarray, np.ndarra
     return np.array(frames, dtype=object), np.array(errors), np.array(keypoints)
 
 
-def _slip_m(shoe: np.ndarray) -> float:
-    """Return the longest slide of any point of a sole while it touches the floor."""
-    worst, touched, start = 0.0, np.zeros(len(shoe[0]), dtype=bool), shoe[0][:, :2].copy()
-    for frame in shoe:
-        touches = frame[:, 2] < TOUCHING_M
-        start[touches & ~touched] = frame[touches & ~touched, :2]
-        moved = np.linalg.norm(frame[:, :2] - start, axis=1)[touches]
-        worst = max(worst, float(moved.max(initial=0.0)))
-        touched = touches
-    return worst
-
-
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=() if name in ALWAYS else pytest.mark.full) for name in WALKS],
@@ -125,7 +105,7 @@ def test_stance_feet_stay_where_they_landed(workers: dict[str, Worker], name: st
     lowest = []
     for side in (0, 1):
         shoe = np.array(soles[side].tolist(), dtype=np.float64)
-        assert _slip_m(shoe) < 0.03
+        assert slip_m(shoe) < 0.03
         lowest.append(shoe[..., 2].min(axis=1))
         assert lowest[-1].min() > -0.005
     assert np.minimum(*lowest).max() < 0.005

@@ -101,7 +101,7 @@ def test_true_awareness_needs_a_line_of_sight():
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(tmp_path):
-    short = ATTENTIVE.model_copy(update={"duration_s": 4.0})
+    short = ATTENTIVE.model_copy(update={"duration_s": 2.0})
     texts = []
     for run, seed in enumerate((5, 5, 6)):
         path = tmp_path / f"{run}.csv"

@@ -100,9 +100,7 @@ def test_it_comes_when_the_person_has_left() -> None:
     assert _speed_mps((5.0, 3.0, 0.0, -1.3)) == pytest.approx(4.1 / (3.85 / 1.3))
 
 
-@pytest.mark.parametrize(
-    "seeds", [[3011, 3012], pytest.param(range(3010, 3022), marks=pytest.mark.full)]
-)
+@pytest.mark.parametrize("seeds", [[3012], pytest.param(range(3010, 3022), marks=pytest.mark.full)])
 def test_people_who_cross_cost_less_time(seeds: Sequence[int]) -> None:
     """A robot that gives way late makes people hesitate: some crossings then take 5 s more."""
     names = ("crossing_from_left", "group_crossing")

@@ -33,7 +33,7 @@ ROUND = ScannerSpec(x_m=0.0, field_of_view_deg=(-180.0, 180.0), resolution_deg=1
 PERIOD_S = 0.04
 SCANNER_FAULTS = tuple(name for name in shipped_faults() if name.startswith("scanner_"))
 #: In every run of the tests; the others with --full.
-ALWAYS = ("scanner_frozen", "scanner_late", "scanner_yawed", "scanner_ghosts")
+ALWAYS = ("scanner_late", "scanner_ghosts")
 
 
 def scan_at(t_s, range_m=5.0, count=360):
@@ -237,7 +237,7 @@ def test_a_drawn_blind_sector_is_the_same_for_all_scanners_and_even_over_seeds()
 
 def test_ghosts_follow_littles_law_and_a_scanner_without_them_is_left_alone():
     fault = ScannerFault(ghosts=Appearances(rate_hz=1.0, for_s=1.0))
-    shown = [(scan.ranges_m < 5.0).any() for _, scan, _ in delivered(fault, 400.0)]
+    shown = [(scan.ranges_m < 5.0).any() for _, scan, _ in delivered(fault, 200.0)]
     # One ghost on average; some walk off or stand farther than the wall at 5 m to 21 m.
     assert 0.35 < np.mean(shown) < 1.0 - math.exp(-1.0) + 0.1
     assert not any((scan.ranges_m < 5.0).any() for _, scan, _ in delivered(ScannerFault(), 2.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import cv2
@@ -116,13 +115,15 @@ def test_a_person_who_looks_away_is_unaware(rendered: Path) -> None:
             assert person["awareness"] == pytest.approx(expected, abs=0.12)
 
 
-def test_the_command_renders_and_prints_the_folder(
+def test_the_command_renders_and_replaces_a_set_on_request_only(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["--frames", "2", "--size", "96x72", "--seed", "3", "--processes", "1"]
-    assert main(["render", *arguments, "--out", str(tmp_path / "set")]) == 0
+    out = tmp_path / "set"
+    command = ["render", "--frames", "2", "--size", "96x72", "--processes", "1", "--out", str(out)]
+    assert main(command) == 0
     assert "2 images" in capsys.readouterr().out
-    assert {entry.name for entry in (tmp_path / "set").iterdir()} == {
+    first = contents(out)
+    assert set(first) == {
         "000000.png",
         "000001.png",
         "camera.yaml",
@@ -130,8 +131,19 @@ def test_the_command_renders_and_prints_the_folder(
         "render.yaml",
         "truth.jsonl",
     }
-    for line in (tmp_path / "set" / "truth.jsonl").read_text("utf-8").splitlines():
-        json.loads(line)
+    assert main(command) == 2
+    message = capsys.readouterr().err
+    for remedy in ("--resume", "--overwrite", "--out"):
+        assert remedy in message
+    assert main([*command, "--resume"]) == 0
+    assert contents(out) == first
+    (out / "mine.txt").write_text("mine")
+    # Another seed: no image of the first set may be used again.
+    assert main([*command, "--seed", "5", "--overwrite"]) == 0
+    second = contents(out)
+    assert second.pop("mine.txt") == b"mine"
+    assert second.keys() == first.keys()
+    assert all(second[name] != first[name] for name in ("000000.png", "000001.png"))
 
 
 @pytest.mark.parametrize(

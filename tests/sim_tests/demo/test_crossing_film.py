@@ -12,8 +12,14 @@ from nav_adapter import Alert
 from sim_tests import Scenario, run_crossing
 from sim_tests.demo._comparison import ComparisonRow, time_behind_s, time_lost_s, write_episodes
 from sim_tests.demo._comparison_plot import headline, plot_comparison
-from sim_tests.demo._film import HOLD_S, film_size_px, write_crossing_film
-from sim_tests.demo._film_panel import MAP_PX_PER_M, draw_map, map_px
+from sim_tests.demo._film import (
+    HOLD_S,
+    MAP_PX_PER_M,
+    draw_map,
+    film_size_px,
+    map_px,
+    write_crossing_film,
+)
 from sim_tests.demo._portraits import FILM_HZ, PORTRAIT_PX, PortraitRecorder
 
 

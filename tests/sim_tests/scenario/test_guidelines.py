@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import pytest
-from paths import ROOT
 
 from awarenav.cli import main
 from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
 from sim_tests.actors.behaviour import PersonSpec
 from sim_tests.crossing.eyes._make_eyes import unusual_size_probability
-from sim_tests.scenario import SCENARIO_SETS, shipped_templates
-from sim_tests.scenario.catalogue import approach_statistics, template_problems
+from sim_tests.scenario import SCENARIO_SETS
 from sim_tests.study.runs import named_templates
 from sim_tests.study.scenarios._validate import AttentionCheck
 
@@ -41,26 +39,6 @@ def test_the_list_shows_all_sets(capsys: pytest.CaptureFixture[str]) -> None:
     assert all(f"{name}@" in second and f"{name}@" not in first for name in NAMES)
     assert all(f"{name}@" in first for name in shipped_scenarios())
     assert all(f"{name}@" in third for name in shipped_scenarios("step_out"))
-
-
-@pytest.mark.parametrize(
-    "template",
-    [*shipped_templates("guidelines"), *shipped_templates("step_out")],
-    ids=lambda each: each.name,
-)
-def test_they_can_be_run_and_are_as_their_page_says(template: ScenarioTemplate) -> None:
-    assert template_problems(template) == ()
-    assert template.parameters()
-    statistics = approach_statistics(template, 200)
-    assert statistics is not None
-    assert statistics.conflict_share >= 0.8
-    assert statistics.median_time_s > 2.0
-    notices_m = [each.glances.notices_within_m for each in template.median().people]
-    if template.attention == "unaware":
-        assert max(notices_m) == 0.0
-    else:
-        assert max(notices_m) > 8.0
-    assert (ROOT / "docs" / "images" / "scenarios" / f"{template.name}.png").is_file()
 
 
 def test_the_child_is_drawn_in_its_size_and_the_robot_is_told_of_unusual_sizes() -> None:

@@ -153,6 +153,29 @@ def test_the_task_is_the_robots_own_or_as_given_or_along_the_longer_side(tmp_pat
         scenario_from_recording(tmp_path / "own_people.csv", tmp_path / "own.yaml")
 
 
+def test_a_goal_on_top_of_somebody_is_refused_but_not_where_people_pass_or_have_left(
+    tmp_path: Path,
+) -> None:
+    """The robot needs 4 s at least; the walker is over the goal at 6 s."""
+    people: dict[str, Place] = {"walks": lambda t: (t, 3.0), "stands": lambda _: (6.0, 0.0)}
+    table = written(tmp_path / "a.csv", people)
+    for start, goal, what in (
+        ((0.0, 0.0), (6.0, 0.0), "goal"),
+        ((0.0, 0.0), (6.5, 0.2), "goal"),
+        ((6.0, 0.3), (0.0, 0.0), "start"),
+    ):
+        options = RecordingOptions(start_odom_m=start, goal_odom_m=goal)
+        message = rf"the robot's {what} .* from 'stands'.*another --{what}"
+        with pytest.raises(SimError, match=message):
+            scenario_from_recording(table, tmp_path / "out.yaml", options)
+    assert not (tmp_path / "out.yaml").exists()
+    rows = table.read_text().splitlines()
+    left = [row for row in rows if ",stands," not in row or float(row.split(",")[0]) < 103.5]
+    table.write_text("\n".join(left).replace("6.000000,0.000000", "6.000000,3.000000") + "\n")
+    options = RecordingOptions(start_odom_m=(0.0, 0.0), goal_odom_m=(6.0, 3.0))
+    assert scenario_from_recording(table, tmp_path / "out.yaml", options).scenario.exists()
+
+
 def test_a_part_of_a_recording_begins_at_time_0_where_it_was_recorded(tmp_path: Path) -> None:
     path = written(tmp_path / "part.csv", {"a": across, "b": along})
     options = RecordingOptions(from_s=102.0, until_s=105.0)

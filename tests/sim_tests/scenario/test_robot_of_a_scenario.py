@@ -1,18 +1,15 @@
 """Scenarios are checked and planned with the body and the limits of their own robot."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, SimError, shipped_scenarios
+from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, shipped_scenarios
 from sim_tests.scenario import scenario_for_robot
 from sim_tests.scenario.catalogue import (
     closest_approaches,
     robot_plan,
     scenario_problems,
 )
-from sim_tests.scenario.recordings import RecordingOptions, scenario_from_recording
 
 RACK = {"x_m": 2.0, "y_m": 0.0, "length_m": 1.0, "width_m": 1.0}
 
@@ -59,38 +56,3 @@ def test_the_plan_has_the_speed_of_the_robot() -> None:
     assert driven_m < 6.0
     # It comes later to the place where somebody crosses.
     assert closest_approaches(slow) != closest_approaches(before)
-
-
-def recording(path: Path, places: dict[str, list[tuple[float, float, float]]]) -> Path:
-    rows = ["t_s,id,x_m,y_m"]
-    rows += [f"{t},{name},{x},{y}" for name, track in places.items() for t, x, y in track]
-    path.write_text("\n".join(rows) + "\n")
-    return path
-
-
-def standing(x: float, y: float, until_s: float) -> list[tuple[float, float, float]]:
-    return [(0.1 * tick, x, y) for tick in range(round(until_s / 0.1) + 1)]
-
-
-WALKER = [(0.1 * tick, 0.1 * tick, 3.0) for tick in range(121)]
-
-
-def test_a_goal_on_top_of_somebody_is_refused(tmp_path: Path) -> None:
-    table = recording(tmp_path / "a.csv", {"walks": WALKER, "stands": standing(6.0, 0.0, 12.0)})
-    for goal in ((6.0, 0.0), (6.5, 0.2)):
-        options = RecordingOptions(start_odom_m=(0.0, 0.0), goal_odom_m=goal)
-        with pytest.raises(SimError, match=r"the robot's goal .* from 'stands'.*another --goal"):
-            scenario_from_recording(table, tmp_path / "out.yaml", options)
-    assert not (tmp_path / "out.yaml").exists()
-    options = RecordingOptions(start_odom_m=(6.0, 0.3), goal_odom_m=(0.0, 0.0))
-    with pytest.raises(SimError, match=r"the robot's start .* from 'stands'.*another --start"):
-        scenario_from_recording(table, tmp_path / "out.yaml", options)
-
-
-def test_people_who_pass_a_goal_or_have_left_it_are_no_obstacle(tmp_path: Path) -> None:
-    """The robot needs 4 s at least; the walker is over the goal at 6 s."""
-    people = {"walks": WALKER, "left": standing(6.0, 3.0, 3.5)}
-    table = recording(tmp_path / "a.csv", people)
-    options = RecordingOptions(start_odom_m=(0.0, 0.0), goal_odom_m=(6.0, 3.0))
-    made = scenario_from_recording(table, tmp_path / "out.yaml", options)
-    assert made.scenario.exists()

@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from full_disk import files_up_to
-from hypothesis import given
-from hypothesis import strategies as st
 
 from sim_tests import SimError
 from sim_tests.search._study import Optimizer, Outcome, Range, SharedStudy, importances
@@ -192,17 +190,6 @@ def test_a_constrained_search_turns_to_where_the_constraint_holds(sampler):
     assert feasible[-4:].mean() >= 0.4
 
 
-def test_cma_es_finds_the_bottom_of_a_bowl():
-    space = {f"x{i}": SPACE["x"] for i in range(4)}
-    asked = Optimizer("cmaes", space, generation=12, seed=0, first=dict.fromkeys(space, 0.0))
-    best = np.inf
-    for _ in range(25):
-        values = [sum((v - 0.3) ** 2 for v in each.values()) for each in asked.ask()]
-        best = min(best, *values)
-        asked.tell([Outcome(value) for value in values])
-    assert best < 1e-3
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -215,13 +202,6 @@ def test_cma_es_finds_the_bottom_of_a_bowl():
 def test_arguments_that_do_not_fit_together_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
-
-
-@given(value=st.floats(-10.0, 10.0))
-def test_clipping_stays_in_the_range_and_keeps_values_inside(value):
-    inside = Range(low=-1.0, high=2.0).clipped(value)
-    assert -1.0 <= inside <= 2.0
-    assert inside == value or not -1.0 <= value <= 2.0
 
 
 def test_importances_sum_to_one_and_find_the_parameter_that_matters():

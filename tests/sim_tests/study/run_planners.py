@@ -120,11 +120,63 @@ class NoPlan:
         pass
 
 
-def with_boxes(robot, static_boxes_odom_m):
-    """Make a planner that knows the racks."""
-    planner = Slow(robot)
-    planner.boxes = static_boxes_odom_m
-    return planner
+class Given:
+    """Keeps the arguments that it was made with, and stands."""
+
+    def __init__(self, *given):
+        self.given = given
+
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        return 0.0, 0.0
+
+
+class Init(Given):
+    def __init__(self):
+        super().__init__()
+
+
+class Robot(Given):
+    def __init__(self, robot):
+        super().__init__(robot)
+
+
+class AnyName(Given):
+    def __init__(self, vehicle, /, gain=2.0):
+        super().__init__(vehicle, gain)
+
+
+class Seed(Given):
+    def __init__(self, *, seed):
+        super().__init__(seed)
+
+
+class Everything(Given):
+    def __init__(self, seed, static_boxes_odom_m, profile, **options):
+        super().__init__(seed, static_boxes_odom_m, profile, options)
+
+
+class Follows(Given):
+    def __init__(self, robot, *, reference_path_odom_m):
+        super().__init__(reference_path_odom_m)
+
+
+class PositionalOnly(Given):
+    def __init__(self, gain=2.0, seed=5, /):
+        super().__init__(gain, seed)
+
+
+class Asks(Given):
+    def __init__(self, robot, costmap):
+        super().__init__(robot, costmap)
+
+
+class Breaks(Given):
+    def __init__(self):
+        raise RuntimeError("no licence")
+
+
+def function(seed=None):
+    return Given(seed)
 
 
 NOT_CALLABLE = 3

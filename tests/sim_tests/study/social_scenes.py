@@ -1,8 +1,6 @@
-"""Episodes made from random walks and from formulas, for tests of the measures that others use."""
+"""Episodes of random walks and of a straight drive, for tests of the measures that others use."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -47,43 +45,25 @@ def random_episode(seed, *, people=4, count=90, absent=True):
     )
 
 
-def formula_episode(t_s, robot, people=(), **values):
-    """Return an episode from formulas: ``robot(t)`` and each of ``people``: x, y, heading, speed.
-
-    Velocities point along the headings.
-    """
+def straight_episode(t_s, speed_mps=1.0, *, standing_m=(), **values):
+    """Return an episode of a robot that drives along x, past people who stand at these places."""
     t_s = np.asarray(t_s, dtype=float)
-
-    def course(formula):
-        return np.array([formula(t) for t in t_s.tolist()], dtype=float).reshape(-1, 4)
-
-    def velocity(rows):
-        return rows[:, 3:] * np.stack([np.cos(rows[:, 2]), np.sin(rows[:, 2])], axis=1)
-
-    own, others = course(robot), [course(person) for person in people]
-    empty = np.zeros((len(t_s), 0, 2))
+    count, people = len(t_s), len(standing_m)
+    nothing = np.zeros(count)
     values = {
         "robot_size_m": (0.6, 0.6),
         "robot_radius_m": 0.3,
-        "person_radius_m": 0.3,
         "goal_m": np.array([10.0, 0.0]),
         **values,
     }
     return SocialEpisode(
         t_s=t_s,
-        robot_m=own[:, :2],
-        robot_heading_rad=own[:, 2],
-        robot_mps=velocity(own),
-        yaw_rate_radps=np.zeros(len(t_s)),
-        people_m=np.stack([each[:, :2] for each in others], axis=1) if others else empty,
-        people_heading_rad=np.stack([each[:, 2] for each in others], axis=1)
-        if others
-        else empty[..., 0],
-        people_mps=np.stack([velocity(each) for each in others], axis=1) if others else empty,
+        robot_m=np.stack([speed_mps * t_s, nothing], axis=1),
+        robot_heading_rad=nothing,
+        robot_mps=np.stack([nothing + speed_mps, nothing], axis=1),
+        yaw_rate_radps=nothing,
+        people_m=np.tile(np.reshape(standing_m, (1, people, 2)), (count, 1, 1)),
+        people_heading_rad=np.zeros((count, people)),
+        people_mps=np.zeros((count, people, 2)),
         **values,
     )
-
-
-def straight(speed, start=(0.0, 0.0), heading=0.0):
-    cos, sin = math.cos(heading), math.sin(heading)
-    return lambda t: (start[0] + speed * t * cos, start[1] + speed * t * sin, heading, speed)

@@ -10,7 +10,7 @@ from sim_tests.study.measures import path_length_m
 from sim_tests.study.measures._driving import (
     count_stops,
     peak_deceleration_and_jerk,
-    success_weighted_path_length,
+    success_weighted,
 )
 
 T_S = np.arange(0.0, 8.0, 0.05)
@@ -63,9 +63,9 @@ def test_path_length_of_a_circle():
 
 @given(st.floats(0.1, 100.0), st.floats(0.1, 100.0))
 def test_spl_is_the_formula_of_anderson(path, shortest):
-    assert success_weighted_path_length(True, path, shortest) == shortest / max(path, shortest)
-    assert success_weighted_path_length(False, path, shortest) == 0.0
-    assert success_weighted_path_length(True, path, None) is None
+    assert success_weighted(True, path, shortest) == shortest / max(path, shortest)
+    assert success_weighted(False, path, shortest) == 0.0
+    assert success_weighted(True, path, None) is None
 
 
 def stops(profile, arrived=False):

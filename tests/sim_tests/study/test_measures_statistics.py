@@ -14,12 +14,10 @@ from sim_tests.study.measures import (
     bootstrap_interval,
     paired,
     paired_difference,
+    paired_ratio,
     proportion_interval,
     ratio_interval,
     violates_more,
-    violation_excess,
-    violation_excess_of_time,
-    won_back,
     zero_of_n_upper,
 )
 
@@ -135,6 +133,14 @@ def episodes(policy, lost, violation=None, scenario="a"):
     ]
 
 
+def won_back(blind, policy):
+    return paired_ratio(blind, policy, "time_lost_s", "time_lost_s", sign=-1.0)
+
+
+def violation_excess(blind, policy, over="violation_time_s"):
+    return paired_ratio(blind, policy, "violation_time_s", over)
+
+
 def test_the_share_won_back_is_of_all_time_lost():
     blind = episodes("blind", [10.0, 1.0, 4.0])
     policy = episodes("balanced", [5.0, 1.0, 4.0])
@@ -186,7 +192,7 @@ def test_longer_violation_is_relative_to_blind_and_to_its_time():
     blind = episodes("blind", [0.0] * 4, [0.2, 0.2, 0.0, 0.4])
     policy = episodes("x", [0.0] * 4, [0.3, 0.1, 0.0, 0.8])
     assert violation_excess(blind, policy).value == pytest.approx(0.4 / 0.8)
-    assert violation_excess_of_time(blind, policy).value == pytest.approx(0.4 / 40.0)
+    assert violation_excess(blind, policy, "duration_s").value == pytest.approx(0.4 / 40.0)
     assert violates_more(blind, policy).value == 0.5
     never = episodes("blind", [0.0] * 4)
     assert not violation_excess(never, policy).known

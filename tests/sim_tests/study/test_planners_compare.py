@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from page_reader import PageReader
-from run_planners import READY
 
 from awarenav.cli import main
 from sim_tests.scenario import ScenarioTemplate
@@ -21,7 +20,6 @@ from sim_tests.study.report._run import Run
 from sim_tests.study.report.command import command_line
 from sim_tests.study.runs import (
     job_key,
-    make_planner,
     policy_of,
     read_attempts,
     read_jobs,
@@ -149,15 +147,6 @@ GOOD = {
 def test_a_broken_limit_and_a_late_command_are_marked(folder, changed, column, text, bad):
     cell = conduct_cells(Run.read(folder), **changed)[column]
     assert (cell.text, cell.bad) == (text, bad)
-
-
-def test_a_planner_may_be_an_object_or_have_arguments():
-    scenario = scene().median()
-    made = make_planner("run_planners:READY", scenario)
-    assert made is not READY
-    assert made.speed_mps == 0.5
-    assert make_planner("run_planners:Straight(speed_mps=0.3)", scenario).speed_mps == 0.3
-    assert make_planner("straight_on", scenario).plan
 
 
 def test_the_probe_of_radii_changes_radii_alone():

@@ -20,9 +20,14 @@ from paths import ROOT
 from report_runs import MadeUpRun, failed, made_up_run
 from run_scenes import short_jobs
 
-from sim_tests.study.measures import read_records, summarise, won_back, zero_of_n_upper
+from sim_tests.study.measures import (
+    paired_ratio,
+    percent,
+    read_records,
+    summarise,
+    zero_of_n_upper,
+)
 from sim_tests.study.report import write_report
-from sim_tests.study.report._page import percent
 from sim_tests.study.runs import plan_jobs, run_jobs
 
 HOSTILE = '<script>alert("x")</script>&\'`{{ 7 * 7 }}'
@@ -110,7 +115,7 @@ def test_pairs_of_people_who_do_not_watch_are_named_and_left_out(tmp_path: Path)
         ]
         for policy in ("blind", "balanced")
     ]
-    value = f"{100.0 * won_back(*counted).value:.0f}"
+    value = f"{100.0 * paired_ratio(*counted, 'time_lost_s', 'time_lost_s', sign=-1.0).value:.0f}"
     assert f"It wins back {value} [" in page.text
     assert f"% of the time that blind loses to attentive people ({len(counted[0])} pairs)" in (
         page.text

@@ -17,12 +17,13 @@ from full_disk import files_up_to
 from run_scenes import short_jobs
 
 from sim_tests import SimError
-from sim_tests.study.measures import read_records, read_rows
+from sim_tests.study.measures import read_records
 from sim_tests.study.runs import (
     RunFiles,
     in_parallel,
     read_attempts,
     read_jobs,
+    read_rows,
     read_run,
     run_episode,
     run_jobs,

@@ -7,10 +7,8 @@ from run_scenes import short, short_jobs
 from nav_adapter import NavError
 from sim_tests import SimError
 from sim_tests.crossing.eyes import ORACLE
-from sim_tests.crossing.planner import SamplingPlanner
 from sim_tests.study.runs import (
     job_key,
-    make_planner,
     plan_jobs,
     run_episode,
 )
@@ -78,16 +76,6 @@ def test_seeds_policies_and_scenarios_are_checked():
         plan_jobs([short()], ["brave"], [0])
     with pytest.raises(SimError, match="two episodes have the same scenario name"):
         plan_jobs([short(), short()], ["blind"], [0])
-
-
-def test_planners_are_made_with_the_arguments_they_take():
-    scenario = short().median()
-    assert make_planner("", scenario) is None
-    boxes = scenario.layout.obstacle_boxes_odom
-    np.testing.assert_array_equal(make_planner("run_planners:with_boxes", scenario).boxes, boxes)
-    assert make_planner("run_planners:Slow", scenario).robot.max_speed_mps > 0.0
-    reference = make_planner("sim_tests.crossing.planner:SamplingPlanner", scenario)
-    assert isinstance(reference, SamplingPlanner)
 
 
 def test_a_planner_that_uses_the_global_generators_repeats_with_its_seed():

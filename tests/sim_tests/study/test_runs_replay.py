@@ -1,12 +1,11 @@
 """Replays: an episode again, with its pictures, and whether its row is the same."""
 
 import pytest
-from run_scenes import SHORT, short_jobs
+from run_scenes import short_jobs
 
 from awarenav.cli import main
-from sim_tests.actors.robot import RobotModel
 from sim_tests.study.report import write_report
-from sim_tests.study.runs import read_jobs, run_jobs, template_of
+from sim_tests.study.runs import run_jobs
 
 
 @pytest.fixture(scope="module")
@@ -55,18 +54,3 @@ def test_the_report_links_to_the_pages_of_replays(tmp_path, capsys):
     assert main(["replay", str(folder), "all", "--view"]) == 0
     report = write_report(folder, stills=False).read_text()
     assert report.count(">Watch</a>") == 2
-
-
-def test_a_replay_has_the_robot_and_the_people_of_the_run(tmp_path, capsys) -> None:
-    (tmp_path / "short.yaml").write_text(SHORT.format(name="short"))
-    words = ["crossings", "--scenario", str(tmp_path / "short.yaml"), "--policy", "blind"]
-    words += ["--perception", "truth", "--workers", "1", "--no-report", "--out", str(tmp_path)]
-    assert main([*words, "--robot", "delivery", "--population", "recorded"]) == 0
-    (job,) = read_jobs(tmp_path)
-    scenario = template_of(job.scenario).for_seed(job.seed)
-    assert scenario.robot_model == RobotModel.shipped("delivery")
-    assert scenario.population == "recorded"
-    capsys.readouterr()
-    assert main(["replay", str(tmp_path), "0", "--no-video"]) == 0
-    assert "short_delivery" in (text := capsys.readouterr().out)
-    assert "The same row as in" in text

@@ -7,13 +7,11 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from social_scenes import formula_episode, random_episode, straight
+from social_scenes import random_episode, straight_episode
 
 from sim_tests import SimError
 from sim_tests.study.social import read_track, social_measures, write_episode
-from sim_tests.study.social._episode import sides, velocities
+from sim_tests.study.social._episode import sides
 
 HEADER = "timestamp,x,y,column,robot_x,robot_y,robot_yaw_rad\n"
 
@@ -57,6 +55,12 @@ def test_a_track_is_read_back_equal(tmp_path):
     assert again.t_s == pytest.approx(episode.t_s - episode.t_s[0], abs=2e-9)
     assert np.array_equal(again.people_m, episode.people_m, equal_nan=True)
     assert np.array_equal(again.robot_heading_rad, episode.robot_heading_rad)
+    # Velocities are differences of positions, and known exactly where these are.
+    assert np.array_equal(np.isfinite(again.people_mps[..., 0]), episode.present)
+    steps_s = np.diff(again.t_s)[:, None, None]
+    known = np.isfinite(again.people_mps[1:]) & np.isfinite(again.people_m[:-1])
+    moved_mps = np.diff(again.people_m, axis=0) / steps_s
+    assert again.people_mps[1:][known] == pytest.approx(moved_mps[known])
     before, after = social_measures(episode), social_measures(again)
     for name in ("navwareset_path_length_m", "navwareset_min_distance_m", "navwareset_jerk_mps3"):
         assert after[name] == pytest.approx(before[name], rel=1e-4)
@@ -64,7 +68,7 @@ def test_a_track_is_read_back_equal(tmp_path):
 
 
 def test_a_track_without_people_and_the_second_layout_are_read(tmp_path):
-    alone = formula_episode(np.arange(0.0, 2.0, 0.1), straight(1.0))
+    alone = straight_episode(np.arange(0.0, 2.0, 0.1))
     write_episode(tmp_path / "alone.csv", alone)
     assert read_track(tmp_path / "alone.csv").people == 0
     wide = "timestamp,robot_x,robot_y,x1,y1,x2,y2\n0,0,0,1,2,,\n1000000000,1,0,1,3,5,5\n"
@@ -101,21 +105,7 @@ def test_what_cannot_be_written_or_read_is_refused(tmp_path):
         write_episode(tmp_path / "x.json", boxed(), "socnav")
     with pytest.raises(SimError, match=r"cannot read .*none\.csv"):
         read_track(tmp_path / "none.csv")
-    aimless = formula_episode([0.0, 1.0], straight(1.0), goal_m=None)
+    aimless = straight_episode([0.0, 1.0], goal_m=None)
     with pytest.raises(SimError, match="needs the robot's goal"):
         write_episode(tmp_path / "x.json", aimless)
     assert list(tmp_path.iterdir()) == []
-
-
-@settings(max_examples=25)
-@given(st.lists(st.sampled_from([0.0, 1.0, math.nan]), min_size=1, max_size=8))
-def test_velocities_are_known_exactly_where_positions_are(presence):
-    """A body that moves at (2, −1) m/s and is absent at times."""
-    t_s = np.arange(float(len(presence)))
-    gone = np.isnan(presence)
-    positions = np.where(gone[:, None], np.nan, np.stack([2.0 * t_s, -t_s], axis=1))
-    found = velocities(t_s, positions)
-    assert np.array_equal(np.isnan(found[:, 0]), gone)
-    for row in np.flatnonzero(~gone):
-        near = row > 0 and not gone[row - 1]
-        assert not near or found[row] == pytest.approx([2.0, -1.0])

@@ -48,8 +48,8 @@ def run(tmp_path_factory):
             "--format navwareset writes files that end in .csv, got x.json",
         ),
         ("frontier EMPTY/nowhere", "nowhere"),
+        ("render --resume --out EMPTY/set", "there are no images"),
         ("planners compare run_planners", "or as one of reference, costmap"),
-        ("planners compare run_planners:Absent", "has no attribute 'Absent'"),
         (
             "planners compare run_planners:Straight(gain=2)",
             "no argument 'gain'; it has 'robot'",

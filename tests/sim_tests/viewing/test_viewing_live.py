@@ -1,4 +1,4 @@
-"""The live page's server: its stream, late readers, readers that come back, and refusals."""
+"""The live page's server: its stream, late readers, and refusals."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ import urllib.request
 
 import pytest
 
-from sim_tests.viewing import LivePage, live_page
+from sim_tests.viewing import LivePage, page_text
 from sim_tests.world.errors import SimError
 
 
-def events(text: str) -> list[tuple[str, str, object]]:
-    """Return the id, kind and value of the events of a stream."""
+def events(text: str) -> list[tuple[str, object]]:
+    """Return the kind and value of the events of a stream."""
     found = []
     for block in text.strip().split("\n\n"):
         fields = dict(line.split(": ", 1) for line in block.splitlines() if line.strip(": "))
         if "data" in fields:
-            value = json.loads(fields["data"])
-            found.append((fields["id"], fields.get("event", "message"), value))
+            found.append((fields.get("event", "message"), json.loads(fields["data"])))
     return found
 
 
@@ -47,16 +46,14 @@ def test_readers_get_all_events_early_or_late(page):
     page.end("Goal reached")
     reader.join(5.0)
     assert events(early[0]) == [
-        ("0", "begin", {"scenario": "short"}),
-        ("1", "message", {"t_s": 0.0}),
-        ("2", "message", {"t_s": 0.05}),
-        ("3", "end", {"outcome": "Goal reached", "note": ""}),
+        ("begin", {"scenario": "short"}),
+        ("message", {"t_s": 0.0}),
+        ("message", {"t_s": 0.05}),
+        ("end", {"outcome": "Goal reached", "note": ""}),
     ]
     assert page.wait_for_delivery(5.0)
     assert events(read(page.url + "states")) == events(early[0])
-    back = events(read(page.url + "states", **{"Last-Event-ID": "1"}))
-    assert [number for number, _, _ in back] == ["2", "3"]
-    assert page.opened == 3
+    assert page.opened == 2
 
 
 def test_the_page_is_served_on_loopback_alone_under_its_own_names(page):
@@ -78,7 +75,7 @@ def test_an_interrupted_crossing_tells_its_readers():
         reader.start()
         assert page.wait_for_reader(5.0)
     reader.join(5.0)
-    assert events(got[0])[-1][2]["outcome"] == "The crossing was stopped."
+    assert events(got[0])[-1][1]["outcome"] == "The crossing was stopped."
 
 
 def test_a_port_in_use_is_named(page):
@@ -93,7 +90,7 @@ def test_nobody_reads(page):
 
 
 def test_the_browser_follows_scrubs_and_keeps_a_live_crossing(chromium, recorder):
-    with LivePage(live_page("live")) as page:
+    with LivePage(page_text("live")) as page:
         chromium.events.clear()
         chromium.call("Page.navigate", url=page.url)
         assert page.wait_for_reader(10.0)

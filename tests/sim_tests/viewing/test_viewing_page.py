@@ -44,14 +44,14 @@ def test_figures_and_drawings_are_those_of_the_state(chromium, page_file, record
         assert float(shown) == pytest.approx(state[f"{name}_mps"], abs=6e-3)
     rows = chromium.evaluate("document.getElementById('tracks').rows.length")
     assert rows == len(state["tracks"]) >= 1
-    for name in ("plan", "camera", "alpha", "motion"):
+    assert chromium.evaluate("document.getElementById('camera').naturalWidth") == 480
+    for name in ("plan", "alpha", "motion"):
         colours = chromium.evaluate(
             f"(() => {{const c = document.getElementById('{name}');"
             "const d = new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height)"
             ".data.buffer); return new Set(d).size})()"
         )
         assert colours > 20, name
-    # Pictures are decoded without an address.
     assert len(chromium.requests()) == 1
 
 

@@ -1,10 +1,12 @@
-"""Camera poses for tests."""
+"""Camera poses and rays for tests."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+
+from perception import Camera
 
 
 def level_pose(
@@ -19,3 +21,10 @@ def level_pose(
     pose[:3, :3] = np.column_stack([right, np.cross(forward, right), forward])
     pose[:3, 3] = position_m
     return pose
+
+
+def pixel_rays(camera: Camera) -> np.ndarray:
+    """Return the ray (H, W, 3) of each pixel in the optical frame, with z = 1."""
+    rows, columns = np.mgrid[: camera.height_px, : camera.width_px]
+    right, down = (columns - camera.cx_px) / camera.fx_px, (rows - camera.cy_px) / camera.fy_px
+    return np.stack([right, down, np.ones(rows.shape)], axis=-1)

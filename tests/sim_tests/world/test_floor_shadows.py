@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from camera_poses import level_pose
+from camera_poses import level_pose, pixel_rays
 from visual_actors import ball
 
 from perception import Camera
@@ -51,9 +51,7 @@ def test_the_shadow_of_a_ball_is_where_the_rays_put_it(
     towards = np.array(direction) / np.linalg.norm(direction)
     spot = centre - towards * centre[2] / towards[2]
     # The floor under each pixel, and the distance of its ray to the lamp from the ball's centre.
-    rows, columns = np.mgrid[:180, :240]
-    rays = np.stack([(columns - 119.5) / 160.0, (rows - 89.5) / 160.0, np.ones((180, 240))], -1)
-    rays = rays @ ABOVE[:3, :3].T
+    rays = pixel_rays(CAMERA) @ ABOVE[:3, :3].T
     floor = ABOVE[:3, 3] - rays * (ABOVE[2, 3] / rays[..., 2:])
     off = floor - spot
     off -= (off @ towards)[..., None] * towards

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 
@@ -47,18 +48,12 @@ def test_every_hall_has_a_free_robot_aisle_and_no_overlapping_things(name: str) 
     assert (boxes[:, :2] < boxes[:, 2:]).all()
     assert (layout.obstacle_heights_m > 0.0).all()
     assert not _blocked(layout, (-3.0, 0.0), (5.5, 0.0))
-    racks = [rack.box_odom_m for rack in layout.racks]
-    parts = [box for prop in layout.props for box in prop.boxes_odom_m]
-    for i, a in enumerate(racks):
-        for b in (*racks[i + 1 :], *parts):
+    things = [*((rack.box_odom_m,) for rack in layout.racks)]
+    things += [prop.boxes_odom_m for prop in layout.props]
+    for one, other in itertools.combinations(things, 2):
+        for a, b in itertools.product(one, other):
             shared = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
             assert min(shared) < 1e-9, (a, b)
-    for i, prop in enumerate(layout.props):
-        for other in layout.props[i + 1 :]:
-            for a in prop.boxes_odom_m:
-                for b in other.boxes_odom_m:
-                    shared = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
-                    assert min(shared) < 1e-9, (prop, other)
 
 
 def test_a_hall_survives_its_file(tmp_path: Path) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
-from camera_poses import level_pose
-from visual_actors import AWAY_M, ShapeActor, ball
+from camera_poses import level_pose, pixel_rays
+from visual_actors import ShapeActor, ball
 
 from perception import Camera
 from sim_tests.world import Warehouse
@@ -22,23 +22,11 @@ def renderer(hall: Warehouse) -> CameraRenderer:
     return CameraRenderer(hall)
 
 
-@pytest.fixture(scope="module")
-def red_ball(hall: Warehouse) -> tuple[int, ShapeActor]:
-    actor = ball(position_m=AWAY_M, colour=(1.0, 0.0, 0.0))
-    return hall.visuals.add_actor(actor), actor
-
-
-@pytest.fixture
-def target(red_ball: tuple[int, ShapeActor]) -> Iterator[tuple[int, ShapeActor]]:
-    """Return a red ball with its actor number; it is out of view before and after the test."""
-    yield red_ball
-    red_ball[1].position_m = np.array(AWAY_M)
-
-
 def test_a_ball_appears_where_it_is_projected(
-    renderer: CameraRenderer, target: tuple[int, ShapeActor]
+    renderer: CameraRenderer, add_actor: Callable[[ShapeActor], int]
 ) -> None:
-    number, actor = target
+    actor = ball(colour=(1.0, 0.0, 0.0))
+    number = add_actor(actor)
     rng = np.random.default_rng(3)
     errors = []
     for _ in range(24):
@@ -62,15 +50,7 @@ def test_a_ball_appears_where_it_is_projected(
 def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float) -> None:
     T = level_pose((0.0, 0.0, 1.4), 0.3, pitch_rad)
     view = renderer.render(OFF_CENTRE, T)
-    rows, columns = np.mgrid[:240, :320]
-    rays = np.stack(
-        [
-            (columns - OFF_CENTRE.cx_px) / OFF_CENTRE.fx_px,
-            (rows - OFF_CENTRE.cy_px) / OFF_CENTRE.fy_px,
-            np.ones_like(rows, dtype=float),
-        ],
-        axis=-1,
-    )
+    rays = pixel_rays(OFF_CENTRE)
     falls = rays @ T[2, :3]  # change of odom z per metre of depth
     expected = np.where(falls < 0.0, -1.4 / falls, np.inf)
     near = expected < 3.5  # farther away the racks and walls begin
@@ -80,9 +60,9 @@ def test_depth_of_the_floor_is_exact(renderer: CameraRenderer, pitch_rad: float)
 
 
 def test_a_rectangle_is_that_part_of_the_whole(
-    renderer: CameraRenderer, target: tuple[int, ShapeActor]
+    renderer: CameraRenderer, add_actor: Callable[[ShapeActor], int]
 ) -> None:
-    target[1].position_m = np.array((2.0, 0.1, 1.5))
+    add_actor(ball(position_m=(2.0, 0.1, 1.5)))
     T = level_pose((0.0, 0.0, 1.4), 0.0)
     whole = renderer.render(OFF_CENTRE, T)
     for u0, v0, u1, v1 in ((100, 40, 220, 200), (0, 0, 77, 33), (159, 100, 160, 101)):

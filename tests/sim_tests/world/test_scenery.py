@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from triangle_hits import shares_met
 
 from sim_tests import SimError
 from sim_tests.world.hall import (
@@ -47,20 +48,10 @@ def _mesh_on_the_floor(layout: WarehouseLayout) -> Mesh:
 
 
 def _hits(mesh: Mesh, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return (N,) whether segments meet a triangle from either side (Möller, Trumbore 1997)."""
-    a, b, c = (mesh.vertices_m[mesh.indices.reshape(-1, 3)[:, k]] for k in range(3))
-    out = np.zeros(len(starts), dtype=bool)
-    for row, (start, along) in enumerate(zip(starts, ends - starts, strict=True)):
-        across = np.cross(along, c - a)
-        volume = np.einsum("ij,ij->i", b - a, across)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            u = np.einsum("ij,ij->i", start - a, across) / volume
-            turned = np.cross(start - a, b - a)
-            v = turned @ along / volume
-            t = np.einsum("ij,ij->i", c - a, turned) / volume
-            inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9)
-        out[row] = (inside & (t >= -1e-9) & (t <= 1.0 + 1e-9)).any()
-    return out
+    """Return (N,) whether segments meet a triangle from either side."""
+    corners = mesh.vertices_m[mesh.indices.reshape(-1, 3)]
+    met = (shares_met(corners, *pair) for pair in zip(starts, ends - starts, strict=True))
+    return np.array([((each >= -1e-9) & (each <= 1.0 + 1e-9)).any() for each in met])
 
 
 def _on_face(

@@ -10,6 +10,7 @@ import pytest
 from camera_poses import level_pose
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from visual_actors import ball
 
 from perception import Camera
 from sim_tests import Scenario
@@ -22,19 +23,18 @@ from sim_tests.world.render._backend_tiny import cut_texture
 
 
 def test_images_with_and_without_culling_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Cameras stand in aisles, in front of a rack, above it, in it, and outside the hall."""
+    """Things hang all over the hall, near and far, and in part beside the images."""
     rng = np.random.default_rng(5)
     camera = Camera.from_fov(160, 120, math.radians(75.0))
-    layout = WarehouseLayout.named("blind_corner")
+    layout = WarehouseLayout.named("open")
+    low, high = (layout.x_min_m, layout.y_min_m, 0.0), (layout.x_max_m, layout.y_max_m, 4.0)
+    shown = set()
     with Warehouse(layout) as hall:
+        for place in rng.uniform(low, high, (60, 3)).tolist():
+            hall.visuals.add_actor(ball(0.4, position_m=tuple(place)))
         renderer = CameraRenderer(hall)
         for number in range(6):
-            place = (
-                rng.uniform(layout.x_min_m - 1.0, layout.x_max_m + 1.0),
-                rng.uniform(layout.y_min_m - 1.0, layout.y_max_m + 1.0),
-                rng.choice([0.3, 1.4, 4.3]),
-            )
-            T = level_pose(place, rng.uniform(-math.pi, math.pi), rng.normal(0.0, 0.25))
+            T = level_pose(tuple(rng.uniform(low, high)), rng.uniform(-math.pi, math.pi), 0.2)
             roi = None if number % 3 else (40.0, 30.0, 110.0, 90.0)
             lean = renderer.render(camera, T, roi)
             with monkeypatch.context() as patch:
@@ -42,7 +42,9 @@ def test_images_with_and_without_culling_are_the_same(monkeypatch: pytest.Monkey
                 full = renderer.render(camera, T, roi)
             np.testing.assert_array_equal(lean.rgb, full.rgb)
             np.testing.assert_array_equal(lean.depth_m, full.depth_m)
-            np.testing.assert_array_equal(lean.body_ids, full.body_ids)
+            np.testing.assert_array_equal(lean.actors, full.actors)
+            shown |= set(np.unique(full.actors).tolist())
+    assert len(shown) > 8
 
 
 CAMERA = Camera.from_fov(768, 480, math.radians(100.0))

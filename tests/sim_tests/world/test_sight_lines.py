@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from camera_poses import level_pose
 from scipy.spatial.transform import Rotation
+from triangle_hits import shares_met
 
 from perception import Camera
 from sim_tests.actors.body import Worker
@@ -34,20 +35,6 @@ def hall() -> Iterator[tuple[Warehouse, list[Worker]]]:
         yield warehouse, workers
 
 
-def meets(eye: np.ndarray, end: np.ndarray, corners: np.ndarray) -> bool:
-    """Return whether a segment meets a triangle (3, 3), by Möller and Trumbore's test."""
-    along, first, second = end - eye, corners[1] - corners[0], corners[2] - corners[0]
-    across = np.cross(along, second)
-    volume = first @ across
-    if volume == 0.0:
-        return False
-    u = (eye - corners[0]) @ across / volume
-    turned = np.cross(eye - corners[0], first)
-    v = along @ turned / volume
-    share = second @ turned / volume
-    return bool(u >= 0.0 and v >= 0.0 and u + v <= 1.0 and 0.0 < share < 1.0)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_a_line_is_blocked_when_it_meets_one_of_the_triangles(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -57,7 +44,8 @@ def test_a_line_is_blocked_when_it_meets_one_of_the_triangles(seed: int) -> None
     eye = 3.0 * rng.normal(size=3)
     ends = rng.normal(size=(60, 3)) - 0.5 * eye
     surface = PlacedSurface(TriangleSet([(0.5 * vertices, rows)]), HOME)
-    expected = [any(meets(eye, end, triangle) for triangle in corners) for end in ends]
+    met = [shares_met(corners, eye, end - eye) for end in ends]
+    expected = [bool(((shares > 0.0) & (shares < 1.0)).any()) for shares in met]
     assert 5 < sum(expected) < 60
     np.testing.assert_array_equal(surface.blocks(eye, ends), expected)
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from triangle_hits import shares_met
 
 from perception.laser import RobotMotion, scan_points
 from sim_tests.actors.robot import Amr, AmrLook
@@ -76,21 +77,6 @@ def test_a_cylinder_is_measured_to_the_error_of_its_facets(place) -> None:
     np.testing.assert_allclose(scan.ranges_m[clear], expected[clear], atol=20.0 * sagitta)
 
 
-def first_hit(origin, direction, corners) -> float:
-    """Return the distance to the first of triangles (T, 3, 3), by Möller and Trumbore's test."""
-    edge, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    across = np.cross(direction, other)
-    volume = (edge * across).sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to = origin - corners[:, 0]
-        u = (to * across).sum(axis=1) / volume
-        turned = np.cross(to, edge)
-        v = turned @ direction / volume
-        distance = (other * turned).sum(axis=1) / volume
-        met = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0)
-    return float(distance[met].min(initial=np.inf))
-
-
 @pytest.mark.parametrize("seed", range(2))
 def test_tilted_sweeps_agree_with_a_test_of_every_ray_and_triangle(seed) -> None:
     rng = np.random.default_rng(seed)
@@ -103,7 +89,8 @@ def test_tilted_sweeps_agree_with_a_test_of_every_ray_and_triangle(seed) -> None
     scan = scanner.scan(motion)
     T = motion.T_odom_base @ scanner.mounting.T_base_scanner
     rays = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad), 0 * scan.angles_rad))
-    expected = [first_hit(T[:3, 3], T[:3, :3] @ ray, corners) for ray in rays]
+    met = [shares_met(corners, T[:3, 3], T[:3, :3] @ ray) for ray in rays]
+    expected = [each[each > 0.0].min(initial=np.inf) for each in met]
     assert 50 < np.isfinite(expected).sum() < 350
     np.testing.assert_allclose(scan.ranges_m, expected, atol=1e-7)
 

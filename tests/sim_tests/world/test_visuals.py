@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from camera_poses import level_pose
-from visual_actors import AWAY_M, CHECKERBOARD, ShapeActor, ball, upright_square
+from visual_actors import CHECKERBOARD, ShapeActor, ball, upright_square
 
 from perception import Camera
 from sim_tests import SimError
@@ -21,20 +21,6 @@ from sim_tests.world.render import Visuals
 
 CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
-
-
-@pytest.fixture
-def add_actor(hall: Warehouse) -> Iterator[Callable[[ShapeActor], int]]:
-    """Return a function that adds an actor to the shared hall until the end of the test."""
-    added: list[ShapeActor] = []
-
-    def add(actor: ShapeActor) -> int:
-        added.append(actor)
-        return hall.visuals.add_actor(actor)
-
-    yield add
-    for actor in added:
-        actor.position_m = np.array(AWAY_M)
 
 
 def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(

@@ -40,8 +40,6 @@ def camera_of(**fields: Any) -> Any:
         (lambda: SensorConfig(full_well_e=0.0), "full_well_e"),
         (lambda: expose(np.zeros((2, 2, 3)), SensorConfig(), np.random.default_rng(0)), "uint8"),
         (lambda: Warehouse(renderer="tinny"), "did you mean 'tiny'"),
-        (lambda: Warehouse(physics_dt_s=0.0), "physics_dt_s"),
-        (lambda: Warehouse(physics_dt_s=math.nan), "physics_dt_s"),
         (
             lambda: hall_of(racks=(RackBox(x_m=5.0, y_m=2.0, length_m=2.0, width_m=1.0),)),
             r"the rack at \(5, 2\) m reaches outside the hall",

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
 
 from awarenav.errors import not_one_of
 from awarenav.files import json_text
-from perception.documents import read_json
 
-from ...world.errors import SimError
-from ._record_file import read_rows, write_records
-from ._summary import BASELINE, summarise_sources
-from ._summary_text import summary_text
-
-_RUN: Final = "run.json"
-# Hearing.answers of sim_tests.actors.behaviour, whose import needs the simulator.
-DEFAULT_ANSWERS: Final = 0.5
-_SETTING: Final = re.compile(r"(?:^|,)\s*answers\s*=\s*([^,\s]+)")
+from ..world.errors import SimError
+from .measures import BASELINE, summarise_sources, summary_text, write_records
+from .runs import answering_note, read_rows, read_run
 
 
 def compare_command(
@@ -47,23 +38,11 @@ def compare_command(
         print(json_text(asdict(summary)).rstrip())
     else:
         asked = any(row.asked for row in summary.policies)
-        print(summary_text(summary, _answering(runs) if asked else ()))
+        answering = dict.fromkeys(answering_note(read_run(path)) for path in runs if asked)
+        print(summary_text(summary, filter(None, answering)))
     if out is not None:
         write_records(out, records)
     return 0
-
-
-def _answering(runs: Sequence[Path]) -> list[str]:
-    """Return each note on the share of people who answer, from the settings of the runs."""
-    notes: dict[str, None] = {}
-    for path in runs:
-        try:
-            note = answering_note(read_json(path / _RUN, SimError))
-        except SimError:  # a file alone, or a folder without settings
-            continue
-        if note:
-            notes[note] = None
-    return list(notes)
 
 
 def _run_names(runs: Sequence[Path]) -> list[str]:
@@ -86,24 +65,3 @@ def _check_baseline(baseline: str, policies: Sequence[str]) -> None:
     if baseline in policies or (baseline == BASELINE and len(policies) >= 1):
         return  # without the default baseline, nothing is compared
     raise SimError(not_one_of("--baseline", baseline, policies))
-
-
-def answering_note(about: Any) -> str:
-    """Return a sentence on the probability with which simulated people answer a request.
-
-    Args:
-        about: content of ``run.json``.
-
-    Returns:
-        The sentence; empty where the settings of the run are not known.
-    """
-    settings = about.get("settings") if isinstance(about, Mapping) else None
-    if not isinstance(settings, Mapping):
-        return ""
-    population = str(settings.get("population") or "")
-    found = _SETTING.search(population)
-    if found is not None:
-        share, source = found[1], f"population {population}"
-    else:
-        share, source = f"{DEFAULT_ANSWERS:g}", "the default, unless a scenario has its own"
-    return f"Simulated people answer a request that they hear with probability {share} ({source})."

@@ -1,30 +1,36 @@
-"""A recording of people as a scenario: resampled paths, a floor that fits, a task for the robot."""
+"""Recordings of people as scenarios: tables read and checked, resampled paths, a robot's task."""
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass, replace
-from io import StringIO
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from awarenav.files import printable, write_text
-from awarenav.tracks import person_id
+from awarenav.files import printable, write_csv, write_text
+from awarenav.tracks import person_id, read_people_table
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number
 from perception.documents import yaml_text
+from tracking.units import FASTEST_MPS
 
-from ...actors.robot import NOVA_CARTER
-from ...world.errors import SimError
-from .._template import ScenarioTemplate
-from ..catalogue import robot_plan
-from ._table import RecordedTable, RecordedTrack, read_table
+from ..actors.robot import NOVA_CARTER
+from ..world.errors import SimError
+from ._template import ScenarioTemplate
+from .catalogue import robot_plan
 
 _Point = tuple[float, float]
 
+_HEADINGS: Final = {"heading_rad": 1.0, "heading_deg": math.pi / 180.0}
+#: A longer time without a row is no gap to fill: the person was away.
+LONGEST_GAP_S: Final = 0.5
+# Nobody is recorded on a larger floor.
+_LARGEST_FLOOR_M: Final = 300.0
+# A row this many usual steps after the one before it ends a gap.
+_GAP_STEPS: Final = 1.5
 # The floor ends this far beyond people, start and goal.
 _MARGIN_M: Final = 3.0
 # Without a task the robot drives along the longer side of the floor, from and to this far outside.
@@ -33,8 +39,52 @@ _SHORTEST_TASK_M: Final = 1.0
 _LONGEST_S: Final = 600.0
 # The robot has at least this time, and as long as the way takes at half its speed.
 _SPARE_S: Final = 10.0
+# Rows a second of the people's table.
+_RATE_HZ: Final = 10.0
 # Samples within half this time of an instant give its position.
 _SMOOTHING_S: Final = 0.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedTrack:
+    """The rows of one person without a long gap.
+
+    Attributes:
+        id: ``id`` in the table.
+        name: the id, followed by the number of the part from the second on.
+        times_s: (N,) increasing, N ≥ 2.
+        positions_odom_m: (N, 2).
+        headings_odom_rad: (N,) unwrapped; None without the column.
+    """
+
+    id: str
+    name: str
+    times_s: FloatArray
+    positions_odom_m: FloatArray
+    headings_odom_rad: FloatArray | None
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTable:
+    """The tracks of a table, and what was done to get them.
+
+    Attributes:
+        tracks: in order of the first rows.
+        filled_gaps: gaps of at most 0.5 s, which are interpolated.
+        long_gaps: longer gaps, at which a person leaves and comes back.
+        lone_rows: rows on their own between two long gaps, left out.
+        ignored: columns that are not read.
+    """
+
+    tracks: tuple[RecordedTrack, ...]
+    filled_gaps: int
+    long_gaps: int
+    lone_rows: int
+    ignored: tuple[str, ...]
+
+    def of(self, name: str) -> tuple[RecordedTrack, ...]:
+        """Return the parts of one id."""
+        return tuple(track for track in self.tracks if track.id == name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +100,6 @@ class RecordingOptions:
         goal_odom_m: goal of the robot; None as for the start.
         from_s: the episode begins at this time of the recording; None at its first row.
         until_s: rows after this time are left out; None leaves none out.
-        rate_hz: rows a second of the people's table.
     """
 
     react: bool = False
@@ -59,7 +108,6 @@ class RecordingOptions:
     goal_odom_m: _Point | None = None
     from_s: float | None = None
     until_s: float | None = None
-    rate_hz: float = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +123,99 @@ class ConvertedRecording:
     scenario: Path
     people: Path
     remarks: tuple[str, ...]
+
+
+def read_table(path: Path | str) -> RecordedTable:
+    """Read a table with the columns ``t_s``, ``id``, ``x_m`` and ``y_m``.
+
+    ``heading_rad`` or ``heading_deg`` is read where it is given; other columns are ignored. The
+    rows of each id are in order of time.
+
+    Raises:
+        SimError: naming file and line, for a missing column, a value that is not a finite number,
+            time that goes back or stands still, an id with one row, a person who moves faster than
+            12 m/s, and a floor of more than 300 m, as units other than metres give.
+    """
+    path = Path(path)
+    rows, ignored, heading = _read_rows(path)
+    tracks: list[RecordedTrack] = []
+    filled = long_gaps = lone = 0
+    for name, numbered in rows.items():
+        lines = np.array([line for line, _ in numbered])
+        values = np.array([row for _, row in numbered])
+        if len(values) < 2:
+            raise SimError(
+                f"{path}, line {lines[0]}: {name!r} has one row; a recorded path needs two or more"
+            )
+        steps_s = np.diff(values[:, 0])
+        gaps = steps_s > LONGEST_GAP_S
+        _check_steps(path, name, lines, values, gaps)
+        usual_s = float(np.median(steps_s))
+        filled += int(((steps_s > _GAP_STEPS * usual_s) & ~gaps).sum())
+        long_gaps += int(gaps.sum())
+        parts = [part for part in np.split(values, np.flatnonzero(gaps) + 1) if len(part) > 1]
+        lone += len(values) - sum(map(len, parts))
+        if not parts:
+            raise SimError(
+                f"{path}: the rows of {name!r} are {usual_s:g} s apart; gaps of at most "
+                f"{LONGEST_GAP_S:g} s can be filled. t_s is in seconds"
+            )
+        for number, part in enumerate(parts):
+            own = name if number == 0 else f"{name} ({number + 1})"
+            turned = None if heading is None else np.unwrap(heading * part[:, 3])
+            tracks.append(RecordedTrack(name, own, part[:, 0], part[:, 1:3], turned))
+    _check_floor(path, tracks)
+    return RecordedTable(tuple(tracks), filled, long_gaps, lone, ignored)
+
+
+def _read_rows(
+    path: Path,
+) -> tuple[dict[str, list[tuple[int, list[float]]]], tuple[str, ...], float | None]:
+    """Return (line, numbers) by id, the columns that are not read, and the unit of headings."""
+    table = read_people_table(path, tuple(_HEADINGS), SimError)
+    heading = next((name for name in _HEADINGS if name in table.rows[0].more), None)
+    rows: dict[str, list[tuple[int, list[float]]]] = {}
+    for row in table.rows:
+        numbers = [row.t_s, row.x_m, row.y_m]
+        if heading is not None:
+            angle = row.more[heading]
+            if angle is None:
+                raise SimError(f"{path}, line {row.line}: {heading} is empty; fill it in all rows")
+            numbers.append(angle)
+        rows.setdefault(row.id, []).append((row.line, numbers))
+    return rows, table.ignored, None if heading is None else _HEADINGS[heading]
+
+
+def _check_steps(
+    path: Path, name: str, lines: FloatArray, values: FloatArray, gaps: NDArray[np.bool_]
+) -> None:
+    """Raise SimError for the first step back in time, or the first one faster than a person."""
+    steps_s = np.diff(values[:, 0])
+    moved_m = np.linalg.norm(np.diff(values[:, 1:3], axis=0), axis=1)
+    for row in np.flatnonzero(steps_s <= 0.0)[:1].tolist():
+        before_s, after_s = values[row : row + 2, 0].tolist()
+        what = (
+            f"has two rows for t_s = {after_s:g} s"
+            if before_s == after_s
+            else f"goes back in time, from {before_s:g} to {after_s:g} s"
+        )
+        raise SimError(f"{path}, line {lines[row + 1]}: {name!r} {what}")
+    for row in np.flatnonzero((moved_m > FASTEST_MPS * steps_s) & ~gaps)[:1].tolist():
+        raise SimError(
+            f"{path}, line {lines[row + 1]}: {name!r} moves {moved_m[row]:.3g} m in "
+            f"{steps_s[row]:.3g} s, faster than {FASTEST_MPS:g} m/s; t_s is in seconds, x_m and "
+            f"y_m are in metres"
+        )
+
+
+def _check_floor(path: Path, tracks: list[RecordedTrack]) -> None:
+    places = np.vstack([track.positions_odom_m for track in tracks])
+    size_m = float(np.ptp(places, axis=0).max())
+    if size_m > _LARGEST_FLOOR_M:
+        raise SimError(
+            f"{path}: the people are spread over {size_m:.4g} m, more than {_LARGEST_FLOOR_M:g} m; "
+            "x_m and y_m are in metres, these look like millimetres"
+        )
 
 
 def scenario_from_recording(
@@ -112,7 +253,7 @@ def scenario_from_recording(
     people = [
         resampled
         for track in tracks
-        if (resampled := _resampled(track, begin_s, end_s, options.rate_hz)) is not None
+        if (resampled := _resampled(track, begin_s, end_s)) is not None
     ]
     if not people:
         raise SimError(
@@ -125,13 +266,12 @@ def scenario_from_recording(
     data = _scenario_data(table, people_file.name, people, (start, goal), options)
     text = yaml_text(data, width=100)
     template = ScenarioTemplate.from_text(text, str(out))
-    write_text(people_file, _people_text(people), SimError)
+    _write_people(people_file, people)
     write_text(out, text, SimError)
     return ConvertedRecording(out, people_file, _remarks(recorded, people, template))
 
 
 def _check_options(options: RecordingOptions) -> None:
-    finite_number("rate_hz", options.rate_hz, SimError, minimum=2.0, maximum=100.0)
     for name in ("from_s", "until_s"):
         value = getattr(options, name)
         if value is not None:
@@ -161,19 +301,17 @@ def _split(
     return robot, people
 
 
-def _resampled(
-    track: RecordedTrack, begin_s: float, end_s: float, rate_hz: float
-) -> RecordedTrack | None:
+def _resampled(track: RecordedTrack, begin_s: float, end_s: float) -> RecordedTrack | None:
     """Return a track at whole multiples of the period after ``begin_s``; None without two rows.
 
     The position at an instant is that of a line fitted to the samples within 0.1 s of it, or lies
     between its neighbours where there are fewer than three.
     """
-    first = math.ceil((max(track.times_s[0], begin_s) - begin_s) * rate_hz - 1e-6)
-    last = math.floor((min(track.times_s[-1], end_s) - begin_s) * rate_hz + 1e-6)
+    first = math.ceil((max(track.times_s[0], begin_s) - begin_s) * _RATE_HZ - 1e-6)
+    last = math.floor((min(track.times_s[-1], end_s) - begin_s) * _RATE_HZ + 1e-6)
     if last <= first:
         return None
-    times = np.arange(first, last + 1) / rate_hz
+    times = np.arange(first, last + 1) / _RATE_HZ
     at_s = np.clip(times + begin_s, track.times_s[0], track.times_s[-1])
     positions = np.column_stack(
         [np.interp(at_s, track.times_s, track.positions_odom_m[:, axis]) for axis in (0, 1)]
@@ -300,18 +438,17 @@ def _scenario_data(
     }
 
 
-def _people_text(people: list[RecordedTrack]) -> str:
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    headed = people[0].headings_odom_rad is not None
-    writer.writerow(["t_s", "id", "x_m", "y_m", *(["heading_rad"] if headed else [])])
+def _write_people(path: Path, people: list[RecordedTrack]) -> None:
+    header, rows = ["t_s", "id", "x_m", "y_m"], []
+    if people[0].headings_odom_rad is not None:
+        header.append("heading_rad")
     for track in people:
         columns = [track.times_s, *track.positions_odom_m.T]
         if track.headings_odom_rad is not None:
             columns.append(track.headings_odom_rad)
         for t_s, *values in np.column_stack(columns).tolist():
-            writer.writerow([f"{t_s:.4f}", track.name, *(f"{value:.4f}" for value in values)])
-    return text.getvalue()
+            rows.append([f"{t_s:.4f}", track.name, *(f"{value:.4f}" for value in values)])
+    write_csv(path, header, rows, SimError)
 
 
 def _remarks(
