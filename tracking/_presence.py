@@ -18,7 +18,7 @@ for a reason that its view does not know.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
@@ -54,9 +54,7 @@ _ROUNDING: Final = 1e-9
 _TURN: Final = 2.0 * math.pi
 
 
-def record_hit(
-    track: Track, distance2: float, log_det: float, shown: Sequence[Track], step: Step
-) -> None:
+def record_hit(track: Track, distance2: float, log_det: float, beside: bool, step: Step) -> None:
     """Take a frame that shows a track; it may confirm it.
 
     By Wald's bound, clutter confirms at most exp(−logit) of the tracks that it starts. It starts
@@ -67,7 +65,7 @@ def record_hit(
         track: corrected with the frame.
         distance2: squared Mahalanobis distance d² of the measurement.
         log_det: ln det S.
-        shown: all tracks that the frame shows; this may be the double of another.
+        beside: whether it may be the double of another that the frame shows.
         step: the frame.
     """
     index, period_s = step.sensor.index, step.clock.period_s
@@ -77,7 +75,7 @@ def record_hit(
         track.presence[index] = _SURE
         return
     gain = 0.5 * (step.sensor.gates.miss_cost - distance2 - log_det) + step.sensor.log_missed
-    if _is_beside(track, shown, step):
+    if beside:
         gain = min(gain, _BESIDE_HIT)
     before = max(
         _left(track, sensor, clock, step.frame.stamp_s, step.config)
@@ -126,7 +124,7 @@ def _loss(track: Track, visible: float, dt_s: float, shown: Sequence[Track], ste
     if track.confirmed:
         counted_s = min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
         return lost + share * counted_s * _SURE / config.max_missed_s
-    miss = _BESIDE_MISS if _is_beside(track, shown, step) else sensor.log_missed
+    miss = _BESIDE_MISS if is_beside(track, shown, step) else sensor.log_missed
     return lost - share * _weight(dt_s, config) * miss
 
 
@@ -150,18 +148,20 @@ def _fading_per_s(track: Track, sensor: Sensor, config: TrackerConfig) -> float:
     return _SURE / max(kept_s, 1e-9)
 
 
-def _is_beside(track: Track, shown: Sequence[Track], step: Step) -> bool:
+def is_beside(track: Track, shown: Iterable[Track], step: Step) -> bool:
     """Return whether a track may be the double of one that is surer.
 
-    It is confirmed, older, or as old and nearer to the sensor.
+    It is as near as the track's place is known, and confirmed, older, or as old and nearer to the
+    sensor.
     """
     x, y = step.frame.origin_odom_m
 
     def age(one: Track) -> tuple[float, float]:
         return one.born_s, math.hypot(one.x - x, one.y - y)
 
+    reach_m = _BESIDE_M + math.sqrt(track.p00 + track.p11)
     return any(
-        (track.x - other.x) ** 2 + (track.y - other.y) ** 2 <= _BESIDE_M**2
+        (track.x - other.x) ** 2 + (track.y - other.y) ** 2 <= reach_m * reach_m
         and (other.confirmed or age(other) < age(track))
         for other in shown
         if other is not track

@@ -10,7 +10,7 @@ from ._frame import Frame
 from ._match import Match, Sight, matched
 from ._noticed import held, remember_looks, remembers
 from ._person import Track
-from ._presence import is_over, record_hit, record_misses
+from ._presence import is_beside, is_over, record_hit, record_misses
 from ._sensors import Sensors
 from ._size import Taken, forget_size, learn_size
 from ._state import State, Step, evidence_interval_s, face_period_s, seen_within
@@ -26,10 +26,14 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     step = Step(frame, sensor, sensors, state, state.at(frame, sensor))
     tracks = _predicted(step)
     match = matched(tracks, step)
-    shown = [track for track, sight in zip(tracks, match.sights, strict=True) if sight is not None]
-    for track, sight in zip(tracks, match.sights, strict=True):
-        if sight is not None:
-            _correct(track, sight, shown, step)
+    found = {
+        track: _correct(track, sight, step)
+        for track, sight in zip(tracks, match.sights, strict=True)
+        if sight is not None
+    }
+    beside = [is_beside(track, found, step) for track in found]
+    for (track, (distance2, log_det)), double in zip(found.items(), beside, strict=True):
+        record_hit(track, distance2, log_det, double, step)
     next_id = _give_birth(tracks, match, step)
     for track, sight in zip(tracks, match.sights, strict=True):
         _see_size(track, sight, step)
@@ -47,7 +51,7 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     kept = [track for track in left if track.id not in gone] if gone else left
     fields = step.state.fields
     if step.view is None:
-        people = [track for track in shown if track.confirmed]
+        people = [track for track in found if track.confirmed]
         field = fields[sensor.index].after(people, frame, sensor)
         fields = (*fields[: sensor.index], field, *fields[sensor.index + 1 :])
     return step.state._replace(tracks=tuple(kept), next_id=next_id, fields=fields)
@@ -68,11 +72,8 @@ def _predicted(step: Step) -> list[Track]:
     return tracks
 
 
-def _correct(track: Track, sight: Sight, shown: list[Track], step: Step) -> None:
-    """Correct a track with its measurement, and count the hit.
-
-    ``shown`` are all tracks that the frame shows.
-    """
+def _correct(track: Track, sight: Sight, step: Step) -> tuple[float, float]:
+    """Correct a track with its measurement; return its d² and ln det S."""
     taken, ray = sight.taken, sight.ray
     expected = track.spread_m2
     dx, dy = taken.x - track.x, taken.y - track.y
@@ -99,7 +100,7 @@ def _correct(track: Track, sight: Sight, shown: list[Track], step: Step) -> None
     if origin is not None:
         taken.pass_lasting(track, noise, origin)
     track.correct(taken.x, taken.y, noise)
-    record_hit(track, *found, shown, step)
+    return found
 
 
 def _give_birth(tracks: list[Track], match: Match, step: Step) -> int:

@@ -98,8 +98,10 @@ def rivals_of(
             if close and costs[i, j] <= costs[i, matches[i]] + CONFIG.ambiguity_margin:
                 found.add((i, owner))
         if owner >= 0:
-            one, own = tracks[i], tracks[owner]
-            close = math.hypot(one.x - own.x, one.y - own.y) <= CONFIG.ambiguity_distance_m
+            first, second = tracks[i], tracks[owner]
+            close = (
+                math.hypot(first.x - second.x, first.y - second.y) <= CONFIG.ambiguity_distance_m
+            )
             if close and costs[i, j] <= costs[owner, j] + CONFIG.ambiguity_margin:
                 found.add((owner, i))
     return found

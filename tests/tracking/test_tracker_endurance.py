@@ -76,7 +76,8 @@ def test_the_tracks_are_valid_after_any_sequence(
                 last_s,
             )
             continue
-        assert tracker.last_stamp_s == (now if last_s is None else max(latest, now))
+        # A frame far ahead is taken back by one that goes on from before it.
+        assert tracker.last_stamp_s in (now, latest if last_s is not None else now)
         latest = tracker.last_stamp_s
         ids = [track.id for track in tracks]
         assert ids == sorted(set(ids))
@@ -88,7 +89,8 @@ def test_the_tracks_are_valid_after_any_sequence(
             np.linalg.cholesky(track.covariance_odom)
             assert track.stamp_s == latest
             assert 0.0 <= track.awareness_lower <= track.awareness <= 1.0
-            assert track.status != "confirmed" or track.time_since_seen_s <= 2.5 * 1.1 + 1e-6
+            # A sensor is silent after 2.5 of its intervals, which are 4 s at most.
+            assert track.status != "confirmed" or track.time_since_seen_s <= 10.0
             if track.status == "tentative":
                 assert track.noticed == track.awareness_lower == 0.0
         lower = {track.id: track.awareness_lower for track in tracks}

@@ -104,12 +104,17 @@ def test_a_second_box_in_a_third_of_the_frames_is_no_second_person() -> None:
     assert (counts[:, 20:] >= 1).all()
 
 
-@pytest.mark.parametrize("shares", [(0.9, 0.9), (0.7, 0.7), (0.7, 0.9)])
+@pytest.mark.parametrize("shares", [(0.95, 0.95), (0.9, 0.8), (0.7, 0.7)])
 def test_two_people_shoulder_to_shoulder_are_two(shares: tuple[float, float]) -> None:
-    """Each frame without one of them makes it more probable that they are one, for a time."""
+    """Whoever is missed often may be a double, but is reported all the same, as unaware."""
     for seed, apart_m in enumerate((0.4, 0.5)):
         scene = pair_scene(seed, shares, apart_m=apart_m)
-        assert (confirmed_counts(follow(scene))[200:] >= 2).all()
+        frames = follow(scene, awareness=(0.95, 0.95))
+        for tracks, seen in zip(frames, scene, strict=True):
+            # Nearer to each other than two bodies they are one.
+            assert len(tracks) >= 2 or not seen[1:] or math.dist(*seen) < 0.3
+        if min(shares) > 0.75:
+            assert (confirmed_counts(frames)[100:] >= 2).all()
 
 
 def test_people_who_cross_stay_two() -> None:
