@@ -43,7 +43,7 @@ _MAX_SHARE_OF_ONE_FRAME: Final = 0.5
 # people who stand as near to another are detected in that share. Both places are as steady, so that
 # only hits and misses tell them apart.
 _BESIDE_M: Final = 0.5
-_DOUBLE_SHARE: Final = 0.33
+_DOUBLE_SHARE: Final = 0.25
 _BESIDE_SHARE: Final = 0.65
 _BESIDE_HIT: Final = math.log(_BESIDE_SHARE / _DOUBLE_SHARE)
 _BESIDE_MISS: Final = math.log((1.0 - _BESIDE_SHARE) / (1.0 - _DOUBLE_SHARE))
