@@ -121,6 +121,8 @@ def _new(
     taken = [sight.given for sight in match.sights if sight is not None]
     used = {id(one) for one in taken}
     left = [one for one in measured if id(one) not in used]
+    if not left:
+        return left
     found: set[int] = set()
     for one in sorted(left, key=lambda one: (math.dist((one.x, one.y), origin_m), one.x, one.y)):
         if not any(is_same_body(one, other) for other in taken):

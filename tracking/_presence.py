@@ -18,6 +18,7 @@ for a reason that its view does not know.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from typing import Final
 
@@ -49,9 +50,9 @@ _BESIDE_HIT: Final = math.log(_BESIDE_SHARE / _DOUBLE_SHARE)
 _BESIDE_MISS: Final = math.log((1.0 - _BESIDE_SHARE) / (1.0 - _DOUBLE_SHARE))
 # A place is empty if nobody is within so many standard deviations of where the person should be.
 _PLACE_SIGMAS: Final = 2.0
+_TURN: Final = 2.0 * math.pi
 # Rounding must not end a track one frame sooner.
 _ROUNDING: Final = 1e-9
-_TURN: Final = 2.0 * math.pi
 
 
 def record_hit(track: Track, distance2: float, log_det: float, beside: bool, step: Step) -> None:
@@ -155,17 +156,16 @@ def is_beside(track: Track, shown: Iterable[Track], step: Step) -> bool:
     sensor.
     """
     x, y = step.frame.origin_odom_m
-
-    def age(one: Track) -> tuple[float, float]:
-        return one.born_s, math.hypot(one.x - x, one.y - y)
-
     reach_m = _BESIDE_M + math.sqrt(track.p00 + track.p11)
-    return any(
-        (track.x - other.x) ** 2 + (track.y - other.y) ** 2 <= reach_m * reach_m
-        and (other.confirmed or age(other) < age(track))
-        for other in shown
-        if other is not track
-    )
+    own = track.born_s, math.hypot(track.x - x, track.y - y)
+    for other in shown:
+        if abs(track.x - other.x) > reach_m or other is track:
+            continue
+        if (track.x - other.x) ** 2 + (track.y - other.y) ** 2 > reach_m * reach_m:
+            continue
+        if other.confirmed or (other.born_s, math.hypot(other.x - x, other.y - y)) < own:
+            return True
+    return False
 
 
 def _left(
@@ -218,12 +218,10 @@ def _visibility(unseen: list[Track], shown: list[Track], step: Step) -> list[flo
                 f"all, got shape {found.shape}: {found!r:.80}"
             )
         in_view = found.tolist()
-    people = [(track.x, track.y) for track in shown]
     camera = (*step.frame.origin_odom_m, float(step.frame.T_odom_camera[2, 3]))
-    radius_m, stature_m = step.config.body_radius_m, step.config.stature_m
+    front = Occluders(shown, camera, step.config.body_radius_m, step.config.stature_m)
     return [
-        visible
-        and visible * unoccluded_share((track.x, track.y), people, camera, radius_m, stature_m)
+        visible and visible * front.unhidden(track)
         for track, visible in zip(unseen, in_view, strict=True)
     ]
 
@@ -266,44 +264,57 @@ def shown_empty(track: Track, state: State, config: TrackerConfig) -> bool:
     )
 
 
-def unoccluded_share(
-    place_m: tuple[float, float],
-    others_m: Sequence[tuple[float, float]],
-    camera_m: tuple[float, float, float],
-    radius_m: float,
-    stature_m: float,
-) -> float:
-    """Return in [0, 1] the share of a body that no nearer body hides.
+class Occluders:
+    """People who hide others: upright cylinders, each of which covers an interval of bearings.
 
-    Bodies are upright cylinders, so each covers an interval of bearings on the floor plane, as far
-    up as the people are tall: a camera high up sees a chest over their heads. The shares that
-    several people hide are summed: two people side by side can hide a third completely.
+    They cover it as far up as people are tall: a camera high up sees a chest over their heads.
 
     Args:
-        place_m: x and y of the body.
-        others_m: of the other people.
-        camera_m: x, y and height of the camera, in the same frame.
+        people: who stand in front.
+        camera_m: x, y and height of the camera, in odom.
         radius_m: > 0, of every body.
         stature_m: of every body.
     """
-    bearing, distance, half = _interval(place_m, camera_m, radius_m)
-    height_m, hidden = camera_m[2], 0.0
-    for other in others_m:
-        front, front_distance, front_half = _interval(other, camera_m, radius_m)
-        if front_distance + radius_m > distance:
-            continue
-        if height_m + (CHEST_M - height_m) * front_distance / distance > stature_m:
-            continue
-        apart = abs((bearing - front + math.pi) % _TURN - math.pi)
-        overlap = min(half, apart + front_half) - max(-half, apart - front_half)
-        hidden += min(max(overlap / (2.0 * half), 0.0), 1.0)
-    return max(1.0 - hidden, 0.0)
 
+    def __init__(
+        self,
+        people: Iterable[Track],
+        camera_m: tuple[float, float, float],
+        radius_m: float,
+        stature_m: float,
+    ) -> None:
+        self._camera_m, self._radius_m, self._stature_m = camera_m, radius_m, stature_m
+        # In the order of their bearings, so that only neighbours are compared.
+        self._people = sorted(self._interval(track.x, track.y) for track in people)
+        self._bearings = [bearing for bearing, _, _ in self._people]
+        self._widest = max((half for _, _, half in self._people), default=0.0)
 
-def _interval(
-    place_m: tuple[float, float], camera_m: tuple[float, float, float], radius_m: float
-) -> tuple[float, float, float]:
-    """Return bearing, distance and angular half-width of a body."""
-    x, y = place_m[0] - camera_m[0], place_m[1] - camera_m[1]
-    distance = math.hypot(x, y)
-    return math.atan2(y, x), distance, math.asin(radius_m / max(distance, radius_m))
+    def _interval(self, x: float, y: float) -> tuple[float, float, float]:
+        """Return bearing, distance and angular half-width of a body."""
+        east, north = x - self._camera_m[0], y - self._camera_m[1]
+        distance, radius_m = math.hypot(east, north), self._radius_m
+        half = math.asin(radius_m / max(distance, radius_m))
+        return math.atan2(north, east), distance, half
+
+    def unhidden(self, track: Track) -> float:
+        """Return in [0, 1] the share of a body that no nearer body hides.
+
+        The shares that several people hide are summed: two people side by side can hide a third
+        completely.
+        """
+        bearing, distance, half = self._interval(track.x, track.y)
+        height_m, hidden = self._camera_m[2], 0.0
+        for turn in (-_TURN, 0.0, _TURN):
+            reach = half + self._widest
+            first = bisect_left(self._bearings, bearing + turn - reach)
+            last = bisect_right(self._bearings, bearing + turn + reach)
+            for front, front_distance, front_half in self._people[first:last]:
+                if front_distance + self._radius_m > distance:
+                    continue
+                seen_at_m = height_m + (CHEST_M - height_m) * front_distance / distance
+                if seen_at_m > self._stature_m:
+                    continue
+                apart = abs(bearing + turn - front)
+                overlap = min(half, apart + front_half) - max(-half, apart - front_half)
+                hidden += min(max(overlap / (2.0 * half), 0.0), 1.0)
+        return max(1.0 - hidden, 0.0)

@@ -31,7 +31,7 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
         for track, sight in zip(tracks, match.sights, strict=True)
         if sight is not None
     }
-    beside = [is_beside(track, found, step) for track in found]
+    beside = [not track.confirmed and is_beside(track, found, step) for track in found]
     for (track, (distance2, log_det)), double in zip(found.items(), beside, strict=True):
         record_hit(track, distance2, log_det, double, step)
     next_id = _give_birth(tracks, match, step)
