@@ -9,7 +9,7 @@ from typing import Final
 
 from perception.arrays import finite_number
 from tracking import PersonTrack
-from tracking.clock import JumpedClock
+from tracking.clock import Entry, Gate
 from tracking.prediction import PredictionModel
 
 from ._asking import Addressed, AddressHistory, Addressing
@@ -26,8 +26,6 @@ from ._speed_basis import SpeedBasis
 _LOG = logging.getLogger("nav_adapter")
 # A stamp that is later than the last one by more than this may be wrong.
 _MAX_PAUSE_S: Final = 10.0
-# When stamps that jump go on for this time, the clock has been set.
-_NEW_CLOCK_AFTER_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,23 +52,6 @@ class _Memory:
     def stamp_s(self) -> float | None:
         """Stamp of the last update."""
         return None if self.constraints is None else self.constraints.stamp_s
-
-
-@dataclass(frozen=True, slots=True)
-class _Clock:
-    """Jumps of the clock.
-
-    Attributes:
-        refused: number of stamps that were refused.
-        restarts: how often the adapter has started anew.
-        jumped: refused stamps that follow one another.
-        before_jump: the memory before a stamp that was far ahead, in case the clock comes back.
-    """
-
-    refused: int = 0
-    restarts: int = 0
-    jumped: JumpedClock | None = None
-    before_jump: _Memory | None = None
 
 
 class NavAdapter:
@@ -127,25 +108,25 @@ class NavAdapter:
         self._governor = SpeedGovernor(policy, robot, self._people)
         self._addressing = Addressing(policy, robot, self._people, self._governor, prediction)
         self._memory = _Memory()
-        self._clock = _Clock()
+        self._gate: Gate[_Memory] = Gate(_MAX_PAUSE_S)
         self._warned_of_drive = False
 
     @property
     def refused_stamps(self) -> int:
         """Number of updates that were refused, or discarded later, for their stamp."""
-        return self._clock.refused
+        return self._gate.late.total() + self._gate.ahead.total()
 
     @property
     def clock_restarts(self) -> int:
         """Number of times the adapter has started anew because the clock had been set."""
-        return self._clock.restarts
+        return self._gate.restarts
 
     def reset(self) -> None:
         """Forget all people and the clock. The limit then rises from its last value."""
         latest = self._memory.constraints
         ceiling_mps = self._memory.ceiling_mps if latest is None else latest.speed_limit_mps
         self._memory = _Memory(ceiling_mps=ceiling_mps)
-        self._clock = replace(self._clock, jumped=None, before_jump=None)
+        self._gate.forget()
 
     def update(
         self,
@@ -180,15 +161,16 @@ class NavAdapter:
         now = finite_number("stamp_s", stamp_s, NavError)
         current = checked_tracks(tracks)
         require_type("robot_state", robot_state, RobotState)
-        before, clock = self._starting_point(now, robot_state)
-        memory = self._following(before, current, robot_state, now, perception_stamp_s)
+        entry = self._entry(now, robot_state)
+        memory = self._following(entry.memory, current, robot_state, now, perception_stamp_s)
         # Nothing can fail from here on. An error above leaves the adapter unchanged.
-        if clock.restarts > self._clock.restarts:
+        if entry.anew:
             last_s = self._memory.stamp_s
             _LOG.warning(
                 "the clock has been set: %.3f s after %.3f s; the adapter starts anew", now, last_s
             )
-        self._memory, self._clock = memory, clock
+        self._memory = memory
+        self._gate.taken(entry)
         self._warn_of_drive(robot_state)
         assert memory.constraints is not None
         return memory.constraints
@@ -217,40 +199,36 @@ class NavAdapter:
             self._memory = memory
         return memory.constraints
 
-    def _starting_point(self, now: float, robot_state: RobotState) -> tuple[_Memory, _Clock]:
-        """Return the memory that an update at ``now`` follows, and the clock after it.
+    def _entry(self, now: float, robot_state: RobotState) -> Entry[_Memory]:
+        """Return how an update at ``now`` is taken, with the memory that it follows.
 
         Raises:
             NavError: for a stamp that jumps. Only then the adapter changes: it counts the stamp.
         """
-        memory, clock = self._memory, self._clock
-        last_s = memory.stamp_s
-        if last_s is None:
-            return memory, clock
-        pause_s = now - last_s
+        memory, leap, latest = self._memory, self._gate.leap, self._memory.constraints
+        if latest is None:
+            return Entry(memory, now)
+        pause_s = now - latest.stamp_s
         if 0.0 <= pause_s <= self._policy.timing.stale_after_s:
             if self._has_caught_up(now):
                 memory = replace(memory, people=self._people.after_silence(memory.people))
-            return memory, replace(clock, jumped=None, before_jump=None)
+            return Entry(memory, now)
         if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
             # A pause of the caller, as it seems.
-            return memory, replace(clock, jumped=None, before_jump=memory)
-        if pause_s < 0.0 and clock.before_jump is not None:
-            earlier_s = clock.before_jump.stamp_s
+            return Entry(memory, now, leaps=True)
+        if pause_s < 0.0 and leap is not None:
+            earlier_s = leap.memory.stamp_s
             if earlier_s is not None and 0.0 <= now - earlier_s <= _MAX_PAUSE_S:
-                return clock.before_jump, _Clock(clock.refused + 1, clock.restarts)
-        jumped = JumpedClock.following(clock.jumped, now, _MAX_PAUSE_S)
-        if jumped.has_lasted(_NEW_CLOCK_AFTER_S):
-            ceiling_mps = robot_state.travel_mps
-            if memory.constraints is not None:
-                ceiling_mps = min(ceiling_mps, memory.constraints.speed_limit_mps)
-            return _Memory(ceiling_mps=ceiling_mps), _Clock(clock.refused, clock.restarts + 1)
-        self._clock = replace(clock, refused=clock.refused + 1, jumped=jumped)
+                return Entry(leap.memory, now, undone=leap)
+        anew = _Memory(ceiling_mps=min(robot_state.travel_mps, latest.speed_limit_mps))
+        entry = self._gate.new_clock(anew, now, ahead=pause_s >= 0.0)
+        if entry is not None:
+            return entry
         if pause_s < 0.0:
-            raise NavError(goes_back(now, last_s))
+            raise NavError(goes_back(now, latest.stamp_s))
         raise NavError(
-            f"stamp_s jumps ahead, got {now:.6f} s after {last_s:.6f} s, with a robot_state of "
-            f"{robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
+            f"stamp_s jumps ahead, got {now:.6f} s after {latest.stamp_s:.6f} s, with a "
+            f"robot_state of {robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
         )
 
     def _has_caught_up(self, now: float) -> bool:
@@ -259,7 +237,7 @@ class NavAdapter:
         The tracker cannot tell the frames since then from late ones. Their people may still have
         the awareness that they had before.
         """
-        jumped, timing = self._clock.jumped, self._policy.timing
+        jumped, timing = self._gate.jumped.get(""), self._policy.timing
         if jumped is None or jumped.stamps < 2:
             return False
         follows = 0.0 <= now - jumped.last_s <= timing.stale_after_s

@@ -76,7 +76,7 @@ class PersonTracker:
         self._config = config
         self._sensors = sensors_of(config, view, sensors)
         self._admission = Admission(config, self._sensors)
-        self._history = History(self._advance, config.max_lag_s, self._nobody(1))
+        self._history = self._empty_history(next_id=1)
 
     @property
     def config(self) -> TrackerConfig:
@@ -109,12 +109,12 @@ class PersonTracker:
     @property
     def refused_late_frames(self) -> int:
         """Number of frames that were refused because they came too late."""
-        return self._admission.late_frames
+        return self._admission.late.total()
 
     @property
     def refused_early_frames(self) -> int:
         """Number of frames that were refused, or taken back, since their stamp jumped ahead."""
-        return self._admission.early_frames
+        return self._admission.ahead.total()
 
     @property
     def refused_frames(self) -> dict[str, int]:
@@ -123,7 +123,8 @@ class PersonTracker:
         If it grows for one sensor only, that sensor's clock differs from the others', or its frames
         come later than ``max_lag_s``.
         """
-        return dict(self._admission.refused)
+        late, ahead = self._admission.late, self._admission.ahead
+        return {each.name: late[each.name] + ahead[each.name] for each in self._sensors.all}
 
     @property
     def clock_restarts(self) -> int:
@@ -132,8 +133,7 @@ class PersonTracker:
 
     def reset(self) -> None:
         """Forget all tracks and the clock. Ids go on, and the counts stay."""
-        start = self._nobody(self._history.latest.next_id)
-        self._history = History(self._advance, self._config.max_lag_s, start)
+        self._history = self._empty_history(self._history.latest.next_id)
         self._admission.forget()
 
     def update(
@@ -181,14 +181,14 @@ class PersonTracker:
         if source.pose_covariance is not None:
             pose = source.pose_covariance if pose is None else pose + source.pose_covariance
         measurements = measurements_of(observations, stamp, T, pose, self._config)
-        entry = self._admission.entry(self._history, stamp, source)
-        if entry.history is None:
-            self.reset()
-            self._admission.restarts += 1
-        history = self._history if entry.history is None else entry.history
+        entry = self._admission.frame_entry(self._history, stamp, source)
+        if entry.anew:
+            history = self._empty_history(entry.memory.latest.next_id)
+        else:
+            history = entry.memory.copy()
         history.insert(Frame(stamp, T, measurements, source.index, view))
         self._history = history
-        self._admission.taken(entry, source)
+        self._admission.taken(entry)
         latest = self._history.latest
         return self._snapshots(stamp if latest.stamp_s is None else latest.stamp_s)
 
@@ -212,10 +212,11 @@ class PersonTracker:
             )
         return self._snapshots(stamp)
 
-    def _nobody(self, next_id: int) -> State:
-        """Return the state before the first frame."""
+    def _empty_history(self, next_id: int) -> History:
+        """Return the history before the first frame."""
         count = len(self._sensors.all)
-        return State((), (FrameClock(),) * count, (Field(),) * count, next_id)
+        nobody = State((), (FrameClock(),) * count, (Field(),) * count, next_id)
+        return History(self._advance, self._config.max_lag_s, nobody)
 
     def _advance(self, state: State, frame: Frame) -> State:
         return advance(state, frame, self._sensors)

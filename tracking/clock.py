@@ -1,9 +1,13 @@
-"""Stamps: the rate of a sequence of frames, and clocks that jump."""
+"""Stamps: the rate of a sequence of frames, clocks that jump, and the gate for stamps."""
 
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from collections import Counter
+from dataclasses import dataclass
+from typing import Final, Generic, NamedTuple, TypeVar
+
+Memory = TypeVar("Memory")
 
 # Share of a new interval in the usual time between frames.
 _PERIOD_GAIN: Final = 0.2
@@ -90,3 +94,77 @@ class JumpedClock(NamedTuple):
     def has_lasted(self, seconds: float) -> bool:
         """Return whether the stamps span this time, and are more than two."""
         return self.stamps >= _LEAST_STAMPS and self.last_s - self.first_s >= seconds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Entry(Generic[Memory]):
+    """The way in which a stamp is admitted.
+
+    Attributes:
+        memory: of the owner, from which it goes on; nobody changes it in place.
+        stamp_s: the stamp.
+        source: of the stamp.
+        leaps: whether it is far ahead, and may be wrong.
+        anew: whether it begins a new clock.
+        undone: the leap that it shows to be wrong.
+    """
+
+    memory: Memory
+    stamp_s: float
+    source: str = ""
+    leaps: bool = False
+    anew: bool = False
+    undone: Entry[Memory] | None = None
+
+
+class Gate(Generic[Memory]):
+    """Judges stamps together with its owner, who says which are late, ahead, or in time.
+
+    The owner asks :meth:`new_clock` about a stamp that is late or ahead. A single one is refused.
+    Those of one source that follow one another for long enough, while none is in time, begin a new
+    clock. For other stamps the owner makes the entry. One may leap ahead, perhaps after a pause; a
+    stamp that goes on from before the leap undoes it. An entry counts once it is :meth:`taken`.
+
+    Args:
+        max_pause_s: longest step between refused stamps that follow one another.
+        new_clock_after_s: time after which they begin a new clock.
+
+    Attributes:
+        late: number of stamps refused as late, by source.
+        ahead: number of stamps refused as ahead, or undone, by source.
+        restarts: how often the clock has been set.
+        jumped: refused stamps that follow one another while none is in time, by source.
+        leap: entry of the latest stamp, if it was a leap.
+    """
+
+    def __init__(self, max_pause_s: float, new_clock_after_s: float = 1.0) -> None:
+        self._max_pause_s, self._new_clock_after_s = max_pause_s, new_clock_after_s
+        self.late: Counter[str] = Counter()
+        self.ahead: Counter[str] = Counter()
+        self.restarts = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all clocks; the counts stay."""
+        self.jumped: dict[str, JumpedClock] = {}
+        self.leap: Entry[Memory] | None = None
+
+    def new_clock(
+        self, memory: Memory, stamp_s: float, *, ahead: bool, source: str = ""
+    ) -> Entry[Memory] | None:
+        """Return the entry of a wrong stamp as a new clock; None if it is refused, and counted."""
+        jumped = JumpedClock.following(self.jumped.get(source), stamp_s, self._max_pause_s)
+        if jumped.has_lasted(self._new_clock_after_s):
+            return Entry(memory, stamp_s, source, anew=True)
+        self.jumped[source] = jumped
+        (self.ahead if ahead else self.late)[source] += 1
+        return None
+
+    def taken(self, entry: Entry[Memory]) -> None:
+        """Remember an entry that has been used. It ends the refused stamps of all sources."""
+        if entry.anew:
+            self.forget()
+            self.restarts += 1
+        self.jumped, self.leap = {}, entry if entry.leaps else None
+        if entry.undone is not None:
+            self.ahead[entry.undone.source] += 1
