@@ -42,14 +42,8 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     if remembers(sensors):
         remember_looks(tracks, match, step)
     record_misses(tracks, step)
-    gone = {
-        track.id
-        for track, sight in zip(tracks, match.sights, strict=True)
-        if sight is None and is_over(track, frame.stamp_s, step.state.clocks, sensors)
-    }
-    left = [track for track in tracks if track.id not in gone]
-    gone = doubles(left, step)
-    kept = [track for track in left if track.id not in gone] if gone else left
+    gone = doubles(tracks, step)
+    kept = [track for track in tracks if track.id not in gone] if gone else tracks
     fields = step.state.fields
     if step.view is None:
         people = [track for track in found if track.confirmed]
@@ -63,10 +57,11 @@ def _predicted(step: Step) -> list[Track]:
     state, stamp, previous = step.state, step.frame.stamp_s, step.earlier.stamp_s
     if previous is None or stamp <= previous:
         return [track.copied() for track in state.tracks]
-    tracks, clocks = [], step.clocks_before
+    tracks, clocks, sensors = [], step.clocks_before, step.sensors
     for track in state.tracks:
         # A track that the last frame has left alive gets a chance, however long the interval.
-        if not is_over(track, stamp, clocks, step.sensors):
+        over = is_over(track, previous, step.earlier.clocks, sensors)
+        if not over and not is_over(track, stamp, clocks, sensors):
             moved = track.copied()
             moved.predict(previous, stamp, step.config)
             tracks.append(moved)
