@@ -33,9 +33,21 @@ class Sight:
         ambiguous: whether the match may be another person's, as a rival is about as likely.
         jumped: whether the place is far from where the person was expected.
         held: whether a sensor without faces had seen the person without a gap before.
+        stands_for_s: time that the frame stands for: that since the frame before, also in the
+            second of two frames with one stamp, if the first did not show the person.
     """
 
-    __slots__ = ("ambiguous", "by_ray", "cost", "evidence", "held", "jumped", "ray", "taken")
+    __slots__ = (
+        "ambiguous",
+        "by_ray",
+        "cost",
+        "evidence",
+        "held",
+        "jumped",
+        "ray",
+        "stands_for_s",
+        "taken",
+    )
 
     def __init__(
         self, taken: Taken, cost: float, ray: Ray | None = None, *, by_ray: bool = False
@@ -44,6 +56,7 @@ class Sight:
         self.evidence = taken.given.evidence
         self.ambiguous = self.jumped = False
         self.held = True
+        self.stands_for_s = 0.0
 
     @property
     def given(self) -> Measurement:

@@ -134,7 +134,8 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
         # A look after a pause stands for one frame, not for the pause. Of two cameras, it stands
         # for the time since the last look of either.
         follows = since_s <= config.max_evidence_gap_s
-        track.looked_s += look * min(dt_s, since_s if follows else period_s)
+        stands_for_s = min(sight.stands_for_s, config.max_evidence_gap_s)
+        track.looked_s += look * min(stands_for_s, since_s if follows else period_s)
     track.look_s = stamp
     track.look_velocity_mps = (track.vx, track.vy)
     track.look_speed_mps, track.look_standing = track.speed_mps, track.standing

@@ -40,6 +40,7 @@ class Track:
         seen_s: of each sensor, stamp of the latest frame that showed the person; −∞ for none.
         presence: of each sensor, log-odds that the person is there (``_presence``); −∞ until it has
             seen them.
+        lost: what the latest frame without the person took from the presence of its sensor.
         passed_s: of each sensor, stamp of the latest frame if it has shown the person's place empty
             (:class:`~tracking.RangedView`); −∞ if it has not.
         belief: of awareness.
@@ -71,6 +72,7 @@ class Track:
         self.seen_s[frame.sensor] = frame.stamp_s
         self.presence = [-math.inf] * sensors
         self.presence[frame.sensor] = 0.0
+        self.lost = 0.0
         self.passed_s = [-math.inf] * sensors
         self.belief: AwarenessBelief = prior(config.awareness)
         self.face_s = -math.inf

@@ -55,7 +55,22 @@ _TURN: Final = 2.0 * math.pi
 _ROUNDING: Final = 1e-9
 
 
-def record_hit(track: Track, distance2: float, log_det: float, beside: bool, step: Step) -> None:
+def hit_evidence(distance2: float, log_det: float, beside: bool, step: Step) -> float:
+    """Return ln(P_D N(z; ẑ, S) / β) of a detection: of the track, or clutter of density β.
+
+    β follows from ``miss_cost``.
+
+    Args:
+        distance2: squared Mahalanobis distance d² of the measurement.
+        log_det: ln det S.
+        beside: whether it may be the double of another person's.
+        step: the frame.
+    """
+    gain = 0.5 * (step.sensor.gates.miss_cost - distance2 - log_det) + step.sensor.log_missed
+    return min(gain, _BESIDE_HIT) if beside else gain
+
+
+def record_hit(track: Track, gain: float, stands_for_s: float, step: Step) -> None:
     """Take a frame that shows a track; it may confirm it.
 
     By Wald's bound, clutter confirms at most exp(−logit) of the tracks that it starts. It starts
@@ -64,25 +79,24 @@ def record_hit(track: Track, distance2: float, log_det: float, beside: bool, ste
 
     Args:
         track: corrected with the frame.
-        distance2: squared Mahalanobis distance d² of the measurement.
-        log_det: ln det S.
-        beside: whether it may be the double of another that the frame shows.
+        gain: the evidence of its detection.
+        stands_for_s: time that the frame stands for.
         step: the frame.
     """
-    index, period_s = step.sensor.index, step.clock.period_s
-    track.seen_s[index] = track.last_seen_s = step.frame.stamp_s
+    index, stamp, period_s = step.sensor.index, step.frame.stamp_s, step.clock.period_s
+    before = max(
+        _left(track, sensor, clock, stamp, step.config)
+        for sensor, clock in zip(step.sensors.all, step.clocks_before, strict=True)
+    )
+    if step.is_second and track.seen_s[index] < stamp:
+        # The first of two frames with this stamp did not show the person, but the second does.
+        before += track.lost
+    track.seen_s[index] = track.last_seen_s = stamp
     track.standing = track.stands(step.config.standing_speed_mps)
     if track.confirmed:
         track.presence[index] = _SURE
         return
-    gain = 0.5 * (step.sensor.gates.miss_cost - distance2 - log_det) + step.sensor.log_missed
-    if beside:
-        gain = min(gain, _BESIDE_HIT)
-    before = max(
-        _left(track, sensor, clock, step.frame.stamp_s, step.config)
-        for sensor, clock in zip(step.sensors.all, step.clocks_before, strict=True)
-    )
-    track.presence[index] = before + max(_weight(step.dt_s, step.config) * gain, 0.0)
+    track.presence[index] = before + max(_weight(stands_for_s, step.config) * gain, 0.0)
     if period_s < math.inf:
         needed = step.config.confirm_logit - math.log(period_s)
         if track.presence[index] >= needed:
@@ -110,7 +124,8 @@ def record_misses(tracks: list[Track], step: Step) -> None:
         visibility = _visibility(unseen, shown, step)
         for track, visible in zip(unseen, visibility, strict=True):
             if track.presence[index] > -math.inf:
-                track.presence[index] -= _loss(track, visible, dt_s, shown, step)
+                track.lost = _loss(track, visible, dt_s, shown, step)
+                track.presence[index] -= track.lost
     _record_empty_places([track for track in unseen if track.confirmed], step)
 
 

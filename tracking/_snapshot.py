@@ -110,17 +110,18 @@ def snapshots(state: State, stamp_s: float, sensors: Sensors) -> tuple[PersonTra
 
     The time in between counts as unseen. It holds no frame that could have missed a person.
     """
-    now_s, people = state.stamp_s, state.tracks
+    now_s = state.stamp_s
     if now_s is None:
         return ()
+    # A track that has ended stays in the state for a second frame with the same stamp.
+    people = [track for track in state.tracks if not is_over(track, now_s, state.clocks, sensors)]
+    if stamp_s > now_s:
+        people = [track for track in people if not is_over(track, stamp_s, state.clocks, sensors)]
     statuses = [_status(track, state, now_s) for track in people]
     if stamp_s > now_s:
-        kept = [not is_over(track, stamp_s, state.clocks, sensors) for track in people]
-        statuses = [status for status, keep in zip(statuses, kept, strict=True) if keep]
-        moved = [track.copied() for track, keep in zip(people, kept, strict=True) if keep]
-        for track in moved:
+        people = [track.copied() for track in people]
+        for track in people:
             track.predict(now_s, stamp_s, sensors.config)
-        people = tuple(moved)
     if not people:
         return ()
     # The snapshots share these arrays.

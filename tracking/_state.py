@@ -196,6 +196,11 @@ class Step(NamedTuple):
         return self.earlier.clocks[self.sensor.index].dt_s(self.frame.stamp_s)
 
     @property
+    def is_second(self) -> bool:
+        """Whether the sensor has sent a frame with the same stamp before."""
+        return self.earlier.clocks[self.sensor.index].stamp_s == self.frame.stamp_s
+
+    @property
     def view(self) -> View | None:
         """Where people can be seen in this frame; None if unknown."""
         return self.sensor.view if self.frame.view is None else self.frame.view

@@ -10,7 +10,7 @@ from ._frame import Frame
 from ._match import Match, Sight, matched
 from ._noticed import held, remember_looks, remembers
 from ._person import Track
-from ._presence import is_beside, is_over, record_hit, record_misses
+from ._presence import hit_evidence, is_beside, is_over, record_hit, record_misses
 from ._sensors import Sensors
 from ._size import Taken, forget_size, learn_size
 from ._state import State, Step, evidence_interval_s, face_period_s, seen_within
@@ -27,13 +27,14 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     tracks = _predicted(step)
     match = matched(tracks, step)
     found = {
-        track: _correct(track, sight, step)
+        track: (sight, *_correct(track, sight, step))
         for track, sight in zip(tracks, match.sights, strict=True)
         if sight is not None
     }
     beside = [not track.confirmed and is_beside(track, found, step) for track in found]
-    for (track, (distance2, log_det)), double in zip(found.items(), beside, strict=True):
-        record_hit(track, distance2, log_det, double, step)
+    for (track, (shown, distance2, log_det)), double in zip(found.items(), beside, strict=True):
+        gain = hit_evidence(distance2, log_det, double, step)
+        record_hit(track, gain, shown.stands_for_s, step)
     next_id = _give_birth(tracks, match, step)
     for track, sight in zip(tracks, match.sights, strict=True):
         _see_size(track, sight, step)
@@ -41,14 +42,8 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     if remembers(sensors):
         remember_looks(tracks, match, step)
     record_misses(tracks, step)
-    gone = {
-        track.id
-        for track, sight in zip(tracks, match.sights, strict=True)
-        if sight is None and is_over(track, frame.stamp_s, step.state.clocks, sensors)
-    }
-    left = [track for track in tracks if track.id not in gone]
-    gone = doubles(left, step)
-    kept = [track for track in left if track.id not in gone] if gone else left
+    gone = doubles(tracks, step)
+    kept = [track for track in tracks if track.id not in gone] if gone else tracks
     fields = step.state.fields
     if step.view is None:
         people = [track for track in found if track.confirmed]
@@ -62,10 +57,11 @@ def _predicted(step: Step) -> list[Track]:
     state, stamp, previous = step.state, step.frame.stamp_s, step.earlier.stamp_s
     if previous is None or stamp <= previous:
         return [track.copied() for track in state.tracks]
-    tracks, clocks = [], step.clocks_before
+    tracks, clocks, sensors = [], step.clocks_before, step.sensors
     for track in state.tracks:
         # A track that the last frame has left alive gets a chance, however long the interval.
-        if not is_over(track, stamp, clocks, step.sensors):
+        over = is_over(track, previous, step.earlier.clocks, sensors)
+        if not over and not is_over(track, stamp, clocks, sensors):
             moved = track.copied()
             moved.predict(previous, stamp, step.config)
             tracks.append(moved)
@@ -78,6 +74,9 @@ def _correct(track: Track, sight: Sight, step: Step) -> tuple[float, float]:
     expected = track.spread_m2
     dx, dy = taken.x - track.x, taken.y - track.y
     origin, has_looked = step.state.origin_m, track.looked_s > 0.0
+    sight.stands_for_s = step.dt_s
+    if step.is_second and track.seen_s[step.sensor.index] < step.frame.stamp_s:
+        sight.stands_for_s = step.clock.interval_s
     if has_looked:
         sight.held = held(track, step.frame.stamp_s, step.state.clocks, step.sensors)
     if origin is not None:

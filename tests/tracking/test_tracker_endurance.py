@@ -14,7 +14,7 @@ from fusion_scenes import LASER, laser_at, seen_by_laser, sensors
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
-from tracking_scenes import CAMERA, as_bytes, camera_at, observe
+from tracking_scenes import CAMERA, as_bytes, camera_at, nearest, observe
 
 from perception import Camera
 from tracking import (
@@ -124,6 +124,30 @@ def test_the_order_of_the_measurements_in_a_frame_does_not_matter(seed: int) -> 
             twin = other[track.position_odom_m.tobytes()]
             assert names.setdefault(track.id, twin.id) == twin.id
             assert as_bytes([track])[0][1:] == as_bytes([twin])[0][1:]
+
+
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_a_frame_may_come_in_two_parts(seed: int) -> None:
+    """Two drivers may each send the people of one half of the image, with the same stamp."""
+    rng = np.random.default_rng(seed)
+    whole, parts = PersonTracker(), PersonTracker()
+    people = np.array([[3.0, -2.0], [3.0, 2.0], [5.0, 0.0], [7.0, -2.0], [7.0, 2.0]])
+    for step in range(30):
+        now = 0.05 * step
+        places = people + rng.normal(0.0, 0.1, people.shape)
+        frame = [observe(place, now, awareness=0.8) for place in places if rng.uniform() < 0.9]
+        one = whole.update(frame, now, CAMERA)
+        half = int(rng.integers(0, len(frame) + 1))
+        parts.update(frame[:half], now, CAMERA)
+        other = parts.update(frame[half:], now, CAMERA)
+        assert len(other) == len(one)
+        for track in one:
+            twin = nearest(other, track.position_odom_m)
+            assert twin.status == track.status
+            for name in ("position_odom_m", "velocity_odom_mps", "covariance_odom"):
+                np.testing.assert_allclose(getattr(twin, name), getattr(track, name), atol=1e-9)
+            assert twin.awareness == pytest.approx(track.awareness, abs=0.02)
 
 
 @pytest.mark.parametrize("frames", [1_000, pytest.param(100_000, marks=pytest.mark.full)])
