@@ -35,6 +35,7 @@ class BridgeClock(Gate[None]):
 
     def read(self, now_s: float) -> float:
         """Return the time at a reading, or the reading itself after a long step back."""
+        # Written so that NaN is no time.
         if not self._last_s - now_s <= CLOCK_TOLERANCE_S:
             return now_s
         self._last_s = max(self._last_s, now_s)
