@@ -157,7 +157,7 @@ def doubles(tracks: list[Track], step: Step) -> set[int]:
     return {
         far.id
         for far in assumed
-        if any(_on_one_ray(far, near, frame.origin_odom_m) for near in measured)
+        if any(_on_one_ray(far, near, step.place_m[:2]) for near in measured)
     }
 
 

@@ -102,11 +102,6 @@ class Frame(NamedTuple):
     sensor: int = 0
     view: View | None = None
 
-    @property
-    def origin_odom_m(self) -> tuple[float, float]:
-        """The place of the sensor on the floor plane."""
-        return float(self.T_odom_camera[0, 3]), float(self.T_odom_camera[1, 3])
-
 
 def measurements_of(
     observations: Iterable[PersonObservation],

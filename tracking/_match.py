@@ -120,7 +120,7 @@ def matched(tracks: list[Track], step: Step) -> Match:
                 if track.confirmed and match.sights[row] is None
             ]
             offer(left, [column for column, one in enumerate(measured) if one.weak])
-    match.new = _new([measured[column] for column in strong], match, step.frame.origin_odom_m)
+    match.new = _new([measured[column] for column in strong], match, step.place_m[:2])
     return match
 
 

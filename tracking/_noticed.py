@@ -215,7 +215,7 @@ def _is_interrupted(
 
 def _towards(track: Track, step: Step) -> tuple[float, float]:
     """Return the unit vector from a person to the robot."""
-    x, y = step.frame.origin_odom_m
+    x, y, _ = step.place_m
     x, y = x - track.x, y - track.y
     distance = max(math.hypot(x, y), 1e-9)
     return x / distance, y / distance

@@ -84,18 +84,19 @@ def record_hit(track: Track, gain: float, stands_for_s: float, step: Step) -> No
         step: the frame.
     """
     index, stamp, period_s = step.sensor.index, step.frame.stamp_s, step.clock.period_s
-    before = max(
-        _left(track, sensor, clock, stamp, step.config)
-        for sensor, clock in zip(step.sensors.all, step.clocks_before, strict=True)
-    )
-    if step.is_second and track.seen_s[index] < stamp:
-        # The first of two frames with this stamp did not show the person, but the second does.
-        before += track.lost
+    second = step.is_second and track.seen_s[index] < stamp
     track.seen_s[index] = track.last_seen_s = stamp
     track.standing = track.stands(step.config.standing_speed_mps)
     if track.confirmed:
         track.presence[index] = _SURE
         return
+    before = max(
+        _left(track, sensor, clock, stamp, step.config)
+        for sensor, clock in zip(step.sensors.all, step.clocks_before, strict=True)
+    )
+    if second:
+        # The first of two frames with this stamp did not show the person, but the second does.
+        before += track.lost
     track.presence[index] = before + max(_weight(stands_for_s, step.config) * gain, 0.0)
     if period_s < math.inf:
         needed = step.config.confirm_logit - math.log(period_s)
@@ -170,7 +171,7 @@ def is_beside(track: Track, shown: Iterable[Track], step: Step) -> bool:
     It is as near as the track's place is known, and confirmed, older, or as old and nearer to the
     sensor.
     """
-    x, y = step.frame.origin_odom_m
+    x, y, _ = step.place_m
     reach_m = _BESIDE_M + math.sqrt(track.p00 + track.p11)
     own = track.born_s, math.hypot(track.x - x, track.y - y)
     for other in shown:
@@ -220,10 +221,7 @@ def _visibility(unseen: list[Track], shown: list[Track], step: Step) -> list[flo
     """
     if step.view is None:
         field = step.state.fields[step.sensor.index]
-        in_view = [
-            field.sees(track, step.frame, step.sensor) if track.confirmed else 1.0
-            for track in unseen
-        ]
+        in_view = [field.sees(track, step) if track.confirmed else 1.0 for track in unseen]
     else:
         places = np.array([(track.x, track.y) for track in unseen])
         found = np.asarray(step.view.visibility(places, step.frame.T_odom_camera), np.float64)
@@ -233,8 +231,7 @@ def _visibility(unseen: list[Track], shown: list[Track], step: Step) -> list[flo
                 f"all, got shape {found.shape}: {found!r:.80}"
             )
         in_view = found.tolist()
-    camera = (*step.frame.origin_odom_m, float(step.frame.T_odom_camera[2, 3]))
-    front = Occluders(shown, camera, step.config.body_radius_m, step.config.stature_m)
+    front = Occluders(shown, step.place_m, step.config.body_radius_m, step.config.stature_m)
     return [
         visible and visible * front.unhidden(track)
         for track, visible in zip(unseen, in_view, strict=True)

@@ -36,32 +36,37 @@ class Field(NamedTuple):
     widest_rad: float = 0.0
     farthest_m: float = 0.0
 
-    def after(self, tracks: Iterable[Track], frame: Frame, sensor: Sensor) -> Field:
+    def after(self, tracks: Iterable[Track], step: Step) -> Field:
         """Return the field after a frame that shows these people."""
         widest_rad, farthest_m = self
+        axis = _axis(step)
         for track in tracks:
-            angle_rad, distance_m = _direction(track, frame, sensor)
+            angle_rad, distance_m = _direction(track, step.place_m, axis)
             widest_rad, farthest_m = max(widest_rad, angle_rad), max(farthest_m, distance_m)
         return Field(widest_rad, farthest_m)
 
-    def sees(self, track: Track, frame: Frame, sensor: Sensor) -> float:
+    def sees(self, track: Track, step: Step) -> float:
         """Return 1 for a person where others have been seen, and 0 elsewhere."""
-        angle_rad, distance_m = _direction(track, frame, sensor)
+        angle_rad, distance_m = _direction(track, step.place_m, _axis(step))
         inside = angle_rad <= self.widest_rad
         return 1.0 if inside and _NEAR_M <= distance_m <= self.farthest_m else 0.0
 
 
-def _direction(track: Track, frame: Frame, sensor: Sensor) -> tuple[float, float]:
-    """Return the angle between a person's chest and the axis, and the distance.
+def _axis(step: Step) -> list[float]:
+    """Return the unit vector of a sensor's axis in odom: z of a camera, x of a scanner."""
+    column = 0 if step.sensor.settings.measures_range else 2
+    axis: list[float] = step.frame.T_odom_camera[:3, column].tolist()
+    return axis
 
-    The axis of a camera is z, that of a scanner x.
-    """
-    axis = 0 if sensor.settings.measures_range else 2
-    T = frame.T_odom_camera[:3].tolist()
-    x, y, z = track.x - T[0][3], track.y - T[1][3], CHEST_M - T[2][3]
+
+def _direction(
+    track: Track, place_m: tuple[float, float, float], axis: list[float]
+) -> tuple[float, float]:
+    """Return the angle between a person's chest and the axis of a sensor, and the distance."""
+    x, y, z = track.x - place_m[0], track.y - place_m[1], CHEST_M - place_m[2]
     distance_m = math.sqrt(x * x + y * y + z * z)
-    along_m = x * T[0][axis] + y * T[1][axis] + z * T[2][axis]
-    return math.acos(min(max(along_m / max(distance_m, 1e-9), -1.0), 1.0)), distance_m
+    cosine = (x * axis[0] + y * axis[1] + z * axis[2]) / max(distance_m, 1e-9)
+    return math.acos(min(max(cosine, -1.0), 1.0)), distance_m
 
 
 class State(NamedTuple):
@@ -87,17 +92,16 @@ class State(NamedTuple):
     origin_m: tuple[float, float] | None = None
     origin_velocity_mps: tuple[float, float] = (0.0, 0.0)
 
-    def at(self, frame: Frame, sensor: Sensor) -> State:
+    def at(self, frame: Frame, sensor: Sensor, place_m: tuple[float, float, float]) -> State:
         """Return the state with the clocks, and the place of the camera, after a frame."""
         index, stamp = sensor.index, frame.stamp_s
         before, clocks = self.clocks[index], self.clocks
         origin, velocity = self.origin_m, self.origin_velocity_mps
         if not sensor.settings.measures_range:
-            x_m, y_m = frame.origin_odom_m
-            if origin is not None and before.dt_s(stamp) >= _LEAST_STEP_S:
-                dt_s = before.dt_s(stamp)
-                velocity = ((x_m - origin[0]) / dt_s, (y_m - origin[1]) / dt_s)
-            origin = (x_m, y_m)
+            dt_s = before.dt_s(stamp)
+            if origin is not None and dt_s >= _LEAST_STEP_S:
+                velocity = ((place_m[0] - origin[0]) / dt_s, (place_m[1] - origin[1]) / dt_s)
+            origin = place_m[:2]
         return State(
             self.tracks,
             (*clocks[:index], before.after(stamp), *clocks[index + 1 :]),
@@ -162,45 +166,51 @@ class Step(NamedTuple):
         frame: the frame.
         sensor: that took it.
         sensors: all sensors.
+        config: the tracker's settings.
         earlier: the state before the frame.
         state: with the clocks after it.
+        clock: of the sensor, this frame included.
+        clocks_before: the clocks before the frame, but with the sensor's usual time between frames
+            after it.
+        dt_s: time since the frame before of the same sensor.
+        place_m: x, y, z of the sensor in odom.
+        view: where people can be seen in this frame; None if unknown.
     """
 
     frame: Frame
     sensor: Sensor
     sensors: Sensors
+    config: TrackerConfig
     earlier: State
     state: State
+    clock: FrameClock
+    clocks_before: tuple[FrameClock, ...]
+    dt_s: float
+    place_m: tuple[float, float, float]
+    view: View | None
 
-    @property
-    def config(self) -> TrackerConfig:
-        """The tracker's settings."""
-        return self.sensors.config
-
-    @property
-    def clock(self) -> FrameClock:
-        """The clock of the sensor, this frame included."""
-        return self.state.clocks[self.sensor.index]
-
-    @property
-    def clocks_before(self) -> list[FrameClock]:
-        """The clocks before the frame, but with the usual time between frames after it."""
-        clocks = list(self.earlier.clocks)
-        own = clocks[self.sensor.index]
-        clocks[self.sensor.index] = own._replace(period_s=self.clock.period_s)
-        return clocks
-
-    @property
-    def dt_s(self) -> float:
-        """The time since the frame before of the same sensor."""
-        return self.earlier.clocks[self.sensor.index].dt_s(self.frame.stamp_s)
+    @staticmethod
+    def of(frame: Frame, earlier: State, sensors: Sensors) -> Step:
+        """Return the step from a state by one more frame."""
+        sensor, clocks, index = sensors.all[frame.sensor], earlier.clocks, frame.sensor
+        x, y, z = frame.T_odom_camera[:3, 3].tolist()
+        state = earlier.at(frame, sensor, (x, y, z))
+        own = clocks[index]._replace(period_s=state.clocks[index].period_s)
+        return Step(
+            frame,
+            sensor,
+            sensors,
+            sensors.config,
+            earlier,
+            state,
+            state.clocks[index],
+            (*clocks[:index], own, *clocks[index + 1 :]),
+            clocks[index].dt_s(frame.stamp_s),
+            (x, y, z),
+            sensor.view if frame.view is None else frame.view,
+        )
 
     @property
     def is_second(self) -> bool:
         """Whether the sensor has sent a frame with the same stamp before."""
         return self.earlier.clocks[self.sensor.index].stamp_s == self.frame.stamp_s
-
-    @property
-    def view(self) -> View | None:
-        """Where people can be seen in this frame; None if unknown."""
-        return self.sensor.view if self.frame.view is None else self.frame.view

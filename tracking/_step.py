@@ -22,8 +22,7 @@ _JUMP_CHI2: Final = 13.8
 
 def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     """Return the state after one more frame, whose stamp is not before the state's."""
-    sensor = sensors.all[frame.sensor]
-    step = Step(frame, sensor, sensors, state, state.at(frame, sensor))
+    step = Step.of(frame, state, sensors)
     tracks = _predicted(step)
     match = matched(tracks, step)
     found = {
@@ -47,8 +46,9 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     fields = step.state.fields
     if step.view is None:
         people = [track for track in found if track.confirmed]
-        field = fields[sensor.index].after(people, frame, sensor)
-        fields = (*fields[: sensor.index], field, *fields[sensor.index + 1 :])
+        index = frame.sensor
+        field = fields[index].after(people, step)
+        fields = (*fields[:index], field, *fields[index + 1 :])
     return step.state._replace(tracks=tuple(kept), next_id=next_id, fields=fields)
 
 

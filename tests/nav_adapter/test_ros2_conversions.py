@@ -331,7 +331,7 @@ def test_no_point_is_faster_than_the_limit_under_an_obedient_controller(
     message = speed_limit(constraints, robot.max_speed_mps, percentage=percentage)
     sent_mps = message.speed_limit * (robot.max_speed_mps / 100.0 if percentage else 1.0)
     fastest = obeying(sent_mps, robot, np.array([x, y]), yaw_rate)
-    assert sent_mps == SLOWEST_MPS or fastest <= limit + 1e-9
+    assert sent_mps <= SLOWEST_MPS + 1e-12 or fastest <= limit + 1e-9
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def scene(seed: int) -> tuple[list[Track], Step]:
     for track in tracks:
         track.confirmed = bool(rng.random() < 0.6)
     state = State(tuple(tracks), (FrameClock(),), (Field(),))
-    return tracks, Step(frame, SENSORS.all[0], SENSORS, state, state)
+    return tracks, Step.of(frame, state, SENSORS)
 
 
 def costs_of(tracks: list[Track], measured: list[Measurement]) -> FloatArray:
@@ -120,7 +120,7 @@ def test_a_rival_at_the_very_edge_counts(count: int, margin: float, distance_m: 
     frame = Frame(1.0, np.eye(4), places[: 3 - count])
     tracks = [Track(row + 1, places[row], frame, 1, config) for row in range(count)]
     state = State(tuple(tracks), (FrameClock(),), (Field(),))
-    found = matched(tracks, Step(frame, sensors.all[0], sensors, state, state))
+    found = matched(tracks, Step.of(frame, state, sensors))
     (sight,) = [each for each in found.sights if each is not None]
     assert sight.given is places[0]
     assert sight.ambiguous == ((margin, distance_m) == (0.25, 0.5))

@@ -104,7 +104,7 @@ def test_the_csv_file_has_every_track_at_every_frame(estimates, tmp_path):
 
 def test_settings_and_camera_come_from_files(tmp_path, capsys):
     path = tmp_path / "estimates.jsonl"
-    write_records(path, lines([standing(4.0, 0.0)], frames=60, hidden=lambda k, who: k > 10))
+    write_records(path, lines([standing(4.0, 2.0)], frames=90, hidden=lambda k, who: k > 10))
 
     def died_s(*arguments):
         assert run(path, "--out", "none", *arguments) == 0
@@ -112,11 +112,12 @@ def test_settings_and_camera_come_from_files(tmp_path, capsys):
 
     unknown_view_s = died_s()
     config = tmp_path / "tracker.yaml"
-    TrackerConfig(max_coast_s=1.5).to_yaml(config)
-    assert died_s("--config", config) < unknown_view_s - 1.0
-    Camera.from_fov(640, 480, 1.2).to_yaml(tmp_path / "elsewhere.yaml")
+    TrackerConfig(max_missed_s=3.0).to_yaml(config)
+    assert died_s("--config", config) > unknown_view_s + 1.0
+    # A camera whose image ends before the person's place.
+    Camera.from_fov(640, 480, 0.4).to_yaml(tmp_path / "elsewhere.yaml")
     known_view_s = died_s("--camera", tmp_path / "elsewhere.yaml")
-    assert known_view_s < unknown_view_s - 1.0
+    assert known_view_s > unknown_view_s + 1.0
     (tmp_path / "elsewhere.yaml").rename(tmp_path / "camera.yaml")
     assert died_s() == known_view_s
 

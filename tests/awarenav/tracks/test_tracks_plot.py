@@ -122,7 +122,7 @@ def test_a_metre_is_as_long_along_x_as_along_y_and_every_track_is_inside(tmp_pat
 
 
 def test_tracks_without_a_panel_are_counted_in_a_note(tmp_path):
-    records = lines(crowd(9), frames=20, hidden=lambda k, who: who == 8 and k > 1)
+    records = lines(crowd(9), frames=20, hidden=lambda k, who: who == 8 and k > 0)
     run = track_recording(recorded(tmp_path, records))
     shown, others = shown_tracks(run.histories, 5)
     assert [each.id for each in shown] == [1, 2, 3, 4, 5]
