@@ -18,7 +18,7 @@ SCRIPTS = ("training", "benchmarks", "tools")
 #: By the name of a contract: a module and an import that does not belong into it.
 PLANTED = {
     "packages: sim_tests > awarenav > nav_adapter > tracking > perception": (
-        "tracking/_motion.py",
+        "tracking/_size.py",
         "from nav_adapter import NavError",
     ),
     "sim_tests: search > study | demo > viewing | learning > crossing > "
