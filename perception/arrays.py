@@ -94,6 +94,8 @@ def finite_number(
 
     True and False are no numbers: YAML reads ``off`` as False.
     """
+    if type(value) is float and minimum < value < maximum:  # the usual case, in short
+        return value
     try:
         if isinstance(value, bool | np.bool_):
             raise TypeError

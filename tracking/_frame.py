@@ -144,13 +144,22 @@ def _measurement(
     ax, bx, cx, origin_x = to_x
     ay, by, cy, origin_y = to_y
     east, north = ax * a + bx * b + cx * c, ay * a + by * b + cy * c
-    # Σ times the two rows, then the rows times that.
-    by_x = [row[0] * ax + row[1] * bx + row[2] * cx for row in spread]
-    by_y = [row[0] * ay + row[1] * by + row[2] * cy for row in spread]
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = spread
+    # Σ times each of the two rows.
+    e_x, e_y, e_z = (
+        xx * ax + xy * bx + xz * cx,
+        xy * ax + yy * bx + yz * cx,
+        xz * ax + yz * bx + zz * cx,
+    )
+    n_x, n_y, n_z = (
+        xx * ay + xy * by + xz * cy,
+        xy * ay + yy * by + yz * cy,
+        xz * ay + yz * by + zz * cy,
+    )
     noise = Spread(
-        ax * by_x[0] + bx * by_x[1] + cx * by_x[2],
-        ax * by_y[0] + bx * by_y[1] + cx * by_y[2],
-        ay * by_y[0] + by * by_y[1] + cy * by_y[2],
+        ax * e_x + bx * e_y + cx * e_z,
+        ax * n_x + bx * n_y + cx * n_z,
+        ay * n_x + by * n_y + cy * n_z,
     )
     lasting = one.range_lasting_relative_std
     if lasting:

@@ -203,6 +203,9 @@ def _left(
 def is_over(track: Track, stamp_s: float, clocks: Sequence[FrameClock], sensors: Sensors) -> bool:
     """Return whether a track has ended at a stamp, without frames since those of the clocks."""
     config = sensors.config
+    unseen_s = stamp_s - track.last_seen_s
+    if track.confirmed and unseen_s < min(config.max_missed_s, config.max_coast_s):
+        return False  # not even misses in full view end it so soon
     for sensor, clock in zip(sensors.all, clocks, strict=True):
         gone = 0.0
         if not track.confirmed:

@@ -60,8 +60,7 @@ def _predicted(step: Step) -> list[Track]:
     tracks, clocks, sensors = [], step.clocks_before, step.sensors
     for track in state.tracks:
         # A track that the last frame has left alive gets a chance, however long the interval.
-        over = is_over(track, previous, step.earlier.clocks, sensors)
-        if not over and not is_over(track, stamp, clocks, sensors):
+        if not is_over(track, stamp, clocks, sensors):
             moved = track.copied()
             moved.predict(previous, stamp, step.config)
             tracks.append(moved)
@@ -69,25 +68,25 @@ def _predicted(step: Step) -> list[Track]:
 
 
 def _correct(track: Track, sight: Sight, step: Step) -> tuple[float, float]:
-    """Correct a track with its measurement; return its d² and ln det S."""
+    """Correct a track with its measurement; return the d² and ln det S of a tentative one."""
     taken, ray = sight.taken, sight.ray
-    expected = track.spread_m2
-    dx, dy = taken.x - track.x, taken.y - track.y
-    origin, has_looked = step.state.origin_m, track.looked_s > 0.0
     sight.stands_for_s = step.dt_s
     if step.is_second and track.seen_s[step.sensor.index] < step.frame.stamp_s:
         sight.stands_for_s = step.clock.interval_s
-    if has_looked:
-        sight.held = held(track, step.frame.stamp_s, step.state.clocks, step.sensors)
+    origin, dx, dy = step.state.origin_m, taken.x - track.x, taken.y - track.y
+    expected = track.spread_m2
     if origin is not None:
         taken.without_lasting(track, origin, step.state.origin_velocity_mps)
-    if has_looked and not sight.by_ray:
+    if track.looked_s > 0.0:
+        sight.held = held(track, step.frame.stamp_s, step.state.clocks, step.sensors)
         jump2 = expected.plus(taken.noise_m2).distance2_and_log_det(dx, dy)[0]
-        sight.jumped = jump2 > _JUMP_CHI2
-    spread = track.spread_m2.plus(taken.noise_m2)
-    if ray is not None and sight.by_ray:
-        spread = spread.plus(ray.extra_m2)
-    found = spread.distance2_and_log_det(dx, dy)
+        sight.jumped = jump2 > _JUMP_CHI2 and not sight.by_ray
+    found = (0.0, 0.0)
+    if not track.confirmed:
+        spread = track.spread_m2.plus(taken.noise_m2)
+        if ray is not None and sight.by_ray:
+            spread = spread.plus(ray.extra_m2)
+        found = spread.distance2_and_log_det(dx, dy)
     # An ambiguous measurement has less weight and leaves more uncertainty.
     noise = taken.noise_m2
     if sight.ambiguous:
