@@ -26,20 +26,19 @@ class PersonTracker:
     """Track people with a moving camera and other sensors, at any frame rates.
 
     Each track has a constant-velocity Kalman filter on the floor plane (odom x and y) and a filter
-    of awareness in logit(α). A track is tentative until its detections exceed ``confirm_logit``, or
-    ``confirm_hits`` frames within ``confirm_window_s`` have shown the person, and coasting while
-    the latest frame does not. An id is never used again. Tentative tracks are returned too, with
-    ``awareness_lower`` 0: the person may not exist, but navigation must treat them as one who has
-    not seen the robot.
+    of awareness in logit(α). A track is tentative until its detections exceed ``confirm_logit``,
+    and coasting while the latest frame does not show the person. An id is never used again.
+    Tentative tracks are returned too, with ``awareness_lower`` 0: the person may not exist, but
+    navigation must treat them as one who has not seen the robot.
 
     Other sensors of the robot, such as laser scanners, have names in ``sensors``. Each sensor has
-    its own view, frame rate and latency; a track is deleted when all sensors would delete it. A
-    sensor that sees no faces keeps identity, place and motion, and says nothing about awareness.
+    its own view, frame rate and latency, and its own opinion whether a person is still there; a
+    track is kept as long as one of them holds it. A sensor that sees no faces keeps identity, place
+    and motion, and says nothing about awareness.
 
-    A track is deleted sooner if frames should have shown the person. With a ``view``, a person whom
-    nothing hides is deleted after ``max_missed_s``. A person out of view or behind another person
-    is deleted after ``max_coast_s``, or after ``max_standing_coast_s`` if they stood still. Without
-    a view every person is kept for ``max_coast_s``.
+    A person is given up after ``max_missed_s`` of frames that should have shown them, after
+    ``max_coast_s`` in which none could, or after ``max_standing_coast_s`` if they stood still; the
+    times add up. Without a ``view``, people are expected where the sensor has seen people.
 
     Frames may come late by up to ``max_lag_s``. The tracks and their ids are then the same as if
     the frames had come in order. This may revise earlier results from after the late frame's stamp:
@@ -197,8 +196,7 @@ class PersonTracker:
 
         They are what :meth:`update` would return for a frame at ``stamp_s`` that covers nothing:
         position uncertainty grows, awareness falls, and expired tracks are left out. A person in
-        the latest frame keeps the status confirmed, and a tentative track is kept for
-        ``confirm_window_s``.
+        the latest frame keeps the status confirmed.
 
         Raises:
             TrackingError: for a stamp that is not finite or lies before the latest frame's.
