@@ -40,6 +40,8 @@ _SURE: Final = 8.0 * math.log(10.0)
 _GIVEN_UP: Final = 1.25 * math.log(0.01)
 # One frame counts for at most this share of max_missed_s, however long the pause before it.
 _MAX_SHARE_OF_ONE_FRAME: Final = 0.5
+# The evidence of one frame. At 10 Hz or faster it takes two to confirm a new track.
+_MOST_OF_ONE_FRAME: Final = 4.5
 # A detector may report a person twice, with a second place as near as this in this share of frames;
 # people who stand as near to another are detected in that share. Both places are as steady, so that
 # only hits and misses tell them apart.
@@ -97,7 +99,8 @@ def record_hit(track: Track, gain: float, stands_for_s: float, step: Step) -> No
     if second:
         # The first of two frames with this stamp did not show the person, but the second does.
         before += track.lost
-    track.presence[index] = before + max(_weight(stands_for_s, step.config) * gain, 0.0)
+    counted = _weight(stands_for_s, step.config) * gain
+    track.presence[index] = before + min(max(counted, 0.0), _MOST_OF_ONE_FRAME)
     if period_s < math.inf:
         needed = step.config.confirm_logit - math.log(period_s)
         if track.presence[index] >= needed:
@@ -125,12 +128,12 @@ def record_misses(tracks: list[Track], step: Step) -> None:
         visibility = _visibility(unseen, shown, step)
         for track, visible in zip(unseen, visibility, strict=True):
             if track.presence[index] > -math.inf:
-                track.lost = _loss(track, visible, dt_s, shown, step)
+                track.lost = _loss(track, visible, dt_s, tracks, step)
                 track.presence[index] -= track.lost
     _record_empty_places([track for track in unseen if track.confirmed], step)
 
 
-def _loss(track: Track, visible: float, dt_s: float, shown: Sequence[Track], step: Step) -> float:
+def _loss(track: Track, visible: float, dt_s: float, tracks: Sequence[Track], step: Step) -> float:
     """Return what a frame takes that should have shown a track by ``visible`` in [0, 1]."""
     config, sensor = step.config, step.sensor
     hidden_s = (1.0 - visible) * dt_s
@@ -141,7 +144,7 @@ def _loss(track: Track, visible: float, dt_s: float, shown: Sequence[Track], ste
     if track.confirmed:
         counted_s = min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
         return lost + share * counted_s * _SURE / config.max_missed_s
-    miss = _BESIDE_MISS if is_beside(track, shown, step) else sensor.log_missed
+    miss = _BESIDE_MISS if is_beside(track, tracks, step) else sensor.log_missed
     return lost - share * _weight(dt_s, config) * miss
 
 
@@ -165,7 +168,7 @@ def _fading_per_s(track: Track, sensor: Sensor, config: TrackerConfig) -> float:
     return _SURE / max(kept_s, 1e-9)
 
 
-def is_beside(track: Track, shown: Iterable[Track], step: Step) -> bool:
+def is_beside(track: Track, tracks: Iterable[Track], step: Step) -> bool:
     """Return whether a track may be the double of one that is surer.
 
     It is as near as the track's place is known, and confirmed, older, or as old and nearer to the
@@ -174,7 +177,7 @@ def is_beside(track: Track, shown: Iterable[Track], step: Step) -> bool:
     x, y, _ = step.place_m
     reach_m = _BESIDE_M + math.sqrt(track.p00 + track.p11)
     own = track.born_s, math.hypot(track.x - x, track.y - y)
-    for other in shown:
+    for other in tracks:
         if abs(track.x - other.x) > reach_m or other is track:
             continue
         if (track.x - other.x) ** 2 + (track.y - other.y) ** 2 > reach_m * reach_m:

@@ -30,7 +30,7 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
         for track, sight in zip(tracks, match.sights, strict=True)
         if sight is not None
     }
-    beside = [not track.confirmed and is_beside(track, found, step) for track in found]
+    beside = [not track.confirmed and is_beside(track, tracks, step) for track in found]
     for (track, (shown, distance2, log_det)), double in zip(found.items(), beside, strict=True):
         gain = hit_evidence(distance2, log_det, double, step)
         record_hit(track, gain, shown.stands_for_s, step)

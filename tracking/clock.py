@@ -9,6 +9,8 @@ from typing import Final, Generic, NamedTuple, TypeVar
 
 Memory = TypeVar("Memory")
 
+# Stamps nearer to each other are those of one frame, and differ by rounding.
+_LEAST_INTERVAL_S: Final = 1e-3
 # Share of a new interval in the usual time between frames.
 _PERIOD_GAIN: Final = 0.2
 # Stamps may come slightly out of order.
@@ -24,7 +26,7 @@ class FrameClock(NamedTuple):
 
     Attributes:
         stamp_s: of the latest frame, or None before the first.
-        interval_s: between the latest two stamps that differ; infinite before there are two.
+        interval_s: between the latest two frames, whose stamps differ; infinite before there are two.
         period_s: usual time between frames, smoothed over pauses; infinite before there are two.
     """
 
@@ -47,7 +49,7 @@ class FrameClock(NamedTuple):
         In the usual time a pause counts as two intervals.
         """
         dt_s, period_s = self.dt_s(stamp_s), self.period_s
-        if dt_s <= 0.0:
+        if dt_s < _LEAST_INTERVAL_S:
             return FrameClock(stamp_s, self.interval_s, period_s)
         if period_s < math.inf:
             period_s += _PERIOD_GAIN * (min(dt_s, 2.0 * period_s) - period_s)
