@@ -26,7 +26,7 @@ class FrameClock(NamedTuple):
 
     Attributes:
         stamp_s: of the latest frame, or None before the first.
-        interval_s: between the latest two frames, whose stamps differ; infinite before there are two.
+        interval_s: between the latest two frames; infinite before there are two.
         period_s: usual time between frames, smoothed over pauses; infinite before there are two.
     """
 

@@ -141,8 +141,10 @@ def test_a_frame_may_come_in_two_parts(seed: int) -> None:
         half = int(rng.integers(0, len(frame) + 1))
         parts.update(frame[:half], now, CAMERA)
         other = parts.update(frame[half:], now, CAMERA)
-        assert len(other) == len(one)
-        for track in one:
+        # Outliers beside a person may be hidden by them, or not, in the first part.
+        surely = [track for track in one if track.status != "tentative"]
+        assert len(surely) == sum(track.status != "tentative" for track in other)
+        for track in surely:
             twin = nearest(other, track.position_odom_m)
             assert twin.status == track.status
             for name in ("position_odom_m", "velocity_odom_mps", "covariance_odom"):
