@@ -19,7 +19,7 @@ SOURCES: Final = (
 SAFETY: Final = re.compile(
     r"nav_adapter/\w*(limit|reach|contact|adapter|people|trust|separation|governor)\w*\.py"
     r"|nav_adapter/policies/\w+\.py"
-    r"|tracking/\w*(association|matching|presence|existence|awareness|clock)\w*\.py"
+    r"|tracking/\w*(match|presence|noticed|step|admission|awareness|clock)\w*\.py"
     r"|perception/\w*(attention|awareness)\w*\.py"
 )
 #: Changes that cannot be noticed: file, what the change says, and why it changes nothing.
