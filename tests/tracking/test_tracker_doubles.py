@@ -141,6 +141,13 @@ def test_a_person_with_a_twin_is_kept_as_long_unseen_as_anybody() -> None:
         assert (confirmed_counts(follow(scene + unseen))[20:] >= 1).all()
 
 
+def test_a_second_box_without_a_face_takes_no_awareness() -> None:
+    scene: Scene = [[np.array([4.0, 0.5]), np.array([4.1, 0.55])] for _ in range(60)]
+    for awareness in ((0.95, None), (None, 0.95)):
+        (track,) = follow(scene, awareness=awareness)[-1]
+        assert track.awareness_lower > 0.5
+
+
 @pytest.mark.parametrize("awareness", [(0.95, 0.05), (0.05, 0.95)])
 def test_two_boxes_on_one_body_are_as_aware_as_the_less_aware(
     awareness: tuple[float, float],

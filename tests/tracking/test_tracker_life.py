@@ -359,3 +359,14 @@ def test_a_faster_camera_confirms_no_more_clutter_a_second() -> None:
         needed[period_s] = config.confirm_logit
     # Twice as many tracks of clutter a second: each is confirmed half as often.
     assert needed[0.4] < needed[0.2] + 1.0
+
+
+def test_somebody_whose_place_is_hardly_known_keeps_one_id() -> None:
+    """Such a detection may as well be clutter; it is no evidence against the person, though."""
+    tracker = PersonTracker()
+    ids = set()
+    for step in range(60):
+        now = step * PERIOD_S
+        (track,) = tracker.update([observe((9.0, 0.0), now, covariance_odom_m2=25.0)], now, CAMERA)
+        ids.add(track.id)
+    assert ids == {1}

@@ -331,6 +331,21 @@ def test_a_camera_overhead_sees_people_behind_each_other() -> None:
     assert kept == pytest.approx([STANDING_S, MISSED_S], abs=0.11)
 
 
+@pytest.mark.parametrize("bearing_rad", [0.0, 2.0, math.pi - 0.01, math.pi + 0.01, -2.0])
+def test_people_hide_others_in_every_direction(bearing_rad: float) -> None:
+    """Also where bearings jump from π to −π: they stand a little to either side of it."""
+    ahead = np.array([math.cos(bearing_rad), math.sin(bearing_rad)])
+    aside = 0.06 * np.array([-ahead[1], ahead[0]])
+    far, front = 5.0 * ahead + aside, (tuple(2.5 * ahead - aside),)
+    tracker = PersonTracker(view=Everywhere())
+    for step in range(30):
+        now = step * PERIOD_S
+        tracks = tracker.update([observe(each, now) for each in (far, *front)], now, CAMERA)
+    last = max(tracks, key=lambda track: math.hypot(*track.position_odom_m))
+    kept_s = kept_for_s(tracker, last.id, now, CAMERA, front)
+    assert kept_s == pytest.approx(STANDING_S, rel=0.05)
+
+
 class Everywhere:
     """A view in which everybody is seen."""
 
