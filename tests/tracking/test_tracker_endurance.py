@@ -70,7 +70,8 @@ def test_the_tracks_are_valid_after_any_sequence(
         try:
             tracks = tracker.update(seen, now, T, sensor=sensor)
         except TrackingError:
-            assert now < latest - config.max_lag_s
+            # Late, or ahead again although a frame of another sensor has shown that to be wrong.
+            assert not latest - config.max_lag_s <= now <= latest + config.max_lag_s
             assert (as_bytes(tracker.predict(last_s or 0.0)), tracker.last_stamp_s) == (
                 before,
                 last_s,
