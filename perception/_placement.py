@@ -110,7 +110,7 @@ class _Feet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """What one frame shows of a person.
+    """One person in one frame, as it shows them.
 
     Attributes:
         detection: their box.

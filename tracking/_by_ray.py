@@ -119,14 +119,14 @@ def rays(tracks: list[Track], step: Step) -> list[Ray | None]:
     return [Ray(one, origin, share, measures) if may_match(one) else None for one in tracks]
 
 
-def doubles(tracks: list[Track], step: Step) -> set[int]:
+def put_too_far(tracks: list[Track], step: Step) -> set[int]:
     """Return the ids of tracks with an assumed range whose person has another track.
 
     The frame shows them, and no scan has for a second. On their ray, nearer or as near, the scanner
     sees somebody whom no image has shown for a second, although they are in view. The camera would
     show the nearer one of two people. What is kept is the nearer place.
 
-    Only a frame of a sensor without measured ranges has doubles; ``tracks`` are those after it.
+    Only a frame of a sensor without measured ranges finds any; ``tracks`` are those after it.
     """
     frame, sensor, sensors = step.frame, step.sensor, step.sensors
     stamp = frame.stamp_s

@@ -22,7 +22,7 @@ _DOUBLE_M: Final = 0.25
 
 
 class Sight:
-    """What a frame shows of one track.
+    """The match of one track in a frame.
 
     Attributes:
         taken: the measurement, as the track takes it.

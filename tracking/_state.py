@@ -24,7 +24,7 @@ _ABSENCE_S: Final = 0.5
 
 
 class Field(NamedTuple):
-    """Where a sensor whose view is not known has seen people: around its axis, and how far.
+    """The field in which a sensor without a known view has seen people: around its axis, so far.
 
     Nearer than 3 m it need not see anybody: beside the robot it does not.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ._by_ray import RANGED_S, doubles
+from ._by_ray import RANGED_S, put_too_far
 from ._frame import Frame
 from ._match import Match, Sight, matched
 from ._noticed import held, remember_looks, remembers
@@ -41,7 +41,7 @@ def advance(state: State, frame: Frame, sensors: Sensors) -> State:
     if remembers(sensors):
         remember_looks(tracks, match, step)
     record_misses(tracks, step)
-    gone = doubles(tracks, step)
+    gone = put_too_far(tracks, step)
     kept = [track for track in tracks if track.id not in gone] if gone else tracks
     fields = step.state.fields
     if step.view is None:

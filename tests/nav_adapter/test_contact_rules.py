@@ -1,4 +1,4 @@
-"""Where a robot and a reach meet, against every course of the fan one by one."""
+"""The meeting of a robot and a reach, against every course of the fan one by one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is refused, by name, and changes nothing: policies, robots, updates, exports, motion."""
+"""Refusals of navigation, by name, which change nothing: policies, robots, updates, exports, motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What perception refuses, each with a message that names the value and what is valid."""
+"""Refusals of perception, each with a message that names the value and what is valid."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is refused, by name, and changes nothing: frames, settings, views, predictions, paths."""
+"""Refusals of tracking, by name, which change nothing: frames, settings, views, predictions, paths."""
 
 from __future__ import annotations
 

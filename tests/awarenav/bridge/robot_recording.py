@@ -1,4 +1,4 @@
-"""What the recorder of a robot hears that stands still, with one scanner and perhaps a camera."""
+"""Messages of a robot that stands still, with one scanner and perhaps a camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What commands print and write: JSON, letters that an output lacks, file names, completions."""
+"""Outputs of commands: JSON, letters that an output lacks, file names, completions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``awarenav doctor`` says of installations and cameras with one thing wrong at a time."""
+"""Findings of ``awarenav doctor`` on installations and cameras with one thing wrong at a time."""
 
 from __future__ import annotations
 

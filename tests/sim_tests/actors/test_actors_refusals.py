@@ -1,4 +1,4 @@
-"""What people, bodies and robots refuse, and that the message says what is valid."""
+"""Refusals of people, bodies and robots, whose message says what is valid."""
 
 from __future__ import annotations
 

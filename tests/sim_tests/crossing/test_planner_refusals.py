@@ -1,4 +1,4 @@
-"""What planners refuse, and what is said about a command that is none."""
+"""Refusals of planners, and what is said about a command that is none."""
 
 from __future__ import annotations
 

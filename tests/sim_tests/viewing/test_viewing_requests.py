@@ -55,7 +55,7 @@ def run(*observers, control_hz: float = 20.0, duration_s: float = 3.6) -> None:
 
 @dataclass
 class Asked:
-    """What observers keep of one crossing with a request and an answer."""
+    """Records of observers of one crossing with a request and an answer."""
 
     recorder: CrossingRecorder = field(default_factory=lambda: CrossingRecorder(EPISODE))
     memory: RequestMemory = field(default_factory=RequestMemory)

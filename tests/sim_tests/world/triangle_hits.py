@@ -1,4 +1,4 @@
-"""Where a segment meets triangles, one by one: what faster tests are held against."""
+"""Meeting points of a segment and triangles, one by one: faster tests are held against them."""
 
 from __future__ import annotations
 
