@@ -1,4 +1,4 @@
-"""Refusals of navigation, by name, which change nothing: policies, robots, updates, exports, motion."""
+"""Refusals by name, which change nothing: policies, robots, updates, exports, motion."""
 
 from __future__ import annotations
 

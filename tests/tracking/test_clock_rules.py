@@ -1,4 +1,4 @@
-"""When refused stamps count as one clock that has been set, and the usual time between frames."""
+"""Refused stamps that count as one clock that has been set, and the usual time between frames."""
 
 from __future__ import annotations
 

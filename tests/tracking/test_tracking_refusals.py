@@ -1,4 +1,4 @@
-"""Refusals of tracking, by name, which change nothing: frames, settings, views, predictions, paths."""
+"""Refusals by name, which change nothing: frames, settings, views, predictions, paths."""
 
 from __future__ import annotations
 

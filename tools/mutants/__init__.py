@@ -1,1 +1,1 @@
-"""How many single changes of the code a test notices."""
+"""Count of the single changes of the code that a test notices."""

@@ -1,4 +1,4 @@
-"""What halls and robot look like: ``python -m training.hall`` makes the files for ``sim_tests``.
+"""The looks of halls and robot: ``python -m training.hall`` makes the files for ``sim_tests``.
 
 Textures are painted with noise, bands, polygons and text only, so nobody else's pictures are in
 them. Meshes of props and of the robot are put together from boxes and tubes.

@@ -1,4 +1,4 @@
-"""What the robot of a crossing perceives, by the name of its perception."""
+"""Perception of the robot of a crossing, by the name of its perception."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def workers(hall):
 
 
 class Look:
-    """What an RGB-D camera sees of one person, and the truth."""
+    """The view of an RGB-D camera of one person, and the truth."""
 
     def __init__(self, hall, worker, place_m, heading_rad, activity="none", seed=0):
         worker.place(place_m, heading_rad, 0.3, 1.0, activity=activity)

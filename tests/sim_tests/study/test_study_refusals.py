@@ -1,4 +1,4 @@
-"""What measures, runs and their commands refuse, by name, before anything is written."""
+"""Refusals of measures, runs and their commands, by name, before anything is written."""
 
 from __future__ import annotations
 

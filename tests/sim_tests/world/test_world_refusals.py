@@ -1,4 +1,4 @@
-"""What hall, light, cameras and renderers refuse, by the name of what was given."""
+"""Refusals of hall, light, cameras and renderers, by the name of what was given."""
 
 from __future__ import annotations
 
