@@ -70,7 +70,9 @@ def is_free_ahead(
     for person in people_ahead(constraints, times_s, math.inf):
         allows = person.least_mps is not None and float(np.min(person.least_mps)) >= needed_mps
         for reach in person.reaches(len(times_s)):
-            farthest_m = robot_m + float(np.max(person.body_m)) + reach.farthest_m(stop_s)
+            farthest_m = robot_m + float(np.max(person.body_m))
+            if basis.policy.reach is not None:
+                farthest_m += reach.farthest_m(stop_s)
             if reach.elapsed_s > _YOUNG_S or farthest_m > _FARTHEST_M:
                 return False
             if not allows and not all(

@@ -104,6 +104,7 @@ def test_looking_ahead_never_makes_a_twist_faster(
     away_m=finite(0.0, 4.0),
     robot=st.sampled_from([TURNS, replace(TURNS, drive="differential")]),
     slack_mps=finite(0.0, 0.1),
+    policy=st.sampled_from([AwarenessPolicy(), AwarenessPolicy(reach=None)]),
 )
 def test_a_twist_alone_is_slowed_down_exactly_as_in_a_row_of_twists(
     tracks: tuple[PersonTrack, ...],
@@ -112,12 +113,13 @@ def test_a_twist_alone_is_slowed_down_exactly_as_in_a_row_of_twists(
     away_m: float,
     robot: RobotProfile,
     slack_mps: float,
+    policy: AwarenessPolicy,
 ) -> None:
     # The plain numbers that spare a single twist the field are right whenever they spare it.
     farther = tuple(
         replace(track, position_odom_m=track.position_odom_m * (1.0 + away_m)) for track in tracks
     )
-    constraints = settled_update(farther, state=state, robot=robot)
+    constraints = settled_update(farther, policy=policy, state=state, robot=robot)
     alone = clip_twists_ahead(constraints, state, twist, CYCLE_S, slack_mps=slack_mps)
     row = clip_twists_ahead(constraints, state, [twist], CYCLE_S, slack_mps=slack_mps)
     assert alone.tolist() == row[0].tolist()
