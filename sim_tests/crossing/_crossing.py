@@ -132,13 +132,11 @@ class Crossing(AbstractContextManager["Crossing"]):
     ) -> None:
         self.scenario = scenario
         senses = Perception.named(perception)
-        jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
-        jitter = scenario.start_jitter_s
-        offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
+        _, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
         self._cone = AttentionCone()
         self.robot = scenario.robot_profile
         self.meter = SafetyMeter(self.robot)
-        self.stage = Stage(scenario, offsets, people_rng, renderer=renderer)
+        self.stage = Stage(scenario, people_rng, renderer=renderer)
         try:
             self._sensing = Sensing(
                 self.stage,
@@ -375,7 +373,6 @@ def _result(
         duration_s=frames[-1].t_s,
         frames=tuple(frames),
         people=people,
-        scripted=len(scenario.workers),
         robot=scenario.robot_profile,
         obstacle_boxes_odom_m=scenario.layout.obstacle_boxes_odom,
     )

@@ -114,14 +114,6 @@ def _widen(data: dict[str, Any], model: RobotModel) -> None:
         racks.append({**rack, across: 0.5 * (low + high), size: high - low})
     hall["racks"] = racks
     hall["props"] = [{**prop, across: moved(prop[across])} for prop in hall["props"]]
-    _move_people(data, across, moved)
-
-
-def _move_people(data: dict[str, Any], across: str, moved: Callable[[float], float]) -> None:
-    data["workers"] = [
-        {**worker, "path": [{**key, across: moved(key[across])} for key in worker["path"]]}
-        for worker in data["workers"]
-    ]
     data["people"] = [_moved_person(person, across, moved) for person in data["people"]]
 
 
@@ -181,17 +173,12 @@ def _reached_m(corners: FloatArray) -> FloatArray:
 
 
 def _delay(data: dict[str, Any], later_s: float) -> None:
-    """Let everybody start later."""
+    """Let everybody start later, and look later where they look as planned."""
     data["people"] = [
-        {**person, "start_s": person["start_s"] + later_s} for person in data["people"]
-    ]
-    data["workers"] = [
         {
-            **worker,
-            **{
-                name: [{**key, "t_s": key["t_s"] + later_s} for key in worker[name]]
-                for name in ("path", "heading", "gaze", "activities")
-            },
+            **person,
+            "start_s": person["start_s"] + later_s,
+            "gaze": [{**key, "t_s": key["t_s"] + later_s} for key in person["gaze"]],
         }
-        for worker in data["workers"]
+        for person in data["people"]
     ]

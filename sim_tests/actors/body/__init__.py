@@ -20,7 +20,6 @@ from ._asset import (
 from ._gait import Gait
 from ._gait_pose import GaitPose
 from ._online_footsteps import OnlineFootsteps
-from ._planned_footsteps import plan_footsteps
 from ._pose import BodyPose, link_transforms, skin_points
 from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, STAYING, Activity, ActivityName
 from ._sitting import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Seat, SeatKind
@@ -65,7 +64,6 @@ __all__ = [
     "WorkerSkin",
     "link_transforms",
     "load_worker",
-    "plan_footsteps",
     "skeleton",
     "skin_points",
     "worker_names",

@@ -1,6 +1,6 @@
-"""Footsteps of a walk that is not known beforehand: each step is placed while the body moves.
+"""Footsteps: each step is placed while the body moves.
 
-The gait is that of :func:`plan_footsteps`. A stance foot stays where it landed, rolls from heel to
+A stance foot stays where it landed, rolls from heel to
 toe and lifts off. A swing foot aims at the place under the body at midstance, which is predicted
 from the body's velocity and acceleration. All arithmetic is scalar: NumPy is slow on two feet.
 """

@@ -154,8 +154,8 @@ class Worker:
             eye_pitch_rad: of the eyes from the head, up positive, within ±25°.
             activity: ``"none"``, ``"carry_box"``, ``"phone"``, or a change between two of them;
                 or ``"sitting"`` on the seat, or ``"kneeling"``; the hips are above the position.
-            feet: gait pose in odom, as :func:`plan_footsteps` and :class:`OnlineFootsteps` give it;
-                None takes the straight walk of ``walked_m`` and ``speed_mps``. Unused low down.
+            feet: gait pose in odom, as :class:`OnlineFootsteps` gives it; None takes the straight
+                walk of ``walked_m`` and ``speed_mps``. Unused low down.
             collides: False leaves the collision body behind until :meth:`place_collision_body`,
                 which saves half the time.
 

@@ -1,4 +1,4 @@
-"""Parameters of a person who reacts; the person is a mapping, the YAML of ``PersonSpec``."""
+"""Parameters of a person; the person is a mapping, the YAML of ``PersonSpec``."""
 
 from __future__ import annotations
 
