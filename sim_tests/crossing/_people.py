@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from perception.arrays import FloatArray
 
-from ..actors.behaviour import Ears, Person, habits_of, people_on_tracks
+from ..actors.behaviour import (
+    Ears,
+    Glances,
+    Person,
+    PersonSpec,
+    RoutePoint,
+    Track,
+    habits_of,
+    read_recordings,
+)
+from ..actors.body import worker_names
 from ..scenario import Scenario
 
 
@@ -26,7 +38,7 @@ def staged_people(
         offset = float(own.uniform(-jitter, jitter))
         everybody.append(Person(spec, own, boxes_odom_m, habits=habits, offset_s=offset))
     if scenario.replay_csv is not None:
-        everybody += people_on_tracks(
+        everybody += recorded_people(
             scenario.replay_csv,
             boxes_odom_m,
             reacts=scenario.replay_reacts,
@@ -39,3 +51,32 @@ def staged_people(
         for person, stream in zip(everybody, rng.spawn(len(everybody)), strict=True)
     )
     return tuple(everybody), ears
+
+
+def recorded_people(
+    path: str | Path, boxes_odom_m: FloatArray, *, reacts: bool = False, leaves: bool = False
+) -> list[Person]:
+    """Return the recorded people of a table in order of their first rows, with different looks.
+
+    Args:
+        path: the table, see :func:`read_recordings`.
+        boxes_odom_m: (N, 4) racks and walls.
+        reacts: as for :class:`Track`.
+        leaves: as for :class:`Track`.
+
+    Raises:
+        SimError: see :func:`read_recordings`.
+    """
+    looks = worker_names()
+    people = []
+    for number, recording in enumerate(read_recordings(path)):
+        x_m, y_m = recording.positions_odom_m[0].tolist()
+        spec = PersonSpec(
+            name=recording.name,
+            look=looks[number % len(looks)],
+            route=(RoutePoint(x_m=x_m, y_m=y_m),),
+            glances=Glances(notices_within_m=0.0),
+        )
+        track = Track(recording, reacts=reacts, leaves=leaves)
+        people.append(Person(spec, np.random.default_rng(0), boxes_odom_m, track=track))
+    return people

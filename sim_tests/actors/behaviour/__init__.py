@@ -14,8 +14,8 @@ from ._habits import (
     population_of,
 )
 from ._hearing import Ears, Heard, Hearing, Request, RequestMeans, StartleKind
-from ._person import DECISION_PERIOD_S, Person, people_on_tracks
-from ._spec import GazeKey, Glances, Lapse, PersonSpec, Reactions
+from ._person import DECISION_PERIOD_S, Person
+from ._spec import GazeKey, Glances, Lapse, PersonSpec, Reactions, RoutePoint
 from ._starting import LOOK_WITHIN_S, START_SHARES, start_share
 from ._surroundings import (
     ALONE,
@@ -54,6 +54,7 @@ __all__ = [
     "Request",
     "RequestMeans",
     "RobotBody",
+    "RoutePoint",
     "StartleKind",
     "Surroundings",
     "Track",
@@ -61,7 +62,6 @@ __all__ = [
     "habits_of",
     "known_population",
     "median_person",
-    "people_on_tracks",
     "population_of",
     "read_recordings",
     "start_share",

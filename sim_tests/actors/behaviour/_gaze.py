@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ...world.errors import SimError
-from ..body import MAX_EYE_YAW_RAD, STAYING
+from ..body import MAX_EYE_YAW_RAD, MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, STAYING
 from ._head import ON_TARGET_RAD, AnsweringLook, HeadAndEyes, angles_to, clipped
 from ._hearing import FIELD_RAD, UPPER_QUARTILE, Heard
 from ._spec import GazeKey, Glances
@@ -150,12 +150,12 @@ def planned_gaze(
     first, second = plan[max(after - 1, 0)], plan[min(after, len(plan) - 1)]
     to_robot = angles_to(camera_odom_m, place, eyes_m)
     yaw, pitch = _key_angles(first, to_robot)
-    if first is second:
-        return yaw, pitch
-    next_yaw, next_pitch = _key_angles(second, to_robot)
-    share = (t_s - first.t_s) / (second.t_s - first.t_s)
-    share = share * share * (3.0 - 2.0 * share)
-    return yaw + share * (next_yaw - yaw), pitch + share * (next_pitch - pitch)
+    if first is not second:
+        next_yaw, next_pitch = _key_angles(second, to_robot)
+        share = (t_s - first.t_s) / (second.t_s - first.t_s)
+        share = share * share * (3.0 - 2.0 * share)
+        yaw, pitch = yaw + share * (next_yaw - yaw), pitch + share * (next_pitch - pitch)
+    return clipped(yaw, MAX_HEAD_YAW_RAD), clipped(pitch, MAX_HEAD_PITCH_RAD)
 
 
 def _key_angles(key: GazeKey, to_robot: tuple[float, float]) -> tuple[float, float]:
@@ -209,7 +209,8 @@ class Gaze:
         self._visible_since_s: float | None = None
         self._first_glance_s: float | None = None
         self.away = (math.radians(glances.away_yaw_deg), math.radians(glances.away_pitch_deg))
-        self._posture = HeadAndEyes(self.away, (0.0, 0.0), twists=activity not in STAYING)
+        self._twists = activity not in STAYING
+        self._posture = HeadAndEyes(self.away, (0.0, 0.0), twists=self._twists)
         self.noticed_s: float | None = None
         self.looking = False
         self.answer: AnsweringLook | None = None
@@ -238,13 +239,13 @@ class Gaze:
             self._process.begin(t_s)
 
     def follow(self, head_rad: tuple[float, float]) -> None:
-        """Let the head point as recorded: at once, but after a look at the robot it turns back."""
+        """Let the head point there: at once, but after a look at the robot it turns back."""
         self.away = head_rad
         if self.turned and not self.looking:
             off = self._posture.off_rad(head_rad)
             self.turned = max(off, abs(self._posture.twist_rad(0.0))) > _SETTLED_RAD
         if not self.turned:
-            self._posture = HeadAndEyes(head_rad, (0.0, 0.0))
+            self._posture = HeadAndEyes(head_rad, (0.0, 0.0), twists=self._twists)
 
     def update(
         self,

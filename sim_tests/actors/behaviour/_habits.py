@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, get_args
 
@@ -11,8 +12,12 @@ import numpy as np
 from awarenav.errors import did_you_mean
 
 from ...world.errors import SimError
+from ._gaze import EyeRest
 from ._hearing import Hearing
+from ._route import DesiredVelocity
 from ._spec import PersonSpec
+from ._starting import StartingModel
+from ._surroundings import RobotBody
 
 PopulationName = Literal["classic", "recorded"]
 #: Names of the populations.
@@ -34,6 +39,9 @@ _GLANCE_MEDIAN_S: Final = 0.60
 _GLANCE_QUARTILES_S: Final = (0.336, 1.072)
 _AWAY_MEDIAN_S: Final = 1.80
 _AWAY_QUARTILES_S: Final = (1.24, 2.61)
+# People with nowhere to go try this many directions; each try is nearer by this factor.
+_ERRAND_TRIES: Final = 8
+_NEARER: Final = 0.8
 # The variation follows the speed with this time constant.
 _SHARE_S: Final = 0.4
 
@@ -206,6 +214,82 @@ def _as_recorded(spec: PersonSpec, speed_mps: float) -> PersonSpec:
         glances["looker_share"] = min(spec.glances.looker_share, _LOOKER_SHARE)
     changes["glances"] = spec.glances.model_copy(update=glances)
     return spec.model_copy(update=changes)
+
+
+class Manner:
+    """The manner of one person whose habits vary: how they walk, look aside and start by chance.
+
+    Args:
+        habits: of the population.
+        variation: of the walk.
+        free_mps: the person's own speed.
+        rngs: four generators: of the walk, of starts, of the eyes and of errands.
+
+    Attributes:
+        eye_rest: where the eyes come to rest.
+        starting: decides when the person starts.
+    """
+
+    def __init__(
+        self,
+        habits: Habits,
+        variation: VariationFigures,
+        free_mps: float,
+        rngs: Sequence[np.random.Generator],
+    ) -> None:
+        gait_rng, start_rng, eye_rng, self._errand_rng = rngs
+        self._habits, self._free_mps = habits, free_mps
+        self._variation = GaitVariation(variation, gait_rng)
+        self.starting = StartingModel(habits.idle_share, start_rng)
+        self.eye_rest = EyeRest(habits.eye_spread_rad, eye_rng)
+
+    def varied(
+        self,
+        desired: DesiredVelocity,
+        place: tuple[float, float],
+        robot: RobotBody | None,
+        dt_s: float,
+        *,
+        walking: bool,
+    ) -> tuple[DesiredVelocity, tuple[float, float], tuple[float, float]]:
+        """Return the desired velocity as the walk varies it, and its rate ahead and aside.
+
+        Args:
+            desired: velocity without variation.
+            place: x, y of the person.
+            robot: the robot as the person knows it.
+            dt_s: time since the last call.
+            walking: the person is on the way.
+        """
+        share = desired.speed_mps / self._free_mps if walking else 0.0
+        along, across, d_along, d_across = self._variation.step(dt_s, share)
+        ux, uy, habits = desired.ux, desired.uy, self._habits
+        near = robot is not None and math.dist(place, (robot.x_m, robot.y_m)) < habits.near_robot_m
+        if near and desired.speed_mps <= self._free_mps:  # nobody who hurries or goes first
+            speed_mps = min(desired.speed_mps, habits.near_robot_share * self._free_mps)
+            desired = DesiredVelocity(ux, uy, speed_mps)
+        vx = (desired.speed_mps + along) * ux - across * uy
+        vy = (desired.speed_mps + along) * uy + across * ux
+        speed = math.hypot(vx, vy)
+        if speed > 1e-6:
+            desired = DesiredVelocity(vx / speed, vy / speed, speed)
+        return desired, (d_along * ux, d_along * uy), (-d_across * uy, d_across * ux)
+
+    def errand(
+        self,
+        start: tuple[float, float],
+        is_clear: Callable[[tuple[float, float], tuple[float, float]], bool],
+    ) -> tuple[tuple[float, float], float] | None:
+        """Return goal and speed of a way in a random direction; None where no way is free."""
+        rng, habits = self._errand_rng, self._habits
+        length_m = habits.errand_m * math.exp(habits.errand_sigma * rng.standard_normal())
+        speed_mps = max(float(rng.normal(*habits.errand_mps)), 0.4)
+        for course in rng.uniform(-math.pi, math.pi, _ERRAND_TRIES).tolist():
+            goal = start[0] + length_m * math.cos(course), start[1] + length_m * math.sin(course)
+            if is_clear(start, goal):
+                return goal, speed_mps
+            length_m *= _NEARER
+        return None
 
 
 class GaitVariation:

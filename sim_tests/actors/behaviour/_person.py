@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from ..body import Activity, Gait, GaitPose, OnlineFootsteps, skeleton, worker_names
+from ..body import Activity
+from ._feet import Feet
 from ._forces import (
     RELAXATION_S,
     SlowRobotDetour,
@@ -19,14 +19,14 @@ from ._forces import (
     robot_force,
     without_part,
 )
-from ._gaze import EyeRest, Gaze, planned_gaze
-from ._habits import CLASSIC, GaitVariation, Habits, draw_person
+from ._gaze import Gaze, planned_gaze
+from ._habits import CLASSIC, Habits, Manner, draw_person
 from ._head import turn_rate, twisted
 from ._hearing import Heard
 from ._reactions import ReactionModel, Startle
 from ._route import STANDING_BELOW_MPS, DesiredVelocity, FreeWalk, Route, RouteFollower
-from ._spec import Glances, PersonSpec, RoutePoint
-from ._starting import AttentionSpan, StartingModel
+from ._spec import PersonSpec
+from ._starting import AttentionSpan
 from ._surroundings import (
     ALONE,
     PersonMotion,
@@ -35,7 +35,7 @@ from ._surroundings import (
     Surroundings,
     eye_height_m,
 )
-from ._track import Track, read_recordings
+from ._track import Track
 from ._trajectory import MAX_ACCELERATION_MPS2, Obstacles, State, Trajectory, limited
 
 #: Time between two decisions of a person; in between the motion follows closed forms.
@@ -61,9 +61,6 @@ _SIDE_STEP_COSINE: Final = 0.2
 _RECOIL_S: Final = 0.7
 _RECOIL_MPS: Final = 0.4
 _TOUCHING_S: Final = 0.1
-# People with nowhere to go try this many directions; each try is nearer by this factor.
-_ERRAND_TRIES: Final = 8
-_NEARER: Final = 0.8
 # A robot whose force is greater moves a person off the recorded track.
 _FORCED_OFF_MPS2: Final = 0.5
 # The body of somebody off the track faces where it walks from this speed on.
@@ -116,17 +113,13 @@ class Person:
         track: Track | None = None,
         offset_s: float = 0.0,
     ) -> None:
-        self._variation: GaitVariation | None = None
-        self._starting: StartingModel | None = None
-        eye_rest = None
-        if habits.variation is not None:
-            spec_rng, gait_rng, start_rng, eye_rng, self._errand_rng = rng.spawn(5)
-            spec = draw_person(spec, spec_rng)
-            self._variation = GaitVariation(habits.variation, gait_rng)
-            self._starting = StartingModel(habits.idle_share, start_rng)
-            eye_rest = EyeRest(habits.eye_spread_rad, eye_rng)
-        self.spec = spec
         self._habits = habits
+        self._manner: Manner | None = None
+        if habits.variation is not None:
+            spec_rng, *manner_rngs = rng.spawn(5)
+            spec = draw_person(spec, spec_rng)
+            self._manner = Manner(habits, habits.variation, spec.speed_mps, manner_rngs)
+        self.spec = spec
         self._track = track
         self.on_track = track is not None
         self._boxes_odom_m = boxes_odom_m
@@ -142,7 +135,7 @@ class Person:
                 )
         gaze_rng, reaction_rng = rng.spawn(2)
         self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, activity=spec.activity)
-        self._gaze.eye_rest = eye_rest
+        self._gaze.eye_rest = None if self._manner is None else self._manner.eye_rest
         self._eyes_m = eye_height_m(spec.stature_m, spec.activity)
         self._reactions = ReactionModel(spec.reactions, reaction_rng)
         self._detour = SlowRobotDetour()
@@ -170,9 +163,7 @@ class Person:
         self._bumped_s = -math.inf
         self._startle: Startle | None = None
         # The feet, and the positions of the last two motions.
-        self._feet: OnlineFootsteps | None = None
-        self._feet_s = 0.0
-        self._last_heading = 0.0
+        self._feet = Feet(spec)
         self._previous_position = self._last_position = route.start
 
     @property
@@ -218,7 +209,14 @@ class Person:
         self._previous_position, self._last_position = self._last_position, (x, y)
         after_s = t_s - self._tick * DECISION_PERIOD_S
         heading = self._recorded_heading(t_s) + self._heading + self._turning * after_s
-        feet = self._walk_on(t_s, (x, y, heading), (vx, vy))
+        feet = self._feet.follow(
+            t_s,
+            (x, y, heading),
+            (vx, vy),
+            self._trajectory.acceleration,
+            turning_radps=self._turning if self._track is None else None,
+            slide=t_s - self._bumped_s < _RECOIL_S,
+        )
         head = self._gaze.angles(after_s)
         twist = self._gaze.twist_rad(after_s)
         if self._track is not None and not self._gaze.turned:
@@ -257,27 +255,6 @@ class Person:
         """Return the heading from which ``_heading`` counts: 0 without a track."""
         return 0.0 if self._track is None else self._track.heading_rad(t_s)
 
-    def _walk_on(
-        self, t_s: float, place: tuple[float, float, float], velocity_mps: tuple[float, float]
-    ) -> GaitPose:
-        """Let the feet walk on to a place (x, y, heading) of the body; return their pose."""
-        x, y, heading = place
-        if self._feet is None:
-            gait = Gait(skeleton(self.spec.look, self.spec.stature_m))
-            self._feet, self._last_heading = OnlineFootsteps(gait, x, y, heading), heading
-        feet, dt_s = None, t_s - self._feet_s
-        if t_s - self._bumped_s < _RECOIL_S:
-            feet = self._feet.translate(
-                x - self._previous_position[0], y - self._previous_position[1]
-            )
-        if feet is None:
-            turning, acceleration = self._turning, self._trajectory.acceleration
-            if self._track is not None and dt_s > 0.0:
-                turning = math.remainder(heading - self._last_heading, math.tau) / dt_s
-            feet = self._feet.step(dt_s, place, (*velocity_mps, turning), acceleration)
-        self._feet_s, self._last_heading = t_s, heading
-        return feet
-
     def _take_in(self, around: Surroundings) -> None:
         """Note what happened since the last motion: it was held, a request heard, a contact."""
         if around.held:
@@ -296,8 +273,7 @@ class Person:
         self._trajectory.start_segment(self._now_s, state, (0.0, 0.0), left_s)
         self.on_track = False
         self._last_position = self._previous_position
-        if self._feet is not None:
-            self._feet.undo()
+        self._feet.undo()
 
     def _hear(self, heard: Heard) -> None:
         """Turn to the robot that has asked for attention, or startle, as :class:`Heard` says."""
@@ -333,8 +309,8 @@ class Person:
 
     def _decide(self, around: Surroundings) -> None:
         """Take one decision: look, follow the way, react, avoid, and set the next segment."""
-        if self._starting is not None and not self.spec.stays:
-            self._maybe_start(self._starting, around.robot)
+        if self._manner is not None and not self.spec.stays:
+            self._maybe_start(self._manner, around.robot)
         first = self._tick < 0
         self._tick += 1
         t_s = self._tick * DECISION_PERIOD_S
@@ -402,7 +378,10 @@ class Person:
         if robot is None:
             return None
         if self.spec.gaze:
-            self._gaze.away = planned_gaze(self.spec.gaze, t_s, place, robot.camera_m, self._eyes_m)
+            head = planned_gaze(self.spec.gaze, t_s, place, robot.camera_m, self._eyes_m)
+            if self._tick == 0:
+                self._gaze.follow(head)
+            self._gaze.away = head
         in_view = self._gaze.in_field_of_view(DECISION_PERIOD_S, place, robot)
         asked = self._gaze.asked(t_s)
         sighted = (in_view or asked) and around.sees_robot()
@@ -453,25 +432,14 @@ class Person:
         robot: RobotBody | None,
         around: Surroundings,
     ) -> tuple[float, float]:
-        """Return the acceleration, and to it the rate at which the gait varies."""
-        if self._variation is None:
+        """Return the acceleration, and to it the rate at which the walk varies."""
+        if self._manner is None:
             return self._acceleration_to(state, desired, robot, around)
-        share = desired.speed_mps / self.spec.speed_mps if self._follower.walking else 0.0
-        along, across, d_along, d_across = self._variation.step(DECISION_PERIOD_S, share)
-        ux, uy, habits = desired.ux, desired.uy, self._habits
-        near = robot is not None and (
-            math.dist(state[:2], (robot.x_m, robot.y_m)) < habits.near_robot_m
+        desired, ahead, aside = self._manner.varied(
+            desired, state[:2], robot, DECISION_PERIOD_S, walking=self._follower.walking
         )
-        if near and desired.speed_mps <= self.spec.speed_mps:  # nobody who hurries or goes first
-            speed_mps = min(desired.speed_mps, habits.near_robot_share * self.spec.speed_mps)
-            desired = DesiredVelocity(ux, uy, speed_mps)
-        vx = (desired.speed_mps + along) * ux - across * uy
-        vy = (desired.speed_mps + along) * uy + across * ux
-        speed = math.hypot(vx, vy)
-        if speed > 1e-6:
-            desired = DesiredVelocity(vx / speed, vy / speed, speed)
         ax, ay = self._acceleration_to(state, desired, robot, around)
-        return ax + d_along * ux - d_across * uy, ay + d_along * uy + d_across * ux
+        return ax + ahead[0] + aside[0], ay + ahead[1] + aside[1]
 
     def _acceleration_to(
         self,
@@ -484,7 +452,7 @@ class Person:
         _, _, vx, vy = state
         desired_vx, desired_vy = desired.speed_mps * desired.ux, desired.speed_mps * desired.uy
         slower = desired.speed_mps < math.hypot(vx, vy)
-        within_s = _BRAKING_S if slower else RELAXATION_S
+        within_s = _BRAKING_S if slower and self._track is None else RELAXATION_S
         ax, ay = (desired_vx - vx) / within_s, (desired_vy - vy) / within_s
         if self.spec.social:
             fx, fy = self._social_force(state, robot, around)
@@ -528,13 +496,13 @@ class Person:
                 ax, ay = ax + fx, ay + fy
         return ax, ay
 
-    def _maybe_start(self, starting: StartingModel, robot: RobotBody | None) -> None:
+    def _maybe_start(self, manner: Manner, robot: RobotBody | None) -> None:
         """Let a person who stands start by chance."""
         t_s = (self._tick + 1) * DECISION_PERIOD_S
         x, y, vx, vy = self._trajectory.end
         leader = self._follower
         before_start = self._task.started_s is None
-        if starting.starts(
+        if not manner.starting.starts(
             t_s,
             DECISION_PERIOD_S,
             standing=not before_start and math.hypot(vx, vy) < STANDING_BELOW_MPS,
@@ -543,24 +511,16 @@ class Person:
             place=(x, y),
             robot=robot,
         ):
-            if leader.arrived_s is not None:
-                self._run_errand(t_s, (x, y))
-                return
+            return
+        if leader.arrived_s is None:
             leader.go(t_s)
             self._span.end_halt()
             self._reactions.go_first()
-
-    def _run_errand(self, t_s: float, start: tuple[float, float]) -> None:
-        """Set off to a place at a random distance, in a random direction that is free."""
-        rng, habits = self._errand_rng, self._habits
-        length_m = habits.errand_m * math.exp(habits.errand_sigma * rng.standard_normal())
-        speed_mps = max(float(rng.normal(*habits.errand_mps)), 0.4)
-        for course in rng.uniform(-math.pi, math.pi, _ERRAND_TRIES).tolist():
-            goal = start[0] + length_m * math.cos(course), start[1] + length_m * math.sin(course)
-            if self._obstacles.is_clear(start, goal):
-                self._follower = RouteFollower(Route([start, goal], []), speed_mps, t_s)
-                return
-            length_m *= _NEARER
+            return
+        errand = manner.errand((x, y), self._obstacles.is_clear)
+        if errand is not None:
+            goal, speed_mps = errand
+            self._follower = RouteFollower(Route([(x, y), goal], []), speed_mps, t_s)
 
     @cached_property
     def _free_walk(self) -> FreeWalk | None:
@@ -579,32 +539,3 @@ class Person:
             if alone._tick * DECISION_PERIOD_S > longest_s:
                 return None
         return FreeWalk(alone._task.arrived_s, alone._walked_m, DECISION_PERIOD_S, tuple(along_m))
-
-
-def people_on_tracks(
-    path: str | Path, boxes_odom_m: Any, *, reacts: bool = False, leaves: bool = False
-) -> tuple[Person, ...]:
-    """Return the recorded people of a table in order of their first rows, with different looks.
-
-    Args:
-        path: the table, see :func:`read_recordings`.
-        boxes_odom_m: (N, 4) racks and walls.
-        reacts: as for :class:`Track`.
-        leaves: as for :class:`Track`.
-
-    Raises:
-        SimError: see :func:`read_recordings`.
-    """
-    looks = worker_names()
-    people = []
-    for number, recording in enumerate(read_recordings(path)):
-        x_m, y_m = recording.positions_odom_m[0].tolist()
-        spec = PersonSpec(
-            name=recording.name,
-            look=looks[number % len(looks)],
-            route=(RoutePoint(x_m=x_m, y_m=y_m),),
-            glances=Glances(notices_within_m=0.0),
-        )
-        track = Track(recording, reacts=reacts, leaves=leaves)
-        people.append(Person(spec, np.random.default_rng(0), boxes_odom_m, track=track))
-    return tuple(people)

@@ -83,8 +83,7 @@ def run_stage(
     meter = SafetyMeter(NOVA_CARTER)
     cone = AttentionCone()
     times, rows, angles, places, awareness = [], [], [], [], []
-    offsets = np.zeros(len(case.workers))
-    with Stage(case, offsets, np.random.default_rng(seed)) as stage:
+    with Stage(case, np.random.default_rng(seed)) as stage:
         stage.amr.command(robot_mps, 0.0)
         for tick in range(round(seconds / DT_S)):
             stage.measure(meter, DT_S)
