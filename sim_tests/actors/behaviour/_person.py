@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -22,7 +21,6 @@ from ._forces import (
 from ._gaze import Gaze, planned_gaze
 from ._habits import CLASSIC, Habits, Manner, draw_person
 from ._head import turn_rate, twisted
-from ._hearing import Heard
 from ._reactions import ReactionModel, Startle
 from ._route import STANDING_BELOW_MPS, DesiredVelocity, FreeWalk, Route, RouteFollower
 from ._spec import PersonSpec
@@ -35,14 +33,12 @@ from ._surroundings import (
     Surroundings,
     eye_height_m,
 )
-from ._track import Track
+from ._track import FACING_FROM_MPS, Track
 from ._trajectory import MAX_ACCELERATION_MPS2, Obstacles, State, Trajectory, limited
 
 #: Time between two decisions of a person; in between the motion follows closed forms.
 DECISION_PERIOD_S: Final = 1.0 / 20.0
 
-# A robot out of sight is extrapolated for this time, then forgotten.
-_REMEMBERED_S: Final = 3.0
 _BRAKING_S: Final = 0.1
 # Highest speed, relative to the larger of free and desired speed.
 _MAX_SPEED_FACTOR: Final = 1.3
@@ -61,12 +57,6 @@ _SIDE_STEP_COSINE: Final = 0.2
 _RECOIL_S: Final = 0.7
 _RECOIL_MPS: Final = 0.4
 _TOUCHING_S: Final = 0.1
-# A robot whose force is greater moves a person off the recorded track.
-_FORCED_OFF_MPS2: Final = 0.5
-# The body of somebody off the track faces where it walks from this speed on.
-_FACING_FROM_MPS: Final = 0.3
-# People who are away are this far from their place, out of every sensor's range.
-_AWAY_M: Final = 1000.0
 # The free walk has no end if it takes longer than this factor times its plan.
 _MAX_FREE_TIME_FACTOR: Final = 4.0
 
@@ -157,8 +147,7 @@ class Person:
         # Length walked so far, and when the end was reached.
         self._walked_m = 0.0
         self._walked_to_end_m: float | None = None
-        # The robot: last known state and its time, contact direction and time, first contact.
-        self._known_robot: tuple[RobotBody, float] | None = None
+        # Contact with the robot: direction and time, and the time of the first one.
         self._touch: tuple[float, float, float] | None = None
         self._bumped_s = -math.inf
         self._startle: Startle | None = None
@@ -234,10 +223,8 @@ class Person:
             eye_pitch_rad=eye_pitch,
             activity=self._activity,
         )
-        if self._track is None or not self._track.is_away(t_s):
-            return motion
-        place = motion.position_odom_m + np.array([_AWAY_M, 0.0])
-        return replace(motion, position_odom_m=place, feet=feet.moved(_AWAY_M, 0.0), away=True)
+        away = self._track is not None and self._track.is_away(t_s)
+        return motion.far_away() if away else motion
 
     def advance(self, t_s: float, around: Surroundings) -> None:
         """Take all decisions up to ``t_s``."""
@@ -260,7 +247,10 @@ class Person:
         if around.held:
             self._hold()
         for heard in around.heard:
-            self._hear(heard)
+            if heard.looks:
+                self._gaze.hear(heard)
+            if heard.startle:
+                self._startle = Startle(heard.startle, heard.from_s)
         for towards_x, towards_y in around.touches:
             self._note_contact(towards_x, towards_y)
 
@@ -274,13 +264,6 @@ class Person:
         self.on_track = False
         self._last_position = self._previous_position
         self._feet.undo()
-
-    def _hear(self, heard: Heard) -> None:
-        """Turn to the robot that has asked for attention, or startle, as :class:`Heard` says."""
-        if heard.looks:
-            self._gaze.hear(heard)
-        if heard.startle:
-            self._startle = Startle(heard.startle, heard.from_s)
 
     def _note_contact(self, towards_x: float, towards_y: float) -> None:
         """Step back from the robot in this direction, and look at it."""
@@ -320,10 +303,13 @@ class Person:
             self._heading += self._turning * DECISION_PERIOD_S
         heading = self._recorded_heading(t_s) + self._heading
         self._span.maybe_set_off(self._task, t_s, around.robot)
-        robot = self._span.known(self._look_at_robot(t_s, (x, y, heading), around))
+        robot = self._look_at_robot(t_s, (x, y, heading), around)
         if self._track is not None:
             robot = around.robot
-            self.on_track = self._keeps_to_track(self._track, t_s, state, robot)
+            startled = self._startle is not None and self._startle.is_on(t_s)
+            self.on_track = self._track.leads(
+                t_s, state, robot, on_track=self.on_track, startled=startled
+            )
             if self.on_track:
                 self._turn(-self._heading)
                 state = self._track.state(t_s)
@@ -334,7 +320,7 @@ class Person:
             return
         if self._track is not None:
             desired = on_way = self._track.velocity_back(t_s, x, y)
-            walking = on_way.speed_mps >= _FACING_FROM_MPS
+            walking = on_way.speed_mps >= FACING_FROM_MPS
         else:
             on_way = self._span.lead(self._follower, t_s, x, y, math.hypot(vx, vy))
             if self._walked_to_end_m is None and self.arrived:
@@ -349,24 +335,12 @@ class Person:
             desired = limit_approach(desired, x, y, robot, self.spec.keeps_off_m)
         desired, facing = self._recoil_or_face(t_s, heading, on_way, desired)
         if self._startle is not None and around.robot is not None:
-            startled = self._startle.velocity(t_s, (x, y), around.robot)
-            if startled is not None:
-                desired, facing = startled, heading
+            step_aside = self._startle.velocity(t_s, (x, y), around.robot)
+            if step_aside is not None:
+                desired, facing = step_aside, heading
         acceleration = self._acceleration(state, desired, robot, around)
         self._turn(facing - heading)
         self._trajectory.start_segment(t_s, state, acceleration, DECISION_PERIOD_S)
-
-    def _keeps_to_track(
-        self, track: Track, t_s: float, state: State, robot: RobotBody | None
-    ) -> bool:
-        """Return whether the person moves as recorded from ``t_s`` on."""
-        if robot is None or track.is_away(t_s):
-            return True
-        if self._startle is not None and self._startle.velocity(t_s, state[:2], robot) is not None:
-            return False
-        if track.reacts and math.hypot(*robot_force(*state, robot)) >= _FORCED_OFF_MPS2:
-            return False
-        return self.on_track or track.is_met(t_s, state)
 
     def _look_at_robot(
         self, t_s: float, place: tuple[float, float, float], around: Surroundings
@@ -390,10 +364,8 @@ class Person:
         self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, visible, answers)
         felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
         if ((visible or answers) and self._gaze.noticed_s is not None) or felt:
-            self._known_robot = (robot, t_s)
-        if self._known_robot is None or t_s - self._known_robot[1] > _REMEMBERED_S:
-            return None
-        return self._known_robot[0].extrapolated(t_s - self._known_robot[1])
+            self._span.remember(robot, t_s)
+        return self._span.known(t_s)
 
     def _recoil_or_face(
         self, t_s: float, heading: float, on_way: DesiredVelocity, desired: DesiredVelocity
@@ -402,9 +374,7 @@ class Person:
         if self._touch is not None and t_s - self._bumped_s < _RECOIL_S:
             return DesiredVelocity(-self._touch[0], -self._touch[1], _RECOIL_MPS), heading
         if self._track is not None:
-            walks = desired.speed_mps >= _FACING_FROM_MPS
-            ahead = math.atan2(desired.uy, desired.ux)
-            return desired, ahead if walks else self._track.heading_rad(t_s)
+            return desired, self._track.facing_rad(t_s, desired)
         if not self._follower.walking:
             facing = self._follower.stop_heading_rad
             facing = self._standing_heading if facing is None else facing
@@ -426,11 +396,7 @@ class Person:
         self._turning = turn_rate(off, self._turning, DECISION_PERIOD_S)
 
     def _acceleration(
-        self,
-        state: State,
-        desired: DesiredVelocity,
-        robot: RobotBody | None,
-        around: Surroundings,
+        self, state: State, desired: DesiredVelocity, robot: RobotBody | None, around: Surroundings
     ) -> tuple[float, float]:
         """Return the acceleration, and to it the rate at which the walk varies."""
         if self._manner is None:
@@ -442,11 +408,7 @@ class Person:
         return ax + ahead[0] + aside[0], ay + ahead[1] + aside[1]
 
     def _acceleration_to(
-        self,
-        state: State,
-        desired: DesiredVelocity,
-        robot: RobotBody | None,
-        around: Surroundings,
+        self, state: State, desired: DesiredVelocity, robot: RobotBody | None, around: Surroundings
     ) -> tuple[float, float]:
         """Return the acceleration by desired velocity and social forces, within human limits."""
         _, _, vx, vy = state
@@ -473,10 +435,7 @@ class Person:
         return (next_vx - vx) / DECISION_PERIOD_S, (next_vy - vy) / DECISION_PERIOD_S
 
     def _social_force(
-        self,
-        state: State,
-        robot: RobotBody | None,
-        around: Surroundings,
+        self, state: State, robot: RobotBody | None, around: Surroundings
     ) -> tuple[float, float]:
         """Return the force of racks and people, and of the robot as far as it is known.
 

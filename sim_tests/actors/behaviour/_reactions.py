@@ -232,9 +232,9 @@ class Startle:
         self._kind, self._from_s = kind, from_s
         self._velocity: DesiredVelocity | None = None
 
-    def is_over(self, t_s: float) -> bool:
-        """Return whether the startle has ended."""
-        return t_s >= self._from_s + _STARTLE_S - 1e-9
+    def is_on(self, t_s: float) -> bool:
+        """Return whether the startle has begun and not ended."""
+        return self._from_s <= t_s < self._from_s + _STARTLE_S - 1e-9
 
     def velocity(
         self, t_s: float, place: tuple[float, float], robot: RobotBody
@@ -249,7 +249,7 @@ class Startle:
             place: x, y of the person.
             robot: the robot now.
         """
-        if t_s < self._from_s or self.is_over(t_s):
+        if not self.is_on(t_s):
             return None
         if self._velocity is None:
             ux, uy = line = _robot_line(robot)

@@ -28,6 +28,8 @@ _HALF_SECOND_S: Final = 0.5
 _YIELDING_MPS: Final = 0.25
 # Robots farther away make nobody start.
 _RANGE_M: Final = 12.0
+# A robot out of sight is extrapolated for this time, then forgotten.
+_REMEMBERED_S: Final = 3.0
 
 
 def start_share(since_look_s: float, *, yielding: bool) -> float:
@@ -100,7 +102,7 @@ class StartingModel:
 
 
 class AttentionSpan:
-    """Tells whether a person stands and looks, or has forgotten the robot.
+    """Tells whether a person stands and looks, knows of the robot, or has forgotten it.
 
     Args:
         lapse: when and how the attention ends; None never.
@@ -119,6 +121,7 @@ class AttentionSpan:
         self._lapse, self._within_m, self._earliest_s = lapse, sets_off_within_m, start_s
         self.starts_s = start_s if sets_off_within_m is None else math.inf
         self.halted = self.lapsed = False
+        self._robot: tuple[RobotBody, float] | None = None  # as last known, and its time
 
     def sees(self, t_s: float, noticed_s: float | None, touched: bool, visible: bool) -> bool:
         """Update the attention; return whether the person may look at the robot.
@@ -150,9 +153,15 @@ class AttentionSpan:
         self._lapse = None
         self.halted = False
 
-    def known(self, robot: RobotBody | None) -> RobotBody | None:
-        """Return the robot as the person reacts to it: None once it is forgotten."""
-        return None if self.lapsed else robot
+    def remember(self, robot: RobotBody, t_s: float) -> None:
+        """Note the robot as the person sees or feels it now."""
+        self._robot = robot, t_s
+
+    def known(self, t_s: float) -> RobotBody | None:
+        """Return the robot as the person reacts to it; None without knowledge of it."""
+        if self._robot is None or self.lapsed or t_s - self._robot[1] > _REMEMBERED_S:
+            return None
+        return self._robot[0].extrapolated(t_s - self._robot[1])
 
     def lead(
         self, follower: RouteFollower, t_s: float, x: float, y: float, speed_mps: float

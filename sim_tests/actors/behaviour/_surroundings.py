@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
+
+import numpy as np
 
 from perception.arrays import FloatArray
 
 from ..body import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Activity, GaitPose
 from ._hearing import Heard
 
+# People who are away are this far from their place.
+_AWAY_M: Final = 1000.0
 #: Height of the eyes as a share of stature.
 EYE_HEIGHT_SHARE: Final = 0.94
 _LOW_EYE_HEIGHT_SHARES: Final = {
@@ -151,6 +155,12 @@ class PersonMotion:
     eye_pitch_rad: float
     activity: Activity
     away: bool = False
+
+    def far_away(self) -> PersonMotion:
+        """Return the motion of a person who is not there: out of every sensor's range."""
+        place = self.position_odom_m + np.array([_AWAY_M, 0.0])
+        feet = self.feet.moved(_AWAY_M, 0.0)
+        return replace(self, position_odom_m=place, feet=feet, away=True)
 
 
 @dataclass(frozen=True, slots=True)

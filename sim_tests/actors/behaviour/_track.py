@@ -18,8 +18,10 @@ from tracking.units import FASTEST_MPS
 
 from ...world.errors import SimError
 from ..body import MAX_HEAD_YAW_RAD
+from ._forces import robot_force
 from ._head import clipped
 from ._route import DesiredVelocity
+from ._surroundings import RobotBody
 from ._trajectory import State
 
 _OPTIONAL: Final = ("heading_rad", "head_yaw_rad")
@@ -33,6 +35,10 @@ _ROW_STEP_S: Final = 0.01
 _RETURN_S: Final = 1.0
 _OFF_TRACK_MPS: Final = 1.6
 _OFF_TRACK_FACTOR: Final = 1.3
+# A robot whose force is greater moves a person off the track.
+_FORCED_OFF_MPS2: Final = 0.5
+#: The body of somebody off the track faces where it walks from this speed on.
+FACING_FROM_MPS: Final = 0.3
 # The recording goes on from a place and a velocity this near to it.
 _BACK_WITHIN_M: Final = 0.01
 _BACK_WITHIN_MPS: Final = 0.05
@@ -135,7 +141,39 @@ class Track:
             return DesiredVelocity(1.0, 0.0, 0.0)
         return DesiredVelocity(wish_x / wish, wish_y / wish, min(wish, self.fastest_mps(t_s)))
 
-    def is_met(self, t_s: float, state: State) -> bool:
+    def facing_rad(self, t_s: float, desired: DesiredVelocity) -> float:
+        """Return the heading of somebody off the track: where they walk, else as recorded."""
+        if desired.speed_mps < FACING_FROM_MPS:
+            return self.heading_rad(t_s)
+        return math.atan2(desired.uy, desired.ux)
+
+    def leads(
+        self,
+        t_s: float,
+        state: State,
+        robot: RobotBody | None,
+        *,
+        on_track: bool,
+        startled: bool,
+    ) -> bool:
+        """Return whether a person in this state moves as recorded from ``t_s`` on.
+
+        Args:
+            t_s: now.
+            state: position and velocity.
+            robot: the robot; None without one.
+            on_track: the person has moved as recorded up to now.
+            startled: the person stops, or steps beside the track.
+        """
+        if robot is None or self.is_away(t_s):
+            return True
+        if startled:
+            return False
+        if self.reacts and math.hypot(*robot_force(*state, robot)) >= _FORCED_OFF_MPS2:
+            return False
+        return on_track or self._is_met(t_s, state)
+
+    def _is_met(self, t_s: float, state: State) -> bool:
         """Return whether somebody in this state can go on as recorded."""
         x, y, vx, vy = self.state(t_s)
         return (
