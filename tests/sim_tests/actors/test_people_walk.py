@@ -67,6 +67,15 @@ def test_a_person_who_turns_back_ends_at_the_start_and_faces_back():
     assert math.cos(rows[-1, 5]) == pytest.approx(-1.0, abs=0.01)
 
 
+def test_people_face_where_a_pause_and_the_end_of_the_route_say():
+    pauses = [{"at_m": 2.0, "for_s": 3.0, "heading_deg": -90.0}, {"at_m": 4.0, "for_s": 3.0}]
+    rows = walk(walker([(0, 0), (6, 0)], pauses=pauses, end_heading_deg=135.0), 16.0)
+    standing = np.hypot(rows[:, 3], rows[:, 4]) < 0.01
+    for x_m, heading_deg in ((2.0, -90.0), (4.0, 0.0), (6.0, 135.0)):
+        there = standing & (np.abs(rows[:, 1] - x_m) < 0.15)
+        assert math.degrees(rows[there][-1, 5]) == pytest.approx(heading_deg, abs=1.0)
+
+
 @pytest.mark.parametrize("speed", [0.5, 1.34, 2.0, 3.0])
 def test_starts_and_stops_are_smooth_and_within_the_free_speed(speed):
     rows = walk(walker([(0, 0), (10, 0)], speed_mps=speed), 10.0 / speed + 4.0)
