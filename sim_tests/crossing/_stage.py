@@ -110,8 +110,7 @@ class Stage(AbstractContextManager["Stage"]):
                 np.random.default_rng(0) if people_rng is None else people_rng,
             )
             self.workers = tuple(
-                Worker(self.warehouse, each.stature_m, look=each.look, stride_m=each.stride_m)
-                for each in self._behaviours
+                Worker(self.warehouse, each.stature_m, look=each.look) for each in self._behaviours
             )
         except BaseException:
             self.warehouse.close()

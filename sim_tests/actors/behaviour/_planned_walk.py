@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 from perception.arrays import FloatArray
 
 from ...world.config import SimConfig
-from ..body import Gait, GaitPose, plan_footsteps, skeleton
+from ..body import GaitPose, PlannedGait, plan_footsteps, skeleton
 
 # Below this speed the direction of walking is noise and the body keeps its heading.
 _HEADING_FROM_MPS: Final = 0.05
@@ -82,7 +82,7 @@ class PlannedWalk:
     """
 
     def __init__(
-        self, path: tuple[Waypoint, ...], heading: tuple[HeadingKey, ...], gait: Gait
+        self, path: tuple[Waypoint, ...], heading: tuple[HeadingKey, ...], gait: PlannedGait
     ) -> None:
         first, last = path[0].t_s, path[-1].t_s
         steps = max(math.ceil((last - first) / _ROW_STEP_S), 1)
@@ -122,7 +122,7 @@ class PlannedWalk:
             velocity_odom_mps=here[2:4] if walking else np.zeros(2),
             heading_odom_rad=heading,
             walked_m=walked,
-            feet=GaitPose.from_row(feet),
+            feet=GaitPose((tuple(feet[:5]), tuple(feet[5:10])), *feet[10:]),
         )
 
 
@@ -135,7 +135,7 @@ def planned_walk(
     stride_m: float | None,
 ) -> PlannedWalk:
     """Plan the walk of a worker; walks with the same arguments share one plan."""
-    return PlannedWalk(path, heading, Gait(skeleton(look, stature_m), stride_m))
+    return PlannedWalk(path, heading, PlannedGait(skeleton(look, stature_m), stride_m))
 
 
 def _facing(

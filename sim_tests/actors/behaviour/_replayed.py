@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from perception.arrays import FloatArray
 
 from ...world.errors import SimError
-from ..body import MAX_HEAD_YAW_RAD, Activity, Gait, skeleton, worker_names
+from ..body import MAX_HEAD_YAW_RAD, Activity, PlannedGait, skeleton, worker_names
 from ._person import PersonMotion, Surroundings
 from ._planned_walk import HeadingKey, PlannedWalk, Waypoint
 
@@ -87,7 +87,7 @@ class Replayed:
                 HeadingKey(t_s=t, heading_deg=angle)
                 for t, angle in zip(times.tolist(), degrees, strict=True)
             )
-        self._walk = PlannedWalk(path, headings, Gait(skeleton(look, stature_m)))
+        self._walk = PlannedWalk(path, headings, PlannedGait(skeleton(look, stature_m)))
         # Exact splines: the planned walk's table interpolates between its rows.
         self._position = self._velocity = self._heading = None
         if len(times) > 1:

@@ -11,10 +11,8 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from perception.arrays import FloatArray
 
-from ._gait import Gait
-from ._gait_pose import (
+from ._gait import (
     BACKWARD_STRIDE_SHARE,
-    HIP_HEIGHT_COLUMN,
     LONGEST_SWING_S,
     MAX_CADENCE_HZ,
     SIDE_STRIDE_SHARE,
@@ -22,6 +20,7 @@ from ._gait_pose import (
     TWIST_FROM_MPS,
     TWIST_RAD,
 )
+from ._planned_gait import PlannedGait
 from ._skeleton import LEFT, RIGHT
 
 # Below both of these the body stands.
@@ -88,7 +87,7 @@ class _BodyMotion:
 
 
 def plan_footsteps(
-    gait: Gait,
+    gait: PlannedGait,
     times_s: FloatArray,
     position_odom_m: FloatArray,
     heading_odom_rad: FloatArray,
@@ -137,7 +136,7 @@ def plan_footsteps(
             feet, position_odom_m, heading_odom_rad, phase, stride_ratio, dt_s, twist_rad=twist
         )
         foot_speed_mps = float(np.abs(np.diff(feet[..., :3], axis=1)).max()) / dt_s
-        hip_share = float(table[:, HIP_HEIGHT_COLUMN].min()) / gait.standing_height_m
+        hip_share = float(table[:, 10].min()) / gait.standing_height_m
         excess = max(_MIN_HIP_HEIGHT_SHARE / hip_share, foot_speed_mps / _MAX_FOOT_SPEED_MPS)
         if excess < least_excess:
             best, least_excess = table, excess
@@ -151,7 +150,7 @@ def _moving_average(values: FloatArray, window: int) -> FloatArray:
 
 
 def _cadence_hz(
-    gait: Gait, forward_mps: FloatArray, left_mps: FloatArray, turning_radps: FloatArray
+    gait: PlannedGait, forward_mps: FloatArray, left_mps: FloatArray, turning_radps: FloatArray
 ) -> FloatArray:
     """Return (N,) cycles per second that walking and turning need together."""
     speed = np.hypot(forward_mps, left_mps)
@@ -182,7 +181,7 @@ def _walks(moving: FloatArray, dt_s: float) -> list[tuple[int, int]]:
 
 
 def _feet_and_phase(
-    gait: Gait, motion: _BodyMotion, walks: list[tuple[int, int]], reach_scale: float
+    gait: PlannedGait, motion: _BodyMotion, walks: list[tuple[int, int]], reach_scale: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return (2, N, 5) ankles of both feet, and (N,) cycles since the left foot landed."""
     stances = tuple(
@@ -198,7 +197,11 @@ def _feet_and_phase(
 
 
 def _needs_steps(
-    gait: Gait, motion: _BodyMotion, first: int, last: int, stances: tuple[list[_Stance], ...]
+    gait: PlannedGait,
+    motion: _BodyMotion,
+    first: int,
+    last: int,
+    stances: tuple[list[_Stance], ...],
 ) -> bool:
     """Return whether the body moves too far from where its feet stand."""
     rows = slice(first, last + 1)
@@ -215,7 +218,7 @@ def _needs_steps(
 
 
 def _add_steps(
-    gait: Gait,
+    gait: PlannedGait,
     motion: _BodyMotion,
     first: int,
     last: int,
@@ -314,7 +317,7 @@ def _latest_lift_off_s(
 
 
 def _landing_place(
-    gait: Gait,
+    gait: PlannedGait,
     side: int,
     motion: _BodyMotion,
     covered: FloatArray,
@@ -335,7 +338,7 @@ def _landing_place(
     return place if ahead_m <= limit_m else under + limit_m / ahead_m * (place - under)
 
 
-def _neutral(gait: Gait, side: int, motion: _BodyMotion, t_s: float) -> FloatArray:
+def _neutral(gait: PlannedGait, side: int, motion: _BodyMotion, t_s: float) -> FloatArray:
     """Return (3,) the neutral place of a flat foot at a time."""
     position = np.array([[motion.interpolated(column, t_s) for column in motion.position_m.T]])
     heading = np.array([motion.interpolated(motion.heading_rad, t_s)])
@@ -343,7 +346,9 @@ def _neutral(gait: Gait, side: int, motion: _BodyMotion, t_s: float) -> FloatArr
     return np.asarray(gait.neutral(side, position, heading, stride_ratio)[0])
 
 
-def _ankles(gait: Gait, side: int, motion: _BodyMotion, stances: list[_Stance]) -> FloatArray:
+def _ankles(
+    gait: PlannedGait, side: int, motion: _BodyMotion, stances: list[_Stance]
+) -> FloatArray:
     """Return (N, 5) x, y, z, yaw, pitch of one ankle at all times."""
     times_s = motion.times_s
     body = np.column_stack([motion.position_m, motion.heading_rad])

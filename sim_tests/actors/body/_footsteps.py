@@ -1,18 +1,16 @@
-"""Footsteps of a walk that is not known beforehand: each step is placed while the body moves.
+"""Footsteps: each step is placed while the body moves.
 
-The gait is that of :func:`plan_footsteps`. A stance foot stays where it landed, rolls from heel to
-toe and lifts off. A swing foot aims at the place under the body at midstance, which is predicted
-from the body's velocity and acceleration. All arithmetic is scalar: NumPy is slow on two feet.
+A stance foot stays where it landed, rolls from heel to toe and lifts off. A swing foot aims at the
+place under the body at midstance, which is predicted from the body's velocity and acceleration. All
+arithmetic is scalar: NumPy is slow on two feet.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final
 
-from ._gait import Gait
-from ._gait_pose import (
+from ._gait import (
     ARM_SWING_RAD,
     FOOT_LIFT_M,
     LOADING_S,
@@ -31,11 +29,13 @@ from ._gait_pose import (
     THORAX_YAW_RAD,
     TWIST_FROM_MPS,
     TWIST_RAD,
+    FootPose,
+    Gait,
     GaitPose,
+    PlanarPose,
     landing_pitch_rad,
     lift_off_pitch_rad,
 )
-from ._gait_tables import GaitTables, PlanarPose
 from ._skeleton import LEFT, RIGHT, SIGNS
 
 # Below both of these the body stands.
@@ -60,6 +60,8 @@ _MAX_TURN_RAD: Final = 0.7
 _SMOOTHING_S: Final = 0.15
 _HIPS_RISING_S: Final = 0.12
 _MAX_PITCH_RATE_RADPS: Final = 8.0
+# Longest time step of a steady walk.
+_STEADY_STEP_S: Final = 1.0 / 60.0
 
 
 class _Foot:
@@ -107,14 +109,14 @@ class OnlineFootsteps:
     """
 
     def __init__(self, gait: Gait, x_m: float, y_m: float, heading_rad: float) -> None:
-        self._tables = GaitTables(gait)
+        self._gait = gait
         self._feet = [
-            _Foot(self._tables.neutral(side, x_m, y_m, heading_rad, 0.0)) for side in (LEFT, RIGHT)
+            _Foot(gait.neutral(side, x_m, y_m, heading_rad, 0.0)) for side in (LEFT, RIGHT)
         ]
         self._phase = 0.0
         self._walking = False
         self._stride_ratio = self._twist = 0.0
-        self._hip_height_m = self._tables.standing_height_m
+        self._hip_height_m = gait.standing.hip_height_m
         self._pose: GaitPose | None = None
         self._before_step: (
             tuple[float, bool, float, float, float, list[_Foot], GaitPose | None] | None
@@ -141,11 +143,8 @@ class OnlineFootsteps:
         for foot in self._feet:
             foot.place = (foot.place[0] + dx_m, foot.place[1] + dy_m, foot.place[2])
             foot.target = (foot.target[0] + dx_m, foot.target[1] + dy_m, foot.target[2])
-        (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = self._pose.feet
-        left = (ax + dx_m, ay + dy_m, az, ayaw, apitch)
-        right = (bx + dx_m, by + dy_m, bz, byaw, bpitch)
         self._before_step = None
-        self._pose = replace(self._pose, feet=(left, right))
+        self._pose = self._pose.moved(dx_m, dy_m)
         return self._pose
 
     def step(
@@ -183,12 +182,12 @@ class OnlineFootsteps:
         self._twist += blend * (twist - self._twist)
         along = askew - self._twist
         forward, left = speed * math.cos(along), speed * math.sin(along)
-        stride_ratio = self._tables.stride_ratio(forward)
+        stride_ratio = self._gait.stride_ratio(forward)
         if speed <= _STANDING_BELOW_MPS:
             stride_ratio = 0.0
         self._stride_ratio += blend * (stride_ratio - self._stride_ratio)
-        share = min(self._tables.stance_share(speed), _MAX_STANCE_SHARE)
-        cadence = self._tables.cadence_hz(forward, left, turning)
+        share = min(self._gait.stance_share(speed), _MAX_STANCE_SHARE)
+        cadence = self._gait.cadence_hz(forward, left, turning)
         standing = speed <= _STANDING_BELOW_MPS and abs(turning) <= _STANDING_BELOW_RADPS
         facing = heading + self._twist
         if not self._walking and (
@@ -205,8 +204,10 @@ class OnlineFootsteps:
                 and not self._misplaced(x, y, facing, _REST_WITHIN_M, _REST_WITHIN_RAD)
             ):
                 self._walking = False
-        ankles = [self._ankle(side, dt_s, cadence, share, place) for side in (LEFT, RIGHT)]
-        self._pose = self._gait_pose(dt_s, (ankles[LEFT], ankles[RIGHT]), place)
+        rate = max(cadence, _MIN_CADENCE_HZ)
+        left_foot = self._ankle(LEFT, dt_s, rate, share, place)
+        right_foot = self._ankle(RIGHT, dt_s, rate, share, place)
+        self._pose = self._gait_pose(dt_s, (left_foot, right_foot), place)
         return self._pose
 
     def _misplaced(
@@ -214,7 +215,7 @@ class OnlineFootsteps:
     ) -> bool:
         """Return whether a foot is too far from its neutral place in standing."""
         for side in (LEFT, RIGHT):
-            nx, ny, nyaw = self._tables.neutral(side, x, y, facing, 0.0)
+            nx, ny, nyaw = self._gait.neutral(side, x, y, facing, 0.0)
             px, py, pyaw = self._feet[side].place
             if math.hypot(nx - px, ny - py) > limit_m:
                 return True
@@ -242,7 +243,7 @@ class OnlineFootsteps:
         """Advance the cycle: feet land, lift off and aim at their next place."""
         x, y, facing = body[:3]
         rate = max(cadence, _MIN_CADENCE_HZ)
-        limit = _MAX_BEHIND_SHARE * self._tables.stature_m
+        limit = _MAX_BEHIND_SHARE * self._gait.stature_m
         for foot in self._feet:
             if not foot.swinging and math.hypot(x - foot.place[0], y - foot.place[1]) > limit:
                 rate = max(rate, min(_CATCH_UP_FACTOR * rate, MAX_CADENCE_HZ))
@@ -257,7 +258,7 @@ class OnlineFootsteps:
                 foot.landed_for_s += dt_s
                 other = self._feet[RIGHT - side]
                 if foot.phase >= share and not wrapped and not other.swinging:
-                    neutral = self._tables.neutral(side, x, y, facing, 0.0)
+                    neutral = self._gait.neutral(side, x, y, facing, 0.0)
                     if standing and _may_stay(foot.place, neutral):
                         continue
                     foot.swinging, foot.lift_off_phase = True, foot.phase
@@ -290,16 +291,15 @@ class OnlineFootsteps:
         dx = vx * lasts_s + 0.5 * ax * lasts_s * lasts_s
         dy = vy * lasts_s + 0.5 * ay * lasts_s * lasts_s
         turn = min(max(turning * ahead_s, -_MAX_TURN_RAD), _MAX_TURN_RAD)
-        goal = self._tables.neutral(side, x + dx, y + dy, facing + turn, self._stride_ratio)
+        goal = self._gait.neutral(side, x + dx, y + dy, facing + turn, self._stride_ratio)
         start = self._feet[side].place
         return goal[0], goal[1], start[2] + math.remainder(goal[2] - start[2], math.tau)
 
     def _ankle(
-        self, side: int, dt_s: float, cadence: float, share: float, place: PlanarPose
-    ) -> tuple[float, float, float, float, float]:
-        """Return x, y, z, yaw, pitch of an ankle; advances the pitch of the foot."""
+        self, side: int, dt_s: float, rate: float, share: float, place: PlanarPose
+    ) -> FootPose:
+        """Return the pose of a foot; advances its pitch."""
         foot = self._feet[side]
-        rate = max(cadence, _MIN_CADENCE_HZ)
         stride_ratio = self._stride_ratio
         lift = 0.0
         x, y, yaw = foot.place
@@ -317,13 +317,13 @@ class OnlineFootsteps:
             # The swing foot goes round the stance foot.
             sin, cos = math.sin(place[2] + self._twist), math.cos(place[2] + self._twist)
             beside = cos * (y - place[1]) - sin * (x - place[0])
-            clear = self._tables.half_width_m(side, stride_ratio) + SWING_CLEARANCE_M
+            clear = self._gait.half_width_m(side, stride_ratio) + SWING_CLEARANCE_M
             bump = min(1.6 * math.sin(math.pi * u) ** 2, 1.0)
             aside = max(clear - SIGNS[side] * beside, 0.0) * bump
             x -= SIGNS[side] * aside * sin
             y += SIGNS[side] * aside * cos
             reach += 4.0 * aside
-            strides = min(reach / self._tables.comfortable_stride_m, 1.5)
+            strides = min(reach / self._gait.comfortable_stride_m, 1.5)
             lift = FOOT_LIFT_M * math.sqrt(strides) * math.sin(math.pi * u)
         else:
             stance_s = share / rate
@@ -337,15 +337,13 @@ class OnlineFootsteps:
                 pitch += lift_off_pitch_rad(stride_ratio) * rolled * rolled
         most = _MAX_PITCH_RATE_RADPS * dt_s
         foot.pitch += min(max(pitch - foot.pitch, -most), most)
-        ahead, height = self._tables.ankle(side, foot.pitch)
+        ahead, height = self._gait.ankle(side, foot.pitch)
         return x + ahead * math.cos(yaw), y + ahead * math.sin(yaw), height + lift, yaw, foot.pitch
 
     def _gait_pose(
         self,
         dt_s: float,
-        feet: tuple[
-            tuple[float, float, float, float, float], tuple[float, float, float, float, float]
-        ],
+        feet: tuple[FootPose, FootPose],
         place: PlanarPose,
     ) -> GaitPose:
         """Return the pose of hips and trunk over these feet; advances the hip height."""
@@ -357,7 +355,7 @@ class OnlineFootsteps:
         yaw = -PELVIS_YAW_RAD * stride_ratio * turn + PELVIS_TWIST_SHARE * self._twist
         tilt = PELVIS_LIST_RAD * size * weight
         highest = min(
-            self._tables.hip_limit_m(feet, place, sway, yaw, tilt), self._tables.standing_height_m
+            self._gait.hip_limit_m(feet, place, sway, yaw, tilt), self._gait.standing.hip_height_m
         )
         if highest < self._hip_height_m:
             self._hip_height_m = highest
@@ -382,3 +380,28 @@ def _may_stay(place: PlanarPose, neutral: PlanarPose) -> bool:
         math.hypot(neutral[0] - place[0], neutral[1] - place[1]) < _STAY_WITHIN_M
         and abs(math.remainder(neutral[2] - place[2], math.tau)) < _REST_WITHIN_RAD
     )
+
+
+def steady_walk(gait: Gait, walked_m: float, speed_mps: float) -> GaitPose:
+    """Return the pose in a straight walk at one speed, in the body's frame.
+
+    The feet have walked two to three cycles from standing; the distance gives the phase.
+
+    Args:
+        gait: the body's gait.
+        walked_m: distance walked so far.
+        speed_mps: speed ≥ 0; one too low to walk stands.
+    """
+    if speed_mps <= _STANDING_BELOW_MPS:
+        return gait.standing
+    cycle_m = speed_mps / max(gait.cadence_hz(speed_mps, 0.0, 0.0), _MIN_CADENCE_HZ)
+    start_m = -cycle_m * (2.0 + walked_m / cycle_m % 1.0)
+    steps = math.ceil(-start_m / speed_mps / _STEADY_STEP_S)
+    feet = OnlineFootsteps(gait, start_m, 0.0, 0.0)
+    pose = gait.standing
+    for step in range(steps):
+        x = start_m * (1.0 - (step + 1) / steps)
+        pose = feet.step(
+            -start_m / speed_mps / steps, (x, 0.0, 0.0), (speed_mps, 0.0, 0.0), (0.0, 0.0)
+        )
+    return pose
