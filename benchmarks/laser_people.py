@@ -31,7 +31,7 @@ from perception.laser import (
     scan_points,
 )
 from sim_tests.actors.body import Worker, worker_names
-from sim_tests.actors.robot import Amr, AmrLook
+from sim_tests.actors.robot import Amr, RobotLook
 from sim_tests.world import Warehouse
 from sim_tests.world.hall import LAYOUTS, WarehouseLayout
 from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScanScene, SimulatedScanner
@@ -133,7 +133,7 @@ def drive(
         people = [Worker(warehouse, look=name) for name in workers]
         amr = Amr(warehouse)
         pose = [np.eye(4)]
-        warehouse.add_actor(AmrLook(lambda: (pose[0], 0.0, 0.0)))
+        warehouse.add_actor(RobotLook.nova_carter(lambda: pose[0]))
         boxes = warehouse.obstacle_boxes_odom
         robot = Wanderer(boxes, rng, _ROBOT_CLEARANCE_M, (0.3, _ROBOT_MPS), 0.2)
         walks = [

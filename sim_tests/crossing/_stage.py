@@ -23,7 +23,7 @@ from ..actors.behaviour import (
     Surroundings,
 )
 from ..actors.body import Worker
-from ..actors.robot import NOVA_CARTER, Amr, AmrLook, KinematicLook, KinematicRobot
+from ..actors.robot import Amr, KinematicRobot, RobotLook
 from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.bullet import pybullet
@@ -115,11 +115,7 @@ class Stage(AbstractContextManager["Stage"]):
         except BaseException:
             self.warehouse.close()
             raise
-        self.warehouse.add_actor(
-            KinematicLook(self.amr)
-            if isinstance(self.amr, KinematicRobot)
-            else AmrLook.of(self.warehouse, self.amr)
-        )
+        self.warehouse.add_actor(RobotLook.of(self.amr))
         self._sight = RobotSight(self.amr, self.workers)
         self._audience = Audience(ears, self.workers, self._sight)
         self._motions: tuple[PersonMotion, ...] = ()
@@ -357,7 +353,7 @@ def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
     start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
     if model is None or model.body == "nova_carter":
         mount = scenario.camera.mount
-        return Amr(warehouse, start, heading_rad, NOVA_CARTER, camera_mount=mount)
+        return Amr(warehouse, start, heading_rad, mount)
     return KinematicRobot(warehouse, model, start, heading_rad)
 
 

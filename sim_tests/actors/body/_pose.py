@@ -79,37 +79,33 @@ def link_transforms(joints_m: FloatArray, pose: BodyPose) -> FloatArray:
     return links
 
 
-def piece_transforms(
-    joints_m: FloatArray,
-    pose: BodyPose,
-    joints: NDArray[np.int64],
-    shares: FloatArray,
-    links: FloatArray | None = None,
-) -> FloatArray:
-    """Return (N, 4, 4) transforms of rigid pieces that follow a share of a joint's rotation.
+class RigidPieces:
+    """Rigid pieces that each follow a share of one joint's rotation, and its parents fully.
 
-    With share 1 a piece has the transform of its joint's link.
+    With share 1 a piece moves with its joint's link.
 
     Args:
         joints_m: (16, 3) joints of the asset at rest.
-        pose: the body's pose.
         joints: (N,) joint of each piece, −1 for the pelvis.
-        shares: (N,) in [0, 1]: the part of the joint's rotation angle by which a piece turns. It
-            follows the joint's parents fully. Ignored for the pelvis.
-        links: :func:`link_transforms` of this pose, if known.
+        shares: (N,) in [0, 1]: the part of the joint's rotation angle by which a piece turns;
+            ignored for the pelvis.
     """
-    if links is None:
-        links = link_transforms(joints_m, pose)
-    parents = np.where(joints < 0, -1, _PARENTS[joints])
-    before = links[1 + parents]
-    turning = np.where(joints < 0, 0.0, shares)[:, None]
-    turn = rotation_matrices(turning * pose.joint_rotvecs[joints])
-    centre = joints_m[joints] * pose.scale
-    pieces = np.array(before)
-    pieces[:, :3, :3] = before[:, :3, :3] @ turn
-    shift = centre - np.einsum("nij,nj->ni", turn, centre)
-    pieces[:, :3, 3] += np.einsum("nij,nj->ni", before[:, :3, :3], shift)
-    return pieces
+
+    def __init__(self, joints_m: FloatArray, joints: NDArray[np.int64], shares: FloatArray) -> None:
+        self._joints, self._centres_m = joints, joints_m[joints]
+        self._parent_rows = 1 + np.where(joints < 0, -1, _PARENTS[joints])
+        self._turning = np.where(joints < 0, 0.0, shares)[:, None]
+
+    def odom(self, pose: BodyPose, links: FloatArray) -> FloatArray:
+        """Return (N, 4, 4) transforms to odom, from the :func:`link_transforms` of the pose."""
+        pieces = links[self._parent_rows]
+        before = np.array(pieces[:, :3, :3])
+        turn = rotation_matrices(self._turning * pose.joint_rotvecs[self._joints])
+        centre = self._centres_m * pose.scale
+        pieces[:, :3, :3] = before @ turn
+        shift = centre - np.einsum("nij,nj->ni", turn, centre)
+        pieces[:, :3, 3] += np.einsum("nij,nj->ni", before, shift)
+        return pieces
 
 
 class SkinnedPoints:
@@ -122,7 +118,6 @@ class SkinnedPoints:
     """
 
     def __init__(self, joints_m: FloatArray, points_m: FloatArray, weights: FloatArray) -> None:
-        self._joints_m = joints_m
         self._points_m = np.ascontiguousarray(points_m.T)
         self._passes: list[tuple[NDArray[np.int64], slice]] = []
         owners, shares, begin = [], [], 0
@@ -146,6 +141,7 @@ class SkinnedPoints:
             begin += row.size
         # All passes, one after the other.
         self._owner, self._share = np.concatenate(owners), np.concatenate(shares)
+        self._centres_m = np.ascontiguousarray(joints_m.T[:, self._owner])
 
     def odom_m(self, pose: BodyPose) -> FloatArray:
         """Return (N, 3) points in odom."""
@@ -153,7 +149,7 @@ class SkinnedPoints:
         rotvecs = pose.joint_rotvecs
         angles = np.sqrt(np.einsum("ij,ij->i", rotvecs, rotvecs))
         axes = (rotvecs / np.maximum(angles, 1e-12)[:, None]).T[:, self._owner]
-        centres = (self._joints_m.T * pose.scale)[:, self._owner]
+        centres = self._centres_m * pose.scale
         turns = angles[self._owner] * self._share
         sines, versines = np.sin(turns), 1.0 - np.cos(turns)
         nexts, afters = axes[_NEXT], axes[_AFTER]
