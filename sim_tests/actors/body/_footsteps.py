@@ -8,7 +8,8 @@ arithmetic is scalar: NumPy is slow on two feet.
 from __future__ import annotations
 
 import math
-from typing import Final
+from dataclasses import dataclass
+from typing import Any, Final
 
 from ._gait import (
     ARM_SWING_RAD,
@@ -64,38 +65,31 @@ _MAX_PITCH_RATE_RADPS: Final = 8.0
 _STEADY_STEP_S: Final = 1.0 / 60.0
 
 
+@dataclass(slots=True)
 class _Foot:
     """One foot, in stance or in swing; its phase is the share of the cycle since it landed."""
 
-    __slots__ = (
-        "landed_for_s",
-        "lift_off_phase",
-        "lift_off_pitch",
-        "phase",
-        "pitch",
-        "place",
-        "swinging",
-        "target",
-    )
-
-    def __init__(self, place: PlanarPose) -> None:
-        self.place = self.target = place
-        self.swinging = False
-        self.phase = 0.0
-        self.lift_off_phase = 0.0
-        self.landed_for_s = math.inf
-        self.pitch = self.lift_off_pitch = 0.0
+    place: PlanarPose
+    target: PlanarPose
+    swinging: bool = False
+    phase: float = 0.0
+    lift_off_phase: float = 0.0
+    landed_for_s: float = math.inf
+    pitch: float = 0.0
+    lift_off_pitch: float = 0.0
 
     def copy(self) -> _Foot:
         """Return an independent foot in the same state."""
-        other = _Foot(self.place)
-        other.target = self.target
-        other.swinging = self.swinging
-        other.phase = self.phase
-        other.lift_off_phase = self.lift_off_phase
-        other.landed_for_s = self.landed_for_s
-        other.pitch, other.lift_off_pitch = self.pitch, self.lift_off_pitch
-        return other
+        return _Foot(
+            self.place,
+            self.target,
+            self.swinging,
+            self.phase,
+            self.lift_off_phase,
+            self.landed_for_s,
+            self.pitch,
+            self.lift_off_pitch,
+        )
 
 
 class OnlineFootsteps:
@@ -110,31 +104,19 @@ class OnlineFootsteps:
 
     def __init__(self, gait: Gait, x_m: float, y_m: float, heading_rad: float) -> None:
         self._gait = gait
-        self._feet = [
-            _Foot(gait.neutral(side, x_m, y_m, heading_rad, 0.0)) for side in (LEFT, RIGHT)
-        ]
+        places = [gait.neutral(side, x_m, y_m, heading_rad, 0.0) for side in (LEFT, RIGHT)]
+        self._feet = [_Foot(place, place) for place in places]
         self._phase = 0.0
         self._walking = False
         self._stride_ratio = self._twist = 0.0
         self._hip_height_m = gait.standing.hip_height_m
         self._pose: GaitPose | None = None
-        self._before_step: (
-            tuple[float, bool, float, float, float, list[_Foot], GaitPose | None] | None
-        ) = None
+        # All attributes before the last step.
+        self._before_step: dict[str, Any] = {}
 
     def undo(self) -> None:
         """Take the last :meth:`step` back, because the body did not move."""
-        if self._before_step is not None:
-            (
-                self._phase,
-                self._walking,
-                self._stride_ratio,
-                self._twist,
-                self._hip_height_m,
-                self._feet,
-                self._pose,
-            ) = self._before_step
-            self._before_step = None
+        vars(self).update(self._before_step)
 
     def translate(self, dx_m: float, dy_m: float) -> GaitPose | None:
         """Shift feet and body without a step; return the pose, None before the first step."""
@@ -143,7 +125,7 @@ class OnlineFootsteps:
         for foot in self._feet:
             foot.place = (foot.place[0] + dx_m, foot.place[1] + dy_m, foot.place[2])
             foot.target = (foot.target[0] + dx_m, foot.target[1] + dy_m, foot.target[2])
-        self._before_step = None
+        self._before_step = {}
         self._pose = self._pose.moved(dx_m, dy_m)
         return self._pose
 
@@ -162,15 +144,9 @@ class OnlineFootsteps:
             velocity: of the body, m/s and rad/s.
             acceleration: of the body, m/s².
         """
-        self._before_step = (
-            self._phase,
-            self._walking,
-            self._stride_ratio,
-            self._twist,
-            self._hip_height_m,
-            [foot.copy() for foot in self._feet],
-            self._pose,
-        )
+        left_foot, right_foot = self._feet
+        feet_before = [left_foot.copy(), right_foot.copy()]
+        self._before_step = {**vars(self), "_feet": feet_before, "_before_step": {}}
         x, y, heading = place
         vx, vy, turning = velocity
         speed = math.hypot(vx, vy)
@@ -205,9 +181,11 @@ class OnlineFootsteps:
             ):
                 self._walking = False
         rate = max(cadence, _MIN_CADENCE_HZ)
-        left_foot = self._ankle(LEFT, dt_s, rate, share, place)
-        right_foot = self._ankle(RIGHT, dt_s, rate, share, place)
-        self._pose = self._gait_pose(dt_s, (left_foot, right_foot), place)
+        ankles = (
+            self._ankle(LEFT, dt_s, rate, share, place),
+            self._ankle(RIGHT, dt_s, rate, share, place),
+        )
+        self._pose = self._gait_pose(dt_s, ankles, place)
         return self._pose
 
     def _misplaced(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -133,6 +133,7 @@ class Activity:
                 )
 
     @classmethod
+    @cache
     def of(cls, name: str) -> Activity:
         """Return the activity of this name, with no other before it."""
         return cls(name, name)

@@ -113,8 +113,15 @@ def aligned(x_axis: Vector, towards: Vector) -> Quaternion:
         x_axis: unit vector.
         towards: any vector that is not parallel to it.
     """
-    y_axis = unit(add_scaled(towards, x_axis, -dot(x_axis, towards)))
-    return from_axes(x_axis, y_axis, cross(x_axis, y_axis))
+    # Written out: every placing of a body takes four of them.
+    ax, ay, az = x_axis
+    tx, ty, tz = towards
+    back = -(ax * tx + ay * ty + az * tz)
+    bx, by, bz = tx + back * ax, ty + back * ay, tz + back * az
+    length = math.sqrt(bx * bx + by * by + bz * bz)
+    bx, by, bz = bx / length, by / length, bz / length
+    z_axis = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+    return from_axes(x_axis, (bx, by, bz), z_axis)
 
 
 def multiply(first: Quaternion, then: Quaternion) -> Quaternion:
