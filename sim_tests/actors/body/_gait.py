@@ -110,9 +110,9 @@ class GaitPose(NamedTuple):
 
     def moved(self, dx_m: float, dy_m: float) -> GaitPose:
         """Return the same pose elsewhere in odom."""
-        (ax, ay, *a), (bx, by, *b) = self.feet
-        left, right = (ax + dx_m, ay + dy_m, *a), (bx + dx_m, by + dy_m, *b)
-        return self._replace(feet=(left, right))
+        (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = self.feet
+        left = ax + dx_m, ay + dy_m, az, ayaw, apitch
+        return self._replace(feet=(left, (bx + dx_m, by + dy_m, bz, byaw, bpitch)))
 
 
 def landing_pitch_rad(stride_ratio: float) -> float:

@@ -105,7 +105,7 @@ class RigidPieces:
         pieces[:, :3, :3] = before @ turn
         shift = centre - np.einsum("nij,nj->ni", turn, centre)
         pieces[:, :3, 3] += np.einsum("nij,nj->ni", before, shift)
-        return pieces
+        return np.asarray(pieces)
 
 
 class SkinnedPoints:
