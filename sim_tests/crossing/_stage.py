@@ -15,6 +15,7 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 from ..actors.behaviour import (
+    Heard,
     MovingBody,
     PersonMotion,
     PersonOutcome,
@@ -82,12 +83,11 @@ class TrueView:
 class Stage(AbstractContextManager["Stage"]):
     """Hall, robot and people of one crossing, moved together by physics.
 
-    People are numbered in this order: scripted workers, people who react, replayed people.
+    People are numbered in this order: those of the scenario, then replayed people.
 
     Args:
         scenario: the scenario.
-        start_offsets_s: how much later each scripted worker starts.
-        people_rng: random generator of the people who react; None for the generator of seed 0.
+        people_rng: random generator of the people; None for the generator of seed 0.
         renderer: renderer for images of the stage.
 
     Attributes:
@@ -98,7 +98,6 @@ class Stage(AbstractContextManager["Stage"]):
     def __init__(
         self,
         scenario: Scenario,
-        start_offsets_s: FloatArray,
         people_rng: np.random.Generator | None = None,
         *,
         renderer: RendererName = "tiny",
@@ -107,14 +106,14 @@ class Stage(AbstractContextManager["Stage"]):
         self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
             self.amr = _robot(self.warehouse, scenario)
-            self.walkers, self._behaviours, ears = staged_people(
+            self.people, ears = staged_people(
                 scenario,
                 self.warehouse.obstacle_boxes_odom,
-                start_offsets_s,
                 np.random.default_rng(0) if people_rng is None else people_rng,
             )
             self.workers = tuple(
-                Worker(self.warehouse, each.stature_m, look=each.look) for each in self._behaviours
+                Worker(self.warehouse, each.spec.stature_m, look=each.spec.look)
+                for each in self.people
             )
         except BaseException:
             self.warehouse.close()
@@ -134,7 +133,10 @@ class Stage(AbstractContextManager["Stage"]):
         self._half_size_m: tuple[float, float] = (half_length, half_width)
         # The middle of the outline, which is not the base origin of every robot.
         self._middle_base_m: tuple[float, float] = tuple((0.5 * (low + high)).tolist())
+        # What happened to each person since the last motion, for the next one.
         self._held = [False] * len(self.workers)
+        self._heard: list[list[Heard]] = [[] for _ in self.workers]
+        self._touches: list[list[tuple[float, float]]] = [[] for _ in self.workers]
         self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
 
@@ -183,9 +185,9 @@ class Stage(AbstractContextManager["Stage"]):
         """
         robot = self.amr.T_odom_base[:2, 3]
         heard = self._audience.hear(self.t_s, means, place_odom_m, robot, self._motions)
-        for behaviour, what in zip(self._behaviours, heard, strict=True):
+        for news, what in zip(self._heard, heard, strict=True):
             if what is not None:
-                behaviour.hear(what)
+                news.append(what)
 
     def observe(self, t_s: float, lasts_s: float) -> Separations:
         """Return the separations of all people from the robot now.
@@ -239,21 +241,24 @@ class Stage(AbstractContextManager["Stage"]):
 
     @property
     def outcomes(self) -> tuple[PersonOutcome, ...]:
-        """Outcomes of the people who react, in their order."""
-        return tuple(walker.outcome() for walker in self.walkers)
+        """Outcomes of the people of the scenario, in their order; replayed people have none."""
+        return tuple(person.outcome() for person in self.people[: len(self.scenario.people)])
 
     def _place_workers(self) -> None:
         robot, others = self._robot_body(), self._moving_bodies()
         motions = []
-        for index, (worker, behaviour) in enumerate(
-            zip(self.workers, self._behaviours, strict=True)
-        ):
+        for index, (worker, person) in enumerate(zip(self.workers, self.people, strict=True)):
             around = Surroundings(
                 robot,
                 others[:index] + others[index + 1 :],
                 partial(self._sight.seen_by, worker),
+                held=self._held[index],
+                heard=tuple(self._heard[index]),
+                touches=tuple(self._touches[index]),
             )
-            motion = behaviour.motion(self.t_s, around)
+            self._heard[index].clear()
+            self._touches[index].clear()
+            motion = person.step(self.t_s, around)
             motions.append(self._move_or_hold(index, worker, motion, robot))
         self._motions = tuple(motions)
 
@@ -274,7 +279,6 @@ class Stage(AbstractContextManager["Stage"]):
             return motion
         _pose(worker, before)
         self._held[index] = True
-        self._behaviours[index].hold()
         return replace(before, velocity_odom_mps=np.zeros(2))
 
     def _depth_m(self, worker: Worker) -> float:
@@ -357,7 +361,8 @@ class Stage(AbstractContextManager["Stage"]):
         if not self._touching[index]:  # a continuing touch is one contact
             self._touching[index] = True
             self.contacts.append(ContactEvent(self.t_s, index, velocity, towards))
-        self._behaviours[index].touch(*(-towards).tolist())
+        x, y = (-towards).tolist()
+        self._touches[index].append((x, y))
 
 
 def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:

@@ -20,8 +20,6 @@ from ._asset import (
 from ._footsteps import OnlineFootsteps
 from ._gait import Gait, GaitPose
 from ._held_object import Seat, SeatKind
-from ._planned_footsteps import plan_footsteps
-from ._planned_gait import PlannedGait
 from ._pose import BodyPose, link_transforms, skin_points
 from ._postures import (
     ACTIVITIES,
@@ -66,7 +64,6 @@ __all__ = [
     "Gait",
     "GaitPose",
     "OnlineFootsteps",
-    "PlannedGait",
     "Seat",
     "SeatKind",
     "SkinMesh",
@@ -75,7 +72,6 @@ __all__ = [
     "WorkerSkin",
     "link_transforms",
     "load_worker",
-    "plan_footsteps",
     "skeleton",
     "skin_points",
     "worker_names",

@@ -3,6 +3,9 @@
 A stance foot stays where it landed, rolls from heel to toe and lifts off. A swing foot aims at the
 place under the body at midstance, which is predicted from the body's velocity and acceleration. All
 arithmetic is scalar: NumPy is slow on two feet.
+
+A stance begins with the loading response (the toes come down after the heel) and ends with the
+roll-off (the heel lifts before the toes). Both take a share of the stance, up to a longest time.
 """
 
 from __future__ import annotations
@@ -12,32 +15,47 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from ._gait import (
-    ARM_SWING_RAD,
-    FOOT_LIFT_M,
-    LOADING_S,
-    LOADING_SHARE,
     LONGEST_SWING_S,
     MAX_CADENCE_HZ,
-    MIDSTANCE_PHASE,
-    MIDSTANCE_SHIFT,
-    PELVIS_LIST_RAD,
-    PELVIS_TWIST_SHARE,
-    PELVIS_YAW_RAD,
-    ROLL_OFF_S,
-    ROLL_OFF_SHARE,
-    SWAY_M,
-    SWING_CLEARANCE_M,
-    THORAX_YAW_RAD,
-    TWIST_FROM_MPS,
-    TWIST_RAD,
     FootPose,
     Gait,
     GaitPose,
     PlanarPose,
-    landing_pitch_rad,
-    lift_off_pitch_rad,
 )
 from ._skeleton import LEFT, RIGHT, SIGNS
+
+_LOADING_SHARE: Final = 0.15
+_LOADING_S: Final = 0.18
+_ROLL_OFF_SHARE: Final = 0.43
+_ROLL_OFF_S: Final = 0.45
+# The weight is over the left foot at this phase, counted from its landing.
+_MIDSTANCE_PHASE: Final = 0.30
+# The body is over its foot earlier than halfway through a stance by this share of it.
+_MIDSTANCE_SHIFT: Final = 0.12
+# Lift of a foot in a swing as long as the comfortable stride.
+_FOOT_LIFT_M: Final = 0.035
+# A swing foot stays this much farther from the body's centre line than a stance foot.
+_SWING_CLEARANCE_M: Final = 0.010
+# A body that walks askew turns its feet towards the walk: at most by this angle, and less below
+# this speed.
+_TWIST_RAD: Final = math.radians(35.0)
+_TWIST_FROM_MPS: Final = 0.3
+
+# Amplitudes at the stride of a walk at 1.2 m/s.
+_PELVIS_YAW_RAD: Final = 0.07
+_PELVIS_LIST_RAD: Final = 0.035
+_THORAX_YAW_RAD: Final = 0.06
+_SWAY_M: Final = 0.016
+_ARM_SWING_RAD: Final = 0.36
+# Share of the angle between feet and heading that the pelvis follows.
+_PELVIS_TWIST_SHARE: Final = 0.75
+
+_LANDING_PITCH_RAD: Final = math.radians(-20.0)
+_LIFT_OFF_PITCH_RAD: Final = math.radians(40.0)
+# A backward step lands on the toes and lifts off from the heel.
+_BACKWARD_LANDING_PITCH_RAD: Final = math.radians(16.0)
+_BACKWARD_LIFT_OFF_PITCH_RAD: Final = math.radians(-12.0)
+_MAX_PITCH_FACTOR: Final = 1.15
 
 # Below both of these the body stands.
 _STANDING_BELOW_MPS: Final = 0.05
@@ -154,7 +172,7 @@ class OnlineFootsteps:
         if speed > 1e-3:
             askew = math.atan2(vy, vx) - heading
         blend = 1.0 - math.exp(-dt_s / _SMOOTHING_S)
-        twist = TWIST_RAD * min(speed / TWIST_FROM_MPS, 1.0) * math.sin(2.0 * askew)
+        twist = _TWIST_RAD * min(speed / _TWIST_FROM_MPS, 1.0) * math.sin(2.0 * askew)
         self._twist += blend * (twist - self._twist)
         along = askew - self._twist
         forward, left = speed * math.cos(along), speed * math.sin(along)
@@ -257,7 +275,7 @@ class OnlineFootsteps:
     ) -> PlanarPose:
         """Return the place of the swing foot under the body's predicted position at midstance."""
         x, y, facing, vx, vy, turning = body
-        midstance = 0.5 - MIDSTANCE_SHIFT * min(max(2.0 * self._stride_ratio, -1.0), 1.0)
+        midstance = 0.5 - _MIDSTANCE_SHIFT * min(max(2.0 * self._stride_ratio, -1.0), 1.0)
         ahead_s = (1.0 - self._feet[side].phase + midstance * share) / rate
         ax, ay = acceleration
         gain = vx * ax + vy * ay
@@ -287,32 +305,32 @@ class OnlineFootsteps:
             tx, ty, tyaw = foot.target
             reach = math.hypot(tx - x, ty - y) + 0.25 * abs(tyaw - yaw)
             x, y, yaw = x + smooth * (tx - x), y + smooth * (ty - y), yaw + smooth * (tyaw - yaw)
-            lift_off, landing = foot.lift_off_pitch, landing_pitch_rad(stride_ratio)
+            lift_off, landing = foot.lift_off_pitch, _landing_pitch_rad(stride_ratio)
             swing_s = min((1.0 - share) / rate, LONGEST_SWING_S)
-            roll_off_s = min(ROLL_OFF_SHARE * share / rate, ROLL_OFF_S)
+            roll_off_s = min(_ROLL_OFF_SHARE * share / rate, _ROLL_OFF_S)
             pitch = lift_off + (landing - lift_off) * smooth
             pitch += 2.0 * lift_off * swing_s / roll_off_s * u * (1.0 - u) ** 2
             # The swing foot goes round the stance foot.
             sin, cos = math.sin(place[2] + self._twist), math.cos(place[2] + self._twist)
             beside = cos * (y - place[1]) - sin * (x - place[0])
-            clear = self._gait.half_width_m(side, stride_ratio) + SWING_CLEARANCE_M
+            clear = self._gait.half_width_m(side, stride_ratio) + _SWING_CLEARANCE_M
             bump = min(1.6 * math.sin(math.pi * u) ** 2, 1.0)
             aside = max(clear - SIGNS[side] * beside, 0.0) * bump
             x -= SIGNS[side] * aside * sin
             y += SIGNS[side] * aside * cos
             reach += 4.0 * aside
             strides = min(reach / self._gait.comfortable_stride_m, 1.5)
-            lift = FOOT_LIFT_M * math.sqrt(strides) * math.sin(math.pi * u)
+            lift = _FOOT_LIFT_M * math.sqrt(strides) * math.sin(math.pi * u)
         else:
             stance_s = share / rate
-            landed = min(foot.landed_for_s / min(LOADING_SHARE * stance_s, LOADING_S), 1.0)
+            landed = min(foot.landed_for_s / min(_LOADING_SHARE * stance_s, _LOADING_S), 1.0)
             landed = landed * landed * (3.0 - 2.0 * landed)
-            pitch = landing_pitch_rad(stride_ratio) * (1.0 - landed)
+            pitch = _landing_pitch_rad(stride_ratio) * (1.0 - landed)
             if self._walking and foot.phase < share:
                 until_lift_off_s = (share - foot.phase) / rate
-                roll_off_s = min(ROLL_OFF_SHARE * stance_s, ROLL_OFF_S)
+                roll_off_s = min(_ROLL_OFF_SHARE * stance_s, _ROLL_OFF_S)
                 rolled = max(1.0 - until_lift_off_s / roll_off_s, 0.0)
-                pitch += lift_off_pitch_rad(stride_ratio) * rolled * rolled
+                pitch += _lift_off_pitch_rad(stride_ratio) * rolled * rolled
         most = _MAX_PITCH_RATE_RADPS * dt_s
         foot.pitch += min(max(pitch - foot.pitch, -most), most)
         ahead, height = self._gait.ankle(side, foot.pitch)
@@ -328,10 +346,10 @@ class OnlineFootsteps:
         stride_ratio, size = self._stride_ratio, abs(self._stride_ratio)
         # The phase counts from the left foot's landing.
         turn = math.cos(math.tau * self._phase)
-        weight = math.cos(math.tau * (self._phase - MIDSTANCE_PHASE))
-        sway = SWAY_M * min(2.0 * size, 1.0) * weight
-        yaw = -PELVIS_YAW_RAD * stride_ratio * turn + PELVIS_TWIST_SHARE * self._twist
-        tilt = PELVIS_LIST_RAD * size * weight
+        weight = math.cos(math.tau * (self._phase - _MIDSTANCE_PHASE))
+        sway = _SWAY_M * min(2.0 * size, 1.0) * weight
+        yaw = -_PELVIS_YAW_RAD * stride_ratio * turn + _PELVIS_TWIST_SHARE * self._twist
+        tilt = _PELVIS_LIST_RAD * size * weight
         highest = min(
             self._gait.hip_limit_m(feet, place, sway, yaw, tilt), self._gait.standing.hip_height_m
         )
@@ -346,9 +364,9 @@ class OnlineFootsteps:
             sway,
             yaw,
             tilt,
-            THORAX_YAW_RAD * stride_ratio * turn,
+            _THORAX_YAW_RAD * stride_ratio * turn,
             stride_ratio,
-            -ARM_SWING_RAD * stride_ratio * turn,
+            -_ARM_SWING_RAD * stride_ratio * turn,
         )
 
 
@@ -383,3 +401,15 @@ def steady_walk(gait: Gait, walked_m: float, speed_mps: float) -> GaitPose:
             -start_m / speed_mps / steps, (x, 0.0, 0.0), (speed_mps, 0.0, 0.0), (0.0, 0.0)
         )
     return pose
+
+
+def _landing_pitch_rad(stride_ratio: float) -> float:
+    """Return the pitch of a landing foot; toes down is positive."""
+    size = min(abs(stride_ratio), _MAX_PITCH_FACTOR)
+    return size * (_LANDING_PITCH_RAD if stride_ratio >= 0.0 else _BACKWARD_LANDING_PITCH_RAD)
+
+
+def _lift_off_pitch_rad(stride_ratio: float) -> float:
+    """Return the pitch of a foot that lifts off; toes down is positive."""
+    size = min(abs(stride_ratio), _MAX_PITCH_FACTOR)
+    return size * (_LIFT_OFF_PITCH_RAD if stride_ratio >= 0.0 else _BACKWARD_LIFT_OFF_PITCH_RAD)

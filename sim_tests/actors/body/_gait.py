@@ -1,8 +1,4 @@
-"""The gait of a body: strides that follow the speed, and the pose of feet, hips and trunk.
-
-A stance begins with the loading response (the toes come down after the heel) and ends with the
-roll-off (the heel lifts before the toes). Both take a share of the stance, up to a longest time.
-"""
+"""The gait of a body: strides that follow the speed, and the pose of feet, hips and trunk."""
 
 from __future__ import annotations
 
@@ -15,49 +11,17 @@ from ._quaternions import subtract
 from ._skeleton import SIDES, SIGNS, Skeleton
 
 LONGEST_SWING_S: Final = 0.65
-LOADING_SHARE: Final = 0.15
-LOADING_S: Final = 0.18
-ROLL_OFF_SHARE: Final = 0.43
-ROLL_OFF_S: Final = 0.45
-#: The weight is over the left foot at this phase, counted from its landing.
-MIDSTANCE_PHASE: Final = 0.30
-#: The body is over its foot earlier than halfway through a stance by this share of it.
-MIDSTANCE_SHIFT: Final = 0.12
-#: Lift of a foot in a swing as long as the comfortable stride.
-FOOT_LIFT_M: Final = 0.035
-#: A swing foot stays this much farther from the body's centre line than a stance foot.
-SWING_CLEARANCE_M: Final = 0.010
-#: Part of a leg's reach that is used. Knees are never locked: this leaves a bend of 7 degrees.
-USED_REACH: Final = 0.998
+# Part of a leg's reach that is used. Knees are never locked: this leaves a bend of 7 degrees.
+_USED_REACH: Final = 0.998
 
-#: A cycle turns the body this far on the spot.
-TURN_PER_CYCLE_RAD: Final = math.radians(60.0)
-#: A sideways stride as a share of stature: the feet must not cross.
-SIDE_STRIDE_SHARE: Final = 0.12
-#: A backward stride as a share of a forward one.
-BACKWARD_STRIDE_SHARE: Final = 0.75
+# A cycle turns the body this far on the spot.
+_TURN_PER_CYCLE_RAD: Final = math.radians(60.0)
+# A sideways stride as a share of stature: the feet must not cross.
+_SIDE_STRIDE_SHARE: Final = 0.12
+# A backward stride as a share of a forward one.
+_BACKWARD_STRIDE_SHARE: Final = 0.75
 #: Largest cadence of any motion.
 MAX_CADENCE_HZ: Final = 1.8
-#: A body that walks askew turns its feet towards the walk: at most by this angle, and less below
-#: this speed.
-TWIST_RAD: Final = math.radians(35.0)
-TWIST_FROM_MPS: Final = 0.3
-
-# Amplitudes at the stride of a walk at 1.2 m/s.
-PELVIS_YAW_RAD: Final = 0.07
-PELVIS_LIST_RAD: Final = 0.035
-THORAX_YAW_RAD: Final = 0.06
-SWAY_M: Final = 0.016
-ARM_SWING_RAD: Final = 0.36
-#: Share of the angle between feet and heading that the pelvis follows.
-PELVIS_TWIST_SHARE: Final = 0.75
-
-_LANDING_PITCH_RAD: Final = math.radians(-20.0)
-_LIFT_OFF_PITCH_RAD: Final = math.radians(40.0)
-# A backward step lands on the toes and lifts off from the heel.
-_BACKWARD_LANDING_PITCH_RAD: Final = math.radians(16.0)
-_BACKWARD_LIFT_OFF_PITCH_RAD: Final = math.radians(-12.0)
-_MAX_PITCH_FACTOR: Final = 1.15
 
 # Stride at the comfortable speed as a share of stature. Step length grows with speed to about this
 # power (Bertram and Ruina 2001, Journal of Theoretical Biology 209, 445-453).
@@ -115,18 +79,6 @@ class GaitPose(NamedTuple):
         return self._replace(feet=(left, (bx + dx_m, by + dy_m, bz, byaw, bpitch)))
 
 
-def landing_pitch_rad(stride_ratio: float) -> float:
-    """Return the pitch of a landing foot; toes down is positive."""
-    size = min(abs(stride_ratio), _MAX_PITCH_FACTOR)
-    return size * (_LANDING_PITCH_RAD if stride_ratio >= 0.0 else _BACKWARD_LANDING_PITCH_RAD)
-
-
-def lift_off_pitch_rad(stride_ratio: float) -> float:
-    """Return the pitch of a foot that lifts off; toes down is positive."""
-    size = min(abs(stride_ratio), _MAX_PITCH_FACTOR)
-    return size * (_LIFT_OFF_PITCH_RAD if stride_ratio >= 0.0 else _BACKWARD_LIFT_OFF_PITCH_RAD)
-
-
 class Gait:
     """The gait of one body: its figures for one speed, pitch or place at a time.
 
@@ -162,7 +114,7 @@ class Gait:
         rolls = [sole.ankle(pitches) for sole in bones.soles]
         self._rolls = [(ahead.tolist(), height.tolist()) for ahead, height in rolls]
         self._hips_m = [subtract(bones.joint_m(f"{side}_hip"), bones.hips_m) for side in SIDES]
-        self._reach_m = [USED_REACH * leg.reach_m for leg in bones.legs]
+        self._reach_m = [_USED_REACH * leg.reach_m for leg in bones.legs]
         self.standing = self._standing_pose(bones)
 
     def _standing_pose(self, bones: Skeleton) -> GaitPose:
@@ -195,9 +147,9 @@ class Gait:
         """Return the cycles per second that walking and turning need together."""
         forward = max(self.stride_m(math.hypot(forward_mps, left_mps)), 1e-6)
         if forward_mps < 0.0:
-            forward *= BACKWARD_STRIDE_SHARE
-        sideways = min(forward, SIDE_STRIDE_SHARE * self.stature_m)
-        turn = turning_radps / TURN_PER_CYCLE_RAD
+            forward *= _BACKWARD_STRIDE_SHARE
+        sideways = min(forward, _SIDE_STRIDE_SHARE * self.stature_m)
+        turn = turning_radps / _TURN_PER_CYCLE_RAD
         return min(math.hypot(forward_mps / forward, left_mps / sideways, turn), MAX_CADENCE_HZ)
 
     def neutral(

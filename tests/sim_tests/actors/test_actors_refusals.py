@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import pytest
 
 from sim_tests import Scenario
@@ -20,7 +19,7 @@ def person(**fields: Any) -> dict[str, Any]:
 
 def stage(*people: dict[str, Any], layout: str = "open") -> Stage:
     case = {"name": "x", "duration_s": 1.0, "layout": layout, "robot": {"goal_x_m": 1.0}}
-    return Stage(Scenario.model_validate({**case, "people": list(people)}), np.zeros(0))
+    return Stage(Scenario.model_validate({**case, "people": list(people)}))
 
 
 @pytest.mark.parametrize(
@@ -36,6 +35,10 @@ def stage(*people: dict[str, Any], layout: str = "open") -> Stage:
         (
             lambda: PersonSpec.model_validate(person(sets_off_within_m=1.0)),
             "sets_off_within_m needs a route of at least two",
+        ),
+        (
+            lambda: PersonSpec.model_validate(person(gaze=[{"t_s": 1.0}, {"t_s": 1.0}])),
+            "gaze must have increasing t_s",
         ),
         (lambda: stage(person(), person()), "names of people must be unique"),
         (lambda: stage(person(reactions={"wait": 0.0})), "at least one share"),
