@@ -44,8 +44,6 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
-# The highest speed that a body is placed with; recorded people may be faster.
-_FASTEST_MPS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -385,10 +383,8 @@ def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> Non
     worker.place(
         motion.position_odom_m,
         motion.heading_odom_rad,
-        motion.walked_m,
-        min(math.hypot(*motion.velocity_odom_mps.tolist()), _FASTEST_MPS),
-        motion.head_yaw_rad,
-        motion.head_pitch_rad,
+        head_yaw_rad=motion.head_yaw_rad,
+        head_pitch_rad=motion.head_pitch_rad,
         eye_yaw_rad=motion.eye_yaw_rad,
         eye_pitch_rad=motion.eye_pitch_rad,
         activity=motion.activity,
