@@ -24,7 +24,7 @@ from ..actors.behaviour import (
     Surroundings,
 )
 from ..actors.body import Worker
-from ..actors.robot import Amr, KinematicRobot, RobotLook
+from ..actors.robot import Amr, KinematicRobot, RobotLook, robot_of
 from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.bullet import pybullet
@@ -367,10 +367,7 @@ def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
     """Return the robot of a scenario at its start."""
     task, model = scenario.robot, scenario.robot_model
     start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
-    if model is None or model.body == "nova_carter":
-        mount = scenario.camera.mount
-        return Amr(warehouse, start, heading_rad, mount)
-    return KinematicRobot(warehouse, model, start, heading_rad)
+    return robot_of(warehouse, model, start, heading_rad, camera_mount=scenario.camera.mount)
 
 
 def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:

@@ -12,14 +12,13 @@ from ._asset import (
     JOINTS,
     MESH_UNITS,
     PARENTS,
-    SkinMesh,
     WorkerAsset,
     load_worker,
     worker_names,
 )
 from ._footsteps import OnlineFootsteps
 from ._gait import Gait, GaitPose
-from ._held_object import Seat, SeatKind
+from ._held_object import SeatKind
 from ._pose import BodyPose, link_transforms, skin_points
 from ._postures import (
     ACTIVITIES,
@@ -64,9 +63,7 @@ __all__ = [
     "Gait",
     "GaitPose",
     "OnlineFootsteps",
-    "Seat",
     "SeatKind",
-    "SkinMesh",
     "Worker",
     "WorkerAsset",
     "WorkerSkin",

@@ -13,7 +13,7 @@ from ._model import (
     RobotModel,
     shipped_robots,
 )
-from ._robots import Amr, KinematicRobot, Robot
+from ._robots import Amr, KinematicRobot, Robot, robot_of
 
 __all__ = [
     "CAMERA_FORWARD_M",
@@ -28,5 +28,6 @@ __all__ = [
     "RobotLook",
     "RobotModel",
     "amr_meshes",
+    "robot_of",
     "shipped_robots",
 ]

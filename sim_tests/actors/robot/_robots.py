@@ -467,6 +467,20 @@ class KinematicRobot(Robot):
         self._T_odom_base: FloatArray = T
 
 
+def robot_of(
+    warehouse: Warehouse,
+    model: RobotModel | None,
+    position_odom_m: Any = (0.0, 0.0),
+    heading_odom_rad: float = 0.0,
+    *,
+    camera_mount: Literal["front", "top"] = "front",
+) -> Amr | KinematicRobot:
+    """Place the robot of a model; None is the Nova Carter, whose camera alone can be mounted."""
+    if model is None or model.body == "nova_carter":
+        return Amr(warehouse, position_odom_m, heading_odom_rad, camera_mount)
+    return KinematicRobot(warehouse, model, position_odom_m, heading_odom_rad)
+
+
 def _ramped(now: float, target: float, rise: float, fall: float) -> float:
     """Return a step from ``now`` to ``target``: by ``rise`` away from zero, by ``fall`` towards it.
 
