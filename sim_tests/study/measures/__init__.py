@@ -21,8 +21,14 @@ if TYPE_CHECKING:
         resampled_interval,
         resampled_means,
     )
-    from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
-    from ._driving import path_length_m, success_weighted
+    from ._driving import (
+        OVERSHOOT_MPS,
+        Conduct,
+        fastest_point_excess_mps,
+        limit_excess_mps,
+        path_length_m,
+        success_weighted,
+    )
     from ._interval import (
         FEW_PAIRS,
         NOTHING,
@@ -33,20 +39,16 @@ if TYPE_CHECKING:
         proportion_interval,
         zero_of_n_upper,
     )
-    from ._measure import measure
+    from ._log import measure
+    from ._metrics import COLUMNS, METRICS
     from ._pairs import (
         paired,
         paired_difference,
         paired_ratio,
         violates_more,
     )
-    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric
-    from ._record_file import (
-        RECORD_COLUMNS,
-        read_records,
-        record_row,
-        write_records,
-    )
+    from ._record import RECORD_COLUMNS, EpisodeRecord, read_records, record_row, write_records
+    from ._registry import RATIOS, SHARES, Metric
     from ._step_out import StepOut, step_out_impacts
     from ._summary import (
         BASELINE,

@@ -11,8 +11,8 @@ import numpy as np
 from ...world.errors import SimError
 from ._bootstrap import bootstrap_interval, ratio_interval
 from ._interval import Interval, proportion_interval
+from ._metrics import COLUMNS
 from ._record import EpisodeRecord
-from ._record_file import COLUMN_KINDS
 
 Pair = tuple[EpisodeRecord, EpisodeRecord]
 
@@ -54,7 +54,7 @@ def paired_difference(
     Raises:
         SimError: one side has an episode twice, or the field holds no number.
     """
-    if COLUMN_KINDS.get(field, "text") == "text":
+    if field not in COLUMNS or COLUMNS[field].kind == "text":
         raise SimError(f"field must be a number of an episode, got {field!r}")
     pairs = paired(base, other)
     kept = _with_numbers(pairs, field)

@@ -14,13 +14,15 @@ from perception.short_repr import short_repr
 from ._awareness import measured_part
 from ._bootstrap import ratio_intervals
 from ._interval import Interval, proportion_interval
+from ._metrics import METRICS
 from ._pairs import (
     paired,
     paired_difference,
     paired_ratio,
     violates_more,
 )
-from ._record import METRICS, RATIOS, EpisodeRecord
+from ._record import EpisodeRecord
+from ._registry import RATIOS
 
 #: Policy that others are compared with, unless another is named.
 BASELINE: Final = "blind"
