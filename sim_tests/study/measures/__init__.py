@@ -15,12 +15,6 @@ if TYPE_CHECKING:
         MeasuredAttention,
         measured_part,
     )
-    from ._bootstrap import (
-        bootstrap_interval,
-        ratio_interval,
-        resampled_interval,
-        resampled_means,
-    )
     from ._driving import (
         OVERSHOOT_MPS,
         Conduct,
@@ -29,26 +23,26 @@ if TYPE_CHECKING:
         path_length_m,
         success_weighted,
     )
-    from ._interval import (
+    from ._log import measure
+    from ._metrics import COLUMNS, METRICS
+    from ._record import RECORD_COLUMNS, EpisodeRecord, read_records, record_row, write_records
+    from ._registry import RATIOS, SHARES, Metric
+    from ._statistics import (
         FEW_PAIRS,
         NOTHING,
         THIN,
         Interval,
+        bootstrap_interval,
         number_text,
-        percent,
-        proportion_interval,
-        zero_of_n_upper,
-    )
-    from ._log import measure
-    from ._metrics import COLUMNS, METRICS
-    from ._pairs import (
         paired,
         paired_difference,
-        paired_ratio,
+        percent,
+        proportion_interval,
+        resampled_interval,
+        resampled_means,
         violates_more,
+        zero_of_n_upper,
     )
-    from ._record import RECORD_COLUMNS, EpisodeRecord, read_records, record_row, write_records
-    from ._registry import RATIOS, SHARES, Metric
     from ._step_out import StepOut, step_out_impacts
     from ._summary import (
         BASELINE,
@@ -99,11 +93,9 @@ __all__ = [
     "number_text",
     "paired",
     "paired_difference",
-    "paired_ratio",
     "path_length_m",
     "percent",
     "proportion_interval",
-    "ratio_interval",
     "read_records",
     "record_row",
     "resampled_interval",

@@ -11,12 +11,12 @@ from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
-from ._record import EpisodeRecord
 from ._registry import Awareness
 from ._trace import Trace
 
 if TYPE_CHECKING:
     from ...crossing import CrossingResult
+    from ._record import EpisodeRecord
 
 #: Largest distance between a track and its person.
 MATCHED_WITHIN_M: Final = 1.0

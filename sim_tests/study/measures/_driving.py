@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
@@ -52,22 +53,21 @@ def success_weighted(
     return best / max(actual or 0.0, best) if success else 0.0
 
 
-def count_stops(
-    speeds_mps: FloatArray, arrived: bool, standing_mps: float, moving_mps: float = MOVING_SPEED_MPS
-) -> int:
+def count_stops(speeds_mps: FloatArray, stands: NDArray[np.bool_], arrived: bool) -> int:
     """Return how often the robot came to a stand.
+
+    After a stop, it must exceed :data:`MOVING_SPEED_MPS` before it can stop again.
 
     Args:
         speeds_mps: (N,) speeds, signed or not.
+        stands: (N,) whether the robot stands.
         arrived: the goal was reached at the end; standing at the goal is not a stop.
-        standing_mps: the robot stands below this speed.
-        moving_mps: after a stop, the robot must exceed this speed before it can stop again.
     """
     stops, moving = 0, False
-    for speed in np.abs(speeds_mps).tolist():
-        if speed > moving_mps:
+    for speed, still in zip(np.abs(speeds_mps).tolist(), stands.tolist(), strict=True):
+        if speed > MOVING_SPEED_MPS:
             moving = True
-        elif speed < standing_mps and moving:
+        elif still and moving:
             stops, moving = stops + 1, False
     return stops - 1 if stops and arrived and not moving else stops
 

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ...crossing import STANDING_SPEED_MPS, ContactEvent, CrossingResult
-from ._awareness import MeasuredAttention, awareness_class, nearest_person, track_awareness
-from ._conflict import Outline, min_time_to_collision_s, post_encroachment_s
-from ._driving import count_stops, path_length_m, peak_deceleration_and_jerk, success_weighted
+from ._awareness import nearest_person, track_awareness
+from ._conflict import Outline
+from ._driving import path_length_m, peak_deceleration_and_jerk
 from ._metrics import COLUMNS
 from ._record import EpisodeRecord
-from ._registry import Awareness
 from ._requests import Requests
 from ._step_out import FASTER_STEP_OUT, StepOutImpacts, is_unaware, since_look_of, step_out_impacts
 from ._trace import Trace
@@ -69,8 +68,9 @@ class Log:
     Attributes:
         result: as given.
         trace: the true course as arrays.
-        time_without_people_s: as given.
         contacts: all contacts.
+        time_without_people_s: as given.
+        length_without_people_m: as given.
 
     Raises:
         SimError: a result without frames, or with frames that do not hold all people.
@@ -86,7 +86,7 @@ class Log:
         self.trace = Trace.of(result)
         self.contacts = result.contacts
         self.time_without_people_s = time_without_people_s
-        self._length_without_people_m = length_without_people_m
+        self.length_without_people_m = length_without_people_m
 
     @cached_property
     def nearest_m(self) -> FloatArray:
@@ -140,37 +140,15 @@ class Log:
         """Length of the driven path."""
         return path_length_m(self.trace.robot_odom_m)
 
-    @property
-    def path_weighted_success(self) -> float | None:
-        """SPL of the episode; None where the length without people is not known."""
-        return success_weighted(
-            self.result.success, self.path_length_m, self._length_without_people_m
-        )
-
-    @property
-    def stops(self) -> int:
-        """Number of stops before the goal."""
-        arrived = self.result.time_to_goal_s is not None
-        return count_stops(self.trace.travel_mps, arrived, STANDING_SPEED_MPS)
-
     @cached_property
     def peak_deceleration_and_jerk(self) -> tuple[float | None, float | None]:
         """Highest deceleration (m/s²) and largest jerk (m/s³) of the velocity in the base frame."""
         return peak_deceleration_and_jerk(self.trace.t_s, self.trace.velocity_base_mps)
 
     @cached_property
-    def _outline(self) -> Outline:
+    def outline(self) -> Outline:
+        """Convex hull of the robot's footprint."""
         return Outline(self.result.robot.footprint_m)
-
-    @property
-    def min_time_to_collision_s(self) -> float | None:
-        """Smallest time to collision; None without a course of collision."""
-        return min_time_to_collision_s(self.trace, self._outline)
-
-    @property
-    def post_encroachment_s(self) -> float | None:
-        """Smallest post-encroachment time; None where robot and people shared no place."""
-        return post_encroachment_s(self.trace, self._outline)
 
     @cached_property
     def step_out(self) -> StepOutImpacts:
@@ -187,11 +165,6 @@ class Log:
         """Requests for attention."""
         return Requests.of(self.result, self.trace)
 
-    @property
-    def attention(self) -> MeasuredAttention:
-        """Attention of the people while it mattered."""
-        return MeasuredAttention.of(self.trace)
-
     @cached_property
     def tracked_awareness(self) -> tuple[FloatArray, FloatArray]:
         """(N, P) α of each person's track, and its lower bound; NaN without a track."""
@@ -201,12 +174,3 @@ class Log:
     def nearest_person(self) -> tuple[int, int] | None:
         """Instant and person of the closest approach; None if nobody came near."""
         return nearest_person(self.trace.separation_m)
-
-    @property
-    def awareness_of_nearest(self) -> Awareness:
-        """Awareness of that person, and the robot's judgement of it."""
-        if self.nearest_person is None:
-            return ""
-        row, person = self.nearest_person
-        true, (_, lower) = self.trace.awareness, self.tracked_awareness
-        return awareness_class(self.trace.t_s, true[:, person], lower[:, person], row)

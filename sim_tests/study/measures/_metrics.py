@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from . import _conflict, _driving
+from ._awareness import MeasuredAttention, awareness_class
 from ._registry import Awareness, Better, Column, Kind, Metric
 
 if TYPE_CHECKING:
@@ -185,7 +187,9 @@ def path_length_m(log: Log) -> float:
 @measure_of_log("Success weighted by path length", better="higher", decimals=3)
 def spl(log: Log) -> float | None:
     """1 for every goal reached on the shortest way (Anderson et al. 2018)."""
-    return log.path_weighted_success
+    return _driving.success_weighted(
+        log.result.success, log.path_length_m, log.length_without_people_m
+    )
 
 
 @measure_of_log("Speed when nearest")
@@ -202,13 +206,13 @@ def speed_at_min_separation_mps(log: Log) -> float | None:
 @measure_of_log("Smallest time to collision", better="higher")
 def min_time_to_collision_s(log: Log) -> float | None:
     """Time until robot and person would touch if both went straight on, at its smallest."""
-    return log.min_time_to_collision_s
+    return _conflict.min_time_to_collision_s(log.trace, log.outline)
 
 
 @measure_of_log("Post-encroachment time", better="higher")
 def post_encroachment_s(log: Log) -> float | None:
     """Smallest time between one leaving a place and the other entering it."""
-    return log.post_encroachment_s
+    return _conflict.post_encroachment_s(log.trace, log.outline)
 
 
 @measure_of_log("Time within 0.45 m")
@@ -256,7 +260,8 @@ def peak_jerk_mps3(log: Log) -> float | None:
 @measure_of_log("Stops")
 def stops(log: Log) -> int:
     """Number of times that the robot came to a stand before the goal."""
-    return log.stops
+    arrived = log.result.time_to_goal_s is not None
+    return _driving.count_stops(log.trace.travel_mps, ~log.moves, arrived)
 
 
 @measure_of_log("Delay of people")
@@ -313,7 +318,11 @@ def awareness_error(log: Log) -> float | None:
 @column
 def awareness(log: Log) -> Awareness:
     """Awareness of the person who came nearest, and the robot's judgement of it."""
-    return log.awareness_of_nearest
+    if log.nearest_person is None:
+        return ""
+    row, person = log.nearest_person
+    true, (_, lower) = log.trace.awareness, log.tracked_awareness
+    return awareness_class(log.trace.t_s, true[:, person], lower[:, person], row)
 
 
 @column
@@ -347,7 +356,7 @@ def attentive_share(log: Log) -> float | None:
 
     Counted while the robot was in front of them, in sight and within 5 m.
     """
-    return log.attention.least_aware_share
+    return MeasuredAttention.of(log.trace).least_aware_share
 
 
 @measure_of_log("Contacts with a moving robot", decimals=3)
