@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from ._crossing import (
-    Crossing,
-    Observer,
-    Situation,
-    run_crossing,
-)
+from ._assembly import Setup, changed, named_fault
+from ._crossing import Crossing, Observer, Situation, drive, run_crossing
 from ._drawing import TopView, draw_camera_view
 from ._policies import named_policy
 from ._requests import RequestMemory
@@ -30,13 +26,17 @@ __all__ = [
     "Observer",
     "RequestMemory",
     "SafetyFigures",
+    "Setup",
     "Situation",
     "Stage",
     "StraightOn",
     "TopView",
     "TrueView",
+    "changed",
     "contact_by",
     "draw_camera_view",
+    "drive",
+    "named_fault",
     "named_policy",
     "run_crossing",
 ]

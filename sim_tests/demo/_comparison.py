@@ -14,8 +14,8 @@ from tqdm import tqdm
 from awarenav.files import csv_number, write_csv
 from perception.arrays import ImageRgb
 
+from ..conditions import Perception
 from ..crossing import CrossingFrame, CrossingResult, run_crossing
-from ..crossing.eyes import Perception
 from ..scenario import Scenario, ScenarioTemplate
 from ..world.errors import SimError
 from ._portraits import PortraitRecorder

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from awarenav.cli import command, option, options
+from awarenav.cli import OneOf, command, option, options
+
+from ..conditions import conditions_options
 
 
 @command(
@@ -17,11 +19,11 @@ from awarenav.cli import command, option, options
     epilog="Needs the extra 'sim'. The encounter keeps the paper's robot and its scripted worker.",
 )
 @options.out_folder("demo")
-@options.seed()
 @option("--no-video", is_flag=True, help="Write no films (faster).")
-@options.perception(["keypoints", "pixels"], note=" 'pixels' takes many minutes.")
-@options.robot()
-@options.population()
+@conditions_options(
+    without=("scenario", "policy", "planner", "sensors", "camera", "fault"),
+    perception={"type": OneOf(["keypoints", "pixels"]), "note": " 'pixels' takes many minutes."},
+)
 @options.as_json("the tables")
 def demo(
     out: Path,

@@ -17,21 +17,24 @@ from perception.arrays import FloatArray
 from perception.installation import install_command
 from tracking.config import complaints
 
-from ..actors.behaviour import population_of
 from ..actors.robot import NOVA_CARTER, RobotModel
+from ..conditions import Perception
 from ..crossing import (
     STANDING_SPEED_MPS,
     Crossing,
     CrossingFrame,
     SafetyFigures,
+    Setup,
     Situation,
     TopView,
+    changed,
     contact_by,
     draw_camera_view,
+    named_fault,
     named_policy,
 )
-from ..crossing.eyes import Perception
-from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
+from ..crossing.faults import Fault
+from ..scenario import Scenario, ScenarioTemplate
 from ..world.camera import CameraRenderer
 from ..world.errors import SimError
 from ._actions import action_limits, command_of
@@ -82,6 +85,9 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         robot: another robot, to which every scenario is fitted: a model, a shipped name, a YAML
             file or a profile. A holonomic one is driven by speed and yaw rate too.
         population: habits of the people, as for ``run_crossing``; None for each scenario's own.
+        fault: a fault of sensors, detections or odometry, or its name; None for none.
+        axes: other conditions of ``run_crossing`` that change the scenario, such as
+            ``camera="surround"``.
 
     Raises:
         SimError: for arguments that are not valid.
@@ -109,6 +115,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         render_view: View = "top",
         robot: RobotModel | RobotProfile | str | Path | None = None,
         population: str | None = None,
+        fault: Fault | str | None = None,
+        **axes: str,
     ) -> None:
         EzPickle.__init__(
             self,
@@ -125,10 +133,15 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             render_view=render_view,
             robot=robot,
             population=population,
+            fault=fault,
+            **axes,
         )
         if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
             scenarios = (scenarios,)
-        self._scenarios = tuple(map(_template, scenarios))
+        own_robot = None if robot is None else RobotModel.of(robot)
+        # The conditions that change the scenario, which is done once, and not in every episode.
+        self._axes = {"robot": own_robot, "population": population, **axes}
+        self._scenarios = tuple(self._changed(each) for each in scenarios)
         if not self._scenarios:
             raise SimError("scenarios must name at least one scenario, got none")
         if control_hz is not None and not 0.0 < control_hz <= 240.0:
@@ -138,8 +151,11 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if render_view not in _VIEWS:
             raise SimError(not_one_of("render_view", render_view, _VIEWS))
         Perception.named(perception)
-        self._policy = named_policy(policy)[1]
-        self._perception = perception
+        self._given: dict[str, Any] = {
+            "policy": named_policy(policy)[1],
+            "perception": perception,
+            "fault": named_fault(fault),
+        }
         self._control_hz = control_hz
         self._normalised = normalised_actions
         self._weights = _weights(reward)
@@ -158,11 +174,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
-        if population is not None:
-            population_of(population)  # refuses an unknown one now
-        self._population = population
-        self._robot = None if robot is None else RobotModel.of(robot)
-        profile = NOVA_CARTER if self._robot is None else self._robot.profile
+        profile = NOVA_CARTER if own_robot is None else own_robot.profile
         limits = np.array(action_limits(profile))
         self.action_space = (
             spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -212,16 +224,12 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         choice = int(self.np_random.integers(len(self._scenarios)))
         episode_seed = drawn if seed is None else seed
         given = (options or {}).get("scenario")
-        template = self._scenarios[choice] if given is None else _template(given)
+        template = self._scenarios[choice] if given is None else self._changed(given)
         scenario = template if isinstance(template, Scenario) else template.for_seed(episode_seed)
         if self._control_hz is not None:
             scenario = scenario.model_copy(update={"control_hz": self._control_hz})
-        if self._population is not None:
-            scenario = scenario.with_population(self._population)
-        if self._robot is not None:
-            scenario = scenario_for_robot(scenario, self._robot)
         self.close()
-        self._crossing = Crossing(scenario, self._policy, self._perception, episode_seed)
+        self._crossing = Crossing(Setup.of(scenario, seed=episode_seed, **self._given))
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
         self._frame = None
         self._ended = False
@@ -300,6 +308,15 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._safety = self._safety.after(now.t_s, now.separations)
         return now
 
+    def _changed(self, given: Any) -> Scenario | ScenarioTemplate:
+        """Return a scenario with the robot, the population and the like of the environment."""
+        if not isinstance(given, (str, Scenario, ScenarioTemplate)):
+            raise SimError(
+                "a scenario must be a name, a YAML file, a Scenario or a template, got "
+                f"{given!r:.80}"
+            )
+        return changed(given, self._axes)
+
     def _observation(self) -> Observation:
         now = self.situation
         return self._encoder.encode(now.sensed.state, self.crossing.goal_odom_m, now.constraints)
@@ -346,16 +363,6 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if seed is not None:
             info["seed"] = seed
         return info
-
-
-def _template(given: Any) -> Scenario | ScenarioTemplate:
-    if isinstance(given, (Scenario, ScenarioTemplate)):
-        return given
-    if not isinstance(given, str):
-        raise SimError(
-            f"a scenario must be a name, a YAML file, a Scenario or a template, got {given!r:.80}"
-        )
-    return ScenarioTemplate.named(given)
 
 
 def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights:

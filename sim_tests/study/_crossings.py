@@ -10,17 +10,17 @@ from awarenav.errors import counted
 from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
+from ..conditions import Experiment
 from ..world.errors import SimError
 from .measures import nondeterminism_notes, short_text, summarise
-from .runs import Conditions, RunFiles, run_jobs, sample_jobs
+from .runs import RunFiles, about_run, experiment_jobs, run_jobs, sample_jobs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrossingsOptions:
     """The options of ``awarenav crossings``."""
 
-    conditions: Conditions
-    policy: tuple[str, ...]
+    experiment: Experiment
     sample: int | None
     workers: int | None
     scheduler: str | None
@@ -42,13 +42,13 @@ def crossings_command(options: CrossingsOptions) -> int:
         NavError: an unknown preset or unusable policy file.
         PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
-    conditions = options.conditions
-    jobs = conditions.jobs(options.policy)
-    if conditions.perception == "pixels" and set(conditions.sensors) != {"scanner"}:
+    experiment = options.experiment
+    jobs = experiment_jobs(experiment)
+    if experiment["perception"] == "pixels" and set(experiment["sensors"]) != {"scanner"}:
         # Refuses missing networks before anything runs.
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
     if options.sample is not None:
-        jobs = sample_jobs(jobs, options.sample, conditions.seed)
+        jobs = sample_jobs(jobs, options.sample, experiment["seed"])
     records = run_jobs(
         jobs,
         options.out,
@@ -58,9 +58,7 @@ def crossings_command(options: CrossingsOptions) -> int:
         resume=options.resume,
         overwrite=options.overwrite,
         progress=True,
-        about=conditions.about(
-            "crossings", options.out, policy=options.policy, sample=options.sample
-        ),
+        about=about_run(experiment, "crossings", options.out, sample=options.sample),
     )
     summary = summarise(records)
     if options.as_json:

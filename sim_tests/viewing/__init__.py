@@ -11,12 +11,11 @@ if TYPE_CHECKING:
     from ._page import page_text, show_page, write_page
     from ._pictures import CameraPictures
     from ._recorder import CrossingRecorder
-    from ._states import Episode, begin_of, outcome_text, state_of
+    from ._states import begin_of, outcome_text, state_of
 
 __all__ = [
     "CameraPictures",
     "CrossingRecorder",
-    "Episode",
     "LivePage",
     "begin_of",
     "outcome_text",

@@ -11,9 +11,10 @@ import numpy as np
 from nav_adapter import Alert
 from nav_adapter.alerts import Answer
 
+from ..conditions import Conditions
 from ..crossing import CrossingFrame, Stage
 from ._pictures import CameraPictures
-from ._states import Episode, begin_of, cycles_per_state, state_of
+from ._states import begin_of, cycles_per_state, state_of
 
 # A scan older than this is not drawn.
 _SCAN_AGE_S: Final = 0.2
@@ -25,7 +26,7 @@ class CrossingRecorder:
     Give it to :func:`~sim_tests.crossing.run_crossing` as ``observer``.
 
     Args:
-        episode: the names that the page shows.
+        conditions: the names that the page shows.
         pictures: of the robot's camera; None for none.
         on_begin: called once, before the first state, with the hall and the robot.
         on_state: called with every state.
@@ -37,13 +38,13 @@ class CrossingRecorder:
 
     def __init__(
         self,
-        episode: Episode,
+        conditions: Conditions,
         *,
         pictures: CameraPictures | None = None,
         on_begin: Callable[[dict[str, Any]], None] | None = None,
         on_state: Callable[[dict[str, Any]], None] | None = None,
     ) -> None:
-        self._episode = episode
+        self._conditions = conditions
         self._pictures = pictures
         self._on_begin = on_begin
         self._on_state = on_state
@@ -58,7 +59,7 @@ class CrossingRecorder:
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
         """Take one control cycle."""
         if not self.begin:
-            self.begin = begin_of(self._episode, stage)
+            self.begin = begin_of(self._conditions, stage)
             if self._on_begin is not None:
                 self._on_begin(self.begin)
         if len(frame.scan_points_odom_m):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from perception import AttentionCone
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
+from ..conditions import Conditions
 from ..crossing import STANDING_SPEED_MPS, CrossingFrame, CrossingResult, Stage
 
 #: States per second of simulated time; fewer where the robot's control is slower.
@@ -25,19 +26,7 @@ _SCAN_CELL_CM: Final = 5
 _MOST_SCAN_POINTS: Final = 400
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Episode:
-    """The names of a crossing, as a page shows them; empty for no fault and no planner."""
-
-    scenario: str
-    seed: int
-    policy: str
-    planner: str = ""
-    perception: str = "truth"
-    fault: str = ""
-
-
-def begin_of(episode: Episode, stage: Stage) -> dict[str, Any]:
+def begin_of(conditions: Conditions, stage: Stage) -> dict[str, Any]:
     """Return what stays the same in a crossing: hall, robot, goal and names.
 
     Lengths are in metres in odom, boxes are x_min, y_min, x_max, y_max.
@@ -47,7 +36,7 @@ def begin_of(episode: Episode, stage: Stage) -> dict[str, Any]:
     hall = scenario.layout
     floor = (hall.x_min_m, hall.y_min_m, hall.x_max_m, hall.y_max_m)
     return {
-        **asdict(episode),
+        **asdict(conditions),
         "step_s": cycles_per_state(scenario.control_hz) / scenario.control_hz,
         "planned_s": scenario.duration_s,
         "floor_odom_m": _rounded(floor),

@@ -7,8 +7,10 @@ page of the documentation read it from here.
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Final, Literal
+
+from ...conditions import AXES, Conditions
 
 #: Awareness of the person who came nearest, before the encounter, and the robot's error about it if
 #: there is one; empty if nobody came near.
@@ -43,7 +45,7 @@ class Metric:
     share: bool = False
 
 
-def _column(meaning: str, default: Any = MISSING) -> Any:
+def _column(meaning: str, default: Any) -> Any:
     """Return a field of a record that is a column, but no measure."""
     return field(default=default, metadata={"meaning": meaning})
 
@@ -70,21 +72,13 @@ def _measure(
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class EpisodeRecord:
-    """The measures of one episode, as docs/simulation.md defines them.
+class EpisodeRecord(Conditions):
+    """The conditions and the measures of one episode, as docs/simulation.md defines them.
 
     None means that a measure does not apply to the episode. With an ``error``, every measure keeps
     its default. :data:`COLUMNS` has the meaning of each field.
     """
 
-    scenario: str = _column("Name of the scenario.")
-    seed: int = _column("Of the episode.")
-    policy: str = _column("Name of the policy.")
-    planner: str = _column("Name of the planner.")
-    perception: str = _column(
-        '``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are '
-        'scanners too, or ``"scanner"``.'
-    )
     success: bool = _column(
         "The goal was reached and the robot touched nobody by its own motion.", False
     )
@@ -118,7 +112,6 @@ class EpisodeRecord:
     attention: str = _column(
         'The scenario\'s ``attention``: ``"attentive"``, ``"unaware"`` or ``"mixed"``.', "mixed"
     )
-    fault: str = _column("Name of the fault, empty for none.", "")
     time_without_people_s: float | None = _column(
         "Time to goal of the same task in the empty hall.", None
     )
@@ -331,8 +324,14 @@ class EpisodeRecord:
         return self.person_contacts > 0 or self.contact_by == "person"
 
 
-#: The meaning of each column of ``episodes.csv``, in their order.
-COLUMNS: Final = {each.name: str(each.metadata["meaning"]) for each in fields(EpisodeRecord)}
+#: The meaning of each column of ``episodes.csv``, in their order; conditions that may be empty
+#: come last.
+COLUMNS: Final = {
+    each.name: str(each.metadata["meaning"])
+    for each in sorted(
+        fields(EpisodeRecord), key=lambda each: each.name in AXES and each.default == ""
+    )
+}
 
 #: Numbers that are averaged over episodes.
 METRICS: Final = {

@@ -15,7 +15,7 @@ from awarenav.files import atomic_path
 from perception.installation import install_command
 
 from ...world.errors import SimError
-from ._record import Awareness, EpisodeRecord
+from ._record import COLUMNS, Awareness, EpisodeRecord
 
 if TYPE_CHECKING:
     import pyarrow
@@ -34,7 +34,7 @@ _KINDS: Final[dict[str, Kind]] = {
 }
 #: Columns of ``episodes.csv`` in their order, and the kind of each.
 COLUMN_KINDS: Final[dict[str, Kind]] = {
-    field.name: _KINDS[str(field.type)] for field in fields(EpisodeRecord)
+    name: _KINDS[str(EpisodeRecord.__dataclass_fields__[name].type)] for name in COLUMNS
 }
 RECORD_COLUMNS: Final = tuple(COLUMN_KINDS)
 #: Columns that every table must have; others take their defaults.

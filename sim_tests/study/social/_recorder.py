@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...world.errors import SimError
-from ..runs import Job, describe, free_run_of, job_key, observed_episode
+from ..runs import Job, free_run_of, observed_episode
 from ._episode import Outcome, SocialEpisode, sides
 
 if TYPE_CHECKING:
@@ -92,4 +92,4 @@ def episode_of(job: Job) -> tuple[SocialEpisode, EpisodeRecord]:
         reference_length_m=free.length_m,
         human_delay_s=record.human_delay_s,
     )
-    return recorder.episode(result, outcome, describe(job_key(job))), record
+    return recorder.episode(result, outcome, job.conditions.text), record
