@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from ._assembly import Setup, changed, named_fault
+from ._assembly import Setup, changed, named_fault, named_policy
 from ._crossing import Crossing, Observer, Situation, drive, run_crossing
-from ._drawing import TopView, draw_camera_view
-from ._policies import named_policy
-from ._requests import RequestMemory
+from ._drawing import RequestMemory, TopView, draw_camera_view
 from ._result import CrossingFrame, CrossingResult
 from ._separations import (
     STANDING_SPEED_MPS,

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, NavAdapter
+from awarenav.errors import not_one_of
+from nav_adapter import AwarenessPolicy, NavAdapter, NavError
 from perception import AttentionCone, AwarenessPipeline
+from perception.documents import parse_yaml
 
 from ..actors.robot import RobotModel
 from ..conditions import (
@@ -22,10 +26,10 @@ from ..conditions import (
     table_name,
 )
 from ..scenario import Scenario, ScenarioTemplate
+from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner
-from ._policies import named_policy
-from ._sensing import Sensing
+from ._sensing import STREAMS, Sensing
 from ._stage import Stage
 from .eyes import KeypointNoise
 from .faults import Fault
@@ -138,8 +142,7 @@ class Setup:
             PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
         """
         scenario, seed = self.scenario, self.conditions.seed
-        # One generator each, so that none of them depends on what the others draw.
-        jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
+        jitter_rng, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
         jitter = scenario.start_jitter_s
         offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
         cone = AttentionCone()
@@ -149,11 +152,9 @@ class Setup:
                 stage,
                 Perception.named(self.conditions.perception),
                 self.policy,
-                cone,
                 seed,
-                noise=KeypointNoise() if self.noise is None else self.noise,
-                camera_rng=camera_rng,
-                timing_rng=timing_rng,
+                cone=cone,
+                noise=self.noise,
                 pipeline=self.pipeline,
                 fault=self.fault,
             )
@@ -181,6 +182,47 @@ def changed(
     if isinstance(scenario, Scenario) and given:
         scenario = ScenarioTemplate(scenario.model_dump(mode="json"), scenario.name)
     return changed_scenario(scenario, given)
+
+
+def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
+    """Return the name and the policy.
+
+    Args:
+        policy: a policy, whose name is then ``"custom"``; the name of a preset of the library;
+            ``"scanner"``, today's AMR with a safety laser scanner, for comparisons only; or a
+            ``.yaml`` or ``.yml`` file.
+
+    Raises:
+        NavError: for a name that is not a preset, or a file that cannot be used.
+        SimError: for a path to another kind of file.
+    """
+    if isinstance(policy, AwarenessPolicy):
+        return "custom", policy
+    path = Path(policy)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return path.stem, AwarenessPolicy.from_yaml(path)
+    if not isinstance(policy, str):
+        raise SimError(f"policy must be a preset's name or a .yaml file, got {policy}")
+    own = _own_presets()
+    if policy in own:
+        return policy, own[policy]
+    shipped = {path.name for path in resources.files("nav_adapter.policies").iterdir()}
+    if f"{policy}.yaml" not in shipped:
+        names = {name.removesuffix(".yaml") for name in shipped if name.endswith(".yaml")}
+        raise NavError(not_one_of("preset", policy, sorted(names | set(own))))
+    return policy, AwarenessPolicy.preset(policy)
+
+
+@cache
+def _own_presets() -> dict[str, AwarenessPolicy]:
+    """Return the simulator's own presets by name; they are frozen, so one reading serves all."""
+    folder = resources.files("sim_tests.crossing") / "policies"
+    return {
+        (name := file.name.removesuffix(".yaml")): AwarenessPolicy.model_validate(
+            parse_yaml(file.read_text("utf-8"), name, NavError)
+        )
+        for file in folder.iterdir()
+    }
 
 
 def named_fault(fault: Fault | str | None) -> Fault | None:
