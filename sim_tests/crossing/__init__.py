@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ._assembly import Setup, changed, named_fault, named_policy
+from ._assembly import Setup, axis_names, changed, named_fault, named_policy
 from ._crossing import Crossing, Observer, Situation, drive, run_crossing
 from ._drawing import RequestMemory, TopView, draw_camera_view
 from ._result import CrossingFrame, CrossingResult
@@ -30,6 +30,7 @@ __all__ = [
     "StraightOn",
     "TopView",
     "TrueView",
+    "axis_names",
     "changed",
     "contact_by",
     "draw_camera_view",

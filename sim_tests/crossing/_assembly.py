@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from awarenav.errors import not_one_of
 from nav_adapter import AwarenessPolicy, NavAdapter, NavError
-from perception import AttentionCone, AwarenessPipeline
+from perception import AwarenessPipeline
 from perception.documents import parse_yaml
 
 from ..actors.robot import RobotModel
@@ -34,22 +34,6 @@ from ._stage import Stage
 from .eyes import KeypointNoise
 from .faults import Fault
 from .planner import LocalPlanner, make_planner, planner_label
-
-
-class Assembled(NamedTuple):
-    """The parts of a closed loop but its planner.
-
-    Attributes:
-        stage: hall, robot and people.
-        sensing: camera, scanners and odometry with their faults, and the tracker.
-        adapter: the adapter.
-        cone: attention cone of camera and truth.
-    """
-
-    stage: Stage
-    sensing: Sensing
-    adapter: NavAdapter
-    cone: AttentionCone
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -134,8 +118,8 @@ class Setup:
             return make_planner(self.planner, self.scenario, self.conditions.seed)
         return self.planner
 
-    def assembled(self) -> Assembled:
-        """Return stage, senses, tracker and adapter; the stage must be closed.
+    def assembled(self) -> tuple[Stage, Sensing, NavAdapter]:
+        """Return stage, senses with their tracker, and adapter; the stage must be closed.
 
         Raises:
             SimError: a perception with scanners and a scenario without any.
@@ -145,7 +129,6 @@ class Setup:
         jitter_rng, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
         jitter = scenario.start_jitter_s
         offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
-        cone = AttentionCone()
         stage = Stage(scenario, offsets, people_rng, renderer=self.renderer)
         try:
             sensing = Sensing(
@@ -153,7 +136,6 @@ class Setup:
                 Perception.named(self.conditions.perception),
                 self.policy,
                 seed,
-                cone=cone,
                 noise=self.noise,
                 pipeline=self.pipeline,
                 fault=self.fault,
@@ -161,7 +143,7 @@ class Setup:
         except BaseException:
             stage.close()
             raise
-        return Assembled(stage, sensing, NavAdapter(self.policy, scenario.robot_profile), cone)
+        return stage, sensing, NavAdapter(self.policy, scenario.robot_profile)
 
 
 def changed(
@@ -236,7 +218,7 @@ def named_fault(fault: Fault | str | None) -> Fault | None:
     return fault
 
 
-def axis_names(axes: Mapping[str, Any]) -> dict[str, str]:
+def axis_names(axes: Mapping[str, Any]) -> dict[str, Any]:
     """Return the names in tables of the values of axes; a robot may be a model or a profile."""
     robot = axes.get("robot")
     named = dict(axes)

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from nav_adapter import AwarenessPolicy, NavConstraints, RobotProfile, RobotState
-from perception import AwarenessPipeline
+from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
 
 from ..actors.behaviour import RequestMeans
@@ -110,7 +110,8 @@ class Crossing(AbstractContextManager["Crossing"]):
     def __init__(self, setup: Setup) -> None:
         self.scenario = scenario = setup.scenario
         self.robot = scenario.robot_profile
-        self.stage, self._sensing, self._adapter, self._cone = setup.assembled()
+        self._cone = AttentionCone()
+        self.stage, self._sensing, self._adapter = setup.assembled()
         self.goal_odom_m = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         self.dt_s = 1.0 / scenario.control_hz
         self._ticks_per_observation = max(round(scenario.control_hz / _OBSERVED_HZ), 1)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from awarenav.cli import OneOf, command, option, options
 
-from ..conditions import conditions_options
+from ..conditions import Experiment, conditions_options
 
 
 @command(
@@ -27,13 +28,10 @@ from ..conditions import conditions_options
 @options.as_json("the tables")
 def demo(
     out: Path,
-    seed: int,
     *,
     no_video: bool,
-    perception: str,
-    robot: str,
-    population: str | None,
     as_json: bool,
+    **values: Any,
 ) -> int:
     """Run the paper's 25 s encounter, and one crossing with and without awareness.
 
@@ -42,13 +40,13 @@ def demo(
     """
     from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
 
+    experiment = Experiment.taken_from(values)
     run_demo(
         out,
-        seed=seed,
+        seed=experiment["seed"],
         video=not no_video,
-        perception=perception,
-        robot=robot,
-        population=population or "",
+        perception=experiment["perception"],
+        axes=experiment.changes,
         as_json=as_json,
     )
     return 0

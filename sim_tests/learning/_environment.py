@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from typing import Any, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from awarenav.errors import MissingExtraError, not_one_of
-from nav_adapter import AwarenessPolicy, RobotProfile
+from nav_adapter import AwarenessPolicy, NavConstraints, RobotProfile
 from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.installation import install_command
@@ -27,6 +29,7 @@ from ..crossing import (
     Setup,
     Situation,
     TopView,
+    axis_names,
     changed,
     contact_by,
     draw_camera_view,
@@ -36,10 +39,10 @@ from ..crossing import (
 from ..crossing.faults import Fault
 from ..scenario import Scenario, ScenarioTemplate
 from ..world.camera import CameraRenderer
+from ..world.config import SimConfig
 from ..world.errors import SimError
-from ._actions import action_limits, command_of
 from ._observations import Observation, ObservationEncoder
-from ._reward import RewardWeights, over_limit_mps
+from ._policy_planner import action_limits, command_of
 
 try:
     import gymnasium
@@ -57,6 +60,27 @@ _NO_EPISODE: Final = "the environment has no episode: call reset first"
 # The plan shows the robot's way with this margin.
 _PLAN_MARGIN_M: Final = 4.0
 _PICTURE_PX: Final = (640, 480)
+
+
+class RewardWeights(SimConfig):
+    """The weights of the reward; the reward of a step is the sum of its parts.
+
+    Attributes:
+        progress_per_m: for each metre that the goal came closer.
+        goal: once, at the goal.
+        time_per_s: for each second.
+        over_limit_per_m: for each metre that the commanded speed exceeds the limit, summed over
+            time. The speed is that of the robot's fastest point, |v| + |ω| R.
+        negative_margin_per_s: for each second with a negative separation margin of a moving robot.
+        contact: once for each contact that the robot caused.
+    """
+
+    progress_per_m: float = 1.0
+    goal: float = Field(default=5.0)
+    time_per_s: float = -0.2
+    over_limit_per_m: float = -2.0
+    negative_margin_per_s: float = -2.0
+    contact: float = -20.0
 
 
 class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
@@ -118,24 +142,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         fault: Fault | str | None = None,
         **axes: str,
     ) -> None:
-        EzPickle.__init__(
-            self,
-            scenarios=scenarios,
-            policy=policy,
-            perception=perception,
-            control_hz=control_hz,
-            people_slots=people_slots,
-            scan_rays=scan_rays,
-            normalised_actions=normalised_actions,
-            reward=reward,
-            end_at_contact=end_at_contact,
-            render_mode=render_mode,
-            render_view=render_view,
-            robot=robot,
-            population=population,
-            fault=fault,
-            **axes,
-        )
+        given = {name: value for name, value in locals().items() if name in _ARGUMENTS}
+        EzPickle.__init__(self, **given, **axes)
         if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
             scenarios = (scenarios,)
         own_robot = None if robot is None else RobotModel.of(robot)
@@ -229,7 +237,9 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if self._control_hz is not None:
             scenario = scenario.model_copy(update={"control_hz": self._control_hz})
         self.close()
-        self._crossing = Crossing(Setup.of(scenario, seed=episode_seed, **self._given))
+        setup = Setup.of(scenario, seed=episode_seed, **self._given)
+        conditions = replace(setup.conditions, **axis_names(self._axes))
+        self._crossing = Crossing(replace(setup, conditions=conditions))
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
         self._frame = None
         self._ended = False
@@ -269,7 +279,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             "goal": weights.goal * (reason == "goal"),
             "time": weights.time_per_s * dt_s,
             "over_limit": weights.over_limit_per_m
-            * over_limit_mps(before.constraints, command)
+            * _over_limit_mps(before.constraints, command)
             * dt_s,
             "margin": weights.negative_margin_per_s * _violates(now) * dt_s,
             "contact": weights.contact * hits,
@@ -376,6 +386,17 @@ def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights
         raise SimError(f"reward: {cause}") from cause
 
 
+def _over_limit_mps(constraints: NavConstraints, command: tuple[float, float]) -> float:
+    """Return by how much a command of speed (m/s) and yaw rate (rad/s) exceeds the limit, ≥ 0."""
+    speed = abs(command[0])
+    over = max(speed - constraints.speed_limit_mps, 0.0)
+    fastest = constraints.fastest_point_limit_mps
+    if constraints.robot is not None and fastest is not None:
+        radius = constraints.robot.circumscribed_radius_m
+        over = max(over, speed + abs(command[1]) * radius - fastest)
+    return over
+
+
 def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
     """Return the true distance of the base origin to the goal."""
     return float(np.linalg.norm(goal_odom_m - now.state.position_odom_m))
@@ -391,3 +412,7 @@ def _violates(now: Situation) -> bool:
 def _by_robot(crossing: Crossing) -> int:
     """Return how many contacts the robot has caused."""
     return sum(contact.by == "robot" for contact in crossing.stage.contacts)
+
+
+# The arguments of an environment, by which it is copied and pickled.
+_ARGUMENTS: Final = frozenset(signature(CrossingEnv.__init__).parameters) - {"self", "axes"}

@@ -66,7 +66,7 @@ def common_settings(experiment: Experiment) -> dict[str, Any]:
         NavError: an unusable policy.
     """
     name, own_policy = named_policy(experiment.one("policy"))
-    templates = named_templates(experiment["scenario"], experiment.changes)
+    templates = named_templates(experiment["scenario"], **experiment.changes)
     return {
         "policy_name": name,
         "policy": policy_text(own_policy),

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -178,9 +177,7 @@ def job_of(scenario_text: str, policy: tuple[str, str], planner: str, **axes: An
     )
 
 
-def named_templates(
-    names: Sequence[str], axes: Mapping[str, str] = MappingProxyType({})
-) -> tuple[ScenarioTemplate, ...]:
+def named_templates(names: Sequence[str], **axes: str) -> tuple[ScenarioTemplate, ...]:
     """Return the scenarios of names and YAML files, each once.
 
     Args:
