@@ -181,7 +181,7 @@ def _without_reference(context: Any, parameter: Any, value: Any) -> Any:
 class Conditions:
     """The conditions of one episode, each by its name in tables.
 
-    Rows of ``episodes.csv``, jobs and keys of episodes have these fields. The metadata of a field
+    Jobs have these fields, tables these columns. The metadata of a field
     are those of :func:`_axis`.
     """
 
@@ -293,7 +293,7 @@ class Conditions:
 
     @property
     def conditions(self) -> Conditions:
-        """The conditions alone, of a row or a job that has more: the key of its episode."""
+        """The conditions alone, of a job that has more: the key of its episode."""
         return Conditions(**{name: getattr(self, name) for name in AXES})
 
     @property

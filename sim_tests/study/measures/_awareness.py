@@ -11,11 +11,12 @@ from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
-from ._record import Awareness, EpisodeRecord
+from ._registry import Awareness
 from ._trace import Trace
 
 if TYPE_CHECKING:
     from ...crossing import CrossingResult
+    from ._record import EpisodeRecord
 
 #: Largest distance between a track and its person.
 MATCHED_WITHIN_M: Final = 1.0
@@ -82,15 +83,6 @@ def track_awareness(result: CrossingResult, trace: Trace) -> tuple[FloatArray, F
                 mean[row, person] = frame.tracks[index].awareness
                 lower[row, person] = frame.tracks[index].awareness_lower
     return mean, lower
-
-
-def awareness_error(true: FloatArray, tracked: FloatArray) -> float | None:
-    """Return the mean |α of the track − true α| over all instants and tracked people.
-
-    None without a track.
-    """
-    known = np.isfinite(tracked)
-    return float(np.abs(tracked - true)[known].mean()) if known.any() else None
 
 
 def nearest_person(separation_m: FloatArray) -> tuple[int, int] | None:
@@ -186,7 +178,7 @@ def measured_part(record: EpisodeRecord) -> str:
     An episode labelled attentive counts as such only if each of its people was aware for at least
     80 % of the time.
     """
-    share = record.attentive_share
-    if record.attention != "attentive" or record.error:
-        return record.attention
+    attention, share = str(record.attention), record.attentive_share
+    if attention != "attentive" or record.error:
+        return attention
     return "attentive" if share is not None and share >= ATTENTIVE_FROM else UNCONFIRMED

@@ -113,8 +113,10 @@ def observed_episode(
         length_without_people_m=free.length_m,
         scenario_version=template.version,
         attention=template.attention,
+        nondeterministic=not free.repeats,
+        **asdict(job.conditions),
     )
-    return result, replace(record, **asdict(job.conditions), nondeterministic=not free.repeats)
+    return result, record
 
 
 def setup_of(job: Job) -> Setup:
@@ -168,7 +170,7 @@ def failed(job: Job, error: str, traceback: str = "") -> Attempt:
     except SimError:  # the scenario cannot be read
         return Attempt(record, traceback)
     about = {"scenario_version": template.version, "attention": template.attention}
-    return Attempt(replace(record, **about), traceback)  # type: ignore[arg-type]
+    return Attempt(replace(record, **about), traceback)
 
 
 def died(job: Job, reason: str) -> Attempt:

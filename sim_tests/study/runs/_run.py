@@ -256,9 +256,9 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         write_records(self._files.episodes, records)
         self._files.errors.unlink(missing_ok=True)
         log = "".join(
-            f"== episode {number}: {attempt.record.text}\n{attempt.traceback.rstrip()}\n\n"
-            for number, attempt in ended
-            if attempt.traceback
+            f"== episode {number}: {each.record.conditions.text}\n{each.traceback.rstrip()}\n\n"
+            for number, each in ended
+            if each.traceback
         )
         if log:
             write_text(self._files.errors, log, SimError)
