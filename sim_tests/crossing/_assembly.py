@@ -126,10 +126,8 @@ class Setup:
             PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
         """
         scenario, seed = self.scenario, self.conditions.seed
-        jitter_rng, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
-        jitter = scenario.start_jitter_s
-        offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
-        stage = Stage(scenario, offsets, people_rng, renderer=self.renderer)
+        _, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
+        stage = Stage(scenario, people_rng, renderer=self.renderer)
         try:
             sensing = Sensing(
                 stage,

@@ -312,7 +312,6 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
             time_to_goal_s=reached_s,
             frames=tuple(frames),
             people=stage.outcomes,
-            scripted=len(setup.scenario.workers),
             robot=crossing.robot,
             obstacle_boxes_odom_m=setup.scenario.layout.obstacle_boxes_odom,
         )

@@ -93,7 +93,7 @@ def test_a_planner_that_is_not_deterministic_is_found_and_named(drawing, tmp_pat
 
 
 _SHORT = SHORT.format(name="short")
-ADULT = _SHORT + "    gaze: [{t_s: 0.0, look: robot}]\n"
+ADULT = _SHORT.replace("notices_within_m: 0.0", "watches: true")
 CHILD = _SHORT + "    stature_m: 1.15\n"
 TWO_VIEWS = ADULT + "camera: {views_deg: [0.0, 90.0]}\n"
 
