@@ -15,8 +15,7 @@ from ..measures import EpisodeRecord
 from ..runs import RunFiles, about_run, experiment_jobs, policy_text, read_rows, run_jobs
 from ._family import TODAY, family, sensors_of_today
 from ._frontier import frontier_of
-from ._plot import draw_frontier
-from ._text import frontier_text
+from ._show import draw_frontier, frontier_text
 
 
 def frontier_command(

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ...crossing import STANDING_SPEED_MPS, ContactEvent, CrossingResult
-from ._awareness import nearest_person, track_awareness
+from ._awareness import Requests, nearest_person, track_awareness
 from ._conflict import Outline
 from ._driving import path_length_m, peak_deceleration_and_jerk
 from ._metrics import COLUMNS
 from ._record import EpisodeRecord
-from ._requests import Requests
 from ._step_out import FASTER_STEP_OUT, StepOutImpacts, is_unaware, since_look_of, step_out_impacts
 from ._trace import Trace
 
@@ -153,12 +152,12 @@ class Log:
     @cached_property
     def step_out(self) -> StepOutImpacts:
         """Step-out impacts of people who start as recorded."""
-        return step_out_impacts(self.result)
+        return step_out_impacts(self.result, trace=self.trace)
 
     @cached_property
     def step_out_stress(self) -> StepOutImpacts:
         """Step-out impacts of people who start faster than recorded."""
-        return step_out_impacts(self.result, FASTER_STEP_OUT)
+        return step_out_impacts(self.result, FASTER_STEP_OUT, trace=self.trace)
 
     @cached_property
     def requests(self) -> Requests:

@@ -331,7 +331,7 @@ def reaction(log: Log) -> str:
     """Reaction of that person, see :class:`PersonOutcome`."""
     if log.nearest_person is None:
         return ""
-    person = log.nearest_person[1]
+    _, person = log.nearest_person
     return log.result.people[person].reaction if person < len(log.result.people) else ""
 
 
