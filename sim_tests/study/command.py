@@ -78,13 +78,9 @@ def crossings(**values: Any) -> int:
     Every episode that ends appends a row to episodes.csv. At the end the rows are sorted and the
     report is written. The row of a failed episode has the reason; the other episodes still run.
     """
-    from ._crossings import (  # noqa: PLC0415 - help needs no simulator
-        CrossingsOptions,
-        crossings_command,
-    )
+    from ._crossings import crossings_command  # noqa: PLC0415 - help needs no simulator
 
-    experiment = Experiment.taken_from(values)
-    return crossings_command(CrossingsOptions(experiment=experiment, **values))
+    return crossings_command(Experiment.taken_from(values), **values)
 
 
 @command(
@@ -123,9 +119,9 @@ def replay(**values: Any) -> int:
 
     Prints whether the episode gives the same row as before.
     """
-    from .runs import ReplayOptions, replay_command  # noqa: PLC0415 - help needs no simulator
+    from .runs import replay_command  # noqa: PLC0415 - help needs no simulator
 
-    return replay_command(ReplayOptions(**values))
+    return replay_command(**values)
 
 
 @command(

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
         template_of,
     )
     from ._replay import (
-        ReplayOptions,
         box_scale_of,
         find_episode,
         recorder_of,
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Job",
-    "ReplayOptions",
     "RunFiles",
     "Workers",
     "about_run",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -134,60 +134,57 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         self._video.add(image)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReplayOptions:
-    """The options of ``awarenav replay``."""
-
-    folder: Path
-    episode: str
-    out: Path | None
-    no_video: bool
-    view: bool
-
-
-def replay_command(options: ReplayOptions) -> int:
+def replay_command(
+    folder: Path, episode: str, *, out: Path | None, no_video: bool, view: bool
+) -> int:
     """Run an episode again, write its pictures or its page, and compare its row with the run's.
+
+    Args:
+        folder: of the run.
+        episode: as for :func:`find_episode`; or ``"all"``.
+        out: folder of the pictures; None for the one in the folder of the run.
+        no_video: draw only the map.
+        view: write a page instead of pictures, and show it.
 
     Raises:
         SimError: the folder holds no run, or the run does not have the episode.
     """
-    jobs = read_jobs(options.folder)
-    every = options.episode == _EVERY
-    numbers = range(len(jobs)) if every else [find_episode(jobs, options.episode)]
-    out = options.out if options.out is not None else RunFiles(options.folder).replays
+    jobs, files = read_jobs(folder), RunFiles(folder)
+    every = episode == _EVERY
+    numbers = range(len(jobs)) if every else [find_episode(jobs, episode)]
+    out = files.replays if out is None else out
     out.mkdir(parents=True, exist_ok=True)
     status = 0
     for number in numbers:
-        written, differs = _replay(options, number, jobs[number], out)
-        status = max(status, differs)
-        if options.view and not every:
-            show_page(written[0].resolve().as_uri())
+        job, path = jobs[number], out / files.page(number).name
+        print(f"Episode {number}: {job.conditions.text}")
+        result, record, written = _drawn(job, path, video=not no_video, view=view)
+        for each in written:
+            print(f"Written: {each}")
+        print(outcome_text(result))
+        status = max(status, _compare_row(folder, job, record))
+        if view and not every:
+            show_page(path.resolve().as_uri())
     return status
 
 
-def _replay(options: ReplayOptions, number: int, job: Job, out: Path) -> tuple[Sequence[Path], int]:
-    """Run one episode again; return the files written, and 1 if its row is another, else 0."""
-    print(f"Episode {number}: {job.conditions.text}")
+def _drawn(
+    job: Job, path: Path, *, video: bool, view: bool
+) -> tuple[CrossingResult, EpisodeRecord, Sequence[Path]]:
+    """Run one episode again; return its result, its row and the files written."""
     scenario = template_of(job.scenario_text).for_seed(job.seed)
     total = round(scenario.duration_s * scenario.control_hz)
-    path = out / RunFiles(options.folder).page(number).name
     with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
-        if options.view:
+        if view:
             recorder = recorder_of(job)
             result, record = _observed(job, recorder, bar)
             write_page(path, recorder.begin, recorder.states, outcome_text(result), recorder.note)
-            written = [path]
-        else:
-            video = None if options.no_video else path.with_suffix(".mp4")
-            drawn = ReplayPictures(path.with_suffix(".png"), video, box_scale_of(job))
-            with drawn as pictures:
-                result, record = _observed(job, pictures.add, bar)
-                pictures.finish()
-            written = pictures.written
-    for each in written:
-        print(f"Written: {each}")
-    print(outcome_text(result))
-    return written, _compare_row(options.folder, job, record)
+            return result, record, [path]
+        film = path.with_suffix(".mp4") if video else None
+        with ReplayPictures(path.with_suffix(".png"), film, box_scale_of(job)) as pictures:
+            result, record = _observed(job, pictures.add, bar)
+            pictures.finish()
+        return result, record, pictures.written
 
 
 def _observed(
