@@ -25,7 +25,7 @@ from tracking import ScannerView, SensorConfig
 
 from ...world import Warehouse
 from ...world.camera import FrameClock, FrameQueue
-from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner
+from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner, scan_all
 from ._eyes import NOBODY, Sighting
 from ._map_view import MapView
 
@@ -98,11 +98,10 @@ class ScannerEyes:
             motion: true motion of the robot now.
             known: the same as the robot knows it.
         """
-        for number, (clock, scanner) in enumerate(zip(self._clocks, self._scanners, strict=True)):
-            due, delivery_s = clock.tick(now_s)
-            if not due:
-                continue
-            scan = scanner.scan(motion)
+        ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
+        taken = [(number, delivery_s) for number, due, delivery_s in ticks if due]
+        scans = scan_all([self._scanners[number] for number, _ in taken], motion)
+        for (number, delivery_s), scan in zip(taken, scans, strict=True):
             if delivery_s is None:
                 continue
             if self._change is not None:
