@@ -63,7 +63,11 @@ class Hypotheses:
 
 
 def hypotheses_of(
-    clusters: Clusters, points_m: FloatArray, ranges_m: FloatArray, increment_rad: float
+    clusters: Clusters,
+    points_m: FloatArray,
+    ranges_m: FloatArray,
+    increment_rad: float,
+    ruled_out: NDArray[np.bool_] | None = None,
 ) -> Hypotheses:
     """Return the hypotheses about people that clusters allow.
 
@@ -72,29 +76,41 @@ def hypotheses_of(
         points_m: (N, 2) all points of the scan, also of known walls; NaN without a return.
         ranges_m: (N,) their ranges; NaN without a return.
         increment_rad: angle between rays.
+        ruled_out: (C,) clusters without hypotheses; None for none. The other hypotheses are the
+            same with and without it.
     """
     step = abs(increment_rad)
-    returned = np.isfinite(ranges_m).nonzero()[0]
     # Single clusters come first, then the pairs; ``left`` of a single one is the cluster itself.
     single, one, other = _singles_and_pairs(clusters)
     first, left = np.concatenate([single, one]), np.concatenate([single, other])
-    second = left.copy()
-    second[: len(single)] = -1
-    pairs = slice(len(single), None)
+    singles = len(single)
     centres = clusters.centres_m.T
     right_m, left_m = centres.take(first, axis=1), centres.take(left, axis=1)
     middle = right_m + left_m
     middle *= 0.5
+    kept: slice | NDArray[np.int64] = slice(None)
+    every_middle = middle
+    if ruled_out is not None:
+        kept = (~(ruled_out[first] | ruled_out[left])).nonzero()[0]
+        singles = int(np.searchsorted(kept, singles))
+        first, left, middle = first[kept], left[kept], middle[:, kept]
+        right_m, left_m = right_m[:, kept], left_m[:, kept]
+    second = left.copy()
+    second[:singles] = -1
+    if not len(first):
+        features = np.zeros((0, HYPOTHESIS_FEATURES), dtype=np.float32)
+        return Hypotheses(first, second, left, middle.T, np.zeros((0, 2)), features)
+    other, pairs = left[singles:], slice(singles, None)
     away = middle - clusters.origin_m[:, None]
     squares = away * away
     ranges = np.maximum(np.sqrt(squares[0] + squares[1]), 1e-6)
     rays = away / ranges
     apart = left_m - right_m
     squares = apart * apart
-    features = cluster_features(clusters)
+    own = cluster_features(clusters)
     out = np.zeros((len(first), HYPOTHESIS_FEATURES), dtype=np.float32)
-    out[:, :CLUSTER_FEATURES] = features.take(first, axis=1).T
-    out[pairs, CLUSTER_FEATURES : 2 * CLUSTER_FEATURES] = features.take(other, axis=1).T
+    out[:, :CLUSTER_FEATURES] = own.take(first, axis=1).T
+    out[pairs, CLUSTER_FEATURES : 2 * CLUSTER_FEATURES] = own.take(other, axis=1).T
     pair = np.zeros((8, len(first)))
     pair[0, pairs] = 1.0
     np.sqrt(squares[0] + squares[1], out=pair[1])
@@ -107,10 +123,13 @@ def hypotheses_of(
     np.divide(0.1 * _MAX_LEG_M, np.maximum(ranges * step, 0.005), out=pair[5])
     length = clusters.lengths_m[first]
     length[pairs] += clusters.lengths_m[other]
-    around = pair[6:]
-    _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, middle, around)
+    returned = np.isfinite(ranges_m).nonzero()[0]
+    # The sums of all hypotheses, so that their rounding does not depend on those that are kept.
+    around = _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, every_middle)[
+        :, kept
+    ]
     around -= length
-    np.minimum(np.maximum(around, 0.0, out=around), _MAX_AROUND_M, out=around)
+    np.minimum(np.maximum(around, 0.0, out=around), _MAX_AROUND_M, out=pair[6:])
     out[:, 2 * CLUSTER_FEATURES : -CUTOUT] = pair.T
     middle_ray = 0.5 * (clusters.rays[clusters.starts] + clusters.rays[clusters.ends])
     ray = 0.5 * (middle_ray[first] + middle_ray[left])
@@ -118,15 +137,11 @@ def hypotheses_of(
     return Hypotheses(first, second, left, middle.T, rays.T, out)
 
 
-def _around(
-    points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray, out: FloatArray
-) -> None:
-    """Put the length of the surfaces (2, N) within each distance of centres (2, H) into ``out``.
-
-    ``out`` (2, H) holds zeros.
-    """
-    if not centres_m.size or not points_m.size:
-        return
+def _around(points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray) -> FloatArray:
+    """Return the length of the surfaces (2, N) within each distance of centres (2, H), (2, H)."""
+    out = np.zeros((len(_AROUND_M), centres_m.shape[1]))
+    if not points_m.size:
+        return out
     # Half the precision and one matrix product: this is the largest table of a scan.
     origin = (np.add.reduce(centres_m, axis=1) / centres_m.shape[1])[:, None]
     points = (points_m - origin).astype(np.float32)
@@ -139,6 +154,7 @@ def _around(
     squares += (centres[0] + centres[1])[:, None]
     for row, radius in enumerate(_AROUND_M):
         out[row] = (squares < radius * radius).astype(np.float32) @ lengths
+    return out
 
 
 def _cutouts(

@@ -104,12 +104,11 @@ class ScannerEyes:
         for (number, delivery_s), scan in zip(taken, scans, strict=True):
             if delivery_s is None:
                 continue
+            arriving: tuple[LaserScan, float] | None = scan, delivery_s
             if self._change is not None:
-                changed = self._change(scan, delivery_s, number, motion)
-                if changed is None:
-                    continue
-                scan, delivery_s = changed
-            self._queue.put(now_s, delivery_s, _Taken(scan, number, known))
+                arriving = self._change(scan, delivery_s, number, motion)
+            if arriving is not None:
+                self._queue.put(now_s, arriving[1], _Taken(arriving[0], number, known))
         sightings = [
             self._sighting(taken) for taken in self._queue.take(now_s) if self._is_new(taken)
         ]

@@ -57,7 +57,7 @@ def cast_rays(
     origins = origins_m.T
     centre = 0.5 * (origins.min(axis=1) + origins.max(axis=1))
     places = origins - centre[:, None]
-    ends = np.ascontiguousarray(segments_m.reshape(-1, 4).T)
+    ends = np.array(segments_m.reshape(-1, 4).T, order="C")
     ends -= np.tile(centre, 2)[:, None]
     # Rays start beside the middle and are turned, so a segment is met by some rays beyond its ends.
     squares = places * places
@@ -85,10 +85,25 @@ def cast_rays(
     np.sin(angles, out=rays[1])
     rays[2:4] = places
     np.subtract(places[0] * rays[1], places[1] * rays[0], out=rays[4])
-    # For every pair: the ray's direction across the segment, the distance along the ray, and the
-    # share of the segment at which it is met.
-    x, y, along_x, along_y, moment = lines.take(segment, axis=1)
-    cos, sin, origin_x, origin_y, aside = rays.take(ray, axis=1)
+    met, distance = _meetings(lines.take(segment, axis=1), rays.take(ray, axis=1))
+    segment, ray = segment[met], ray[met]
+    np.minimum.at(ranges, ray, distance)
+    nearest = (distance == ranges[ray]).nonzero()[0]
+    hits[ray[nearest]] = segment[nearest]
+    return RayHits(ranges, hits)
+
+
+def _meetings(lines: FloatArray, rays: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
+    """Return the pairs (M,) in which the ray meets the segment, and the distances (M,) along it.
+
+    Args:
+        lines: (5, P) x, y, along x, along y and moment of the segment of each pair.
+        rays: (5, P) cosine, sine, origin x, origin y and moment of its ray.
+    """
+    x, y, along_x, along_y, moment = lines
+    cos, sin, origin_x, origin_y, aside = rays
+    # The ray's direction across the segment, the share of the segment at which it is met, and the
+    # distance along the ray.
     across = cos * along_y
     across -= sin * along_x
     across[across == 0.0] = np.nan  # a parallel ray meets nothing
@@ -103,11 +118,7 @@ def cast_rays(
     share -= 0.5
     np.abs(share, out=share)
     met = ((distance > 0.0) & (share <= 0.5 + _SEAM)).nonzero()[0]
-    ray, distance = ray[met], distance[met]
-    np.minimum.at(ranges, ray, distance)
-    nearest = (distance == ranges[ray]).nonzero()[0]
-    hits[ray[nearest]] = segment[met[nearest]]
-    return RayHits(ranges, hits)
+    return met, distance[met]
 
 
 def _distances(lines: FloatArray) -> FloatArray:

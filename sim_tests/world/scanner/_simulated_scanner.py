@@ -13,7 +13,7 @@ from perception.arrays import FloatArray
 from perception.laser import LaserScan, RobotMotion, Scanner
 
 from ._ray_cast import RayHits, cast_rays
-from ._scene import SCENERY, Plane, SceneCut, ScanScene
+from ._scene import SCENERY, Plane, ScanScene, SceneCut
 from ._spec import ScannerSpec
 
 # Clothes that reflect at least this share of the light return every ray.
