@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from ..arrays import FloatArray
 from ..errors import PerceptionError
 from ..networks import OnnxModel, OnnxSettings
 from ._clusters import CLUSTER_FEATURES, Clusters, cluster_features
+
+AnyArray = TypeVar("AnyArray", FloatArray, NDArray[np.int64])
 
 #: Number of ranges across a hypothesis and its surroundings.
 CUTOUT: Final = 49
@@ -117,24 +119,27 @@ def hypotheses_of(
     pair[2] = apart[0] * rays[0] + apart[1] * rays[1]
     pair[3] = rays[0] * apart[1] - rays[1] * apart[0]
     pair[1:4] *= 10.0
-    counts = clusters.counts[first]
-    counts[pairs] += clusters.counts[other]
-    np.log(counts, out=pair[4])
+    np.log(_of_both(clusters.counts, first, other), out=pair[4])
     np.divide(0.1 * _MAX_LEG_M, np.maximum(ranges * step, 0.005), out=pair[5])
-    length = clusters.lengths_m[first]
-    length[pairs] += clusters.lengths_m[other]
     returned = np.isfinite(ranges_m).nonzero()[0]
     # The sums of all hypotheses, so that their rounding does not depend on those that are kept.
     around = _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, every_middle)[
         :, kept
     ]
-    around -= length
+    around -= _of_both(clusters.lengths_m, first, other)
     np.minimum(np.maximum(around, 0.0, out=around), _MAX_AROUND_M, out=pair[6:])
     out[:, 2 * CLUSTER_FEATURES : -CUTOUT] = pair.T
     middle_ray = 0.5 * (clusters.rays[clusters.starts] + clusters.rays[clusters.ends])
     ray = 0.5 * (middle_ray[first] + middle_ray[left])
     out[:, -CUTOUT:] = _cutouts(ranges_m, ray, ranges, clusters.turn * step)
     return Hypotheses(first, second, left, middle.T, rays.T, out)
+
+
+def _of_both(values: AnyArray, first: NDArray[np.int64], other: NDArray[np.int64]) -> AnyArray:
+    """Return values of clusters summed over each hypothesis; ``other`` are those of the pairs."""
+    sums = values[first]
+    sums[len(first) - len(other) :] += values[other]
+    return sums
 
 
 def _around(points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray) -> FloatArray:

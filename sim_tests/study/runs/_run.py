@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from perception.arrays import finite_number
 
+from ...world.bullet import require_pybullet
 from ...world.errors import SimError
 from ..measures import EpisodeRecord
 from ._episode import attempt, attempt_within, died, failed
@@ -58,8 +59,9 @@ def run_jobs(
         The records in the order of the jobs; ``error`` of a record says why an episode failed.
 
     Raises:
-        SimError: no jobs or no workers, or the folder cannot be used (:class:`RunFolder`); nothing
-            has run then.
+        SimError: no jobs or no workers, the folder cannot be used (:class:`RunFolder`), or the
+            extra ``sim`` is missing on this computer and there is no scheduler; nothing has run
+            then.
     """
     if not jobs:
         raise SimError("jobs must be at least one episode, got none")
@@ -71,7 +73,9 @@ def run_jobs(
         function = partial(attempt_within, limit_s)
         if scheduler is not None:
             raise SimError("a time limit works in processes of this computer, not on a cluster")
-    if scheduler is not None:
+    if scheduler is None:
+        require_pybullet()
+    else:
         function = partial(_attempt_with, versions())
     folder = RunFolder(
         Path(out_dir),
