@@ -122,6 +122,7 @@ class Stage(AbstractContextManager["Stage"]):
             else AmrLook.of(self.warehouse, self.amr)
         )
         self._sight = RobotSight(self.amr, self.workers)
+        self._sees_robot = [partial(self._sight.seen_by, worker) for worker in self.workers]
         self._audience = Audience(ears, self.workers, self._sight)
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
@@ -151,23 +152,21 @@ class Stage(AbstractContextManager["Stage"]):
 
     def advance(self, until_s: float, meter: SafetyMeter) -> None:
         """Run physics until ``until_s``; move the people and record contacts."""
-        while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
+        dt_s = self.warehouse.physics_dt_s
+        near = [index for index, is_near in enumerate(self._near_robot) if is_near]
+        while self.t_s < until_s - 0.5 * dt_s:
             # Far from the robot, bodies move once per control cycle and touch nobody.
-            if any(self._near_robot) and self.warehouse.steps % self._steps_per_body_update == 0:
-                self._place_workers()
-            self.amr.advance(self.warehouse.physics_dt_s)
+            if near and self.warehouse.steps % self._steps_per_body_update == 0:
+                self._place_workers(in_between=True)
+            self.amr.advance(dt_s)
             # A collision slows the robot in the step that reports it, and in the one before, which
             # stops the robot at the body. The velocity before the collision is the one that counts.
-            previous, current = self._last_velocity_mps, None
-            if any(self._near_robot):
-                current = self.robot_velocity_odom_mps
-            self._last_velocity_mps = current
+            previous, self._last_velocity_mps = self._last_velocity_mps, None
+            if near:
+                self._last_velocity_mps = current = self.robot_velocity_odom_mps
             self.warehouse.step()
-            if current is None:
-                continue
-            for index, near in enumerate(self._near_robot):
-                if near:
-                    self._update_contact(index, (previous, current), meter)
+            for index in near:
+                self._update_contact(index, (previous, current), meter)
         self._place_workers()
 
     def request(self, means: RequestMeans, place_odom_m: FloatArray) -> None:
@@ -235,23 +234,31 @@ class Stage(AbstractContextManager["Stage"]):
         """Outcomes of the people who react, in their order."""
         return tuple(walker.outcome() for walker in self.walkers)
 
-    def _place_workers(self) -> None:
-        robot, others = self._robot_body(), self._moving_bodies()
+    def _place_workers(self, *, in_between: bool = False) -> None:
+        """Move all people to the present time, which may lie between two control cycles.
+
+        Collision bodies that nothing can touch are left behind: those far from the robot, and
+        between two control cycles, when no distance is measured, all that are not next to it.
+        """
+        t_s, robot, others = self.t_s, self._robot_body(), self._moving_bodies()
+        robot_m = robot.x_m, robot.y_m
         motions = []
         for index, (worker, behaviour) in enumerate(
             zip(self.workers, self._behaviours, strict=True)
         ):
             around = Surroundings(
-                robot,
-                others[:index] + others[index + 1 :],
-                partial(self._sight.seen_by, worker),
+                robot, others[:index] + others[index + 1 :], self._sees_robot[index]
             )
-            motion = behaviour.motion(self.t_s, around)
-            motions.append(self._move_or_hold(index, worker, motion, robot))
+            motion = behaviour.motion(t_s, around)
+            collides = self._near_robot[index]
+            if not in_between:
+                x_m, y_m = motion.position_odom_m.tolist()
+                collides = near_robot(worker, (x_m, y_m), robot_m)
+            motions.append(self._move_or_hold(index, worker, motion, collides=collides))
         self._motions = tuple(motions)
 
     def _move_or_hold(
-        self, index: int, worker: Worker, motion: PersonMotion, robot: RobotBody
+        self, index: int, worker: Worker, motion: PersonMotion, *, collides: bool
     ) -> PersonMotion:
         """Move a body; one that would move into the robot stays where it was.
 
@@ -259,9 +266,7 @@ class Stage(AbstractContextManager["Stage"]):
         """
         before = self._motions[index] if self._motions and self._near_robot[index] else None
         depth_m = 0.0 if before is None else self._depth_m(worker)
-        x_m, y_m = motion.position_odom_m.tolist()
-        # Collision bodies far from the robot are left behind: nothing there touches them.
-        _pose(worker, motion, collides=near_robot(worker, (x_m, y_m), (robot.x_m, robot.y_m)))
+        _pose(worker, motion, collides=collides)
         self._held[index] = False
         if before is None or self._depth_m(worker) < depth_m + _DEEPER_M:
             return motion
@@ -278,15 +283,14 @@ class Stage(AbstractContextManager["Stage"]):
         return -min((float(pair[8]) for pair in pairs), default=0.0)
 
     def _robot_body(self) -> RobotBody:
-        T_odom_base = self.amr.T_odom_base
-        x, y = T_odom_base[:2, 3].tolist()
+        (xx, xy, _, x), (yx, yy, _, y) = self.amr.T_odom_base[:2].tolist()
         vx, vy = self.amr.velocity_odom_mps.tolist()
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
         ahead, left = self._middle_base_m
         return RobotBody(
-            x + ahead * float(T_odom_base[0, 0]) + left * float(T_odom_base[0, 1]),
-            y + ahead * float(T_odom_base[1, 0]) + left * float(T_odom_base[1, 1]),
-            math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
+            x + ahead * xx + left * xy,
+            y + ahead * yx + left * yy,
+            math.atan2(yx, xx),
             vx,
             vy,
             *self._half_size_m,
