@@ -218,16 +218,18 @@ class Stage(AbstractContextManager["Stage"]):
     def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
         """Return the truth about every person, seen from the robot's camera."""
         rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
+        camera: list[float] = origin.tolist()
         views = []
         for worker, motion in zip(self.workers, self._motions, strict=True):
             gaze = worker.gaze_odom
-            alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
-            in_front = _faces(motion, origin)
+            alpha = cone.score_of(worker.eyes_odom_m.tolist(), gaze.tolist(), camera)
+            in_front = _faces(motion, camera)
             sighted = (in_front or alpha > 0.0) and self._sight.seen_by(worker)
             views.append(
                 TrueView(
-                    (worker.chest_odom_m - origin) @ rotation,
-                    gaze @ rotation,
+                    # On three numbers dot takes half the time of @.
+                    (worker.chest_odom_m - origin).dot(rotation),
+                    gaze.dot(rotation),
                     alpha if sighted else 0.0,
                     motion.position_odom_m,
                     motion.velocity_odom_mps,
@@ -318,9 +320,8 @@ class Stage(AbstractContextManager["Stage"]):
 
     def _separation(self, index: int) -> tuple[float, FloatArray]:
         """Return the distance between the surfaces and the direction (2,) from robot to worker."""
-        base = self.amr.T_odom_base[:2, 3]
-        centre = self._motions[index].position_odom_m - base
-        distance = math.sqrt(centre @ centre)
+        centre = self._motions[index].position_odom_m - self.amr.T_odom_base[:2, 3]
+        distance = math.sqrt(centre.dot(centre))
         towards = centre / max(distance, 1e-9)
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
@@ -379,10 +380,12 @@ def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
     return KinematicRobot(warehouse, model, start, heading_rad)
 
 
-def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
-    """Return whether a target (2,) or (3,) is at most 90° aside of where the body faces."""
-    forward = np.array([math.cos(motion.heading_odom_rad), math.sin(motion.heading_odom_rad)])
-    return bool(forward @ (target_odom_m[:2] - motion.position_odom_m) >= 0.0)
+def _faces(motion: PersonMotion, target_odom_m: list[float]) -> bool:
+    """Return whether a target is at most 90° aside of where the body faces."""
+    x, y = motion.position_odom_m.tolist()
+    heading_rad = motion.heading_odom_rad
+    ahead_m = math.cos(heading_rad) * (target_odom_m[0] - x)
+    return ahead_m + math.sin(heading_rad) * (target_odom_m[1] - y) >= 0.0
 
 
 def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> None:
