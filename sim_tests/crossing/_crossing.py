@@ -22,7 +22,7 @@ from ..world.render import RendererName
 from ._command import check_planner, checked_command
 from ._policies import named_policy
 from ._result import CrossingFrame, CrossingResult
-from ._sensing import Sensed, Sensing
+from ._sensing import STREAMS, Sensed, Sensing
 from ._separations import Separations
 from ._stage import Stage, TrueView
 from .eyes import KeypointNoise, Perception
@@ -128,7 +128,7 @@ class Crossing(AbstractContextManager["Crossing"]):
     ) -> None:
         self.scenario = scenario
         senses = Perception.named(perception)
-        jitter_rng, camera_rng, timing_rng, people_rng = np.random.default_rng(seed).spawn(4)
+        jitter_rng, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
         jitter = scenario.start_jitter_s
         offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
         self._cone = AttentionCone()
@@ -139,11 +139,9 @@ class Crossing(AbstractContextManager["Crossing"]):
                 self.stage,
                 senses,
                 policy,
-                self._cone,
                 seed,
-                noise=noise if noise is not None else KeypointNoise(),
-                camera_rng=camera_rng,
-                timing_rng=timing_rng,
+                cone=self._cone,
+                noise=noise,
                 pipeline=pipeline,
                 fault=fault,
             )

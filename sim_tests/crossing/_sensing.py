@@ -32,6 +32,9 @@ from .eyes import (
 )
 from .faults import Fault, FaultInjection, FaultyEyes
 
+#: Random streams of an episode: of the people's starts, the camera's noise, its losses and delays,
+#: and the people.
+STREAMS: Final = 4
 # Age of perception before the first image has arrived: older than any policy accepts.
 _NEVER_S: Final = 1.0e6
 # An image without a person is no evidence about people farther away than this.
@@ -66,11 +69,9 @@ class Sensing:
         stage: the stage of the crossing.
         perception: how it perceives people.
         policy: has the settings of the awareness filter.
-        cone: attention cone.
         seed: of the episode.
-        noise: noise of the keypoint camera.
-        camera_rng: random generator of the camera's noise.
-        timing_rng: random generator of its losses and delays.
+        cone: attention cone; None for the default.
+        noise: noise of the keypoint camera; None for the default.
         pipeline: pipeline for pixels; None for the shipped networks.
         fault: a fault of the sensors; None for none.
 
@@ -83,16 +84,15 @@ class Sensing:
         stage: Stage,
         perception: Perception,
         policy: AwarenessPolicy,
-        cone: AttentionCone,
         seed: int,
         *,
-        noise: KeypointNoise,
-        camera_rng: np.random.Generator,
-        timing_rng: np.random.Generator,
+        cone: AttentionCone | None = None,
+        noise: KeypointNoise | None = None,
         pipeline: AwarenessPipeline | None = None,
         fault: Fault | None = None,
     ) -> None:
         self._stage = stage
+        _, camera_rng, timing_rng, _ = np.random.default_rng(seed).spawn(STREAMS)
         injection = FaultInjection(fault, seed)
         model, timing = _camera_and_timing(stage, perception.kind)
         self._camera: FaultyEyes | None = None
@@ -101,8 +101,8 @@ class Sensing:
                 perception.kind,
                 stage,
                 model,
-                cone,
-                noise,
+                AttentionCone() if cone is None else cone,
+                KeypointNoise() if noise is None else noise,
                 camera_rng,
                 pipeline,
                 injection.T_camera_assumed,
