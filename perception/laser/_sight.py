@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -146,10 +147,17 @@ class SeenDirections:
             middle_rad: bearing of its middle in the base frame.
             half_rad: angle from there to either side.
         """
-        off = np.remainder(_BEARINGS_RAD - middle_rad + math.pi, _FULL_TURN_RAD) - math.pi
-        inside = np.abs(off) <= max(half_rad, float(np.abs(off).min())) + 1e-9
-        oldest_s = float(self._seen_s[inside].min())
+        oldest_s = float(self._seen_s[_sector(middle_rad, half_rad)].min())
         return oldest_s if math.isfinite(oldest_s) else None
+
+
+@lru_cache(maxsize=16)
+def _sector(middle_rad: float, half_rad: float) -> NDArray[np.bool_]:
+    """Return which of the bearings are in a sector: at least the one nearest to its middle."""
+    off = np.remainder(_BEARINGS_RAD - middle_rad + math.pi, _FULL_TURN_RAD) - math.pi
+    inside = np.abs(off) <= max(half_rad, float(np.abs(off).min())) + 1e-9
+    inside.setflags(write=False)
+    return np.asarray(inside)
 
 
 def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None) -> ScannerSight:

@@ -49,7 +49,7 @@ class RobotSight:
             # A line that meets the person's own body first counts as free.
             worker.place_collision_body()
             first = first_body_before(worker, camera)
-        return first == -1 or first == worker.body or first in self._through
+        return first in (-1, worker.body) or first in self._through
 
 
 def near_robot(worker: Worker, place_odom_m: Point, robot_odom_m: Point) -> bool:

@@ -69,7 +69,7 @@ def sees(viewer: Viewer, target_odom_m: FloatArray, through: frozenset[int] = fr
         through: ids of other bodies that do not block, such as the robot that carries the target.
     """
     first = first_body_before(viewer, target_odom_m)
-    return first == -1 or first == viewer.body or first in through
+    return first in (-1, viewer.body) or first in through
 
 
 def first_body_before(viewer: Viewer, target_odom_m: FloatArray) -> int:

@@ -43,6 +43,7 @@ _MAX_WHEEL_TORQUE_NM: Final = 25.0
 _TYRE_FRICTION: Final = 1.0
 # The axes of the optical frame (x right, y down, z forward) in the base frame, as columns.
 _ROTATION_BASE_OPTICAL: Final = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+_IDENTITY: Final = np.eye(4)
 
 
 class _Motion(NamedTuple):
@@ -202,8 +203,10 @@ class Amr:
             self.body, physicsClientId=self._client
         )
         velocity, angular = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
-        rotation = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-        arm = rotation @ self._to_base_m
+        entries = pybullet.getMatrixFromQuaternion(quaternion)
+        rotation = np.array(entries).reshape(3, 3)
+        # On so few numbers dot takes half the time of @.
+        arm = rotation.dot(self._to_base_m)
         (wx, wy, wz), (x, y, z), (vx, vy, vz) = angular, arm.tolist(), velocity
         origin_velocity = np.array(
             [vx + (wy * z - wz * y), vy + (wz * x - wx * z), vz + (wx * y - wy * x)]
@@ -211,8 +214,8 @@ class Amr:
         self._last_motion = _Motion(
             rotation,
             com + arm,
-            math.atan2(rotation[1, 0], rotation[0, 0]),
-            float(origin_velocity @ rotation[:, 0]),
+            math.atan2(entries[3], entries[0]),
+            float(origin_velocity.dot(rotation[:, 0])),
             angular[2],
         )
         return self._last_motion
@@ -221,10 +224,10 @@ class Amr:
         """Return T_odom_base and T_odom_camera of the latest step."""
         motion = self._motion()
         if self._last_poses[0] is not motion:
-            T = np.eye(4)
+            T = _IDENTITY.copy()
             T[:3, :3], T[:3, 3] = motion.rotation, motion.origin_m
             T.setflags(write=False)
-            T_odom_camera = np.asarray(T @ self.T_base_camera)
+            T_odom_camera = T.dot(self.T_base_camera)
             T_odom_camera.setflags(write=False)
             self._last_poses = motion, T, T_odom_camera
         return self._last_poses[1:]
