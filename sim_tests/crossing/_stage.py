@@ -141,6 +141,7 @@ class Stage(AbstractContextManager["Stage"]):
         # The middle of the outline, which is not the base origin of every robot.
         self._middle_base_m: tuple[float, float] = tuple((0.5 * (low + high)).tolist())
         self._held = [False] * len(self.workers)
+        self._placed_at_step = 0
         self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
 
@@ -162,7 +163,7 @@ class Stage(AbstractContextManager["Stage"]):
         near = [index for index, is_near in enumerate(self._near_robot) if is_near]
         while self.t_s < until_s - 0.5 * dt_s:
             # Far from the robot, bodies move once per control cycle and touch nobody.
-            if near and self.warehouse.steps % self._steps_per_body_update == 0:
+            if near and self._bodies_move():
                 self._place_workers(in_between=True)
             self.amr.advance(dt_s)
             # A collision slows the robot in the step that reports it, and in the one before, which
@@ -174,6 +175,16 @@ class Stage(AbstractContextManager["Stage"]):
             for index in near:
                 self._update_contact(index, (previous, current))
         self._place_workers()
+
+    def _bodies_move(self) -> bool:
+        """Return whether it is time for bodies next to the robot to move on.
+
+        The last control cycle has ended with this already, but whoever was held may go on now.
+        """
+        steps = self.warehouse.steps
+        if steps % self._steps_per_body_update != 0:
+            return False
+        return steps != self._placed_at_step or any(self._held) or any(self._touching)
 
     def request(self, means: RequestMeans, place_odom_m: FloatArray) -> None:
         """Ask the person at a place for attention, from where the robot is now.
@@ -256,6 +267,7 @@ class Stage(AbstractContextManager["Stage"]):
         """
         t_s, robot, others = self.t_s, self._robot_body(), self._moving_bodies()
         robot_m = robot.x_m, robot.y_m
+        self._placed_at_step = self.warehouse.steps
         motions = []
         for index, (worker, behaviour) in enumerate(
             zip(self.workers, self._behaviours, strict=True)
