@@ -32,7 +32,7 @@ PLANTED = {
     ),
     "sim_tests.actors: behaviour > body, robot apart": (
         "sim_tests/actors/body/_asset.py",
-        "from ..behaviour import Walker",
+        "from ..behaviour import Person",
     ),
     "sim_tests.study: command | watch > report > social > runs | scenarios > measures": (
         "sim_tests/study/measures/_interval.py",

@@ -223,10 +223,7 @@ def _awareness_of_nearest(
         return "", "", error
     row, person = closest
     awareness = awareness_class(trace.t_s, trace.awareness[:, person], lower[:, person], row)
-    reacting = person - result.scripted
-    reaction = ""
-    if 0 <= reacting < len(result.people):
-        reaction = result.people[reacting].reaction
+    reaction = result.people[person].reaction if person < len(result.people) else ""
     return awareness, reaction, error
 
 

@@ -139,19 +139,16 @@ def test_somebody_who_is_blocked_for_good_costs_more_than_somebody_who_is_delaye
 
 
 def test_the_reaction_is_that_of_who_came_nearest():
-    """Scripted workers come first, then those who react, then replayed ones."""
+    """People of the scenario come first, then replayed ones, who have no outcome."""
     places = [(5.0, 3.0), (5.0, 1.0), (5.0, 2.0)]
     people = [walking(place, (0.0, 0.0)) for place in places]
     outcomes = (outcome(reaction="wait"), outcome(reaction="hurry"))
 
-    def reaction(scripted, outcomes):
-        result = crossing(T_S, straight(1.0), people, people=outcomes, scripted=scripted)
-        return measure(result).reaction
+    def reaction(outcomes):
+        return measure(crossing(T_S, straight(1.0), people, people=outcomes)).reaction
 
-    assert reaction(0, outcomes) == "hurry"
-    assert reaction(1, outcomes) == "wait"
-    assert reaction(2, outcomes[:1]) == ""  # a scripted worker came nearest
-    assert reaction(0, outcomes[:1]) == ""  # a replayed one
+    assert reaction(outcomes) == "hurry"
+    assert reaction(outcomes[:1]) == ""  # a replayed one came nearest
 
 
 def test_the_error_of_awareness_is_over_those_with_a_track():
