@@ -16,7 +16,7 @@ from .arrays import FloatArray, finite_number, set_fields
 from .errors import PerceptionError
 from .eyes import EyeGaze
 
-Vector = Sequence[float]
+_Vector = Sequence[float]
 
 #: Half of θ_FOV = 120°, the horizontal field of view that head orientation alone supports.
 DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)
@@ -96,7 +96,7 @@ class AttentionCone:
         ratio = np.divide(perpendicular, radius, out=np.ones_like(radius), where=inside)
         return np.asarray(np.where(inside, 1.0 - ratio, 0.0), dtype=np.float64)
 
-    def score_of(self, apex_m: Vector, gaze: Vector, target_m: Vector) -> float:
+    def score_of(self, apex_m: _Vector, gaze: _Vector, target_m: _Vector) -> float:
         """Return :meth:`scores` of one gaze in plain floats, which take a tenth of the time."""
         # The sums are in the order of einsum, so that both give the same digits.
         gx, gy, gz = gaze

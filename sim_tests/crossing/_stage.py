@@ -396,8 +396,9 @@ def _faces(motion: PersonMotion, target_odom_m: list[float]) -> bool:
     """Return whether a target is at most 90° aside of where the body faces."""
     x, y = motion.position_odom_m.tolist()
     heading_rad = motion.heading_odom_rad
-    ahead_m = math.cos(heading_rad) * (target_odom_m[0] - x)
-    return ahead_m + math.sin(heading_rad) * (target_odom_m[1] - y) >= 0.0
+    ahead_m: float = math.cos(heading_rad) * (target_odom_m[0] - x)
+    ahead_m += math.sin(heading_rad) * (target_odom_m[1] - y)
+    return ahead_m >= 0.0
 
 
 def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> None:
