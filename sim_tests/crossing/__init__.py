@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from ._crossing import (
-    Crossing,
-    Observer,
-    Situation,
-    run_crossing,
-)
-from ._drawing import TopView, draw_camera_view
-from ._metrics import CLEARANCE_M, STANDING_SPEED_MPS, ContactEvent, SafetyMeter
-from ._policies import named_policy
-from ._requests import RequestMemory
+from ._assembly import Setup, axis_names, changed, named_fault, named_policy
+from ._crossing import Crossing, Observer, Situation, drive, run_crossing
+from ._drawing import RequestMemory, TopView, draw_camera_view
 from ._result import CrossingFrame, CrossingResult
+from ._separations import (
+    STANDING_SPEED_MPS,
+    ContactEvent,
+    SafetyFigures,
+    contact_by,
+)
 from ._stage import Stage, TrueView
 from .planner import StraightOn
 
 __all__ = [
-    "CLEARANCE_M",
     "STANDING_SPEED_MPS",
     "ContactEvent",
     "Crossing",
@@ -25,13 +23,19 @@ __all__ = [
     "CrossingResult",
     "Observer",
     "RequestMemory",
-    "SafetyMeter",
+    "SafetyFigures",
+    "Setup",
     "Situation",
     "Stage",
     "StraightOn",
     "TopView",
     "TrueView",
+    "axis_names",
+    "changed",
+    "contact_by",
     "draw_camera_view",
+    "drive",
+    "named_fault",
     "named_policy",
     "run_crossing",
 ]

@@ -13,14 +13,13 @@ from perception.arrays import FloatArray
 from perception.laser import AHEAD_RAD, RobotMotion, SeenDirections
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
+from ..conditions import ORACLE, Perception
 from ..world.camera import CameraTiming
 from ..world.errors import SimError
 from ._stage import Stage, TrueView
 from .eyes import (
-    ORACLE,
     KeypointNoise,
     MapView,
-    Perception,
     ScannerEyes,
     Sighting,
     TimedEyes,
@@ -32,6 +31,9 @@ from .eyes import (
 )
 from .faults import Fault, FaultInjection, FaultyEyes
 
+#: Random streams of an episode: one that is spare, of the camera's noise, its losses and delays,
+#: and the people.
+STREAMS: Final = 4
 # Age of perception before the first image has arrived: older than any policy accepts.
 _NEVER_S: Final = 1.0e6
 # An image without a person is no evidence about people farther away than this.
@@ -66,11 +68,9 @@ class Sensing:
         stage: the stage of the crossing.
         perception: how it perceives people.
         policy: has the settings of the awareness filter.
-        cone: attention cone.
         seed: of the episode.
-        noise: noise of the keypoint camera.
-        camera_rng: random generator of the camera's noise.
-        timing_rng: random generator of its losses and delays.
+        cone: attention cone; None for the default.
+        noise: noise of the keypoint camera; None for the default.
         pipeline: pipeline for pixels; None for the shipped networks.
         fault: a fault of the sensors; None for none.
 
@@ -83,16 +83,15 @@ class Sensing:
         stage: Stage,
         perception: Perception,
         policy: AwarenessPolicy,
-        cone: AttentionCone,
         seed: int,
         *,
-        noise: KeypointNoise,
-        camera_rng: np.random.Generator,
-        timing_rng: np.random.Generator,
+        cone: AttentionCone | None = None,
+        noise: KeypointNoise | None = None,
         pipeline: AwarenessPipeline | None = None,
         fault: Fault | None = None,
     ) -> None:
         self._stage = stage
+        _, camera_rng, timing_rng, _ = np.random.default_rng(seed).spawn(STREAMS)
         injection = FaultInjection(fault, seed)
         model, timing = _camera_and_timing(stage, perception.kind)
         self._camera: FaultyEyes | None = None
@@ -101,8 +100,8 @@ class Sensing:
                 perception.kind,
                 stage,
                 model,
-                cone,
-                noise,
+                AttentionCone() if cone is None else cone,
+                KeypointNoise() if noise is None else noise,
                 camera_rng,
                 pipeline,
                 injection.T_camera_assumed,
@@ -182,8 +181,9 @@ class Sensing:
 
     def _perceived_s(self) -> float:
         """Return the time from which camera or scanners know what is ahead, as on a robot."""
-        stamps_s = (self._newest_s.get("camera"), self._seen.stamp_s(0.0, AHEAD_RAD))
-        return max((each for each in stamps_s if each is not None), default=-_NEVER_S)
+        newest_s = self._newest_s.get("camera", -_NEVER_S)
+        seen_s = None if self._scanners is None else self._seen.stamp_s(0.0, AHEAD_RAD)
+        return newest_s if seen_s is None else max(newest_s, seen_s)
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:
         """Return whether the tracker takes a sighting.

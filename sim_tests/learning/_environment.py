@@ -2,39 +2,48 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from typing import Any, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from awarenav.errors import MissingExtraError, not_one_of
-from nav_adapter import AwarenessPolicy, RobotProfile
+from nav_adapter import AwarenessPolicy, NavConstraints, RobotProfile
 from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.installation import install_command
 from tracking.config import complaints
 
-from ..actors.behaviour import population_of
 from ..actors.robot import NOVA_CARTER, RobotModel
+from ..conditions import Perception
 from ..crossing import (
     STANDING_SPEED_MPS,
     Crossing,
     CrossingFrame,
+    SafetyFigures,
+    Setup,
     Situation,
     TopView,
+    axis_names,
+    changed,
+    contact_by,
     draw_camera_view,
+    named_fault,
     named_policy,
 )
-from ..crossing.eyes import Perception
-from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
+from ..crossing.faults import Fault
+from ..scenario import Scenario, ScenarioTemplate
 from ..world.camera import CameraRenderer
+from ..world.config import SimConfig
 from ..world.errors import SimError
-from ._actions import action_limits, command_of
 from ._observations import Observation, ObservationEncoder
-from ._reward import RewardWeights, over_limit_mps
+from ._policy_planner import action_limits, command_of
 
 try:
     import gymnasium
@@ -52,6 +61,27 @@ _NO_EPISODE: Final = "the environment has no episode: call reset first"
 # The plan shows the robot's way with this margin.
 _PLAN_MARGIN_M: Final = 4.0
 _PICTURE_PX: Final = (640, 480)
+
+
+class RewardWeights(SimConfig):
+    """The weights of the reward; the reward of a step is the sum of its parts.
+
+    Attributes:
+        progress_per_m: for each metre that the goal came closer.
+        goal: once, at the goal.
+        time_per_s: for each second.
+        over_limit_per_m: for each metre that the commanded speed exceeds the limit, summed over
+            time. The speed is that of the robot's fastest point, |v| + |ω| R.
+        negative_margin_per_s: for each second with a negative separation margin of a moving robot.
+        contact: once for each contact that the robot caused.
+    """
+
+    progress_per_m: float = 1.0
+    goal: float = Field(default=5.0)
+    time_per_s: float = -0.2
+    over_limit_per_m: float = -2.0
+    negative_margin_per_s: float = -2.0
+    contact: float = -20.0
 
 
 class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
@@ -80,6 +110,9 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         robot: another robot, to which every scenario is fitted: a model, a shipped name, a YAML
             file or a profile. A holonomic one is driven by speed and yaw rate too.
         population: habits of the people, as for ``run_crossing``; None for each scenario's own.
+        fault: a fault of sensors, detections or odometry, or its name; None for none.
+        axes: other conditions of ``run_crossing`` that change the scenario, such as
+            ``camera="surround"``.
 
     Raises:
         SimError: for arguments that are not valid.
@@ -107,26 +140,17 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         render_view: View = "top",
         robot: RobotModel | RobotProfile | str | Path | None = None,
         population: str | None = None,
+        fault: Fault | str | None = None,
+        **axes: str,
     ) -> None:
-        EzPickle.__init__(
-            self,
-            scenarios=scenarios,
-            policy=policy,
-            perception=perception,
-            control_hz=control_hz,
-            people_slots=people_slots,
-            scan_rays=scan_rays,
-            normalised_actions=normalised_actions,
-            reward=reward,
-            end_at_contact=end_at_contact,
-            render_mode=render_mode,
-            render_view=render_view,
-            robot=robot,
-            population=population,
-        )
+        given = {name: value for name, value in locals().items() if name in _ARGUMENTS}
+        EzPickle.__init__(self, **given, **axes)
         if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
             scenarios = (scenarios,)
-        self._scenarios = tuple(map(_template, scenarios))
+        own_robot = None if robot is None else RobotModel.of(robot)
+        # The conditions that change the scenario, which is done once, and not in every episode.
+        self._axes = {"robot": own_robot, "population": population, **axes}
+        self._scenarios = tuple(self._changed(each) for each in scenarios)
         if not self._scenarios:
             raise SimError("scenarios must name at least one scenario, got none")
         if control_hz is not None and not 0.0 < control_hz <= 240.0:
@@ -136,8 +160,11 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if render_view not in _VIEWS:
             raise SimError(not_one_of("render_view", render_view, _VIEWS))
         Perception.named(perception)
-        self._policy = named_policy(policy)[1]
-        self._perception = perception
+        self._given: dict[str, Any] = {
+            "policy": named_policy(policy)[1],
+            "perception": perception,
+            "fault": named_fault(fault),
+        }
         self._control_hz = control_hz
         self._normalised = normalised_actions
         self._weights = _weights(reward)
@@ -156,11 +183,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
-        if population is not None:
-            population_of(population)  # refuses an unknown one now
-        self._population = population
-        self._robot = None if robot is None else RobotModel.of(robot)
-        profile = NOVA_CARTER if self._robot is None else self._robot.profile
+        profile = NOVA_CARTER if own_robot is None else own_robot.profile
         limits = np.array(action_limits(profile))
         self.action_space = (
             spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -169,7 +192,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         )
         self._crossing: Crossing | None = None
         self._situation: Situation | None = None
-        self._frame: CrossingFrame | None = None
+        self._safety = SafetyFigures()
+        self._last: tuple[Situation, tuple[float, float]] | None = None
         self._plan: TopView | None = None
         self._camera: CameraRenderer | None = None
         self._ended = False
@@ -191,7 +215,10 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
     @property
     def frame(self) -> CrossingFrame | None:
         """The control cycle of the last step, as ``run_crossing`` records it; None before it."""
-        return self._frame
+        if self._last is None:
+            return None
+        situation, command = self._last
+        return situation.frame(command)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -209,20 +236,19 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         choice = int(self.np_random.integers(len(self._scenarios)))
         episode_seed = drawn if seed is None else seed
         given = (options or {}).get("scenario")
-        template = self._scenarios[choice] if given is None else _template(given)
+        template = self._scenarios[choice] if given is None else self._changed(given)
         scenario = template if isinstance(template, Scenario) else template.for_seed(episode_seed)
         if self._control_hz is not None:
             scenario = scenario.model_copy(update={"control_hz": self._control_hz})
-        if self._population is not None:
-            scenario = scenario.with_population(self._population)
-        if self._robot is not None:
-            scenario = scenario_for_robot(scenario, self._robot)
         self.close()
-        self._crossing = Crossing(scenario, self._policy, self._perception, episode_seed)
+        setup = Setup.of(scenario, seed=episode_seed, **self._given)
+        conditions = replace(setup.conditions, **axis_names(self._axes))
+        self._crossing = Crossing(replace(setup, conditions=conditions))
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
-        self._frame = None
+        self._last = None
         self._ended = False
-        self._situation = self._crossing.sense()
+        self._safety = SafetyFigures()
+        self._sense()
         return self._observation(), self._info((0.0, 0.0), {}, "", episode_seed)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -237,9 +263,9 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         command = command_of(action, crossing.stage.amr.profile, normalised=self._normalised)
         contacts = _by_robot(crossing)
         crossing.command(*command)
-        self._frame = before.frame(command)
+        self._last = before, command
         crossing.advance()
-        now = self._situation = crossing.sense()
+        now = self._sense()
         hits = _by_robot(crossing) - contacts
         terminated = now.at_goal and not crossing.time_is_up
         reason = "goal" if terminated else ""
@@ -257,7 +283,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             "goal": weights.goal * (reason == "goal"),
             "time": weights.time_per_s * dt_s,
             "over_limit": weights.over_limit_per_m
-            * over_limit_mps(before.constraints, command)
+            * _over_limit_mps(before.constraints, command)
             * dt_s,
             "margin": weights.negative_margin_per_s * _violates(now) * dt_s,
             "contact": weights.contact * hits,
@@ -270,7 +296,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if self.render_mode is None:
             return None
         crossing = self.crossing
-        command = (0.0, 0.0) if self._frame is None else self._frame.command
+        command = (0.0, 0.0) if self._last is None else self._last[1]
         frame, cone = self.situation.frame(command), AttentionCone()
         if self._render_view == "top":
             if self._plan is None:
@@ -291,6 +317,20 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._crossing, self._situation = None, None
         self._plan, self._camera = None, None
 
+    def _sense(self) -> Situation:
+        now = self._situation = self.crossing.sense()
+        self._safety = self._safety.after(now.t_s, now.separations)
+        return now
+
+    def _changed(self, given: Any) -> Scenario | ScenarioTemplate:
+        """Return a scenario with the robot, the population and the like of the environment."""
+        if not isinstance(given, (str, Scenario, ScenarioTemplate)):
+            raise SimError(
+                "a scenario must be a name, a YAML file, a Scenario or a template, got "
+                f"{given!r:.80}"
+            )
+        return changed(given, self._axes)
+
     def _observation(self) -> Observation:
         now = self.situation
         return self._encoder.encode(now.sensed.state, self.crossing.goal_odom_m, now.constraints)
@@ -302,18 +342,18 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         reason: str,
         seed: int | None,
     ) -> dict[str, Any]:
-        now, meter = self.situation, self.crossing.meter
+        now, safety = self.situation, self._safety
         limits = now.constraints
         info: dict[str, Any] = {
             "t_s": now.t_s,
             "scenario": self.crossing.scenario.name,
             "command": list(command),
             "distance_to_goal_m": _distance_m(now, self.crossing.goal_odom_m),
-            "margins_m": list(now.margins_m),
-            "separations_m": list(now.separations_m),
-            "min_margin_m": meter.min_margin_m,
-            "min_separation_m": meter.min_separation_m,
-            "violation_time_s": meter.violation_time_s,
+            "margins_m": list(now.separations.margins_m),
+            "separations_m": list(now.separations.separations_m),
+            "min_margin_m": safety.min_margin_m,
+            "min_separation_m": safety.min_separation_m,
+            "violation_time_s": safety.violation_time_s,
             "speed_limit_mps": limits.speed_limit_mps,
             "yaw_rate_limit_radps": limits.yaw_rate_limit_radps(now.sensed.state.speed_mps),
             "limited_by": limits.limited_by,
@@ -329,7 +369,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
                 ]
                 for each in limits.obstacles
             ],
-            "contact": _contact(self.crossing),
+            "contact": contact_by(self.crossing.stage.contacts),
             "end": reason,
             "is_success": reason == "goal" and not _by_robot(self.crossing),
             "reward_parts": parts,
@@ -337,16 +377,6 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if seed is not None:
             info["seed"] = seed
         return info
-
-
-def _template(given: Any) -> Scenario | ScenarioTemplate:
-    if isinstance(given, (Scenario, ScenarioTemplate)):
-        return given
-    if not isinstance(given, str):
-        raise SimError(
-            f"a scenario must be a name, a YAML file, a Scenario or a template, got {given!r:.80}"
-        )
-    return ScenarioTemplate.named(given)
 
 
 def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights:
@@ -360,21 +390,34 @@ def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights
         raise SimError(f"reward: {cause}") from cause
 
 
+def _over_limit_mps(constraints: NavConstraints, command: tuple[float, float]) -> float:
+    """Return by how much a command of speed (m/s) and yaw rate (rad/s) exceeds the limit, ≥ 0."""
+    speed = abs(command[0])
+    over = max(speed - constraints.speed_limit_mps, 0.0)
+    fastest = constraints.fastest_point_limit_mps
+    if constraints.robot is not None and fastest is not None:
+        radius = constraints.robot.circumscribed_radius_m
+        over = max(over, speed + abs(command[1]) * radius - fastest)
+    return over
+
+
 def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
     """Return the true distance of the base origin to the goal."""
-    return float(np.linalg.norm(goal_odom_m - now.state.position_odom_m))
+    off_m = goal_odom_m - now.state.position_odom_m
+    return math.sqrt(off_m.dot(off_m))
 
 
 def _violates(now: Situation) -> bool:
-    return now.state.travel_mps > STANDING_SPEED_MPS and min(now.margins_m, default=0.0) < 0.0
+    return (
+        now.state.travel_mps > STANDING_SPEED_MPS
+        and min(now.separations.margins_m, default=0.0) < 0.0
+    )
 
 
 def _by_robot(crossing: Crossing) -> int:
     """Return how many contacts the robot has caused."""
-    return sum(contact.by == "robot" for contact in crossing.meter.contacts)
+    return sum(contact.by == "robot" for contact in crossing.stage.contacts)
 
 
-def _contact(crossing: Crossing) -> str:
-    """Return who caused a contact in this episode; empty for none."""
-    causes = {contact.by for contact in crossing.meter.contacts}
-    return "robot" if "robot" in causes else "person" if causes else ""
+# The arguments of an environment, by which it is copied and pickled.
+_ARGUMENTS: Final = frozenset(signature(CrossingEnv.__init__).parameters) - {"self", "axes"}

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from measured_scenes import ALONG_M, BODY_RADIUS_M, crossing, straight, track_at, walking
+from measured_scenes import ALONG_M, BODY_RADIUS_M, contact, crossing, straight, track_at, walking
 
 from nav_adapter import Alert
 from sim_tests import run_crossing
 from sim_tests.actors.behaviour import PersonOutcome
-from sim_tests.crossing._metrics import ContactEvent
 from sim_tests.study.measures import measure
 from sim_tests.study.measures._awareness import awareness_class, matched_tracks, nearest_person
-from sim_tests.study.measures._measure import human_cost, time_lost_s
 
 T_S = np.arange(0.0, 8.001, 0.05)
 
@@ -43,10 +41,13 @@ def test_way_and_time_against_the_same_task_without_people():
     assert unknown.time_lost_s is unknown.spl is None
 
 
+def test_a_printed_result_has_its_main_figures():
+    text = repr(crossing(T_S, straight(1.0), [walking((20.0, 0.0), (0.0, 0.0))]))
+    assert "success=True, contact_by='', min_separation_m=11." in text
+    assert f"frames=<{len(T_S)} CrossingFrame>" in text
+
+
 def test_not_reaching_the_goal_loses_all_of_the_time():
-    assert time_lost_s(None, 40.0, 10.0) == 40.0
-    assert time_lost_s(12.0, 12.0, 10.0) == 2.0
-    assert time_lost_s(None, 40.0, None) is None
     record = measure(
         crossing(T_S, straight(1.0), reached=False),
         time_without_people_s=6.5,
@@ -57,9 +58,9 @@ def test_not_reaching_the_goal_loses_all_of_the_time():
 
 def test_contacts_are_split_and_a_contact_is_no_separation():
     touches = (
-        ContactEvent(1.0, 0, "person", 0.9),
-        ContactEvent(2.0, 0, "robot", 0.4),
-        ContactEvent(3.0, 0, "robot", 0.2),
+        contact(1.0, 0, "person", 0.9),
+        contact(2.0, 0, "robot", 0.4),
+        contact(3.0, 0, "robot", 0.2),
     )
     person = walking((20.0, 0.0), (0.0, 0.0))
     record = measure(crossing(T_S, straight(1.0), [person], contacts=touches))
@@ -72,7 +73,7 @@ def test_contacts_are_split_and_a_contact_is_no_separation():
     assert by_person.contact_speed_mps is None
     assert (by_person.moving_contacts, by_person.moving_contact_mps) == (1, 0.9)
     assert by_person.success
-    standing = (ContactEvent(1.0, 0, "person", 0.02),)
+    standing = (contact(1.0, 0, "person", 0.02),)
     walked_into = measure(crossing(T_S, straight(0.02), [person], contacts=standing))
     assert (walked_into.contacts, walked_into.moving_contacts) == (1, 0)
     assert walked_into.moving_contact_mps is None
@@ -91,19 +92,19 @@ def test_contacts_with_people_who_have_not_looked_for_a_second_are_counted_apart
         people = [walking((20.0, 0.0), (0.0, 0.0))]
         return measure(crossing(T_S, straight(1.0), people, awareness=looks, contacts=touches))
 
-    before, looking = ContactEvent(1.0, 0, "person", 0.9), ContactEvent(2.5, 0, "robot", 1.2)
-    shortly, later = ContactEvent(4.0, 0, "robot", 0.7), ContactEvent(4.2, 0, "robot", 0.3)
+    before, looking = contact(1.0, 0, "person", 0.9), contact(2.5, 0, "robot", 1.2)
+    shortly, later = contact(4.0, 0, "robot", 0.7), contact(4.2, 0, "robot", 0.3)
     found = record(before, looking, shortly, later)
     assert (found.moving_contacts, found.moving_contacts_unaware) == (4, 2)
     assert (found.moving_contact_mps, found.moving_contact_unaware_mps) == (1.2, 0.9)
     assert record(looking, shortly).moving_contacts_unaware == 0
     assert record(looking, shortly).moving_contact_unaware_mps is None
     # The robot comes nearer all the time, to somebody who is unaware again at the end.
-    assert found.min_margin_unaware_m == pytest.approx(record().min_separation_m)
+    assert found.min_margin_unaware_m == record().min_margin_m < record().min_separation_m
     aware = crossing(T_S, straight(1.0), [walking((20.0, 0.0), (0.0, 0.0))], awareness=always)
     assert measure(aware).min_margin_unaware_m is None
     # A standing robot has stopped for everybody.
-    assert record(ContactEvent(1.0, 0, "person", 0.02)).moving_contacts_unaware == 0
+    assert record(contact(1.0, 0, "person", 0.02)).moving_contacts_unaware == 0
 
 
 def test_warnings_are_counted_as_they_are_asked_for():
@@ -117,42 +118,39 @@ def outcome(**values):
     return PersonOutcome(name="somebody", **values)
 
 
+def human_cost(*people):
+    record = measure(crossing(T_S, straight(1.0), people=people))
+    return record.human_delay_s, record.human_detour_m
+
+
 def test_people_are_delayed_by_what_is_over_their_free_walk():
     done = outcome(time_s=12.0, free_time_s=10.0, length_m=14.5, free_length_m=13.0)
     early = outcome(time_s=9.5, free_time_s=10.0, length_m=13.0, free_length_m=13.0)
     not_started = outcome(free_time_s=10.0, free_length_m=13.0)
     standing = outcome()
-    assert human_cost([done, early, not_started, standing]) == (1.5, 1.5)
-    assert human_cost([not_started, standing]) == (None, None)
+    assert human_cost(done, early, not_started, standing) == (1.5, 1.5)
+    assert human_cost(not_started, standing) == (None, None)
 
 
 def test_somebody_who_is_blocked_for_good_costs_more_than_somebody_who_is_delayed():
     delayed = outcome(time_s=15.0, free_time_s=10.0, length_m=13.0, free_length_m=13.0)
     blocked = outcome(late_s=24.0, free_time_s=10.0, length_m=5.0, free_length_m=13.0)
-
-    def cost(*people):
-        record = measure(crossing(T_S, straight(1.0), people=people))
-        return record.human_delay_s, record.human_detour_m
-
-    assert cost(delayed) == (5.0, 0.0)
-    assert cost(blocked) == (24.0, None)
-    assert cost(delayed, blocked) == (29.0, 0.0)
+    assert human_cost(delayed) == (5.0, 0.0)
+    assert human_cost(blocked) == (24.0, None)
+    assert human_cost(delayed, blocked) == (29.0, 0.0)
 
 
 def test_the_reaction_is_that_of_who_came_nearest():
-    """Scripted workers come first, then those who react, then replayed ones."""
+    """People of the scenario come first, then replayed ones, who have no outcome."""
     places = [(5.0, 3.0), (5.0, 1.0), (5.0, 2.0)]
     people = [walking(place, (0.0, 0.0)) for place in places]
     outcomes = (outcome(reaction="wait"), outcome(reaction="hurry"))
 
-    def reaction(scripted, outcomes):
-        result = crossing(T_S, straight(1.0), people, people=outcomes, scripted=scripted)
-        return measure(result).reaction
+    def reaction(outcomes):
+        return measure(crossing(T_S, straight(1.0), people, people=outcomes)).reaction
 
-    assert reaction(0, outcomes) == "hurry"
-    assert reaction(1, outcomes) == "wait"
-    assert reaction(2, outcomes[:1]) == ""  # a scripted worker came nearest
-    assert reaction(0, outcomes[:1]) == ""  # a replayed one
+    assert reaction(outcomes) == "hurry"
+    assert reaction(outcomes[:1]) == ""  # a replayed one came nearest
 
 
 def test_the_error_of_awareness_is_over_those_with_a_track():
