@@ -22,7 +22,7 @@ PLANTED = {
         "from nav_adapter import NavError",
     ),
     "sim_tests: search > study | demo > viewing | learning > crossing > "
-    "scenario | dataset > actors > world": (
+    "scenario | dataset > actors > conditions > world": (
         "sim_tests/world/_visibility.py",
         "from ..crossing import run_crossing",
     ),
@@ -34,7 +34,7 @@ PLANTED = {
         "sim_tests/actors/body/_asset.py",
         "from ..behaviour import Person",
     ),
-    "sim_tests.study: command | watch > report > social > runs | scenarios > measures": (
+    "sim_tests.study: command > report > social > runs | scenarios > measures": (
         "sim_tests/study/measures/_summary.py",
         "from ..runs import run_jobs",
     ),

@@ -13,14 +13,13 @@ from perception.arrays import FloatArray
 from perception.laser import AHEAD_RAD, RobotMotion, SeenDirections
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
+from ..conditions import ORACLE, Perception
 from ..world.camera import CameraTiming
 from ..world.errors import SimError
 from ._stage import Stage, TrueView
 from .eyes import (
-    ORACLE,
     KeypointNoise,
     MapView,
-    Perception,
     ScannerEyes,
     Sighting,
     TimedEyes,

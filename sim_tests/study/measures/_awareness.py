@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
@@ -65,6 +64,9 @@ def matched_tracks(
         tracks_odom_m: (T, 2) positions of the tracks.
         people_odom_m: (P, 2) positions of the people.
     """
+    # Takes long to import; processes that only read runs do without.
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
+
     gaps = tracks_odom_m[:, None, :] - people_odom_m[None, :, :]
     distances = np.hypot(gaps[..., 0], gaps[..., 1])
     # The cost of a pair beyond the bound is so high that as many pairs as possible lie within it.

@@ -152,12 +152,12 @@ class Log:
     @cached_property
     def step_out(self) -> StepOutImpacts:
         """Step-out impacts of people who start as recorded."""
-        return step_out_impacts(self.result)
+        return step_out_impacts(self.result, trace=self.trace)
 
     @cached_property
     def step_out_stress(self) -> StepOutImpacts:
         """Step-out impacts of people who start faster than recorded."""
-        return step_out_impacts(self.result, FASTER_STEP_OUT)
+        return step_out_impacts(self.result, FASTER_STEP_OUT, trace=self.trace)
 
     @cached_property
     def requests(self) -> Requests:

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import MISSING, fields
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from ...conditions import Conditions
 from . import _conflict, _driving
 from ._awareness import MeasuredAttention, awareness_class
 from ._registry import Awareness, Better, Column, Kind, Metric
@@ -73,16 +75,15 @@ def condition(name: str, kind: Kind, meaning: str, default: Any = None) -> None:
     COLUMNS[name] = Column(name, kind, meaning, None, default, default is None and kind != "number")
 
 
-condition("scenario", "text", "Name of the scenario.")
-condition("seed", "count", "Of the episode.")
-condition("policy", "text", "Name of the policy.")
-condition("planner", "text", "Name of the planner.")
-condition(
-    "perception",
-    "text",
-    '``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are scanners too, '
-    'or ``"scanner"``.',
-)
+def _conditions(*, required: bool) -> None:
+    """Add the columns of the conditions: those that every table has, or those that may be empty."""
+    for axis in fields(Conditions):
+        if (axis.default is MISSING) == required:
+            kind = _KINDS[str(axis.type)]
+            condition(axis.name, kind, axis.metadata["meaning"], None if required else axis.default)
+
+
+_conditions(required=True)
 
 
 @column
@@ -157,7 +158,7 @@ condition(
     'The scenario\'s ``attention``: ``"attentive"``, ``"unaware"`` or ``"mixed"``.',
     "mixed",
 )
-condition("fault", "text", "Name of the fault, empty for none.", "")
+_conditions(required=False)
 
 
 @column
@@ -330,7 +331,7 @@ def reaction(log: Log) -> str:
     """Reaction of that person, see :class:`PersonOutcome`."""
     if log.nearest_person is None:
         return ""
-    person = log.nearest_person[1]
+    _, person = log.nearest_person
     return log.result.people[person].reaction if person < len(log.result.people) else ""
 
 

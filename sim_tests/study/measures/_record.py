@@ -14,6 +14,7 @@ from awarenav.errors import did_you_mean
 from awarenav.files import atomic_path
 from perception.installation import install_command
 
+from ...conditions import AXES, Conditions
 from ...world.errors import SimError
 from ._metrics import COLUMNS
 from ._registry import Awareness, Column, Kind
@@ -78,6 +79,11 @@ class EpisodeRecord:
             name: rounded(values[name]) for name, each in COLUMNS.items() if each.kind == "number"
         }
         return EpisodeRecord(**{**values, **numbers})
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions of the episode, which are its key."""
+        return Conditions(**{name: getattr(self, name) for name in AXES})
 
     @property
     def versioned_scenario(self) -> str:

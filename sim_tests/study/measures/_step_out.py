@@ -124,7 +124,9 @@ class StepOutImpacts:
     worst_mps: float
 
 
-def step_out_impacts(result: CrossingResult, model: StepOut = STEP_OUT) -> StepOutImpacts:
+def step_out_impacts(
+    result: CrossingResult, model: StepOut = STEP_OUT, *, trace: Trace | None = None
+) -> StepOutImpacts:
     """Return the step-out impacts of a crossing; every figure is NaN without people.
 
     Every 0.1 s at which the robot moves, each person sets off in each of 16 directions, evenly
@@ -137,11 +139,12 @@ def step_out_impacts(result: CrossingResult, model: StepOut = STEP_OUT) -> StepO
     Args:
         result: the crossing.
         model: the people's constants.
+        trace: the course of the crossing; None to take it from the result.
 
     Raises:
         SimError: a result without frames, or with frames that do not hold all people.
     """
-    trace = Trace.of(result)
+    trace = Trace.of(result) if trace is None else trace
     if not trace.people:
         return StepOutImpacts(*[math.nan] * 5)
     t_s = trace.t_s

@@ -11,6 +11,7 @@ import numpy as np
 
 from perception.short_repr import short_repr
 
+from ...conditions import AXES
 from ._awareness import measured_part
 from ._metrics import METRICS
 from ._record import EpisodeRecord
@@ -27,6 +28,12 @@ from ._statistics import (
 #: Policy that others are compared with, unless another is named.
 BASELINE: Final = "blind"
 _NO_FAULT: Final = "no fault"
+# The conditions that have no field of their own in a variant.
+_OTHERS: Final = tuple(
+    name
+    for name in AXES
+    if name not in ("scenario", "seed", "policy", "planner", "perception", "fault")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +46,7 @@ class Variant:
         perception: ``"truth"``, ``"keypoints"``, ``"pixels"`` or ``"oracle"``.
         fault: name of the fault, empty for none.
         source: name of the table that its episodes come from, empty with a single table.
+        others: other conditions that are not the scenario's own, such as ``("robot", "omni")``.
     """
 
     policy: str
@@ -46,11 +54,13 @@ class Variant:
     perception: str = ""
     fault: str = ""
     source: str = ""
+    others: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(cls, record: EpisodeRecord, source: str = "") -> Variant:
         """Return the variant of an episode."""
-        return cls(record.policy, record.planner, record.perception, record.fault, source)
+        others = tuple((name, value) for name in _OTHERS if (value := getattr(record, name)))
+        return cls(record.policy, record.planner, record.perception, record.fault, source, others)
 
 
 def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
@@ -64,6 +74,11 @@ def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
             for field in ("planner", "perception", "fault", "source")
             if len({getattr(each, field) for each in same}) > 1
         ]
+        differing += [
+            f"{name} {value}"
+            for name, value in variant.others
+            if any((name, value) not in each.others for each in same)
+        ]
         return ", ".join([variant.policy, *differing])
 
     return {variant: label(variant) for variant in found}
@@ -73,8 +88,9 @@ def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> 
     """Return the variants that a variant is compared with.
 
     The first is the baseline policy with the same planner. Where there are several, the one under
-    the most similar conditions is taken: the same table, then the same fault, then the same
-    perception. The second is the same variant in the first of several tables.
+    the most similar conditions is taken: the same table, then the same camera, robot and the like,
+    then the same fault, then the same perception. The second is the same variant in the first of
+    several tables.
 
     Args:
         variant: the variant to compare.
@@ -92,6 +108,7 @@ def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> 
                 candidates,
                 key=lambda each: (
                     each.source == variant.source,
+                    each.others == variant.others,
                     each.fault == variant.fault,
                     not each.fault,
                     each.perception == variant.perception,

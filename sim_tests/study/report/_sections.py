@@ -197,7 +197,7 @@ def _mean(row: SummaryRow | None, name: str, decimals: int) -> Cell:
 def recorded_people(jobs: Iterable[Job]) -> tuple[str, ...]:
     """Return a sentence about each scenario of recorded people: whether they react to the robot."""
     notes: dict[str, str] = {}
-    for text in dict.fromkeys(job.scenario for job in jobs):
+    for text in dict.fromkeys(job.scenario_text for job in jobs):
         try:
             data = parse_yaml(text, "scenario", SimError)
         except SimError:
@@ -379,8 +379,8 @@ def failures_section(run: Run) -> Section | None:
 def reproduction_section(run: Run) -> Section:
     """Return the configuration of a run, from which it can be repeated."""
     command = str(run.about.get("command", ""))
-    policies = dict.fromkeys((f"Policy {job.policy_name}", job.policy) for job in run.jobs)
-    faults = dict.fromkeys((f"Fault {j.fault_name}", j.fault) for j in run.jobs if j.fault_name)
+    policies = dict.fromkeys((f"Policy {job.policy}", job.policy_text) for job in run.jobs)
+    faults = dict.fromkeys((f"Fault {j.fault}", j.fault_text) for j in run.jobs if j.fault)
     return Section(
         "reproduce",
         "Reproduce",

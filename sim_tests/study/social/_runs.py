@@ -20,11 +20,9 @@ from ..runs import (
     Job,
     RunFiles,
     attempt,
-    describe,
     find_episode,
     free_run_of,
     in_parallel,
-    job_key,
     observed_episode,
     read_jobs,
 )
@@ -124,7 +122,7 @@ def episode_of(job: Job) -> tuple[SocialEpisode, EpisodeRecord]:
         reference_length_m=free.length_m,
         human_delay_s=record.human_delay_s,
     )
-    return recorder.episode(result, outcome, describe(job_key(job))), record
+    return recorder.episode(result, outcome, job.conditions.text), record
 
 
 def measure_sources(

@@ -265,10 +265,11 @@ def test_a_failing_still_costs_only_itself(folder: Path, tmp_path: Path, how: st
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     job = json.loads((folder / "jobs.jsonl").read_text())
     if how == "other":
-        job["policy"] = plan_jobs(["crossing_from_left"], ["conservative"], [0])[0].policy
-        job["scenario"] = job["scenario"].replace("duration_s: ", "duration_s: 0.")
+        other, *_ = plan_jobs(["crossing_from_left"], ["conservative"], [0])
+        job["policy_text"] = other.policy_text
+        job["scenario_text"] = job["scenario_text"].replace("duration_s: ", "duration_s: 0.")
     else:
-        job["policy"] = "inflation: [what"
+        job["policy_text"] = "inflation: [what"
     (tmp_path / "jobs.jsonl").write_text(json.dumps(job) + "\n")
     page = PageReader(write_report(tmp_path).read_text("utf-8"))
     assert "No picture: " in page.text
