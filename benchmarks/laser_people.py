@@ -173,13 +173,7 @@ def drive(
             robot.advance(t, 1.0 / _RATE_HZ)
             for walk, back_m, worker, steps in zip(walks, backs_m, people, feet, strict=True):
                 walk.advance(t, 1.0 / _RATE_HZ)
-                x, y, heading = _ahead(walk, -back_m)
-                cos, sin = math.cos(heading), math.sin(heading)
-                ahead, turning = walk.speed_mps, walk.yaw_rate_radps
-                aside = -turning * back_m  # somebody behind a trolley goes round it
-                moving = (ahead * cos - aside * sin, ahead * sin + aside * cos, turning)
-                gait = steps.step(1.0 / _RATE_HZ, (x, y, heading), moving, (0.0, 0.0))
-                worker.place((x, y), heading, feet=gait)
+                _place(worker, steps, walk, back_m)
             pose[0] = _pose(robot)
             velocity = np.array([robot.speed_mps, 0.0])
             motion = RobotMotion(t, pose[0], velocity, robot.yaw_rate_radps)
@@ -262,6 +256,17 @@ def _ahead(walk: Wanderer, distance_m: float) -> tuple[float, float, float]:
     x, y = walk.place_m.tolist()
     heading = walk.heading_rad
     return x + distance_m * math.cos(heading), y + distance_m * math.sin(heading), heading
+
+
+def _place(worker: Worker, feet: OnlineFootsteps, walk: Wanderer, back_m: float) -> None:
+    """Let somebody walk on, at a distance behind the middle of what wanders."""
+    x, y, heading = _ahead(walk, -back_m)
+    cos, sin = math.cos(heading), math.sin(heading)
+    ahead, turning = walk.speed_mps, walk.yaw_rate_radps
+    aside = -turning * back_m  # somebody behind a trolley goes round it
+    velocity = (ahead * cos - aside * sin, ahead * sin + aside * cos, turning)
+    gait = feet.step(1.0 / _RATE_HZ, (x, y, heading), velocity, (0.0, 0.0))
+    worker.place((x, y), heading, feet=gait)
 
 
 def _pose(robot: Wanderer) -> FloatArray:
