@@ -24,7 +24,7 @@ from ..actors.behaviour import (
     Surroundings,
 )
 from ..actors.body import Worker
-from ..actors.robot import NOVA_CARTER, Amr, AmrLook, KinematicLook, KinematicRobot
+from ..actors.robot import Amr, KinematicRobot, RobotLook, robot_of
 from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.bullet import pybullet
@@ -44,8 +44,6 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
-# The highest speed that a body is placed with; recorded people may be faster.
-_FASTEST_MPS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,11 +116,7 @@ class Stage(AbstractContextManager["Stage"]):
         except BaseException:
             self.warehouse.close()
             raise
-        self.warehouse.add_actor(
-            KinematicLook(self.amr)
-            if isinstance(self.amr, KinematicRobot)
-            else AmrLook.of(self.warehouse, self.amr)
-        )
+        self.warehouse.add_actor(RobotLook.of(self.amr))
         self._sight = RobotSight(self.amr, self.workers)
         self._audience = Audience(ears, self.workers, self._sight)
         self._motions: tuple[PersonMotion, ...] = ()
@@ -373,10 +367,7 @@ def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
     """Return the robot of a scenario at its start."""
     task, model = scenario.robot, scenario.robot_model
     start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
-    if model is None or model.body == "nova_carter":
-        mount = scenario.camera.mount
-        return Amr(warehouse, start, heading_rad, NOVA_CARTER, camera_mount=mount)
-    return KinematicRobot(warehouse, model, start, heading_rad)
+    return robot_of(warehouse, model, start, heading_rad, camera_mount=scenario.camera.mount)
 
 
 def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
@@ -389,10 +380,8 @@ def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> Non
     worker.place(
         motion.position_odom_m,
         motion.heading_odom_rad,
-        motion.walked_m,
-        min(math.hypot(*motion.velocity_odom_mps.tolist()), _FASTEST_MPS),
-        motion.head_yaw_rad,
-        motion.head_pitch_rad,
+        head_yaw_rad=motion.head_yaw_rad,
+        head_pitch_rad=motion.head_pitch_rad,
         eye_yaw_rad=motion.eye_yaw_rad,
         eye_pitch_rad=motion.eye_pitch_rad,
         activity=motion.activity,

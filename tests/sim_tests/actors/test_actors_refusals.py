@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import pytest
 
 from sim_tests import Scenario
 from sim_tests.actors.behaviour import Hearing, PersonSpec
-from sim_tests.actors.body import Gait, load_worker, skeleton
+from sim_tests.actors.body import load_worker
 from sim_tests.crossing import Stage
 from sim_tests.scenario import ScenarioTemplate
 
@@ -27,8 +26,6 @@ def stage(*people: dict[str, Any], layout: str = "open") -> Stage:
     ("make", "message"),
     [
         (lambda: load_worker("nobody"), "must be one of .*got 'nobody'"),
-        (lambda: Gait(skeleton(None, 1.75), math.nan), "stride_m"),
-        (lambda: Gait(skeleton(None, 1.75), 2.0), "stride_m"),
         (lambda: Hearing(heard_within_m=20.0), "heard_within_m must be at most not_heard_beyond"),
         (lambda: Hearing.model_validate({"answer": 0.3}), "did you mean 'answers'"),
         (
