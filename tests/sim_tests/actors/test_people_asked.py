@@ -15,7 +15,7 @@ from staged_people import DT_S, StageRun, run_stage
 from nav_adapter import Alert
 from sim_tests import Scenario
 from sim_tests.actors.behaviour import WALKER_RADIUS_M
-from sim_tests.crossing import Crossing, Stage, named_policy
+from sim_tests.crossing import Crossing, Setup, Stage
 from sim_tests.world.hall import WarehouseLayout
 
 ANSWERS = {"answers": 1.0, "startles": 0.0, "delay_spread": 1.0, "look_spread": 1.0}
@@ -218,7 +218,7 @@ def test_a_crossing_lets_people_hear_its_requests_and_not_its_warnings(monkeypat
     monkeypatch.setattr(
         Stage, "request", lambda _, means, place: asked.append((means, tuple(place)))
     )
-    with Crossing(scenario, named_policy("balanced")[1]) as crossing:
+    with Crossing(Setup.of(scenario, policy="balanced")) as crossing:
         update = crossing._adapter.update
 
         def with_alerts(*words: Any, **named: Any) -> Any:

@@ -7,8 +7,9 @@ import pytest
 
 from perception import AttentionCone
 from sim_tests import Scenario, SimError, run_crossing
+from sim_tests.conditions import ORACLE, Perception
 from sim_tests.crossing import Stage
-from sim_tests.crossing.eyes import ORACLE, MapView, Perception, TrueEyes
+from sim_tests.crossing.eyes import MapView, TrueEyes
 from sim_tests.scenario import ScenarioTemplate
 
 NAMES = ("truth", "keypoints", "pixels", "keypoints+scanner", "pixels+scanner", "scanner", ORACLE)

@@ -151,8 +151,8 @@ def test_the_camera_of_a_scenario_can_be_replaced(tmp_path: Path) -> None:
 
 def test_runs_and_searches_accept_a_camera() -> None:
     jobs = plan_jobs(["runs_out"], ["blind"], [0], camera="surround")
-    assert ScenarioTemplate.from_text(jobs[0].scenario).median().camera.mount == "top"
-    (template,) = named_templates(["runs_out"], "surround")
+    assert ScenarioTemplate.from_text(jobs[0].scenario_text).median().camera.mount == "top"
+    (template,) = named_templates(["runs_out"], camera="surround")
     assert template.median().camera.mount == "top"
 
 

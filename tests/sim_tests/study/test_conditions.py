@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import asdict, replace
 
 import pytest
 from paths import ROOT
@@ -17,7 +18,7 @@ from sim_tests.actors.robot import RobotModel
 from sim_tests.conditions import AXES, OPTIONS, POPULATIONS, Conditions, Experiment
 from sim_tests.crossing import Setup
 from sim_tests.scenario import ScenarioTemplate
-from sim_tests.study.measures import RECORD_COLUMNS, EpisodeRecord
+from sim_tests.study.measures import RECORD_COLUMNS, EpisodeRecord, Variant, labels
 from sim_tests.study.runs import Job, experiment_jobs
 
 #: Options that a command of crossings does not have.
@@ -33,10 +34,9 @@ WITHOUT = {
 def test_every_axis_has_an_option_a_column_and_a_place_in_job_and_key():
     assert set(AXES) <= set(OPTIONS)
     assert set(AXES) <= set(RECORD_COLUMNS)
-    assert issubclass(EpisodeRecord, Conditions)
     assert issubclass(Job, Conditions)
     key = Conditions(*map(str, range(len(AXES))))
-    record = EpisodeRecord(*map(str, range(len(AXES))), success=True)
+    record = EpisodeRecord(**asdict(key), success=True)
     assert record.conditions == key
     assert POPULATIONS == KNOWN_POPULATIONS
 
@@ -72,6 +72,15 @@ def test_a_drawn_scenario_is_changed_as_its_template_is():
     second = Setup.of(template, policy="blind", seed=2, **changes)
     assert first.scenario == second.scenario
     assert first.conditions.robot == "forklift"
+
+
+def test_tables_tell_episodes_of_other_conditions_apart():
+    usual = EpisodeRecord("a", 0, "blind", "P", "truth")
+    others = [replace(usual, robot="omni"), replace(usual, population="recorded", robot="omni")]
+    variants = [Variant.of(each) for each in (usual, *others)]
+    assert list(labels(variants).values()) == [
+        *("blind", "blind, robot omni", "blind, robot omni, population recorded")
+    ]
 
 
 def test_an_unknown_axis_is_refused():

@@ -20,8 +20,6 @@ from sim_tests.study.runs import (
     observed_episode,
     plan_jobs,
     read_jobs,
-    read_jobs,
-    read_jobs,
     run_episode,
     run_jobs,
 )
@@ -95,7 +93,7 @@ def test_a_planner_that_is_not_deterministic_is_found_and_named(drawing, tmp_pat
 
 
 _SHORT = SHORT.format(name="short")
-ADULT = _SHORT + "    gaze: [{t_s: 0.0, look: robot}]\n"
+ADULT = _SHORT.replace("notices_within_m: 0.0", "watches: true")
 CHILD = _SHORT + "    stature_m: 1.15\n"
 TWO_VIEWS = ADULT + "camera: {views_deg: [0.0, 90.0]}\n"
 
@@ -109,8 +107,7 @@ def signature(frame: CrossingFrame) -> tuple[Any, ...]:
         [(each.position_odom_m.tobytes(), each.awareness) for each in frame.truth],
         [each.position_camera_m.tobytes() for each in frame.observations],
         [
-            (each.id, each.position_odom_m.tobytes(), each.covariance_odom.tobytes())
-            + (each.awareness, each.awareness_lower)
+            (each.id, each.awareness, *map(bytes, (each.position_odom_m, each.covariance_odom)))
             for each in frame.tracks
         ],
         frame.scan_points_odom_m.tobytes(),

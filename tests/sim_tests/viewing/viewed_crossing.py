@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sim_tests.conditions import Conditions
 from sim_tests.crossing import CrossingFrame, CrossingResult, Stage, run_crossing
 from sim_tests.scenario import ScenarioTemplate
-from sim_tests.viewing import CameraPictures, CrossingRecorder, Episode
+from sim_tests.viewing import CameraPictures, CrossingRecorder
 
 SHORT = """
 name: short
@@ -20,7 +21,7 @@ people:
     speed_mps: 0.4
     glances: {notices_within_m: 0.0}
 """
-EPISODE = Episode(scenario="short", seed=0, policy="balanced", planner="SamplingPlanner")
+CONDITIONS = Conditions("short", 0, "balanced", "SamplingPlanner", "truth")
 
 
 def record(
@@ -28,7 +29,7 @@ def record(
 ) -> tuple[CrossingRecorder, CrossingResult, list[CrossingFrame]]:
     """Return the recorder, the result and the frames of the crossing."""
     pictures = CameraPictures(2.0) if camera else None
-    recorder = CrossingRecorder(EPISODE, pictures=pictures)
+    recorder = CrossingRecorder(CONDITIONS, pictures=pictures)
     frames: list[CrossingFrame] = []
 
     def observe(frame: CrossingFrame, stage: Stage) -> None:

@@ -19,13 +19,12 @@ import numpy as np
 
 from nav_adapter import RobotProfile
 
-from ...crossing.planner import CostmapPlanner, LocalPlanner, StraightOn
+from ...conditions import REFERENCE_PLANNER
 from ...scenario import Scenario
 from ...world.errors import SimError
+from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
+from ._sampling_planner import SamplingPlanner
 
-# Names in tables of the reference planner, and of the driver of scenarios without a planner.
-_REFERENCE: Final = "SamplingPlanner"
-_STRAIGHT_ON: Final = "StraightOn"
 # Arguments by these names receive the robot's profile, the racks and walls, the way from start to
 # goal, and the episode's seed.
 _ROBOT: Final = ("robot", "robot_profile", "profile")
@@ -79,11 +78,15 @@ def planner_label(planner: str, scenario: Scenario) -> str:
     """Return the name of a planner in tables: the part after the colon, or the default's name."""
     if planner:
         return planner.rpartition(":")[2]
-    return _REFERENCE if scenario.robot.straight_on_speed_mps is None else _STRAIGHT_ON
+    straight = scenario.robot.straight_on_speed_mps is not None
+    return (StraightOn if straight else SamplingPlanner).__name__
 
 
-def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanner | None:
-    """Return a new planner for one episode; None for the default planner.
+def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanner:
+    """Return a new planner for one episode.
+
+    An empty name is the reference :class:`SamplingPlanner`, or :class:`StraightOn` where the
+    scenario drives straight ahead. ``"costmap"`` and ``"straight_on"`` have a name, too.
 
     ``module:Class`` names a class, a function that returns a planner, or a planner. The module is
     searched on the import path and in the working directory. A planner is copied for each episode.
@@ -104,7 +107,10 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
             error, or the planner has no ``plan``.
     """
     if not planner:
-        return None
+        straight_mps = scenario.robot.straight_on_speed_mps
+        if straight_mps is not None:
+            return StraightOn(straight_mps)
+        return SamplingPlanner(scenario.robot_profile, scenario.planner_boxes_odom_m)
     factory = import_planner(planner)
     available: dict[str, Any] = {
         _BOXES: scenario.planner_boxes_odom_m,
@@ -212,7 +218,7 @@ def import_planner(planner: str) -> PlannerFactory:
     if not (colon and module_name and name):
         raise SimError(
             f"planner must be given as module:Class, e.g. my_robot.planning:MyPlanner, or as one "
-            f"of {', '.join(('reference', *KNOWN_PLANNERS))}, got {planner!r}"
+            f"of {', '.join((REFERENCE_PLANNER, *KNOWN_PLANNERS))}, got {planner!r}"
         )
     found = _found(planner, module_name, name)
     if not isinstance(found, type) and callable(getattr(found, "plan", None)):

@@ -6,19 +6,11 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
-from ...viewing import LivePage, outcome_text, page_text, show_page, write_page
-from ...world.errors import SimError
-from ..runs import (
-    Conditions,
-    Job,
-    describe,
-    fault_of,
-    job_key,
-    policy_of,
-    recorder_of,
-    seeded_crossing,
-    template_of,
-)
+from ..conditions import Experiment
+from ..crossing import drive
+from ..viewing import LivePage, outcome_text, page_text, show_page, write_page
+from ..world.errors import SimError
+from .runs import Job, experiment_jobs, recorder_of, setup_of
 
 # Rendering takes at most this share of the time, so that states arrive often.
 _PICTURE_SHARE: Final = 0.25
@@ -27,8 +19,7 @@ _CATCH_UP_S: Final = 0.3
 
 
 def watch_command(
-    conditions: Conditions,
-    policy: str,
+    experiment: Experiment,
     *,
     speed: float,
     port: int,
@@ -44,12 +35,11 @@ def watch_command(
         NavError: an unknown preset or unusable policy file.
         PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
-    job = _job(conditions, policy)
-    key = job_key(job)
+    job = _job(experiment)
     if out is not None and not out.parent.is_dir():
         raise SimError(f"cannot write {out}: there is no folder {out.parent}")
-    with LivePage(page_text(f"awarenav watch: {key.scenario}"), port) as page:
-        print(f"{describe(key)}\nWatch it at {page.url} (Ctrl-C ends it)", flush=True)
+    with LivePage(page_text(f"awarenav watch: {job.scenario}"), port) as page:
+        print(f"{job.conditions.text}\nWatch it at {page.url} (Ctrl-C ends it)", flush=True)
         if not no_browser:
             show_page(page.url)
         pace = _Pace(page, speed, wait)
@@ -60,15 +50,7 @@ def watch_command(
             on_begin=pace.begin,
             on_state=pace.state,
         )
-        result = seeded_crossing(
-            template_of(job.scenario).for_seed(job.seed),
-            job.planner,
-            job.seed,
-            observer=recorder,
-            policy=policy_of(job.policy),
-            perception=job.perception,
-            fault=fault_of(job.fault),
-        )
+        result = drive(setup_of(job), recorder)
         outcome = outcome_text(result)
         page.end(outcome, recorder.note)
         page.wait_for_delivery(_DELIVERY_S)
@@ -111,11 +93,11 @@ class _Pace:
         self._page.state(state)
 
 
-def _job(conditions: Conditions, policy: str) -> Job:
+def _job(experiment: Experiment) -> Job:
     """Return the job of the options, as a run of ``awarenav crossings`` would plan it."""
-    jobs = conditions.jobs([policy])
+    jobs = experiment_jobs(experiment)
     if len(jobs) != 1:
-        scenario, fault = conditions.scenario[0], conditions.fault[0]
+        scenario, fault = experiment.one("scenario"), experiment.one("fault")
         raise SimError(
             f"watch shows one crossing, but scenario {scenario!r} with fault {fault!r} stands for "
             f"{len(jobs)}; give one of each"
