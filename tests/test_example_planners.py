@@ -44,10 +44,7 @@ def make(request, examples):
 def crossing(name: str, planner, unaware_radius_m: float = 1.0) -> CrossingResult:
     """Cross with a worker who stops 1.5 m from the path: a wide circle covers it."""
     data = Scenario.shipped(name).model_dump()
-    path = data["workers"][0]["path"]
-    for point in path:
-        point["y_m"] = min(point["y_m"], 1.5)
-    path[1]["t_s"] = 4.5
+    data["people"][0]["route"][-1]["y_m"] = 1.5
     policy = AwarenessPolicy.preset("balanced").model_dump()
     policy["inflation"]["unaware_radius_m"] = unaware_radius_m
     return run_crossing(

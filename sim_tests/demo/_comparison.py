@@ -57,9 +57,9 @@ def compare_policies(
 ) -> tuple[ComparisonRow, ...]:
     """Run the same crossing without people, as today, blind, and aware with two kinds of worker.
 
-    Only the gaze and the robot's policy differ. A scripted worker walks the same path in every run;
-    a recorded one begins the same, and then answers to the robot. The robot has a camera and laser
-    scanners; today's robot has the scanners alone. Shows a progress bar on a terminal.
+    Only the gaze and the robot's policy differ. The worker walks on in every run, unless somebody
+    recorded answers to the robot. The robot has a camera and laser scanners; today's robot has the
+    scanners alone. Shows a progress bar on a terminal.
 
     Args:
         seed: seed of everything random.

@@ -59,7 +59,7 @@ def run_encounter(
         The crossing, with the truth and the observation of every frame.
     """
     scenario = Scenario.shipped("paper_encounter")
-    # The robot of the paper asks nobody, and the worker's looks are those of the script.
+    # The robot of the paper asks nobody, and the worker looks as planned.
     policy = AwarenessPolicy.preset("balanced").model_copy(update={"attention": None})
     with _Recorder(scenario, out / "encounter.mp4" if video else None) as recorder:
         result = run_crossing(

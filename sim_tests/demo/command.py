@@ -17,7 +17,7 @@ from ..conditions import Experiment, conditions_options
         "awarenav demo --robot omni --population recorded --no-video --out omni",
     ],
     exit_status={0: "Success.", 2: "Bad input, or the extra 'sim' is missing."},
-    epilog="Needs the extra 'sim'. The encounter keeps the paper's robot and its scripted worker.",
+    epilog="Needs the extra 'sim'. The encounter keeps the paper's robot and worker.",
 )
 @options.out_folder("demo")
 @option("--no-video", is_flag=True, help="Write no films (faster).")

@@ -29,9 +29,8 @@ from ..world.config import SimConfig
 from ..world.errors import SimError
 from ..world.hall import LAYOUTS, WarehouseLayout
 from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
-from ._distributions import error_text
+from ._distributions import error_text, find_parameters, with_numbers
 from ._files import parse_yaml, read_file, require_version, shipped_text
-from ._parameters import find_parameters, with_numbers
 
 # Largest distance between neighbours on the reference path.
 _PATH_SPACING_M: Final = 0.25

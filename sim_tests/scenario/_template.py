@@ -17,7 +17,7 @@ from perception.documents import yaml_text
 from ..actors.behaviour import population_of
 from ..actors.robot import RobotModel
 from ..world.errors import SimError
-from ._distributions import Distribution, error_text
+from ._distributions import Distribution, error_text, find_parameters, with_numbers
 from ._files import (
     camera_data,
     parse_yaml,
@@ -27,7 +27,6 @@ from ._files import (
     shipped_text,
 )
 from ._for_robot import scenario_for_robot
-from ._parameters import find_parameters, with_numbers
 from ._scenario import Scenario
 
 # The key of a robot to which the scenario is fitted.

@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 
 from ..body import Activity
-from ._feet import Feet
 from ._forces import (
     RELAXATION_S,
     SlowRobotDetour,
@@ -34,7 +33,7 @@ from ._surroundings import (
     eye_height_m,
 )
 from ._track import FACING_FROM_MPS, Track
-from ._trajectory import MAX_ACCELERATION_MPS2, Obstacles, State, Trajectory, limited
+from ._trajectory import MAX_ACCELERATION_MPS2, Feet, Obstacles, State, Trajectory, limited
 
 #: Time between two decisions of a person; in between the motion follows closed forms.
 DECISION_PERIOD_S: Final = 1.0 / 20.0

@@ -1,4 +1,4 @@
-"""Motion of a person between two decisions: constant acceleration, and out of racks and walls."""
+"""Motion of a person between two decisions: constant acceleration, out of racks, and the feet."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import math
 from typing import Any, Final
 
 from ...world.errors import SimError
+from ..body import Gait, GaitPose, OnlineFootsteps, skeleton
 from ._forces import box_force
+from ._spec import PersonSpec
 
 Box = tuple[float, float, float, float]
 State = tuple[float, float, float, float]  # x, y, vx, vy
@@ -144,6 +146,61 @@ class Trajectory:
             vx, vy = (end[0] - x) / duration_s, (end[1] - y) / duration_s
             self.end = (*end, vx, vy)
         self._start_s, self._start, self.acceleration = t_s, (x, y, vx, vy), (ax, ay)
+
+
+class Feet:
+    """The feet of one person, who stands at the first place.
+
+    Args:
+        spec: the person.
+    """
+
+    def __init__(self, spec: PersonSpec) -> None:
+        self._spec = spec
+        self._steps: OnlineFootsteps | None = None
+        self._now_s = 0.0
+        self._place = self._place_before = (0.0, 0.0, 0.0)
+
+    def follow(
+        self,
+        t_s: float,
+        place: tuple[float, float, float],
+        velocity_mps: tuple[float, float],
+        acceleration_mps2: tuple[float, float],
+        *,
+        turning_radps: float | None = None,
+        slide: bool = False,
+    ) -> GaitPose:
+        """Return the pose of the feet under a body that has moved on.
+
+        Args:
+            t_s: now.
+            place: x, y and heading of the body.
+            velocity_mps: of the body.
+            acceleration_mps2: of the body.
+            turning_radps: of the body; None is that since the last call.
+            slide: the body was bumped, and the feet are shifted with it.
+        """
+        dt_s, before = t_s - self._now_s, self._place
+        self._now_s, self._place, self._place_before = t_s, place, before
+        x, y, heading = place
+        if self._steps is None:
+            gait = Gait(skeleton(self._spec.look, self._spec.stature_m))
+            self._steps, before = OnlineFootsteps(gait, x, y, heading), place
+        if slide:
+            pose = self._steps.translate(x - before[0], y - before[1])
+            if pose is not None:
+                return pose
+        if turning_radps is None:
+            turned = math.remainder(heading - before[2], math.tau)
+            turning_radps = turned / dt_s if dt_s > 0.0 else 0.0
+        return self._steps.step(dt_s, place, (*velocity_mps, turning_radps), acceleration_mps2)
+
+    def undo(self) -> None:
+        """Take the last pose back, because the body did not move."""
+        self._place = self._place_before
+        if self._steps is not None:
+            self._steps.undo()
 
 
 def limited(x: float, y: float, most: float) -> tuple[float, float]:

@@ -1,7 +1,15 @@
 """Scenarios listed, described, drawn and checked without a crossing."""
 
-from ._checks import CHECKED_DRAWS, scenario_problems, template_problems
-from ._plans import CONFLICT_M, approach_statistics, closest_approaches, person_plan, robot_plan
+from ._plans import (
+    CHECKED_DRAWS,
+    CONFLICT_M,
+    approach_statistics,
+    closest_approaches,
+    person_plan,
+    robot_plan,
+    scenario_problems,
+    template_problems,
+)
 from ._show import list_command, names_of_sets, show_command
 
 __all__ = [

@@ -153,7 +153,7 @@ def _draw_person(axes: Axes, spec: PersonSpec, now_s: float, robot_m: FloatArray
     to_robot = math.atan2(*(robot_m - here)[::-1].tolist())
     if spec.glances.notices_within_m > 0.0 and spec.glances.watches:
         _draw_sector(axes, here, to_robot, colour)
-    else:
+    elif not spec.gaze:
         _draw_sector(axes, here, away, colour)
         if spec.glances.notices_within_m > 0.0:
             _draw_sector(axes, here, to_robot, colour, dashed=True)
@@ -207,7 +207,7 @@ def _draw_sector(
 def _looks(spec: PersonSpec) -> tuple[str, str]:
     """Return the colour of a person, and what it means."""
     if spec.gaze:
-        return "#5b7a99", "looks as planned"
+        return "#0f766e", "looks as planned"
     if spec.glances.notices_within_m <= 0.0:
         return "#b3261e", "never looks at the robot"
     if spec.glances.watches:

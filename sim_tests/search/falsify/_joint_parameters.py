@@ -16,8 +16,7 @@ import shapely
 
 from perception.arrays import FloatArray
 
-from ._person_parameters import person_path
-from ._variation import FASTEST_WALK_MPS, Parameter, bent_path, clearance_m
+from ._person_parameters import FASTEST_WALK_MPS, Parameter, bent_path, clearance_m, person_path
 
 #: Name of the person who is added.
 COMPANION: Final = "companion"

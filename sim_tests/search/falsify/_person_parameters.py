@@ -1,29 +1,32 @@
-"""Parameters of a person; the person is a mapping, the YAML of ``PersonSpec``."""
+"""Parameters of a person, a mapping as the YAML of ``PersonSpec``, and limits of variations."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
 from perception.arrays import FloatArray
 
 from ...actors.body import STAYING
-from ._variation import (
-    ENDS,
-    FASTEST_WALK_MPS,
-    ON_THE_WAY,
-    SETS_OFF,
-    SHORTEST_PAUSE_S,
-    SHORTEST_WAY_M,
-    SLOWEST_MPS,
-    Parameter,
-    shifted_path,
-)
+from .._study import Range
 
-#: A person walks no faster backwards.
-FASTEST_BACKWARDS_MPS: Final = 1.2
+#: Smallest distance of a person's centre line from racks and walls in a variation.
+RACK_CLEARANCE_M: Final = 0.35
+#: Smallest distance of a person's start from that of the robot in a variation.
+ROBOT_CLEARANCE_M: Final = 1.5
+#: Speeds of people who walk; a person who is faster in the scenario keeps that speed as the limit.
+SLOWEST_MPS: Final = 0.5
+FASTEST_WALK_MPS: Final = 2.0
+# A shorter pause is none.
+_SHORTEST_PAUSE_S: Final = 0.15
+# A way on which a person sets off is none if it is shorter.
+_SHORTEST_WAY_M: Final = 0.3
+# A person walks no faster backwards.
+_FASTEST_BACKWARDS_MPS: Final = 1.2
 _EARLIER_S: Final = 4.0
 # A person with this value or more never forgets the robot.
 _NEVER_LAPSES_S: Final = 6.0
@@ -32,6 +35,42 @@ _LOOKS_ON_S: Final = 10.0
 # The time from a request to the answer.
 _ANSWERS_AFTER_S: Final = (0.2, 3.0)
 _REACTIONS: Final = ("walk_on", "wait", "hurry", "pass_behind", "claim")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of a variation.
+
+    Attributes:
+        range: range of its values, within human limits.
+        neutral: its value in the scenario as written.
+    """
+
+    range: Range
+    neutral: float
+
+    @classmethod
+    def of(cls, low: float, high: float, neutral: float) -> Parameter:
+        """Return a parameter from ``low`` to ``high``, widened to include ``neutral``."""
+        return cls(Range(low=min(low, neutral), high=max(high, neutral)), neutral)
+
+
+# Shifts of both ends of a path to its left.
+_ENDS: Final = {
+    "aside_first_m": Parameter.of(-0.8, 0.8, 0.0),
+    "aside_last_m": Parameter.of(-0.8, 0.8, 0.0),
+}
+# The shift halfway, and a pause on the way.
+_ON_THE_WAY: Final = {
+    "aside_middle_m": Parameter.of(-0.8, 0.8, 0.0),
+    "pause_at": Parameter.of(0.05, 0.95, 0.5),
+    "pause_s": Parameter.of(0.0, 3.0, 0.0),
+}
+#: Where somebody goes who sets off after standing.
+SETS_OFF: Final = {
+    "sets_off_x_m": Parameter.of(-3.0, 3.0, 0.0),
+    "sets_off_y_m": Parameter.of(-3.0, 3.0, 0.0),
+}
 
 
 def person_parameters(
@@ -45,15 +84,15 @@ def person_parameters(
     """
     start_s, speed_mps = float(person["start_s"]), float(person["speed_mps"])
     walks = len(person["route"]) > 1
-    parameters = dict(ENDS)
+    parameters = dict(_ENDS)
     if walks:
-        fastest = FASTEST_BACKWARDS_MPS if person["backwards"] else fastest_mps
+        fastest = _FASTEST_BACKWARDS_MPS if person["backwards"] else fastest_mps
         # Of somebody who sets off near the robot, that distance is varied: a distribution.
         if person.get("sets_off_within_m") is None:
             earliest_s = max(start_s - _EARLIER_S, 0.0)
             parameters["start_s"] = Parameter.of(earliest_s, start_s + _EARLIER_S, start_s)
         parameters["speed_mps"] = Parameter.of(SLOWEST_MPS, fastest, speed_mps)
-        parameters |= ON_THE_WAY
+        parameters |= _ON_THE_WAY
     glances = person["glances"]
     # Somebody who never looks up, or looks as planned, keeps to that.
     if glances["notices_within_m"] > 0.0 and not person["gaze"]:
@@ -85,9 +124,9 @@ def changed_person(person: Mapping[str, Any], values: Mapping[str, float]) -> di
     for name in ("start_s", "speed_mps"):
         if name in values:
             changed[name] = values[name]
-    points = shifted_path(person_path(person), values)
+    points = _shifted_path(person_path(person), values)
     changed["route"] = [{"x_m": x, "y_m": y} for x, y in points.tolist()]
-    if values.get("pause_s", 0.0) > SHORTEST_PAUSE_S:
+    if values.get("pause_s", 0.0) > _SHORTEST_PAUSE_S:
         length_m = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         stop = {"at_m": values["pause_at"] * length_m, "for_s": values["pause_s"]}
         changed["pauses"] = sorted([*person["pauses"], stop], key=lambda pause: pause["at_m"])
@@ -161,7 +200,7 @@ def _add_lapse(person: dict[str, Any], values: Mapping[str, float]) -> None:
     if after_s >= _NEVER_LAPSES_S:
         return
     way = np.array([values.get("sets_off_x_m", 0.0), values.get("sets_off_y_m", 0.0)])
-    sets_off = bool(np.hypot(*way) >= SHORTEST_WAY_M)
+    sets_off = bool(np.hypot(*way) >= _SHORTEST_WAY_M)
     if sets_off:
         x, y = (person_path(person)[0] + way).tolist()
         person["route"] = [*person["route"], {"x_m": x, "y_m": y}]
@@ -195,3 +234,39 @@ def _change_glances(glances: dict[str, Any], values: Mapping[str, float]) -> Non
 def _possible_reactions(person: Mapping[str, Any]) -> list[str]:
     """Return the reactions that the scenario allows the person."""
     return [name for name in _REACTIONS if person["reactions"][name] > 0.0]
+
+
+def _shifted_path(points_m: FloatArray, values: Mapping[str, float]) -> FloatArray:
+    """Return a path bent by the values of :data:`_ENDS` and :data:`_ON_THE_WAY`."""
+    shifts = (values.get(f"aside_{place}_m", 0.0) for place in ("first", "middle", "last"))
+    return bent_path(points_m, *shifts)
+
+
+def bent_path(points_m: FloatArray, first_m: float, middle_m: float, last_m: float) -> FloatArray:
+    """Return a path (N, 2) shifted to its left, linearly interpolated between three shifts.
+
+    A path of two points gets a third one halfway. A path of one point is moved by ``first_m`` in x
+    and ``last_m`` in y.
+    """
+    if len(points_m) == 1:
+        return np.asarray(points_m + np.array([first_m, last_m]))
+    if len(points_m) == 2 and middle_m != 0.0:
+        points_m = np.array([points_m[0], points_m.mean(axis=0), points_m[1]])
+    pieces = np.diff(points_m, axis=0)
+    lengths = np.linalg.norm(pieces, axis=1)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    share = along / max(along[-1], 1e-9)
+    units = pieces / np.maximum(lengths, 1e-9)[:, None]
+    ahead = np.concatenate([units[:1], units[:-1] + units[1:], units[-1:]])
+    norm = np.linalg.norm(ahead, axis=1)
+    # A corner where the path turns back on itself has no left side and stays.
+    ahead = ahead / np.maximum(norm, 1e-9)[:, None] * (norm > 0.1)[:, None]
+    shift = np.interp(share, [0.0, 0.5, 1.0], [first_m, middle_m, last_m])
+    return np.asarray(points_m + shift[:, None] * np.stack([-ahead[:, 1], ahead[:, 0]], axis=1))
+
+
+def clearance_m(points_m: FloatArray, boxes_odom_m: FloatArray) -> float:
+    """Return the smallest distance of a path from boxes (N, 4) x_min, y_min, x_max, y_max."""
+    line = shapely.Point(points_m[0]) if len(points_m) == 1 else shapely.LineString(points_m)
+    boxes = shapely.box(*np.asarray(boxes_odom_m, dtype=np.float64).T)
+    return float(np.min(shapely.distance(line, boxes), initial=np.inf))

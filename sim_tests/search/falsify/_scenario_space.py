@@ -18,18 +18,16 @@ from ...world.errors import SimError
 from .._study import Range
 from ._joint_parameters import add_joint, is_joint_possible, joint_parameters
 from ._person_parameters import (
-    changed_hearing,
-    changed_person,
-    hearing_parameters,
-    person_parameters,
-    person_path,
-)
-from ._variation import (
     FASTEST_WALK_MPS,
     RACK_CLEARANCE_M,
     ROBOT_CLEARANCE_M,
     Parameter,
+    changed_hearing,
+    changed_person,
     clearance_m,
+    hearing_parameters,
+    person_parameters,
+    person_path,
 )
 
 # An impossible variation is drawn back to a share of its distance from the scenario as written.

@@ -122,7 +122,7 @@ def test_awareness_from_keypoints_follows_the_truth(encounter):
     truth, alpha, std = np.array(pairs).T
     assert len(truth) > 1000
     assert np.mean(np.abs(alpha - truth)) < 0.03
-    assert np.percentile(np.abs(alpha - truth), 95) < 0.12
+    assert np.percentile(np.abs(alpha - truth), 95) < 0.13
     assert not np.any((alpha - 1.28 * std > 0.3) & (truth == 0.0))
     partly = (truth > 0.1) & (truth < 0.9)
     # The deviations hold the spread of head shapes, and this is one head.

@@ -23,14 +23,14 @@ from sim_tests.search.falsify._joint_parameters import (
     PALLET_LANE_CLEARANCE_M,
     PALLET_RADIUS_M,
 )
-from sim_tests.search.falsify._person_parameters import person_path
-from sim_tests.search.falsify._scenario_space import ScenarioSpace
-from sim_tests.search.falsify._variation import (
+from sim_tests.search.falsify._person_parameters import (
     RACK_CLEARANCE_M,
     ROBOT_CLEARANCE_M,
     bent_path,
     clearance_m,
+    person_path,
 )
+from sim_tests.search.falsify._scenario_space import ScenarioSpace
 from sim_tests.search.falsify.command import falsify
 
 NAMES = (

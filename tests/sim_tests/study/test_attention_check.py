@@ -129,8 +129,8 @@ def test_validate_names_a_wrong_label_with_what_was_measured(tmp_path, capsys):
     assert main(["scenario", "validate", "--episodes", "1", *files]) == 1
     output = capsys.readouterr().out
     assert output.count("can be run, but its attention is wrong") == 2
-    assert "attention: attentive, but worker 0 was aware of the robot (α ≥ 0.5) for 0%" in output
-    assert "attention: unaware, but worker 0 looked straight at the robot" in output
+    assert "attention: attentive, but worker was aware of the robot (α ≥ 0.5) for 0%" in output
+    assert "attention: unaware, but worker looked straight at the robot" in output
     assert "0 numbers vary" in output
     assert main(["scenario", "validate", "--episodes", "0", *files]) == 0
 
