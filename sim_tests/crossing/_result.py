@@ -113,7 +113,9 @@ class CrossingResult:
     robot: RobotProfile = NOVA_CARTER
     obstacle_boxes_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
-    __repr__ = short_repr
+    def __repr__(self) -> str:
+        """Return the fields and the main figures, with long values described."""
+        return short_repr(self, "success", "contact_by", "min_separation_m", "min_margin_m")
 
     @property
     def success(self) -> bool:

@@ -11,9 +11,7 @@ if TYPE_CHECKING:
         ATTENTION_WITHIN_M,
         ATTENTIVE_FROM,
         UNAWARE_UP_TO,
-        UNCONFIRMED,
         MeasuredAttention,
-        measured_part,
     )
     from ._driving import (
         OVERSHOOT_MPS,
@@ -23,9 +21,15 @@ if TYPE_CHECKING:
         path_length_m,
         success_weighted,
     )
-    from ._log import measure
     from ._metrics import COLUMNS, METRICS
-    from ._record import RECORD_COLUMNS, EpisodeRecord, read_records, record_row, write_records
+    from ._record import (
+        RECORD_COLUMNS,
+        EpisodeRecord,
+        measure,
+        read_records,
+        record_row,
+        write_records,
+    )
     from ._registry import RATIOS, SHARES, Metric
     from ._statistics import (
         FEW_PAIRS,
@@ -46,11 +50,13 @@ if TYPE_CHECKING:
     from ._step_out import StepOut, step_out_impacts
     from ._summary import (
         BASELINE,
+        UNCONFIRMED,
         Comparison,
         Summary,
         SummaryRow,
         Variant,
         labels,
+        measured_part,
         summarise,
         summarise_sources,
     )

@@ -5,19 +5,21 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
-from ._registry import Awareness
 from ._trace import Trace
 
 if TYPE_CHECKING:
     from ...crossing import CrossingFrame, CrossingResult
-    from ._record import EpisodeRecord
+
+#: Awareness of the person who came nearest, before the encounter, and the robot's error about it if
+#: there is one; empty if nobody came near.
+Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
 #: Largest distance between a track and its person.
 MATCHED_WITHIN_M: Final = 1.0
@@ -43,8 +45,6 @@ LOOKS_FROM: Final = 0.9
 UNAWARE_UP_TO: Final = 0.25
 #: A person for whom attention mattered for less time is not judged.
 _LEAST_TIME_S: Final = 0.5
-#: Part of the episodes labelled attentive whose people were not measured to be so.
-UNCONFIRMED: Final = "unconfirmed"
 #: A look within this time after a request is an answer.
 ANSWERED_WITHIN_S: Final = 2.5
 #: Somebody who has looked within this time before a request does not answer it.
@@ -182,18 +182,6 @@ class MeasuredAttention:
         if not judged.any():
             return None
         return float((self.aware_s[judged] / self.could_look_s[judged]).min())
-
-
-def measured_part(record: EpisodeRecord) -> str:
-    """Return the scenario's attention, or :data:`UNCONFIRMED`.
-
-    An episode labelled attentive counts as such only if each of its people was aware for at least
-    80 % of the time.
-    """
-    attention, share = str(record.attention), record.attentive_share
-    if attention != "attentive" or record.error:
-        return attention
-    return "attentive" if share is not None and share >= ATTENTIVE_FROM else UNCONFIRMED
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,9 @@
-"""The log of one episode as its measures read it, and :func:`measure`, which makes its row."""
+"""The log of one episode as its measures read it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,45 +14,8 @@ from ...crossing import STANDING_SPEED_MPS, ContactEvent, CrossingResult
 from ._awareness import Requests, nearest_person, track_awareness
 from ._conflict import Outline
 from ._driving import path_length_m, peak_deceleration_and_jerk
-from ._metrics import COLUMNS
-from ._record import EpisodeRecord
 from ._step_out import FASTER_STEP_OUT, StepOutImpacts, is_unaware, since_look_of, step_out_impacts
 from ._trace import Trace
-
-
-def measure(
-    result: CrossingResult,
-    *,
-    time_without_people_s: float | None = None,
-    length_without_people_m: float | None = None,
-    **conditions: Any,
-) -> EpisodeRecord:
-    """Return the row of a crossing: every measure, as docs/simulation.md defines them.
-
-    Numbers are rounded to the six decimals that files keep, so that a record read from a file is
-    equal.
-
-    Args:
-        result: the crossing.
-        time_without_people_s: time to goal of the same task without people; None if that run did
-            not reach the goal or was not made.
-        length_without_people_m: driven length of the same task without people.
-        conditions: columns that the log does not tell, such as ``scenario_version``, ``attention``
-            and ``fault``; or that take the place of those of the result.
-
-    Raises:
-        SimError: a result without frames, or with frames that do not hold all people.
-    """
-    log = Log(result, time_without_people_s, length_without_people_m)
-    values = {
-        "scenario": result.scenario,
-        "seed": result.seed,
-        "policy": result.policy,
-        "planner": result.planner,
-        "perception": result.perception,
-        **{name: each.of(log) for name, each in COLUMNS.items() if each.of is not None},
-    }
-    return EpisodeRecord(**{**values, **conditions}).rounded()
 
 
 class Log:

@@ -16,8 +16,8 @@ import numpy as np
 
 from ...conditions import Conditions
 from . import _conflict, _driving
-from ._awareness import MeasuredAttention, awareness_class
-from ._registry import Awareness, Better, Column, Kind, Metric
+from ._awareness import Awareness, MeasuredAttention, awareness_class
+from ._registry import Better, Column, Kind, Metric
 
 if TYPE_CHECKING:
     from ...actors.behaviour import PersonOutcome

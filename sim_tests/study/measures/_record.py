@@ -1,4 +1,4 @@
-"""An episode's row, and tables of rows on disk: CSV, and the same table as Parquet."""
+"""An episode's row: made from its log, and in tables on disk, CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ from perception.installation import install_command
 
 from ...conditions import AXES, Conditions
 from ...world.errors import SimError
+from ._awareness import Awareness
 from ._metrics import COLUMNS
-from ._registry import Awareness, Column, Kind
+from ._registry import Column, Kind
 
 if TYPE_CHECKING:
     import pyarrow
+
+    from ...crossing import CrossingResult
 
 #: Decimals of numbers in files: micrometres.
 DECIMALS: Final = 6
@@ -118,6 +121,43 @@ class EpisodeRecord:
     def person_touched(self) -> bool:
         """True if a person walked into the robot."""
         return bool(self.person_contacts > 0 or self.contact_by == "person")
+
+
+def measure(
+    result: CrossingResult,
+    *,
+    time_without_people_s: float | None = None,
+    length_without_people_m: float | None = None,
+    **conditions: Any,
+) -> EpisodeRecord:
+    """Return the row of a crossing: every measure, as docs/simulation.md defines them.
+
+    Numbers are rounded to the six decimals that files keep, so that a record read from a file is
+    equal.
+
+    Args:
+        result: the crossing.
+        time_without_people_s: time to goal of the same task without people; None if that run did
+            not reach the goal or was not made.
+        length_without_people_m: driven length of the same task without people.
+        conditions: columns that the log does not tell, such as ``scenario_version``, ``attention``
+            and ``fault``; or that take the place of those of the result.
+
+    Raises:
+        SimError: a result without frames, or with frames that do not hold all people.
+    """
+    from ._log import Log  # noqa: PLC0415 - needs the simulator
+
+    log = Log(result, time_without_people_s, length_without_people_m)
+    values = {
+        "scenario": result.scenario,
+        "seed": result.seed,
+        "policy": result.policy,
+        "planner": result.planner,
+        "perception": result.perception,
+        **{name: each.of(log) for name, each in COLUMNS.items() if each.of is not None},
+    }
+    return EpisodeRecord(**{**values, **conditions}).rounded()
 
 
 def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:

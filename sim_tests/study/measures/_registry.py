@@ -12,9 +12,6 @@ if TYPE_CHECKING:
 Better = Literal["lower", "higher", "neither"]
 #: The kind of a column's values; a number may be None, where the column does not apply.
 Kind = Literal["text", "flag", "count", "number"]
-#: Awareness of the person who came nearest, before the encounter, and the robot's error about it if
-#: there is one; empty if nobody came near.
-Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
 
 @dataclass(frozen=True, slots=True)

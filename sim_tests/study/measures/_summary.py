@@ -12,7 +12,7 @@ import numpy as np
 from perception.short_repr import short_repr
 
 from ...conditions import AXES
-from ._awareness import measured_part
+from ._awareness import ATTENTIVE_FROM
 from ._metrics import METRICS
 from ._record import EpisodeRecord
 from ._registry import RATIOS
@@ -27,6 +27,8 @@ from ._statistics import (
 
 #: Policy that others are compared with, unless another is named.
 BASELINE: Final = "blind"
+#: Part of the episodes labelled attentive whose people were not measured to be so.
+UNCONFIRMED: Final = "unconfirmed"
 _NO_FAULT: Final = "no fault"
 # The conditions that have no field of their own in a variant.
 _OTHERS: Final = tuple(
@@ -322,6 +324,18 @@ def summarise_sources(
         comparisons=comparisons(lambda record: "") + comparisons(measured_part),
         scenario_comparisons=comparisons(by_scenario),
     )
+
+
+def measured_part(record: EpisodeRecord) -> str:
+    """Return the scenario's attention, or :data:`UNCONFIRMED`.
+
+    An episode labelled attentive counts as such only if each of its people was aware for at least
+    80 % of the time.
+    """
+    attention, share = str(record.attention), record.attentive_share
+    if attention != "attentive" or record.error:
+        return attention
+    return "attentive" if share is not None and share >= ATTENTIVE_FROM else UNCONFIRMED
 
 
 def _parts(groups: _Groups, part_of: _Part) -> list[str]:

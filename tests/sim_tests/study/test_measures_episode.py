@@ -41,6 +41,12 @@ def test_way_and_time_against_the_same_task_without_people():
     assert unknown.time_lost_s is unknown.spl is None
 
 
+def test_a_printed_result_has_its_main_figures():
+    text = repr(crossing(T_S, straight(1.0), [walking((20.0, 0.0), (0.0, 0.0))]))
+    assert "success=True, contact_by='', min_separation_m=11." in text
+    assert f"frames=<{len(T_S)} CrossingFrame>" in text
+
+
 def test_not_reaching_the_goal_loses_all_of_the_time():
     record = measure(
         crossing(T_S, straight(1.0), reached=False),

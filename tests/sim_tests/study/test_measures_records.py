@@ -1,10 +1,14 @@
 """Tables of episodes: what is written is read again, and what is broken is said."""
 
 import csv
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from paths import ROOT
 
 from sim_tests import SimError
 from sim_tests.demo._comparison import EPISODE_COLUMNS
@@ -108,3 +112,33 @@ def test_a_write_that_fails_leaves_the_old_table(tmp_path):
     assert read_records(path) == (PLAIN,)
     with pytest.raises(SimError, match="cannot write the episodes"):
         write_records(tmp_path / "absent" / "episodes.csv", [PLAIN])
+
+
+#: One function more in the registry; what follows reads it.
+ONE_MORE = """
+from sim_tests.study.measures import _metrics
+
+@_metrics.measure_of_log("Half of the path", better="higher", decimals=1)
+def half_path_m(log) -> "float":
+    '''Half of the length that the robot drove.'''
+    return 0.5 * log.path_length_m
+
+from measured_scenes import crossing, straight
+from sim_tests.study.measures import *
+from tools.docs_site.reference import metrics_page
+
+record = measure(crossing([0.0, 0.5, 1.0], straight(1.0)))
+assert record.half_path_m == 0.5
+assert RECORD_COLUMNS[-1] == "half_path_m" and record_row(record)[-1] == "0.500000"
+assert METRICS["half_path_m"].unit == "m"
+assert summarise([record]).policies[0].means["half_path_m"].value == 0.5
+assert "| `half_path_m` | Half of the path | m | higher | Half of the length" in metrics_page()
+"""
+
+
+@pytest.mark.slow
+def test_a_new_measure_is_one_function():
+    path = [str(ROOT), str(Path(__file__).parent)]
+    code = f"import sys; sys.path[:0] = {path!r}\n{ONE_MORE}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
