@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import Any
 
 from perception import PersonObservation
@@ -223,8 +224,13 @@ class PersonTracker:
         return snapshots(self._history.latest, stamp_s, self._sensors)
 
 
+@cache  # a check against a protocol takes long, and every frame brings a view
+def _are_views(kind: type) -> bool:
+    return issubclass(kind, View)
+
+
 def _check_view(view: Any) -> None:
-    if view is not None and not isinstance(view, View):
+    if view is not None and not (_are_views(type(view)) or isinstance(view, View)):
         raise TrackingError(
             "view must have a method visibility(positions_odom_m, T_odom_camera), "
             f"got {type(view).__name__}"

@@ -150,13 +150,21 @@ class LegDetector:
             config.range_noise_m,
             known,
         )
-        hypotheses = hypotheses_of(clusters, xy, points.ranges_m, points.angle_increment_rad)
+        is_still = clusters.still > _STILL_SHARE * clusters.counts
+        # Nothing else is asked of what stands still than whether it may be learned.
+        learns = config.learn and self._memory.is_due(points.stamp_s, scanner)
+        hypotheses = hypotheses_of(
+            clusters,
+            xy,
+            points.ranges_m,
+            points.angle_increment_rad,
+            None if learns else is_still,
+        )
         judged = np.array(self._classify(hypotheses.features), dtype=np.float64)
         first, left = hypotheses.first, hypotheses.left
         alike = judged[:, 0] >= _ALIKE_SCORE
-        is_still = clusters.still > _STILL_SHARE * clusters.counts
         np.putmask(judged[:, 0], is_still[first] | is_still[left], 0.0)
-        if config.learn:
+        if config.learn and len(first):
             narrow = (hypotheses.second < 0) & (clusters.widths_m[first] < _TWO_LEGS_M)
             seen = self._memory.had_two_legs(hypotheses.centres_m, points.stamp_s)
             recent = self._recently(points.stamp_s)
@@ -176,7 +184,7 @@ class LegDetector:
                 candidates.append(_trolley(points.stamp_s, clusters, number))
             self._found.append((points.stamp_s, people_m))
             legs = _surely_two_legs(clusters, hypotheses, judged[:, 0], chosen)
-            if self._memory.is_due(points.stamp_s, scanner):
+            if learns:
                 taken[first[alike]] = True
                 taken[left[alike]] = True
                 person = np.zeros(len(usable), dtype=bool)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ from ..arrays import FloatArray
 from ..errors import PerceptionError
 from ..networks import OnnxModel, OnnxSettings
 from ._clusters import CLUSTER_FEATURES, Clusters, cluster_features
+
+AnyArray = TypeVar("AnyArray", FloatArray, NDArray[np.int64])
 
 #: Number of ranges across a hypothesis and its surroundings.
 CUTOUT: Final = 49
@@ -63,7 +65,11 @@ class Hypotheses:
 
 
 def hypotheses_of(
-    clusters: Clusters, points_m: FloatArray, ranges_m: FloatArray, increment_rad: float
+    clusters: Clusters,
+    points_m: FloatArray,
+    ranges_m: FloatArray,
+    increment_rad: float,
+    ruled_out: NDArray[np.bool_] | None = None,
 ) -> Hypotheses:
     """Return the hypotheses about people that clusters allow.
 
@@ -72,45 +78,56 @@ def hypotheses_of(
         points_m: (N, 2) all points of the scan, also of known walls; NaN without a return.
         ranges_m: (N,) their ranges; NaN without a return.
         increment_rad: angle between rays.
+        ruled_out: (C,) clusters without hypotheses; None for none. The other hypotheses are the
+            same with and without it.
     """
     step = abs(increment_rad)
-    returned = np.isfinite(ranges_m).nonzero()[0]
     # Single clusters come first, then the pairs; ``left`` of a single one is the cluster itself.
     single, one, other = _singles_and_pairs(clusters)
     first, left = np.concatenate([single, one]), np.concatenate([single, other])
-    second = left.copy()
-    second[: len(single)] = -1
-    pairs = slice(len(single), None)
+    singles = len(single)
     centres = clusters.centres_m.T
     right_m, left_m = centres.take(first, axis=1), centres.take(left, axis=1)
     middle = right_m + left_m
     middle *= 0.5
+    kept: slice | NDArray[np.int64] = slice(None)
+    every_middle = middle
+    if ruled_out is not None:
+        kept = (~(ruled_out[first] | ruled_out[left])).nonzero()[0]
+        singles = int(np.searchsorted(kept, singles))
+        first, left, middle = first[kept], left[kept], middle[:, kept]
+        right_m, left_m = right_m[:, kept], left_m[:, kept]
+    second = left.copy()
+    second[:singles] = -1
+    if not len(first):
+        features = np.zeros((0, HYPOTHESIS_FEATURES), dtype=np.float32)
+        return Hypotheses(first, second, left, middle.T, np.zeros((0, 2)), features)
+    other, pairs = left[singles:], slice(singles, None)
     away = middle - clusters.origin_m[:, None]
     squares = away * away
     ranges = np.maximum(np.sqrt(squares[0] + squares[1]), 1e-6)
     rays = away / ranges
     apart = left_m - right_m
     squares = apart * apart
-    features = cluster_features(clusters)
+    own = cluster_features(clusters)
     out = np.zeros((len(first), HYPOTHESIS_FEATURES), dtype=np.float32)
-    out[:, :CLUSTER_FEATURES] = features.take(first, axis=1).T
-    out[pairs, CLUSTER_FEATURES : 2 * CLUSTER_FEATURES] = features.take(other, axis=1).T
+    out[:, :CLUSTER_FEATURES] = own.take(first, axis=1).T
+    out[pairs, CLUSTER_FEATURES : 2 * CLUSTER_FEATURES] = own.take(other, axis=1).T
     pair = np.zeros((8, len(first)))
     pair[0, pairs] = 1.0
     np.sqrt(squares[0] + squares[1], out=pair[1])
     pair[2] = apart[0] * rays[0] + apart[1] * rays[1]
     pair[3] = rays[0] * apart[1] - rays[1] * apart[0]
     pair[1:4] *= 10.0
-    counts = clusters.counts[first]
-    counts[pairs] += clusters.counts[other]
-    np.log(counts, out=pair[4])
+    np.log(_of_both(clusters.counts, first, other), out=pair[4])
     np.divide(0.1 * _MAX_LEG_M, np.maximum(ranges * step, 0.005), out=pair[5])
-    length = clusters.lengths_m[first]
-    length[pairs] += clusters.lengths_m[other]
-    around = pair[6:]
-    _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, middle, around)
-    around -= length
-    np.minimum(np.maximum(around, 0.0, out=around), _MAX_AROUND_M, out=around)
+    returned = np.isfinite(ranges_m).nonzero()[0]
+    # The sums of all hypotheses, so that their rounding does not depend on those that are kept.
+    around = _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, every_middle)[
+        :, kept
+    ]
+    around -= _of_both(clusters.lengths_m, first, other)
+    np.minimum(np.maximum(around, 0.0, out=around), _MAX_AROUND_M, out=pair[6:])
     out[:, 2 * CLUSTER_FEATURES : -CUTOUT] = pair.T
     middle_ray = 0.5 * (clusters.rays[clusters.starts] + clusters.rays[clusters.ends])
     ray = 0.5 * (middle_ray[first] + middle_ray[left])
@@ -118,15 +135,18 @@ def hypotheses_of(
     return Hypotheses(first, second, left, middle.T, rays.T, out)
 
 
-def _around(
-    points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray, out: FloatArray
-) -> None:
-    """Put the length of the surfaces (2, N) within each distance of centres (2, H) into ``out``.
+def _of_both(values: AnyArray, first: NDArray[np.int64], other: NDArray[np.int64]) -> AnyArray:
+    """Return values of clusters summed over each hypothesis; ``other`` are those of the pairs."""
+    sums = values[first]
+    sums[len(first) - len(other) :] += values[other]
+    return sums
 
-    ``out`` (2, H) holds zeros.
-    """
-    if not centres_m.size or not points_m.size:
-        return
+
+def _around(points_m: FloatArray, spacings_m: FloatArray, centres_m: FloatArray) -> FloatArray:
+    """Return the length of the surfaces (2, N) within each distance of centres (2, H), (2, H)."""
+    out = np.zeros((len(_AROUND_M), centres_m.shape[1]))
+    if not points_m.size:
+        return out
     # Half the precision and one matrix product: this is the largest table of a scan.
     origin = (np.add.reduce(centres_m, axis=1) / centres_m.shape[1])[:, None]
     points = (points_m - origin).astype(np.float32)
@@ -139,6 +159,7 @@ def _around(
     squares += (centres[0] + centres[1])[:, None]
     for row, radius in enumerate(_AROUND_M):
         out[row] = (squares < radius * radius).astype(np.float32) @ lengths
+    return out
 
 
 def _cutouts(

@@ -81,8 +81,8 @@ class RobotMotion:
         Both are given in the base frame of :attr:`stamp_s`; the robot drives arcs of constant speed
         and yaw rate.
         """
-        arc = self._arc(np.asarray(stamps_s, dtype=np.float64) - self.stamp_s)
-        return arc.yaw, np.column_stack((arc.x, arc.y))
+        arc = self.arc(np.asarray(stamps_s, dtype=np.float64) - self.stamp_s)
+        return arc.yaw_rad, np.column_stack((arc.x_m, arc.y_m))
 
     def pose_at(self, stamp_s: float) -> FloatArray:
         """Return T_odom_base (4, 4) at another time, for example that of a scan's middle."""
@@ -93,31 +93,40 @@ class RobotMotion:
         moved[:2, 3] = position[0]
         return np.asarray(self.T_odom_base @ moved)
 
-    def _arc(self, dt_s: FloatArray) -> _Arc:
+    def arc(self, dt_s: FloatArray) -> Arc:
+        """Return the way of the base frame, in the base frame of :attr:`stamp_s`.
+
+        Args:
+            dt_s: (N,) times after :attr:`stamp_s`.
+        """
         yaw = self.yaw_rate_radps * dt_s
         cos, sin = np.cos(yaw), np.sin(yaw)
         along, aside = 1.0 - yaw * yaw / 6.0, 0.5 * yaw
-        small = np.abs(yaw) < _STRAIGHT_RAD
-        if not small.all():
-            safe = np.where(small, 1.0, yaw)
-            along = np.where(small, along, sin / safe)
-            aside = np.where(small, aside, (1.0 - cos) / safe)
+        turned = np.abs(yaw) >= _STRAIGHT_RAD
+        if turned.any():
+            np.divide(sin, yaw, out=along, where=turned)
+            np.divide(1.0 - cos, yaw, out=aside, where=turned)
         x, y = self.velocity_base_mps.tolist()
-        return _Arc(yaw, cos, sin, (along * x - aside * y) * dt_s, (aside * x + along * y) * dt_s)
+        return Arc(yaw, cos, sin, (along * x - aside * y) * dt_s, (aside * x + along * y) * dt_s)
 
 
-class _Arc(NamedTuple):
+class Arc(NamedTuple):
     """Turns (N,) of the base frame with their cosines and sines, and its places (N,)."""
 
-    yaw: FloatArray
+    yaw_rad: FloatArray
     cos: FloatArray
     sin: FloatArray
-    x: FloatArray
-    y: FloatArray
+    x_m: FloatArray
+    y_m: FloatArray
 
-    def moved(self, x: FloatArray | float, y: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+    def moved(
+        self, x_m: FloatArray | float, y_m: FloatArray | float
+    ) -> tuple[FloatArray, FloatArray]:
         """Return x and y (N,) of points, each turned and shifted by its own row."""
-        return self.cos * x - self.sin * y + self.x, self.sin * x + self.cos * y + self.y
+        return (
+            self.cos * x_m - self.sin * y_m + self.x_m,
+            self.sin * x_m + self.cos * y_m + self.y_m,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,12 +162,11 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
         scanner: its mounting.
         motion: the robot's pose and velocity; a pose near the scan's own time is best.
     """
-    beams = _beams(scanner, scan.angle_min_rad, scan.angle_increment_rad, len(scan))
+    beams = beams_of(scanner, scan)
     offset = scanner.T_base_scanner[:3, 3]
-    measured = scan.measured
-    free = scan.free_of(measured)
+    free = scan.free_m
     known = beams.covered & (free > 0.0)
-    measured &= known
+    measured = scan.measured & known
     # All points are computed axis by axis, (3, N).
     reach = beams.rays * np.where(known, free, np.nan)
     reach += offset[:, None]
@@ -168,7 +176,7 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
         near = (np.abs(points) <= beams.outermost_m).all(axis=0).nonzero()[0]
         if near.size:
             measured[rows[near][scanner.is_body(points[:, near].T)]] = False
-    arc = motion._arc(scan.stamps_s - motion.stamp_s)
+    arc = motion.arc(scan.stamps_s - motion.stamp_s)
     origins = np.empty_like(reach)
     x, y, z = offset.tolist()
     origins[0], origins[1] = arc.moved(x, y)
@@ -191,7 +199,7 @@ def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanP
     return ScanPoints(middle_s, *arrays, angle_increment_rad=scan.angle_increment_rad)
 
 
-class _Beams(NamedTuple):
+class Beams(NamedTuple):
     """The rays of a mounted scanner.
 
     Attributes:
@@ -207,10 +215,13 @@ class _Beams(NamedTuple):
     outermost_m: float
 
 
+def beams_of(scanner: Scanner, scan: LaserScan) -> Beams:
+    """Return the rays of a scan in the base frame."""
+    return _beams(scanner, scan.angle_min_rad, scan.angle_increment_rad, len(scan))
+
+
 @lru_cache(maxsize=16)  # the scanners of a robot, scan after scan
-def _beams(
-    scanner: Scanner, angle_min_rad: float, angle_increment_rad: float, count: int
-) -> _Beams:
+def _beams(scanner: Scanner, angle_min_rad: float, angle_increment_rad: float, count: int) -> Beams:
     angles = angle_min_rad + angle_increment_rad * np.arange(count, dtype=np.float64)
     rays = scanner.T_base_scanner[:3, :3] @ np.stack(
         (np.cos(angles), np.sin(angles), np.zeros(count))
@@ -223,4 +234,6 @@ def _beams(
         level = float(np.hypot(rays[0], rays[1]).min(initial=1.0))
         farthest = float(np.hypot(*away.T).max()) + BODY_MARGIN_M
         within_m = farthest / max(level, 1e-9) + BODY_MARGIN_M
-    return _Beams(rays, scanner.covers(angles), within_m, outermost_m)
+    covered = scanner.covers(angles)
+    covered.setflags(write=False)
+    return Beams(rays, covered, within_m, outermost_m)

@@ -39,6 +39,8 @@ class LaserScan:
         range_min_m: shortest range that counts.
         range_max_m: longest range that counts.
         time_increment_s: time from one ray to the next; 0 for a sweep at one instant.
+        measured: (N,) True for rays that measured an object within the limits; made from the rest.
+        no_return: (N,) True for rays that met no object within ``range_max_m``; made as well.
 
     Raises:
         PerceptionError: for a wrong shape, limits in the wrong order, or more than a full turn.
@@ -51,8 +53,8 @@ class LaserScan:
     range_min_m: float
     range_max_m: float
     time_increment_s: float = 0.0
-    # The range of a ray without a return, beside +inf; NaN if there is none.
-    _nothing_m: float = field(init=False, repr=False)
+    measured: NDArray[np.bool_] = field(init=False, repr=False)
+    no_return: NDArray[np.bool_] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         ranges = _numbers("ranges_m", self.ranges_m)
@@ -71,10 +73,11 @@ class LaserScan:
             raise PerceptionError(
                 f"range_max_m must exceed range_min_m, got {high:g} and {low:g} m"
             )
+        # The range of a ray without a return, beside +inf.
         far = ranges[(ranges >= high * _NO_RETURN_SHARE) & (ranges <= high * (1.0 + _ROUNDING))]
-        nothing = float(far.max()) if len(far) >= _NO_RETURN_RAYS else np.nan
-        if np.count_nonzero(far == nothing) < _NO_RETURN_RAYS:
-            nothing = np.nan
+        code_m = float(far.max()) if len(far) >= _NO_RETURN_RAYS else None
+        if code_m is not None and np.count_nonzero(far == code_m) < _NO_RETURN_RAYS:
+            code_m = None
         set_fields(
             self,
             stamp_s=finite_number("stamp_s", self.stamp_s),
@@ -84,8 +87,17 @@ class LaserScan:
             range_min_m=low,
             range_max_m=high,
             time_increment_s=finite_number("time_increment_s", self.time_increment_s, minimum=0.0),
-            _nothing_m=nothing,
         )
+        within = (ranges >= low) & (ranges <= high)
+        within &= ranges > 0.0  # many drivers send 0 for no return, and some 0 for range_min too
+        nothing = ranges == np.inf
+        if code_m is not None:
+            coded = ranges == code_m
+            within &= ~coded
+            nothing |= coded
+        for mask in (within, nothing):
+            mask.setflags(write=False)
+        set_fields(self, measured=within, no_return=nothing)
 
     def __len__(self) -> int:
         return len(self.ranges_m)
@@ -107,14 +119,6 @@ class LaserScan:
         """The time of the last ray."""
         return self.stamp_s + self.time_increment_s * (len(self.ranges_m) - 1)
 
-    @property
-    def measured(self) -> NDArray[np.bool_]:
-        """(N,) True for rays that measured an object within the limits."""
-        ranges = self.ranges_m
-        within = (ranges >= self.range_min_m) & (ranges <= self.range_max_m)
-        within &= ranges > 0.0  # many drivers send 0 for no return, and some 0 for range_min too
-        return np.asarray(within & (ranges != self._nothing_m))
-
     def repeats(self, before: LaserScan) -> bool:
         """Return whether all ranges are those of another scan, and some ray measured something.
 
@@ -124,17 +128,13 @@ class LaserScan:
         return bool(same and self.measured.any())
 
     @property
-    def no_return(self) -> NDArray[np.bool_]:
-        """(N,) True for rays that met no object within ``range_max_m``."""
-        return np.asarray((self.ranges_m == np.inf) | (self.ranges_m == self._nothing_m))
-
-    def free_of(self, measured: NDArray[np.bool_]) -> FloatArray:
-        """Return the distance (N,) over which each ray met nothing.
+    def free_m(self) -> FloatArray:
+        """The distance (N,) over which each ray met nothing.
 
         It is the range where there is one, ``range_max_m`` for :attr:`no_return`, and 0 where
-        nothing is known. :attr:`measured` (N,) is given.
+        nothing is known.
         """
-        free = np.where(measured, self.ranges_m, 0.0)
+        free = np.where(self.measured, self.ranges_m, 0.0)
         np.putmask(free, self.no_return, self.range_max_m)
         return free
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray
-from ._points import RobotMotion, ScanPoints, scan_points
+from ._points import RobotMotion, ScanPoints, beams_of, scan_points
 from ._scan import LaserScan, Scanner
 
 #: A return this near to the scanner is of a cover: behind it the ray sees nothing.
@@ -61,14 +62,15 @@ class ScannerSight:
 
     def sees(self, bearings_base_rad: FloatArray) -> NDArray[np.bool_]:
         """Return (K,) whether the scan shows what is in directions (K,) of the base frame."""
-        ahead = np.stack((np.cos(bearings_base_rad), np.sin(bearings_base_rad)))
-        x, y = self.scanner.T_base_scanner[:2, :2].T @ ahead
-        step, middle = self.scan.angle_increment_rad, 0.5 * (len(self.scan) - 1)
-        off = np.arctan2(y, x) - (self.scan.angle_min_rad + step * middle)
-        # The number of the nearest ray, from -0.5 to half a ray after the last.
-        ray = middle + (np.remainder(off + math.pi, _FULL_TURN_RAD) - math.pi) / step
-        near = np.clip(np.rint(ray).astype(np.int64), 0, len(self.scan) - 1)
-        return np.asarray(self.seen[near] & (np.abs(ray - near) <= 0.5 + 1e-6))
+        scan = self.scan
+        near, within = _nearest_rays(
+            self.scanner,
+            scan.angle_min_rad,
+            scan.angle_increment_rad,
+            len(scan),
+            bearings_base_rad,
+        )
+        return np.asarray(self.seen[near] & within)
 
     @property
     def blind_sectors_base_rad(self) -> tuple[tuple[float, float], ...]:
@@ -136,8 +138,12 @@ class SeenDirections:
 
     def note(self, sight: ScannerSight, stamp_s: float) -> None:
         """Note a scan of any scanner."""
-        seen_s = np.where(sight.sees(_BEARINGS_RAD), stamp_s, -math.inf)
-        self._seen_s = np.maximum(self._seen_s, seen_s)
+        scan = sight.scan
+        near, within = _nearest_to_degrees(
+            sight.scanner, scan.angle_min_rad, scan.angle_increment_rad, len(scan)
+        )
+        seen_s = np.where(sight.seen[near] & within, stamp_s, -math.inf)
+        np.maximum(self._seen_s, seen_s, out=self._seen_s)
 
     def stamp_s(self, middle_rad: float, half_rad: float) -> float | None:
         """Return the time from which all of a sector is; None if not all of it has been seen.
@@ -146,10 +152,43 @@ class SeenDirections:
             middle_rad: bearing of its middle in the base frame.
             half_rad: angle from there to either side.
         """
-        off = np.remainder(_BEARINGS_RAD - middle_rad + math.pi, _FULL_TURN_RAD) - math.pi
-        inside = np.abs(off) <= max(half_rad, float(np.abs(off).min())) + 1e-9
-        oldest_s = float(self._seen_s[inside].min())
+        oldest_s = float(self._seen_s[_sector(middle_rad, half_rad)].min())
         return oldest_s if math.isfinite(oldest_s) else None
+
+
+@lru_cache(maxsize=16)
+def _sector(middle_rad: float, half_rad: float) -> NDArray[np.bool_]:
+    """Return which of the bearings are in a sector: at least the one nearest to its middle."""
+    off = np.remainder(_BEARINGS_RAD - middle_rad + math.pi, _FULL_TURN_RAD) - math.pi
+    inside = np.abs(off) <= max(half_rad, float(np.abs(off).min())) + 1e-9
+    inside.setflags(write=False)
+    return np.asarray(inside)
+
+
+def _nearest_rays(
+    scanner: Scanner,
+    angle_min_rad: float,
+    increment_rad: float,
+    count: int,
+    bearings_base_rad: FloatArray,
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the ray (K,) nearest to each bearing, and whether it is at most half a ray away."""
+    ahead = np.stack((np.cos(bearings_base_rad), np.sin(bearings_base_rad)))
+    x, y = scanner.T_base_scanner[:2, :2].T @ ahead
+    middle = 0.5 * (count - 1)
+    off = np.arctan2(y, x) - (angle_min_rad + increment_rad * middle)
+    # The number of the nearest ray, from -0.5 to half a ray after the last.
+    ray = middle + (np.remainder(off + math.pi, _FULL_TURN_RAD) - math.pi) / increment_rad
+    near = np.clip(np.rint(ray).astype(np.int64), 0, count - 1)
+    return near, np.abs(ray - near) <= 0.5 + 1e-6
+
+
+@lru_cache(maxsize=16)  # the scanners of a robot, scan after scan
+def _nearest_to_degrees(
+    scanner: Scanner, angle_min_rad: float, increment_rad: float, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the rays nearest to the directions for which is known when they were last seen."""
+    return _nearest_rays(scanner, angle_min_rad, increment_rad, count, _BEARINGS_RAD)
 
 
 def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None) -> ScannerSight:
@@ -162,15 +201,19 @@ def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None
     """
     if points is None:
         points = scan_points(scan, scanner, RobotMotion(scan.stamp_s, np.eye(4)))
-    covered = scanner.sees(scan)
-    answered = (points.usable & (scan.ranges_m >= COVER_M)) | (covered & _beyond(scan))
-    own = covered & scan.measured & ~points.usable & (scan.ranges_m >= COVER_M)
+    covered = beams_of(scanner, scan).covered
+    far = scan.ranges_m >= COVER_M
+    answered = (points.usable & far) | (covered & _beyond(scan))
+    own = covered & scan.measured & ~points.usable & far
+    wanted = np.count_nonzero(covered & ~own)
     wrapped = answered & (scan.ranges_m < WRAPPED_M)
-    if 2 * np.count_nonzero(wrapped) > np.count_nonzero(covered & ~own):
+    if 2 * np.count_nonzero(wrapped) > wanted:
         answered &= ~wrapped
-    if np.count_nonzero(answered) >= _ALIVE_SHARE * np.count_nonzero(covered & ~own):
+    if np.count_nonzero(answered) >= _ALIVE_SHARE * wanted:
         answered |= covered & scan.no_return
     dead = covered & ~answered
+    if not dead.any():
+        return ScannerSight(scan, scanner, covered, dead)
     half = round(_WITHIN_RAD / abs(scan.angle_increment_rad))
     turn = _is_full_turn(scan)
     unseen = _with_dead_beside(
@@ -181,9 +224,9 @@ def sight_of(scan: LaserScan, scanner: Scanner, points: ScanPoints | None = None
 
 def _beyond(scan: LaserScan) -> NDArray[np.bool_]:
     """Return (N,) True for rays that measured something beyond the longest range that counts."""
-    beyond = np.isfinite(scan.ranges_m) & (scan.ranges_m > scan.range_max_m) & ~scan.no_return
+    beyond = (scan.ranges_m > scan.range_max_m) & ~scan.no_return
     if not beyond.any():
-        return beyond
+        return np.asarray(beyond)
     _, which, numbers = np.unique(scan.ranges_m[beyond], return_inverse=True, return_counts=True)
     beyond[beyond] = numbers[which] < _CODED
     return beyond

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -320,6 +321,6 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
 def _at_goal(scenario: Scenario, state: RobotState, goal: FloatArray) -> bool:
     if scenario.robot.straight_on_speed_mps is not None:
         return False
-    distance = float(np.linalg.norm(goal - state.position_odom_m))
-    tolerance = scenario.robot.goal_tolerance_m
-    return distance <= tolerance and state.travel_mps <= _GOAL_SPEED_MPS
+    if state.travel_mps > _GOAL_SPEED_MPS:
+        return False
+    return math.dist(goal, state.position_odom_m) <= scenario.robot.goal_tolerance_m

@@ -181,8 +181,9 @@ class Sensing:
 
     def _perceived_s(self) -> float:
         """Return the time from which camera or scanners know what is ahead, as on a robot."""
-        stamps_s = (self._newest_s.get("camera"), self._seen.stamp_s(0.0, AHEAD_RAD))
-        return max((each for each in stamps_s if each is not None), default=-_NEVER_S)
+        newest_s = self._newest_s.get("camera", -_NEVER_S)
+        seen_s = None if self._scanners is None else self._seen.stamp_s(0.0, AHEAD_RAD)
+        return newest_s if seen_s is None else max(newest_s, seen_s)
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:
         """Return whether the tracker takes a sighting.

@@ -118,6 +118,7 @@ class Stage(AbstractContextManager["Stage"]):
             raise
         self.warehouse.add_actor(RobotLook.of(self.amr))
         self._sight = RobotSight(self.amr, self.workers)
+        self._sees_robot = [partial(self._sight.seen_by, worker) for worker in self.workers]
         self._audience = Audience(ears, self.workers, self._sight)
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
@@ -135,6 +136,7 @@ class Stage(AbstractContextManager["Stage"]):
         self._held = [False] * len(self.workers)
         self._heard: list[list[Heard]] = [[] for _ in self.workers]
         self._touches: list[list[tuple[float, float]]] = [[] for _ in self.workers]
+        self._placed_at_step = 0
         self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
 
@@ -152,24 +154,35 @@ class Stage(AbstractContextManager["Stage"]):
 
     def advance(self, until_s: float) -> None:
         """Run physics until ``until_s``; move the people and record contacts."""
-        while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
+        dt_s = self.warehouse.physics_dt_s
+        near = [index for index, is_near in enumerate(self._near_robot) if is_near]
+        while self.t_s < until_s - 0.5 * dt_s:
             # Far from the robot, bodies move once per control cycle and touch nobody.
-            if any(self._near_robot) and self.warehouse.steps % self._steps_per_body_update == 0:
-                self._place_workers()
-            self.amr.advance(self.warehouse.physics_dt_s)
+            if near and self._bodies_move():
+                self._place_workers(in_between=True)
+            self.amr.advance(dt_s)
             # A collision slows the robot in the step that reports it, and in the one before, which
             # stops the robot at the body. The velocity before the collision is the one that counts.
-            previous, current = self._last_velocity_mps, None
-            if any(self._near_robot):
-                current = self.robot_velocity_odom_mps
-            self._last_velocity_mps = current
+            previous, self._last_velocity_mps = self._last_velocity_mps, None
+            if near:
+                self._last_velocity_mps = current = self.robot_velocity_odom_mps
             self.warehouse.step()
-            if current is None:
-                continue
-            for index, near in enumerate(self._near_robot):
-                if near:
-                    self._update_contact(index, (previous, current))
+            for index in near:
+                self._update_contact(index, (previous, current))
         self._place_workers()
+
+    def _bodies_move(self) -> bool:
+        """Return whether it is time for bodies next to the robot to move on.
+
+        The last control cycle has ended with this already. It is repeated only for people to whom
+        something has happened since.
+        """
+        steps = self.warehouse.steps
+        if steps % self._steps_per_body_update != 0:
+            return False
+        if steps != self._placed_at_step:
+            return True
+        return any(self._held) or any(self._touching) or any(self._heard)
 
     def request(self, means: RequestMeans, place_odom_m: FloatArray) -> None:
         """Ask the person at a place for attention, from where the robot is now.
@@ -214,16 +227,18 @@ class Stage(AbstractContextManager["Stage"]):
     def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
         """Return the truth about every person, seen from the robot's camera."""
         rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
+        camera: list[float] = origin.tolist()
         views = []
         for worker, motion in zip(self.workers, self._motions, strict=True):
             gaze = worker.gaze_odom
-            alpha = float(cone.scores(worker.eyes_odom_m, gaze, origin))
-            in_front = _faces(motion, origin)
+            alpha = cone.score_of(worker.eyes_odom_m.tolist(), gaze.tolist(), camera)
+            in_front = _faces(motion, camera)
             sighted = (in_front or alpha > 0.0) and self._sight.seen_by(worker)
             views.append(
                 TrueView(
-                    (worker.chest_odom_m - origin) @ rotation,
-                    gaze @ rotation,
+                    # On three numbers dot takes half the time of @.
+                    (worker.chest_odom_m - origin).dot(rotation),
+                    gaze.dot(rotation),
                     alpha if sighted else 0.0,
                     motion.position_odom_m,
                     motion.velocity_odom_mps,
@@ -242,26 +257,37 @@ class Stage(AbstractContextManager["Stage"]):
         """Outcomes of the people of the scenario, in their order; replayed people have none."""
         return tuple(person.outcome() for person in self.people[: len(self.scenario.people)])
 
-    def _place_workers(self) -> None:
-        robot, others = self._robot_body(), self._moving_bodies()
+    def _place_workers(self, *, in_between: bool = False) -> None:
+        """Move all people to the present time, which may lie between two control cycles.
+
+        Collision bodies that nothing can touch are left behind: those far from the robot, and
+        between two control cycles, when no distance is measured, all that are not next to it.
+        """
+        t_s, robot, others = self.t_s, self._robot_body(), self._moving_bodies()
+        robot_m = robot.x_m, robot.y_m
+        self._placed_at_step = self.warehouse.steps
         motions = []
         for index, (worker, person) in enumerate(zip(self.workers, self.people, strict=True)):
             around = Surroundings(
                 robot,
                 others[:index] + others[index + 1 :],
-                partial(self._sight.seen_by, worker),
+                self._sees_robot[index],
                 held=self._held[index],
                 heard=tuple(self._heard[index]),
                 touches=tuple(self._touches[index]),
             )
             self._heard[index].clear()
             self._touches[index].clear()
-            motion = person.step(self.t_s, around)
-            motions.append(self._move_or_hold(index, worker, motion, robot))
+            motion = person.step(t_s, around)
+            collides = self._near_robot[index]
+            if not in_between:
+                x_m, y_m = motion.position_odom_m.tolist()
+                collides = near_robot(worker, (x_m, y_m), robot_m)
+            motions.append(self._move_or_hold(index, worker, motion, collides=collides))
         self._motions = tuple(motions)
 
     def _move_or_hold(
-        self, index: int, worker: Worker, motion: PersonMotion, robot: RobotBody
+        self, index: int, worker: Worker, motion: PersonMotion, *, collides: bool
     ) -> PersonMotion:
         """Move a body; one that would move into the robot stays where it was.
 
@@ -269,9 +295,7 @@ class Stage(AbstractContextManager["Stage"]):
         """
         before = self._motions[index] if self._motions and self._near_robot[index] else None
         depth_m = 0.0 if before is None else self._depth_m(worker)
-        x_m, y_m = motion.position_odom_m.tolist()
-        # Collision bodies far from the robot are left behind: nothing there touches them.
-        _pose(worker, motion, collides=near_robot(worker, (x_m, y_m), (robot.x_m, robot.y_m)))
+        _pose(worker, motion, collides=collides)
         self._held[index] = False
         if before is None or self._depth_m(worker) < depth_m + _DEEPER_M:
             return motion
@@ -287,15 +311,14 @@ class Stage(AbstractContextManager["Stage"]):
         return -min((float(pair[8]) for pair in pairs), default=0.0)
 
     def _robot_body(self) -> RobotBody:
-        T_odom_base = self.amr.T_odom_base
-        x, y = T_odom_base[:2, 3].tolist()
+        (xx, xy, _, x), (yx, yy, _, y) = self.amr.T_odom_base[:2].tolist()
         vx, vy = self.amr.velocity_odom_mps.tolist()
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
         ahead, left = self._middle_base_m
         return RobotBody(
-            x + ahead * float(T_odom_base[0, 0]) + left * float(T_odom_base[0, 1]),
-            y + ahead * float(T_odom_base[1, 0]) + left * float(T_odom_base[1, 1]),
-            math.atan2(T_odom_base[1, 0], T_odom_base[0, 0]),
+            x + ahead * xx + left * xy,
+            y + ahead * yx + left * yy,
+            math.atan2(yx, xx),
             vx,
             vy,
             *self._half_size_m,
@@ -311,9 +334,8 @@ class Stage(AbstractContextManager["Stage"]):
 
     def _separation(self, index: int) -> tuple[float, FloatArray]:
         """Return the distance between the surfaces and the direction (2,) from robot to worker."""
-        base = self.amr.T_odom_base[:2, 3]
-        centre = self._motions[index].position_odom_m - base
-        distance = math.sqrt(centre @ centre)
+        centre = self._motions[index].position_odom_m - self.amr.T_odom_base[:2, 3]
+        distance = math.sqrt(centre.dot(centre))
         towards = centre / max(distance, 1e-9)
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
@@ -370,10 +392,13 @@ def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
     return robot_of(warehouse, model, start, heading_rad, camera_mount=scenario.camera.mount)
 
 
-def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
-    """Return whether a target (2,) or (3,) is at most 90° aside of where the body faces."""
-    forward = np.array([math.cos(motion.heading_odom_rad), math.sin(motion.heading_odom_rad)])
-    return bool(forward @ (target_odom_m[:2] - motion.position_odom_m) >= 0.0)
+def _faces(motion: PersonMotion, target_odom_m: list[float]) -> bool:
+    """Return whether a target is at most 90° aside of where the body faces."""
+    x, y = motion.position_odom_m.tolist()
+    heading_rad = motion.heading_odom_rad
+    ahead_m: float = math.cos(heading_rad) * (target_odom_m[0] - x)
+    ahead_m += math.sin(heading_rad) * (target_odom_m[1] - y)
+    return ahead_m >= 0.0
 
 
 def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> None:

@@ -21,6 +21,7 @@ from awarenav.files import atomic_path
 from awarenav.records import Record, read_records, write_records
 from perception import Camera
 
+from ..world.bullet import require_pybullet
 from ..world.errors import SimError
 from ._config import RenderConfig
 from ._contact_sheet import contact_sheet
@@ -65,6 +66,7 @@ def render(
         SimError: when ``out`` holds images of other settings, a finished set (with neither
             ``resume`` nor ``overwrite``) or none (with ``resume``), or a process died.
     """
+    require_pybullet()
     if overwrite:
         _remove_set(out)
     _check_folder(config, out, resume=resume)

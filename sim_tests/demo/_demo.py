@@ -11,6 +11,7 @@ from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
 from ..crossing import CrossingResult
+from ..world.bullet import require_pybullet
 from ._comparison import (
     ComparisonRow,
     compare_policies,
@@ -50,6 +51,7 @@ def run_demo(
     Raises:
         SimError: an unknown robot or population; nothing is written then.
     """
+    require_pybullet()
     compared_scenarios(axes)  # refuses unknown names before anything runs
     if perception == "pixels":
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing

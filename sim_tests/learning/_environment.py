@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from inspect import signature
@@ -192,7 +193,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._crossing: Crossing | None = None
         self._situation: Situation | None = None
         self._safety = SafetyFigures()
-        self._frame: CrossingFrame | None = None
+        self._last: tuple[Situation, tuple[float, float]] | None = None
         self._plan: TopView | None = None
         self._camera: CameraRenderer | None = None
         self._ended = False
@@ -214,7 +215,10 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
     @property
     def frame(self) -> CrossingFrame | None:
         """The control cycle of the last step, as ``run_crossing`` records it; None before it."""
-        return self._frame
+        if self._last is None:
+            return None
+        situation, command = self._last
+        return situation.frame(command)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -241,7 +245,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         conditions = replace(setup.conditions, **axis_names(self._axes))
         self._crossing = Crossing(replace(setup, conditions=conditions))
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
-        self._frame = None
+        self._last = None
         self._ended = False
         self._safety = SafetyFigures()
         self._sense()
@@ -259,7 +263,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         command = command_of(action, crossing.stage.amr.profile, normalised=self._normalised)
         contacts = _by_robot(crossing)
         crossing.command(*command)
-        self._frame = before.frame(command)
+        self._last = before, command
         crossing.advance()
         now = self._sense()
         hits = _by_robot(crossing) - contacts
@@ -292,7 +296,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if self.render_mode is None:
             return None
         crossing = self.crossing
-        command = (0.0, 0.0) if self._frame is None else self._frame.command
+        command = (0.0, 0.0) if self._last is None else self._last[1]
         frame, cone = self.situation.frame(command), AttentionCone()
         if self._render_view == "top":
             if self._plan is None:
@@ -399,7 +403,8 @@ def _over_limit_mps(constraints: NavConstraints, command: tuple[float, float]) -
 
 def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
     """Return the true distance of the base origin to the goal."""
-    return float(np.linalg.norm(goal_odom_m - now.state.position_odom_m))
+    off_m = goal_odom_m - now.state.position_odom_m
+    return math.sqrt(off_m.dot(off_m))
 
 
 def _violates(now: Situation) -> bool:

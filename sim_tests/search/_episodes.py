@@ -9,6 +9,7 @@ from tqdm import tqdm
 
 from ..study.measures import EpisodeRecord, nondeterminism_notes
 from ..study.runs import Job, Workers, attempt, died
+from ..world.bullet import require_pybullet
 
 
 class EpisodeRunner:
@@ -29,6 +30,7 @@ class EpisodeRunner:
         self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
 
     def __enter__(self) -> EpisodeRunner:
+        require_pybullet()
         return self
 
     def __exit__(self, *_: object) -> None:

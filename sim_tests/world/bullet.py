@@ -1,7 +1,8 @@
-"""PyBullet, imported in this module only.
+"""PyBullet, imported in this module only, when something first needs it.
 
-PyBullet is the optional dependency ``awarenav[sim]``. Its extension module writes its build time to
-standard error when it is loaded; that line is dropped, so a command prints only its own output.
+PyBullet is the optional dependency ``awarenav[sim]``: scenarios, planners and finished runs are
+listed, compared and reported without it. Its extension module writes its build time to standard
+error when it is loaded; that line is dropped, so a command prints only its own output.
 """
 
 from __future__ import annotations
@@ -10,12 +11,13 @@ import contextlib
 import ctypes
 import os
 from collections.abc import Iterator
+from typing import Any
 
 from perception.installation import install_command
 
 from .errors import MissingSimulatorError
 
-__all__ = ["pybullet"]
+__all__ = ["pybullet", "require_pybullet"]
 
 _STDERR = 2
 
@@ -47,11 +49,30 @@ def _flush_c_streams() -> None:
         ctypes.CDLL(None).fflush(None)
 
 
-try:
-    with _muted_stderr():
-        import pybullet
-except ImportError as cause:
-    raise MissingSimulatorError(
-        "the simulation needs PyBullet, which is not installed; it is the extra 'sim': "
-        f"{install_command('sim')} (wheels exist for Python 3.10 and 3.11)"
-    ) from cause
+def require_pybullet() -> None:
+    """Import PyBullet, if that has not been done.
+
+    Raises:
+        MissingSimulatorError: it is not installed.
+    """
+    pybullet.connect  # noqa: B018 - the first look-up of a name imports it
+
+
+class _PyBullet:
+    """The module, with all its names once one of them has been looked up."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            with _muted_stderr():
+                import pybullet as module  # noqa: PLC0415 - lazy on purpose
+        except ImportError as cause:
+            raise MissingSimulatorError(
+                "the simulation needs PyBullet, which is not installed; it is the extra 'sim': "
+                f"{install_command('sim')} (wheels exist for Python 3.10 and 3.11)"
+            ) from cause
+        vars(self).update(vars(module))
+        return getattr(module, name)
+
+
+#: The module ``pybullet``.
+pybullet: Any = _PyBullet()

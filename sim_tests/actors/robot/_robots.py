@@ -35,6 +35,7 @@ _MAX_WHEEL_TORQUE_NM: Final = 25.0
 _TYRE_FRICTION: Final = 1.0
 # The axes of the optical frame (x right, y down, z forward) in the base frame, as columns.
 _ROTATION_BASE_OPTICAL: Final = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+_IDENTITY: Final = np.eye(4)
 # A kinematic body ends this far above the floor.
 _FLOOR_GAP_M: Final = 0.02
 # A robot that is stopped again within this distance has not gone away meanwhile.
@@ -129,7 +130,7 @@ class Robot(ABC):
         """(4, 4) pose of the camera's optical frame in odom."""
         T_odom_base = self.T_odom_base
         if self._last_view[0] is not T_odom_base:
-            T_odom_camera = np.asarray(T_odom_base @ self.T_base_camera)
+            T_odom_camera = T_odom_base.dot(self.T_base_camera)
             T_odom_camera.setflags(write=False)
             self._last_view = T_odom_base, T_odom_camera
         return self._last_view[1]
@@ -267,19 +268,21 @@ class Amr(Robot):
             self.body, physicsClientId=self._client
         )
         velocity, angular = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
-        rotation = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-        arm = rotation @ self._to_base_m
+        entries = pybullet.getMatrixFromQuaternion(quaternion)
+        rotation = np.array(entries).reshape(3, 3)
+        # On so few numbers dot takes half the time of @.
+        arm = rotation.dot(self._to_base_m)
         (wx, wy, wz), (x, y, z), (vx, vy, vz) = angular, arm.tolist(), velocity
         origin_velocity = np.array(
             [vx + (wy * z - wz * y), vy + (wz * x - wx * z), vz + (wx * y - wy * x)]
         )
-        T = np.eye(4)
+        T = _IDENTITY.copy()
         T[:3, :3], T[:3, 3] = rotation, com + arm
         T.setflags(write=False)
         self._last_motion = _Motion(
             T,
-            math.atan2(rotation[1, 0], rotation[0, 0]),
-            float(origin_velocity @ rotation[:, 0]),
+            math.atan2(entries[3], entries[0]),
+            float(origin_velocity.dot(rotation[:, 0])),
             angular[2],
         )
         return self._last_motion

@@ -25,7 +25,7 @@ from tracking import ScannerView, SensorConfig
 
 from ...world import Warehouse
 from ...world.camera import FrameClock, FrameQueue
-from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner
+from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner, scan_all
 from ._eyes import NOBODY, Sighting
 from ._map_view import MapView
 
@@ -98,19 +98,17 @@ class ScannerEyes:
             motion: true motion of the robot now.
             known: the same as the robot knows it.
         """
-        for number, (clock, scanner) in enumerate(zip(self._clocks, self._scanners, strict=True)):
-            due, delivery_s = clock.tick(now_s)
-            if not due:
-                continue
-            scan = scanner.scan(motion)
+        ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
+        taken = [(number, delivery_s) for number, due, delivery_s in ticks if due]
+        scans = scan_all([self._scanners[number] for number, _ in taken], motion)
+        for (number, delivery_s), scan in zip(taken, scans, strict=True):
             if delivery_s is None:
                 continue
+            arriving: tuple[LaserScan, float] | None = scan, delivery_s
             if self._change is not None:
-                changed = self._change(scan, delivery_s, number, motion)
-                if changed is None:
-                    continue
-                scan, delivery_s = changed
-            self._queue.put(now_s, delivery_s, _Taken(scan, number, known))
+                arriving = self._change(scan, delivery_s, number, motion)
+            if arriving is not None:
+                self._queue.put(now_s, arriving[1], _Taken(arriving[0], number, known))
         sightings = [
             self._sighting(taken) for taken in self._queue.take(now_s) if self._is_new(taken)
         ]

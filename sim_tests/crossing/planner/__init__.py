@@ -11,8 +11,7 @@ from ._choice import (
     seeded_generators,
 )
 from ._config import PlannerConfig
-from ._costmap import CostmapPlanner
-from ._local_planner import LocalPlanner, StraightOn
+from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
 from ._sampling_planner import SamplingPlanner
 
 __all__ = [

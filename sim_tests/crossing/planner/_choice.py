@@ -22,8 +22,7 @@ from nav_adapter import RobotProfile
 from ...conditions import REFERENCE_PLANNER
 from ...scenario import Scenario
 from ...world.errors import SimError
-from ._costmap import CostmapPlanner
-from ._local_planner import LocalPlanner, StraightOn
+from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
 from ._sampling_planner import SamplingPlanner
 
 # Arguments by these names receive the robot's profile, the racks and walls, the way from start to

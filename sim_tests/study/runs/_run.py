@@ -22,6 +22,7 @@ from awarenav.errors import counted
 from awarenav.files import write_text
 from perception.arrays import finite_number
 
+from ...world.bullet import require_pybullet
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, write_records
 from ._episode import FreeRun, attempt, died, failed, free_run_or_none, task_of
@@ -81,8 +82,9 @@ def run_jobs(
         The records in the order of the jobs; ``error`` of a record says why an episode failed.
 
     Raises:
-        SimError: no jobs or no workers, or the folder cannot be used (:class:`RunFolder`); nothing
-            has run then.
+        SimError: no jobs or no workers, the folder cannot be used (:class:`RunFolder`), or the
+            extra ``sim`` is missing on this computer and there is no scheduler; nothing has run
+            then.
     """
     if not jobs:
         raise SimError("jobs must be at least one episode, got none")
@@ -94,6 +96,8 @@ def run_jobs(
         if scheduler is not None:
             raise SimError("a time limit works in processes of this computer, not on a cluster")
     needed = versions()
+    if scheduler is None:
+        require_pybullet()
     folder = RunFolder(
         Path(out_dir),
         jobs,

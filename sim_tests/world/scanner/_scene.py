@@ -43,20 +43,39 @@ class Clothed(Protocol):
         ...
 
 
-class _Plane(NamedTuple):
-    """A plane n · p = offset."""
+class Plane(NamedTuple):
+    """A plane n · p = offset in odom, n a unit vector."""
 
     normal: tuple[float, float, float]
     offset_m: float
 
     @classmethod
-    def through(cls, point_m: FloatArray, normal: FloatArray) -> _Plane:
+    def through(cls, point_m: FloatArray, normal: FloatArray) -> Plane:
         """Return the plane through a point; one that is nearly level is level."""
         x, y, z = normal.tolist()
         if math.hypot(x, y) < _LEVEL_RAD:
             side = math.copysign(1.0, z)
             return cls((0.0, 0.0, side), side * round(float(point_m[2]), _HEIGHT_DIGITS))
         return cls((x, y, z), float(normal @ point_m))
+
+
+class SceneCut(NamedTuple):
+    """The segments in which a plane cuts a scene; those of a scanner's own robot are the last.
+
+    Attributes:
+        segments_odom_m: (S, 2, 3).
+        numbers: (S,) the actor of each, :data:`SCENERY` for the hall.
+        others: number of segments that are not of the robot that carries the scanners.
+    """
+
+    segments_odom_m: FloatArray
+    numbers: NDArray[np.int64]
+    others: int
+
+    def seen_from(self, T_odom_scanner: FloatArray) -> FloatArray:
+        """Return the segments (S, 2, 2) in the frame of a scanner in the plane."""
+        points = self.segments_odom_m.reshape(-1, 3) - T_odom_scanner[:3, 3]
+        return np.asarray((points @ T_odom_scanner[:3, :2]).reshape(-1, 2, 2))
 
 
 class ScanScene:
@@ -68,6 +87,9 @@ class ScanScene:
         layout: the hall; None for no scenery.
         variant: number of the scenery's variant.
         actors: everything that moves; an actor that is no :class:`Occluder` is not seen.
+
+    Attributes:
+        reflectance: (actors + 1,) of the light, in [0, 1]; the last is the scenery's.
     """
 
     def __init__(
@@ -82,51 +104,43 @@ class ScanScene:
             ]
             + [_BRIGHT]
         )
-        #: (actors + 1,) True for the robot that carries the scanners; the last is the scenery.
-        self.carrier: NDArray[np.bool_] = np.array(
-            [getattr(actor, "kind", "") == "robot" for actor in self._occluders] + [False]
-        )
-        # The last cut of the scenery, and of each actor's last surface: the scanners of a robot
-        # mostly have the same plane.
-        self._scenery: tuple[_Plane, FloatArray] | None = None
-        self._cuts: dict[int, tuple[PlacedSurface, _Plane, FloatArray]] = {}
+        # Which actors are the robot that carries the scanners.
+        self._carriers = [getattr(actor, "kind", "") == "robot" for actor in self._occluders]
+        # The last cut of the hall, and of each actor that bends: bodies that stand still are not
+        # cut again.
+        self._scenery: tuple[Plane, FloatArray] | None = None
+        self._cuts: dict[int, tuple[PlacedSurface, Plane, FloatArray]] = {}
 
     @property
     def occluders(self) -> tuple[Occluder, ...]:
         """The actors that are seen, in the order of their numbers."""
         return tuple(self._occluders)
 
-    def cut(
-        self, T_odom_scanner: FloatArray, range_max_m: float
-    ) -> tuple[FloatArray, NDArray[np.int64]]:
-        """Return what the scan plane cuts.
+    def cut(self, plane: Plane, origin_odom_m: FloatArray, range_max_m: float) -> SceneCut:
+        """Return what the plane of a scan cuts.
 
         Args:
-            T_odom_scanner: (4, 4) pose of the scanner; the plane is its x-y plane.
-            range_max_m: actors farther away are left out.
-
-        Returns:
-            Segments (S, 2, 2) in the scanner's frame, and the number (S,) of the actor of each,
-            :data:`SCENERY` for the hall.
+            plane: in odom.
+            origin_odom_m: (3,) a place in the plane, that of the scanner.
+            range_max_m: actors farther from it are left out.
         """
-        rotation, origin = T_odom_scanner[:3, :3], T_odom_scanner[:3, 3]
-        plane = _Plane.through(origin, np.ascontiguousarray(rotation[:, 2]))
         parts = [np.empty((0, 2, 3))]
-        numbers, counts = [SCENERY], [0]
+        numbers = [SCENERY]
         if self._layout is not None:
             if self._scenery is None or self._scenery[0] != plane:
                 self._scenery = plane, _scenery_cut(self._layout, self._variant, plane)
-            parts.append(self._scenery[1])
-            counts[0] = len(self._scenery[1])
-        for number, segments in self._actors_cut(plane, origin, range_max_m):
+            parts[0] = self._scenery[1]
+        cuts = self._actors_cut(plane, origin_odom_m, range_max_m)
+        own = [cut for cut in cuts if self._carriers[cut[0]]]
+        for number, segments in [cut for cut in cuts if not self._carriers[cut[0]]] + own:
             parts.append(segments)
             numbers.append(number)
-            counts.append(len(segments))
-        points = (np.concatenate(parts).reshape(-1, 3) - origin) @ rotation[:, :2]
-        return points.reshape(-1, 2, 2), np.repeat(numbers, counts)
+        counts = [len(segments) for segments in parts]
+        others = sum(counts) - sum(len(segments) for _, segments in own)
+        return SceneCut(np.concatenate(parts), np.repeat(numbers, counts), others)
 
     def _actors_cut(
-        self, plane: _Plane, origin: FloatArray, range_max_m: float
+        self, plane: Plane, origin: FloatArray, range_max_m: float
     ) -> list[tuple[int, FloatArray]]:
         """Return the number and the segments (S, 2, 3) in odom of each actor that is cut."""
         if not self._occluders:
@@ -134,7 +148,7 @@ class ScanScene:
         boxes = np.array([occluder.reach_odom_m() for occluder in self._occluders])
         found: list[tuple[int, FloatArray]] = []
         bending: list[tuple[int, PlacedSurface]] = []
-        for number in np.flatnonzero(_meet(boxes, origin, plane, range_max_m)).tolist():
+        for number in _meet(boxes, origin, plane, range_max_m).nonzero()[0].tolist():
             surface = self._occluders[number].surface(_DETAIL)
             if surface is None:
                 continue
@@ -145,8 +159,11 @@ class ScanScene:
                 found.append((number, last[2]))
             else:
                 bending.append((number, surface))
-        normal, offset = np.array(plane.normal), plane.offset_m
-        segments, owners = cut_surfaces([surface for _, surface in bending], normal, offset)
+        if not bending:
+            return found
+        segments, owners = cut_surfaces(
+            [surface for _, surface in bending], np.array(plane.normal), plane.offset_m
+        )
         for row, (number, surface) in enumerate(bending):
             own = segments[owners == row]
             self._cuts[number] = surface, plane, own
@@ -155,7 +172,7 @@ class ScanScene:
 
 
 def _meet(
-    boxes_odom_m: FloatArray, origin: FloatArray, plane: _Plane, reach_m: float
+    boxes_odom_m: FloatArray, origin: FloatArray, plane: Plane, reach_m: float
 ) -> NDArray[np.bool_]:
     """Return (N,) whether a plane meets boxes (N, 2, 3) within reach of the origin."""
     low, high = boxes_odom_m[:, 0], boxes_odom_m[:, 1]
@@ -172,20 +189,20 @@ def _is_rigid(surface: PlacedSurface) -> bool:
     return len(poses) == 1 or poses.strides[0] == 0
 
 
-def _cut_of_rigid(surface: PlacedSurface, plane: _Plane, origin: FloatArray) -> FloatArray:
+def _cut_of_rigid(surface: PlacedSurface, plane: Plane, origin: FloatArray) -> FloatArray:
     """Return the segments (S, 2, 3) in odom; the cut is kept in the surface's own frame."""
     rotation, place = surface.T_odom_piece[0, :3, :3], surface.T_odom_piece[0, :3, 3]
     normal = np.array(plane.normal)
     # The point of the plane above or below the scanner.
     origin = origin + (plane.offset_m - float(normal @ origin)) * normal
-    own = _Plane.through((origin - place) @ rotation / surface.scale, normal @ rotation)
+    own = Plane.through((origin - place) @ rotation / surface.scale, normal @ rotation)
     segments = _own_cut(surface.triangles, own)
     points = surface.scale * segments.reshape(-1, 3) @ rotation.T + place
     return np.asarray(points.reshape(-1, 2, 3))
 
 
 @lru_cache(maxsize=256)
-def _own_cut(triangles: TriangleSet, plane: _Plane) -> FloatArray:
+def _own_cut(triangles: TriangleSet, plane: Plane) -> FloatArray:
     places = np.broadcast_to(_HOME, (triangles.pieces, 4, 4))
     segments, _ = cut_surfaces(
         [PlacedSurface(triangles, places)], np.array(plane.normal), plane.offset_m
@@ -194,7 +211,7 @@ def _own_cut(triangles: TriangleSet, plane: _Plane) -> FloatArray:
 
 
 @lru_cache(maxsize=32)  # a robot that stands level scans the same plane again and again
-def _scenery_cut(layout: WarehouseLayout, variant: int, plane: _Plane) -> FloatArray:
+def _scenery_cut(layout: WarehouseLayout, variant: int, plane: Plane) -> FloatArray:
     surface = scenery_surface(layout, variant)
     segments, _ = cut_surfaces([surface], np.array(plane.normal), plane.offset_m)
     return _merged(segments) if plane.normal[:2] == (0.0, 0.0) else segments

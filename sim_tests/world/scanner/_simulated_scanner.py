@@ -1,8 +1,9 @@
-"""A scanner on a robot in a hall: exact ranges, then noise, dropouts and limits."""
+"""Scanners on a robot in a hall: exact ranges, then noise, dropouts and limits."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -11,12 +12,14 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 from perception.laser import LaserScan, RobotMotion, Scanner
 
-from ._ray_cast import cast_rays
-from ._scene import SCENERY, ScanScene
+from ._ray_cast import RayHits, cast_rays
+from ._scene import SCENERY, Plane, ScanScene, SceneCut
 from ._spec import ScannerSpec
 
 # Clothes that reflect at least this share of the light return every ray.
 _DARK: Final = 0.3
+# Decimals of the robot's own body in the frame of its scanner, in which it does not move.
+_OWN_DIGITS: Final = 9
 
 
 class SimulatedScanner:
@@ -31,6 +34,7 @@ class SimulatedScanner:
         rng: draws noise and dropouts; every ray of every sweep draws the same number of values.
 
     Attributes:
+        scene: as given.
         spec: as given.
         mounting: its place on the robot.
         hit_by: (N,) number of the actor that each ray of the last sweep met, −1 for the hall and
@@ -38,9 +42,22 @@ class SimulatedScanner:
     """
 
     def __init__(self, scene: ScanScene, spec: ScannerSpec, rng: np.random.Generator) -> None:
-        self._scene, self.spec, self._rng = scene, spec, rng
+        self.scene, self.spec, self._rng = scene, spec, rng
         self.mounting: Scanner = spec.scanner()
-        self.hit_by: NDArray[np.int64] = np.full(spec.rays, SCENERY, dtype=np.int64)
+        count = spec.rays
+        self.hit_by: NDArray[np.int64] = np.full(count, SCENERY, dtype=np.int64)
+        low, _ = np.radians(spec.field_of_view_deg).tolist()
+        self._angle_min_rad: float = low
+        self._increment_rad = math.radians(spec.resolution_deg)
+        # The times of the rays before the last.
+        self._times_s = spec.time_increment_s * (np.arange(count) - (count - 1.0))
+        darkness = np.clip(1.0 - scene.reflectance / _DARK, 0.0, 1.0)
+        self._lost: FloatArray = spec.dropout_rate + spec.dark_dropout_rate * darkness
+        # What the rays meet of the robot's own body, which is the same sweep after sweep.
+        self._own: tuple[FloatArray, RayHits] = (
+            np.empty((0, 2, 2)),
+            RayHits(np.full(count, np.inf), self.hit_by),
+        )
 
     def scan(self, motion: RobotMotion) -> LaserScan:
         """Return the sweep whose last ray is measured at the robot's present pose.
@@ -48,60 +65,86 @@ class SimulatedScanner:
         Args:
             motion: pose and velocity of the robot at the present time, its ``stamp_s``.
         """
-        spec, count = self.spec, self.spec.rays
-        low, _ = np.radians(spec.field_of_view_deg).tolist()
-        step = math.radians(spec.resolution_deg)
-        before = np.arange(count, dtype=np.float64) - (count - 1)
-        stamps = np.asarray(motion.stamp_s + spec.time_increment_s * before)
-        T_base_scanner = self.mounting.T_base_scanner
-        segments, owners = self._scene.cut(motion.T_odom_base @ T_base_scanner, spec.range_max_m)
-        origins, turns = _seen_from(motion, stamps, T_base_scanner)
-        own = self._scene.carrier[owners]
-        if own.any():  # last, so that the others keep their rows
-            order = np.argsort(own, kind="stable")
-            segments, owners, own = segments[order], owners[order], own[order]
-        others = len(own) - int(own.sum())
-        exact, hits = cast_rays(segments[:others], low, step, origins, turns)
-        if others < len(own):
-            # The robot's own body moves with the scanner.
-            still = np.zeros_like(origins)
-            body, rows = cast_rays(segments[others:], low, step, still, still[:, 0])
-            hits = np.where(body < exact, others + rows, hits)
-            exact = np.minimum(exact, body)
-        met = hits >= 0
-        self.hit_by = np.where(met, owners[hits] if len(owners) else SCENERY, SCENERY)
-        noise, chance = self._rng.standard_normal(count), self._rng.random(count)
-        ranges = exact + spec.noise_std_m * noise
-        darkness = np.clip(1.0 - self._scene.reflectance[self.hit_by] / _DARK, 0.0, 1.0)
-        lost = spec.dropout_rate + spec.dark_dropout_rate * darkness
-        ranges[(chance < lost) | (exact > spec.range_max_m)] = np.inf
-        ranges[ranges > spec.range_max_m] = np.inf
+        return scan_all([self], motion)[0]
+
+    def _scan(self, motion: RobotMotion, T_odom_scanner: FloatArray, cut: SceneCut) -> LaserScan:
+        """Return the sweep of what the plane of the scan cuts."""
+        spec = self.spec
+        exact, hits = self._met(cut.seen_from(T_odom_scanner), cut.others, motion)
+        # The last entry is that of −1: a ray that meets nothing.
+        self.hit_by = np.append(cut.numbers, SCENERY)[hits]
+        noise, chance = self._rng.standard_normal(len(hits)), self._rng.random(len(hits))
+        lost = chance < self._lost[self.hit_by]
+        lost |= exact > spec.range_max_m
+        noise *= spec.noise_std_m
+        ranges = exact + noise
+        ranges[lost | (ranges > spec.range_max_m)] = np.inf
         ranges[ranges < spec.range_min_m] = -np.inf
         return LaserScan(
-            float(stamps[0]),
-            low,
-            step,
+            motion.stamp_s + float(self._times_s[0]),
+            self._angle_min_rad,
+            self._increment_rad,
             ranges,
             spec.range_min_m,
             spec.range_max_m,
             spec.time_increment_s,
         )
 
+    def _met(self, segments_m: FloatArray, others: int, motion: RobotMotion) -> RayHits:
+        """Return what the rays meet of segments (S, 2, 2); those from ``others`` on are its own."""
+        angles = self._angle_min_rad, self._increment_rad
+        origins, turns = self._seen_from(motion)
+        exact, hits = cast_rays(segments_m[:others], *angles, origins, turns)
+        own = np.round(segments_m[others:], _OWN_DIGITS)
+        if not np.array_equal(own, self._own[0]):
+            # The body moves with the scanner.
+            still = np.zeros_like(origins)
+            self._own = own, cast_rays(own, *angles, still, still[:, 0])
+        body, rows = self._own[1]
+        if len(own) and (rows >= 0).any():
+            hits = np.where(body < exact, others + rows, hits)
+            exact = np.minimum(exact, body)
+        return RayHits(exact, hits)
 
-def _seen_from(
-    motion: RobotMotion, stamps_s: FloatArray, T_base_scanner: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return origin (N, 2) and turn (N,) of every ray in the present frame of the scanner.
+    def _seen_from(self, motion: RobotMotion) -> tuple[FloatArray, FloatArray]:
+        """Return origin (N, 2) and turn (N,) of every ray in the present frame of the scanner.
 
-    The robot turns about its own z axis. A tilted scanner's rays leave its present plane by a
-    second-order amount, which is neglected.
+        The robot turns about its own z axis. A tilted scanner's rays leave its present plane by a
+        second-order amount, which is neglected.
+        """
+        T = self.mounting.T_base_scanner
+        arc = motion.arc(motion.stamp_s + self._times_s - motion.stamp_s)
+        x, y = T[:2, 3].tolist()
+        moved = np.empty((len(self._times_s), 2))
+        moved[:, 0] = arc.cos * x - arc.sin * y - x + arc.x_m
+        moved[:, 1] = arc.sin * x + arc.cos * y - y + arc.y_m
+        return moved @ T[:2, :2], arc.yaw_rad * T[2, 2]
+
+
+def scan_all(scanners: Sequence[SimulatedScanner], motion: RobotMotion) -> list[LaserScan]:
+    """Return the sweep of each scanner of one robot; see :meth:`SimulatedScanner.scan`.
+
+    Scanners of one height and scene share most of the work.
+
+    Args:
+        scanners: they see one scene.
+        motion: pose and velocity of the robot at the present time, its ``stamp_s``.
     """
-    yaw, moved = motion.poses_base(stamps_s)
-    mount, offset = T_base_scanner[:3, :3], T_base_scanner[:3, 3]
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    x, y = offset[:2].tolist()
-    shift = np.column_stack(
-        (cos * x - sin * y - x + moved[:, 0], sin * x + cos * y - y + moved[:, 1])
+    cuts: dict[Plane, SceneCut] = {}
+    scans = []
+    for scanner in scanners:
+        T = motion.T_odom_base @ scanner.mounting.T_base_scanner
+        plane = Plane.through(T[:3, 3], T[:3, 2])
+        if plane not in cuts:
+            cuts[plane] = scanner.scene.cut(plane, T[:3, 3], _reach_m(scanners, scanner))
+        scans.append(scanner._scan(motion, T, cuts[plane]))
+    return scans
+
+
+def _reach_m(scanners: Sequence[SimulatedScanner], at: SimulatedScanner) -> float:
+    """Return the distance from one scanner beyond which no scanner measures anything."""
+    place = at.mounting.T_base_scanner[:3, 3].tolist()
+    return max(
+        each.spec.range_max_m + math.dist(place, each.mounting.T_base_scanner[:3, 3].tolist())
+        for each in scanners
     )
-    turned: FloatArray = yaw * mount[2, 2]
-    return np.asarray(shift @ mount[:2, :2]), turned

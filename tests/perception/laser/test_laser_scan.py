@@ -46,7 +46,7 @@ def scan_of(ranges, **changes) -> LaserScan:
 def test_special_ranges_have_their_meaning(ranges, low, high, measured, free) -> None:
     scan = scan_of(ranges, range_min_m=low, range_max_m=high)
     assert scan.measured.tolist() == [bool(each) for each in measured]
-    assert scan.free_of(scan.measured).tolist() == free
+    assert scan.free_m.tolist() == free
 
 
 def test_a_mounted_scanner_turns_and_lifts_its_points() -> None:

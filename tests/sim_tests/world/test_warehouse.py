@@ -108,5 +108,8 @@ def test_a_missing_simulator_is_named_with_its_extra(monkeypatch: pytest.MonkeyP
     spec = importlib.util.spec_from_file_location("sim_tests.world.bullet_again", bullet.__file__)
     assert spec is not None
     assert spec.loader is not None
-    with pytest.raises(MissingSimulatorError, match=re.escape(install_command("sim"))):
-        spec.loader.exec_module(importlib.util.module_from_spec(spec))
+    again = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(again)
+    for first_use in (again.require_pybullet, lambda: again.pybullet.connect):
+        with pytest.raises(MissingSimulatorError, match=re.escape(install_command("sim"))):
+            first_use()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -12,18 +11,14 @@ import numpy as np
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from .._constraints import NavConstraints
-from .._people import OLDEST_S, Person
-from .._places import position_sigma_m
-from .._predicted import predicted_sigmas_m
-from .._robot import RobotProfile
-from .._speed_basis import SpeedBasis
-from ..limit import STEPS
-from ..reach import SAME_MPS, WALKING_ON_S, covariance_terms
+from ._constraints import NavConstraints
+from ._people import OLDEST_S, Person
+from ._places import position_sigma_m
+from ._predicted import predicted_sigmas_m
+from ._speed_basis import SpeedBasis
+from .reach import SAME_MPS, WALKING_ON_S, Reach, covariance_terms
 
 Value = Any
-#: Parts of a step of time: the step that decides is divided into these.
-PARTS: Final = 16
 # Ages closer than this are equal.
 _SAME_AGE_S: Final = 1e-9
 
@@ -76,105 +71,38 @@ class PersonAhead(NamedTuple):
             variances=(np.where(np.asarray(a1) >= 0.0, a0, 0.0), 0.0, 0.0),
         )
 
+    def reaches(self, count: int) -> tuple[Reach, ...]:
+        """Return the reach at each of the ``count`` times, in plain numbers, without the body.
 
-@dataclass(frozen=True, slots=True)
-class Reaches:
-    """The reach of all people at all times, in tables over parts of a step of time ahead.
-
-    A row is one person at one time. Tables (J, rows) have one column where all rows are equal.
-
-    Attributes:
-        people: in the order of their rows.
-        first: (P,) the first row of each person.
-        follows: (P,) 1 for a person with a row for each of the times, 0 for one row for all.
-        x_m: (rows,) place.
-        y_m: the same.
-        velocity_x_mps: (rows,).
-        velocity_y_mps: (rows,).
-        body_m: (rows,) body radius and uncertainty of the present place.
-        least_mps: (rows,) what a lost person allows at least, or -∞.
-        elapsed_s: (rows,) age of the place.
-        react_s: (rows,) reaction time of the robot and age of the place.
-        ahead_s: (J,) times ahead.
-        drift_s: (J, rows) m of :class:`~nav_adapter.reach.Reach`.
-        reach_m: (J, rows) r and the uncertainty; the body is not in it.
-        around_m: (J, rows) farthest place of the body from the place now, until then.
-        need_mps: (J, rows) a faster robot still moves.
-        braked_m: (J, rows) way that braking has saved.
-    """
-
-    people: tuple[PersonAhead, ...]
-    first: Any
-    follows: Any
-    x_m: FloatArray
-    y_m: FloatArray
-    velocity_x_mps: Any
-    velocity_y_mps: Any
-    body_m: Any
-    least_mps: FloatArray
-    elapsed_s: Any
-    react_s: Any
-    ahead_s: Any
-    drift_s: Any
-    reach_m: Any
-    around_m: Any
-    need_mps: Any
-    braked_m: Any
-
-    @classmethod
-    def of(
-        cls, people: tuple[PersonAhead, ...], times: int, basis: SpeedBasis, robot: RobotProfile
-    ) -> Reaches:
-        """Return the tables of one or more people."""
-        counts, columns = [], []
-        for each in people:
-            least_mps = -np.inf if each.least_mps is None else each.least_mps
-            values = (*each[1:9], *each.variances, each.body_m, least_mps)
-            count = times if any(np.ndim(value) for value in values) else 1
-            counts.append(count)
-            columns.append(np.stack([np.broadcast_to(value, count) for value in values]))
-        x, y, *others, least = np.concatenate(columns, axis=1)
-        # Most rows of a person differ in place alone.
-        different, each_row = np.unique(np.stack(others), axis=1, return_inverse=True)
-        each_row = each_row.reshape(-1)
-        vx, vy, U, tau, delay, elapsed, a0, a1, a2, body = different
-        follows = np.array(counts) > 1
-        first = np.cumsum([0, *counts[:-1]])
-        a, react = robot.max_deceleration_mps2, robot.reaction_time_s + elapsed
-        step_s = robot.max_speed_mps / a / STEPS * 2  # twice that of the limit
-        steps = math.ceil((react.max() + robot.max_speed_mps / a) / step_s + 1e-6)
-        t = (step_s / PARTS) * np.arange(PARTS * steps + 1)[:, None]
-        late = np.maximum(t - react, 0.0)
-        walking = np.hypot(vx, vy)
-        m, r = np.zeros((len(t), 1)), np.zeros((len(t), 1))
-        if basis.policy.reach is not None:
-            m = tau * -np.expm1(-(t + elapsed) / tau)
-            since = t + elapsed + delay
-            r = U * (since + tau * np.expm1(-since / tau))
-            variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
-            r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))
-        around = np.maximum.accumulate(r + (m + 0.5 * step_s) * walking, axis=0)
-        margin = np.maximum(basis.policy.margins.floor_m, body + basis.policy.margins.clearance_m)
-        around = around + margin + elapsed * walking
-        # Single precision: its rounding counts as reach, and that of squares grows with them.
-        largest_m = float(around.max()) + robot.max_speed_mps * float(t[-1, 0])
-        largest_m += 2.0 * robot.circumscribed_radius_m
-        slack = 2e-6 * (2.0 + largest_m) ** 2
-
-        def table(values: FloatArray) -> Any:
-            """Return values (…, rows), or (…, 1) where all rows are equal."""
-            values = values.astype(np.float32)
-            return values[..., :1] if values.shape[-1] == 1 else values[..., each_row]
-
-        if np.ptp(react) == 0.0:
-            react, late = react[:1], late[:, :1]
-        return cls(
-            *(people, first, follows.astype(np.intp), x, y, vx[each_row].astype(np.float32)),
-            *(vy[each_row].astype(np.float32), (body + slack)[each_row].astype(np.float32), least),
-            *(elapsed[each_row].astype(np.float32), table(react), t[:, 0].astype(np.float32)),
-            *(table(m), table(r + slack), table(around + 2.0 * slack), table(a * late)),
-            table(0.5 * a * late * late),
+        There is a single one, larger by the way between, for somebody who differs in place alone.
+        """
+        x, y = listed(self.x_m, count), listed(self.y_m, count)
+        others = self.speed_mps, self.delay_s, self.elapsed_s, *self.variances
+        margins_m = [0.0] * count
+        if not any(map(varies, others)):
+            margins_m = [0.5 * math.hypot(x[-1] - x[0], y[-1] - y[0])]
+            x, y, count = [0.5 * (x[0] + x[-1])], [0.5 * (y[0] + y[-1])], 1
+        return tuple(
+            Reach(
+                *(x_m, y_m, self.velocity_x_mps, self.velocity_y_mps, speed_mps),
+                *(self.time_constant_s, delay_s, elapsed_s, margin_m, (a0, a1, a2)),
+            )
+            for x_m, y_m, margin_m, speed_mps, delay_s, elapsed_s, a0, a1, a2 in zip(
+                x, y, margins_m, *(listed(each, count) for each in others), strict=True
+            )
         )
+
+
+def varies(value: Value) -> bool:
+    """Return whether a value of a :class:`PersonAhead` has one number for each time."""
+    return isinstance(value, np.ndarray) and value.ndim > 0
+
+
+def listed(value: Value, count: int) -> list[float]:
+    """Return a value of a :class:`PersonAhead` at each of the ``count`` times."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return value.tolist()
+    return [float(value)] * count
 
 
 def people_ahead(
