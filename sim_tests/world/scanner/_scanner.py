@@ -141,7 +141,7 @@ class SimulatedScanner:
         self._angle_min_rad: float = low
         self._increment_rad = math.radians(spec.resolution_deg)
         # The times of the rays before the last.
-        self._times_s: FloatArray = spec.time_increment_s * (np.arange(count) - (count - 1.0))
+        self._times_s: FloatArray = np.arange(1.0 - count, 1.0) * spec.time_increment_s
         darkness = np.clip(1.0 - scene.reflectance / _DARK, 0.0, 1.0)
         self._lost: FloatArray = spec.dropout_rate + spec.dark_dropout_rate * darkness
         # What the rays meet of the robot's own body, which is the same sweep after sweep.
