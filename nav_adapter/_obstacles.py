@@ -30,7 +30,7 @@ def obstacles_of(people: Mapping[int, Person], now: float) -> tuple[PersonObstac
     centers.setflags(write=False)
     covariances = _covariances_at(people, now)
     # Huge numbers may have overflowed to infinity: the checking constructor refuses those.
-    all_finite = math.isfinite(float(centers.sum()) + sum(m.radius_m for m in people.values()))
+    all_finite = math.isfinite(sum(sum(m.position_odom_m) + m.radius_m for m in people.values()))
     obstacles = []
     for (track_id, memory), center, covariance in zip(
         people.items(), centers, covariances, strict=True
@@ -60,8 +60,9 @@ def _polygon(radius_m: float, center: FloatArray) -> shapely.Polygon:
 def _covariances_at(people: Mapping[int, Person], now: float) -> FloatArray:
     """Return the covariances (N, 4, 4) of all tracks, predicted to ``now``; read-only."""
     covariances = np.array([m.track.covariance_odom for m in people.values()])
-    dt_s = np.array([max(now - m.track.stamp_s, 0.0) for m in people.values()])[:, None, None]
-    if dt_s.any():
+    ages_s = [max(now - m.track.stamp_s, 0.0) for m in people.values()]
+    if any(ages_s):
+        dt_s = np.array(ages_s)[:, None, None]
         # F P Fᵀ by blocks, F = [[I, dt I], [0, I]].
         covariances[:, :2] += dt_s * covariances[:, 2:]
         covariances[:, :, :2] += dt_s * covariances[:, :, 2:]

@@ -8,8 +8,6 @@ from typing import Final
 from perception.matrices import larger_eigenvalue
 from tracking import PersonTrack
 
-from .reach import covariance_terms
-
 # Standard deviations by which two positions of one person may differ. 4 are exceeded once in
 # 3000 frames, which costs a moment of speed.
 _EXPLAINED_SIGMAS: Final = 4.0
@@ -34,7 +32,9 @@ def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
 
 def velocity_variance_m2ps2(track: PersonTrack) -> float:
     """Return the variance of the velocity along its most uncertain direction."""
-    return covariance_terms(track.covariance_odom.tolist(), 1.0)[2]
+    _, _, (_, _, uu, uv), (_, _, _, vv) = track.covariance_odom.tolist()
+    variance_m2ps2: float = larger_eigenvalue(uu, uv, vv)
+    return variance_m2ps2
 
 
 def has_jumped(old: PersonTrack, track: PersonTrack, walking_mps: float) -> bool:

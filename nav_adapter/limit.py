@@ -304,13 +304,9 @@ def _is_far(person: Reach, course: Course, size_m: float, maximum_mps: float) ->
     """Return whether a person cannot be met before a robot at that speed has stopped."""
     stop_s = course.reaction_s + person.elapsed_s + maximum_mps / course.deceleration_mps2
     stop_s += _step_s(course)
-    way_m = maximum_mps * stop_s
-    drift_s = person.drift_s(stop_s)
-    walked_m = drift_s * math.hypot(person.velocity_x_mps, person.velocity_y_mps)
-    uncertainty_m = max(person.uncertainty_m(drift_s), person.uncertainty_m(0.0))
-    around_m = person.radius_m(stop_s) + walked_m + uncertainty_m + person.margin_m + size_m
+    around_m = person.farthest_m(stop_s) + person.margin_m + size_m
     distance_m = math.hypot(person.x_m - course.x_m, person.y_m - course.y_m)
-    return distance_m > way_m + around_m
+    return distance_m > maximum_mps * stop_s + around_m
 
 
 def _size_m(course: Course) -> float:

@@ -22,6 +22,7 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from ._constraints import NavConstraints
 from ._errors import NavError
+from ._free_ahead import is_free_ahead
 from ._robot import RobotProfile, RobotState
 from .exporters import speed_limit_at
 
@@ -138,12 +139,14 @@ def clip_twists_ahead(
     now = _clipped(constraints, twists, 0.0, math.inf)
     if cycles == 0 or now.size == 0:
         return _clipped(constraints, twists, slack, math.inf)
+    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
+    if now.ndim == 1 and is_free_ahead(constraints, robot_state, now.tolist(), slack, times_s):
+        return _clipped(constraints, now, slack, math.inf)
     speeds = np.zeros((now.size // now.shape[-1] + 1, 3))
     speeds[:-1, 0], speeds[:-1, 2] = now[..., 0].ravel(), now[..., -1].ravel()
     if now.shape[-1] == 3:
         speeds[:-1, 1] = now[..., 1].ravel()
     speeds[-1] = robot_state.speed_mps, robot_state.lateral_mps, robot_state.yaw_rate_radps
-    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
     positions, headings = _driven(robot_state, speeds, times_s)
     every_time = np.broadcast_to(speeds[:, None], (*headings.shape, 3))
     limits = speed_limit_at(

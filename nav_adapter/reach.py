@@ -86,6 +86,13 @@ class Reach(NamedTuple):
         a0, a1, a2 = self.variances
         return math.sqrt(max(a0 + drift_s * (a1 + drift_s * a2), 0.0))
 
+    def farthest_m(self, ahead_s: float) -> float:
+        """Return how far the body's centre line may come from p until ``ahead_s`` from now."""
+        drift_s = self.drift_s(ahead_s)
+        walked_m = drift_s * math.hypot(self.velocity_x_mps, self.velocity_y_mps)
+        uncertainty_m = max(self.uncertainty_m(drift_s), self.uncertainty_m(0.0))
+        return self.radius_m(ahead_s) + walked_m + uncertainty_m
+
 
 def covariance_terms(
     covariance_odom: list[list[float]], sigmas: float

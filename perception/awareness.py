@@ -16,6 +16,8 @@ from .arrays import FloatArray, finite_number, set_fields
 from .errors import PerceptionError
 from .eyes import EyeGaze
 
+_Vector = Sequence[float]
+
 #: Half of θ_FOV = 120°, the horizontal field of view that head orientation alone supports.
 DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)
 
@@ -93,6 +95,23 @@ class AttentionCone:
         inside = ahead & (perpendicular <= radius)
         ratio = np.divide(perpendicular, radius, out=np.ones_like(radius), where=inside)
         return np.asarray(np.where(inside, 1.0 - ratio, 0.0), dtype=np.float64)
+
+    def score_of(self, apex_m: _Vector, gaze: _Vector, target_m: _Vector) -> float:
+        """Return :meth:`scores` of one gaze in plain floats, which take a tenth of the time."""
+        # The sums are in the order of einsum, so that both give the same digits.
+        gx, gy, gz = gaze
+        length = math.sqrt(gx * gx + gz * gz + gy * gy)
+        if not length > 0.0:
+            raise PerceptionError("gaze must have a direction, got a vector of length 0")
+        gx, gy, gz = gx / length, gy / length, gz / length
+        x, y, z = target_m[0] - apex_m[0], target_m[1] - apex_m[1], target_m[2] - apex_m[2]
+        axial = x * gx + z * gz + y * gy
+        if not axial > 0.0:
+            return 0.0
+        x, y, z = x - axial * gx, y - axial * gy, z - axial * gz
+        perpendicular = math.sqrt(x * x + z * z + y * y)
+        radius = axial * math.tan(self.half_angle_rad)
+        return 1.0 - perpendicular / radius if perpendicular <= radius else 0.0
 
 
 def _dot(first: FloatArray, second: FloatArray) -> FloatArray:

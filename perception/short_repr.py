@@ -15,18 +15,19 @@ _TUPLE_CHARACTERS: Final = 300
 _ARRAY_CELLS: Final = 6
 
 
-def short_repr(instance: Any) -> str:
+def short_repr(instance: Any, *figures: str) -> str:
     """Return ``Name(field=value, …)`` of a dataclass, with long values described.
 
     Numbers have six digits. A long collection is its length and the type of its items, e.g.
     ``<273 CrossingFrame>``, and a long array its shape. Assign it in the class body:
     ``__repr__ = short_repr``, under ``@dataclass(repr=False)``.
+
+    Args:
+        instance: of the dataclass.
+        figures: names of properties that are shown after the fields.
     """
-    cells = (
-        f"{field.name}={_short(getattr(instance, field.name))}"
-        for field in fields(instance)
-        if field.repr
-    )
+    names = [*(field.name for field in fields(instance) if field.repr), *figures]
+    cells = (f"{name}={_short(getattr(instance, name))}" for name in names)
     return f"{type(instance).__name__}({', '.join(cells)})"
 
 

@@ -9,7 +9,18 @@ from __future__ import annotations
 from . import options
 from ._app import app, main
 from ._command import Command, CommandGroup, Option, argument, command, group, option
-from ._types import NUMBER, POSITIVE, SHARE, FilePath, FolderPath, Number, OneOf, Seeds, Whole
+from ._types import (
+    NUMBER,
+    POSITIVE,
+    SHARE,
+    FilePath,
+    FolderPath,
+    Number,
+    OneOf,
+    Seeds,
+    Whole,
+    WordAndNumbers,
+)
 
 __all__ = [
     "NUMBER",
@@ -24,6 +35,7 @@ __all__ = [
     "Option",
     "Seeds",
     "Whole",
+    "WordAndNumbers",
     "app",
     "argument",
     "command",

@@ -81,11 +81,11 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Run closed-loop crossings: scenarios, policies, planners, faults.",
         ),
         "watch": _Entry(
-            "sim_tests.study.watch.command:watch",
+            "sim_tests.study.command:watch",
             "Watch a crossing in the browser while it runs.",
         ),
         "replay": _Entry(
-            "sim_tests.study.runs.command:replay",
+            "sim_tests.study.command:replay",
             "Run one episode of a run again, with video, map or page.",
         ),
         "compare": _Entry(

@@ -13,50 +13,27 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from ._command import Decorator, option
-from ._types import POSITIVE, FilePath, FolderPath, Number, OneOf, Whole, WordAndNumbers
+from ._types import POSITIVE, FilePath, FolderPath, Number, OneOf, Whole
 
 __all__ = [
     "COMPLETE_POLICIES",
-    "COMPLETE_SCENARIOS",
-    "COMPLETE_SIMULATED_POLICIES",
-    "PERCEPTIONS",
-    "POPULATIONS",
-    "REFERENCE_PLANNER",
-    "SENSOR_SETS",
     "allow_simulator_networks",
     "as_json",
-    "camera",
-    "faults",
+    "completion_of",
     "networks",
     "out_file",
     "out_folder",
     "overwrite",
-    "perception",
-    "planner",
     "plot_file",
-    "policies",
     "policy",
-    "population",
     "resume",
-    "robot",
     "running",
-    "scenarios",
     "seed",
-    "sensors",
     "workers",
 ]
 
-#: The command line's name of the reference planner.
-REFERENCE_PLANNER: Final = "reference"
-#: The kinds of perception that the robot of a crossing can have.
-PERCEPTIONS: Final = ("truth", "keypoints", "pixels")
-#: The habits that the people of a crossing can have.
-POPULATIONS: Final = ("classic", "recorded")
-#: The sensors that the robot of a crossing can have.
-SENSOR_SETS: Final = ("camera", "camera+scanner", "scanner")
 
-
-def _shipped(
+def completion_of(
     package: str, folder: str, *others: str, sets: Sequence[str] = ()
 ) -> Callable[..., list[CompletionItem]]:
     """Return a completion of the names of a package's YAML files; it does not import the package.
@@ -83,23 +60,8 @@ def _shipped(
     return complete
 
 
-#: Completion of scenarios, for ``shell_complete`` of an option or argument.
-COMPLETE_SCENARIOS: Final = _shipped(
-    "sim_tests",
-    "scenario/shipped",
-    "all",
-    "guidelines",
-    "step_out",
-    sets=["guidelines", "step_out"],
-)
-_COMPLETE_CAMERAS: Final = _shipped("sim_tests", "scenario/shipped/cameras")
-_COMPLETE_ROBOTS: Final = _shipped("sim_tests", "actors/robot/shipped", "nova_carter")
-#: Completion of policies.
-COMPLETE_POLICIES: Final = _shipped("nav_adapter", "policies")
-#: Completion of the policies of crossings, which have today's AMR besides.
-COMPLETE_SIMULATED_POLICIES: Final = _shipped("nav_adapter", "policies", "scanner")
-_COMPLETE_POLICIES_AND_ORACLE: Final = _shipped("nav_adapter", "policies", "scanner", "oracle")
-_COMPLETE_FAULTS: Final = _shipped("sim_tests", "crossing/faults", "none")
+#: Completion of policies, for ``shell_complete`` of an option or argument.
+COMPLETE_POLICIES: Final = completion_of("nav_adapter", "policies")
 
 
 def seed(note: str = "", *, default: int | None = 0) -> Decorator:
@@ -199,159 +161,15 @@ def workers(default: int | None = None) -> Decorator:
     )
 
 
-def perception(
-    kinds: Sequence[str] = PERCEPTIONS, note: str = "", *, default: str = "keypoints"
-) -> Decorator:
-    """Add ``--perception``: the kind of perception that the robot has."""
-    return option(
-        "--perception",
-        type=OneOf(kinds),
-        default=default,
-        help=f"How the robot perceives people.{note}",
-    )
-
-
-def sensors(*, many: bool = False) -> Decorator:
-    """Add ``--sensors``: a set of sensors, or several to compare."""
-    several = " Several sets are compared." if many else ""
-    return option(
-        "--sensors",
-        many=many,
-        type=OneOf(SENSOR_SETS),
-        default=["camera"] if many else "camera",
-        help="Sensors of the robot: its camera, its laser scanners, or both. With scanners, "
-        f"--perception is keypoints or pixels.{several}",
-    )
-
-
-def camera() -> Decorator:
-    """Add ``--camera``: another camera on the robot of a crossing."""
-    return option(
-        "--camera",
-        default="",
-        show_default="each scenario's own",
-        metavar="NAME|FILE",
-        shell_complete=_COMPLETE_CAMERAS,
-        help="Another camera on the robot: 'forward' (120 degrees, as in the shipped scenarios), "
-        "'surround' (360 degrees), or a YAML file.",
-    )
-
-
-def robot() -> Decorator:
-    """Add ``--robot``: another robot, to which the scenarios are fitted."""
-    return option(
-        "--robot",
-        default="",
-        show_default="nova_carter",
-        metavar="NAME|FILE",
-        shell_complete=_COMPLETE_ROBOTS,
-        help="Another robot: 'forklift' (it steers), 'omni' (it moves sideways), 'delivery' "
-        "(small), or a YAML file. Room and time of the scenarios are fitted to it.",
-    )
-
-
-def population() -> Decorator:
-    """Add ``--population``: the habits of the people in a crossing."""
-    return option(
-        "--population",
-        type=WordAndNumbers(POPULATIONS),
-        show_default="each scenario's own",
-        metavar="NAME|KEY=VALUE,...",
-        help="Habits of the people: 'classic', or 'recorded' as fitted to recorded people; and how "
-        "they hear a request for attention: 'answers=0.3', or 'recorded,answers=0.8,startles=0.2'.",
-    )
-
-
-def policy(*, simulated: bool = False) -> Decorator:
-    """Add ``--policy``: one policy; in the simulator it may be today's AMR."""
+def policy() -> Decorator:
+    """Add ``--policy``: one policy."""
     return option(
         "--policy",
         default="balanced",
         metavar="NAME|FILE",
-        shell_complete=COMPLETE_SIMULATED_POLICIES if simulated else COMPLETE_POLICIES,
+        shell_complete=COMPLETE_POLICIES,
         help="Policy: a preset, or a YAML file.",
     )
-
-
-def policies(default: Sequence[str], *, repeated: bool = False) -> Decorator:
-    """Add ``--policy``: one or more policies to compare.
-
-    Args:
-        default: names.
-        repeated: each policy needs the option before it, as beside positional arguments.
-    """
-    return option(
-        "--policy",
-        **_several(repeated),
-        default=list(default),
-        shell_complete=_COMPLETE_POLICIES_AND_ORACLE,
-        help="Policies: presets, 'scanner' (today's AMR), YAML files, or 'oracle' (balanced with "
-        "true awareness)." + _again(repeated),
-    )
-
-
-def scenarios(
-    which: str, *, repeated: bool = False, default: Sequence[str] = ("all",)
-) -> Decorator:
-    """Add ``--scenario``: shipped scenarios and files.
-
-    Args:
-        which: the shipped ones that the name of a set stands for.
-        repeated: each scenario needs the option before it, as beside positional arguments.
-        default: names.
-    """
-    return option(
-        "--scenario",
-        **_several(repeated),
-        default=list(default),
-        shell_complete=COMPLETE_SCENARIOS,
-        help=f"Scenarios: shipped ones, YAML files, or a set of shipped ones {which}: 'all', "
-        f"'guidelines' or 'step_out'.{_again(repeated)}",
-    )
-
-
-def _several(repeated: bool) -> dict[str, Any]:
-    """Return the settings of an option of several values, with or without its name before each."""
-    if repeated:
-        return {"multiple": True, "metavar": "NAME|FILE"}
-    return {"many": True, "metavar": "NAME|FILE..."}
-
-
-def _again(repeated: bool) -> str:
-    return " May be given more than once." if repeated else ""
-
-
-def faults() -> Decorator:
-    """Add ``--fault``: faults of camera, scanners, odometry and detections."""
-    return option(
-        "--fault",
-        many=True,
-        default=["none"],
-        metavar="NAME|FILE...",
-        shell_complete=_COMPLETE_FAULTS,
-        help="Faults: shipped ones, YAML files, several joined by '+', or 'none'; every "
-        "combination runs with each. 'scanner_*' stands for all shipped ones that fit.",
-    )
-
-
-def planner(*, many: bool = False) -> Decorator:
-    """Add ``--planner``: a local planner, or several to compare; '' is the reference planner."""
-    return option(
-        "--planner",
-        many=many,
-        metavar="MODULE:CLASS..." if many else "MODULE:CLASS",
-        default=[REFERENCE_PLANNER] if many else REFERENCE_PLANNER,
-        callback=_without_reference,
-        help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
-        "class of yours, which gets the robot's profile, and static_boxes_odom_m if it takes that.",
-    )
-
-
-def _without_reference(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    """Return the value with '' for 'reference', the simulator's name of its own planner."""
-    if isinstance(value, tuple):
-        return tuple("" if each == REFERENCE_PLANNER else each for each in value)
-    return "" if value == REFERENCE_PLANNER else value
 
 
 def as_json(what: str = "the table") -> Decorator:

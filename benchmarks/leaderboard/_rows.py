@@ -13,8 +13,8 @@ from awarenav.errors import not_one_of
 from nav_adapter import AwarenessPolicy
 from perception.documents import read_yaml
 from sim_tests import SimError
+from sim_tests.conditions import Perception
 from sim_tests.crossing import named_policy
-from sim_tests.crossing.eyes import Perception
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.runs import Job, named_templates, plan_jobs, policy_text
 from sim_tests.world.config import SimConfig

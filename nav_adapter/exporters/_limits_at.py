@@ -9,11 +9,11 @@ from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
 from .._errors import NavError
+from .._people_ahead import PersonAhead, people_ahead
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
 from .._speed_basis import SpeedBasis
 from ._courses import Value, chosen_of, courses_of, stands_at
-from ._people_ahead import PersonAhead, Reaches, people_ahead
-from ._reach_field import Field
+from ._reach_field import Field, Reaches
 
 
 def limits_at(

@@ -8,14 +8,17 @@ lower the limit that others set, the nearest first.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from perception.arrays import FloatArray
 
+from .._people_ahead import PersonAhead, listed, varies
 from .._robot import RobotProfile
 from .._speed_basis import SpeedBasis
+from ..limit import STEPS
 from ._courses import (
     NOWHERE_M,
     Courses,
@@ -27,12 +30,125 @@ from ._courses import (
     in_table,
     stopping_mps,
 )
-from ._people_ahead import PARTS, Reaches
 
+# Parts of a step of time: the step that decides is divided into these.
+_PARTS: Final = 16
 # Pairs of pose and person that are computed together: few calls, and numbers that fit the cache.
 _TOGETHER: Final = 65536
 # A limit is lowered by this share of itself, for rounding in single precision.
 _ROUNDING: Final = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Reaches:
+    """The reach of all people at all times, in tables over parts of a step of time ahead.
+
+    A row is one person at one time. Tables (J, rows) have one column where all rows are equal.
+
+    Attributes:
+        people: in the order of their rows.
+        first: (P,) the first row of each person.
+        follows: (P,) 1 for a person with a row for each of the times, 0 for one row for all.
+        x_m: (rows,) place.
+        y_m: the same.
+        velocity_x_mps: (rows,).
+        velocity_y_mps: (rows,).
+        body_m: (rows,) body radius and uncertainty of the present place.
+        least_mps: (rows,) what a lost person allows at least, or -∞.
+        elapsed_s: (rows,) age of the place.
+        react_s: (rows,) reaction time of the robot and age of the place.
+        ahead_s: (J,) times ahead.
+        drift_s: (J, rows) m of :class:`~nav_adapter.reach.Reach`.
+        reach_m: (J, rows) r and the uncertainty; the body is not in it.
+        around_m: (J, rows) farthest place of the body from the place now, until then.
+        need_mps: (J, rows) a faster robot still moves.
+        braked_m: (J, rows) way that braking has saved.
+    """
+
+    people: tuple[PersonAhead, ...]
+    first: Any
+    follows: Any
+    x_m: FloatArray
+    y_m: FloatArray
+    velocity_x_mps: Any
+    velocity_y_mps: Any
+    body_m: Any
+    least_mps: FloatArray
+    elapsed_s: Any
+    react_s: Any
+    ahead_s: Any
+    drift_s: Any
+    reach_m: Any
+    around_m: Any
+    need_mps: Any
+    braked_m: Any
+
+    @classmethod
+    def of(
+        cls, people: tuple[PersonAhead, ...], times: int, basis: SpeedBasis, robot: RobotProfile
+    ) -> Reaches:
+        """Return the tables of one or more people."""
+        places: list[tuple[float, ...]] = []
+        values: list[tuple[float, ...]] = []
+        first, follows, column_of = [], [], []
+        for each in people:
+            # Most people differ in place alone from time to time.
+            place = each.x_m, each.y_m, -np.inf if each.least_mps is None else each.least_mps
+            rest = (*each[3:9], *each.variances, each.body_m)
+            differs = any(map(varies, rest))
+            count = times if differs or any(map(varies, place)) else 1
+            first.append(len(places))
+            follows.append(count > 1)
+            begin = len(values)
+            column_of += range(begin, begin + count) if differs else [begin] * count
+            places += zip(*(listed(value, count) for value in place), strict=True)
+            columns = count if differs else 1
+            values += zip(*(listed(value, columns) for value in rest), strict=True)
+        x, y, least = np.ascontiguousarray(np.array(places).T)
+        vx, vy, U, tau, delay, elapsed, a0, a1, a2, body = np.ascontiguousarray(np.array(values).T)
+        each_row = np.array(column_of)
+        a, react = robot.max_deceleration_mps2, robot.reaction_time_s + elapsed
+        step_s = robot.max_speed_mps / a / STEPS * 2  # twice that of the limit
+        steps = math.ceil((react.max() + robot.max_speed_mps / a) / step_s + 1e-6)
+        t = (step_s / _PARTS) * np.arange(_PARTS * steps + 1)[:, None]
+        late = np.maximum(t - react, 0.0)
+        walking = np.hypot(vx, vy)
+        m, r = np.zeros((len(t), 1)), np.zeros((len(t), 1))
+        if basis.policy.reach is not None:
+            m = tau * -np.expm1(-(t + elapsed) / tau)
+            since = t + elapsed + delay
+            r = U * (since + tau * np.expm1(-since / tau))
+            variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
+            r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))
+        around = np.maximum.accumulate(r + (m + 0.5 * step_s) * walking, axis=0)
+        margin = np.maximum(basis.policy.margins.floor_m, body + basis.policy.margins.clearance_m)
+        around = around + margin + elapsed * walking
+        # Single precision: its rounding counts as reach, and that of squares grows with them.
+        largest_m = float(around.max()) + robot.max_speed_mps * float(t[-1, 0])
+        largest_m += 2.0 * robot.circumscribed_radius_m
+        slack = 2e-6 * (2.0 + largest_m) ** 2
+
+        def table(values: FloatArray) -> Any:
+            """Return values (…, rows), or (…, 1) where all rows are equal."""
+            values = values.astype(np.float32)
+            return values[..., :1] if values.shape[-1] == 1 else values[..., each_row]
+
+        if np.ptp(react) == 0.0:
+            react, late = react[:1], late[:, :1]
+        return cls(
+            *(
+                people,
+                np.array(first),
+                np.array(follows, dtype=np.intp),
+                x,
+                y,
+                vx[each_row].astype(np.float32),
+            ),
+            *(vy[each_row].astype(np.float32), (body + slack)[each_row].astype(np.float32), least),
+            *(elapsed[each_row].astype(np.float32), table(react), t[:, 0].astype(np.float32)),
+            *(table(m), table(r + slack), table(around + 2.0 * slack), table(a * late)),
+            table(0.5 * a * late * late),
+        )
 
 
 class Field:
@@ -79,7 +195,7 @@ class Field:
         sizes = np.hypot(np.maximum(courses.front_m, -courses.rear_m), courses.half_m) + clearance
         size = max(float(np.max(sizes)), corner + reach_m)
         self._size_m = np.float32(size + float(np.max(courses.driven_m)))
-        self._step_s = float(reaches.ahead_s[PARTS])
+        self._step_s = float(reaches.ahead_s[_PARTS])
 
     def lower(self, limits: FloatArray) -> Any:
         """Lower limits (N,) in place to those that people set, and return by whom.
@@ -119,7 +235,7 @@ class Field:
     def _around_m(self, row: Any, until_s: Any) -> Any:
         """Return how far people (n,) come from their place until some times."""
         around = self._reaches.around_m
-        part = (until_s * (1.0 / self._step_s) + 1.0).astype(np.intp) * PARTS
+        part = (until_s * (1.0 / self._step_s) + 1.0).astype(np.intp) * _PARTS
         np.minimum(part, len(around) - 1, out=part)
         return in_table(around, part, row)
 
@@ -198,11 +314,11 @@ class Field:
         """Return the number (n,) of the first step in which robot and person may meet."""
         free = np.sqrt(pairs.x_m * pairs.x_m + pairs.y_m * pairs.y_m) - self._size_m
         around = self._reaches.around_m
-        steps = (len(around) - 1) // PARTS
+        steps = (len(around) - 1) // _PARTS
         low, high = np.zeros(len(free), dtype=np.int16), np.full(len(free), steps, dtype=np.int16)
         for _ in range(steps.bit_length()):
             middle = (low + high) >> 1
-            part = np.minimum(middle + 1, steps).astype(np.intp) * PARTS
+            part = np.minimum(middle + 1, steps).astype(np.intp) * _PARTS
             way = self._reaches.ahead_s[part] * before
             apart = free > in_table(around, part, pairs.row) + way
             low, high = np.where(apart, middle + 1, low), np.where(apart, high, middle)
@@ -243,16 +359,16 @@ class Field:
             first = self._first_step(pairs, before)
         limits, lowest = np.full(len(before), NOWHERE_M), before.copy()
         order = np.argsort(first, kind="stable")
-        begins = np.searchsorted(first[order], np.arange(len(self._reaches.ahead_s) // PARTS + 1))
+        begins = np.searchsorted(first[order], np.arange(len(self._reaches.ahead_s) // _PARTS + 1))
         left = order[:0]
         stopping: list[tuple[Any, Any, Any]] = []
         for step in range(len(begins) - 1):
             left = np.concatenate((left, order[begins[step] : begins[step + 1]]))
             if not len(left):
                 continue
-            later = (step + 1) * PARTS
+            later = (step + 1) * _PARTS
             now = pairs.at(left)
-            own = self._lowest_mps(now, step * PARTS, later)
+            own = self._lowest_mps(now, step * _PARTS, later)
             need = in_table(self._reaches.need_mps, later, now.row)
             lower = np.flatnonzero(own < lowest[left])
             lowest[left[lower]] = own[lower]
@@ -264,7 +380,7 @@ class Field:
         if not stopping:
             return limits
         chosen, own, steps = (np.concatenate(each) for each in zip(*stopping, strict=True))
-        halved, is_met = self._halved_mps(pairs.at(chosen), steps * PARTS, own)
+        halved, is_met = self._halved_mps(pairs.at(chosen), steps * _PARTS, own)
         limits[chosen] = np.minimum(limits[chosen], halved)
         free = np.flatnonzero(~is_met)
         if len(free) and again:
@@ -282,9 +398,9 @@ class Field:
         The second array tells where one of them lets the robot stop in it, so later ones are of no
         matter.
         """
-        last = ends = first + PARTS
+        last = ends = first + _PARTS
         others = np.full(len(limits), NOWHERE_M)
-        for _ in range(PARTS.bit_length() - 1):
+        for _ in range(_PARTS.bit_length() - 1):
             middle = (first + last) // 2
             need = in_table(self._reaches.need_mps, middle, pairs.row)
             own = self._lowest_mps(pairs, first, middle)

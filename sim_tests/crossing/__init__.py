@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from ._crossing import (
-    Crossing,
-    Observer,
-    Situation,
-    run_crossing,
-)
-from ._drawing import TopView, draw_camera_view
-from ._policies import named_policy
-from ._requests import RequestMemory
+from ._assembly import Setup, axis_names, changed, named_fault, named_policy
+from ._crossing import Crossing, Observer, Situation, drive, run_crossing
+from ._drawing import RequestMemory, TopView, draw_camera_view
 from ._result import CrossingFrame, CrossingResult
 from ._separations import (
     STANDING_SPEED_MPS,
@@ -30,13 +24,18 @@ __all__ = [
     "Observer",
     "RequestMemory",
     "SafetyFigures",
+    "Setup",
     "Situation",
     "Stage",
     "StraightOn",
     "TopView",
     "TrueView",
+    "axis_names",
+    "changed",
     "contact_by",
     "draw_camera_view",
+    "drive",
+    "named_fault",
     "named_policy",
     "run_crossing",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -11,23 +12,23 @@ from typing import Final
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
+from nav_adapter import AwarenessPolicy, NavConstraints, RobotProfile, RobotState
 from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
 
 from ..actors.behaviour import RequestMeans
 from ..actors.robot import RobotModel
-from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
+from ..scenario import Scenario, ScenarioTemplate
 from ..world.render import RendererName
-from ._command import check_planner, checked_command
-from ._policies import named_policy
+from ._assembly import Setup
+from ._command import checked_command
 from ._result import CrossingFrame, CrossingResult
-from ._sensing import STREAMS, Sensed, Sensing
+from ._sensing import Sensed
 from ._separations import Separations
 from ._stage import Stage, TrueView
-from .eyes import KeypointNoise, Perception
+from .eyes import KeypointNoise
 from .faults import Fault
-from .planner import LocalPlanner, SamplingPlanner, StraightOn
+from .planner import LocalPlanner, import_planner, seeded_generators
 
 Observer = Callable[[CrossingFrame, Stage], None]
 
@@ -93,62 +94,25 @@ class Crossing(AbstractContextManager["Crossing"]):
     :func:`run_crossing` lets a planner give the commands.
 
     Args:
-        scenario: the scenario; its ``robot_model`` drives.
-        policy: the policy of the adapter.
-        perception: one of :func:`run_crossing`'s.
-        seed: the same seed and commands give the same cycles, bit for bit.
-        noise: noise of the keypoint camera; None for the default.
-        pipeline: pipeline for ``"pixels"``; None for the shipped networks.
-        fault: a fault of sensors, detections or odometry.
-        renderer: renderer of the images.
+        setup: the episode. The same setup and commands give the same cycles, bit for bit.
 
     Attributes:
-        scenario: as given.
+        scenario: that of the episode.
         robot: profile of the robot.
         stage: hall, robot and people.
         goal_odom_m: (2,) goal.
         dt_s: length of a control cycle.
 
     Raises:
-        SimError: unknown perception.
+        SimError: a perception with scanners and a scenario without any.
         PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        policy: AwarenessPolicy,
-        perception: str = "truth",
-        seed: int = 0,
-        *,
-        noise: KeypointNoise | None = None,
-        pipeline: AwarenessPipeline | None = None,
-        fault: Fault | None = None,
-        renderer: RendererName = "auto",
-    ) -> None:
-        self.scenario = scenario
-        senses = Perception.named(perception)
-        jitter_rng, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
-        jitter = scenario.start_jitter_s
-        offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
-        self._cone = AttentionCone()
+    def __init__(self, setup: Setup) -> None:
+        self.scenario = scenario = setup.scenario
         self.robot = scenario.robot_profile
-        self.stage = Stage(scenario, offsets, people_rng, renderer=renderer)
-        try:
-            self._sensing = Sensing(
-                self.stage,
-                senses,
-                policy,
-                seed,
-                cone=self._cone,
-                noise=noise,
-                pipeline=pipeline,
-                fault=fault,
-            )
-        except BaseException:
-            self.stage.close()
-            raise
-        self._adapter = NavAdapter(policy, self.robot)
+        self._cone = AttentionCone()
+        self.stage, self._sensing, self._adapter = setup.assembled()
         self.goal_odom_m = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         self.dt_s = 1.0 / scenario.control_hz
         self._ticks_per_observation = max(round(scenario.control_hz / _OBSERVED_HZ), 1)
@@ -226,27 +190,29 @@ class Crossing(AbstractContextManager["Crossing"]):
 
 
 def run_crossing(
-    scenario: Scenario | str,
+    scenario: Scenario | ScenarioTemplate | str,
     *,
     policy: AwarenessPolicy | str | Path,
-    planner: LocalPlanner | None = None,
+    planner: LocalPlanner | str | None = None,
     perception: str = "truth",
     seed: int = 0,
     robot: RobotModel | RobotProfile | str | Path | None = None,
     noise: KeypointNoise | None = None,
     pipeline: AwarenessPipeline | None = None,
     observer: Observer | None = None,
-    fault: Fault | None = None,
+    fault: Fault | str | None = None,
     renderer: RendererName = "auto",
     population: str | None = None,
+    **axes: str,
 ) -> CrossingResult:
     """Run one crossing in PyBullet and return its log.
 
     Args:
-        scenario: a scenario, or the name of a shipped one, drawn by the seed.
+        scenario: a scenario; or a template, a shipped name or a YAML file, drawn by the seed.
         policy: a policy, the name of a preset, or a YAML file; see :func:`named_policy`.
-        planner: the local planner; None for the reference :class:`SamplingPlanner`, or for
-            :class:`StraightOn` where the scenario drives straight ahead.
+        planner: the local planner, or its name as for :func:`make_planner`; None for the reference
+            :class:`SamplingPlanner`, or for :class:`StraightOn` where the scenario drives straight
+            ahead.
         perception: ``"truth"``; ``"keypoints"``: true keypoints with noise through the pipeline;
             ``"pixels"``: rendered images through the shipped networks, at 10 images a second where
             the scenario gives no rate; or ``"oracle"``: the truth about everybody who is not hidden
@@ -260,11 +226,14 @@ def run_crossing(
             of the images.
         observer: called after every control cycle with the frame and the stage, for example to
             render.
-        fault: a fault of sensors, detections or odometry; frames keep the truth about the robot.
+        fault: a fault of sensors, detections or odometry, or its name; frames keep the truth about
+            the robot.
         renderer: renderer of the images: ``"tiny"``, ``"gl"``, or ``"auto"`` for the fastest
             available. Their pixels are nearly, but not exactly, the same.
         population: habits of the people, such as ``"recorded"``, ``"answers=0.3"``, or both; None
             for the scenario's own. See :meth:`Scenario.with_population`.
+        axes: other fields of :class:`~sim_tests.conditions.Conditions` that change the scenario,
+            such as ``camera="surround"``.
 
     Raises:
         SimError: unknown scenario, robot, population or perception, a planner without ``plan``, or
@@ -272,26 +241,49 @@ def run_crossing(
         NavError: unknown preset or unusable policy file.
         PerceptionError: for ``"pixels"``, when the shipped networks cannot be loaded.
     """
-    if isinstance(scenario, str):
-        scenario = ScenarioTemplate.shipped(scenario).for_seed(seed)
-    if population is not None:
-        scenario = scenario.with_population(population)
-    if robot is not None:
-        scenario = scenario_for_robot(scenario, robot)
-    policy_name, policy = named_policy(policy)
-    driver = check_planner(planner) if planner is not None else _default_planner(scenario)
-    frames: list[CrossingFrame] = []
-    reached_s: float | None = None
-    with Crossing(
+    setup = Setup.of(
         scenario,
-        policy,
-        perception,
-        seed,
+        policy=policy,
+        planner=planner,
+        perception=perception,
+        seed=seed,
+        fault=fault,
         noise=noise,
         pipeline=pipeline,
-        fault=fault,
         renderer=renderer,
-    ) as crossing:
+        robot=robot,
+        population=population,
+        **axes,
+    )
+    return drive(setup, observer)
+
+
+def drive(setup: Setup, observer: Observer | None = None) -> CrossingResult:
+    """Let the planner of an episode drive; return the log.
+
+    A planner that is given by its name is new, and the global random generators of ``random`` and
+    ``numpy`` have the seed of the episode while it drives.
+
+    Args:
+        setup: the episode.
+        observer: as for :func:`run_crossing`.
+
+    Raises:
+        SimError: a planner that cannot be made, or a command that is not finite numbers.
+    """
+    if not isinstance(setup.planner, str):
+        return _driven(setup, observer)
+    if setup.planner:
+        import_planner(setup.planner)  # before seeding: a module may draw where it begins
+    with seeded_generators(setup.conditions.seed):
+        return _driven(setup, observer)
+
+
+def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
+    driver = setup.driver()
+    frames: list[CrossingFrame] = []
+    reached_s: float | None = None
+    with Crossing(setup) as crossing:
         while not crossing.time_is_up:
             now = crossing.sense()
             asked_s = perf_counter()
@@ -310,54 +302,25 @@ def run_crossing(
                 reached_s = now.t_s
                 break
             crossing.advance()
-        return _result(
-            scenario,
-            seed,
-            policy_name,
-            type(driver).__name__,
-            perception,
-            crossing.stage,
-            frames,
-            reached_s,
+        conditions, stage = setup.conditions, crossing.stage
+        return CrossingResult(
+            scenario=conditions.scenario,
+            seed=conditions.seed,
+            policy=conditions.policy,
+            planner=conditions.planner,
+            perception=conditions.perception,
+            contacts=tuple(stage.contacts),
+            time_to_goal_s=reached_s,
+            frames=tuple(frames),
+            people=stage.outcomes,
+            robot=crossing.robot,
+            obstacle_boxes_odom_m=setup.scenario.layout.obstacle_boxes_odom,
         )
-
-
-def _default_planner(scenario: Scenario) -> LocalPlanner:
-    straight = scenario.robot.straight_on_speed_mps
-    if straight is not None:
-        return StraightOn(straight)
-    return SamplingPlanner(scenario.robot_profile, scenario.planner_boxes_odom_m)
 
 
 def _at_goal(scenario: Scenario, state: RobotState, goal: FloatArray) -> bool:
     if scenario.robot.straight_on_speed_mps is not None:
         return False
-    distance = float(np.linalg.norm(goal - state.position_odom_m))
-    tolerance = scenario.robot.goal_tolerance_m
-    return distance <= tolerance and state.travel_mps <= _GOAL_SPEED_MPS
-
-
-def _result(
-    scenario: Scenario,
-    seed: int,
-    policy: str,
-    planner: str,
-    perception: str,
-    stage: Stage,
-    frames: list[CrossingFrame],
-    reached_s: float | None,
-) -> CrossingResult:
-    return CrossingResult(
-        scenario=scenario.name,
-        seed=seed,
-        policy=policy,
-        planner=planner,
-        perception=perception,
-        contacts=tuple(stage.contacts),
-        time_to_goal_s=reached_s,
-        frames=tuple(frames),
-        people=stage.outcomes,
-        scripted=len(scenario.workers),
-        robot=scenario.robot_profile,
-        obstacle_boxes_odom_m=scenario.layout.obstacle_boxes_odom,
-    )
+    if state.travel_mps > _GOAL_SPEED_MPS:
+        return False
+    return math.dist(goal, state.position_odom_m) <= scenario.robot.goal_tolerance_m

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from typing import Any, Final
 
 import cv2
@@ -11,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.drawing import awareness_colour, draw_disc, draw_line
+from nav_adapter import Alert
+from nav_adapter.alerts import Answer
 from perception import AttentionCone, Camera, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 
-from ._requests import RequestMemory, ShownRequest
 from ._result import CrossingFrame
 from ._stage import Stage
 from .eyes import NOBODY
@@ -35,6 +37,8 @@ _WAVES_M: Final = (0.42, 0.62)
 # Points farther than this outside the image are not drawn.
 _FAR_PX: Final = 1.0e4
 _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
+#: Time for which a request or an answer is shown.
+SHOWN_S: Final = 2.0
 
 
 def draw_camera_view(
@@ -113,6 +117,58 @@ def _draw_box(image: ImageRgb, box_xyxy_px: FloatArray, observation: PersonObser
     if alpha is not None and spread is not None:
         text = f"alpha {alpha:.2f} +- {spread:.2f}"
     _write(image, [text], (left + 4, max(top - 4, 18)), _TEXT_SIZE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShownRequest:
+    """A request to a person or its answer, as a drawing shows it.
+
+    Attributes:
+        track_id: the person.
+        text: ``"asks by voice: wins 2.1 s"`` or ``"looked after 0.9 s"``.
+        answered: whether it is an answer.
+        place_odom_m: (2,) place of the person now; None if the robot no longer has one.
+    """
+
+    track_id: int
+    text: str
+    answered: bool
+    place_odom_m: FloatArray | None
+
+
+class RequestMemory:
+    """The requests and answers of the last 2 s, one per person: the latest.
+
+    Each is in one control cycle only, so :meth:`take` must get every cycle, drawn or not. A cycle
+    that it gets again changes nothing.
+    """
+
+    def __init__(self) -> None:
+        self._latest: dict[int, tuple[float, Alert | Answer]] = {}
+
+    def take(self, frame: CrossingFrame) -> None:
+        """Remember the requests and answers of a control cycle."""
+        limit = frame.constraints
+        asked = [each for each in limit.alerts if each.kind == "attention"]
+        events: tuple[Alert | Answer, ...] = (*asked, *limit.answers)
+        for each in events:
+            self._latest[each.track_id] = (frame.t_s, each)
+
+    def shown(self, frame: CrossingFrame) -> tuple[ShownRequest, ...]:
+        """Return what is shown at the time of a control cycle, the oldest first."""
+        places = {each.id: each.position_odom_m for each in frame.tracks}
+        places.update((each.track_id, each.center_odom_m) for each in frame.constraints.obstacles)
+        return tuple(
+            ShownRequest(who, _event_text(event), isinstance(event, Answer), places.get(who))
+            for who, (t_s, event) in sorted(self._latest.items(), key=lambda item: item[1][0])
+            if frame.t_s - t_s <= SHOWN_S
+        )
+
+
+def _event_text(event: Alert | Answer) -> str:
+    if isinstance(event, Answer):
+        return f"looked after {event.after_s:.1f} s"
+    return f"asks by {event.means}: wins {event.wins_s:.1f} s"
 
 
 class TopView:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from ..actors.body import Worker
-from ..actors.robot import Amr, KinematicRobot
-from ..world import sees
+from ..actors.robot import Robot
+from ..world import first_body_before
 
 Point = tuple[float, float]
 
@@ -25,7 +25,7 @@ class RobotSight:
         workers: the people. Their collision bodies are brought up where they may hide it.
     """
 
-    def __init__(self, amr: Amr | KinematicRobot, workers: Sequence[Worker]) -> None:
+    def __init__(self, amr: Robot, workers: Sequence[Worker]) -> None:
         self._amr = amr
         self._workers = workers
         self._through = frozenset({amr.body})
@@ -33,22 +33,23 @@ class RobotSight:
     def seen_by(self, worker: Worker) -> bool:
         """Return whether nothing stands between a person's eyes and the camera."""
         camera = self._amr.T_odom_camera[:3, 3]
-        line = worker.place_odom_m, (float(camera[0]), float(camera[1]))
-        own_left_behind = worker.collision_left_behind
+        camera_x, camera_y = camera[:2].tolist()
+        line = worker.place_odom_m, (camera_x, camera_y)
         for other in self._workers:
-            if not other.collision_left_behind:
+            if other is worker or not other.collision_left_behind:
                 continue
-            if _near_line(other.collision_place_odom_m, *line) or (
-                other is not worker and _near_line(other.place_odom_m, *line)
+            if _near_line(other.collision_place_odom_m, *line) or _near_line(
+                other.place_odom_m, *line
             ):
                 other.place_collision_body()
-        if sees(worker, camera, through=self._through):
+        first = first_body_before(worker, camera)
+        if first == -1 or first in self._through:
             return True
-        if not own_left_behind:
-            return False
-        # A line that meets the person's own body first counts as free.
-        worker.place_collision_body()
-        return sees(worker, camera, through=self._through)
+        if worker.collision_left_behind:
+            # A line that meets the person's own body first counts as free.
+            worker.place_collision_body()
+            first = first_body_before(worker, camera)
+        return first in (-1, worker.body) or first in self._through
 
 
 def near_robot(worker: Worker, place_odom_m: Point, robot_odom_m: Point) -> bool:

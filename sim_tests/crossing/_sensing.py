@@ -13,14 +13,13 @@ from perception.arrays import FloatArray
 from perception.laser import AHEAD_RAD, RobotMotion, SeenDirections
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
+from ..conditions import ORACLE, Perception
 from ..world.camera import CameraTiming
 from ..world.errors import SimError
 from ._stage import Stage, TrueView
 from .eyes import (
-    ORACLE,
     KeypointNoise,
     MapView,
-    Perception,
     ScannerEyes,
     Sighting,
     TimedEyes,
@@ -32,7 +31,7 @@ from .eyes import (
 )
 from .faults import Fault, FaultInjection, FaultyEyes
 
-#: Random streams of an episode: of the people's starts, the camera's noise, its losses and delays,
+#: Random streams of an episode: one that is spare, of the camera's noise, its losses and delays,
 #: and the people.
 STREAMS: Final = 4
 # Age of perception before the first image has arrived: older than any policy accepts.
@@ -182,8 +181,9 @@ class Sensing:
 
     def _perceived_s(self) -> float:
         """Return the time from which camera or scanners know what is ahead, as on a robot."""
-        stamps_s = (self._newest_s.get("camera"), self._seen.stamp_s(0.0, AHEAD_RAD))
-        return max((each for each in stamps_s if each is not None), default=-_NEVER_S)
+        newest_s = self._newest_s.get("camera", -_NEVER_S)
+        seen_s = None if self._scanners is None else self._seen.stamp_s(0.0, AHEAD_RAD)
+        return newest_s if seen_s is None else max(newest_s, seen_s)
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:
         """Return whether the tracker takes a sighting.

@@ -94,22 +94,21 @@ class Separations:
         """Separation margin of each person."""
         if not self.robot_moves:
             return tuple(each - CLEARANCE_M for each in self.separations_m)
+        pairs = zip(self.towards_people, self.people_velocities_odom_mps, strict=True)
+        protective_m = protective_separation_m(
+            [
+                max(float(self.robot_velocity_odom_mps.dot(each)), 0.0)
+                for each in self.towards_people
+            ],
+            [max(float(-velocity.dot(towards)), 0.0) for towards, velocity in pairs],
+            deceleration_mps2=self.robot.max_deceleration_mps2,
+            reaction_time_s=self.robot.reaction_time_s,
+            clearance_m=CLEARANCE_M,
+        )
         return tuple(
-            separation_m
-            - float(
-                protective_separation_m(
-                    max(float(self.robot_velocity_odom_mps @ towards), 0.0),
-                    max(float(-(velocity @ towards)), 0.0),
-                    deceleration_mps2=self.robot.max_deceleration_mps2,
-                    reaction_time_s=self.robot.reaction_time_s,
-                    clearance_m=CLEARANCE_M,
-                )
-            )
-            for separation_m, towards, velocity in zip(
-                self.separations_m,
-                self.towards_people,
-                self.people_velocities_odom_mps,
-                strict=True,
+            separation_m - needed_m
+            for separation_m, needed_m in zip(
+                self.separations_m, protective_m.tolist(), strict=True
             )
         )
 
@@ -157,4 +156,4 @@ class SafetyFigures:
 
 def _length(vector: FloatArray) -> float:
     """Return the length of a vector (2,)."""
-    return math.sqrt(vector @ vector)
+    return math.sqrt(vector.dot(vector))

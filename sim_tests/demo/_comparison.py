@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -14,8 +14,8 @@ from tqdm import tqdm
 from awarenav.files import csv_number, write_csv
 from perception.arrays import ImageRgb
 
+from ..conditions import Perception, changed_scenario
 from ..crossing import CrossingFrame, CrossingResult, run_crossing
-from ..crossing.eyes import Perception
 from ..scenario import Scenario, ScenarioTemplate
 from ..world.errors import SimError
 from ._portraits import PortraitRecorder
@@ -53,8 +53,7 @@ def compare_policies(
     perception: str = "keypoints",
     *,
     filmed: bool = False,
-    robot: str = "",
-    population: str = "",
+    **axes: str,
 ) -> tuple[ComparisonRow, ...]:
     """Run the same crossing without people, as today, blind, and aware with two kinds of worker.
 
@@ -66,13 +65,13 @@ def compare_policies(
         seed: seed of everything random.
         perception: ``"keypoints"`` or ``"pixels"``.
         filmed: whether to take the worker's portraits for the film.
-        robot: a shipped name or a YAML file of the robot; empty for the Nova Carter.
-        population: habits of the worker, as for ``run_crossing``; empty for the scenario's.
+        axes: other conditions that change the crossings, as for ``run_crossing``: ``robot`` and
+            ``population``; empty ones keep the scenario's own.
 
     Raises:
         SimError: an unknown robot or population.
     """
-    attentive, distracted = compared_scenarios(robot, population)
+    attentive, distracted = compared_scenarios(axes)
     both = Perception.of(perception, "camera+scanner").name
     alone = Perception.of(perception, "scanner").name
     runs = (
@@ -96,14 +95,14 @@ def compare_policies(
     return tuple(rows)
 
 
-def compared_scenarios(robot: str, population: str) -> tuple[Scenario, Scenario]:
+def compared_scenarios(axes: Mapping[str, str]) -> tuple[Scenario, Scenario]:
     """Return the crossings with an attentive and with a distracted worker.
 
     Raises:
         SimError: an unknown robot or population.
     """
     attentive, distracted = (
-        ScenarioTemplate.shipped(name).with_population(population).with_robot(robot).median()
+        changed_scenario(ScenarioTemplate.shipped(name), axes).median()
         for name in ("crossing_attentive", "crossing_distracted")
     )
     return attentive, distracted

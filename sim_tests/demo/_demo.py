@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,8 +34,7 @@ def run_demo(
     seed: int,
     video: bool,
     perception: str,
-    robot: str,
-    population: str,
+    axes: Mapping[str, str],
     as_json: bool,
 ) -> None:
     """Run the demonstration and write its files.
@@ -46,15 +45,14 @@ def run_demo(
         seed: seed of everything random.
         video: whether to render the films.
         perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
-        robot: robot of the crossings, as for :func:`compare_policies`.
-        population: likewise.
+        axes: robot and population of the crossings, as for :func:`compare_policies`.
         as_json: print the tables as JSON.
 
     Raises:
         SimError: an unknown robot or population; nothing is written then.
     """
     require_pybullet()
-    compared_scenarios(robot, population)  # refuses unknown names before anything runs
+    compared_scenarios(axes)  # refuses unknown names before anything runs
     if perception == "pixels":
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing
     # With JSON on standard output, text goes to standard error.
@@ -64,7 +62,7 @@ def run_demo(
     encounter = run_encounter(out, seed=seed, video=video, perception=perception)
     print(encounter_table(encounter), file=text_stream)
     print("\nThe same crossing, with and without awareness", file=text_stream)
-    rows = compare_policies(seed, perception, filmed=video, robot=robot, population=population)
+    rows = compare_policies(seed, perception, filmed=video, **axes)
     write_episodes(out / "episodes.csv", [row.result for row in rows])
     plot_comparison(out / "crossings.png", rows)
     print(comparison_table(rows), file=text_stream)

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from awarenav.cli import command, option, options
+from awarenav.cli import OneOf, command, option, options
+
+from ..conditions import Experiment, conditions_options
 
 
 @command(
@@ -17,21 +20,18 @@ from awarenav.cli import command, option, options
     epilog="Needs the extra 'sim'. The encounter keeps the paper's robot and its scripted worker.",
 )
 @options.out_folder("demo")
-@options.seed()
 @option("--no-video", is_flag=True, help="Write no films (faster).")
-@options.perception(["keypoints", "pixels"], note=" 'pixels' takes many minutes.")
-@options.robot()
-@options.population()
+@conditions_options(
+    without=("scenario", "policy", "planner", "sensors", "camera", "fault"),
+    perception={"type": OneOf(["keypoints", "pixels"]), "note": " 'pixels' takes many minutes."},
+)
 @options.as_json("the tables")
 def demo(
     out: Path,
-    seed: int,
     *,
     no_video: bool,
-    perception: str,
-    robot: str,
-    population: str | None,
     as_json: bool,
+    **values: Any,
 ) -> int:
     """Run the paper's 25 s encounter, and one crossing with and without awareness.
 
@@ -40,13 +40,13 @@ def demo(
     """
     from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
 
+    experiment = Experiment.taken_from(values)
     run_demo(
         out,
-        seed=seed,
+        seed=experiment["seed"],
         video=not no_video,
-        perception=perception,
-        robot=robot,
-        population=population or "",
+        perception=experiment["perception"],
+        axes=experiment.changes,
         as_json=as_json,
     )
     return 0

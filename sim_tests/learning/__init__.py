@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._actions import command_of
-    from ._environment import CrossingEnv
+    from ._environment import CrossingEnv, RewardWeights
     from ._observations import ObservationEncoder
-    from ._policy_planner import PolicyPlanner
-    from ._reward import RewardWeights
+    from ._policy_planner import PolicyPlanner, command_of
 
 __all__ = [
     "CrossingEnv",

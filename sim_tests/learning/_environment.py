@@ -2,41 +2,48 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from typing import Any, Final, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from awarenav.errors import MissingExtraError, not_one_of
-from nav_adapter import AwarenessPolicy, RobotProfile
+from nav_adapter import AwarenessPolicy, NavConstraints, RobotProfile
 from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.installation import install_command
 from tracking.config import complaints
 
-from ..actors.behaviour import population_of
 from ..actors.robot import NOVA_CARTER, RobotModel
+from ..conditions import Perception
 from ..crossing import (
     STANDING_SPEED_MPS,
     Crossing,
     CrossingFrame,
     SafetyFigures,
+    Setup,
     Situation,
     TopView,
+    axis_names,
+    changed,
     contact_by,
     draw_camera_view,
+    named_fault,
     named_policy,
 )
-from ..crossing.eyes import Perception
-from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
+from ..crossing.faults import Fault
+from ..scenario import Scenario, ScenarioTemplate
 from ..world.camera import CameraRenderer
+from ..world.config import SimConfig
 from ..world.errors import SimError
-from ._actions import action_limits, command_of
 from ._observations import Observation, ObservationEncoder
-from ._reward import RewardWeights, over_limit_mps
+from ._policy_planner import action_limits, command_of
 
 try:
     import gymnasium
@@ -54,6 +61,27 @@ _NO_EPISODE: Final = "the environment has no episode: call reset first"
 # The plan shows the robot's way with this margin.
 _PLAN_MARGIN_M: Final = 4.0
 _PICTURE_PX: Final = (640, 480)
+
+
+class RewardWeights(SimConfig):
+    """The weights of the reward; the reward of a step is the sum of its parts.
+
+    Attributes:
+        progress_per_m: for each metre that the goal came closer.
+        goal: once, at the goal.
+        time_per_s: for each second.
+        over_limit_per_m: for each metre that the commanded speed exceeds the limit, summed over
+            time. The speed is that of the robot's fastest point, |v| + |ω| R.
+        negative_margin_per_s: for each second with a negative separation margin of a moving robot.
+        contact: once for each contact that the robot caused.
+    """
+
+    progress_per_m: float = 1.0
+    goal: float = Field(default=5.0)
+    time_per_s: float = -0.2
+    over_limit_per_m: float = -2.0
+    negative_margin_per_s: float = -2.0
+    contact: float = -20.0
 
 
 class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
@@ -82,6 +110,9 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         robot: another robot, to which every scenario is fitted: a model, a shipped name, a YAML
             file or a profile. A holonomic one is driven by speed and yaw rate too.
         population: habits of the people, as for ``run_crossing``; None for each scenario's own.
+        fault: a fault of sensors, detections or odometry, or its name; None for none.
+        axes: other conditions of ``run_crossing`` that change the scenario, such as
+            ``camera="surround"``.
 
     Raises:
         SimError: for arguments that are not valid.
@@ -109,26 +140,17 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         render_view: View = "top",
         robot: RobotModel | RobotProfile | str | Path | None = None,
         population: str | None = None,
+        fault: Fault | str | None = None,
+        **axes: str,
     ) -> None:
-        EzPickle.__init__(
-            self,
-            scenarios=scenarios,
-            policy=policy,
-            perception=perception,
-            control_hz=control_hz,
-            people_slots=people_slots,
-            scan_rays=scan_rays,
-            normalised_actions=normalised_actions,
-            reward=reward,
-            end_at_contact=end_at_contact,
-            render_mode=render_mode,
-            render_view=render_view,
-            robot=robot,
-            population=population,
-        )
+        given = {name: value for name, value in locals().items() if name in _ARGUMENTS}
+        EzPickle.__init__(self, **given, **axes)
         if isinstance(scenarios, (str, Scenario, ScenarioTemplate)):
             scenarios = (scenarios,)
-        self._scenarios = tuple(map(_template, scenarios))
+        own_robot = None if robot is None else RobotModel.of(robot)
+        # The conditions that change the scenario, which is done once, and not in every episode.
+        self._axes = {"robot": own_robot, "population": population, **axes}
+        self._scenarios = tuple(self._changed(each) for each in scenarios)
         if not self._scenarios:
             raise SimError("scenarios must name at least one scenario, got none")
         if control_hz is not None and not 0.0 < control_hz <= 240.0:
@@ -138,8 +160,11 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if render_view not in _VIEWS:
             raise SimError(not_one_of("render_view", render_view, _VIEWS))
         Perception.named(perception)
-        self._policy = named_policy(policy)[1]
-        self._perception = perception
+        self._given: dict[str, Any] = {
+            "policy": named_policy(policy)[1],
+            "perception": perception,
+            "fault": named_fault(fault),
+        }
         self._control_hz = control_hz
         self._normalised = normalised_actions
         self._weights = _weights(reward)
@@ -158,11 +183,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
-        if population is not None:
-            population_of(population)  # refuses an unknown one now
-        self._population = population
-        self._robot = None if robot is None else RobotModel.of(robot)
-        profile = NOVA_CARTER if self._robot is None else self._robot.profile
+        profile = NOVA_CARTER if own_robot is None else own_robot.profile
         limits = np.array(action_limits(profile))
         self.action_space = (
             spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -172,7 +193,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._crossing: Crossing | None = None
         self._situation: Situation | None = None
         self._safety = SafetyFigures()
-        self._frame: CrossingFrame | None = None
+        self._last: tuple[Situation, tuple[float, float]] | None = None
         self._plan: TopView | None = None
         self._camera: CameraRenderer | None = None
         self._ended = False
@@ -194,7 +215,10 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
     @property
     def frame(self) -> CrossingFrame | None:
         """The control cycle of the last step, as ``run_crossing`` records it; None before it."""
-        return self._frame
+        if self._last is None:
+            return None
+        situation, command = self._last
+        return situation.frame(command)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -212,18 +236,16 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         choice = int(self.np_random.integers(len(self._scenarios)))
         episode_seed = drawn if seed is None else seed
         given = (options or {}).get("scenario")
-        template = self._scenarios[choice] if given is None else _template(given)
+        template = self._scenarios[choice] if given is None else self._changed(given)
         scenario = template if isinstance(template, Scenario) else template.for_seed(episode_seed)
         if self._control_hz is not None:
             scenario = scenario.model_copy(update={"control_hz": self._control_hz})
-        if self._population is not None:
-            scenario = scenario.with_population(self._population)
-        if self._robot is not None:
-            scenario = scenario_for_robot(scenario, self._robot)
         self.close()
-        self._crossing = Crossing(scenario, self._policy, self._perception, episode_seed)
+        setup = Setup.of(scenario, seed=episode_seed, **self._given)
+        conditions = replace(setup.conditions, **axis_names(self._axes))
+        self._crossing = Crossing(replace(setup, conditions=conditions))
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
-        self._frame = None
+        self._last = None
         self._ended = False
         self._safety = SafetyFigures()
         self._sense()
@@ -241,7 +263,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         command = command_of(action, crossing.stage.amr.profile, normalised=self._normalised)
         contacts = _by_robot(crossing)
         crossing.command(*command)
-        self._frame = before.frame(command)
+        self._last = before, command
         crossing.advance()
         now = self._sense()
         hits = _by_robot(crossing) - contacts
@@ -261,7 +283,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             "goal": weights.goal * (reason == "goal"),
             "time": weights.time_per_s * dt_s,
             "over_limit": weights.over_limit_per_m
-            * over_limit_mps(before.constraints, command)
+            * _over_limit_mps(before.constraints, command)
             * dt_s,
             "margin": weights.negative_margin_per_s * _violates(now) * dt_s,
             "contact": weights.contact * hits,
@@ -274,7 +296,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if self.render_mode is None:
             return None
         crossing = self.crossing
-        command = (0.0, 0.0) if self._frame is None else self._frame.command
+        command = (0.0, 0.0) if self._last is None else self._last[1]
         frame, cone = self.situation.frame(command), AttentionCone()
         if self._render_view == "top":
             if self._plan is None:
@@ -299,6 +321,15 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         now = self._situation = self.crossing.sense()
         self._safety = self._safety.after(now.t_s, now.separations)
         return now
+
+    def _changed(self, given: Any) -> Scenario | ScenarioTemplate:
+        """Return a scenario with the robot, the population and the like of the environment."""
+        if not isinstance(given, (str, Scenario, ScenarioTemplate)):
+            raise SimError(
+                "a scenario must be a name, a YAML file, a Scenario or a template, got "
+                f"{given!r:.80}"
+            )
+        return changed(given, self._axes)
 
     def _observation(self) -> Observation:
         now = self.situation
@@ -348,16 +379,6 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         return info
 
 
-def _template(given: Any) -> Scenario | ScenarioTemplate:
-    if isinstance(given, (Scenario, ScenarioTemplate)):
-        return given
-    if not isinstance(given, str):
-        raise SimError(
-            f"a scenario must be a name, a YAML file, a Scenario or a template, got {given!r:.80}"
-        )
-    return ScenarioTemplate.named(given)
-
-
 def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights:
     if isinstance(given, RewardWeights):
         return given
@@ -369,9 +390,21 @@ def _weights(given: RewardWeights | Mapping[str, float] | None) -> RewardWeights
         raise SimError(f"reward: {cause}") from cause
 
 
+def _over_limit_mps(constraints: NavConstraints, command: tuple[float, float]) -> float:
+    """Return by how much a command of speed (m/s) and yaw rate (rad/s) exceeds the limit, ≥ 0."""
+    speed = abs(command[0])
+    over = max(speed - constraints.speed_limit_mps, 0.0)
+    fastest = constraints.fastest_point_limit_mps
+    if constraints.robot is not None and fastest is not None:
+        radius = constraints.robot.circumscribed_radius_m
+        over = max(over, speed + abs(command[1]) * radius - fastest)
+    return over
+
+
 def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
     """Return the true distance of the base origin to the goal."""
-    return float(np.linalg.norm(goal_odom_m - now.state.position_odom_m))
+    off_m = goal_odom_m - now.state.position_odom_m
+    return math.sqrt(off_m.dot(off_m))
 
 
 def _violates(now: Situation) -> bool:
@@ -384,3 +417,7 @@ def _violates(now: Situation) -> bool:
 def _by_robot(crossing: Crossing) -> int:
     """Return how many contacts the robot has caused."""
     return sum(contact.by == "robot" for contact in crossing.stage.contacts)
+
+
+# The arguments of an environment, by which it is copied and pickled.
+_ARGUMENTS: Final = frozenset(signature(CrossingEnv.__init__).parameters) - {"self", "axes"}

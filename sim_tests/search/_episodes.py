@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from tqdm import tqdm
 
 from ..study.measures import EpisodeRecord, nondeterminism_notes
-from ..study.runs import Job, attempt, died, in_parallel
+from ..study.runs import Job, Workers, attempt, died
 from ..world.bullet import require_pybullet
 
 
@@ -25,7 +25,7 @@ class EpisodeRunner:
     """
 
     def __init__(self, workers: int, label: str, total: int | None = None) -> None:
-        self._workers = workers
+        self._workers = Workers(workers)
         self._unrepeatable: set[str] = set()
         self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
 
@@ -34,6 +34,7 @@ class EpisodeRunner:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._workers.__exit__()
         self.bar.close()
 
     def run(self, jobs: Sequence[Job]) -> tuple[EpisodeRecord, ...]:
@@ -42,9 +43,7 @@ class EpisodeRunner:
         A planner that is not deterministic is named once on standard error.
         """
         records: dict[int, EpisodeRecord] = {}
-        for number, outcome in in_parallel(
-            attempt, jobs, workers=self._workers, keep=True, on_death=died
-        ):
+        for number, outcome in self._workers.results(attempt, jobs, on_death=died):
             records[number] = outcome.record
             self.bar.update()
         differing = [each for each in records.values() if each.nondeterministic]

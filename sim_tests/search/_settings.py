@@ -13,14 +13,16 @@ from typing import Any, Final
 from awarenav.files import write_text
 from perception.documents import parse_json, read_json
 
+from ..conditions import REFERENCE_PLANNER, Experiment, Perception, option_words
 from ..crossing import named_policy
-from ..crossing.eyes import Perception
 from ..scenario import ScenarioTemplate
-from ..study.runs import Conditions, named_templates, policy_text
+from ..study.runs import named_templates, policy_text
 from ..world.errors import SimError
 
 # The files of every search, beside its results.
 _FILES: Final = ("study.log", "study.log.lock", "studies/*.log*")
+# Options that the next command has otherwise.
+_OWN_WORDS: Final = ("policy", "seed", "episodes")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,30 +55,25 @@ class SearchSettings:
         return tuple(ScenarioTemplate.from_text(text) for text in self.scenarios)
 
 
-def common_settings(policy: str, conditions: Conditions) -> dict[str, Any]:
-    """Return the settings of a policy and of conditions, but for the generation.
+def common_settings(experiment: Experiment) -> dict[str, Any]:
+    """Return the settings of an experiment, but for the episodes and the generation.
 
     Args:
-        policy: name of a preset, or a YAML file.
-        conditions: of the command, with one planner and one set of sensors.
+        experiment: of the command, with one policy, one planner and one set of sensors.
 
     Raises:
         SimError: an unknown scenario, camera or robot.
         NavError: an unusable policy.
     """
-    name, own_policy = named_policy(policy)
-    (planner,), (sensors,) = conditions.planner, conditions.sensors
-    templates = named_templates(
-        conditions.scenario, conditions.camera, conditions.population or "", conditions.robot
-    )
+    name, own_policy = named_policy(experiment.one("policy"))
+    templates = named_templates(experiment["scenario"], **experiment.changes)
     return {
         "policy_name": name,
         "policy": policy_text(own_policy),
         "scenarios": tuple(each.to_text() for each in templates),
-        "episodes": conditions.episodes,
-        "perception": Perception.of(conditions.perception, sensors).name,
-        "planner": planner,
-        "seed": conditions.seed,
+        "perception": Perception.of(experiment["perception"], experiment.one("sensors")).name,
+        "planner": experiment.one("planner"),
+        "seed": experiment["seed"],
     }
 
 
@@ -151,20 +148,13 @@ def print_results(
     print(f"Verdict: {verdict}\nNext: {next_command}\nWritten to {file.parent}")
 
 
-def episode_words(conditions: Conditions) -> list[str]:
+def episode_words(experiment: Experiment) -> list[str]:
     """Return the words of the command line that repeat scenarios, people, sensors and planner."""
-    (planner,), (sensors,) = conditions.planner, conditions.sensors
-    words = ["--scenario", *conditions.scenario]
-    words += Perception.of(conditions.perception, sensors).options.split()
-    for name, value in (
-        ("--camera", conditions.camera),
-        ("--robot", conditions.robot),
-        ("--population", conditions.population),
-        ("--planner", planner),
-    ):
-        if value:
-            words += [name, value]
-    return words
+    settings = experiment.settings()
+    settings = {name: settings[name] for name in settings if name not in _OWN_WORDS}
+    if settings.get("planner") == [REFERENCE_PLANNER]:
+        del settings["planner"]
+    return option_words(settings)
 
 
 def command_text(*words: object) -> str:

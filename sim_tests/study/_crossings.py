@@ -3,71 +3,69 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from awarenav.errors import counted
 from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
+from ..conditions import Experiment
 from ..world.errors import SimError
 from .measures import nondeterminism_notes, short_text, summarise
-from .runs import Conditions, RunFiles, run_jobs, sample_jobs
+from .runs import RunFiles, about_run, experiment_jobs, run_jobs, sample_jobs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CrossingsOptions:
-    """The options of ``awarenav crossings``."""
-
-    conditions: Conditions
-    policy: tuple[str, ...]
-    sample: int | None
-    workers: int | None
-    scheduler: str | None
-    time_limit: float | None
-    out: Path
-    resume: bool
-    overwrite: bool
-    no_report: bool
-    as_json: bool
-
-
-def crossings_command(options: CrossingsOptions) -> int:
+def crossings_command(
+    experiment: Experiment,
+    *,
+    out: Path,
+    sample: int | None,
+    time_limit: float | None,
+    no_report: bool,
+    as_json: bool,
+    **running: Any,
+) -> int:
     """Run episodes, print a short table, write the report.
 
     All errors are raised before anything runs.
+
+    Args:
+        experiment: the episodes.
+        out: folder of the run.
+        sample: number of episodes to draw; None for all.
+        time_limit: of an episode, seconds; None for no limit.
+        no_report: write no report.
+        as_json: print the table as JSON.
+        running: ``workers``, ``scheduler``, ``resume`` and ``overwrite`` of
+            :func:`~sim_tests.study.runs.run_jobs`.
 
     Raises:
         SimError: an unknown or unusable option.
         NavError: an unknown preset or unusable policy file.
         PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
-    conditions = options.conditions
-    jobs = conditions.jobs(options.policy)
-    if conditions.perception == "pixels" and set(conditions.sensors) != {"scanner"}:
+    jobs = experiment_jobs(experiment)
+    if experiment["perception"] == "pixels" and set(experiment["sensors"]) != {"scanner"}:
         # Refuses missing networks before anything runs.
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
-    if options.sample is not None:
-        jobs = sample_jobs(jobs, options.sample, conditions.seed)
+    if sample is not None:
+        jobs = sample_jobs(jobs, sample, experiment["seed"])
     records = run_jobs(
         jobs,
-        options.out,
-        workers=options.workers,
-        scheduler=options.scheduler,
-        time_limit_s=options.time_limit,
-        resume=options.resume,
-        overwrite=options.overwrite,
+        out,
+        time_limit_s=time_limit,
         progress=True,
-        about=conditions.about(
-            "crossings", options.out, policy=options.policy, sample=options.sample
-        ),
+        about=about_run(experiment, "crossings", out, sample=sample),
+        **running,
     )
     summary = summarise(records)
-    if options.as_json:
+    if as_json:
         print(json_text([asdict(row) for row in summary.policies]), end="")
     else:
         print(short_text(summary))
-        print(f"\nWritten to {options.out}: episodes.csv with {counted(len(records), 'episode')}")
+        print(f"\nWritten to {out}: episodes.csv with {counted(len(records), 'episode')}")
     for note in nondeterminism_notes(records):
         print(note, file=sys.stderr)
     failed = [number for number, record in enumerate(records) if record.error]
@@ -76,11 +74,11 @@ def crossings_command(options: CrossingsOptions) -> int:
         print(
             f"{len(failed)} of {counted(len(records), 'episode')} failed; episode {failed[0]} "
             f"({first.scenario}, seed {first.seed}): {first.error}\n"
-            f"{RunFiles(options.out).errors} has the tracebacks",
+            f"{RunFiles(out).errors} has the tracebacks",
             file=sys.stderr,
         )
-    if not options.no_report:
-        _write_report(options.out, as_json=options.as_json)
+    if not no_report:
+        _write_report(out, as_json=as_json)
     return 1 if failed else 0
 
 

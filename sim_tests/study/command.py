@@ -1,10 +1,23 @@
-"""The commands ``awarenav crossings`` and ``awarenav compare``."""
+"""The commands ``awarenav crossings``, ``replay``, ``watch`` and ``compare``."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from awarenav.cli import NUMBER, POSITIVE, FilePath, argument, command, option, options
+from awarenav.cli import (
+    NUMBER,
+    POSITIVE,
+    FilePath,
+    FolderPath,
+    Number,
+    Whole,
+    argument,
+    command,
+    option,
+    options,
+)
+
+from ..conditions import COMPLETE_SCENARIOS, Experiment, conditions_options
 
 
 @command(
@@ -25,15 +38,11 @@ from awarenav.cli import NUMBER, POSITIVE, FilePath, argument, command, option, 
     epilog="A killed or interrupted run continues with the same command and --resume. `awarenav "
     "replay DIR N` films episode N; `awarenav compare DIR` prints more tables.",
 )
-@options.scenarios("that have a planner")
-@options.policies(["blind", "balanced"])
-@options.planner(many=True)
-@options.perception()
-@options.sensors(many=True)
-@options.camera()
-@options.robot()
-@options.population()
-@options.faults()
+@conditions_options(
+    many=("scenario", "policy", "planner", "sensors", "fault"),
+    policy={"default": ["blind", "balanced"]},
+    seed={"note": " It is that of the first episode; the next ones count up."},
+)
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
 @option(
     "--sample",
@@ -43,7 +52,6 @@ from awarenav.cli import NUMBER, POSITIVE, FilePath, argument, command, option, 
     help="Run only N of all these episodes, drawn at random by --seed: each fault once before any "
     "twice, scenarios and policies equally often.",
 )
-@options.seed(" It is that of the first episode; the next ones count up.")
 @options.workers()
 @option(
     "--scheduler",
@@ -70,13 +78,115 @@ def crossings(**values: Any) -> int:
     Every episode that ends appends a row to episodes.csv. At the end the rows are sorted and the
     report is written. The row of a failed episode has the reason; the other episodes still run.
     """
-    from ._crossings import (  # noqa: PLC0415 - help needs no simulator
-        CrossingsOptions,
-        crossings_command,
-    )
-    from .runs import Conditions  # noqa: PLC0415
+    from ._crossings import crossings_command  # noqa: PLC0415 - help needs no simulator
 
-    return crossings_command(CrossingsOptions(conditions=Conditions.taken_from(values), **values))
+    return crossings_command(Experiment.taken_from(values), **values)
+
+
+@command(
+    "replay",
+    examples=[
+        "awarenav replay run 12",
+        "awarenav replay run blind_corner:3:balanced --no-video",
+        "awarenav replay run 12 --view",
+        "awarenav replay run all --view",
+    ],
+    exit_status={
+        0: "The episode gives the same row as before.",
+        1: "The episode gives another row.",
+        2: "Bad input.",
+    },
+)
+@argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")
+@argument(
+    "episode",
+    help="The number of the episode in episodes.csv, from 0; or SCENARIO:SEED:POLICY, followed by "
+    ":PLANNER and :FAULT if the run has several; or 'all'.",
+)
+@options.out_folder(
+    None, "Folder of the video and the map, or of the page.", show_default="DIR/replays"
+)
+@option("--no-video", is_flag=True, help="Draw only the map (faster).")
+@option(
+    "--view",
+    is_flag=True,
+    excludes="--no-video",
+    help="Write a page for the browser instead of video and map, and open it if there is a "
+    "display. The report links to it.",
+)
+def replay(**values: Any) -> int:
+    """Run one episode of a run again, film it and draw it from above, or write its page.
+
+    Prints whether the episode gives the same row as before.
+    """
+    from .runs import replay_command  # noqa: PLC0415 - help needs no simulator
+
+    return replay_command(**values)
+
+
+@command(
+    "watch",
+    examples=[
+        "awarenav watch crossing_attentive",
+        "awarenav watch blind_corner --seed 3 --policy blind --sensors camera+scanner",
+        "awarenav watch late_glance --population recorded --robot delivery",
+        "awarenav watch late_glance --port 8765 --wait 300 --out late_glance.html",
+    ],
+    exit_status={
+        0: "The crossing has ended, whatever its outcome.",
+        2: "Bad input; nothing was run.",
+        130: "Interrupted.",
+    },
+    epilog="The page is served on this computer alone and makes no request to any other. It keeps "
+    "all states after the end, so the crossing can then be scrubbed.",
+)
+@argument(
+    "scenario",
+    metavar="SCENARIO",
+    shell_complete=COMPLETE_SCENARIOS,
+    help="A shipped scenario, or a YAML file.",
+)
+@conditions_options(without=("scenario",))
+@option(
+    "--speed",
+    type=Number(0.1, 20.0),
+    default=1.0,
+    metavar="X",
+    help="Simulated seconds per second. A computer that is slower than this sets its own pace.",
+)
+@option(
+    "--port",
+    type=Whole(0, 65535),
+    default=0,
+    show_default="any free one",
+    metavar="N",
+    help="Port of the page on 127.0.0.1.",
+)
+@option(
+    "--wait",
+    type=Number(0.0, 3600.0),
+    default=30.0,
+    metavar="S",
+    help="Longest time to wait for somebody to open the page before the crossing starts.",
+)
+@option(
+    "--out",
+    type=FilePath(),
+    show_default="none",
+    metavar="FILE.html",
+    help="Also write the crossing as a page that needs no server.",
+)
+@option("--no-camera", is_flag=True, help="Show no picture of the robot's camera (faster).")
+@option("--no-browser", is_flag=True, help="Open no browser; print the address only.")
+def watch(**values: Any) -> int:
+    """Watch one crossing in the browser while it runs.
+
+    Shows the hall from above and the robot's camera, with attention cones, tracks, scans and radii;
+    and over time each person's α with its bound, the speed limit and what sets it.
+    """
+    from ._watch import watch_command  # noqa: PLC0415 - help needs no simulator
+
+    return watch_command(Experiment.taken_from(values), **values)
 
 
 @command(

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from perception.lazy import lazy_page
-
-if TYPE_CHECKING:
-    from ._live import LivePage
-    from ._page import page_text, show_page, write_page
-    from ._pictures import CameraPictures
-    from ._recorder import CrossingRecorder
-    from ._states import Episode, begin_of, outcome_text, state_of
+from ._live import LivePage
+from ._page import page_text, show_page, write_page
+from ._recorder import CameraPictures, CrossingRecorder, begin_of, outcome_text, state_of
 
 __all__ = [
     "CameraPictures",
     "CrossingRecorder",
-    "Episode",
     "LivePage",
     "begin_of",
     "outcome_text",
@@ -25,5 +17,3 @@ __all__ = [
     "state_of",
     "write_page",
 ]
-
-__getattr__ = lazy_page(__name__, __file__)

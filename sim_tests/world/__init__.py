@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         FACE_KEYPOINTS,
         JOINT_DEPTH_M,
         crosses_boxes,
+        first_body_before,
         keypoints_in_front,
         sees,
     )
@@ -27,6 +28,7 @@ __all__ = [
     "ROBOT_GROUP",
     "Warehouse",
     "crosses_boxes",
+    "first_body_before",
     "keypoints_in_front",
     "sees",
 ]

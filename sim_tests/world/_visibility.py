@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -67,16 +68,20 @@ def sees(viewer: Viewer, target_odom_m: FloatArray, through: frozenset[int] = fr
         target_odom_m: (3,).
         through: ids of other bodies that do not block, such as the robot that carries the target.
     """
+    first = first_body_before(viewer, target_odom_m)
+    return first in (-1, viewer.body) or first in through
+
+
+def first_body_before(viewer: Viewer, target_odom_m: FloatArray) -> int:
+    """Return the id of the first body between a person's eyes and a point (3,); −1 for none."""
     eyes = viewer.eyes_odom_m
     ray = target_odom_m - eyes
-    distance = float(np.linalg.norm(ray))
+    distance = math.sqrt(ray.dot(ray))
     if distance <= _HEAD_M:
-        return True
+        return -1
     start = eyes + ray * (_HEAD_M / distance)
-    (hit,) = pybullet.rayTestBatch(
-        [start.tolist()], [target_odom_m.tolist()], physicsClientId=viewer.client
-    )
-    return hit[0] == -1 or hit[0] == viewer.body or hit[0] in through
+    hit = pybullet.rayTest(start.tolist(), target_odom_m.tolist(), physicsClientId=viewer.client)
+    return int(hit[0][0])
 
 
 def keypoints_in_front(

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, crowds, finite, person, robot_at, settled_update
 
-from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotState
+from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from nav_adapter.motion import clip_twists, clip_twists_ahead, twist_envelope
 from perception.arrays import FloatArray
 from tracking import PersonTrack
@@ -94,6 +94,35 @@ def test_looking_ahead_never_makes_a_twist_faster(
         np.cross(few, wanted) if math.hypot(*few[:2]) >= still_mps else np.cross(few, wanted)[2]
     )
     np.testing.assert_allclose(flatter, 0.0, atol=ROUNDING)
+
+
+@settings(max_examples=60)
+@given(
+    tracks=crowds(),
+    state=driving(),
+    twist=TWISTS,
+    away_m=finite(0.0, 4.0),
+    robot=st.sampled_from([TURNS, replace(TURNS, drive="differential")]),
+    slack_mps=finite(0.0, 0.1),
+    policy=st.sampled_from([AwarenessPolicy(), AwarenessPolicy(reach=None)]),
+)
+def test_a_twist_alone_is_slowed_down_exactly_as_in_a_row_of_twists(
+    tracks: tuple[PersonTrack, ...],
+    state: RobotState,
+    twist: tuple[float, ...],
+    away_m: float,
+    robot: RobotProfile,
+    slack_mps: float,
+    policy: AwarenessPolicy,
+) -> None:
+    # The plain numbers that spare a single twist the field are right whenever they spare it.
+    farther = tuple(
+        replace(track, position_odom_m=track.position_odom_m * (1.0 + away_m)) for track in tracks
+    )
+    constraints = settled_update(farther, policy=policy, state=state, robot=robot)
+    alone = clip_twists_ahead(constraints, state, twist, CYCLE_S, slack_mps=slack_mps)
+    row = clip_twists_ahead(constraints, state, [twist], CYCLE_S, slack_mps=slack_mps)
+    assert alone.tolist() == row[0].tolist()
 
 
 def driven(state: RobotState, twist: FloatArray, time_s: float) -> RobotState:

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from perception import AttentionCone
+from perception import AttentionCone, PerceptionError
 
 coordinate = st.floats(-10.0, 10.0, allow_nan=False)
 point = st.tuples(coordinate, coordinate, coordinate).map(np.array)
@@ -28,6 +28,18 @@ def test_score_is_the_papers_equations(apex, gaze, target, angle):
     inside = d > 0 and d_perpendicular <= radius
     expected = 1 - d_perpendicular / radius if inside else 0.0  # eq. (3)
     assert AttentionCone(angle).score(apex, gaze, target) == pytest.approx(expected, abs=1e-9)
+
+
+@given(point, direction, point, half_angle)
+def test_one_gaze_in_plain_floats_has_the_same_score(apex, gaze, target, angle):
+    cone = AttentionCone(angle)
+    in_floats = cone.score_of(apex.tolist(), gaze.tolist(), target.tolist())
+    assert in_floats == pytest.approx(float(cone.scores(apex, gaze, target)), abs=1e-12)
+
+
+def test_one_gaze_in_plain_floats_needs_a_direction():
+    with pytest.raises(PerceptionError, match="length 0"):
+        AttentionCone().score_of((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
 @given(point, direction, point, half_angle, st.floats(0.1, 10.0), st.integers(0, 2**31))

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from ._eyes import NOBODY, Eyes, Sighting, SurroundEyes, TimedEyes, WorkerObservations
 from ._keypoint_camera import KeypointCamera, KeypointNoise
-from ._make_eyes import make_eyes, pixel_pipeline
+from ._make_eyes import make_eyes
 from ._map_view import MapView
 from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
 from ._scanner_eyes import ScanChange, ScannerEyes, known_motion, scanner_sensors
-from ._sensors import ORACLE, Perception, PerceptionKind, SensorSet
 from ._true_eyes import TrueEyes
 
 __all__ = [
     "NOBODY",
-    "ORACLE",
     "PIXEL_RATE_HZ",
     "Eyes",
     "KeypointCamera",
     "KeypointNoise",
     "MapView",
-    "Perception",
-    "PerceptionKind",
     "PixelEyes",
     "ScanChange",
     "ScannerEyes",
-    "SensorSet",
     "Sighting",
     "SurroundEyes",
     "TimedEyes",
@@ -33,7 +28,6 @@ __all__ = [
     "known_motion",
     "make_eyes",
     "match_to_workers",
-    "pixel_pipeline",
     "pixel_timing",
     "scanner_sensors",
 ]

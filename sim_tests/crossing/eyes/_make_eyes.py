@@ -13,7 +13,7 @@ from perception.arrays import FloatArray
 from perception.networks import OnnxSettings
 from perception.surround import FlatView
 
-from ...actors.behaviour import PersonSpec, WorkerScript
+from ...conditions import ORACLE, PerceptionKind
 from ...scenario import CameraSpec, Scenario
 from ...world.camera import CoarseSceneryRenderer
 from ...world.errors import SimError
@@ -24,11 +24,12 @@ from ._keypoint_camera import KeypointNoise
 from ._keypoint_eyes import KeypointEyes
 from ._map_view import MapView
 from ._pixel_eyes import PictureChange, PixelEyes
-from ._sensors import ORACLE, PerceptionKind
 from ._true_eyes import TrueEyes
 
 # Statures of adults: within two and a half standard deviations of the mean.
 _LEAST_ADULT_M: Final = 1.5
+# An episode runs on one core, often beside others, and is the same on every computer.
+_ONE_CORE: Final = OnnxSettings(intra_op_threads=1)
 
 
 def make_eyes(
@@ -80,49 +81,31 @@ def make_eyes(
 
 def unusual_size_probability(scenario: Scenario) -> float:
     """Return what a robot may assume: 0 where all people are adults who stand, else the default."""
-    everybody: list[WorkerScript | PersonSpec] = [*scenario.workers, *scenario.people]
-    if all(each.stature_m >= _LEAST_ADULT_M and not each.stays for each in everybody):
+    if all(each.stature_m >= _LEAST_ADULT_M and not each.stays for each in scenario.people):
         return 0.0
     return UNUSUAL_SIZE_PROBABILITY
 
 
-def pixel_pipeline(
-    scenario: Scenario,
-    *,
-    cone: AttentionCone | None = None,
-    onnx_settings: OnnxSettings | None = None,
-) -> AwarenessPipeline:
-    """Return the pipeline with the shipped networks for the rendered images of a scenario.
-
-    Scenarios with the same camera and the same people share one, because networks load slowly.
+# Scenarios with the same camera and the same people share one, because networks load slowly.
+@lru_cache(maxsize=4)
+def _pipeline(camera: CameraSpec, unusual: float, cone: AttentionCone) -> AwarenessPipeline:
+    """Return the pipeline with the shipped networks for rendered images.
 
     Args:
-        scenario: has the camera, and the people whose sizes the robot may assume.
-        cone: attention cone; None for the default.
-        onnx_settings: how the networks run.
+        camera: that of the scenario.
+        unusual: probability of an unusual size that the robot may assume.
+        cone: attention cone.
 
     Raises:
         PerceptionError: the shipped networks cannot be loaded.
     """
-    return _pipeline(
-        scenario.camera,
-        unusual_size_probability(scenario),
-        AttentionCone() if cone is None else cone,
-        onnx_settings,
-    )
-
-
-@lru_cache(maxsize=4)
-def _pipeline(
-    camera: CameraSpec, unusual: float, cone: AttentionCone, onnx_settings: OnnxSettings | None
-) -> AwarenessPipeline:
     return AwarenessPipeline(
         camera.camera(camera.picture_scale),
         cone=cone,
         # Workers in a crossing turn their heads; their eyes follow.
         eye_in_head_std_rad=0.0,
         unusual_size_probability=unusual,
-        onnx_settings=onnx_settings,
+        onnx_settings=_ONE_CORE,
     )
 
 
@@ -139,7 +122,7 @@ def _pixel_eyes(
     spec, camera = stage.scenario.camera, views[0].camera
     renderer = CoarseSceneryRenderer(stage.warehouse, spec.scenery_divisor)
     if pipeline is None:
-        pipeline = pixel_pipeline(stage.scenario, cone=cone)
+        pipeline = _pipeline(spec, unusual_size_probability(stage.scenario), cone)
     return [
         PixelEyes(
             stage,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from .._stage import TrueView
 from ._eyes import WorkerObservations
 
 # Standard deviations that are reported with the truth: small, but not zero.
-_TRUE_POSITION_STD_M: Final = 0.01
+_TRUE_POSITION_COVARIANCE_M2: Final = 0.01**2 * np.eye(3)
 _TRUE_AWARENESS_STD: Final = 0.02
 _TRUE_RANGE_M: Final = 20.0
 
@@ -39,7 +40,7 @@ class TrueEyes:
                 PersonObservation(
                     stamp_s=stamp_s,
                     position_camera_m=view.position_camera_m,
-                    position_covariance_m2=_TRUE_POSITION_STD_M**2 * np.eye(3),
+                    position_covariance_m2=_TRUE_POSITION_COVARIANCE_M2,
                     gaze_camera=view.gaze_camera,
                     awareness=view.awareness,
                     awareness_std=_TRUE_AWARENESS_STD,
@@ -49,7 +50,7 @@ class TrueEyes:
                 index,
             )
             for index, view in enumerate(truth)
-            if visible[index] and float(np.linalg.norm(view.position_camera_m)) <= _TRUE_RANGE_M
+            if visible[index] and math.hypot(*view.position_camera_m.tolist()) <= _TRUE_RANGE_M
         )
 
     def _visible(self, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]) -> list[bool]:

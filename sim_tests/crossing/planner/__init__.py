@@ -1,16 +1,29 @@
-"""Local planners: the interface, the reference planner, one with a costmap, one straight ahead."""
+"""Local planners: the interface, the reference planner, one with a costmap, and users' own."""
 
 from __future__ import annotations
 
+from ._choice import (
+    KNOWN_PLANNERS,
+    import_planner,
+    make_planner,
+    planner_label,
+    refuse_unusable_planner,
+    seeded_generators,
+)
 from ._config import PlannerConfig
-from ._costmap import CostmapPlanner
-from ._local_planner import LocalPlanner, StraightOn
+from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
 from ._sampling_planner import SamplingPlanner
 
 __all__ = [
+    "KNOWN_PLANNERS",
     "CostmapPlanner",
     "LocalPlanner",
     "PlannerConfig",
     "SamplingPlanner",
     "StraightOn",
+    "import_planner",
+    "make_planner",
+    "planner_label",
+    "refuse_unusable_planner",
+    "seeded_generators",
 ]

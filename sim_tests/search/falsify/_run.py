@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-from ...study.runs import Conditions
+from ...conditions import Experiment
 from .._settings import command_text, common_settings, episode_words, print_results
 from ._plot import draw_falsification
 from ._results import (
@@ -23,8 +22,8 @@ from ._worst_cases import POLICY_FILE, write_worst
 
 def run_falsify(
     *,
-    conditions: Conditions,
-    policy: str,
+    experiment: Experiment,
+    episodes: int,
     against: str,
     people: int,
     worst: int,
@@ -43,7 +42,8 @@ def run_falsify(
         NavError: an unusable policy.
     """
     settings = FalsifySettings(
-        **common_settings(policy, conditions),
+        **common_settings(experiment),
+        episodes=episodes,
         generation=generation,
         people=people,
         unsafe_no_floor=unsafe_no_floor,
@@ -62,31 +62,29 @@ def run_falsify(
     write_summary(found, cases, out / "summary.json", verdict=text, against=others)
     draw_falsification(found, cases, out / "falsify.png")
     rival = against or (other[0] if other else "")
-    following = _next_command(found, conditions, policy, rival, out)
+    following = _next_command(found, experiment, rival, out)
     table = table_lines(found, cases)
     print_results(out / "summary.json", table, text, following, as_json=as_json)
     return 1 if found.contacts else 0
 
 
-def _next_command(
-    found: Falsification, conditions: Conditions, policy: str, other: str, out: Path
-) -> str:
+def _next_command(found: Falsification, experiment: Experiment, other: str, out: Path) -> str:
     """Return the command to run after the search."""
     if found.settings.unsafe_no_floor:
         return command_text(
-            *("falsify", "--policy", policy, *episode_words(conditions)),
-            *("--episodes", conditions.episodes, "--out", f"{out}_with_floor"),
+            *("falsify", "--policy", experiment.one("policy"), *episode_words(experiment)),
+            *("--episodes", found.settings.episodes, "--out", f"{out}_with_floor"),
         )
     own = out / POLICY_FILE
     if found.contacts:
         # The file has the camera, the robot and the population.
         case = (str(out / "worst_001.yaml"),)
-        of_case = replace(conditions, scenario=case, camera="", robot="", population=None)
+        of_case = experiment.replaced(scenario=case, **dict.fromkeys(experiment.changes, ""))
         return command_text(
             *("crossings", *episode_words(of_case), "--policy", own, other),
-            *("--seed", conditions.seed, "--episodes", 1, "--out", out / "worst"),
+            *("--seed", experiment["seed"], "--episodes", 1, "--out", out / "worst"),
         )
     return command_text(
-        *("crossings", *episode_words(conditions), "--policy", other, own, "--episodes", 44),
+        *("crossings", *episode_words(experiment), "--policy", other, own, "--episodes", 44),
         *("--out", out / "crossings"),
     )

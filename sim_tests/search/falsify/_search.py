@@ -20,9 +20,10 @@ import numpy as np
 
 from perception.documents import yaml_text
 
+from ...crossing.planner import refuse_unusable_planner
 from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
-from ...study.runs import Job, policy_of, refuse_unusable_planner
+from ...study.runs import Job, job_of, policy_of
 from ...world.errors import SimError
 from .._episodes import EpisodeRunner
 from .._settings import SearchSettings, write_or_check_settings
@@ -76,12 +77,12 @@ class FalsifySettings(SearchSettings):
 
     def job(self, scenario: Scenario) -> Job:
         """Return the job of a variation."""
-        return Job(
-            scenario=yaml_text(scenario.model_dump(mode="json")),
+        name = self.policy_name + (f" {LABEL}" if self.unsafe_no_floor else "")
+        return job_of(
+            yaml_text(scenario.model_dump(mode="json")),
+            (name, self.policy),
+            self.planner_of_jobs,
             seed=self.seed,
-            policy_name=self.policy_name + (f" {LABEL}" if self.unsafe_no_floor else ""),
-            policy=self.policy,
-            planner=self.planner_of_jobs,
             perception=self.perception,
         )
 
@@ -217,7 +218,7 @@ def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
     margin_m = record.min_margin_m if everybody else record.min_margin_unaware_m
     if margin_m is None:
         return NO_MARGIN_SCORE
-    return min(max(margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE)
+    return float(min(max(margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE))
 
 
 def falsify(

@@ -12,8 +12,8 @@ import numpy as np
 from awarenav.files import write_text
 from perception.documents import yaml_text
 
+from ...conditions import Perception
 from ...crossing import CrossingResult
-from ...crossing.eyes import Perception
 from ...scenario import Scenario, ScenarioTemplate
 from ...study.measures import EpisodeRecord
 from ...study.runs import observed_episode

@@ -6,6 +6,8 @@ from typing import Any
 
 from awarenav.cli import POSITIVE, command, option, options
 
+from ...conditions import COMPLETE_SIMULATED_POLICIES, Experiment, conditions_options
+
 
 @command(
     "falsify",
@@ -23,16 +25,23 @@ from awarenav.cli import POSITIVE, command, option, options
     "with the same result, whatever --workers is. --episodes may be raised then. Needs the extra "
     "'bench'.",
 )
-@options.policy(simulated=True)
+@conditions_options(
+    many=("scenario",),
+    without=("fault",),
+    scenario={
+        "help": "Scenarios: shipped ones, YAML files, or a set of shipped ones that have a planner "
+        "and people: 'all', 'guidelines' or 'step_out'.",
+        "default": ["all", "step_out"],
+    },
+)
 @option(
     "--against",
     default="",
     show_default="balanced; blind for balanced itself",
     metavar="NAME|FILE",
-    shell_complete=options.COMPLETE_SIMULATED_POLICIES,
+    shell_complete=COMPLETE_SIMULATED_POLICIES,
     help="Policy that the worst cases are run with too, for the verdict.",
 )
-@options.scenarios("that have a planner and people", default=("all", "step_out"))
 @option(
     "--episodes",
     type=POSITIVE,
@@ -56,12 +65,6 @@ from awarenav.cli import POSITIVE, command, option, options
     help="Number of people of a scenario that are varied.",
 )
 @option("--worst", type=POSITIVE, default=10, metavar="N", help="Number of cases to write.")
-@options.perception()
-@options.sensors()
-@options.camera()
-@options.robot()
-@options.population()
-@options.planner()
 @option(
     "--unsafe-no-floor",
     is_flag=True,
@@ -69,7 +72,6 @@ from awarenav.cli import POSITIVE, command, option, options
     help="UNSAFE, for the simulation only: the reference planner ignores the adapter's radii and "
     "speed limits. Checks that the search finds the contacts.",
 )
-@options.seed()
 @options.workers(1)
 @options.out_folder("falsify")
 @options.resume()
@@ -86,7 +88,7 @@ def falsify(**values: Any) -> int:
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings
     --scenario` runs them again), episodes.csv, falsify.png, summary.json and the studies.
     """
-    from ...study.runs import Conditions  # noqa: PLC0415 - help needs no simulator
-    from ._run import run_falsify  # noqa: PLC0415
+    from ._run import run_falsify  # noqa: PLC0415 - help needs no simulator
 
-    return run_falsify(conditions=Conditions.taken_from(values), **values)
+    episodes = values.pop("episodes")
+    return run_falsify(experiment=Experiment.taken_from(values), episodes=episodes, **values)

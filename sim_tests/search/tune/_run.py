@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ...conditions import Experiment
 from ...scenario import ScenarioTemplate
-from ...study.runs import Conditions
 from .._settings import command_text, common_settings, episode_words, print_results
 from ._evaluation import BEATS_BASE
 from ._policy_space import read_ranges, shipped_ranges
@@ -17,8 +17,7 @@ from ._tune import TuneSettings, Tuning, held_out_scenarios, tune
 
 def run_tune(
     *,
-    conditions: Conditions,
-    policy: str,
+    experiment: Experiment,
     ranges: Path | None,
     workers: int,
     out: Path,
@@ -35,7 +34,7 @@ def run_tune(
         SimError: an unusable option.
         NavError: an unusable policy.
     """
-    common = common_settings(policy, conditions)
+    common = common_settings(experiment)
     templates = [ScenarioTemplate.from_text(text) for text in common["scenarios"]]
     searched = shipped_ranges() if ranges is None else read_ranges(ranges)
     settings = TuneSettings(
@@ -44,11 +43,16 @@ def run_tune(
         ranges={key: each.model_dump(mode="json") for key, each in searched.items()},
         hold_out_scenarios=held_out_scenarios(templates),
     )
-    given = {"--policy": policy, "--ranges": ranges, "--workers": workers, "--out": out}
+    given = {
+        "--policy": experiment.one("policy"),
+        "--ranges": ranges,
+        "--workers": workers,
+        "--out": out,
+    }
 
     def report(tuning: Tuning) -> None:
         write_tuning(tuning, out)
-        following = _next_command(tuning, conditions, given)
+        following = _next_command(tuning, experiment, given)
         table, verdict = table_lines(tuning), verdict_text(tuning)
         print_results(out / "chosen.json", table, verdict, following, as_json=as_json)
 
@@ -56,17 +60,17 @@ def run_tune(
     return 0
 
 
-def _next_command(tuning: Tuning, conditions: Conditions, given: Mapping[str, Any]) -> str:
+def _next_command(tuning: Tuning, experiment: Experiment, given: Mapping[str, Any]) -> str:
     """Return the next command: falsify the winner, or go on with more seeds or more trials."""
     settings, out = tuning.settings, given["--out"]
     if tuning.winner is not None:
         return command_text(
             *("falsify", "--policy", out / "chosen" / f"{BEATS_BASE}.yaml"),
-            *("--against", given["--policy"], *episode_words(conditions)),
+            *("--against", given["--policy"], *episode_words(experiment)),
             *("--workers", given["--workers"], "--out", out / "falsify"),
         )
     more_seeds = is_undecided(tuning)
-    words = ["tune", "--policy", given["--policy"], *episode_words(conditions)]
+    words = ["tune", "--policy", given["--policy"], *episode_words(experiment)]
     for name, value in (
         ("--ranges", given["--ranges"]),
         ("--risk", settings.risk),

@@ -12,8 +12,8 @@ import filelock
 from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
 
+from ...conditions import Perception
 from ...crossing import named_policy
-from ...crossing.eyes import Perception
 from ...scenario import ScenarioTemplate
 from ...study.frontier import TODAY, sensors_of_today
 from ...study.measures import EpisodeRecord, Interval, read_records, write_records

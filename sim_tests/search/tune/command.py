@@ -6,6 +6,8 @@ from typing import Any
 
 from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, options
 
+from ...conditions import Experiment, conditions_options
+
 
 @command(
     "tune",
@@ -22,8 +24,7 @@ from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, opt
     "with the same result; --trials and --held-out may be raised then. Several processes that run "
     "the command with the same --out share the trials. Needs the extra 'bench'.",
 )
-@options.policy(simulated=True)
-@options.scenarios("that have a planner")
+@conditions_options(many=("scenario",), without=("fault",))
 @option(
     "--ranges",
     type=FilePath(),
@@ -75,13 +76,6 @@ from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, opt
     metavar="N",
     help="Requests for attention that a policy may make per crossing.",
 )
-@options.perception()
-@options.sensors()
-@options.camera()
-@options.robot()
-@options.population()
-@options.planner()
-@options.seed()
 @options.workers(1)
 @options.out_folder("tune")
 @options.resume()
@@ -97,7 +91,7 @@ def tune(**values: Any) -> int:
     scenario, which no trial runs, and the next command. Writes study.log, trials.csv, tuning.png,
     importances.json, chosen.json, and chosen/*.yaml with their results on the held-out seeds.
     """
-    from ...study.runs import Conditions  # noqa: PLC0415 - help needs no simulator
-    from ._run import run_tune  # noqa: PLC0415
+    from ._run import run_tune  # noqa: PLC0415 - help needs no simulator
 
-    return run_tune(conditions=Conditions.taken_from(values), **values)
+    seeds = values.pop("episodes")
+    return run_tune(experiment=Experiment.taken_from(values), episodes=seeds, **values)

@@ -7,7 +7,7 @@ from typing import Final, Literal
 
 from nav_adapter import AwarenessPolicy
 
-from ...crossing.eyes import SensorSet
+from ...conditions import SensorSet
 
 #: The policy of today's AMR, which is one end of the frontier without awareness.
 TODAY: Final = "scanner"

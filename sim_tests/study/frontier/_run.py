@@ -9,23 +9,23 @@ from typing import Any
 from awarenav.errors import counted
 from awarenav.files import json_text, write_text
 
+from ...conditions import Experiment
 from ...world.errors import SimError
 from ..measures import EpisodeRecord
-from ..runs import Conditions, RunFiles, policy_text, read_rows, run_jobs
+from ..runs import RunFiles, about_run, experiment_jobs, policy_text, read_rows, run_jobs
 from ._family import TODAY, family, sensors_of_today
 from ._frontier import frontier_of
-from ._plot import draw_frontier
-from ._text import frontier_text
+from ._show import draw_frontier, frontier_text
 
 
 def frontier_command(
-    folder: Path | None, conditions: Conditions, out: Path, *, as_json: bool, **running: Any
+    folder: Path | None, experiment: Experiment, out: Path, *, as_json: bool, **running: Any
 ) -> int:
     """Run the family unless a folder of episodes is given, and write what it shows.
 
     Args:
         folder: of episodes; None to run the family.
-        conditions: of the episodes to run.
+        experiment: the episodes to run.
         out: folder of the episodes to run.
         as_json: print the frontier as JSON.
         running: ``workers``, ``resume`` and ``overwrite`` of
@@ -36,7 +36,7 @@ def frontier_command(
     """
     failed = 0
     if folder is None:
-        folder, records = out, _run(conditions, out, **running)
+        folder, records = out, _run(experiment, out, **running)
         failed = sum(bool(record.error) for record in records)
     else:
         records = read_rows(folder)
@@ -56,13 +56,13 @@ def frontier_command(
     return 1 if failed else 0
 
 
-def _run(conditions: Conditions, out: Path, **running: Any) -> tuple[EpisodeRecord, ...]:
+def _run(experiment: Experiment, out: Path, **running: Any) -> tuple[EpisodeRecord, ...]:
     """Run the family and today's AMR, and write the policies beside the episodes."""
-    (sensors,) = conditions.sensors
+    sensors = experiment.one("sensors")
     members = [(each.name, each.policy()) for each in family(memory="scanner" in sensors)]
-    jobs = conditions.jobs(members)
-    jobs += conditions.with_sensors(sensors_of_today(sensors)).jobs([TODAY])
-    about = conditions.about("frontier", out)
+    today = experiment.replaced(sensors=sensors_of_today(sensors))
+    jobs = experiment_jobs(experiment, members) + experiment_jobs(today, [TODAY])
+    about = about_run(experiment, "frontier", out)
     records = run_jobs(jobs, out, progress=True, about=about, **running)
     for name, policy in members:
         write_text(out / "policies" / f"{name}.yaml", policy_text(policy), SimError)

@@ -6,6 +6,8 @@ from typing import Any
 
 from awarenav.cli import POSITIVE, FolderPath, argument, command, option, options
 
+from ...conditions import Experiment, conditions_options
+
 
 @command(
     "frontier",
@@ -30,15 +32,13 @@ from awarenav.cli import POSITIVE, FolderPath, argument, command, option, option
     metavar="[DIR]",
     help="Folder of finished episodes, to draw them again; nothing is run.",
 )
-@options.scenarios("that have a planner", repeated=True)
-@options.planner()
-@options.perception()
-@options.sensors()
-@options.camera()
-@options.robot()
-@options.population()
+@conditions_options(
+    many=("scenario",),
+    repeated=True,
+    without=("policy", "fault"),
+    seed={"note": " It is that of the first episode; the next ones count up."},
+)
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
-@options.seed(" It is that of the first episode; the next ones count up.")
 @options.workers()
 @options.out_folder("frontier")
 @options.resume()
@@ -53,7 +53,6 @@ def frontier(**values: Any) -> int:
     They say what awareness wins at equal risk and at equal time, with 95 % intervals. With DIR,
     the folder of such episodes, it runs nothing and draws them again.
     """
-    from ..runs import Conditions  # noqa: PLC0415 - help needs no simulator
-    from ._run import frontier_command  # noqa: PLC0415
+    from ._run import frontier_command  # noqa: PLC0415 - help needs no simulator
 
-    return frontier_command(conditions=Conditions.taken_from(values), **values)
+    return frontier_command(experiment=Experiment.taken_from(values), **values)

@@ -1,21 +1,25 @@
-"""Awareness in an episode: people's attention, the nearest person's class, and α's error."""
+"""Awareness in an episode: people's attention, the nearest person's class, requests for a look."""
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
-from ._record import Awareness, EpisodeRecord
 from ._trace import Trace
 
 if TYPE_CHECKING:
-    from ...crossing import CrossingResult
+    from ...crossing import CrossingFrame, CrossingResult
+
+#: Awareness of the person who came nearest, before the encounter, and the robot's error about it if
+#: there is one; empty if nobody came near.
+Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
 #: Largest distance between a track and its person.
 MATCHED_WITHIN_M: Final = 1.0
@@ -41,8 +45,14 @@ LOOKS_FROM: Final = 0.9
 UNAWARE_UP_TO: Final = 0.25
 #: A person for whom attention mattered for less time is not judged.
 _LEAST_TIME_S: Final = 0.5
-#: Part of the episodes labelled attentive whose people were not measured to be so.
-UNCONFIRMED: Final = "unconfirmed"
+#: A look within this time after a request is an answer.
+ANSWERED_WITHIN_S: Final = 2.5
+#: Somebody who has looked within this time before a request does not answer it.
+LOOKED_BEFORE_S: Final = 0.5
+#: Somebody who is no obstacle after this time was asked needlessly.
+NEEDED_AFTER_S: Final = 1.0
+_LIMITING: Final = re.compile(r"track (-?\d+):")
+_SAME_S: Final = 1e-6
 
 
 def matched_tracks(
@@ -54,6 +64,9 @@ def matched_tracks(
         tracks_odom_m: (T, 2) positions of the tracks.
         people_odom_m: (P, 2) positions of the people.
     """
+    # Takes long to import; processes that only read runs do without.
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
+
     gaps = tracks_odom_m[:, None, :] - people_odom_m[None, :, :]
     distances = np.hypot(gaps[..., 0], gaps[..., 1])
     # The cost of a pair beyond the bound is so high that as many pairs as possible lie within it.
@@ -82,15 +95,6 @@ def track_awareness(result: CrossingResult, trace: Trace) -> tuple[FloatArray, F
                 mean[row, person] = frame.tracks[index].awareness
                 lower[row, person] = frame.tracks[index].awareness_lower
     return mean, lower
-
-
-def awareness_error(true: FloatArray, tracked: FloatArray) -> float | None:
-    """Return the mean |α of the track − true α| over all instants and tracked people.
-
-    None without a track.
-    """
-    known = np.isfinite(tracked)
-    return float(np.abs(tracked - true)[known].mean()) if known.any() else None
 
 
 def nearest_person(separation_m: FloatArray) -> tuple[int, int] | None:
@@ -180,13 +184,83 @@ class MeasuredAttention:
         return float((self.aware_s[judged] / self.could_look_s[judged]).min())
 
 
-def measured_part(record: EpisodeRecord) -> str:
-    """Return the scenario's attention, or :data:`UNCONFIRMED`.
+@dataclass(frozen=True, slots=True)
+class Requests:
+    """The requests for attention of one episode, as docs/simulation.md defines them.
 
-    An episode labelled attentive counts as such only if each of its people was aware for at least
-    80 % of the time.
+    Attributes:
+        requests: their number.
+        answered: those after which the person truly looked.
+        needless: those to somebody who was no obstacle a second later, and had not looked.
+        asked_twice: people who were asked more than once.
+        after_answer: requests to a track that had answered before.
     """
-    share = record.attentive_share
-    if record.attention != "attentive" or record.error:
-        return record.attention
-    return "attentive" if share is not None and share >= ATTENTIVE_FROM else UNCONFIRMED
+
+    requests: int = 0
+    answered: int = 0
+    needless: int = 0
+    asked_twice: int = 0
+    after_answer: int = 0
+
+    @classmethod
+    def of(cls, result: CrossingResult, trace: Trace) -> Requests:
+        """Return the requests of a crossing."""
+        asked: Counter[int] = Counter()
+        had_answered: set[int] = set()
+        requests = answered = needless = after_answer = 0
+        for row, frame in enumerate(result.frames):
+            had_answered |= {answer.track_id for answer in frame.constraints.answers}
+            for alert in frame.constraints.alerts:
+                if alert.kind != "attention":
+                    continue
+                person = _person_of(alert.track_id, frame, trace, row)
+                requests += 1
+                after_answer += alert.track_id in had_answered
+                needless += _was_needless(alert.track_id, person, row, result, trace)
+                if person is not None:
+                    asked[person] += 1
+                    answered += _was_answered(person, row, trace)
+        twice = sum(times > 1 for times in asked.values())
+        return cls(requests, answered, needless, twice, after_answer)
+
+
+def _person_of(track_id: int, frame: CrossingFrame, trace: Trace, row: int) -> int | None:
+    """Return the person nearest to the obstacle of a track, within 1 m; None for nobody."""
+    place = next(
+        (o.center_odom_m for o in frame.constraints.obstacles if o.track_id == track_id), None
+    )
+    if place is None or not trace.people:
+        return None
+    distances_m = np.hypot(*(trace.people_odom_m[row] - place).T)
+    nearest = int(np.argmin(distances_m))
+    return nearest if distances_m[nearest] <= MATCHED_WITHIN_M else None
+
+
+def _was_answered(person: int, row: int, trace: Trace) -> bool:
+    """Return whether a person began to look at the robot within 2.5 s after a request."""
+    since_s = trace.t_s - trace.t_s[row]
+    looks = trace.awareness[:, person] >= AWARE_FROM
+    before = (since_s >= -LOOKED_BEFORE_S - _SAME_S) & (since_s <= 0.0)
+    after = (since_s > 0.0) & (since_s <= ANSWERED_WITHIN_S + _SAME_S)
+    return bool(looks[after].any() and not looks[before].any())
+
+
+def _was_needless(
+    track_id: int, person: int | None, row: int, result: CrossingResult, trace: Trace
+) -> bool:
+    """Return whether somebody no longer set the limit a second later, and had not looked.
+
+    The last instant counts in an episode that ends before. A new track of the same person is still
+    that person. A track without a person cannot look.
+    """
+    after = int(np.searchsorted(trace.t_s, trace.t_s[row] + NEEDED_AFTER_S - _SAME_S))
+    after = min(after, len(trace.t_s) - 1)
+    frame = result.frames[after]
+    if person is not None and (trace.awareness[row + 1 : after + 1, person] >= AWARE_FROM).any():
+        return False
+    limiting = _LIMITING.match(frame.constraints.limited_by)
+    if limiting is None:
+        return True
+    limiting_id = int(limiting[1])
+    same_person = person is not None and person == _person_of(limiting_id, frame, trace, after)
+    return limiting_id != track_id and not same_person

@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
@@ -37,9 +36,11 @@ class Outline:
     """
 
     def __init__(self, footprint_m: FloatArray) -> None:
-        self._corners: FloatArray = footprint_m[
-            ConvexHull(footprint_m).vertices
-        ]  # counter-clockwise
+        # Takes long to import; processes that only read runs do without.
+        from scipy.spatial import ConvexHull  # noqa: PLC0415
+
+        corners = ConvexHull(footprint_m).vertices  # counter-clockwise
+        self._corners: FloatArray = footprint_m[corners]
         edges = np.roll(self._corners, -1, axis=0) - self._corners
         self._lengths = np.hypot(edges[:, 0], edges[:, 1])
         self._along = edges / self._lengths[:, None]

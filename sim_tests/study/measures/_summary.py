@@ -11,20 +11,31 @@ import numpy as np
 
 from perception.short_repr import short_repr
 
-from ._awareness import measured_part
-from ._bootstrap import ratio_intervals
-from ._interval import Interval, proportion_interval
-from ._pairs import (
+from ...conditions import AXES
+from ._awareness import ATTENTIVE_FROM
+from ._metrics import METRICS
+from ._record import EpisodeRecord
+from ._registry import RATIOS
+from ._statistics import (
+    Interval,
     paired,
     paired_difference,
-    paired_ratio,
+    proportion_interval,
+    ratio_intervals,
     violates_more,
 )
-from ._record import METRICS, RATIOS, EpisodeRecord
 
 #: Policy that others are compared with, unless another is named.
 BASELINE: Final = "blind"
+#: Part of the episodes labelled attentive whose people were not measured to be so.
+UNCONFIRMED: Final = "unconfirmed"
 _NO_FAULT: Final = "no fault"
+# The conditions that have no field of their own in a variant.
+_OTHERS: Final = tuple(
+    name
+    for name in AXES
+    if name not in ("scenario", "seed", "policy", "planner", "perception", "fault")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +48,7 @@ class Variant:
         perception: ``"truth"``, ``"keypoints"``, ``"pixels"`` or ``"oracle"``.
         fault: name of the fault, empty for none.
         source: name of the table that its episodes come from, empty with a single table.
+        others: other conditions that are not the scenario's own, such as ``("robot", "omni")``.
     """
 
     policy: str
@@ -44,11 +56,13 @@ class Variant:
     perception: str = ""
     fault: str = ""
     source: str = ""
+    others: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(cls, record: EpisodeRecord, source: str = "") -> Variant:
         """Return the variant of an episode."""
-        return cls(record.policy, record.planner, record.perception, record.fault, source)
+        others = tuple((name, value) for name in _OTHERS if (value := getattr(record, name)))
+        return cls(record.policy, record.planner, record.perception, record.fault, source, others)
 
 
 def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
@@ -62,6 +76,11 @@ def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
             for field in ("planner", "perception", "fault", "source")
             if len({getattr(each, field) for each in same}) > 1
         ]
+        differing += [
+            f"{name} {value}"
+            for name, value in variant.others
+            if any((name, value) not in each.others for each in same)
+        ]
         return ", ".join([variant.policy, *differing])
 
     return {variant: label(variant) for variant in found}
@@ -71,8 +90,9 @@ def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> 
     """Return the variants that a variant is compared with.
 
     The first is the baseline policy with the same planner. Where there are several, the one under
-    the most similar conditions is taken: the same table, then the same fault, then the same
-    perception. The second is the same variant in the first of several tables.
+    the most similar conditions is taken: the same table, then the same camera, robot and the like,
+    then the same fault, then the same perception. The second is the same variant in the first of
+    several tables.
 
     Args:
         variant: the variant to compare.
@@ -90,6 +110,7 @@ def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> 
                 candidates,
                 key=lambda each: (
                     each.source == variant.source,
+                    each.others == variant.others,
                     each.fault == variant.fault,
                     not each.fault,
                     each.perception == variant.perception,
@@ -252,7 +273,7 @@ def summarise_sources(
         for record in records:
             groups.setdefault(Variant.of(record, source), []).append(record)
     for group in groups.values():
-        group.sort(key=_episode_order)
+        group.sort(key=attrgetter("task"))
     ordered = {
         variant: groups[variant]
         for variant in sorted(
@@ -305,8 +326,16 @@ def summarise_sources(
     )
 
 
-def _episode_order(record: EpisodeRecord) -> tuple[str, int, int]:
-    return record.scenario, record.scenario_version, record.seed
+def measured_part(record: EpisodeRecord) -> str:
+    """Return the scenario's attention, or :data:`UNCONFIRMED`.
+
+    An episode labelled attentive counts as such only if each of its people was aware for at least
+    80 % of the time.
+    """
+    attention, share = str(record.attention), record.attentive_share
+    if attention != "attentive" or record.error:
+        return attention
+    return "attentive" if share is not None and share >= ATTENTIVE_FROM else UNCONFIRMED
 
 
 def _parts(groups: _Groups, part_of: _Part) -> list[str]:
@@ -344,7 +373,7 @@ def _summary_row(
         np.hstack([present.astype(np.float64), parts[..., 1]]),
         rng,
         level,
-        strata=[(record.scenario, record.scenario_version) for record in ran],
+        strata=[record.task[:2] for record in ran],
     )
     worst = {}
     for metric, column, applies in zip(METRICS.values(), table.T, present.T, strict=True):
@@ -374,20 +403,20 @@ def _comparison(
     rng: np.random.Generator,
 ) -> Comparison:
     variant, baseline, part = names
+
+    def change(field: str, over: str = "", sign: float = 1.0) -> Interval:
+        return paired_difference(base, group, field, rng, level, over=over, sign=sign)
+
     return Comparison(
         variant=variant,
         baseline=baseline,
         part=part,
         pairs=len(paired(base, group)),
-        won_back=paired_ratio(base, group, "time_lost_s", "time_lost_s", rng, level, sign=-1.0),
-        time_lost_s=paired_difference(base, group, "time_lost_s", rng, level),
-        violation_excess=paired_ratio(
-            base, group, "violation_time_s", "violation_time_s", rng, level
-        ),
-        violation_excess_of_time=paired_ratio(
-            base, group, "violation_time_s", "duration_s", rng, level
-        ),
+        won_back=change("time_lost_s", "time_lost_s", -1.0),
+        time_lost_s=change("time_lost_s"),
+        violation_excess=change("violation_time_s", "violation_time_s"),
+        violation_excess_of_time=change("violation_time_s", "duration_s"),
         violates_more=violates_more(base, group, level),
-        min_separation_m=paired_difference(base, group, "min_separation_m", rng, level),
-        step_out_unaware=paired_difference(base, group, "step_out_unaware", rng, level),
+        min_separation_m=change("min_separation_m"),
+        step_out_unaware=change("step_out_unaware"),
     )

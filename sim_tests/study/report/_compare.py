@@ -18,16 +18,14 @@ from awarenav.errors import AwarenavError
 from awarenav.files import json_text
 from nav_adapter import AwarenessPolicy
 
-from ...crossing.eyes import ORACLE
-from ...crossing.planner import SamplingPlanner
+from ...conditions import ORACLE, REFERENCE_PLANNER
+from ...crossing.planner import KNOWN_PLANNERS, SamplingPlanner
 from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
 from ..measures import BASELINE, EpisodeRecord, table_text
-from ..runs import KNOWN_PLANNERS, Job, plan_jobs, policy_of, run_jobs, template_of
+from ..runs import Job, plan_jobs, policy_of, run_jobs, template_of
 from ._run import WIDE_KEY, Run
 
-#: The command line's name of the reference planner, whose name in jobs is empty.
-REFERENCE: Final = "reference"
 #: Radii of the probe, as a multiple of the policy's.
 RADII_FACTOR: Final = 2.0
 #: The probe of radii runs the first seeds only, at most so many.
@@ -125,7 +123,7 @@ def plan_comparison(
     for name, given in (("seeds", seeds), ("scenarios", scenarios)):
         if not given:
             raise SimError(f"{name} must be at least one, got none")
-    wanted = dict.fromkeys(["", *("" if each == REFERENCE else each for each in planners)])
+    wanted = dict.fromkeys(["", *("" if each == REFERENCE_PLANNER else each for each in planners)])
     conditions |= {
         "planners": list(wanted),
         "perception": perception,
@@ -134,13 +132,13 @@ def plan_comparison(
     main = plan_jobs(
         scenarios, [BASELINE, *(p for p in policies if p != BASELINE)], seeds, **conditions
     )
-    for text in dict.fromkeys(job.scenario for job in main):
+    for text in dict.fromkeys(job.scenario_text for job in main):
         if template_of(text).median().robot.straight_on_speed_mps is not None:
             raise SimError(
                 f"scenario {template_of(text).name!r} drives straight on without a planner, so it "
                 "cannot compare planners"
             )
-    texts = {job.policy_name: job.policy for job in main}
+    texts = {job.policy: job.policy_text for job in main}
     probed = next((name for name in texts if name not in (BASELINE, ORACLE)), BASELINE)
     wide = f"{probed}, radii × {RADII_FACTOR:g}"
     policy = _with_wider_radii(policy_of(texts[probed]))
@@ -217,7 +215,7 @@ def print_comparison(folder: Path, *, as_json: bool) -> None:
 
 def known_planners() -> dict[str, str]:
     """Return the planners that have a name, with the first sentence about each."""
-    makers = {REFERENCE: SamplingPlanner, **KNOWN_PLANNERS}
+    makers = {REFERENCE_PLANNER: SamplingPlanner, **KNOWN_PLANNERS}
     sentences = {
         name: (inspect.getdoc(make) or "").partition("\n")[0].removeprefix("Return ")
         for name, make in makers.items()

@@ -105,8 +105,8 @@ def _radii_table(results: Results, run: Run) -> Table:
     """Return what wider radii change, with everything else the same."""
     from ..runs import policy_of  # noqa: PLC0415 - needs the simulator
 
-    wide = next(job for job in run.jobs if job.policy_name == run.wide_policy)
-    widest_m = policy_of(wide.policy).inflation.radius_m(0.0)
+    wide = next(job for job in run.jobs if job.policy == run.wide_policy)
+    widest_m = policy_of(wide.policy_text).inflation.radius_m(0.0)
     probed = run.wide_policy.partition(",")[0]
     lines: list[Row] = []
     for arm in results.arms:

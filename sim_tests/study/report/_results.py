@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from awarenav.errors import counted
@@ -87,8 +87,7 @@ class Results:
             found = [
                 each
                 for each in own
-                if (each.record.policy, each.record.planner, each.record.perception)
-                == (variant.policy, variant.planner, variant.perception)
+                if replace(Variant.of(each.record), fault=variant.fault) == variant
             ]
             arms.append(
                 Arm(

@@ -106,5 +106,4 @@ class Run:
 
 def _fits(job: Job, record: EpisodeRecord) -> bool:
     """Return whether a row can be that of a job."""
-    asked = job.seed, job.policy_name, job.perception, job.fault_name
-    return asked == (record.seed, record.policy, record.perception, record.fault)
+    return job.conditions == record.conditions

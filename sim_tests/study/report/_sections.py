@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
+
+from tqdm import tqdm
 
 from awarenav.files import json_text
 from perception.documents import parse_yaml
@@ -22,10 +25,12 @@ from ..measures import (
 )
 from ..runs import Job, answering_note
 from ._charts import episode_chart, risk_chart
-from ._page import Cell, Row, Section, Table, interval_cell, number_cell, share_cell
+from ._page import Cell, Row, Section, Still, Table, interval_cell, number_cell, share_cell
 from ._results import Arm, Results, moving_contacts
 from ._run import Episode, Run
 
+#: Most episodes with pictures; of each scenario and arm only the worst.
+MOST_STILLS: Final = 4
 #: Most lines in the list of episodes, which keeps a report below 2 MB.
 MOST_LINES: Final = 3000
 # Awareness classes, and their meaning.
@@ -192,7 +197,7 @@ def _mean(row: SummaryRow | None, name: str, decimals: int) -> Cell:
 def recorded_people(jobs: Iterable[Job]) -> tuple[str, ...]:
     """Return a sentence about each scenario of recorded people: whether they react to the robot."""
     notes: dict[str, str] = {}
-    for text in dict.fromkeys(job.scenario for job in jobs):
+    for text in dict.fromkeys(job.scenario_text for job in jobs):
         try:
             data = parse_yaml(text, "scenario", SimError)
         except SimError:
@@ -277,6 +282,77 @@ def _metrics_table(results: Results, names: Iterable[str]) -> Table:
     return Table(columns, lines)
 
 
+def stills_section(run: Run, results: Results, *, pictures: bool, progress: bool) -> Section | None:
+    """Return the worst episodes, with pictures if wanted; None without any.
+
+    A failure affects only its own episode. Contacts of any arm come first. Only the arms that
+    verdicts are about count for the smallest margins.
+
+    Args:
+        run: the run, whose jobs are run again.
+        results: its figures.
+        pictures: run the episodes again for pictures.
+        progress: show progress on standard error.
+    """
+    judged = {arm.name for arm in results.judged}
+    points = [
+        (arm, each)
+        for arm in results.arms
+        for each in (*arm.episodes, *arm.others)
+        if each.record.moving_touched
+        or (arm.name in judged and each.record.min_margin_m is not None)
+    ]
+    found: dict[tuple[str, str], tuple[Arm, Episode]] = {}
+    for arm, each in sorted(points, key=lambda point: worst_first(point[1])):
+        found.setdefault((arm.name, each.record.scenario), (arm, each))
+    worst = list(found.values())[:MOST_STILLS]
+    if not worst:
+        return None
+    silent = not (pictures and progress)
+    with tqdm(worst, desc="stills", unit="episode", file=sys.stderr, disable=silent) as bar:
+        stills = [_still(run, arm, each, pictures=pictures) for arm, each in bar]
+    lead = (
+        "Contacts with the moving robot first, then the smallest margins; of each scenario and arm "
+        "only the worst."
+    )
+    if pictures:
+        lead += (
+            " Pictures show the instant of the smallest margin: the robot's camera, and the plan. "
+            "Discs are people and fans where they look; rings are the obstacles that the robot "
+            "kept clear of. Green is aware, red unaware, grey not known."
+        )
+    return Section("worst", "Worst", lead, stills=stills)
+
+
+def _still(run: Run, arm: Arm, episode: Episode, *, pictures: bool) -> Still:
+    record = episode.record
+    parts = [
+        f"seed {record.seed}",
+        f"fault {record.fault}" if record.fault else "",
+        f"smallest margin {number_cell(record.min_margin_m).text} m",
+        f"smallest separation {number_cell(record.min_separation_m).text} m",
+        outcome_of(episode),
+    ]
+    text = ", ".join(filter(None, parts))
+    shown: tuple[tuple[str, str], ...] = ()
+    if pictures:
+        shown, trouble = _pictures(run, episode)
+        text += trouble and f". {trouble}"
+    return Still(f"{arm.name}, {record.scenario}", text, run.replay(episode), shown)
+
+
+def _pictures(run: Run, episode: Episode) -> tuple[tuple[tuple[str, str], ...], str]:
+    """Return the pictures of an episode, or the reason why there are none."""
+    if episode.number is None:
+        return (), "No picture: its job is not known."
+    try:
+        from ._pictures import pictures_of  # noqa: PLC0415 - needs the simulator
+
+        return pictures_of(run.jobs[episode.number], episode.record)
+    except Exception as error:  # a planner or a renderer may raise anything
+        return (), f"No picture: {type(error).__name__}: {error}"
+
+
 def failures_section(run: Run) -> Section | None:
     """Return the errors that ended episodes, the most frequent first; None without any."""
     failed = [each for each in run.episodes if each.record.error]
@@ -303,8 +379,8 @@ def failures_section(run: Run) -> Section | None:
 def reproduction_section(run: Run) -> Section:
     """Return the configuration of a run, from which it can be repeated."""
     command = str(run.about.get("command", ""))
-    policies = dict.fromkeys((f"Policy {job.policy_name}", job.policy) for job in run.jobs)
-    faults = dict.fromkeys((f"Fault {j.fault_name}", j.fault) for j in run.jobs if j.fault_name)
+    policies = dict.fromkeys((f"Policy {job.policy}", job.policy_text) for job in run.jobs)
+    faults = dict.fromkeys((f"Fault {j.fault}", j.fault_text) for j in run.jobs if j.fault)
     return Section(
         "reproduce",
         "Reproduce",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from awarenav.cli import FolderPath, Number, Seeds, argument, command, group, option, options
+
+from ...conditions import Experiment, conditions_options, option_words
 
 
 @command(
@@ -88,8 +90,12 @@ def list_planners(*, as_json: bool) -> int:
     help="Classes, functions that return a planner, planners, or 'reference', 'costmap' and "
     "'straight_on'.",
 )
-@options.scenarios("that have a planner", repeated=True)
-@options.policies(["balanced"], repeated=True)
+@conditions_options(
+    many=("scenario", "policy"),
+    repeated=True,
+    without=("planner", "fault", "seed"),
+    perception={"default": "truth"},
+)
 @option(
     "--seeds",
     type=Seeds(),
@@ -97,11 +103,6 @@ def list_planners(*, as_json: bool) -> int:
     metavar="N|A-B",
     help="Seeds of the episodes of each scenario: 0 to N − 1, or A to B.",
 )
-@options.perception(default="truth")
-@options.sensors()
-@options.camera()
-@options.robot()
-@options.population()
 @options.workers()
 @option(
     "--time-limit",
@@ -116,7 +117,13 @@ def list_planners(*, as_json: bool) -> int:
 @options.overwrite()
 @options.as_json("the figures")
 def compare(
-    planners: tuple[str, ...], out: Path, *, time_limit: float, as_json: bool, **settings: Any
+    planners: tuple[str, ...],
+    out: Path,
+    *,
+    seeds: tuple[int, ...],
+    time_limit: float,
+    as_json: bool,
+    **values: Any,
 ) -> int:
     """Compare local planners on the same crossings, and write one page about them.
 
@@ -128,17 +135,20 @@ def compare(
     from ..runs import RunFiles  # noqa: PLC0415
     from ._compare import compare_planners, print_comparison  # noqa: PLC0415
 
-    words = command_line(planners, out, settings)
-    settings["population"] = settings["population"] or ""
+    experiment = Experiment.taken_from(values)
     records = compare_planners(
         planners,
-        settings.pop("scenario"),
+        experiment["scenario"],
         out,
-        policies=settings.pop("policy"),
+        policies=experiment["policy"],
+        seeds=seeds,
+        perception=experiment["perception"],
+        sensors=experiment.one("sensors"),
         time_limit_s=time_limit,
         progress=True,
-        about={"command": words},
-        **settings,
+        about={"command": command_line(planners, seeds, experiment, out)},
+        **experiment.changes,
+        **values,
     )
     print_comparison(out, as_json=as_json)
     failed = sum(bool(each.error) for each in records)
@@ -151,15 +161,17 @@ def compare(
     return 1 if failed else 0
 
 
-def command_line(planners: tuple[str, ...], out: Path, settings: Mapping[str, Any]) -> str:
+def command_line(
+    planners: Sequence[str], seeds: Sequence[int], experiment: Experiment, out: Path
+) -> str:
     """Return the command line that makes the same comparison."""
+    settings = experiment.settings()
     words = ["awarenav", "planners", "compare", *planners]
     for name in ("scenario", "policy"):
-        words += [word for each in settings[name] for word in (f"--{name}", each)]
-    words += ["--seeds", f"{settings['seeds'][0]}-{settings['seeds'][-1]}"]
-    for name in ("perception", "sensors", "camera", "robot", "population"):
-        words += [f"--{name}", settings[name]] if settings[name] else []
-    return shlex.join([*words, "--out", str(out)])
+        words += [word for each in settings.pop(name) for word in (f"--{name}", each)]
+    del settings["episodes"]
+    words += ["--seeds", f"{seeds[0]}-{seeds[-1]}", *option_words(settings), "--out", str(out)]
+    return shlex.join(words)
 
 
 for _command in (list_planners, compare):

@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._conditions import Conditions
     from ._episode import (
         attempt,
         died,
         free_run_of,
         observed_episode,
         run_episode,
-        seeded_crossing,
+        setup_of,
     )
-    from ._job import Job, describe
-    from ._parallel import in_parallel, tidy
+    from ._parallel import Workers, in_parallel, tidy
     from ._plan import (
+        about_run,
+        experiment_jobs,
         fault_of,
-        job_key,
+        job_of,
         named_templates,
         plan_jobs,
         policy_of,
@@ -28,14 +28,15 @@ if TYPE_CHECKING:
         sample_jobs,
         template_of,
     )
-    from ._planner_choice import (
-        KNOWN_PLANNERS,
-        make_planner,
-        refuse_unusable_planner,
+    from ._replay import (
+        box_scale_of,
+        find_episode,
+        recorder_of,
+        replay_command,
     )
-    from ._replay import box_scale_of, find_episode, recorder_of
     from ._run import run_jobs
     from ._run_files import (
+        Job,
         RunFiles,
         answering_note,
         read_attempts,
@@ -45,21 +46,20 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "KNOWN_PLANNERS",
-    "Conditions",
     "Job",
     "RunFiles",
+    "Workers",
+    "about_run",
     "answering_note",
     "attempt",
     "box_scale_of",
-    "describe",
     "died",
+    "experiment_jobs",
     "fault_of",
     "find_episode",
     "free_run_of",
     "in_parallel",
-    "job_key",
-    "make_planner",
+    "job_of",
     "named_templates",
     "observed_episode",
     "plan_jobs",
@@ -70,11 +70,11 @@ __all__ = [
     "read_rows",
     "read_run",
     "recorder_of",
-    "refuse_unusable_planner",
+    "replay_command",
     "run_episode",
     "run_jobs",
     "sample_jobs",
-    "seeded_crossing",
+    "setup_of",
     "template_of",
     "tidy",
 ]

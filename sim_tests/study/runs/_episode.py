@@ -4,31 +4,28 @@ from __future__ import annotations
 
 import faulthandler
 import signal
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from traceback import format_exc
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from perception.networks import OnnxSettings
-
-from ...crossing import CrossingResult, Observer, run_crossing
-from ...crossing.eyes import Perception, pixel_pipeline
+from ...crossing import CrossingResult, Observer, Setup, drive
 from ...scenario import Scenario
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, measure, path_length_m
-from ._job import Attempt, Job
-from ._plan import fault_of, job_key, policy_of, template_of
-from ._planner_choice import import_planner, make_planner, planner_label, seeded_generators
+from ._plan import fault_of, policy_of, template_of
+from ._run_files import Attempt, Job
 
 # Seed of the planner in the task without people, the same for every episode of the task.
 _FREE_SEED: Final = 0
+_FREE_POLICY: Final = "balanced"
 # A planner that does not come back from compiled code cannot be interrupted. Its process is ended
 # this long after the limit.
 _GRACE_S: Final = 5.0
-# An episode runs on one core, beside others.
-_ONE_CORE: Final = OnnxSettings(intra_op_threads=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +52,20 @@ def run_episode(job: Job) -> EpisodeRecord:
     return attempt(job).record
 
 
-def attempt(job: Job) -> Attempt:
-    """Run and measure one episode; only an interruption is raised."""
+def attempt(job: Job, free: FreeRun | None = None, *, limit_s: float | None = None) -> Attempt:
+    """Run and measure one episode; only an interruption is raised.
+
+    Args:
+        job: the episode.
+        free: its task without people; None to drive that too.
+        limit_s: wall-clock limit, in a process that runs nothing else; None for no limit.
+    """
     try:
-        result, record = observed_episode(job)
-        return Attempt(record, conduct=Conduct.of(result))
+        with _ended_after(limit_s):
+            result, record = observed_episode(job, free=free)
+            return Attempt(record, conduct=Conduct.of(result))
+    except _TimeLimit:
+        return failed(job, f"TimeLimit: ended after the time limit of {limit_s:g} s", format_exc())
     except Exception as error:  # a planner may raise anything, and the run continues
         return failed(job, f"{type(error).__name__}: {error}", format_exc())
 
@@ -68,13 +74,12 @@ class _TimeLimit(BaseException):
     """An episode took too long; no planner catches it by ``except Exception``."""
 
 
-def attempt_within(limit_s: float, job: Job) -> Attempt:
-    """Run and measure one episode as :func:`attempt`, in a process of its own, and end it in time.
-
-    Args:
-        limit_s: wall-clock limit.
-        job: the episode.
-    """
+@contextmanager
+def _ended_after(limit_s: float | None) -> Iterator[None]:
+    """Raise :class:`_TimeLimit` in the block, or end the process if it does not come back."""
+    if limit_s is None:
+        yield
+        return
 
     def end(*_: object) -> None:
         raise _TimeLimit
@@ -84,9 +89,7 @@ def attempt_within(limit_s: float, job: Job) -> Attempt:
         if hasattr(signal, "setitimer"):  # not on Windows
             signal.signal(signal.SIGALRM, end)
             signal.setitimer(signal.ITIMER_REAL, limit_s)
-        return attempt(job)
-    except _TimeLimit:
-        return failed(job, f"TimeLimit: ended after the time limit of {limit_s:g} s", format_exc())
+        yield
     finally:
         faulthandler.cancel_dump_traceback_later()
         if hasattr(signal, "setitimer"):
@@ -94,114 +97,98 @@ def attempt_within(limit_s: float, job: Job) -> Attempt:
 
 
 def observed_episode(
-    job: Job, observer: Observer | None = None
+    job: Job, observer: Observer | None = None, *, free: FreeRun | None = None
 ) -> tuple[CrossingResult, EpisodeRecord]:
-    """Run and measure one episode, watched by ``observer``; exceptions are raised."""
-    template, fault = template_of(job.scenario), fault_of(job.fault)
-    scenario, senses = template.for_seed(job.seed), Perception.named(job.perception)
+    """Run and measure one episode, watched by ``observer``; exceptions are raised.
+
+    ``free`` is its task without people; None drives that too.
+    """
+    template = template_of(job.scenario_text)
     # Before the episode: what a planner imports only while it drives is then there.
-    free = free_run_of(job)
-    result = seeded_crossing(
-        scenario,
-        job.planner,
-        job.seed,
-        observer=observer,
-        policy=policy_of(job.policy),
-        perception=job.perception,
-        fault=fault,
-        pipeline=pixel_pipeline(scenario, onnx_settings=_ONE_CORE)
-        if senses.kind == "pixels"
-        else None,
-    )
+    free = free_run_of(job) if free is None else free
+    result = drive(setup_of(job), observer)
     record = measure(
         result,
         time_without_people_s=free.time_s,
         length_without_people_m=free.length_m,
         scenario_version=template.version,
         attention=template.attention,
-        fault=job.fault_name,
-    )
-    return result, replace(
-        record,
-        policy=job.policy_name,
-        planner=planner_label(job.planner, scenario),
         nondeterministic=not free.repeats,
+        **asdict(job.conditions),
     )
+    return result, record
+
+
+def setup_of(job: Job) -> Setup:
+    """Return the episode of a job; raise SimError for a job that cannot be read."""
+    return Setup(
+        conditions=job.conditions,
+        scenario=template_of(job.scenario_text).for_seed(job.seed),
+        policy=policy_of(job.policy_text),
+        planner=job.planner_text,
+        fault=fault_of(job.fault_text),
+    )
+
+
+def task_of(job: Job) -> tuple[str, int, str]:
+    """Return the key of a job's task without people: jobs with the same key share it."""
+    try:
+        parameters = template_of(job.scenario_text).parameters()
+    except SimError:  # each of its episodes says it
+        parameters = {}
+    varies = any(path.startswith("robot.") for path in parameters)
+    return job.scenario_text, job.seed if varies else 0, job.planner_text
 
 
 def free_run_of(job: Job) -> FreeRun:
     """Return the figures of a job's task without people; unknown for a robot without a planner."""
-    scenario = template_of(job.scenario).for_seed(job.seed)
-    if not job.planner and scenario.robot.straight_on_speed_mps is not None:
+    scenario = template_of(job.scenario_text).for_seed(job.seed)
+    if not job.planner_text and scenario.robot.straight_on_speed_mps is not None:
         return FreeRun(None, None, repeats=True)
-    return free_run(scenario.without_people().model_dump_json(), job.planner)
+    return _free_run(scenario.without_people().model_dump_json(), job.planner_text)
+
+
+def free_run_or_none(job: Job, *, limit_s: float | None = None) -> FreeRun | None:
+    """Return :func:`free_run_of`; None for one that fails, as its episodes will.
+
+    ``limit_s`` is that of :func:`attempt`.
+    """
+    try:
+        with _ended_after(limit_s):
+            return free_run_of(job)
+    except (_TimeLimit, Exception):  # a planner may raise anything; each episode says it
+        return None
 
 
 def failed(job: Job, error: str, traceback: str = "") -> Attempt:
     """Return the record of an episode without a result."""
+    # As it is read back from the table, where an episode is one line.
+    line = " ".join(error.replace("\0", "").splitlines())[:500]
+    record = EpisodeRecord(**asdict(job.conditions), error=line)
     try:
-        key = job_key(job)
+        template = template_of(job.scenario_text)
     except SimError:  # the scenario cannot be read
-        planner = job.planner.rpartition(":")[2]
-        record = EpisodeRecord("", job.seed, job.policy_name, planner, job.perception)
-        return Attempt(replace(record, fault=job.fault_name, error=_error_text(error)), traceback)
-    template = template_of(job.scenario)
-    record = EpisodeRecord(
-        **key._asdict(),
-        scenario_version=template.version,
-        attention=template.attention,
-        error=_error_text(error),
-    )
-    return Attempt(record, traceback)
+        return Attempt(record, traceback)
+    about = {"scenario_version": template.version, "attention": template.attention}
+    return Attempt(replace(record, **about), traceback)
 
 
 def died(job: Job, reason: str) -> Attempt:
-    """Return the record of an episode that killed its process, for :func:`in_parallel`."""
+    """Return the record of an episode that killed its process, for :meth:`Workers.results`."""
     return failed(job, f"WorkerDied: {reason}", reason)
-
-
-def _error_text(error: str) -> str:
-    """Return an error as it is read back from the table, where an episode is one line."""
-    return " ".join(error.replace("\0", "").splitlines())[:500]
-
-
-def seeded_crossing(
-    scenario: Scenario,
-    planner: str,
-    seed: int,
-    *,
-    observer: Observer | None = None,
-    **options: Any,
-) -> CrossingResult:
-    """Run a crossing with a new planner, with the global random generators seeded.
-
-    Args:
-        scenario: the scenario.
-        planner: ``"module:Class"``, or empty for the default planner.
-        seed: seed of the crossing, the planner and the generators.
-        observer: as for :func:`run_crossing`.
-        options: further arguments of :func:`run_crossing`.
-    """
-    if planner:
-        import_planner(planner)  # before seeding: a module may draw where it begins
-    with seeded_generators(seed):
-        own = make_planner(planner, scenario, seed)
-        return run_crossing(scenario, planner=own, seed=seed, observer=observer, **options)
 
 
 # Cached, because one process runs many episodes of few tasks.
 @lru_cache(maxsize=4096)
-def free_run(task: str, planner: str) -> FreeRun:
+def _free_run(task: str, planner: str) -> FreeRun:
     """Return the figures of a task without people: JSON of a :class:`Scenario`.
 
     A planner of the user's drives it twice, and both must give the same commands in every cycle.
     """
     scenario = Scenario.model_validate_json(task)
-    first = seeded_crossing(scenario, planner, _FREE_SEED, policy="balanced")
-    repeats = True
-    if planner:
-        second = seeded_crossing(scenario, planner, _FREE_SEED, policy="balanced")
-        repeats = _commands(first) == _commands(second)
+    setup = Setup.of(scenario, policy=_FREE_POLICY, planner=planner, seed=_FREE_SEED)
+    first = drive(setup)
+    repeats = not planner or _commands(first) == _commands(drive(setup))
     if first.time_to_goal_s is None:
         return FreeRun(None, None, repeats)
     path_m = np.array([frame.robot_state.position_odom_m for frame in first.frames])

@@ -10,9 +10,10 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager
 from typing import Any, Final, TypeVar
 
 from joblib.externals.loky import get_reusable_executor
@@ -47,61 +48,104 @@ _LEAN: Final = {
 _one_at_a_time = threading.Lock()
 
 
-def in_parallel(
-    function: Callable[[Item], Result],
-    items: Iterable[Item],
-    *,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    own_process: bool = False,
-    keep: bool = False,
-    on_death: Callable[[Item, str], Result] | None = None,
-) -> Generator[tuple[int, Result], None, None]:
-    """Yield the number of each item and the function's result for it, as soon as it is there.
+class Workers(AbstractContextManager["Workers"]):
+    """This process, processes of this computer, or a Dask cluster; they last until the block ends.
 
-    When a process dies (killed, out of memory, a crash in compiled code), every item that was
-    being worked on runs again, each alone. An item that kills its process again is given up.
+    When a process dies (killed, out of memory, a crash in compiled code), every item that it may
+    have worked on runs again, each alone. An item that then kills two processes is given up.
 
     Args:
-        function: of a module, so that other processes can import it. An exception that it raises
-            ends the work.
-        items: can be pickled.
         workers: number of processes; 1 works in this process, None takes one per core.
         scheduler: address of a Dask scheduler (``"tcp://…"``), or ``"local"`` for a cluster of
             ``workers`` processes on this computer; None works without Dask.
         own_process: a single worker has a process of its own, too.
-        keep: leave the processes idle for the next call instead of ending them; they then end by
-            themselves after 10 s.
-        on_death: returns the result of an item that kills its process, given the item and the
-            reason; without it, such an item ends the work.
+        most: no more processes than this, such as the number of items; None for no bound.
 
     Raises:
-        SimError: no workers, no Dask, no scheduler at the address, or a process that died twice.
+        SimError: no workers.
     """
-    count = cores() if workers is None else finite_number("workers", workers, SimError, minimum=1)
-    numbered = deque(enumerate(items))
-    if scheduler is None and count == 1 and not own_process:
-        yield from ((number, function(item)) for number, item in numbered)
-    elif numbered and scheduler is None:
-        # Another number would end the processes that the call before has kept.
-        processes = int(count) if keep else min(int(count), len(numbered))
-        try:
+
+    def __init__(
+        self,
+        workers: int | None = None,
+        *,
+        scheduler: str | None = None,
+        own_process: bool = False,
+        most: int | None = None,
+    ) -> None:
+        count = (
+            cores() if workers is None else finite_number("workers", workers, SimError, minimum=1)
+        )
+        self._count = int(count)
+        #: Whether all work is done in this process.
+        self.is_this_process = scheduler is None and self._count == 1 and not own_process
+        if most is not None:
+            self._count = max(min(self._count, most), 1)
+        self._scheduler = scheduler
+        self._cleanup = contextlib.ExitStack()
+        self._client: Any = None
+        self._has_processes = False
+
+    def __exit__(self, *_: object) -> None:
+        self._cleanup.close()
+
+    def results(
+        self,
+        function: Callable[[Item], Result],
+        items: Iterable[Item],
+        *,
+        on_death: Callable[[Item, str], Result] | None = None,
+    ) -> Generator[tuple[int, Result], None, None]:
+        """Yield the number of each item and the function's result for it, as soon as it is there.
+
+        Args:
+            function: of a module, so that other processes can import it. An exception that it
+                raises ends the work.
+            items: can be pickled.
+            on_death: returns the result of an item that kills its process, given the item and the
+                reason; without it, such an item ends the work.
+
+        Raises:
+            SimError: no Dask, no scheduler at the address, or a process that died twice.
+        """
+        numbered = deque(enumerate(items))
+        if self.is_this_process:
+            yield from ((number, function(item)) for number, item in numbered)
+        elif numbered and self._scheduler is None:
+            # The next item of each process waits for it, so that no process waits for this one.
+            if not self._has_processes:
+                self._has_processes = True
+                self._cleanup.callback(end_processes)
             yield from _on(
-                lambda: _processes(processes), lambda: processes, function, numbered, on_death
+                lambda: _processes(self._count),
+                lambda: 2 * self._count,
+                function,
+                numbered,
+                on_death,
             )
-        except BaseException:
-            end_processes()
-            raise
-        if not keep:
-            end_processes()
-    elif numbered and scheduler is not None:
-        with _cluster(scheduler, int(count)) as client:
-            executor = client.get_executor(pure=False)
+        elif numbered and self._scheduler is not None:
+            if self._client is None:
+                cluster = _cluster(self._scheduler, self._count)
+                self._client = self._cleanup.enter_context(cluster)
+            executor = self._client.get_executor(pure=False)
 
             def ahead() -> int:  # workers may join and leave at any time
-                return _AHEAD * max(sum(map(int, client.nthreads().values())), 1)
+                return _AHEAD * max(sum(map(int, self._client.nthreads().values())), 1)
 
             yield from _on(lambda: executor, ahead, function, numbered, on_death)
+
+
+def in_parallel(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    workers: int | None = None,
+    own_process: bool = False,
+    on_death: Callable[[Item, str], Result] | None = None,
+) -> Generator[tuple[int, Result], None, None]:
+    """Yield the results of :meth:`Workers.results`, with workers for these items alone."""
+    with Workers(workers, own_process=own_process, most=len(items)) as some:
+        yield from some.results(function, items, on_death=on_death)
 
 
 def cores() -> int:
@@ -113,7 +157,7 @@ def cores() -> int:
 
 
 def end_processes() -> None:
-    """Kill the processes of :func:`in_parallel`, even in the middle of an item."""
+    """Kill the processes of :class:`Workers`, even in the middle of an item."""
     get_reusable_executor(reuse=True).shutdown(kill_workers=True)
 
 
@@ -148,21 +192,22 @@ def _on(
         yield from results
         if suspects and not sent:
             for number, item in suspects:
-                yield number, _alone(executor(), function, item, on_death)
+                yield number, _alone(executor, function, item, on_death)
             suspects = []
 
 
 def _alone(
-    executor: Executor,
+    executor: Callable[[], Executor],
     function: Callable[[Item], Result],
     item: Item,
     on_death: Callable[[Item, str], Result] | None,
 ) -> Result:
-    """Return the result of an item while no other is worked on."""
-    future = executor.submit(_work, function, item)
-    error = future.exception()
-    if not _is_death(error):
-        return future.result()
+    """Return the result of an item while no other is worked on, in a second process if need be."""
+    for _ in range(2):
+        future = executor().submit(_work, function, item)
+        error = future.exception()
+        if not _is_death(error):
+            return future.result()
     reason = f"the process that ran it died, and so did a second one ({type(error).__name__})"
     if on_death is None:
         raise SimError(f"{reason}: {item!r:.200}") from error

@@ -5,11 +5,12 @@ from __future__ import annotations
 import fnmatch
 import itertools
 import re
+import shlex
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 import yaml
@@ -20,18 +21,25 @@ from perception.arrays import finite_number
 from perception.documents import parse_yaml, yaml_text
 from tracking.config import StrictConfig, complaints
 
+from ...conditions import (
+    AXES,
+    NO_FAULT,
+    ORACLE,
+    Experiment,
+    Perception,
+    changed_scenario,
+    option_words,
+    table_name,
+)
 from ...crossing import named_policy
-from ...crossing.eyes import ORACLE, Perception
 from ...crossing.faults import Fault, shipped_faults
+from ...crossing.planner import planner_label, refuse_unusable_planner
 from ...scenario import SCENARIO_SETS, ScenarioTemplate, shipped_templates
 from ...world.errors import SimError
-from ._job import Job, JobKey, describe
-from ._planner_choice import planner_label, refuse_unusable_planner
+from ._run_files import Job
 
 _ConfigT = TypeVar("_ConfigT", bound=StrictConfig)
 
-# The name that stands for "without a fault".
-_NO_FAULT: Final = "none"
 _PATTERN: Final = re.compile(r"[*?\[]")
 # Makes the draw of a sample independent of the episodes, whose generators have the seed alone.
 _STREAM: Final = 83
@@ -46,9 +54,7 @@ def plan_jobs(
     perception: str = "keypoints",
     sensors: Sequence[str] = ("camera",),
     faults: Sequence[str | Fault] = ("",),
-    camera: str = "",
-    robot: str = "",
-    population: str = "",
+    **axes: str,
 ) -> tuple[Job, ...]:
     """Return the jobs of every scenario, seed, fault, planner, policy and set of sensors.
 
@@ -68,71 +74,125 @@ def plan_jobs(
         faults: faults, shipped names, YAML files, or ``"none"`` or empty for no fault. ``*``, ``?``
             and ``[…]`` in a name stand for all shipped names that fit, as in a shell; in names that
             are joined by ``+`` for every combination.
-        camera: a shipped name or a YAML file that replaces the camera of every scenario; empty
-            keeps each scenario's own.
-        robot: a shipped name or a YAML file of a robot, to which every scenario is fitted; empty
-            keeps each scenario's own.
-        population: as for :meth:`ScenarioTemplate.with_population`.
+        axes: the other conditions, which change every scenario: ``camera`` and ``robot`` (a shipped
+            name or a YAML file) and ``population``; empty keeps each scenario's own.
 
     Raises:
-        SimError: an unknown or unusable argument, or two episodes with the same key.
+        SimError: an unknown or unusable argument, or two episodes with the same conditions.
         NavError: an unknown preset or unusable policy file.
     """
     perceptions = [Perception.of(perception, each).name for each in sensors]
-    templates = _expanded(scenarios, camera, population, robot)
+    templates = _expanded(scenarios, axes)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]
     checked_seeds = [_checked_seed(seed) for seed in seeds]
+    names = {name: table_name(value) for name, value in axes.items()}
     for planner in planners:
         if templates:
             refuse_unusable_planner(planner, templates[0].median())
     jobs = tuple(
-        Job(text, seed, policy_name, policy, planner, policy_perception, fault_name, fault)
-        for text in (template.to_text() for template in templates)
+        Job(
+            template.name,
+            seed,
+            policy_name,
+            planner_label(planner, template.median()),
+            policy_perception,
+            fault=fault_name,
+            **names,
+            scenario_text=text,
+            policy_text=policy,
+            planner_text=planner,
+            fault_text=fault,
+        )
+        for template, text in ((each, each.to_text()) for each in templates)
         for seed in checked_seeds
         for fault_name, fault in fault_texts
         for planner in planners
         for policy_name, policy, policy_perception in policy_texts
     )
-    seen: set[JobKey] = set()
-    for job in jobs:
-        key = job_key(job)
-        if key in seen:
-            raise SimError(
-                "two episodes have the same scenario name, seed, policy, planner, perception and "
-                f"fault: {describe(key)}; give each a name of its own, and each only once"
-            )
-        seen.add(key)
+    twice = [key for key, count in Counter(job.conditions for job in jobs).items() if count > 1]
+    if twice:
+        raise SimError(
+            f"two episodes have the same {', '.join(AXES[:-1])} and {AXES[-1]}: {twice[0].text}; "
+            "give each a name of its own, and each only once"
+        )
     return jobs
 
 
-def named_templates(
-    names: Sequence[str], camera: str = "", population: str = "", robot: str = ""
-) -> tuple[ScenarioTemplate, ...]:
+def experiment_jobs(
+    experiment: Experiment,
+    policies: Sequence[str | tuple[str, AwarenessPolicy]] | None = None,
+) -> tuple[Job, ...]:
+    """Return the episodes of a command; :func:`plan_jobs` names the errors.
+
+    Args:
+        experiment: the values of its options.
+        policies: other policies than those of the experiment.
+    """
+    first = experiment["seed"]
+    return plan_jobs(
+        experiment["scenario"],
+        experiment["policy"] if policies is None else policies,
+        range(first, first + experiment.episodes),
+        planners=experiment["planner"],
+        perception=experiment["perception"],
+        sensors=experiment["sensors"],
+        faults=experiment["fault"],
+        **experiment.changes,
+    )
+
+
+def about_run(experiment: Experiment, command: str, out: Path, **more: Any) -> dict[str, Any]:
+    """Return a command and its settings for ``run.json``; resuming a run gives the same.
+
+    Args:
+        experiment: the values of its options.
+        command: its name.
+        out: folder of the run.
+        more: further settings, by the names of their options; None and empty ones are left out.
+    """
+    settings = experiment.settings(**more)
+    words = ["awarenav", *command.split(), *option_words(settings), "--out", str(out)]
+    return {"command": shlex.join(words), "settings": settings}
+
+
+def job_of(scenario_text: str, policy: tuple[str, str], planner: str, **axes: Any) -> Job:
+    """Return the job of a scenario whose conditions are already in it.
+
+    Args:
+        scenario_text: YAML of a :class:`ScenarioTemplate`.
+        policy: its name in tables, and its YAML.
+        planner: ``"module:Class"``, or empty for the reference planner.
+        axes: ``seed`` and ``perception``, as fields of a job.
+    """
+    scenario = template_of(scenario_text).median()
+    return Job(
+        scenario=scenario.name,
+        policy=policy[0],
+        planner=planner_label(planner, scenario),
+        **axes,
+        scenario_text=scenario_text,
+        policy_text=policy[1],
+        planner_text=planner,
+    )
+
+
+def named_templates(names: Sequence[str], **axes: str) -> tuple[ScenarioTemplate, ...]:
     """Return the scenarios of names and YAML files, each once.
 
     Args:
         names: shipped names, YAML files, or sets (``"all"``, ``"guidelines"``, ``"step_out"``)
             without the scenarios that need no planner.
-        camera: as for :meth:`ScenarioTemplate.with_camera`.
-        population: as for :meth:`ScenarioTemplate.with_population`.
-        robot: as for :meth:`ScenarioTemplate.with_robot`.
+        axes: as for :func:`plan_jobs`.
 
     Raises:
         SimError: an unknown name, an unusable file, camera or robot, or two scenarios of one name.
     """
     found: dict[str, ScenarioTemplate] = {}
-    for template in _expanded(names, camera, population, robot):
+    for template in _expanded(names, axes):
         if found.setdefault(template.name, template) != template:
             raise SimError(f"two scenarios are called {template.name!r}; give them other names")
     return tuple(found.values())
-
-
-def job_key(job: Job) -> JobKey:
-    """Return the key of a job, which is unique in its run."""
-    scenario = template_of(job.scenario).median()
-    label = planner_label(job.planner, scenario)
-    return JobKey(scenario.name, job.seed, job.policy_name, label, job.perception, job.fault_name)
 
 
 @lru_cache(maxsize=256)
@@ -173,9 +233,9 @@ def policy_text(policy: AwarenessPolicy) -> str:
 
 
 def _expanded(
-    scenarios: Iterable[str | ScenarioTemplate], camera: str, population: str, robot: str
+    scenarios: Iterable[str | ScenarioTemplate], axes: Mapping[str, str]
 ) -> list[ScenarioTemplate]:
-    """Return the templates of names and files, with another camera, population and robot."""
+    """Return the templates of names and files, as camera, robot and population change them."""
     templates: list[ScenarioTemplate] = []
     for each in scenarios:
         if isinstance(each, ScenarioTemplate):
@@ -188,9 +248,7 @@ def _expanded(
             ]
         else:
             templates.append(ScenarioTemplate.named(each))
-    return [
-        each.with_camera(camera).with_population(population).with_robot(robot) for each in templates
-    ]
+    return [changed_scenario(each, axes) for each in templates]
 
 
 def _named_policy(
@@ -220,10 +278,10 @@ def _matching_faults(given: str | Fault) -> list[str | Fault]:
 def _named_fault(fault: str | Fault) -> tuple[str, str]:
     """Return the name and the YAML of a fault, both empty for none."""
     if isinstance(fault, str):
-        if fault in ("", _NO_FAULT):
+        if fault in ("", NO_FAULT):
             return "", ""
         fault = Fault.of(fault)
-    if fault.name == _NO_FAULT:
+    if fault.name == NO_FAULT:
         raise SimError(f"a fault must have a name of its own, got {fault.name!r}")
     return fault.name, fault.to_text()
 
@@ -257,7 +315,7 @@ def sample_jobs(jobs: Sequence[Job], count: int, seed: int = 0) -> tuple[Job, ..
     rng = np.random.default_rng([seed, _STREAM])
     left: dict[str, list[int]] = {}
     for row in rng.permutation(len(jobs)).tolist():
-        left.setdefault(jobs[row].fault_name, []).append(row)
+        left.setdefault(jobs[row].fault, []).append(row)
     faults = sorted(left)
     scenarios: Counter[str] = Counter()
     variants: Counter[tuple[str, str, str]] = Counter()
@@ -278,4 +336,4 @@ def sample_jobs(jobs: Sequence[Job], count: int, seed: int = 0) -> tuple[Job, ..
 
 
 def _variant(job: Job) -> tuple[str, str, str]:
-    return job.policy_name, job.planner, job.perception
+    return job.policy, job.planner_text, job.perception

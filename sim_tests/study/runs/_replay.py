@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
@@ -18,6 +18,7 @@ from awarenav.errors import counted
 from awarenav.video import VideoWriter
 from perception import AttentionCone
 
+from ...conditions import Perception
 from ...crossing import (
     CrossingFrame,
     CrossingResult,
@@ -26,11 +27,9 @@ from ...crossing import (
     TopView,
     draw_camera_view,
 )
-from ...crossing.eyes import Perception
 from ...viewing import (
     CameraPictures,
     CrossingRecorder,
-    Episode,
     outcome_text,
     show_page,
     write_page,
@@ -44,9 +43,8 @@ from ..measures import (
     record_row,
 )
 from ._episode import observed_episode
-from ._job import Job, describe, record_key
-from ._plan import job_key, template_of
-from ._run_files import RunFiles, read_jobs, read_rows
+from ._plan import template_of
+from ._run_files import Job, RunFiles, read_jobs, read_rows
 
 Image = NDArray[np.uint8]
 
@@ -136,60 +134,57 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         self._video.add(image)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReplayOptions:
-    """The options of ``awarenav replay``."""
-
-    folder: Path
-    episode: str
-    out: Path | None
-    no_video: bool
-    view: bool
-
-
-def replay_command(options: ReplayOptions) -> int:
+def replay_command(
+    folder: Path, episode: str, *, out: Path | None, no_video: bool, view: bool
+) -> int:
     """Run an episode again, write its pictures or its page, and compare its row with the run's.
+
+    Args:
+        folder: of the run.
+        episode: as for :func:`find_episode`; or ``"all"``.
+        out: folder of the pictures; None for the one in the folder of the run.
+        no_video: draw only the map.
+        view: write a page instead of pictures, and show it.
 
     Raises:
         SimError: the folder holds no run, or the run does not have the episode.
     """
-    jobs = read_jobs(options.folder)
-    every = options.episode == _EVERY
-    numbers = range(len(jobs)) if every else [find_episode(jobs, options.episode)]
-    out = options.out if options.out is not None else RunFiles(options.folder).replays
+    jobs, files = read_jobs(folder), RunFiles(folder)
+    every = episode == _EVERY
+    numbers = range(len(jobs)) if every else [find_episode(jobs, episode)]
+    out = files.replays if out is None else out
     out.mkdir(parents=True, exist_ok=True)
     status = 0
     for number in numbers:
-        written, differs = _replay(options, number, jobs[number], out)
-        status = max(status, differs)
-        if options.view and not every:
-            show_page(written[0].resolve().as_uri())
+        job, path = jobs[number], out / files.page(number).name
+        print(f"Episode {number}: {job.conditions.text}")
+        result, record, written = _drawn(job, path, video=not no_video, view=view)
+        for each in written:
+            print(f"Written: {each}")
+        print(outcome_text(result))
+        status = max(status, _compare_row(folder, job, record))
+        if view and not every:
+            show_page(path.resolve().as_uri())
     return status
 
 
-def _replay(options: ReplayOptions, number: int, job: Job, out: Path) -> tuple[Sequence[Path], int]:
-    """Run one episode again; return the files written, and 1 if its row is another, else 0."""
-    print(f"Episode {number}: {describe(job_key(job))}")
-    scenario = template_of(job.scenario).for_seed(job.seed)
+def _drawn(
+    job: Job, path: Path, *, video: bool, view: bool
+) -> tuple[CrossingResult, EpisodeRecord, Sequence[Path]]:
+    """Run one episode again; return its result, its row and the files written."""
+    scenario = template_of(job.scenario_text).for_seed(job.seed)
     total = round(scenario.duration_s * scenario.control_hz)
-    path = out / RunFiles(options.folder).page(number).name
     with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
-        if options.view:
+        if view:
             recorder = recorder_of(job)
             result, record = _observed(job, recorder, bar)
             write_page(path, recorder.begin, recorder.states, outcome_text(result), recorder.note)
-            written = [path]
-        else:
-            video = None if options.no_video else path.with_suffix(".mp4")
-            drawn = ReplayPictures(path.with_suffix(".png"), video, box_scale_of(job))
-            with drawn as pictures:
-                result, record = _observed(job, pictures.add, bar)
-                pictures.finish()
-            written = pictures.written
-    for each in written:
-        print(f"Written: {each}")
-    print(outcome_text(result))
-    return written, _compare_row(options.folder, job, record)
+            return result, record, [path]
+        film = path.with_suffix(".mp4") if video else None
+        with ReplayPictures(path.with_suffix(".png"), film, box_scale_of(job)) as pictures:
+            result, record = _observed(job, pictures.add, bar)
+            pictures.finish()
+        return result, record, pictures.written
 
 
 def _observed(
@@ -221,16 +216,15 @@ def recorder_of(
         on_begin: as for :class:`~sim_tests.viewing.CrossingRecorder`.
         on_state: likewise.
     """
-    episode = Episode(**job_key(job)._asdict())
     pictures = CameraPictures(box_scale=box_scale_of(job), share=share) if camera else None
-    return CrossingRecorder(episode, pictures=pictures, on_begin=on_begin, on_state=on_state)
+    return CrossingRecorder(job.conditions, pictures=pictures, on_begin=on_begin, on_state=on_state)
 
 
 def box_scale_of(job: Job) -> float:
     """Return the size of the images of a job's boxes, over that of its scenario's camera."""
     if Perception.named(job.perception).kind != "pixels":
         return 1.0
-    return template_of(job.scenario).for_seed(job.seed).camera.picture_scale
+    return template_of(job.scenario_text).for_seed(job.seed).camera.picture_scale
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:
@@ -253,12 +247,12 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
             "the episode must be its number, or SCENARIO:SEED:POLICY (and :PLANNER or :FAULT where "
             f"that is not enough), got {episode!r}"
         )
-    keys = [job_key(job) for job in jobs]
+    keys = [job.conditions for job in jobs]
     found = [
         number
         for number, key in enumerate(keys)
         if [key.scenario, str(key.seed), key.policy] == parts[:3]
-        and all(part in (key.planner, key.fault, key.perception) for part in parts[3:])
+        and all(part in astuple(key)[3:] for part in parts[3:])
     ]
     if len(found) == 1:
         return found[0]
@@ -266,14 +260,13 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
         near = [key for key in keys if key.scenario == parts[0]][:1] or keys[:1]
         example = f"{near[0].scenario}:{near[0].seed}:{near[0].policy}"
         raise SimError(f"the run has no episode {episode!r}; one that it has is {example}")
-    listed = "; ".join(f"{number}: {describe(keys[number])}" for number in found[:6])
+    listed = "; ".join(f"{number}: {keys[number].text}" for number in found[:6])
     raise SimError(f"{episode!r} is {len(found)} episodes of the run, give one's number: {listed}")
 
 
 def _compare_row(folder: Path, job: Job, record: EpisodeRecord) -> int:
     """Print the difference to the row of the run; return 0 for the same row, else 1."""
-    key = job_key(job)
-    before = [each for each in read_rows(folder) if record_key(each) == key]
+    before = [each for each in read_rows(folder) if each.conditions == job.conditions]
     if not before:
         print(f"{folder} has no row of this episode yet")
         return 0

@@ -1,21 +1,76 @@
-"""The files in the folder of a run, read without the simulator."""
+"""An episode as plain data, and the files in the folder of a run, read without the simulator."""
 
 from __future__ import annotations
 
+import platform
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
-from perception.documents import parse_json, read_json, read_lines
+from perception.documents import parse_json, parse_yaml, read_json, read_lines
 
+from ...conditions import Conditions
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, read_records
-from ._job import JOB_FIELDS, Attempt, Job
 
 # Hearing.answers of sim_tests.actors.behaviour, whose import needs the simulator.
 DEFAULT_ANSWERS: Final = 0.5
 _ANSWERS: Final = re.compile(r"(?:^|,)\s*answers\s*=\s*([^,\s]+)")
+_PACKAGES: Final = ("awarenav", "numpy", "scipy", "opencv-python-headless", "pybullet")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job(Conditions):
+    """One episode to run: its conditions, and the texts that their names stand for.
+
+    Scenario, policy and fault are YAML text, so that a job gives the same episode on every worker,
+    even if the files change in the meantime. Each line of ``jobs.jsonl`` has these fields.
+
+    Attributes:
+        scenario_text: YAML of a :class:`ScenarioTemplate`, with the camera, the robot and the
+            population.
+        policy_text: YAML of an :class:`AwarenessPolicy`.
+        planner_text: ``"module:Class"``, empty for the reference planner.
+        fault_text: YAML of a :class:`Fault`, empty for none.
+    """
+
+    scenario_text: str
+    policy_text: str
+    planner_text: str = ""
+    fault_text: str = ""
+
+
+#: Names of the fields of a job, the keys of each line of ``jobs.jsonl``.
+JOB_FIELDS: Final = tuple(field.name for field in fields(Job))
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """The outcome of one episode.
+
+    Attributes:
+        record: its row in the table.
+        traceback: of the error that ended it; empty without an error.
+        conduct: of its planner; None for an episode that ended with an error.
+    """
+
+    record: EpisodeRecord
+    traceback: str = ""
+    conduct: Conduct | None = None
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that results depend on, beside the jobs themselves."""
+    found = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:  # pragma: no cover - a checkout that is not installed
+            found[name] = "unknown"
+    return found
 
 
 class RunFiles:
@@ -73,12 +128,32 @@ def read_jobs(folder: Path) -> tuple[Job, ...]:
 
 def _parse_job(line: str | bytes, source: str) -> Job:
     try:
-        return Job(**parse_json(line, source, SimError))
-    except (ValueError, TypeError) as cause:
+        values = parse_json(line, source, SimError)
+        return Job(**(_of_earlier_line(values) if "policy_name" in values else values))
+    except (ValueError, TypeError, KeyError) as cause:
         raise SimError(
             f"{source} is not an episode: it must be an object with the keys "
             f"{', '.join(JOB_FIELDS)} ({cause})"
         ) from cause
+
+
+def _of_earlier_line(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a job from a line whose keys are those of earlier versions."""
+    scenario = parse_yaml(values["scenario"], "its scenario", SimError)
+    planner = values["planner"]
+    straight = scenario["robot"].get("straight_on_speed_mps") is not None
+    return {
+        "scenario": scenario["name"],
+        "seed": values["seed"],
+        "policy": values["policy_name"],
+        "planner": planner.rpartition(":")[2] or ("StraightOn" if straight else "SamplingPlanner"),
+        "perception": values["perception"],
+        "fault": values["fault_name"],
+        "scenario_text": values["scenario"],
+        "policy_text": values["policy"],
+        "planner_text": planner,
+        "fault_text": values["fault"],
+    }
 
 
 def read_run(folder: Path) -> dict[str, Any]:
@@ -120,12 +195,9 @@ def read_attempts(folder: Path) -> dict[int, Attempt]:
     Raises:
         SimError: a file that is not of an episode of this run; the message names it.
     """
-    files = RunFiles(folder)
-    paths = sorted(files.ended.glob("*.json")) if files.ended.is_dir() else []
-    if not paths:
-        return {}
+    ended = RunFiles(folder).ended
     found = {}
-    for path in paths:
+    for path in sorted(ended.glob("*.json")) if ended.is_dir() else ():
         try:
             number = int(path.stem)
             content = read_json(path, SimError)

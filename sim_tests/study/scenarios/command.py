@@ -7,6 +7,8 @@ from pathlib import Path
 
 from awarenav.cli import NUMBER, FilePath, Whole, argument, command, group, option, options
 
+from ...conditions import COMPLETE_SCENARIOS
+
 
 @group("scenario")
 def scenario() -> None:
@@ -44,7 +46,7 @@ def list_scenarios(*, as_json: bool) -> int:
 @argument(
     "scenario",
     metavar="NAME|FILE",
-    shell_complete=options.COMPLETE_SCENARIOS,
+    shell_complete=COMPLETE_SCENARIOS,
     help="A shipped scenario, or a YAML file.",
 )
 @option("--yaml", is_flag=True, help="Print YAML instead, with the shared defaults written out.")
@@ -77,7 +79,7 @@ def show(scenario: str, *, yaml: bool, seed: int | None, out: Path | None) -> in
     nargs=-1,
     required=True,
     metavar="NAME|FILE...",
-    shell_complete=options.COMPLETE_SCENARIOS,
+    shell_complete=COMPLETE_SCENARIOS,
     help="YAML files, shipped scenarios, or a set of these: 'all', 'guidelines' or 'step_out'.",
 )
 @option(

@@ -79,12 +79,12 @@ def test_its_name_runs_it_beside_the_policy_of_today() -> None:
     (job,) = plan_jobs(
         ["reads_phone"], ["scanner"], [2000], planners=["costmap"], sensors=["scanner"]
     )
-    assert (job.planner, job.policy_name, job.perception) == ("costmap", "scanner", "scanner")
+    assert (job.planner_text, job.policy, job.perception) == ("costmap", "scanner", "scanner")
     scenario = ScenarioTemplate.shipped("reads_phone").for_seed(2000)
     blind, seeing = (
         run_crossing(
             scenario,
-            policy=policy_of(job.policy),
+            policy=policy_of(job.policy_text),
             planner=planner(scenario.robot_profile, scenario.planner_boxes_odom_m),
             perception="truth",
             seed=2000,

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from sim_tests import CrossingResult, run_crossing
 from sim_tests.actors.robot import NOVA_CARTER
 from sim_tests.crossing.planner import PlannerConfig, SamplingPlanner
-from sim_tests.crossing.planner._give_way import Way, giving_way_mps
+from sim_tests.crossing.planner._scene import Way, giving_way_mps
 from sim_tests.scenario import Scenario
 
 WAY = Way(bearing_rad=0.0, length_m=10.0, half_width_m=0.35, front_m=0.4, rear_m=0.3)

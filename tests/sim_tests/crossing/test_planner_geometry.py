@@ -13,13 +13,16 @@ from hypothesis import strategies as st
 from planner_scenes import HALF_LENGTH_M, HALF_WIDTH_M, OUTLINE_M, coordinate
 from scipy.integrate import quad
 
-from sim_tests.crossing.planner._detour import detour_bearing_rad
-from sim_tests.crossing.planner._rollout import (
+from sim_tests.crossing.planner._geometry import (
     Poses,
+    Rectangles,
+    box_gap_m,
+    disc_gap_m,
     ramp_integral,
     stopping_integral,
+    strip_distance_m,
 )
-from sim_tests.crossing.planner._scene import Rectangles, box_gap_m, disc_gap_m, strip_distance_m
+from sim_tests.crossing.planner._scene import detour_bearing_rad
 
 
 @given(
@@ -77,8 +80,8 @@ def test_the_box_gap_is_a_lower_bound_of_the_distance(
     pose: tuple[float, float, float], x: float, y: float, length: float, width: float
 ) -> None:
     rectangles, polygon = rectangle(*pose)
-    boxes = np.array([[x, y, x + length, y + width]])
-    assert float(box_gap_m(rectangles, boxes)) <= polygon.distance(shapely.box(*boxes[0])) + 1e-9
+    box = x, y, x + length, y + width
+    assert float(box_gap_m(rectangles, [box])) <= polygon.distance(shapely.box(*box)) + 1e-9
 
 
 @given(coordinate, coordinate, st.floats(-1.6, 1.6), st.floats(-1.6, 1.6), st.floats(0.0, 2.0))

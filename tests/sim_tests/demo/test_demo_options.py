@@ -12,15 +12,14 @@ from sim_tests.scenario import Scenario
 
 def test_without_options_the_crossings_are_the_shipped_ones() -> None:
     names = ("crossing_attentive", "crossing_distracted")
-    assert compared_scenarios("", "") == tuple(Scenario.shipped(name) for name in names)
+    assert compared_scenarios({}) == tuple(Scenario.shipped(name) for name in names)
 
 
 def test_the_crossings_have_the_robot_and_the_people_asked_for() -> None:
-    attentive, distracted = compared_scenarios("omni", "recorded")
+    attentive, distracted = compared_scenarios({"robot": "omni", "population": "recorded"})
     for scenario in (attentive, distracted):
         assert scenario.robot_model == RobotModel.shipped("omni")
         assert scenario.population == "recorded"
-        assert scenario.workers == ()
     assert attentive.people[0].route == distracted.people[0].route
     assert [each.people[0].glances.watches for each in (attentive, distracted)] == [True, False]
 

@@ -17,6 +17,7 @@ from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from sim_tests import Scenario, SimError
 from sim_tests.actors.robot import RobotModel
+from sim_tests.conditions import Experiment
 from sim_tests.search._settings import command_text, episode_words
 from sim_tests.search._study import Outcome, Range, Trial
 from sim_tests.search.falsify._results import policy_against, verdict_text
@@ -32,7 +33,7 @@ from sim_tests.search.falsify._search import (
 )
 from sim_tests.search.falsify._worst_cases import WorstCase, worst_episodes
 from sim_tests.study.measures import EpisodeRecord
-from sim_tests.study.runs import Conditions, policy_text
+from sim_tests.study.runs import policy_text
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 # A person who crosses ahead and does not look; a robot without its floor hits them.
@@ -374,14 +375,18 @@ def test_a_policy_is_compared_with_another_one(given_name, policy, expected):
 
 
 def test_the_next_command_repeats_the_sensors_and_is_safe_for_a_shell():
-    conditions = Conditions(
-        scenario=("my file.yaml", "runs_out"), planner=("a.b:C",), sensors=("camera+scanner",)
+    values = {"scenario": ("my file.yaml", "runs_out"), "perception": "keypoints", "seed": 3}
+    experiment = Experiment.taken_from(
+        {**values, "sensors": "camera+scanner", "planner": "a.b:C", "policy": "mine.yaml"}
     )
-    words = episode_words(conditions)
+    words = episode_words(experiment)
     assert shlex.split(command_text("falsify", *words)) == ["awarenav", "falsify", *words]
     assert words[:3] == ["--scenario", "my file.yaml", "runs_out"]
     assert words[3:] == [
-        *("--perception", "keypoints", "--sensors", "camera+scanner", "--planner", "a.b:C")
+        *("--planner", "a.b:C", "--perception", "keypoints", "--sensors", "camera+scanner")
     ]
-    others = episode_words(replace(conditions, population="recorded", robot="my robot.yaml"))
-    assert others[-6:-2] == ["--robot", "my robot.yaml", "--population", "recorded"]
+    others = episode_words(experiment.replaced(population="recorded", robot="my robot.yaml"))
+    assert others[-4:] == ["--population", "recorded", "--robot", "my robot.yaml"]
+    assert episode_words(Experiment.taken_from({**values, "planner": ""})) == [
+        *("--scenario", "my file.yaml", "runs_out", "--perception", "keypoints")
+    ]

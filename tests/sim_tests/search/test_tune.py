@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
+from sim_tests.conditions import Experiment
 from sim_tests.crossing import named_policy
 from sim_tests.scenario import shipped_templates
 from sim_tests.search._settings import common_settings
@@ -37,7 +38,6 @@ from sim_tests.search.tune._tune import (
     ranked_trials,
 )
 from sim_tests.study.measures import EpisodeRecord, Interval, write_records
-from sim_tests.study.runs import Conditions
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 SPACES = {name: PolicySpace(AwarenessPolicy.preset(name)) for name in PRESETS}
@@ -228,8 +228,15 @@ def test_a_third_of_the_scenarios_is_held_out_of_every_kind_of_attention():
 
 
 def tune_settings(**changes) -> TuneSettings:
-    common = common_settings("balanced", Conditions(scenario=["runs_out"], episodes=5))
-    others = {"ranges": {}, "trials": 10, "held_out": 5, "sampler": "tpe", "generation": 4}
+    common = common_settings(Experiment({"scenario": ("runs_out",)}))
+    others = {
+        "episodes": 5,
+        "ranges": {},
+        "trials": 10,
+        "held_out": 5,
+        "sampler": "tpe",
+        "generation": 4,
+    }
     return TuneSettings(**{**common, "perception": "truth", **others, **changes})
 
 
@@ -239,7 +246,7 @@ def test_the_episodes_of_a_tuning_have_its_perception(name):
     settings = tune_settings(perception=name)
     jobs = settings.jobs("b", balanced, range(7, 9), shipped_templates()[:3])
     assert len(jobs) == 6
-    assert {(job.perception, job.policy_name) for job in jobs} == {(name, "b")}
+    assert {(job.perception, job.policy) for job in jobs} == {(name, "b")}
     assert sorted({job.seed for job in jobs}) == [7, 8]
 
 

@@ -81,13 +81,11 @@ def made_up_run(
                     records.append(record)
                     jobs.append(
                         Job(
-                            scenario=f"name: {name}\nversion: 1\nattention: {attention}\n",
-                            seed=episode_seed,
-                            policy_name=policy,
-                            policy="inflation: {shape: linear}\n",
-                            perception=perception,
-                            fault_name=fault,
-                            fault=f"name: {fault}\n" if fault else "",
+                            *(name, episode_seed, policy, "SamplingPlanner", perception),
+                            fault=fault,
+                            scenario_text=f"name: {name}\nversion: 1\nattention: {attention}\n",
+                            policy_text="inflation: {shape: linear}\n",
+                            fault_text=f"name: {fault}\n" if fault else "",
                         )
                     )
     run = {

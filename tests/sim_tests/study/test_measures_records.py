@@ -1,35 +1,38 @@
 """Tables of episodes: what is written is read again, and what is broken is said."""
 
 import csv
-from dataclasses import fields
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from paths import ROOT
 
 from sim_tests import SimError
 from sim_tests.demo._comparison import EPISODE_COLUMNS
 from sim_tests.study.measures import (
+    COLUMNS,
     RECORD_COLUMNS,
     EpisodeRecord,
     read_records,
     record_row,
     write_records,
 )
-from sim_tests.study.measures._record_file import rounded
+from sim_tests.study.measures._record import rounded
 
 numbers = st.none() | st.floats(-1e6, 1e6).map(rounded)
 texts = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
 KINDS = {
-    "str": texts,
-    "bool": st.booleans(),
-    "int": st.integers(-(2**40), 2**40),
-    "float | None": numbers,
-    "Awareness": st.sampled_from(["", "aware", "unaware", "falsely_aware", "missed_aware"]),
+    "text": texts,
+    "flag": st.booleans(),
+    "count": st.integers(-(2**40), 2**40),
+    "number": numbers,
 }
-records = st.builds(
-    EpisodeRecord, **{field.name: KINDS[field.type] for field in fields(EpisodeRecord)}
-)
+cells = {name: KINDS[each.kind] for name, each in COLUMNS.items()}
+cells["awareness"] = st.sampled_from(["", "aware", "unaware", "falsely_aware", "missed_aware"])
+records = st.builds(EpisodeRecord, **cells)
 PLAIN = EpisodeRecord("late_glance", 3, "balanced", "SamplingPlanner", "truth", success=True)
 in_one_folder = settings(
     max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -68,7 +71,7 @@ def test_the_columns_of_earlier_tables_come_first_and_alone_suffice(tmp_path):
         (("scenario,", ""), "no column 'scenario'"),
         ((",true,", ",yes,"), "line 2: success must be true or false, got 'yes'"),
         (("glance,3,", "glance,3.5,"), "line 2: seed must be a whole number, got '3.5'"),
-        (("late_glance,", "late,glance,"), "line 2 has 60 cells, its header 59"),
+        (("late_glance,", "late,glance,"), "line 2 has 63 cells, its header 62"),
         (("mixed", "mixed,nan"), "cells"),
         (("scenario", "\x00\x01"), "not a table of episodes"),
     ],
@@ -109,3 +112,33 @@ def test_a_write_that_fails_leaves_the_old_table(tmp_path):
     assert read_records(path) == (PLAIN,)
     with pytest.raises(SimError, match="cannot write the episodes"):
         write_records(tmp_path / "absent" / "episodes.csv", [PLAIN])
+
+
+#: One function more in the registry; what follows reads it.
+ONE_MORE = """
+from sim_tests.study.measures import _metrics
+
+@_metrics.measure_of_log("Half of the path", better="higher", decimals=1)
+def half_path_m(log) -> "float":
+    '''Half of the length that the robot drove.'''
+    return 0.5 * log.path_length_m
+
+from measured_scenes import crossing, straight
+from sim_tests.study.measures import *
+from tools.docs_site.reference import metrics_page
+
+record = measure(crossing([0.0, 0.5, 1.0], straight(1.0)))
+assert record.half_path_m == 0.5
+assert RECORD_COLUMNS[-1] == "half_path_m" and record_row(record)[-1] == "0.500000"
+assert METRICS["half_path_m"].unit == "m"
+assert summarise([record]).policies[0].means["half_path_m"].value == 0.5
+assert "| `half_path_m` | Half of the path | m | higher | Half of the length" in metrics_page()
+"""
+
+
+@pytest.mark.slow
+def test_a_new_measure_is_one_function():
+    path = [str(ROOT), str(Path(__file__).parent)]
+    code = f"import sys; sys.path[:0] = {path!r}\n{ONE_MORE}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -6,7 +6,8 @@ from run_planners import READY
 from run_scenes import short
 
 from sim_tests import NOVA_CARTER, SimError
-from sim_tests.study.runs import make_planner, plan_jobs
+from sim_tests.crossing.planner import make_planner
+from sim_tests.study.runs import plan_jobs
 
 
 @pytest.mark.parametrize(

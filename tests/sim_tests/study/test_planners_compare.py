@@ -10,6 +10,7 @@ import pytest
 from page_reader import PageReader
 
 from awarenav.cli import main
+from sim_tests.conditions import Experiment
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import Conduct
 from sim_tests.study.report import compare_planners
@@ -19,7 +20,6 @@ from sim_tests.study.report._results import Results
 from sim_tests.study.report._run import Run
 from sim_tests.study.report.command import command_line
 from sim_tests.study.runs import (
-    job_key,
     policy_of,
     read_attempts,
     read_jobs,
@@ -34,9 +34,10 @@ duration_s: 9.0
 control_hz: 10.0
 layout: {x_min_m: -3.0, y_min_m: -4.0, x_max_m: 8.0, y_max_m: 4.0}
 robot: {goal_x_m: 2.0}
-workers:
-  - path:
-      - {t_s: 0.0, x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}
+people:
+  - name: stands
+    route: [{x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}]
+    glances: {notices_within_m: 0.0}
 """
 NAMES = ["straight_on", "run_planners:Raises", "run_planners:ReturnsNothing"]
 
@@ -69,7 +70,7 @@ def tables(folder):
 
 
 def test_every_planner_runs_with_blind_and_the_reference_planner_runs_too(folder):
-    ran = [(key.policy, key.planner) for key in map(job_key, read_jobs(folder))]
+    ran = [(key.policy, key.planner) for key in read_jobs(folder)]
     for policy in ("blind", "balanced", "balanced, radii × 2"):
         planners = [planner for of, planner in ran if of == policy]
         assert planners == ["SamplingPlanner", "straight_on", "Raises", "ReturnsNothing"]
@@ -152,8 +153,8 @@ def test_a_broken_limit_and_a_late_command_are_marked(folder, changed, column, t
 def test_the_probe_of_radii_changes_radii_alone():
     jobs, wide = plan_comparison(["straight_on"], [scene()], ["oracle", "balanced"], range(7))
     assert wide == "balanced, radii × 2"
-    assert sum(job.policy_name == wide for job in jobs) == 2 * 5
-    policies = {job.policy_name: policy_of(job.policy) for job in jobs}
+    assert sum(job.policy == wide for job in jobs) == 2 * 5
+    policies = {job.policy: policy_of(job.policy_text) for job in jobs}
     changed, same = policies[wide], policies["balanced"]
     assert changed.inflation.radius_m(0.0) == 2.0 * same.inflation.radius_m(0.0)
     assert changed.inflation.radius_m(1.0) == 2.0 * same.inflation.radius_m(1.0)
@@ -169,15 +170,15 @@ def test_robot_and_population_are_those_of_every_episode_and_of_the_command():
         robot="delivery",
         population="recorded",
     )
-    names = {job_key(job).scenario for job in jobs}
+    names = {job.scenario for job in jobs}
     assert names == {"late_glance_delivery", "crossing_attentive_delivery"}
-    assert {template_of(job.scenario).for_seed(0).population for job in jobs} == {"recorded"}
-    settings = {"scenario": ["runs_out"], "policy": ["blind"], "seeds": (0, 1)}
-    settings |= {"perception": "truth", "sensors": "camera", "camera": ""}
-    settings |= {"robot": "omni", "population": "recorded"}
-    assert command_line(("reference",), Path("out"), settings) == (
+    assert {template_of(job.scenario_text).for_seed(0).population for job in jobs} == {"recorded"}
+    values = {"scenario": ("runs_out",), "policy": ("blind",), "perception": "truth"}
+    values |= {"sensors": "camera+scanner", "camera": "", "robot": "omni", "population": "recorded"}
+    experiment = Experiment.taken_from(values)
+    assert command_line(("reference",), (0, 1), experiment, Path("out")) == (
         "awarenav planners compare reference --scenario runs_out --policy blind --seeds 0-1 "
-        "--perception truth --sensors camera --robot omni --population recorded --out out"
+        "--perception truth --sensors camera+scanner --robot omni --population recorded --out out"
     )
 
 

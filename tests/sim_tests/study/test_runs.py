@@ -60,7 +60,7 @@ def killed(serial, tmp_path):
 def test_a_run_writes_its_table_its_jobs_and_its_settings(serial):
     records = read_records(serial / "episodes.csv")
     assert [(record.seed, record.policy) for record in records] == [
-        (job.seed, job.policy_name) for job in JOBS
+        (job.seed, job.policy) for job in JOBS
     ]
     assert all(record.success and not record.error for record in records)
     assert all(record.time_without_people_s > 0.0 for record in records)

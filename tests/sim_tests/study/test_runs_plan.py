@@ -6,9 +6,8 @@ from run_scenes import short, short_jobs
 
 from nav_adapter import NavError
 from sim_tests import SimError
-from sim_tests.crossing.eyes import ORACLE
+from sim_tests.conditions import ORACLE
 from sim_tests.study.runs import (
-    job_key,
     plan_jobs,
     run_episode,
 )
@@ -23,7 +22,7 @@ def test_every_combination_is_planned_once_and_seeds_are_paired():
         perception="truth",
         faults=["none", "misses_30"],
     )
-    keys = [job_key(job) for job in jobs]
+    keys = [job.conditions for job in jobs]
     assert len(set(keys)) == len(jobs) == 2**5
     for policy in ("blind", "balanced"):
         seeds = [(key.scenario, key.seed, key.fault) for key in keys if key.policy == policy]
@@ -38,13 +37,13 @@ def test_every_combination_is_planned_once_and_seeds_are_paired():
 
 def test_the_oracle_is_balanced_and_knows_the_truth():
     blind, oracle = plan_jobs([short()], ["balanced", ORACLE], [0], perception="keypoints")
-    assert oracle.policy == blind.policy
+    assert oracle.policy_text == blind.policy_text
     assert (blind.perception, oracle.perception) == ("keypoints", "oracle")
-    assert oracle.policy_name == "oracle"
+    assert oracle.policy == "oracle"
 
 
 def test_all_scenarios_are_those_that_need_a_planner():
-    names = {job_key(job).scenario for job in plan_jobs(["all"], ["blind"], [0])}
+    names = {job.scenario for job in plan_jobs(["all"], ["blind"], [0])}
     assert "crossing_attentive" in names
     assert "paper_encounter" not in names
 
@@ -74,7 +73,7 @@ def test_seeds_policies_and_scenarios_are_checked():
         plan_jobs([short()], ["blind"], [0.5])
     with pytest.raises(NavError, match="preset must be one of"):
         plan_jobs([short()], ["brave"], [0])
-    with pytest.raises(SimError, match="two episodes have the same scenario name"):
+    with pytest.raises(SimError, match="two episodes have the same scenario, seed, policy"):
         plan_jobs([short(), short()], ["blind"], [0])
 
 

@@ -15,7 +15,7 @@ from awarenav.cli import main
 from sim_tests import SimError
 from sim_tests.crossing.faults import shipped_faults
 from sim_tests.study.measures import read_records
-from sim_tests.study.runs import job_key, plan_jobs, sample_jobs
+from sim_tests.study.runs import plan_jobs, sample_jobs
 
 SCANNERS = [name for name in shipped_faults() if name.startswith("scanner_")]
 
@@ -45,13 +45,13 @@ def test_a_sample_is_even(count: int, seed: int) -> None:
     # The order of the plan, so that jobs.jsonl is that of a run of these episodes.
     rows = [numbers()[job] for job in drawn]
     assert rows == sorted(rows)
-    faults = Counter(job.fault_name for job in drawn)
+    faults = Counter(job.fault for job in drawn)
     # Each fault once before any twice.
     assert len(faults) == min(count, 7)
     assert max(faults.values()) - min(faults.values()) <= 1
-    scenarios = Counter(job_key(job).scenario for job in drawn)
+    scenarios = Counter(job.scenario for job in drawn)
     assert len(scenarios) == min(count, 5)
-    policies = Counter(job.policy_name for job in drawn)
+    policies = Counter(job.policy for job in drawn)
     if count <= 105:
         assert max(scenarios.values()) - min(scenarios.values()) <= 1
         assert abs(policies["blind"] - policies["balanced"]) <= 0.1 * count + 2
@@ -69,7 +69,7 @@ def test_a_larger_sample_holds_the_smaller_one(count: int, seed: int) -> None:
 def test_a_pattern_stands_for_the_shipped_faults_that_fit() -> None:
     def faults(*patterns: str) -> list[str]:
         jobs = plan_jobs([short()], ["blind"], [0], perception="truth", faults=patterns)
-        return [job.fault_name for job in jobs]
+        return [job.fault for job in jobs]
 
     assert faults("scanner_*") == SCANNERS
     assert faults("none", "*_5deg") == ["", "wrong_pitch_5deg", "wrong_yaw_5deg"]

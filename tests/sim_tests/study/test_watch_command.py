@@ -19,8 +19,9 @@ from run_scenes import SHORT
 
 from awarenav.cli import main
 from sim_tests.actors.robot import RobotModel
-from sim_tests.study.runs import Conditions, plan_jobs, template_of
-from sim_tests.study.watch._watch import _job
+from sim_tests.conditions import Experiment
+from sim_tests.study._watch import _job
+from sim_tests.study.runs import plan_jobs, template_of
 
 #: Three seconds of a robot on its way, with control at 20 Hz.
 WATCHED = (
@@ -107,11 +108,13 @@ def test_an_interrupted_crossing_ends_with_130(scenario):
 
 
 def test_a_crossing_is_watched_with_another_robot_and_population() -> None:
-    values = {"scenario": "late_glance", "perception": "truth", "seed": 3}
-    usual = Conditions.taken_from(dict(values))
-    conditions = Conditions.taken_from({**values, "robot": "omni", "population": "recorded"})
-    scenario = template_of(_job(conditions, "blind").scenario).for_seed(3)
+    values = {"scenario": "late_glance", "policy": "blind", "perception": "truth", "seed": 3}
+    usual = Experiment.taken_from(dict(values))
+    others = Experiment.taken_from({**values, "robot": "omni", "population": "recorded"})
+    job = _job(others)
+    assert (job.robot, job.population, job.camera) == ("omni", "recorded", "")
+    scenario = template_of(job.scenario_text).for_seed(3)
     assert scenario.robot_model == RobotModel.shipped("omni")
     assert scenario.population == "recorded"
     (own,) = plan_jobs(["late_glance"], ["blind"], [3], perception="truth")
-    assert _job(usual, "blind") == own
+    assert _job(usual) == own

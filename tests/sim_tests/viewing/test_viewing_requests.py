@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from viewed_crossing import EPISODE, SHORT
+from viewed_crossing import CONDITIONS, SHORT
 
 from nav_adapter import Alert
 from nav_adapter.alerts import Answer
@@ -57,7 +57,7 @@ def run(*observers, control_hz: float = 20.0, duration_s: float = 3.6) -> None:
 class Asked:
     """Records of observers of one crossing with a request and an answer."""
 
-    recorder: CrossingRecorder = field(default_factory=lambda: CrossingRecorder(EPISODE))
+    recorder: CrossingRecorder = field(default_factory=lambda: CrossingRecorder(CONDITIONS))
     memory: RequestMemory = field(default_factory=RequestMemory)
     shown: list[tuple[float, list[tuple[str, bool]]]] = field(default_factory=list)
     views: dict[str, TopView] = field(default_factory=dict)
@@ -91,7 +91,7 @@ def asked() -> Asked:
 def test_states_have_each_request_and_answer_once_whatever_the_rate_of_control(control_hz, asked):
     recorder = asked.recorder
     if control_hz != 20.0:
-        recorder = CrossingRecorder(EPISODE)
+        recorder = CrossingRecorder(CONDITIONS)
         run(recorder, control_hz=control_hz, duration_s=1.5)
     ((t_s, request),) = [(s["t_s"], e) for s in recorder.states for e in s["requests"]]
     ((looked, answer),) = [(s["t_s"], e) for s in recorder.states for e in s["answers"]]

@@ -119,7 +119,7 @@ def test_a_renderer_that_fails_ends_the_pictures_and_not_the_crossing(monkeypatc
 
 def test_rendering_takes_no_more_than_its_share_of_the_time(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("sim_tests.viewing._pictures.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("sim_tests.viewing._recorder.time.monotonic", lambda: now[0])
     pictures = CameraPictures(1000.0, share=0.25)
     taken = []
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sim_tests.conditions import Conditions
 from sim_tests.crossing import CrossingFrame, CrossingResult, Stage, run_crossing
 from sim_tests.scenario import ScenarioTemplate
-from sim_tests.viewing import CameraPictures, CrossingRecorder, Episode
+from sim_tests.viewing import CameraPictures, CrossingRecorder
 
 SHORT = """
 name: short
@@ -14,12 +15,13 @@ control_hz: 20.0
 layout: {x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}
 camera: {width_px: 640, height_px: 400}
 robot: {goal_x_m: 0.6}
-workers:
-  - path:
-      - {t_s: 0.0, x_m: 4.0, y_m: -0.8}
-      - {t_s: 2.0, x_m: 3.2, y_m: -0.8}
+people:
+  - name: walks
+    route: [{x_m: 4.0, y_m: -0.8}, {x_m: 3.2, y_m: -0.8}]
+    speed_mps: 0.4
+    glances: {notices_within_m: 0.0}
 """
-EPISODE = Episode(scenario="short", seed=0, policy="balanced", planner="SamplingPlanner")
+CONDITIONS = Conditions("short", 0, "balanced", "SamplingPlanner", "truth")
 
 
 def record(
@@ -27,7 +29,7 @@ def record(
 ) -> tuple[CrossingRecorder, CrossingResult, list[CrossingFrame]]:
     """Return the recorder, the result and the frames of the crossing."""
     pictures = CameraPictures(2.0) if camera else None
-    recorder = CrossingRecorder(EPISODE, pictures=pictures)
+    recorder = CrossingRecorder(CONDITIONS, pictures=pictures)
     frames: list[CrossingFrame] = []
 
     def observe(frame: CrossingFrame, stage: Stage) -> None:

@@ -1,0 +1,453 @@
+"""The conditions of an episode: every axis of an experiment, from the command line to the table.
+
+A new axis is one field of :class:`Conditions`, and the code that gives it a meaning. The options of
+the commands, the column of ``episodes.csv``, the key of an episode, the keys of ``jobs.jsonl`` and
+the words of ``run.json`` follow from the field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
+
+from awarenav.cli import OneOf, Whole, WordAndNumbers, option
+from awarenav.cli.options import completion_of
+from awarenav.errors import not_one_of
+
+from .world.errors import SimError
+
+#: How the people in an image are perceived.
+PerceptionKind = Literal["truth", "keypoints", "pixels"]
+#: The sensors of the robot.
+SensorSet = Literal["camera", "camera+scanner", "scanner"]
+#: One more kind, for comparison: the truth about everybody who is not hidden by a rack.
+ORACLE: Final = "oracle"
+#: The command line's name of the reference planner, which is empty elsewhere.
+REFERENCE_PLANNER: Final = "reference"
+#: The name that stands for "without a fault".
+NO_FAULT: Final = "none"
+#: The habits that people can have.
+POPULATIONS: Final = ("classic", "recorded")
+
+#: Completion of scenarios on the command line.
+COMPLETE_SCENARIOS: Final = completion_of(
+    "sim_tests",
+    "scenario/shipped",
+    *("all", "guidelines", "step_out"),
+    sets=("guidelines", "step_out"),
+)
+#: Completion of the policies of crossings, which have today's AMR besides.
+COMPLETE_SIMULATED_POLICIES: Final = completion_of("nav_adapter", "policies", "scanner")
+
+_KINDS: Final[tuple[str, ...]] = get_args(PerceptionKind)
+_SENSOR_SETS: Final[tuple[str, ...]] = get_args(SensorSet)
+_AND_SCANNER: Final = "+scanner"
+_SCANNER: Final = "scanner"
+# A scanner adds nothing to the truth.
+_TRUTHS: Final = ("truth", ORACLE)
+
+_ScenarioT = TypeVar("_ScenarioT")
+
+
+class Perception(NamedTuple):
+    """The perception of a robot.
+
+    Attributes:
+        kind: one of :data:`PerceptionKind`, :data:`ORACLE`, or empty without a camera.
+        has_scanners: whether the scenario's scanners are used.
+    """
+
+    kind: str
+    has_scanners: bool = False
+
+    @property
+    def name(self) -> str:
+        """The name in tables, such as ``"keypoints+scanner"``."""
+        if not self.has_scanners:
+            return self.kind
+        return self.kind + _AND_SCANNER if self.kind else _SCANNER
+
+    @property
+    def sensors(self) -> SensorSet:
+        """The set of sensors: with the kind, what :meth:`of` takes."""
+        if not self.has_scanners:
+            return "camera"
+        return "camera+scanner" if self.kind else "scanner"
+
+    @property
+    def options(self) -> str:
+        """The options of the command line, such as ``"--perception keypoints"``."""
+        if not self.has_scanners:
+            return f"--perception {self.kind}"
+        if not self.kind:
+            return "--sensors scanner"
+        return f"--perception {self.kind} --sensors camera+scanner"
+
+    @classmethod
+    def named(cls, name: str) -> Perception:
+        """Return the perception of a name in tables.
+
+        Raises:
+            SimError: for another name.
+        """
+        if name == _SCANNER:
+            return cls("", has_scanners=True)
+        kind = name.removesuffix(_AND_SCANNER)
+        has_scanners = kind != name
+        if kind in (*_KINDS, ORACLE) and not (has_scanners and kind in _TRUTHS):
+            return cls(kind, has_scanners)
+        seen = (kind for kind in _KINDS if kind not in _TRUTHS)
+        names = (*_KINDS, *(kind + _AND_SCANNER for kind in seen), _SCANNER)
+        raise SimError(not_one_of("perception", name, names))
+
+    @classmethod
+    def of(cls, kind: str, sensors: str) -> Perception:
+        """Return the perception of a kind with a set of sensors.
+
+        Args:
+            kind: one of :data:`PerceptionKind`.
+            sensors: one of :data:`SensorSet`; with the scanner alone, the kind does not matter.
+
+        Raises:
+            SimError: for other names, and for the truth with a scanner.
+        """
+        if kind not in _KINDS:
+            raise SimError(not_one_of("perception", kind, _KINDS))
+        if sensors not in _SENSOR_SETS:
+            raise SimError(not_one_of("sensors", sensors, _SENSOR_SETS))
+        if sensors == "camera":
+            return cls(kind)
+        if sensors == "scanner":
+            return cls("", has_scanners=True)
+        if kind in _TRUTHS:
+            raise SimError(
+                f"perception {kind!r} has no use for a scanner: sensors must be 'camera', got "
+                f"{sensors!r}; or perception must be 'keypoints' or 'pixels'"
+            )
+        return cls(kind, has_scanners=True)
+
+
+class AxisOption(NamedTuple):
+    """An option of the command line that gives an axis its value.
+
+    Attributes:
+        settings: of :func:`awarenav.cli.option`, for one value.
+        several: settings that differ for several values to compare; None where there are never
+            several.
+    """
+
+    settings: Mapping[str, Any]
+    several: Mapping[str, Any] | None = None
+
+
+def _axis(
+    meaning: str,
+    *,
+    several: Mapping[str, Any] | None = None,
+    also: Mapping[str, AxisOption] | None = None,
+    empty: bool = False,
+    changes_scenario: bool = False,
+    **option: Any,
+) -> Any:
+    """Return a field of the conditions.
+
+    Args:
+        meaning: of its column in ``episodes.csv``.
+        several: as for :class:`AxisOption`.
+        also: further options that the value is made of, by name.
+        empty: the value may be empty, and a table may lack the column.
+        changes_scenario: the value is given to ``with_NAME`` of the scenario's template.
+        option: settings of the option of the same name, for one value.
+    """
+    about = {
+        "meaning": meaning,
+        "option": AxisOption(option, several),
+        "also": also or {},
+        "changes_scenario": changes_scenario,
+    }
+    return field(default="" if empty else MISSING, metadata=about)
+
+
+def _without_reference(context: Any, parameter: Any, value: Any) -> Any:
+    """Return the value of ``--planner`` with '' for 'reference'."""
+    if isinstance(value, tuple):
+        return tuple("" if each == REFERENCE_PLANNER else each for each in value)
+    return "" if value == REFERENCE_PLANNER else value
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """The conditions of one episode, each by its name in tables.
+
+    Jobs have these fields, tables these columns. The metadata of a field
+    are those of :func:`_axis`.
+    """
+
+    scenario: str = _axis(
+        "Name of the scenario.",
+        help="A shipped scenario, or a YAML file.",
+        metavar="NAME|FILE",
+        shell_complete=COMPLETE_SCENARIOS,
+        several={
+            "help": "Scenarios: shipped ones, YAML files, or a set of shipped ones that have a "
+            "planner: 'all', 'guidelines' or 'step_out'.",
+            "default": ["all"],
+        },
+    )
+    seed: int = _axis(
+        "Of the episode.",
+        help="Seed of the random numbers.",
+        type=Whole(0),
+        default=0,
+        metavar="N",
+    )
+    policy: str = _axis(
+        "Name of the policy.",
+        help="Policy: a preset, or a YAML file.",
+        default="balanced",
+        metavar="NAME|FILE",
+        shell_complete=COMPLETE_SIMULATED_POLICIES,
+        several={
+            "help": "Policies: presets, 'scanner' (today's AMR), YAML files, or 'oracle' (balanced "
+            "with true awareness).",
+            "default": ["balanced"],
+            "shell_complete": completion_of("nav_adapter", "policies", "scanner", ORACLE),
+        },
+    )
+    planner: str = _axis(
+        "Name of the planner.",
+        help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
+        "class of yours, which gets the robot's profile, and static_boxes_odom_m if it takes that.",
+        default=REFERENCE_PLANNER,
+        metavar="MODULE:CLASS",
+        callback=_without_reference,
+        several={"default": [REFERENCE_PLANNER]},
+    )
+    perception: str = _axis(
+        '``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are '
+        'scanners too, or ``"scanner"``.',
+        help="How the robot perceives people.",
+        type=OneOf(_KINDS),
+        default="keypoints",
+        also={
+            "sensors": AxisOption(
+                {
+                    "help": "Sensors of the robot: its camera, its laser scanners, or both. With "
+                    "scanners, --perception is keypoints or pixels.",
+                    "type": OneOf(_SENSOR_SETS),
+                    "default": "camera",
+                },
+                several={"default": ["camera"], "note": " Several sets are compared."},
+            )
+        },
+    )
+    camera: str = _axis(
+        "Name of another camera on the robot, empty for the scenario's own.",
+        empty=True,
+        changes_scenario=True,
+        help="Another camera on the robot: 'forward' (120 degrees, as in the shipped scenarios), "
+        "'surround' (360 degrees), or a YAML file.",
+        default="",
+        show_default="each scenario's own",
+        metavar="NAME|FILE",
+        shell_complete=completion_of("sim_tests", "scenario/shipped/cameras"),
+    )
+    robot: str = _axis(
+        "Name of another robot, empty for the scenario's own.",
+        empty=True,
+        changes_scenario=True,
+        help="Another robot: 'forklift' (it steers), 'omni' (it moves sideways), 'delivery' "
+        "(small), or a YAML file. Room and time of the scenarios are fitted to it.",
+        default="",
+        show_default="nova_carter",
+        metavar="NAME|FILE",
+        shell_complete=completion_of("sim_tests", "actors/robot/shipped", "nova_carter"),
+    )
+    population: str = _axis(
+        "Habits of the people, empty for the scenario's own.",
+        empty=True,
+        changes_scenario=True,
+        help="Habits of the people: 'classic', or 'recorded' as fitted to recorded people; and how "
+        "they hear a request for attention: 'answers=0.3', or "
+        "'recorded,answers=0.8,startles=0.2'.",
+        type=WordAndNumbers(POPULATIONS),
+        default=None,
+        show_default="each scenario's own",
+        metavar="NAME|KEY=VALUE,...",
+    )
+    fault: str = _axis(
+        "Name of the fault, empty for none.",
+        empty=True,
+        help="Fault: a shipped one, a YAML file, several joined by '+', or 'none'.",
+        default=NO_FAULT,
+        metavar="NAME|FILE",
+        shell_complete=completion_of("sim_tests", "crossing/faults", "none"),
+        several={
+            "help": "Faults: shipped ones, YAML files, several joined by '+', or 'none'; every "
+            "combination runs with each. 'scanner_*' stands for all shipped ones that fit.",
+            "default": [NO_FAULT],
+        },
+    )
+
+    @property
+    def conditions(self) -> Conditions:
+        """The conditions alone, of a job that has more: the key of its episode."""
+        return Conditions(**{name: getattr(self, name) for name in AXES})
+
+    @property
+    def text(self) -> str:
+        """The conditions in words; those that are empty are left out."""
+        named = {"seed": "seed ", "policy": "policy ", "planner": "", "scenario": ""}
+        words = [
+            f"{named.get(name, f'{name} ')}{value}"
+            for name in AXES
+            if (value := getattr(self, name)) != ""
+        ]
+        return ", ".join(words)
+
+
+#: Names of the axes, in the order of the columns of tables.
+AXES: Final = tuple(each.name for each in fields(Conditions))
+#: Options of the command line by name, in the order of the help.
+OPTIONS: Final[dict[str, AxisOption]] = {
+    name: each
+    for axis in sorted(fields(Conditions), key=lambda axis: axis.name == "seed")
+    for name, each in {axis.name: axis.metadata["option"], **axis.metadata["also"]}.items()
+}
+#: Options that may have several values, which a command's episodes combine.
+COMBINED: Final = tuple(name for name, each in OPTIONS.items() if each.several is not None)
+_CHANGES: Final = tuple(
+    each.name for each in fields(Conditions) if each.metadata["changes_scenario"]
+)
+
+
+def changed_scenario(scenario: _ScenarioT, values: Mapping[str, Any]) -> _ScenarioT:
+    """Return the template of a scenario as the axes among some values change it.
+
+    Args:
+        scenario: a template, with a method ``with_NAME`` for each of these axes.
+        values: by the name of the axis; None and empty ones change nothing.
+    """
+    for name in _CHANGES:
+        if values.get(name) not in (None, ""):
+            scenario = getattr(scenario, f"with_{name}")(values[name])
+    return scenario
+
+
+def table_name(value: Any) -> str:
+    """Return the name in tables of the value of an axis: a file's is that of its stem."""
+    path = Path(str(value or ""))
+    return path.stem if path.suffix in (".yaml", ".yml") else str(value or "")
+
+
+def conditions_options(
+    *,
+    many: Sequence[str] = (),
+    without: Sequence[str] = (),
+    repeated: bool = False,
+    **changes: Mapping[str, Any],
+) -> Callable[[Any], Any]:
+    """Return a decorator that adds the options of all axes to a command.
+
+    Args:
+        many: options that take several values.
+        without: options that the command does not have.
+        repeated: each of several values needs the option before it, as beside positional arguments.
+        changes: other settings of an option, by its name; ``note`` is added to the help.
+    """
+
+    def decorate(function: Any) -> Any:
+        for name, each in reversed(OPTIONS.items()):
+            if name in without:
+                continue
+            settings = dict(each.settings)
+            if name in many:
+                settings |= {**(each.several or {}), "multiple" if repeated else "many": True}
+                if repeated:
+                    settings["help"] += " May be given more than once."
+                elif "metavar" in settings:
+                    settings["metavar"] += "..."
+            settings |= changes.get(name, {})
+            settings["help"] += settings.pop("note", "")
+            function = option(f"--{name}", **settings)(function)
+        return function
+
+    return decorate
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """The values that the options of a command give to the axes: one, or several to compare.
+
+    Attributes:
+        values: by the name of the option; a tuple where :data:`COMBINED` has the option.
+        episodes: number of seeds; ``seed`` is the first.
+    """
+
+    values: Mapping[str, Any]
+    episodes: int = 1
+
+    @classmethod
+    def taken_from(cls, values: dict[str, Any]) -> Experiment:
+        """Return the experiment among the options of a command, and take them out of these."""
+        episodes = values.pop("episodes", 1)
+        found = {name: values.pop(name) for name in OPTIONS if name in values}
+        return cls({}, episodes).replaced(**found)
+
+    def replaced(self, **values: Any) -> Experiment:
+        """Return the same experiment with other values."""
+        tuples = {
+            name: (value,) if name in COMBINED and isinstance(value, str) else value
+            for name, value in values.items()
+        }
+        return Experiment({**self.values, **tuples}, self.episodes)
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of an option, or the values of one in :data:`COMBINED`."""
+        if name in self.values:
+            return self.values[name]
+        usual = OPTIONS[name].settings["default"]
+        return ("" if usual == REFERENCE_PLANNER else usual,) if name in COMBINED else usual
+
+    def one(self, name: str) -> Any:
+        """Return the value of an option that has a single one."""
+        value = self[name]
+        if not isinstance(value, tuple):
+            return value
+        (only,) = value
+        return only
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """The values of the axes that change scenarios; empty ones keep the scenario's own."""
+        return {name: self[name] or "" for name in _CHANGES}
+
+    def settings(self, **more: Any) -> dict[str, Any]:
+        """Return the values as they are given on the command line.
+
+        Without those that are None or empty, and without the camera as the only set of sensors.
+
+        Args:
+            more: further values, by the names of their options.
+        """
+        found = {**self.values, "episodes": self.episodes, **more}
+        if "planner" in found:
+            found["planner"] = [each or REFERENCE_PLANNER for each in found["planner"]]
+        if tuple(found.get("sensors", ())) == ("camera",):
+            del found["sensors"]
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in found.items()
+            if value not in (None, "")
+        }
+
+
+def option_words(settings: Mapping[str, Any]) -> list[str]:
+    """Return the words of a command line that give options these values."""
+    words: list[str] = []
+    for name, value in settings.items():
+        several: Iterable[Any] = value if isinstance(value, list) else [value]
+        words += [f"--{name}", *map(str, several)]
+    return words

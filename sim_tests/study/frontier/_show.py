@@ -1,0 +1,218 @@
+"""The frontier shown: a table and two sentences, and the picture with today's AMR on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from awarenav.errors import counted
+from awarenav.figures import Axes, new_figure, save_figure, scale_by_roots
+from perception.arrays import FloatArray
+
+from ..measures import NOTHING, Interval
+from ..report import Table
+from ._frontier import Frontier, Point, Worth
+
+# The policy of the sentences, chosen beforehand: that of `balanced`.
+_SPEED_MPS: Final = 1.5
+_KINDS: Final = {"blind": "none", "aware": "who looks", "memory": "who looks or has looked"}
+_HEADER: Final = (
+    "policy",
+    "U (m/s)",
+    "awareness",
+    "time lost (s)",
+    "time over today's",
+    "impacts",
+    "wins at equal risk (s)",
+    "avoids at equal time",
+)
+_TODAY: Final = "#b3261e"
+_OTHER: Final = "#b8651b"
+_LINES: Final = {
+    "blind": ("#8a8f98", "s", "without awareness"),
+    "aware": ("#1f4e79", "o", "with awareness"),
+    "memory": ("#2e7d4f", "D", "with awareness, 3 s of memory"),
+}
+
+
+def frontier_text(frontier: Frontier) -> str:
+    """Return the frontier as Markdown: the sentences, the episodes and a table."""
+    worth = {each.member.name: each for each in frontier.worth}
+    rows = []
+    for point in frontier.points:
+        own, member = worth.get(point.name), point.member
+        rows.append(
+            (
+                f"`{point.name}`",
+                NOTHING if member is None else f"{member.speed_mps:g}",
+                NOTHING if member is None else _KINDS[member.kind],
+                point.time_lost_s.text(),
+                point.time_over_today.text(),
+                point.step_out_unaware.text(),
+                NOTHING if own is None else own.at_equal_risk_s.text(),
+                NOTHING if own is None else own.at_equal_time.text(),
+            )
+        )
+    table = Table(dict.fromkeys(_HEADER, ""), rows).markdown()
+    episodes = (
+        f"{counted(frontier.episodes, 'episode')} of each policy in "
+        f"{counted(frontier.scenarios, 'scenario')}; 95 % intervals. Impacts: step-out impacts "
+        "with unaware people, per 1 000 crossings."
+    )
+    return "\n\n".join([*sentences(frontier), episodes, table]) + "\n"
+
+
+def sentences(frontier: Frontier) -> tuple[str, ...]:
+    """Return what awareness wins at equal risk and at equal time, one sentence each.
+
+    They are about the policy with the U of ``balanced``, and with its memory if the run has that.
+    """
+    rows = [each for each in frontier.worth if each.member.speed_mps == _SPEED_MPS]
+    if not rows:
+        return ()
+    worth = rows[-1]  # memory comes last
+    return _at_equal_risk(worth), _at_equal_time(worth)
+
+
+def _at_equal_risk(worth: Worth) -> str:
+    won = worth.at_equal_risk_s
+    if not won.known:
+        return "At equal risk: no figure, as no policy without awareness has so many impacts."
+    text = (
+        f"At equal risk, awareness {_verb(won, 'wins', 'loses')} {_amount(won)} s a crossing "
+        f"{_bounds(won)}"
+    )
+    attentive = worth.attentive_s
+    if attentive.known:
+        text += (
+            f", and {_verb(attentive, 'wins', 'loses')} {_amount(attentive)} s with attentive "
+            f"people {_bounds(attentive)}"
+        )
+    return f"{text} (`{worth.member.name}`)."
+
+
+def _at_equal_time(worth: Worth) -> str:
+    avoided = worth.at_equal_time
+    if not avoided.known:
+        return "At equal time: no figure, as no policy without awareness is so slow."
+    return (
+        f"At equal time, it {_verb(avoided, 'avoids', 'adds')} {_amount(avoided)} step-out impacts "
+        f"with unaware people per 1 000 crossings {_bounds(avoided)}."
+    )
+
+
+def _verb(interval: Interval, positive: str, negative: str) -> str:
+    return positive if interval.value >= 0.0 else negative
+
+
+def _amount(interval: Interval) -> str:
+    return f"{abs(interval.value):.2f}"
+
+
+def _bounds(interval: Interval) -> str:
+    """Return the interval of the signed figure, ``"[?]"`` without bounds."""
+    _, _, bounds = interval.text().partition(" ")
+    return bounds
+
+
+def draw_frontier(frontier: Frontier, path: Path) -> None:
+    """Draw the frontier into a file (PNG, SVG or PDF).
+
+    The axis of the impacts is that of their square roots, so that 0 and today's AMR both show.
+    """
+    figure = new_figure(8.2, 6.2, dpi=110.0)
+    axes = figure.subplots()
+    for kind, (colour, marker, label) in _LINES.items():
+        found = [p for p in frontier.points if p.member is not None and p.member.kind == kind]
+        if not found:
+            continue
+        _draw(axes, found, colour, marker, label)
+        x, y = _places(frontier.line if kind == "blind" else found).T
+        if kind == "blind":  # straight between two policies, which a scale by roots bends
+            between = np.linspace(x[0], x[-1], 400)
+            x, y = between, np.interp(between, x, y)
+        axes.plot(x, y, color=colour, lw=1.4, alpha=0.7, zorder=1)
+        for point in found:
+            if point.member is not None:
+                _name(axes, point, f"{point.member.speed_mps:g}", colour)
+    _draw(axes, [frontier.today], _TODAY, "*", "today's AMR", size=13.0)
+    others = [p for p in frontier.points[1:] if p.member is None]
+    if others:
+        _draw(axes, others, _OTHER, "^", "other policies")
+    for point in others:
+        _name(axes, point, point.name, _OTHER)
+    scale_by_roots(axes, max(point.step_out_unaware.value for point in frontier.points))
+    free_s, today_s = frontier.free_s, frontier.free_s + frontier.today.time_lost_s.value
+
+    def over_today(lost_s: Any) -> Any:
+        return (free_s + lost_s) / today_s
+
+    def lost_at(ratio: Any) -> Any:
+        return ratio * today_s - free_s
+
+    over = axes.secondary_xaxis("top", functions=(over_today, lost_at))
+    over.set_xlabel("time to the goal over that of today's AMR")
+    axes.set_xlabel(
+        "time lost to people (s a crossing)\n"
+        f"numbers: U in m/s; {counted(frontier.episodes, 'episode')} of each policy in "
+        f"{counted(frontier.scenarios, 'scenario')}; 95 % intervals"
+    )
+    axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
+    axes.grid(alpha=0.25)
+    axes.spines[["right"]].set_visible(False)
+    axes.legend(frameon=False)
+    said = sentences(frontier)
+    if said:
+        figure.suptitle("\n".join(said).replace("`", ""), fontsize=9, x=0.02, ha="left")
+    save_figure(figure, path)
+
+
+def _draw(
+    axes: Axes, points: Sequence[Point], colour: str, marker: str, label: str, size: float = 6.0
+) -> None:
+    """Draw points with the intervals of both figures, where they are bounded."""
+    x, y = _places(points).T
+    axes.errorbar(
+        x,
+        y,
+        xerr=_ends([point.time_lost_s for point in points]),
+        yerr=_ends([point.step_out_unaware for point in points]),
+        fmt=marker,
+        ms=size,
+        color=colour,
+        ecolor=colour,
+        elinewidth=0.8,
+        alpha=0.9,
+        label=label,
+        zorder=3,
+    )
+
+
+def _places(points: Sequence[Point]) -> FloatArray:
+    places = [[p.time_lost_s.value, p.step_out_unaware.value] for p in points]
+    return np.array(places, dtype=np.float64)
+
+
+def _ends(intervals: Sequence[Interval]) -> FloatArray:
+    """Return the (2, N) lengths of error bars; 0 where an interval is unbounded."""
+    known = [
+        each if each.bounded else replace(each, low=each.value, high=each.value)
+        for each in intervals
+    ]
+    below = [max(each.value - each.low, 0.0) for each in known]
+    return np.array([below, [max(each.high - each.value, 0.0) for each in known]], dtype=np.float64)
+
+
+def _name(axes: Axes, point: Point, text: str, colour: str) -> None:
+    axes.annotate(
+        text,
+        (point.time_lost_s.value, point.step_out_unaware.value),
+        xytext=(4, 4),
+        textcoords="offset points",
+        color=colour,
+        fontsize=9,
+    )

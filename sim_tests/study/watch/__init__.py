@@ -1,1 +1,0 @@
-"""The command ``awarenav watch``: one crossing, shown in the browser while it runs."""
