@@ -101,7 +101,8 @@ def varies(value: Value) -> bool:
 def listed(value: Value, count: int) -> list[float]:
     """Return a value of a :class:`PersonAhead` at each of the ``count`` times."""
     if isinstance(value, np.ndarray) and value.ndim:
-        return value.tolist()
+        numbers: list[float] = value.tolist()
+        return numbers
     return [float(value)] * count
 
 

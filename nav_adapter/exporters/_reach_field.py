@@ -90,7 +90,9 @@ class Reaches:
         """Return the tables of one or more people."""
         places: list[tuple[float, ...]] = []
         values: list[tuple[float, ...]] = []
-        first, follows, column_of = [], [], []
+        first: list[int] = []
+        follows: list[bool] = []
+        column_of: list[int] = []
         for each in people:
             # Most people differ in place alone from time to time.
             place = each.x_m, each.y_m, -np.inf if each.least_mps is None else each.least_mps

@@ -186,7 +186,8 @@ class Scene:
     @cached_property
     def _columns(self) -> FloatArray:
         """Places, velocities and radii (5, P, 1, 1, 1)."""
-        return np.array(self.people, dtype=np.float64).T.reshape(5, -1, 1, 1, 1)
+        columns = np.array(self.people, dtype=np.float64).T
+        return np.asarray(columns.reshape(5, -1, 1, 1, 1))
 
 
 def past_standing(
