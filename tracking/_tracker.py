@@ -230,7 +230,7 @@ def _are_views(kind: type) -> bool:
 
 
 def _check_view(view: Any) -> None:
-    if view is not None and not (_are_views(type(view)) or isinstance(view, View)):
+    if view is not None and not (_are_views(view.__class__) or isinstance(view, View)):
         raise TrackingError(
             "view must have a method visibility(positions_odom_m, T_odom_camera), "
             f"got {type(view).__name__}"

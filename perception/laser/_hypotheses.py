@@ -90,8 +90,7 @@ def hypotheses_of(
     right_m, left_m = centres.take(first, axis=1), centres.take(left, axis=1)
     middle = right_m + left_m
     middle *= 0.5
-    kept: slice | NDArray[np.int64] = slice(None)
-    every_middle = middle
+    kept, every_middle = np.arange(len(first)), middle
     if ruled_out is not None:
         kept = (~(ruled_out[first] | ruled_out[left])).nonzero()[0]
         singles = int(np.searchsorted(kept, singles))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from ._scanner import DIAGONAL_SCANNERS, ScannerSpec, SimulatedScanner, scan_all
 from ._scene import ScanScene
-from ._simulated_scanner import SimulatedScanner, scan_all
-from ._spec import DIAGONAL_SCANNERS, ScannerSpec
 
 __all__ = [
     "DIAGONAL_SCANNERS",

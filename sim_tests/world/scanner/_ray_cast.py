@@ -74,9 +74,8 @@ def cast_rays(
     np.arcsin(slack, out=slack)
     slack += turned_rad
     slack[near_m <= aside_m + _AT_ORIGIN_M] = np.pi
-    first, last = _rays_within(
-        *np.arctan2(ends[1::2], ends[::2]), slack, angle_min_rad, angle_increment_rad
-    )
+    start_rad, end_rad = np.arctan2(ends[1::2], ends[::2])
+    first, last = _rays_within(start_rad, end_rad, slack, angle_min_rad, angle_increment_rad)
     segment, ray = _pairs(first, last, count, 2.0 * np.pi / abs(angle_increment_rad))
     rays = np.empty((5, count))  # cosine, sine, origin x, origin y, moment
     angles = angle_min_rad + angle_increment_rad * np.arange(count)

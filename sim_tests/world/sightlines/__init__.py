@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ._plane_cuts import cut_surfaces
-from ._sight_lines import Occluder, PlacedSurface, SightLines, scenery_surface
+from ._sight_lines import Occluder, PlacedSurface, SightLines, cut_surfaces, scenery_surface
 from ._triangles import TriangleSet
 
 __all__ = [
