@@ -9,15 +9,19 @@ from ._crossing import (
     run_crossing,
 )
 from ._drawing import TopView, draw_camera_view
-from ._metrics import CLEARANCE_M, STANDING_SPEED_MPS, ContactEvent, SafetyMeter
 from ._policies import named_policy
 from ._requests import RequestMemory
 from ._result import CrossingFrame, CrossingResult
+from ._separations import (
+    STANDING_SPEED_MPS,
+    ContactEvent,
+    SafetyFigures,
+    contact_by,
+)
 from ._stage import Stage, TrueView
 from .planner import StraightOn
 
 __all__ = [
-    "CLEARANCE_M",
     "STANDING_SPEED_MPS",
     "ContactEvent",
     "Crossing",
@@ -25,12 +29,13 @@ __all__ = [
     "CrossingResult",
     "Observer",
     "RequestMemory",
-    "SafetyMeter",
+    "SafetyFigures",
     "Situation",
     "Stage",
     "StraightOn",
     "TopView",
     "TrueView",
+    "contact_by",
     "draw_camera_view",
     "named_policy",
     "run_crossing",

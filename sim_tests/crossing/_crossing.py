@@ -15,15 +15,15 @@ from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfil
 from perception import AttentionCone, AwarenessPipeline
 from perception.arrays import FloatArray
 
-from ..actors.behaviour import PersonOutcome, RequestMeans
+from ..actors.behaviour import RequestMeans
 from ..actors.robot import RobotModel
 from ..scenario import Scenario, ScenarioTemplate, scenario_for_robot
 from ..world.render import RendererName
 from ._command import check_planner, checked_command
-from ._metrics import SafetyMeter
 from ._policies import named_policy
 from ._result import CrossingFrame, CrossingResult
 from ._sensing import STREAMS, Sensed, Sensing
+from ._separations import Separations
 from ._stage import Stage, TrueView
 from .eyes import KeypointNoise, Perception
 from .faults import Fault
@@ -33,8 +33,8 @@ Observer = Callable[[CrossingFrame, Stage], None]
 
 # Within the goal tolerance the goal counts as reached at this speed or less.
 _GOAL_SPEED_MPS: Final = 0.2
-# Rate of the separation measurements; contacts are checked in every physics step.
-_MEASURED_HZ: Final = 20.0
+# Rate at which separations are observed; contacts are checked in every physics step.
+_OBSERVED_HZ: Final = 20.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +48,7 @@ class Situation:
         truth: the truth about each person.
         sensed: the knowledge of the robot: its own state, and its tracks of the people.
         constraints: constraints from the adapter.
-        margins_m: separation margin of each person, as last measured.
-        separations_m: distance to the surface of each person, measured at the same time.
+        separations: separations of the people, as last observed.
         at_goal: the robot stands at its goal.
     """
 
@@ -59,8 +58,7 @@ class Situation:
     truth: tuple[TrueView, ...]
     sensed: Sensed
     constraints: NavConstraints
-    margins_m: tuple[float, ...]
-    separations_m: tuple[float, ...]
+    separations: Separations
     at_goal: bool
 
     def frame(
@@ -81,8 +79,7 @@ class Situation:
             self.sensed.tracks,
             self.constraints,
             command,
-            self.margins_m,
-            self.separations_m,
+            self.separations,
             self.sensed.scan_points_odom_m,
             plan_s,
             lateral_mps,
@@ -109,7 +106,6 @@ class Crossing(AbstractContextManager["Crossing"]):
         scenario: as given.
         robot: profile of the robot.
         stage: hall, robot and people.
-        meter: the safety figures so far.
         goal_odom_m: (2,) goal.
         dt_s: length of a control cycle.
 
@@ -137,7 +133,6 @@ class Crossing(AbstractContextManager["Crossing"]):
         offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
         self._cone = AttentionCone()
         self.robot = scenario.robot_profile
-        self.meter = SafetyMeter(self.robot)
         self.stage = Stage(scenario, offsets, people_rng, renderer=renderer)
         try:
             self._sensing = Sensing(
@@ -156,8 +151,8 @@ class Crossing(AbstractContextManager["Crossing"]):
         self._adapter = NavAdapter(policy, self.robot)
         self.goal_odom_m = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         self.dt_s = 1.0 / scenario.control_hz
-        self._ticks_per_measurement = max(round(scenario.control_hz / _MEASURED_HZ), 1)
-        self._margins_m: tuple[float, ...] = ()
+        self._ticks_per_observation = max(round(scenario.control_hz / _OBSERVED_HZ), 1)
+        self._separations: Separations | None = None
         self._ticks = round(scenario.duration_s * scenario.control_hz)
         self._tick = 0
 
@@ -179,15 +174,17 @@ class Crossing(AbstractContextManager["Crossing"]):
         return self._tick >= self._ticks
 
     def sense(self) -> Situation:
-        """Measure the separations, take images and scans, update the constraints.
+        """Observe the separations, take images and scans, update the constraints.
 
-        Call it once per control cycle. After the last one nothing is measured any more.
+        Call it once per control cycle. After the last one no separations are observed any more.
         """
         t_s = self.t_s
-        if not self.time_is_up and self._tick % self._ticks_per_measurement == 0:
-            self._margins_m = self.stage.measure(
-                self.meter, self._ticks_per_measurement * self.dt_s
-            )
+        separations = self._separations
+        if separations is None or (
+            not self.time_is_up and self._tick % self._ticks_per_observation == 0
+        ):
+            lasts_s = self._ticks_per_observation * self.dt_s
+            separations = self._separations = self.stage.observe(t_s, lasts_s)
         T_odom_camera = self.stage.amr.T_odom_camera
         truth = self.stage.truth(self._cone, T_odom_camera)
         state = self.stage.amr.state(t_s)
@@ -203,8 +200,7 @@ class Crossing(AbstractContextManager["Crossing"]):
             truth,
             sensed,
             constraints,
-            self._margins_m,
-            tuple(self.meter.separations_m),
+            separations,
             _at_goal(self.scenario, state, self.goal_odom_m),
         )
 
@@ -225,7 +221,7 @@ class Crossing(AbstractContextManager["Crossing"]):
 
     def advance(self) -> None:
         """Run robot, people and physics up to the next control cycle."""
-        self.stage.advance(self.t_s + self.dt_s, self.meter)
+        self.stage.advance(self.t_s + self.dt_s)
         self._tick += 1
 
 
@@ -244,7 +240,7 @@ def run_crossing(
     renderer: RendererName = "auto",
     population: str | None = None,
 ) -> CrossingResult:
-    """Run one crossing in PyBullet and measure it.
+    """Run one crossing in PyBullet and return its log.
 
     Args:
         scenario: a scenario, or the name of a shipped one, drawn by the seed.
@@ -320,10 +316,9 @@ def run_crossing(
             policy_name,
             type(driver).__name__,
             perception,
-            crossing.meter,
+            crossing.stage,
             frames,
             reached_s,
-            crossing.stage.outcomes,
         )
 
 
@@ -348,31 +343,20 @@ def _result(
     policy: str,
     planner: str,
     perception: str,
-    meter: SafetyMeter,
+    stage: Stage,
     frames: list[CrossingFrame],
     reached_s: float | None,
-    people: tuple[PersonOutcome, ...],
 ) -> CrossingResult:
-    causes = {contact.by for contact in meter.contacts}
-    by = "robot" if "robot" in causes else "person" if causes else ""
     return CrossingResult(
         scenario=scenario.name,
         seed=seed,
         policy=policy,
         planner=planner,
         perception=perception,
-        success=reached_s is not None and by != "robot",
-        contact=bool(causes),
-        contact_by=by,
-        contacts=tuple(meter.contacts),
-        min_separation_m=meter.min_separation_m,
+        contacts=tuple(stage.contacts),
         time_to_goal_s=reached_s,
-        max_speed_within_2m_mps=meter.max_speed_near_mps,
-        min_margin_m=meter.min_margin_m,
-        violation_time_s=meter.violation_time_s,
-        duration_s=frames[-1].t_s,
         frames=tuple(frames),
-        people=people,
+        people=stage.outcomes,
         scripted=len(scenario.workers),
         robot=scenario.robot_profile,
         obstacle_boxes_odom_m=scenario.layout.obstacle_boxes_odom,

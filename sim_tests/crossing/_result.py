@@ -1,8 +1,10 @@
-"""The result of one crossing: its figures, and every control cycle as a frame."""
+"""The log of one crossing: every control cycle as a frame, contacts, and figures of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from tracking import PersonTrack
 
 from ..actors.behaviour import PersonOutcome
 from ..actors.robot import NOVA_CARTER
-from ._metrics import ContactEvent
+from ._separations import ContactEvent, SafetyFigures, Separations, contact_by
 from ._stage import TrueView
 
 
@@ -33,10 +35,8 @@ class CrossingFrame:
         tracks: tracks of the people.
         constraints: constraints from the adapter.
         command: commanded speed (m/s) and yaw rate (rad/s).
-        margins_m: separation margin of each person, as last measured, which is in every frame up to
-            20 a second.
-        separations_m: distance between the surfaces of each person and the robot, measured at the
-            same time; a lower bound with centres more than 4 m apart.
+        separations: separations of the people, as last observed, which is in every frame up to 20 a
+            second.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle, as the robot
             places them.
         plan_s: elapsed time of the planner's ``plan``, seconds by the clock of the computer. It is
@@ -53,13 +53,25 @@ class CrossingFrame:
     tracks: tuple[PersonTrack, ...]
     constraints: NavConstraints
     command: tuple[float, float]
-    margins_m: tuple[float, ...]
-    separations_m: tuple[float, ...] = ()
+    separations: Separations
     scan_points_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     plan_s: float = 0.0
     lateral_command_mps: float = 0.0
 
     __repr__ = short_repr
+
+    @property
+    def separations_m(self) -> tuple[float, ...]:
+        """Distance between the surfaces of each person and the robot, as last observed.
+
+        It is a lower bound with centres more than 4 m apart.
+        """
+        return self.separations.separations_m
+
+    @property
+    def margins_m(self) -> tuple[float, ...]:
+        """Separation margin of each person, as last observed."""
+        return self.separations.margins_m
 
     def observation_of(self, worker: int) -> PersonObservation | None:
         """Return the observation of a worker in this frame, or None."""
@@ -69,9 +81,9 @@ class CrossingFrame:
         return None
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CrossingResult:
-    """The outcome of one crossing.
+    """The log of one crossing; every figure is computed from it.
 
     Attributes:
         scenario: name of the scenario.
@@ -80,18 +92,8 @@ class CrossingResult:
         planner: name of the planner's class.
         perception: ``"truth"``, ``"keypoints"``, ``"pixels"``, ``"keypoints+scanner"``,
             ``"pixels+scanner"``, ``"scanner"`` or ``"oracle"``.
-        success: the goal was reached, and the robot hit nobody by its own motion.
-        contact: robot and a person touched, whether the robot moved or stood: ``contacts`` has its
-            speed.
-        contact_by: ``"robot"`` if the robot moved into a person in any contact, ``"person"`` if
-            only people walked into the robot, else empty.
         contacts: all contacts.
-        min_separation_m: smallest distance between the surfaces of robot and person.
         time_to_goal_s: None when the goal was not reached.
-        max_speed_within_2m_mps: highest speed of the robot with a person's surface within 2 m.
-        min_margin_m: smallest separation margin S − S_p while the robot moved.
-        violation_time_s: time with a negative margin while the robot moved.
-        duration_s: simulated time.
         frames: one per control cycle.
         people: outcomes of the reacting people: ``people[i]`` is person ``i`` of the scenario, and
             number ``scripted + i`` in lists of all people.
@@ -105,16 +107,8 @@ class CrossingResult:
     policy: str
     planner: str
     perception: str
-    success: bool
-    contact: bool
-    contact_by: str
     contacts: tuple[ContactEvent, ...]
-    min_separation_m: float
     time_to_goal_s: float | None
-    max_speed_within_2m_mps: float
-    min_margin_m: float
-    violation_time_s: float
-    duration_s: float
     frames: tuple[CrossingFrame, ...]
     people: tuple[PersonOutcome, ...] = ()
     scripted: int = 0
@@ -122,3 +116,54 @@ class CrossingResult:
     obstacle_boxes_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
     __repr__ = short_repr
+
+    @property
+    def success(self) -> bool:
+        """True if the goal was reached, and the robot hit nobody by its own motion."""
+        return self.time_to_goal_s is not None and self.contact_by != "robot"
+
+    @property
+    def contact(self) -> bool:
+        """True if robot and a person touched, whether the robot moved or stood."""
+        return bool(self.contacts)
+
+    @property
+    def contact_by(self) -> Literal["", "robot", "person"]:
+        """``"robot"`` if the robot moved into a person in any contact, else ``"person"``.
+
+        Empty without a contact.
+        """
+        return contact_by(self.contacts)
+
+    @property
+    def duration_s(self) -> float:
+        """Simulated time."""
+        return self.frames[-1].t_s
+
+    @cached_property
+    def safety(self) -> SafetyFigures:
+        """The safety figures of the observed separations."""
+        figures = SafetyFigures()
+        for frame in self.frames:
+            figures = figures.after(frame.t_s, frame.separations)
+        return figures
+
+    @property
+    def min_separation_m(self) -> float:
+        """Smallest distance between the surfaces of robot and person."""
+        return self.safety.min_separation_m
+
+    @property
+    def min_margin_m(self) -> float:
+        """Smallest separation margin S − S_p while the robot moved."""
+        return self.safety.min_margin_m
+
+    @property
+    def violation_time_s(self) -> float:
+        """Time with a negative margin while the robot moved."""
+        return self.safety.violation_time_s
+
+    @property
+    def max_speed_within_2m_mps(self) -> float:
+        """Highest speed of the robot with a person's surface within 2 m."""
+        return self.safety.max_speed_within_2m_mps

@@ -29,9 +29,9 @@ from ..world import Warehouse
 from ..world.bullet import pybullet
 from ..world.render import RendererName
 from ._audience import Audience
-from ._metrics import STANDING_SPEED_MPS, SafetyMeter
 from ._people import staged_people
 from ._robot_sight import RobotSight, near_robot
+from ._separations import STANDING_SPEED_MPS, ContactEvent, Separations
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.
 _EXACT_WITHIN_M: Final = 4.0
@@ -89,6 +89,10 @@ class Stage(AbstractContextManager["Stage"]):
         start_offsets_s: how much later each scripted worker starts.
         people_rng: random generator of the people who react; None for the generator of seed 0.
         renderer: renderer for images of the stage.
+
+    Attributes:
+        scenario: as given.
+        contacts: all contacts so far.
     """
 
     def __init__(
@@ -126,6 +130,8 @@ class Stage(AbstractContextManager["Stage"]):
         self._motions: tuple[PersonMotion, ...] = ()
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
+        self.contacts: list[ContactEvent] = []
+        self._touching = [False] * len(self.workers)
         self._near_robot = [False] * len(self.workers)
         corners = self.amr.profile.footprint_m
         low, high = corners.min(axis=0), corners.max(axis=0)
@@ -149,7 +155,7 @@ class Stage(AbstractContextManager["Stage"]):
         """Simulated time in seconds."""
         return self.warehouse.time_s
 
-    def advance(self, until_s: float, meter: SafetyMeter) -> None:
+    def advance(self, until_s: float) -> None:
         """Run physics until ``until_s``; move the people and record contacts."""
         while self.t_s < until_s - 0.5 * self.warehouse.physics_dt_s:
             # Far from the robot, bodies move once per control cycle and touch nobody.
@@ -167,7 +173,7 @@ class Stage(AbstractContextManager["Stage"]):
                 continue
             for index, near in enumerate(self._near_robot):
                 if near:
-                    self._update_contact(index, (previous, current), meter)
+                    self._update_contact(index, (previous, current))
         self._place_workers()
 
     def request(self, means: RequestMeans, place_odom_m: FloatArray) -> None:
@@ -186,18 +192,24 @@ class Stage(AbstractContextManager["Stage"]):
             if what is not None:
                 behaviour.hear(what)
 
-    def measure(self, meter: SafetyMeter, dt_s: float) -> tuple[float, ...]:
-        """Measure the separation of every person; return the separation margins."""
-        velocity = self.robot_velocity_odom_mps
-        margins = []
-        meter.separations_m.clear()
-        for index, motion in enumerate(self._motions):
-            separation, towards = self._separation(index)
-            self._near_robot[index] = separation < _TOUCH_WITHIN_M
-            margins.append(
-                meter.add_separation(separation, velocity, motion.velocity_odom_mps, towards, dt_s)
-            )
-        return tuple(margins)
+    def observe(self, t_s: float, lasts_s: float) -> Separations:
+        """Return the separations of all people from the robot now.
+
+        Args:
+            t_s: time of the control cycle.
+            lasts_s: time to the next observation.
+        """
+        observed = [self._separation(index) for index in range(len(self._motions))]
+        self._near_robot = [separation_m < _TOUCH_WITHIN_M for separation_m, _ in observed]
+        return Separations(
+            t_s,
+            lasts_s,
+            self.amr.profile,
+            self.robot_velocity_odom_mps,
+            tuple(motion.velocity_odom_mps for motion in self._motions),
+            tuple(separation_m for separation_m, _ in observed),
+            tuple(towards for _, towards in observed),
+        )
 
     @property
     def robot_velocity_odom_mps(self) -> FloatArray:
@@ -332,7 +344,6 @@ class Stage(AbstractContextManager["Stage"]):
         self,
         index: int,
         velocities_mps: tuple[FloatArray | None, FloatArray],
-        meter: SafetyMeter,
     ) -> None:
         """Record whether a person touches the robot.
 
@@ -340,7 +351,7 @@ class Stage(AbstractContextManager["Stage"]):
         and before the last step.
         """
         if not self._held[index] and not self.amr.touches(self.workers[index].body):
-            meter.release(index)
+            self._touching[index] = False
             return
         previous, velocity = velocities_mps
         if previous is not None and previous @ previous > velocity @ velocity:
@@ -348,7 +359,9 @@ class Stage(AbstractContextManager["Stage"]):
         if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
             velocity = np.zeros(2)  # only a person who walks into it moves a standing robot
         _, towards = self._separation(index)
-        meter.touch(self.t_s, index, velocity, towards)
+        if not self._touching[index]:  # a continuing touch is one contact
+            self._touching[index] = True
+            self.contacts.append(ContactEvent(self.t_s, index, velocity, towards))
         self._behaviours[index].touch(*(-towards).tolist())
 
 

@@ -23,8 +23,10 @@ from ..crossing import (
     STANDING_SPEED_MPS,
     Crossing,
     CrossingFrame,
+    SafetyFigures,
     Situation,
     TopView,
+    contact_by,
     draw_camera_view,
     named_policy,
 )
@@ -169,6 +171,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         )
         self._crossing: Crossing | None = None
         self._situation: Situation | None = None
+        self._safety = SafetyFigures()
         self._frame: CrossingFrame | None = None
         self._plan: TopView | None = None
         self._camera: CameraRenderer | None = None
@@ -222,7 +225,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
         self._frame = None
         self._ended = False
-        self._situation = self._crossing.sense()
+        self._safety = SafetyFigures()
+        self._sense()
         return self._observation(), self._info((0.0, 0.0), {}, "", episode_seed)
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -239,7 +243,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         crossing.command(*command)
         self._frame = before.frame(command)
         crossing.advance()
-        now = self._situation = crossing.sense()
+        now = self._sense()
         hits = _by_robot(crossing) - contacts
         terminated = now.at_goal and not crossing.time_is_up
         reason = "goal" if terminated else ""
@@ -291,6 +295,11 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._crossing, self._situation = None, None
         self._plan, self._camera = None, None
 
+    def _sense(self) -> Situation:
+        now = self._situation = self.crossing.sense()
+        self._safety = self._safety.after(now.t_s, now.separations)
+        return now
+
     def _observation(self) -> Observation:
         now = self.situation
         return self._encoder.encode(now.sensed.state, self.crossing.goal_odom_m, now.constraints)
@@ -302,18 +311,18 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         reason: str,
         seed: int | None,
     ) -> dict[str, Any]:
-        now, meter = self.situation, self.crossing.meter
+        now, safety = self.situation, self._safety
         limits = now.constraints
         info: dict[str, Any] = {
             "t_s": now.t_s,
             "scenario": self.crossing.scenario.name,
             "command": list(command),
             "distance_to_goal_m": _distance_m(now, self.crossing.goal_odom_m),
-            "margins_m": list(now.margins_m),
-            "separations_m": list(now.separations_m),
-            "min_margin_m": meter.min_margin_m,
-            "min_separation_m": meter.min_separation_m,
-            "violation_time_s": meter.violation_time_s,
+            "margins_m": list(now.separations.margins_m),
+            "separations_m": list(now.separations.separations_m),
+            "min_margin_m": safety.min_margin_m,
+            "min_separation_m": safety.min_separation_m,
+            "violation_time_s": safety.violation_time_s,
             "speed_limit_mps": limits.speed_limit_mps,
             "yaw_rate_limit_radps": limits.yaw_rate_limit_radps(now.sensed.state.speed_mps),
             "limited_by": limits.limited_by,
@@ -329,7 +338,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
                 ]
                 for each in limits.obstacles
             ],
-            "contact": _contact(self.crossing),
+            "contact": contact_by(self.crossing.stage.contacts),
             "end": reason,
             "is_success": reason == "goal" and not _by_robot(self.crossing),
             "reward_parts": parts,
@@ -366,15 +375,12 @@ def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
 
 
 def _violates(now: Situation) -> bool:
-    return now.state.travel_mps > STANDING_SPEED_MPS and min(now.margins_m, default=0.0) < 0.0
+    return (
+        now.state.travel_mps > STANDING_SPEED_MPS
+        and min(now.separations.margins_m, default=0.0) < 0.0
+    )
 
 
 def _by_robot(crossing: Crossing) -> int:
     """Return how many contacts the robot has caused."""
-    return sum(contact.by == "robot" for contact in crossing.meter.contacts)
-
-
-def _contact(crossing: Crossing) -> str:
-    """Return who caused a contact in this episode; empty for none."""
-    causes = {contact.by for contact in crossing.meter.contacts}
-    return "robot" if "robot" in causes else "person" if causes else ""
+    return sum(contact.by == "robot" for contact in crossing.stage.contacts)

@@ -10,9 +10,7 @@ import numpy as np
 from perception import AttentionCone
 from sim_tests import Scenario
 from sim_tests.actors.behaviour import PersonMotion, PersonOutcome
-from sim_tests.actors.robot import NOVA_CARTER
-from sim_tests.crossing import Stage
-from sim_tests.crossing._metrics import SafetyMeter
+from sim_tests.crossing import ContactEvent, Stage
 
 DT_S = 0.05
 
@@ -27,7 +25,8 @@ class StageRun:
     robot: np.ndarray  # (T, 2)
     awareness: np.ndarray  # (T, P); 0 unless it was asked for
     outcomes: tuple[PersonOutcome, ...]
-    meter: SafetyMeter
+    contacts: tuple[ContactEvent, ...]
+    min_separation_m: float
 
     @property
     def places(self) -> np.ndarray:
@@ -80,14 +79,15 @@ def run_stage(
             **scenario,
         }
     )
-    meter = SafetyMeter(NOVA_CARTER)
     cone = AttentionCone()
     times, rows, angles, places, awareness = [], [], [], [], []
+    nearest_m = np.inf
     offsets = np.zeros(len(case.workers))
     with Stage(case, offsets, np.random.default_rng(seed)) as stage:
         stage.amr.command(robot_mps, 0.0)
         for tick in range(round(seconds / DT_S)):
-            stage.measure(meter, DT_S)
+            observed = stage.observe(tick * DT_S, DT_S)
+            nearest_m = min(nearest_m, *observed.separations_m)
             motions = stage.motions
             times.append(stage.t_s)
             rows.append([[*m.position_odom_m, *m.velocity_odom_mps] for m in motions])
@@ -99,7 +99,7 @@ def run_stage(
                 awareness[-1] = [view.awareness for view in views]
                 if any(abs(stage.t_s - t_s) < 0.5 * DT_S for t_s in asks_at_s):
                     stage.request("voice", motions[asks].position_odom_m)
-            stage.advance((tick + 1) * DT_S, meter)
+            stage.advance((tick + 1) * DT_S)
         outcomes = stage.outcomes
     return StageRun(
         np.array(times),
@@ -108,7 +108,8 @@ def run_stage(
         np.array(places),
         np.array(awareness),
         outcomes,
-        meter,
+        tuple(stage.contacts),
+        nearest_m,
     )
 
 

@@ -75,8 +75,8 @@ def test_the_robots_touch_ends_the_lapse():
         "lapse": {"after_look_s": 0.0},
     }
     run = run_stage([person], robot_mps=0.8, seconds=8.0)
-    assert run.meter.contacts
-    touched_s = run.meter.contacts[0].t_s
+    assert run.contacts
+    touched_s = run.contacts[0].t_s
     assert math.isfinite(touched_s)
     after = run.people[run.times_s > touched_s + 1.5, 0]
     assert np.hypot(after[:, 0] - 4.0, after[:, 1]).max() > 0.2

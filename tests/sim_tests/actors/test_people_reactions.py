@@ -13,7 +13,7 @@ def test_walk_on_changes_nothing():
     unaware, aware = (run_stage([crosser(reaction, start_s=1.5)]) for reaction in (None, "walk_on"))
     assert aware.outcomes[0].noticed_s is not None
     assert aware.outcomes[0].reaction == "walk_on"
-    assert aware.meter.min_separation_m > 0.3  # a nearer robot would be avoided
+    assert aware.min_separation_m > 0.3  # a nearer robot would be avoided
     # Before the encounter a visible robot pushes the walker a little.
     np.testing.assert_allclose(aware.people[:, 0, :2], unaware.people[:, 0, :2], atol=0.1)
     assert aware.outcomes[0].time_s == pytest.approx(unaware.outcomes[0].time_s, abs=0.1)
@@ -27,7 +27,7 @@ def test_wait_stops_short_of_the_robots_line_until_it_has_passed():
     before = waiting.robot[:, 0] < 5.0
     assert waiting.people[before, 0, 1].max() < -0.8
     assert waiting.speeds[:, 0][waiting.people[:, 0, 1] < -0.8][60:].min() < 0.1
-    assert not waiting.meter.contacts
+    assert not waiting.contacts
     assert waiting.outcomes[0].time_s > waiting.outcomes[0].free_time_s + 1.0
 
 
@@ -82,7 +82,7 @@ def test_pass_behind_walks_behind_the_robot_without_stopping():
     assert passing.people[:, 0, 0].min() < 4.7
     y = passing.people[:, 0, 1]
     assert passing.speeds[(y > -3.0) & (y < 3.0), 0].min() > 0.2
-    assert not passing.meter.contacts
+    assert not passing.contacts
     assert passing.outcomes[0].length_m > passing.outcomes[0].free_length_m + 0.05
 
 
@@ -93,8 +93,8 @@ def test_a_person_head_on_steps_aside_to_let_the_robot_pass(reaction):
         seconds=9.0,
     )
     assert head_on.outcomes[0].reaction == reaction
-    assert not head_on.meter.contacts
-    assert head_on.meter.min_separation_m > 0.2
+    assert not head_on.contacts
+    assert head_on.min_separation_m > 0.2
 
 
 def test_reactions_are_drawn_by_their_shares():
@@ -114,9 +114,9 @@ def test_a_blind_person_who_hits_a_standing_robot_stops_and_walks_around_it():
         seconds=14.0,
         robot={"start_x_m": 5.0, "goal_x_m": 12.0},
     )
-    assert bump.meter.contacts
-    assert {contact.by for contact in bump.meter.contacts} == {"person"}
-    touch_s = bump.meter.contacts[0].t_s
+    assert bump.contacts
+    assert {contact.by for contact in bump.contacts} == {"person"}
+    touch_s = bump.contacts[0].t_s
     after = np.searchsorted(bump.times_s, touch_s)
     assert bump.speeds[after + 1 : after + 4, 0].min() < 0.5
     # The person does not walk through the robot, and does not move it.
@@ -130,8 +130,8 @@ def test_a_blind_person_who_hits_a_standing_robot_stops_and_walks_around_it():
 
 def test_a_blind_person_who_walks_into_the_side_of_a_moving_robot_is_the_cause():
     side = run_stage([crosser(None, start_s=3.6)], seconds=9.0)
-    assert side.meter.contacts
-    assert side.meter.contacts[0].by == "person"
+    assert side.contacts
+    assert side.contacts[0].by == "person"
 
 
 def test_a_person_behind_racks_never_notices_the_robot():

@@ -105,9 +105,9 @@ def bootstrapped(values, **options):
         (lambda out: measure(still(frames=())), "without frames"),
         (
             lambda out: measure(
-                still(frames=(replace(still().frames[0], separations_m=(1.0, 2.0)),))
+                still(frames=(replace(frame := still().frames[0], truth=2 * frame.truth),))
             ),
-            "separation of all 1 people",
+            "separation of all 2 people",
         ),
         (lambda out: sample_jobs(short_jobs(1), 0), "sample must"),
         (lambda out: sample_jobs(short_jobs(1), 3), "sample must"),
