@@ -124,6 +124,7 @@ class Sensing:
         self._tracker = _make_tracker(perception, policy, stage, model)
         self._newest_s: dict[str, float] = {}
         self._seen = SeenDirections()
+        self._ahead_s: float | None = None
 
     def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
         """Take the images and scans that are due; return what the robot knows then.
@@ -154,6 +155,7 @@ class Sensing:
             )
             if sighting.sight is not None:
                 self._seen.note(sighting.sight, sighting.stamp_s)
+                self._ahead_s = self._seen.stamp_s(0.0, AHEAD_RAD)
             if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
                 self._newest_s[sighting.sensor] = sighting.stamp_s
                 if sighting.points_odom_m is None:
@@ -173,7 +175,7 @@ class Sensing:
 
     def _perceived_s(self) -> float:
         """Return the time from which camera or scanners know what is ahead, as on a robot."""
-        stamps_s = (self._newest_s.get("camera"), self._seen.stamp_s(0.0, AHEAD_RAD))
+        stamps_s = (self._newest_s.get("camera"), self._ahead_s)
         return max((each for each in stamps_s if each is not None), default=-_NEVER_S)
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:

@@ -14,9 +14,9 @@ from ._messages import (
     Sighting,
     WorkerObservations,
 )
-from ._perception import ORACLE, Perception, PerceptionKind, SensorSet
 from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
 from ._scanner_eyes import ScannerEyes, scanner_sensors
+from ._sensors import ORACLE, Perception, PerceptionKind, SensorSet
 
 __all__ = [
     "NOBODY",

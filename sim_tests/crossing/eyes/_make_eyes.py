@@ -22,8 +22,8 @@ from .._stage import Stage
 from ._camera_eyes import Eyes, MapView, PicturelessEyes, SurroundEyes, TrueEyes
 from ._keypoint_camera import KeypointEyes, KeypointNoise
 from ._messages import Change
-from ._perception import ORACLE, PerceptionKind
 from ._pixel_eyes import PixelEyes
+from ._sensors import ORACLE, PerceptionKind
 
 # Statures of adults: within two and a half standard deviations of the mean.
 _LEAST_ADULT_M: Final = 1.5

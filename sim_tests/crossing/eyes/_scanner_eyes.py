@@ -91,14 +91,14 @@ class ScannerEyes:
             state: its true state.
             known: the state that it knows.
         """
-        ticks = [clock.tick(now_s) for clock in self._clocks]
-        if any(due for due, _ in ticks):
-            motion = _motion(T_odom_base, state)
-            known_motion = _motion(_pose_of(known), known)
-            for number, (due, arrives_s) in enumerate(ticks):
-                # The noise of a lost scan is drawn, so that a loss changes no other scan.
-                scan = self._scanners[number].scan(motion) if due else None
-                if scan is not None and arrives_s is not None:
+        ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
+        due = [(number, arrives_s) for number, is_due, arrives_s in ticks if is_due]
+        if due:
+            motion, known_motion = _motion(T_odom_base, state), _motion(_pose_of(known), known)
+            # The noise of a lost scan is drawn, so that a loss changes no other scan.
+            scans = [self._scanners[number].scan(motion) for number, _ in due]
+            for (number, arrives_s), scan in zip(due, scans, strict=True):
+                if arrives_s is not None:
                     self._send(scan, arrives_s, number, motion, known_motion)
         sightings = [
             self._sighting(taken) for taken in self._queue.take(now_s) if self._is_new(taken)
