@@ -30,8 +30,8 @@ from perception.laser import (
     observations_of,
     scan_points,
 )
-from sim_tests.actors.body import Worker, worker_names
-from sim_tests.actors.robot import Amr, AmrLook
+from sim_tests.actors.body import OnlineFootsteps, Worker, worker_names
+from sim_tests.actors.robot import Amr, RobotLook
 from sim_tests.world import Warehouse
 from sim_tests.world.hall import LAYOUTS, WarehouseLayout
 from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScanScene, SimulatedScanner
@@ -133,7 +133,7 @@ def drive(
         people = [Worker(warehouse, look=name) for name in workers]
         amr = Amr(warehouse)
         pose = [np.eye(4)]
-        warehouse.add_actor(AmrLook(lambda: (pose[0], 0.0, 0.0)))
+        warehouse.add_actor(RobotLook.nova_carter(lambda: pose[0]))
         boxes = warehouse.obstacle_boxes_odom
         robot = Wanderer(boxes, rng, _ROBOT_CLEARANCE_M, (0.3, _ROBOT_MPS), 0.2)
         walks = [
@@ -151,6 +151,11 @@ def drive(
             Trolley(kind, partial(_ahead, walk, TROLLEY_AHEAD_M - _TROLLEY_MIDDLE_M))
             for kind, walk in zip(trolleys, walks, strict=False)
         ]
+        backs_m = [_TROLLEY_MIDDLE_M if k < len(pushed) else 0.0 for k in range(len(walks))]
+        feet = [
+            OnlineFootsteps(worker.gait, *_ahead(walk, -back_m))
+            for worker, walk, back_m in zip(people, walks, backs_m, strict=True)
+        ]
         scene = ScanScene(warehouse.layout, variant, (*warehouse.actors, *pushed))
         loads = [*trolleys, *("" for _ in walks[len(trolleys) :])]
         seen_as = [[scene.occluders.index(worker.skin)] for worker in people]
@@ -166,11 +171,15 @@ def drive(
         for tick in range(round(duration_s * _RATE_HZ)):
             t = tick / _RATE_HZ
             robot.advance(t, 1.0 / _RATE_HZ)
-            for walk, worker in zip(walks, people, strict=True):
+            for walk, back_m, worker, steps in zip(walks, backs_m, people, feet, strict=True):
                 walk.advance(t, 1.0 / _RATE_HZ)
-                back_m = _TROLLEY_MIDDLE_M if walk in walks[: len(pushed)] else 0.0
                 x, y, heading = _ahead(walk, -back_m)
-                worker.place((x, y), heading, walk.walked_m, walk.speed_mps)
+                cos, sin = math.cos(heading), math.sin(heading)
+                ahead, turning = walk.speed_mps, walk.yaw_rate_radps
+                aside = -turning * back_m  # somebody behind a trolley goes round it
+                moving = (ahead * cos - aside * sin, ahead * sin + aside * cos, turning)
+                gait = steps.step(1.0 / _RATE_HZ, (x, y, heading), moving, (0.0, 0.0))
+                worker.place((x, y), heading, feet=gait)
             pose[0] = _pose(robot)
             velocity = np.array([robot.speed_mps, 0.0])
             motion = RobotMotion(t, pose[0], velocity, robot.yaw_rate_radps)

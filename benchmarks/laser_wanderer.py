@@ -41,7 +41,7 @@ class Wanderer:
         self._speeds, self._stands = speeds_mps, stands
         self.place_m = self._free()
         self.heading_rad = float(rng.uniform(-math.pi, math.pi))
-        self.speed_mps, self.walked_m, self.yaw_rate_radps = 0.0, 0.0, 0.0
+        self.speed_mps, self.yaw_rate_radps = 0.0, 0.0
         self._goal, self._until_s = self.place_m, float(rng.uniform(0.0, 4.0))
 
     def advance(self, t_s: float, dt_s: float) -> None:
@@ -65,7 +65,6 @@ class Wanderer:
         self.speed_mps = self._speed if abs(turn) < 0.3 else 0.0
         along = np.array([math.cos(self.heading_rad), math.sin(self.heading_rad)])
         self.place_m = self.place_m + self.speed_mps * dt_s * along
-        self.walked_m += self.speed_mps * dt_s
 
     def _next(self) -> FloatArray:
         for _ in range(200):

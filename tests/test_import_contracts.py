@@ -32,10 +32,10 @@ PLANTED = {
     ),
     "sim_tests.actors: behaviour > body, robot apart": (
         "sim_tests/actors/body/_asset.py",
-        "from ..behaviour import Walker",
+        "from ..behaviour import Person",
     ),
     "sim_tests.study: command | watch > report > social > runs | scenarios > measures": (
-        "sim_tests/study/measures/_interval.py",
+        "sim_tests/study/measures/_summary.py",
         "from ..runs import run_jobs",
     ),
     "awarenav: tools > command line > files": (
@@ -50,7 +50,7 @@ PLANTED = {
     "a robot needs neither PyBullet nor sim_tests": ("awarenav/files.py", "import pybullet"),
     "the core draws no plots, films or progress bars": ("nav_adapter/_robot.py", "import tqdm"),
     "awarenav compare runs without the simulator": (
-        "sim_tests/study/measures/_bootstrap.py",
+        "sim_tests/study/measures/_statistics.py",
         "import pybullet",
     ),
 }

@@ -12,11 +12,11 @@ from perception.arrays import FloatArray
 from sim_tests.actors.behaviour import (
     Glances,
     MovingBody,
+    Person,
     PersonSpec,
     RobotBody,
     Surroundings,
-    Walker,
-    walker_of,
+    habits_of,
 )
 
 from ._motion import RATE_HZ, Scene
@@ -82,7 +82,8 @@ def simulate(layout: Layout, seed: int, people: str = "classic") -> Scene:
                     "glances": Glances(notices_within_m=25.0),
                 }
             )
-            walkers.append(walker_of(people)(spec, rng.spawn(1)[0], _NO_BOXES))
+            own = rng.spawn(1)[0]
+            walkers.append(Person(spec, own, _NO_BOXES, habits=habits_of(people)))
     return _recorded(walkers, layout.cart)
 
 
@@ -96,7 +97,7 @@ def _places(count: int, rng: np.random.Generator) -> list[tuple[float, float]]:
     return places
 
 
-def _recorded(walkers: list[Walker], cart: bool) -> Scene:
+def _recorded(walkers: list[Person], cart: bool) -> Scene:
     """Let people walk; return their positions, sampled like a recording."""
     frames = round((_BEFORE_S + _SHOWN_S) * RATE_HZ)
     first = round(_BEFORE_S * RATE_HZ)

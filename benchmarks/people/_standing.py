@@ -11,11 +11,11 @@ import numpy as np
 from perception.arrays import FloatArray
 from sim_tests.actors.behaviour import (
     LOOK_WITHIN_S,
+    Person,
     PersonSpec,
     RobotBody,
     Surroundings,
-    Walker,
-    walker_of,
+    habits_of,
 )
 
 #: Measured on 229 standing people within 4 m of a mobile robot: time, 99th percentile, maximum.
@@ -147,13 +147,13 @@ def eye_yaw_deg(people: str, count: int = 40, seed: int = 0) -> FloatArray:
     return np.degrees(np.concatenate(found))
 
 
-def watch(walker: Walker, robot_x_m: float, robot_mps: float, for_s: float) -> Watched:
+def watch(walker: Person, robot_x_m: float, robot_mps: float, for_s: float) -> Watched:
     """Watch a person beside a robot that drives along the x axis at a constant speed."""
     places, looks, eyes = [], [], []
     for frame in range(round(for_s * _RATE_HZ)):
         t_s = frame / _RATE_HZ
         x = robot_x_m + robot_mps * t_s
-        motion = walker.motion(t_s, _around(x, robot_mps))
+        motion = walker.step(t_s, _around(x, robot_mps))
         px, py = motion.position_odom_m.tolist()
         gaze = motion.heading_odom_rad + motion.head_yaw_rad + motion.eye_yaw_rad
         off = math.remainder(math.atan2(-py, x - px) - gaze, math.tau)
@@ -163,7 +163,7 @@ def watch(walker: Walker, robot_x_m: float, robot_mps: float, for_s: float) -> W
     return Watched(np.array(places), np.array(looks), np.array(eyes))
 
 
-def _places(walker: Walker, robot_x_m: float, robot_mps: float, for_s: float) -> FloatArray:
+def _places(walker: Person, robot_x_m: float, robot_mps: float, for_s: float) -> FloatArray:
     """Return (frames, 2) the places of a person who is watched without feet and eyes."""
     places = []
     for frame in range(round(for_s * _RATE_HZ)):
@@ -178,8 +178,8 @@ def _around(robot_x_m: float, robot_mps: float) -> Surroundings:
     return Surroundings(robot, (), _always)
 
 
-def _person(people: str, spec: dict[str, Any], rng: np.random.Generator) -> Walker:
-    return walker_of(people)(PersonSpec.model_validate(spec), rng, _NO_BOXES)
+def _person(people: str, spec: dict[str, Any], rng: np.random.Generator) -> Person:
+    return Person(PersonSpec.model_validate(spec), rng, _NO_BOXES, habits=habits_of(people))
 
 
 def _stands(place_m: FloatArray) -> np.ndarray[Any, np.dtype[np.bool_]]:

@@ -128,12 +128,10 @@ class Crossing(AbstractContextManager["Crossing"]):
     ) -> None:
         self.scenario = scenario
         senses = Perception.named(perception)
-        jitter_rng, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
-        jitter = scenario.start_jitter_s
-        offsets = jitter_rng.uniform(-jitter, jitter, len(scenario.workers))
+        _, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
         self._cone = AttentionCone()
         self.robot = scenario.robot_profile
-        self.stage = Stage(scenario, offsets, people_rng, renderer=renderer)
+        self.stage = Stage(scenario, people_rng, renderer=renderer)
         try:
             self._sensing = Sensing(
                 self.stage,
@@ -357,7 +355,6 @@ def _result(
         time_to_goal_s=reached_s,
         frames=tuple(frames),
         people=stage.outcomes,
-        scripted=len(scenario.workers),
         robot=scenario.robot_profile,
         obstacle_boxes_odom_m=scenario.layout.obstacle_boxes_odom,
     )

@@ -2,79 +2,81 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from perception.arrays import FloatArray
 
 from ..actors.behaviour import (
-    Answering,
     Ears,
-    PersonBehaviour,
-    PersonPath,
-    Scripted,
-    Walker,
-    displaced_people,
-    replayed_people,
-    walker_of,
+    Glances,
+    Person,
+    PersonSpec,
+    RoutePoint,
+    Track,
+    habits_of,
+    read_recordings,
 )
+from ..actors.body import worker_names
 from ..scenario import Scenario
 
 
 def staged_people(
-    scenario: Scenario,
-    boxes_odom_m: FloatArray,
-    start_offsets_s: FloatArray,
-    rng: np.random.Generator,
-) -> tuple[tuple[Walker, ...], tuple[PersonBehaviour, ...], tuple[Ears, ...]]:
-    """Return the people who react, everybody, and everybody's ears.
-
-    Everybody is in this order: scripted workers, people who react, replayed people.
+    scenario: Scenario, boxes_odom_m: FloatArray, rng: np.random.Generator
+) -> tuple[tuple[Person, ...], tuple[Ears, ...]]:
+    """Return the people of a scenario, then those who are replayed, and everybody's ears.
 
     Args:
         scenario: the scenario.
         boxes_odom_m: (N, 4) racks and walls.
-        start_offsets_s: how much later each scripted worker starts.
-        rng: random generator of the people.
+        rng: random generator of the people; each has one of their own.
     """
-    walkers = _walkers(scenario, boxes_odom_m, rng)
-    scripted = (
-        Scripted(script, float(offset))
-        for script, offset in zip(scenario.workers, start_offsets_s, strict=True)
-    )
-    behaviours: tuple[PersonBehaviour, ...] = (
-        *(Answering(person, boxes_odom_m) for person in scripted),
-        *walkers,
-        *(Answering(person, boxes_odom_m) for person in _recorded(scenario, boxes_odom_m)),
-    )
-    # The ears draw from generators of their own, which come after those of the walkers: what
-    # people do whom nobody asks depends on nothing here.
-    own = [script.hearing for script in scenario.workers]
-    own += [person.hearing for person in scenario.people]
-    own += [None] * (len(behaviours) - len(own))
-    ears = tuple(
-        Ears(scenario.hearing if hearing is None else hearing, stream)
-        for hearing, stream in zip(own, rng.spawn(len(behaviours)), strict=True)
-    )
-    return walkers, behaviours, ears
-
-
-def _walkers(
-    scenario: Scenario, boxes_odom_m: FloatArray, rng: np.random.Generator
-) -> tuple[Walker, ...]:
-    """Return the people who react, each with a random generator of their own."""
-    jitter = scenario.start_jitter_s
-    make = walker_of(scenario.population)
-    walkers = []
+    jitter, habits = scenario.start_jitter_s, habits_of(scenario.population)
+    everybody = []
     for spec, own in zip(scenario.people, rng.spawn(len(scenario.people)), strict=True):
         offset = float(own.uniform(-jitter, jitter))
-        walkers.append(make(spec, own, boxes_odom_m, offset_s=offset))
-    return tuple(walkers)
+        everybody.append(Person(spec, own, boxes_odom_m, habits=habits, offset_s=offset))
+    if scenario.replay_csv is not None:
+        everybody += recorded_people(
+            scenario.replay_csv,
+            boxes_odom_m,
+            reacts=scenario.replay_reacts,
+            leaves=scenario.replay_leaves,
+        )
+    # The ears draw from generators of their own, which come after those of the people: what
+    # people do whom nobody asks depends on nothing here.
+    ears = tuple(
+        Ears(scenario.hearing if person.spec.hearing is None else person.spec.hearing, stream)
+        for person, stream in zip(everybody, rng.spawn(len(everybody)), strict=True)
+    )
+    return tuple(everybody), ears
 
 
-def _recorded(scenario: Scenario, boxes_odom_m: FloatArray) -> tuple[PersonPath, ...]:
-    path, leaves = scenario.replay_csv, scenario.replay_leaves
-    if path is None:
-        return ()
-    if scenario.replay_reacts:
-        return displaced_people(path, boxes_odom_m, leaves=leaves)
-    return replayed_people(path, leaves=leaves)
+def recorded_people(
+    path: str | Path, boxes_odom_m: FloatArray, *, reacts: bool = False, leaves: bool = False
+) -> list[Person]:
+    """Return the recorded people of a table in order of their first rows, with different looks.
+
+    Args:
+        path: the table, see :func:`read_recordings`.
+        boxes_odom_m: (N, 4) racks and walls.
+        reacts: as for :class:`Track`.
+        leaves: as for :class:`Track`.
+
+    Raises:
+        SimError: see :func:`read_recordings`.
+    """
+    looks = worker_names()
+    people = []
+    for number, recording in enumerate(read_recordings(path)):
+        x_m, y_m = recording.positions_odom_m[0].tolist()
+        spec = PersonSpec(
+            name=recording.name,
+            look=looks[number % len(looks)],
+            route=(RoutePoint(x_m=x_m, y_m=y_m),),
+            glances=Glances(notices_within_m=0.0),
+        )
+        track = Track(recording, reacts=reacts, leaves=leaves)
+        people.append(Person(spec, np.random.default_rng(0), boxes_odom_m, track=track))
+    return people

@@ -95,9 +95,8 @@ class CrossingResult:
         contacts: all contacts.
         time_to_goal_s: None when the goal was not reached.
         frames: one per control cycle.
-        people: outcomes of the reacting people: ``people[i]`` is person ``i`` of the scenario, and
-            number ``scripted + i`` in lists of all people.
-        scripted: number of scripted workers; they come first in lists of all people.
+        people: outcomes of the people of the scenario, who come first in lists of all people;
+            replayed people come after them.
         robot: the robot.
         obstacle_boxes_odom_m: (B, 4) x_min, y_min, x_max, y_max of racks, walls and props.
     """
@@ -111,7 +110,6 @@ class CrossingResult:
     time_to_goal_s: float | None
     frames: tuple[CrossingFrame, ...]
     people: tuple[PersonOutcome, ...] = ()
-    scripted: int = 0
     robot: RobotProfile = NOVA_CARTER
     obstacle_boxes_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ..actors.body import Worker
-from ..actors.robot import Amr, KinematicRobot
+from ..actors.robot import Robot
 from ..world import sees
 
 Point = tuple[float, float]
@@ -25,7 +25,7 @@ class RobotSight:
         workers: the people. Their collision bodies are brought up where they may hide it.
     """
 
-    def __init__(self, amr: Amr | KinematicRobot, workers: Sequence[Worker]) -> None:
+    def __init__(self, amr: Robot, workers: Sequence[Worker]) -> None:
         self._amr = amr
         self._workers = workers
         self._through = frozenset({amr.body})

@@ -34,7 +34,7 @@ from .eyes import (
 )
 from .faults import EpisodeFaults, Fault
 
-#: Random streams of an episode: of the people's starts, the camera's noise, its losses and delays,
+#: Random streams of an episode: one that is spare, of the camera's noise, its losses and delays,
 #: and the people.
 STREAMS: Final = 4
 # Age of perception before the first image has arrived: older than any policy accepts.

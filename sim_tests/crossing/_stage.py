@@ -15,6 +15,7 @@ from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
 from ..actors.behaviour import (
+    Heard,
     MovingBody,
     PersonMotion,
     PersonOutcome,
@@ -23,7 +24,7 @@ from ..actors.behaviour import (
     Surroundings,
 )
 from ..actors.body import Worker
-from ..actors.robot import NOVA_CARTER, Amr, AmrLook, KinematicLook, KinematicRobot
+from ..actors.robot import Amr, KinematicRobot, RobotLook, robot_of
 from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.bullet import pybullet
@@ -43,8 +44,6 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
-# The highest speed that a body is placed with; recorded people may be faster.
-_FASTEST_MPS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,12 +81,11 @@ class TrueView:
 class Stage(AbstractContextManager["Stage"]):
     """Hall, robot and people of one crossing, moved together by physics.
 
-    People are numbered in this order: scripted workers, people who react, replayed people.
+    People are numbered in this order: those of the scenario, then replayed people.
 
     Args:
         scenario: the scenario.
-        start_offsets_s: how much later each scripted worker starts.
-        people_rng: random generator of the people who react; None for the generator of seed 0.
+        people_rng: random generator of the people; None for the generator of seed 0.
         renderer: renderer for images of the stage.
 
     Attributes:
@@ -98,7 +96,6 @@ class Stage(AbstractContextManager["Stage"]):
     def __init__(
         self,
         scenario: Scenario,
-        start_offsets_s: FloatArray,
         people_rng: np.random.Generator | None = None,
         *,
         renderer: RendererName = "tiny",
@@ -107,24 +104,19 @@ class Stage(AbstractContextManager["Stage"]):
         self.warehouse = Warehouse(scenario.layout, renderer=renderer)
         try:
             self.amr = _robot(self.warehouse, scenario)
-            self.walkers, self._behaviours, ears = staged_people(
+            self.people, ears = staged_people(
                 scenario,
                 self.warehouse.obstacle_boxes_odom,
-                start_offsets_s,
                 np.random.default_rng(0) if people_rng is None else people_rng,
             )
             self.workers = tuple(
-                Worker(self.warehouse, each.stature_m, look=each.look, stride_m=each.stride_m)
-                for each in self._behaviours
+                Worker(self.warehouse, each.spec.stature_m, look=each.spec.look)
+                for each in self.people
             )
         except BaseException:
             self.warehouse.close()
             raise
-        self.warehouse.add_actor(
-            KinematicLook(self.amr)
-            if isinstance(self.amr, KinematicRobot)
-            else AmrLook.of(self.warehouse, self.amr)
-        )
+        self.warehouse.add_actor(RobotLook.of(self.amr))
         self._sight = RobotSight(self.amr, self.workers)
         self._audience = Audience(ears, self.workers, self._sight)
         self._motions: tuple[PersonMotion, ...] = ()
@@ -139,7 +131,10 @@ class Stage(AbstractContextManager["Stage"]):
         self._half_size_m: tuple[float, float] = (half_length, half_width)
         # The middle of the outline, which is not the base origin of every robot.
         self._middle_base_m: tuple[float, float] = tuple((0.5 * (low + high)).tolist())
+        # What happened to each person since the last motion, for the next one.
         self._held = [False] * len(self.workers)
+        self._heard: list[list[Heard]] = [[] for _ in self.workers]
+        self._touches: list[list[tuple[float, float]]] = [[] for _ in self.workers]
         self._last_velocity_mps: FloatArray | None = None
         self._place_workers()
 
@@ -188,9 +183,9 @@ class Stage(AbstractContextManager["Stage"]):
         """
         robot = self.amr.T_odom_base[:2, 3]
         heard = self._audience.hear(self.t_s, means, place_odom_m, robot, self._motions)
-        for behaviour, what in zip(self._behaviours, heard, strict=True):
+        for news, what in zip(self._heard, heard, strict=True):
             if what is not None:
-                behaviour.hear(what)
+                news.append(what)
 
     def observe(self, t_s: float, lasts_s: float) -> Separations:
         """Return the separations of all people from the robot now.
@@ -244,21 +239,24 @@ class Stage(AbstractContextManager["Stage"]):
 
     @property
     def outcomes(self) -> tuple[PersonOutcome, ...]:
-        """Outcomes of the people who react, in their order."""
-        return tuple(walker.outcome() for walker in self.walkers)
+        """Outcomes of the people of the scenario, in their order; replayed people have none."""
+        return tuple(person.outcome() for person in self.people[: len(self.scenario.people)])
 
     def _place_workers(self) -> None:
         robot, others = self._robot_body(), self._moving_bodies()
         motions = []
-        for index, (worker, behaviour) in enumerate(
-            zip(self.workers, self._behaviours, strict=True)
-        ):
+        for index, (worker, person) in enumerate(zip(self.workers, self.people, strict=True)):
             around = Surroundings(
                 robot,
                 others[:index] + others[index + 1 :],
                 partial(self._sight.seen_by, worker),
+                held=self._held[index],
+                heard=tuple(self._heard[index]),
+                touches=tuple(self._touches[index]),
             )
-            motion = behaviour.motion(self.t_s, around)
+            self._heard[index].clear()
+            self._touches[index].clear()
+            motion = person.step(self.t_s, around)
             motions.append(self._move_or_hold(index, worker, motion, robot))
         self._motions = tuple(motions)
 
@@ -279,7 +277,6 @@ class Stage(AbstractContextManager["Stage"]):
             return motion
         _pose(worker, before)
         self._held[index] = True
-        self._behaviours[index].hold()
         return replace(before, velocity_odom_mps=np.zeros(2))
 
     def _depth_m(self, worker: Worker) -> float:
@@ -362,17 +359,15 @@ class Stage(AbstractContextManager["Stage"]):
         if not self._touching[index]:  # a continuing touch is one contact
             self._touching[index] = True
             self.contacts.append(ContactEvent(self.t_s, index, velocity, towards))
-        self._behaviours[index].touch(*(-towards).tolist())
+        x, y = (-towards).tolist()
+        self._touches[index].append((x, y))
 
 
 def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
     """Return the robot of a scenario at its start."""
     task, model = scenario.robot, scenario.robot_model
     start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
-    if model is None or model.body == "nova_carter":
-        mount = scenario.camera.mount
-        return Amr(warehouse, start, heading_rad, NOVA_CARTER, camera_mount=mount)
-    return KinematicRobot(warehouse, model, start, heading_rad)
+    return robot_of(warehouse, model, start, heading_rad, camera_mount=scenario.camera.mount)
 
 
 def _faces(motion: PersonMotion, target_odom_m: FloatArray) -> bool:
@@ -385,10 +380,8 @@ def _pose(worker: Worker, motion: PersonMotion, *, collides: bool = True) -> Non
     worker.place(
         motion.position_odom_m,
         motion.heading_odom_rad,
-        motion.walked_m,
-        min(math.hypot(*motion.velocity_odom_mps.tolist()), _FASTEST_MPS),
-        motion.head_yaw_rad,
-        motion.head_pitch_rad,
+        head_yaw_rad=motion.head_yaw_rad,
+        head_pitch_rad=motion.head_pitch_rad,
         eye_yaw_rad=motion.eye_yaw_rad,
         eye_pitch_rad=motion.eye_pitch_rad,
         activity=motion.activity,

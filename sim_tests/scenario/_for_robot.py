@@ -31,7 +31,8 @@ def scenario_for_robot(
 
     *Time.* The duration grows with the time that the way takes at the robot's speed and
     acceleration. People start later by what the robot takes longer for half of the way, so that
-    they still meet. Smaller and faster robots change neither. Recorded people (``replay_csv``) stay
+    they still meet; those who set off as it comes let a slower robot come nearer, as near in time.
+    Smaller and faster robots change neither. Recorded people (``replay_csv``) stay
     as they were recorded, in place and in time.
 
     The name becomes ``scenario_robot``, such as ``blind_corner_forklift``.
@@ -63,6 +64,7 @@ def scenario_for_robot(
     data["duration_s"] = min(scenario.duration_s * ratio, 600.0)
     half_m = 0.5 * way_m
     _delay(data, max(_drive_s(slower, half_m) - _drive_s(usual, half_m), 0.0))
+    _let_nearer(data, min(slower.max_speed_mps / usual.max_speed_mps, 1.0))
     data |= {"name": f"{scenario.name}_{model.name}", "robot_model": model}
     data["scanners"] = model.scanners
     return Scenario.from_data(data, scenario.name)
@@ -114,14 +116,6 @@ def _widen(data: dict[str, Any], model: RobotModel) -> None:
         racks.append({**rack, across: 0.5 * (low + high), size: high - low})
     hall["racks"] = racks
     hall["props"] = [{**prop, across: moved(prop[across])} for prop in hall["props"]]
-    _move_people(data, across, moved)
-
-
-def _move_people(data: dict[str, Any], across: str, moved: Callable[[float], float]) -> None:
-    data["workers"] = [
-        {**worker, "path": [{**key, across: moved(key[across])} for key in worker["path"]]}
-        for worker in data["workers"]
-    ]
     data["people"] = [_moved_person(person, across, moved) for person in data["people"]]
 
 
@@ -181,17 +175,19 @@ def _reached_m(corners: FloatArray) -> FloatArray:
 
 
 def _delay(data: dict[str, Any], later_s: float) -> None:
-    """Let everybody start later."""
+    """Let everybody start later, and look later where they look as planned."""
     data["people"] = [
-        {**person, "start_s": person["start_s"] + later_s} for person in data["people"]
-    ]
-    data["workers"] = [
         {
-            **worker,
-            **{
-                name: [{**key, "t_s": key["t_s"] + later_s} for key in worker[name]]
-                for name in ("path", "heading", "gaze", "activities")
-            },
+            **person,
+            "start_s": person["start_s"] + later_s,
+            "gaze": [{**key, "t_s": key["t_s"] + later_s} for key in person["gaze"]],
         }
-        for worker in data["workers"]
+        for person in data["people"]
     ]
+
+
+def _let_nearer(data: dict[str, Any], share: float) -> None:
+    """Let people who set off as the robot comes wait until it is at a share of the distance."""
+    for person in data["people"]:
+        if person["sets_off_within_m"] is not None:
+            person["sets_off_within_m"] *= share

@@ -13,7 +13,7 @@ from ..world.errors import SimError
 from ._distributions import DISTRIBUTIONS, Distribution, read_distribution
 
 # Keys whose numbers may vary. Hall, camera and duration are the same in every episode.
-_VARIABLE: Final = ("people", "workers", "robot")
+_VARIABLE: Final = ("people", "robot")
 
 
 def find_parameters(data: Mapping[str, Any], source: str) -> dict[str, Distribution]:
@@ -24,11 +24,13 @@ def find_parameters(data: Mapping[str, Any], source: str) -> dict[str, Distribut
         source: name of the scenario in messages.
 
     Raises:
-        SimError: for an impossible distribution, and for one outside people, workers and robot.
+        SimError: for an impossible distribution, and for one outside people and robot.
     """
     found: dict[str, Distribution] = {}
     for path, kind, settings in _distributions_in(data, (), source):
         dotted = ".".join(path)
+        if path[0] == "workers":
+            continue  # scripts are refused with the scenario, see Scenario
         if path[0] not in _VARIABLE:
             raise SimError(
                 f"{source}: {dotted}: only numbers under {', '.join(_VARIABLE)} may be "

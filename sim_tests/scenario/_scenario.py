@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,7 +21,6 @@ from ..actors.behaviour import (
     Hearing,
     PersonSpec,
     PopulationName,
-    WorkerScript,
     population_of,
 )
 from ..actors.robot import NOVA_CARTER, RobotModel
@@ -34,7 +32,6 @@ from ..world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 from ._distributions import error_text
 from ._files import parse_yaml, read_file, require_version, shipped_text
 from ._parameters import find_parameters, with_numbers
-from ._population import person_of_script
 
 # Largest distance between neighbours on the reference path.
 _PATH_SPACING_M: Final = 0.25
@@ -200,7 +197,6 @@ class Scenario(SimConfig):
             :func:`~sim_tests.scenario.scenario_for_robot`, which fits room and time as well.
         camera: the robot's camera; a robot model has its place.
         scanners: the robot's laser scanners; they are used where a crossing asks for them.
-        workers: scripted people, who move the same whatever the robot does.
         people: people who look, react and walk by themselves; names are unique.
         population: habits of the people: ``"classic"``, or ``"recorded"`` as fitted to recorded
             people, see :meth:`with_population`.
@@ -208,10 +204,10 @@ class Scenario(SimConfig):
         replay_csv: table of recorded people to replay, see :func:`read_recordings`; relative
             to the scenario's own file.
         replay_reacts: the recorded people leave their paths where the robot forces them off, and
-            return; see :class:`Displaced`. Otherwise they walk on whatever the robot does.
+            return; see :class:`Person`. Otherwise they walk on whatever the robot does.
         replay_leaves: the recorded people are away before their first and after their last row;
             otherwise they stand there.
-        start_jitter_s: each worker and each person starts up to this much earlier or later, drawn
+        start_jitter_s: each person starts up to this much earlier or later, drawn
             from the seed.
     """
 
@@ -226,7 +222,6 @@ class Scenario(SimConfig):
     robot_model: Annotated[RobotModel | None, BeforeValidator(_robot_model)] = None
     camera: CameraSpec = CameraSpec()
     scanners: tuple[ScannerSpec, ...] = DIAGONAL_SCANNERS
-    workers: tuple[WorkerScript, ...] = ()
     people: tuple[PersonSpec, ...] = ()
     population: PopulationName = DEFAULT_POPULATION
     hearing: Hearing = Hearing()
@@ -234,6 +229,20 @@ class Scenario(SimConfig):
     replay_reacts: bool = False
     replay_leaves: bool = False
     start_jitter_s: float = Field(default=0.0, ge=0.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_scripts(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping) or "workers" not in data:
+            return data
+        if data["workers"]:
+            raise ValueError(
+                "workers: scripted people are now ordinary ones; write each of them under people: "
+                "with a name, the x_m and y_m of its path as route, its speed as speed_mps, its "
+                "first t_s as start_s, its waits as pauses, and its gaze as glances, or as gaze"
+            )
+        # Files that were written with every key hold an empty list.
+        return {key: value for key, value in data.items() if key != "workers"}
 
     @model_validator(mode="after")
     def _unique_names(self) -> Scenario:
@@ -323,9 +332,6 @@ class Scenario(SimConfig):
     def with_population(self, text: str) -> Scenario:
         """Return the same task among people with other habits.
 
-        With ``"recorded"``, people who react also take the place of scripted workers, unless the
-        robot drives straight on.
-
         Args:
             text: a population, ``"classic"`` or ``"recorded"``, numbers of :class:`Hearing`, or
                 both: ``"recorded"``, ``"recorded,answers=0.8,startles=0.2"``, ``"answers=0.3"``.
@@ -337,16 +343,10 @@ class Scenario(SimConfig):
         changes: dict[str, Any] = {} if name is None else {"population": name}
         if numbers:
             changes["hearing"] = self.hearing.with_numbers(numbers)
-        if name == "recorded" and self.robot.straight_on_speed_mps is None:
-            taken = {person.name for person in self.people}
-            names = (f"worker {number}" for number in itertools.count(1))
-            free = (each for each in names if each not in taken)
-            added = tuple(person_of_script(script, next(free)) for script in self.workers)
-            changes.update(workers=(), people=(*added, *self.people))
         return self.model_copy(update=changes)
 
     def without_people(self) -> Scenario:
         """Return the same task in a hall without people."""
-        empty: dict[str, Any] = {"workers": (), "people": (), "replay_csv": None}
+        empty: dict[str, Any] = {"people": (), "replay_csv": None}
         empty |= {"replay_reacts": False, "replay_leaves": False}
         return self.model_copy(update={"name": f"{self.name}_without_people", **empty})

@@ -37,7 +37,7 @@ _FOR_ROBOT: Final = "for_robot"
 class ScenarioTemplate:
     """A scenario in which some numbers are distributions.
 
-    Any number under ``people``, ``workers`` and ``robot`` may be a mapping such as
+    Any number under ``people`` and ``robot`` may be a mapping such as
     ``{uniform: {low: 1.0, high: 2.0}}``, ``{normal: {mean:, std:, low:, high:}}``,
     ``{lognormal: {median:, quartiles: [,]}}``, ``{integers: {low:, high:}}`` or
     ``{choice: [...]}``. A :class:`Scenario` is a template without distributions.

@@ -268,8 +268,8 @@ def metrics_page() -> str:
     """Return the page of metrics and columns."""
     columns = ["| column | unit | meaning |", "| --- | --- | --- |"]
     columns += [
-        f"| `{name}` | {unit_of(name)} | {_cell(plain(meaning))} |"
-        for name, meaning in COLUMNS.items()
+        f"| `{name}` | {unit_of(name)} | {_cell(plain(each.meaning))} |"
+        for name, each in COLUMNS.items()
     ]
     return "\n\n".join(
         [

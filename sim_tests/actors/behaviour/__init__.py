@@ -1,38 +1,32 @@
-"""The behaviour of people: scripts, recorded paths, and walkers that look, decide and react."""
+"""The behaviour of people: they walk a route or a recorded track, look, decide and react."""
 
 from __future__ import annotations
 
-from ._answering import Answering
-from ._displaced import Displaced, displaced_people
-from ._hearing import Ears, Heard, Hearing, Request, RequestMeans, StartleKind
-from ._obstacles import WALKER_RADIUS_M
-from ._person import (
-    ALONE,
-    MovingBody,
-    PersonBehaviour,
-    PersonMotion,
-    PersonOutcome,
-    PersonPath,
-    RobotBody,
-    Surroundings,
-)
-from ._population import (
+from ._habits import (
     DEFAULT_POPULATION,
     FASTEST_RECORDED_MPS,
     POPULATIONS,
     PopulationName,
-    RecordedWalker,
     draw_person,
+    habits_of,
     known_population,
     median_person,
     population_of,
-    walker_of,
 )
-from ._replayed import RecordedPath, Replayed, read_recordings, replayed_people
-from ._script import Scripted, WorkerScript
-from ._spec import Glances, Lapse, PersonSpec, Reactions
+from ._hearing import Ears, Heard, Hearing, Request, RequestMeans, StartleKind
+from ._person import DECISION_PERIOD_S, Person
+from ._spec import GazeKey, Glances, Lapse, PersonSpec, Reactions, RoutePoint
 from ._starting import LOOK_WITHIN_S, START_SHARES, start_share
-from ._walker import DECISION_PERIOD_S, Walker
+from ._surroundings import (
+    ALONE,
+    MovingBody,
+    PersonMotion,
+    PersonOutcome,
+    RobotBody,
+    Surroundings,
+)
+from ._track import RecordedPath, Track, read_recordings
+from ._trajectory import WALKER_RADIUS_M
 
 __all__ = [
     "ALONE",
@@ -43,39 +37,32 @@ __all__ = [
     "POPULATIONS",
     "START_SHARES",
     "WALKER_RADIUS_M",
-    "Answering",
-    "Displaced",
     "Ears",
+    "GazeKey",
     "Glances",
     "Heard",
     "Hearing",
     "Lapse",
     "MovingBody",
-    "PersonBehaviour",
+    "Person",
     "PersonMotion",
     "PersonOutcome",
-    "PersonPath",
     "PersonSpec",
     "PopulationName",
     "Reactions",
     "RecordedPath",
-    "RecordedWalker",
-    "Replayed",
     "Request",
     "RequestMeans",
     "RobotBody",
-    "Scripted",
+    "RoutePoint",
     "StartleKind",
     "Surroundings",
-    "Walker",
-    "WorkerScript",
-    "displaced_people",
+    "Track",
     "draw_person",
+    "habits_of",
     "known_population",
     "median_person",
     "population_of",
     "read_recordings",
-    "replayed_people",
     "start_share",
-    "walker_of",
 ]

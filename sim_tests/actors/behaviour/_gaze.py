@@ -1,26 +1,68 @@
 """Gaze of a person: when glances at the robot begin and end, and how head and eyes follow.
 
-Glances and looking away alternate as a renewal process with lognormal durations.
+Glances and looking away alternate as a renewal process with lognormal durations. Between glances
+the head points to one side, where a gaze plan says, or as recorded.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from ..body import MAX_EYE_YAW_RAD, STAYING
-from ._duration import LogNormalDuration
+from ...world.errors import SimError
+from ..body import MAX_EYE_YAW_RAD, MAX_HEAD_PITCH_RAD, MAX_HEAD_YAW_RAD, STAYING
 from ._head import ON_TARGET_RAD, AnsweringLook, HeadAndEyes, angles_to, clipped
-from ._hearing import FIELD_RAD, Heard
-from ._person import RobotBody, eye_height_m
-from ._spec import Glances
+from ._hearing import FIELD_RAD, UPPER_QUARTILE, Heard
+from ._spec import GazeKey, Glances
+from ._surroundings import RobotBody, eye_height_m
 
 # A robot that was noticed before is seen up to this distance.
 _SEEN_WITHIN_M: Final = 25.0
 # Eyes change their place in the head after this mean time, and with every glance.
 _REST_S: Final = 1.5
+# A recorded head is as recorded again this near to it after a look.
+_SETTLED_RAD: Final = math.radians(1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class LogNormalDuration:
+    """A duration whose logarithm is normally distributed.
+
+    Attributes:
+        median_s: > 0.
+        sigma: standard deviation of the logarithm, ≥ 0.
+    """
+
+    median_s: float
+    sigma: float
+
+    @classmethod
+    def fitted(cls, median_s: float, quartiles_s: tuple[float, float]) -> LogNormalDuration:
+        """Fit the median and the ratio of the quartiles.
+
+        The quartiles of a lognormal lie at median · exp(±0.6745 σ), so their ratio gives σ. The
+        fitted quartiles equal the given ones only if those lie evenly around the median in
+        logarithms.
+        """
+        lower, upper = quartiles_s
+        if not (median_s > 0.0 and 0.0 < lower <= median_s <= upper):
+            raise SimError(
+                "quartiles must be positive and lie on either side of the median, got "
+                f"{lower:g} and {upper:g} s about {median_s:g} s"
+            )
+        return cls(median_s, math.log(upper / lower) / (2.0 * UPPER_QUARTILE))
+
+    @property
+    def mean_s(self) -> float:
+        """Expected duration."""
+        return self.median_s * math.exp(0.5 * self.sigma**2)
+
+    def draw_s(self, rng: np.random.Generator) -> float:
+        """Draw a duration."""
+        return self.median_s * math.exp(self.sigma * rng.standard_normal())
 
 
 class GlanceProcess:
@@ -86,6 +128,43 @@ class EyeRest:
         return self._yaw_rad
 
 
+def planned_gaze(
+    plan: tuple[GazeKey, ...],
+    t_s: float,
+    place: tuple[float, float, float],
+    camera_odom_m: tuple[float, float, float],
+    eyes_m: float,
+) -> tuple[float, float]:
+    """Return yaw and pitch of the head from the body as a gaze plan says.
+
+    A head turns through the front from one key to the next.
+
+    Args:
+        plan: at least one key.
+        t_s: now.
+        place: x, y and heading of the body.
+        camera_odom_m: (x, y, z) of the robot's camera.
+        eyes_m: height of the eyes.
+    """
+    after = sum(key.t_s <= t_s for key in plan)
+    first, second = plan[max(after - 1, 0)], plan[min(after, len(plan) - 1)]
+    to_robot = angles_to(camera_odom_m, place, eyes_m)
+    yaw, pitch = _key_angles(first, to_robot)
+    if first is not second:
+        next_yaw, next_pitch = _key_angles(second, to_robot)
+        share = (t_s - first.t_s) / (second.t_s - first.t_s)
+        share = share * share * (3.0 - 2.0 * share)
+        yaw, pitch = yaw + share * (next_yaw - yaw), pitch + share * (next_pitch - pitch)
+    return clipped(yaw, MAX_HEAD_YAW_RAD), clipped(pitch, MAX_HEAD_PITCH_RAD)
+
+
+def _key_angles(key: GazeKey, to_robot: tuple[float, float]) -> tuple[float, float]:
+    """Return yaw and pitch of the head at a key."""
+    yaw, pitch = to_robot if key.look == "robot" else (0.0, 0.0)
+    yaw = math.remainder(yaw + math.radians(key.yaw_deg), math.tau)
+    return yaw, pitch + math.radians(key.pitch_deg)
+
+
 class Gaze:
     """Head and eyes of one person.
 
@@ -101,7 +180,9 @@ class Gaze:
     Attributes:
         noticed_s: time of the first look at the robot; None before.
         looking: whether a glance at the robot is on.
+        away: yaw and pitch of the head from the body while the person does not look at the robot.
         answer: the last look that answers a request of the robot.
+        turned: the head is not as recorded because of a look; see :meth:`follow`.
         eye_rest: where the eyes come to rest in the head, which turns the rest of the way; None:
             in the middle.
     """
@@ -127,11 +208,13 @@ class Gaze:
             self._notices_within_m = 0.0
         self._visible_since_s: float | None = None
         self._first_glance_s: float | None = None
-        self._away = (math.radians(glances.away_yaw_deg), math.radians(glances.away_pitch_deg))
-        self._posture = HeadAndEyes(self._away, (0.0, 0.0), twists=activity not in STAYING)
+        self.away = (math.radians(glances.away_yaw_deg), math.radians(glances.away_pitch_deg))
+        self._twists = activity not in STAYING
+        self._posture = HeadAndEyes(self.away, (0.0, 0.0), twists=self._twists)
         self.noticed_s: float | None = None
         self.looking = False
         self.answer: AnsweringLook | None = None
+        self.turned = False
 
     def angles(self, after_s: float) -> tuple[float, float, float, float]:
         """Return yaw and pitch of the head and of the eyes, ``after_s`` after the last update."""
@@ -155,6 +238,15 @@ class Gaze:
             self._first_glance_s = t_s
             self._process.begin(t_s)
 
+    def follow(self, head_rad: tuple[float, float]) -> None:
+        """Let the head point there: at once, but after a look at the robot it turns back."""
+        self.away = head_rad
+        if self.turned and not self.looking:
+            off = self._posture.off_rad(head_rad)
+            self.turned = max(off, abs(self._posture.twist_rad(0.0))) > _SETTLED_RAD
+        if not self.turned:
+            self._posture = HeadAndEyes(head_rad, (0.0, 0.0), twists=self._twists)
+
     def update(
         self,
         t_s: float,
@@ -176,8 +268,9 @@ class Gaze:
         """
         self._posture.advance(dt_s)
         self.looking = self._glances_now(t_s, visible) or answers
-        target = self._away
+        target = self.away
         if self.looking:
+            self.turned = True
             target = angles_to(robot.camera_m, place, self._eyes_m)
             if answers:
                 target = self._posture.unwrapped(target)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Final
 
 from ..body import (
@@ -169,7 +168,7 @@ def twisted(feet: GaitPose, twist_rad: float) -> GaitPose:
     """Return the gait pose of a body whose heading is turned by the twist while the feet stay."""
     if twist_rad == 0.0:
         return feet
-    return replace(feet, pelvis_yaw_rad=feet.pelvis_yaw_rad - _WAIST_SHARE * twist_rad)
+    return feet._replace(pelvis_yaw_rad=feet.pelvis_yaw_rad - _WAIST_SHARE * twist_rad)
 
 
 def angles_to(

@@ -14,11 +14,12 @@ from tracking.config import complaints
 
 from ...world.config import SimConfig
 from ...world.errors import SimError
-from ._duration import UPPER_QUARTILE
 
 StartleKind = Literal["", "stop", "aside", "into_path"]
 RequestMeans = Literal["light", "voice"]
 
+#: The upper quartile of a standard normal distribution.
+UPPER_QUARTILE: Final = 0.6744897501960817
 # Requests that were heard this long ago have worn off.
 _MEMORY_S: Final = 60.0
 #: Motion is noticed up to this angle from the head's direction: the horizontal field of both eyes

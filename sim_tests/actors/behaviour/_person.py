@@ -1,213 +1,500 @@
-"""Interface of a person in a crossing: surroundings in, motion out, and the outcome at the end."""
+"""A person who looks, decides and walks, step by step, along a route or a recorded track."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Final, Protocol
+from functools import cached_property
+from typing import Any, Final
 
-from perception.arrays import FloatArray
+import numpy as np
 
-from ..body import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Activity, GaitPose
-from ._hearing import Heard
+from ..body import Activity
+from ._feet import Feet
+from ._forces import (
+    RELAXATION_S,
+    SlowRobotDetour,
+    limit_approach,
+    people_force,
+    robot_force,
+    without_part,
+)
+from ._gaze import Gaze, planned_gaze
+from ._habits import CLASSIC, Habits, Manner, draw_person
+from ._head import turn_rate, twisted
+from ._reactions import ReactionModel, Startle
+from ._route import STANDING_BELOW_MPS, DesiredVelocity, FreeWalk, Route, RouteFollower
+from ._spec import PersonSpec
+from ._starting import AttentionSpan
+from ._surroundings import (
+    ALONE,
+    PersonMotion,
+    PersonOutcome,
+    RobotBody,
+    Surroundings,
+    eye_height_m,
+)
+from ._track import FACING_FROM_MPS, Track
+from ._trajectory import MAX_ACCELERATION_MPS2, Obstacles, State, Trajectory, limited
 
-#: Height of the eyes as a share of stature.
-EYE_HEIGHT_SHARE: Final = 0.94
-_LOW_EYE_HEIGHT_SHARES: Final = {
-    "sitting": SEATED_EYE_HEIGHT_SHARE,
-    "kneeling": KNEELING_EYE_HEIGHT_SHARE,
-}
+#: Time between two decisions of a person; in between the motion follows closed forms.
+DECISION_PERIOD_S: Final = 1.0 / 20.0
+
+_BRAKING_S: Final = 0.1
+# Highest speed, relative to the larger of free and desired speed.
+_MAX_SPEED_FACTOR: Final = 1.3
+_MIN_REFERENCE_MPS: Final = 0.5
+# Weaker social forces do not move a standing person.
+_UNMOVED_BELOW_MPS2: Final = 1.0
+# A person who goes first avoids the robot only within this distance.
+_TOO_NEAR_M: Final = 0.5
+# A person whose heading is farther off walks slower until it is turned, down to this speed share.
+_TURN_FIRST_RAD: Final = math.radians(60.0)
+_MIN_TURNING_SHARE: Final = 0.1
+# A waiting person steps aside or back without turning if the cosine of the angle between step and
+# route is smaller.
+_SIDE_STEP_COSINE: Final = 0.2
+# After a contact the person steps back, and never towards the robot while they touch.
+_RECOIL_S: Final = 0.7
+_RECOIL_MPS: Final = 0.4
+_TOUCHING_S: Final = 0.1
+# The free walk has no end if it takes longer than this factor times its plan.
+_MAX_FREE_TIME_FACTOR: Final = 4.0
 
 
-def eye_height_m(stature_m: float, activity: str = "none") -> float:
-    """Return the height of the eyes of a person who stands, sits or kneels."""
-    return _LOW_EYE_HEIGHT_SHARES.get(activity, EYE_HEIGHT_SHARE) * stature_m
+class Person:
+    """A person who walks a route or a recorded track, looks around and reacts to the robot.
 
+    Decisions are taken every :data:`DECISION_PERIOD_S`. Position and angles follow closed forms in
+    between, so they do not depend on how often :meth:`step` is called; only the footsteps do.
 
-@dataclass(frozen=True, slots=True)
-class MovingBody:
-    """Position and velocity of another person in odom."""
+    *On a route* the person walks as the specification and the habits say, glances at the robot or
+    looks as planned, and reacts to a robot that they have seen.
 
-    x_m: float
-    y_m: float
-    vx_mps: float
-    vy_mps: float
+    *On a track* the recording is met exactly until a startle, or the robot if the track reacts,
+    forces the person off it: by a social force of more than 0.5 m/s² or a contact. From then on the
+    person is pushed by that force, walks round a slow robot and never into one, and heads for the
+    place where the recording has them at the present time. There the recording goes on. People on a
+    track know the robot from any side, and look at it only where it asks.
 
-
-@dataclass(frozen=True, slots=True)
-class RobotBody:
-    """The robot as a person can see it, in odom: a moving rectangle with a camera.
+    Args:
+        spec: the person.
+        rng: the person's own generator, for glances, reactions and habits.
+        boxes_odom_m: (N, 4) racks and walls, x_min, y_min, x_max, y_max.
+        habits: of the population; with a variation, speed and glances are drawn by
+            :func:`draw_person`.
+        track: recorded motion in place of the route; None for none.
+        offset_s: delay of the start; the person never starts before 0.
 
     Attributes:
-        x_m: position of the base.
-        y_m: position of the base.
-        heading_rad: heading of the base.
-        vx_mps: velocity.
-        vy_mps: velocity.
-        half_length_m: half the rectangle's length along the heading.
-        half_width_m: half its width.
-        camera_m: (x, y, z) of the camera.
+        spec: the person, with the speed and the glances that were drawn.
+        on_track: the person moves as recorded now.
+
+    Raises:
+        SimError: for a route with a corner inside a rack or a wall.
     """
 
-    x_m: float
-    y_m: float
-    heading_rad: float
-    vx_mps: float
-    vy_mps: float
-    half_length_m: float
-    half_width_m: float
-    camera_m: tuple[float, float, float]
+    def __init__(
+        self,
+        spec: PersonSpec,
+        rng: np.random.Generator,
+        boxes_odom_m: Any,
+        *,
+        habits: Habits = CLASSIC,
+        track: Track | None = None,
+        offset_s: float = 0.0,
+    ) -> None:
+        self._habits = habits
+        self._manner: Manner | None = None
+        if habits.variation is not None:
+            spec_rng, *manner_rngs = rng.spawn(5)
+            spec = draw_person(spec, spec_rng)
+            self._manner = Manner(habits, habits.variation, spec.speed_mps, manner_rngs)
+        self.spec = spec
+        self._track = track
+        self.on_track = track is not None
+        self._boxes_odom_m = boxes_odom_m
+        self._obstacles = Obstacles(boxes_odom_m)
+        route = Route.from_spec(spec)
+        start_s = max(spec.start_s + offset_s, 0.0)
+        self._span = AttentionSpan(spec.lapse, spec.sets_off_within_m, start_s)
+        self._follower = self._task = RouteFollower(route, spec.speed_mps, self._span.starts_s)
+        if track is None:
+            for number, point in enumerate(spec.route):
+                self._obstacles.check_free(
+                    f"route point {number} of {spec.name!r}", point.x_m, point.y_m
+                )
+        gaze_rng, reaction_rng = rng.spawn(2)
+        self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, activity=spec.activity)
+        self._gaze.eye_rest = None if self._manner is None else self._manner.eye_rest
+        self._eyes_m = eye_height_m(spec.stature_m, spec.activity)
+        self._reactions = ReactionModel(spec.reactions, reaction_rng)
+        self._detour = SlowRobotDetour()
+        self._activity = Activity(spec.activity, spec.activity)
+        self._trajectory = Trajectory(*route.start, self._obstacles)
+        self._tick = -1
+        self._now_s = 0.0
+        # Heading at the last tick, from the recorded one on a track, and its rate since.
+        self._reverse_rad = math.pi if spec.backwards else 0.0
+        self._standing_heading = (
+            None if spec.heading_deg is None else math.radians(spec.heading_deg)
+        )
+        ux, uy = route.direction(0.0)
+        along = math.atan2(uy, ux) + (self._reverse_rad if route.length_m > 0.0 else 0.0)
+        self._heading = along if self._standing_heading is None else self._standing_heading
+        if track is not None:
+            self._heading = 0.0
+        self._turning = 0.0
+        # Length walked so far, and when the end was reached.
+        self._walked_m = 0.0
+        self._walked_to_end_m: float | None = None
+        # Contact with the robot: direction and time, and the time of the first one.
+        self._touch: tuple[float, float, float] | None = None
+        self._bumped_s = -math.inf
+        self._startle: Startle | None = None
+        # The feet, and the positions of the last two motions.
+        self._feet = Feet(spec)
+        self._previous_position = self._last_position = route.start
 
-    def nearest_point_m(self, x_m: float, y_m: float) -> tuple[float, float]:
-        """Return the point of the rectangle nearest to (x, y)."""
-        cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        dx, dy = x_m - self.x_m, y_m - self.y_m
-        ahead = min(max(cos * dx + sin * dy, -self.half_length_m), self.half_length_m)
-        aside = min(max(cos * dy - sin * dx, -self.half_width_m), self.half_width_m)
-        return self.x_m + cos * ahead - sin * aside, self.y_m + sin * ahead + cos * aside
+    @property
+    def noticed_s(self) -> float | None:
+        """Time of the first look at the robot; None before."""
+        return self._gaze.noticed_s
 
-    def gap_to_line_m(self, point_m: tuple[float, float], direction: tuple[float, float]) -> float:
-        """Return the distance of the rectangle from a line through a point; 0 where it is on it."""
-        (x, y), (ux, uy) = point_m, direction
-        cos, sin = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        half_m = self.half_length_m * abs(ux * sin - uy * cos)
-        half_m += self.half_width_m * abs(ux * cos + uy * sin)
-        return max(abs(ux * (self.y_m - y) - uy * (self.x_m - x)) - half_m, 0.0)
+    @property
+    def place_odom_m(self) -> tuple[float, float]:
+        """Position at the last requested time, x and y."""
+        return self._state(self._now_s)[:2]
 
-    def extrapolated(self, dt_s: float) -> RobotBody:
-        """Return the robot after ``dt_s`` of constant velocity."""
-        dx, dy = self.vx_mps * dt_s, self.vy_mps * dt_s
-        x, y, z = self.camera_m
-        return RobotBody(
-            self.x_m + dx,
-            self.y_m + dy,
-            self.heading_rad,
-            self.vx_mps,
-            self.vy_mps,
-            self.half_length_m,
-            self.half_width_m,
-            (x + dx, y + dy, z),
+    @property
+    def reaction(self) -> str:
+        """Reaction in the present encounter with the robot; empty without one."""
+        return self._reactions.reaction
+
+    @property
+    def arrived(self) -> bool:
+        """True once the end of the route was reached."""
+        return self._task.arrived_s is not None
+
+    def outcome(self) -> PersonOutcome:
+        """Return the outcome for the person up to now."""
+        free = self._free_walk
+        time_s, late_s = (None, None) if free is None else self._task.times_s(self._now_s, free)
+        return PersonOutcome(
+            name=self.spec.name,
+            noticed_s=self._gaze.noticed_s,
+            reaction=self._reactions.first_reaction,
+            time_s=time_s,
+            late_s=late_s,
+            free_time_s=None if free is None else free.time_s,
+            length_m=self._walked_m if self._walked_to_end_m is None else self._walked_to_end_m,
+            free_length_m=None if free is None else free.length_m,
         )
 
-
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """The surroundings of one person at one instant.
-
-    Attributes:
-        robot: the robot; None without one.
-        others: all other people.
-        sees_robot: whether the line from the person's eyes to the robot's camera is free. It is
-            called only while the robot is in the person's field of view.
-    """
-
-    robot: RobotBody | None
-    others: tuple[MovingBody, ...]
-    sees_robot: Callable[[], bool]
-
-
-def _never() -> bool:
-    return False
-
-
-#: Surroundings without a robot and without other people.
-ALONE: Final = Surroundings(None, (), _never)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PersonMotion:
-    """A person at one instant.
-
-    Attributes:
-        position_odom_m: (2,) position of the body's centre line.
-        velocity_odom_mps: (2,).
-        heading_odom_rad: heading of the body.
-        walked_m: length of the path so far.
-        feet: gait pose in odom.
-        head_yaw_rad: of the head from the body, left positive.
-        head_pitch_rad: of the head, up positive.
-        eye_yaw_rad: of the eyes from the head, left positive.
-        eye_pitch_rad: of the eyes from the head, up positive.
-        activity: of the hands, or sitting or kneeling.
-        away: the person is not there, and placed far outside of the hall.
-    """
-
-    position_odom_m: FloatArray
-    velocity_odom_mps: FloatArray
-    heading_odom_rad: float
-    walked_m: float
-    feet: GaitPose
-    head_yaw_rad: float
-    head_pitch_rad: float
-    eye_yaw_rad: float
-    eye_pitch_rad: float
-    activity: Activity
-    away: bool = False
-
-
-class PersonPath(Protocol):
-    """A person who moves: by a script, a recording or decisions of their own."""
-
-    @property
-    def stature_m(self) -> float:
-        """Height of the body."""
-        ...
-
-    @property
-    def look(self) -> str | None:
-        """Name of a shipped worker; None is the one of nearest stature."""
-        ...
-
-    @property
-    def stride_m(self) -> float | None:
-        """Distance of a full gait cycle; None follows the speed."""
-        ...
-
-    def motion(self, t_s: float, around: Surroundings) -> PersonMotion:
+    def step(self, t_s: float, around: Surroundings) -> PersonMotion:
         """Return the person's motion at ``t_s``, which never decreases."""
-        ...
+        self._take_in(around)
+        self.advance(t_s, around)
+        x, y, vx, vy = self._state(t_s)
+        self._previous_position, self._last_position = self._last_position, (x, y)
+        after_s = t_s - self._tick * DECISION_PERIOD_S
+        heading = self._recorded_heading(t_s) + self._heading + self._turning * after_s
+        feet = self._feet.follow(
+            t_s,
+            (x, y, heading),
+            (vx, vy),
+            self._trajectory.acceleration,
+            turning_radps=self._turning if self._track is None else None,
+            slide=t_s - self._bumped_s < _RECOIL_S,
+        )
+        head = self._gaze.angles(after_s)
+        twist = self._gaze.twist_rad(after_s)
+        if self._track is not None and not self._gaze.turned:
+            head, twist = (self._track.head_yaw_rad(t_s), 0.0, 0.0, 0.0), 0.0
+        head_yaw, head_pitch, eye_yaw, eye_pitch = head
+        motion = PersonMotion(
+            position_odom_m=np.array([x, y]),
+            velocity_odom_mps=np.array([vx, vy]),
+            heading_odom_rad=heading + twist,
+            walked_m=self._walked_m,
+            feet=twisted(feet, twist),
+            head_yaw_rad=head_yaw,
+            head_pitch_rad=head_pitch,
+            eye_yaw_rad=eye_yaw,
+            eye_pitch_rad=eye_pitch,
+            activity=self._activity,
+        )
+        away = self._track is not None and self._track.is_away(t_s)
+        return motion.far_away() if away else motion
 
-    def hold(self) -> None:
+    def advance(self, t_s: float, around: Surroundings) -> None:
+        """Take all decisions up to ``t_s``."""
+        while (self._tick + 1) * DECISION_PERIOD_S <= t_s + 1e-9:
+            self._decide(around)
+        self._now_s = t_s
+
+    def _state(self, t_s: float) -> State:
+        """Return position and velocity, as recorded or on the present segment."""
+        if self.on_track and self._track is not None:
+            return self._track.state(t_s)
+        return self._trajectory.state(t_s)
+
+    def _recorded_heading(self, t_s: float) -> float:
+        """Return the heading from which ``_heading`` counts: 0 without a track."""
+        return 0.0 if self._track is None else self._track.heading_rad(t_s)
+
+    def _take_in(self, around: Surroundings) -> None:
+        """Note what happened since the last motion: it was held, a request heard, a contact."""
+        if around.held:
+            self._hold()
+        for heard in around.heard:
+            if heard.looks:
+                self._gaze.hear(heard)
+            if heard.startle:
+                self._startle = Startle(heard.startle, heard.from_s)
+        for towards_x, towards_y in around.touches:
+            self._note_contact(towards_x, towards_y)
+
+    def _hold(self) -> None:
         """Take the last motion back: it would have led into the robot, and the body stayed."""
-        ...
+        if self.on_track and not self._reacts:
+            return
+        left_s = (self._tick + 1) * DECISION_PERIOD_S - self._now_s
+        state = (*self._previous_position, 0.0, 0.0)
+        self._trajectory.start_segment(self._now_s, state, (0.0, 0.0), left_s)
+        self.on_track = False
+        self._last_position = self._previous_position
+        self._feet.undo()
 
-    def touch(self, towards_x: float, towards_y: float) -> None:
-        """Note a contact with the robot, which lies in this direction (a unit vector in odom)."""
-        ...
+    def _note_contact(self, towards_x: float, towards_y: float) -> None:
+        """Step back from the robot in this direction, and look at it."""
+        if not self._reacts:
+            return
+        if self._touch is None or self._now_s - self._touch[2] > _RECOIL_S:
+            self._bumped_s = self._now_s
+            self._heading += self._turning * (self._now_s - self._tick * DECISION_PERIOD_S)
+            self._turning, self._startle = 0.0, None
+            if self._track is None:
+                self._gaze.startle(self._now_s)
+        if self.spec.stays:
+            return
+        self._touch = (towards_x, towards_y, self._now_s)
+        x, y, vx, vy = self._state(self._now_s)
+        back = max(vx * towards_x + vy * towards_y + _RECOIL_MPS, 0.0)
+        vx, vy = vx - back * towards_x, vy - back * towards_y
+        left_s = (self._tick + 1) * DECISION_PERIOD_S - self._now_s
+        self._trajectory.start_segment(self._now_s, (x, y, vx, vy), (0.0, 0.0), left_s)
+        self.on_track = False
 
+    @property
+    def _reacts(self) -> bool:
+        """True for everybody but people on a track who walk on whatever the robot does."""
+        return self._track is None or self._track.reacts
 
-class PersonBehaviour(PersonPath, Protocol):
-    """The behaviour of one person, who also answers a request for attention."""
+    def _decide(self, around: Surroundings) -> None:
+        """Take one decision: look, follow the way, react, avoid, and set the next segment."""
+        if self._manner is not None and not self.spec.stays:
+            self._maybe_start(self._manner, around.robot)
+        first = self._tick < 0
+        self._tick += 1
+        t_s = self._tick * DECISION_PERIOD_S
+        x, y, vx, vy = state = self._state(t_s) if self.on_track else self._trajectory.end
+        if not first:
+            self._walked_m += math.dist((x, y), self._trajectory.start)
+            self._heading += self._turning * DECISION_PERIOD_S
+        heading = self._recorded_heading(t_s) + self._heading
+        self._span.maybe_set_off(self._task, t_s, around.robot)
+        robot = self._look_at_robot(t_s, (x, y, heading), around)
+        if self._track is not None:
+            robot = around.robot
+            startled = self._startle is not None and self._startle.is_on(t_s)
+            self.on_track = self._track.leads(
+                t_s, state, robot, on_track=self.on_track, startled=startled
+            )
+            if self.on_track:
+                self._turn(-self._heading)
+                state = self._track.state(t_s)
+                self._trajectory.start_segment(t_s, state, (0.0, 0.0), DECISION_PERIOD_S)
+                return
+        if self.spec.stays:
+            self._trajectory.start_segment(t_s, (x, y, 0.0, 0.0), (0.0, 0.0), DECISION_PERIOD_S)
+            return
+        if self._track is not None:
+            desired = on_way = self._track.velocity_back(t_s, x, y)
+            walking = on_way.speed_mps >= FACING_FROM_MPS
+        else:
+            on_way = self._span.lead(self._follower, t_s, x, y, math.hypot(vx, vy))
+            if self._walked_to_end_m is None and self.arrived:
+                self._walked_to_end_m = self._walked_m
+            walking = self._follower.walking and not self._span.halted
+            desired = self._reactions.react(
+                t_s, DECISION_PERIOD_S, (x, y), on_way, robot, standing=not walking
+            )
+        if walking and robot is not None:
+            desired = self._detour.steer(desired, x, y, robot)
+        if robot is not None:
+            desired = limit_approach(desired, x, y, robot, self.spec.keeps_off_m)
+        desired, facing = self._recoil_or_face(t_s, heading, on_way, desired)
+        if self._startle is not None and around.robot is not None:
+            step_aside = self._startle.velocity(t_s, (x, y), around.robot)
+            if step_aside is not None:
+                desired, facing = step_aside, heading
+        acceleration = self._acceleration(state, desired, robot, around)
+        self._turn(facing - heading)
+        self._trajectory.start_segment(t_s, state, acceleration, DECISION_PERIOD_S)
 
-    def hear(self, heard: Heard) -> None:
-        """Do what the person does who has heard a request of the robot."""
-        ...
+    def _look_at_robot(
+        self, t_s: float, place: tuple[float, float, float], around: Surroundings
+    ) -> RobotBody | None:
+        """Update head and eyes; return the robot as the person knows it, None without knowledge."""
+        robot = around.robot
+        if self._track is not None:
+            self._gaze.follow((self._track.head_yaw_rad(t_s), 0.0))
+        if robot is None:
+            return None
+        if self.spec.gaze:
+            head = planned_gaze(self.spec.gaze, t_s, place, robot.camera_m, self._eyes_m)
+            if self._tick == 0:
+                self._gaze.follow(head)
+            self._gaze.away = head
+        in_view = self._gaze.in_field_of_view(DECISION_PERIOD_S, place, robot)
+        asked = self._gaze.asked(t_s)
+        sighted = (in_view or asked) and around.sees_robot()
+        visible, answers = in_view and sighted and not self.spec.gaze, asked and sighted
+        visible = self._span.sees(t_s, self._gaze.noticed_s, self._touch is not None, visible)
+        self._gaze.update(t_s, DECISION_PERIOD_S, place, robot, visible, answers)
+        felt = self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S
+        if ((visible or answers) and self._gaze.noticed_s is not None) or felt:
+            self._span.remember(robot, t_s)
+        return self._span.known(t_s)
 
+    def _recoil_or_face(
+        self, t_s: float, heading: float, on_way: DesiredVelocity, desired: DesiredVelocity
+    ) -> tuple[DesiredVelocity, float]:
+        """Return the velocity after contact and turning, and the heading to turn to."""
+        if self._touch is not None and t_s - self._bumped_s < _RECOIL_S:
+            return DesiredVelocity(-self._touch[0], -self._touch[1], _RECOIL_MPS), heading
+        if self._track is not None:
+            return desired, self._track.facing_rad(t_s, desired)
+        if not self._follower.walking:
+            facing = self._follower.stop_heading_rad
+            facing = self._standing_heading if facing is None else facing
+            return desired, heading if facing is None else facing
+        along = desired.ux * on_way.ux + desired.uy * on_way.uy
+        if along < _SIDE_STEP_COSINE and self._reactions.reaction == "wait":
+            return desired, heading
+        facing = math.atan2(desired.uy, desired.ux) + self._reverse_rad
+        off = abs(math.remainder(facing - heading, math.tau))
+        if off > _TURN_FIRST_RAD:
+            share = (math.pi - off) / (math.pi - _TURN_FIRST_RAD)
+            speed_mps = desired.speed_mps * max(share, _MIN_TURNING_SHARE)
+            desired = DesiredVelocity(desired.ux, desired.uy, speed_mps)
+        return desired, facing
 
-@dataclass(frozen=True, slots=True)
-class PersonOutcome:
-    """The outcome of one episode for one person.
+    def _turn(self, by_rad: float) -> None:
+        """Set the turn rate of the body for a turn by an angle."""
+        off = math.remainder(by_rad, math.tau)
+        self._turning = turn_rate(off, self._turning, DECISION_PERIOD_S)
 
-    Attributes:
-        name: of the person in the scenario.
-        noticed_s: time of the first look at the robot; None without one.
-        reaction: first reaction to the robot: ``"walk_on"``, ``"wait"``, ``"hurry"``,
-            ``"pass_behind"`` or ``"claim"``; empty without an encounter.
-        time_s: from the start to the end of the route; None if the end was not reached.
-        free_time_s: the same without robot and other people, pauses included; None without a route
-            or without an end of it.
-        length_m: length of the path walked.
-        free_length_m: the same without robot and other people; None as ``free_time_s``.
-        late_s: of somebody on the way: how much longer than alone they took to come so far, or
-            more. None before the start, at the end of the route, and without ``free_time_s``.
-    """
+    def _acceleration(
+        self, state: State, desired: DesiredVelocity, robot: RobotBody | None, around: Surroundings
+    ) -> tuple[float, float]:
+        """Return the acceleration, and to it the rate at which the walk varies."""
+        if self._manner is None:
+            return self._acceleration_to(state, desired, robot, around)
+        desired, ahead, aside = self._manner.varied(
+            desired, state[:2], robot, DECISION_PERIOD_S, walking=self._follower.walking
+        )
+        ax, ay = self._acceleration_to(state, desired, robot, around)
+        return ax + ahead[0] + aside[0], ay + ahead[1] + aside[1]
 
-    name: str
-    noticed_s: float | None = None
-    reaction: str = ""
-    time_s: float | None = None
-    free_time_s: float | None = None
-    length_m: float = 0.0
-    free_length_m: float | None = None
-    late_s: float | None = None
+    def _acceleration_to(
+        self, state: State, desired: DesiredVelocity, robot: RobotBody | None, around: Surroundings
+    ) -> tuple[float, float]:
+        """Return the acceleration by desired velocity and social forces, within human limits."""
+        _, _, vx, vy = state
+        desired_vx, desired_vy = desired.speed_mps * desired.ux, desired.speed_mps * desired.uy
+        slower = desired.speed_mps < math.hypot(vx, vy)
+        within_s = _BRAKING_S if slower and self._track is None else RELAXATION_S
+        ax, ay = (desired_vx - vx) / within_s, (desired_vy - vy) / within_s
+        if self.spec.social:
+            fx, fy = self._social_force(state, robot, around)
+            moved = self._track is not None or math.hypot(fx, fy) > _UNMOVED_BELOW_MPS2
+            if desired.speed_mps > STANDING_BELOW_MPS or moved:
+                ax, ay = ax + fx, ay + fy
+        ax, ay = limited(ax, ay, MAX_ACCELERATION_MPS2)
+        next_vx, next_vy = vx + ax * DECISION_PERIOD_S, vy + ay * DECISION_PERIOD_S
+        t_s = self._tick * DECISION_PERIOD_S
+        fastest = _MAX_SPEED_FACTOR * max(
+            self.spec.speed_mps, desired.speed_mps, _MIN_REFERENCE_MPS
+        )
+        if self._track is not None:
+            fastest = self._track.fastest_mps(t_s)
+        next_vx, next_vy = limited(next_vx, next_vy, fastest)
+        if self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S:
+            next_vx, next_vy = without_part(next_vx, next_vy, self._touch[0], self._touch[1])
+        return (next_vx - vx) / DECISION_PERIOD_S, (next_vy - vy) / DECISION_PERIOD_S
+
+    def _social_force(
+        self, state: State, robot: RobotBody | None, around: Surroundings
+    ) -> tuple[float, float]:
+        """Return the force of racks and people, and of the robot as far as it is known.
+
+        People off a track feel the robot alone: the track keeps clear of the rest.
+        """
+        x, y, vx, vy = state
+        ax = ay = 0.0
+        if self._track is None:
+            ax, ay = self._obstacles.force(x, y)
+            fx, fy = people_force(x, y, vx, vy, around.others)
+            share = self._habits.people_share
+            ax, ay = ax + share * fx, ay + share * fy
+        if robot is not None:
+            too_near = math.dist(robot.nearest_point_m(x, y), (x, y)) < _TOO_NEAR_M
+            if too_near or not self._reactions.expects_robot_to_yield:
+                fx, fy = robot_force(x, y, vx, vy, robot)
+                ax, ay = ax + fx, ay + fy
+        return ax, ay
+
+    def _maybe_start(self, manner: Manner, robot: RobotBody | None) -> None:
+        """Let a person who stands start by chance."""
+        t_s = (self._tick + 1) * DECISION_PERIOD_S
+        x, y, vx, vy = self._trajectory.end
+        leader = self._follower
+        before_start = self._task.started_s is None
+        if not manner.starting.starts(
+            t_s,
+            DECISION_PERIOD_S,
+            standing=not before_start and math.hypot(vx, vy) < STANDING_BELOW_MPS,
+            idle=leader.arrived_s is not None,
+            looking=self._gaze.looking,
+            place=(x, y),
+            robot=robot,
+        ):
+            return
+        if leader.arrived_s is None:
+            leader.go(t_s)
+            self._span.end_halt()
+            self._reactions.go_first()
+            return
+        errand = manner.errand((x, y), self._obstacles.is_clear)
+        if errand is not None:
+            goal, speed_mps = errand
+            self._follower = RouteFollower(Route([(x, y), goal], []), speed_mps, t_s)
+
+    @cached_property
+    def _free_walk(self) -> FreeWalk | None:
+        """The walk without robot and people; None without a route or without an end of it."""
+        if self._task.route.length_m == 0.0:
+            return None
+        spec = self.spec.model_copy(update={"start_s": 0.0, "sets_off_within_m": None})
+        alone = Person(spec, np.random.default_rng(0), self._boxes_odom_m)
+        route = self._task.route
+        pauses = sum(stop.for_s for stop in route.stops[:-1])
+        longest_s = _MAX_FREE_TIME_FACTOR * (route.length_m / spec.speed_mps + 5.0) + pauses
+        along_m = []
+        while alone._task.arrived_s is None:
+            alone.advance((alone._tick + 1) * DECISION_PERIOD_S, ALONE)
+            along_m.append(alone._task.along_m)
+            if alone._tick * DECISION_PERIOD_S > longest_s:
+                return None
+        return FreeWalk(alone._task.arrived_s, alone._walked_m, DECISION_PERIOD_S, tuple(along_m))

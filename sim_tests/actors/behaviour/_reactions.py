@@ -1,4 +1,4 @@
-"""Reactions of a person to a known robot on a conflicting course."""
+"""Reactions of a person to a robot: to one on a conflicting course, and to a startling request."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from ._person import RobotBody
+from ._forces import RELAXATION_S
+from ._hearing import StartleKind
 from ._route import DesiredVelocity
 from ._spec import Reactions
+from ._surroundings import RobotBody
 
 ReactionName = Literal["walk_on", "wait", "hurry", "pass_behind", "claim"]
 REACTIONS: Final = get_args(ReactionName)
@@ -46,6 +48,10 @@ _CLAIM_FACTOR: Final = 1.1
 _MAX_HURRY_MPS: Final = 2.0
 # A person who passes behind aims this far behind the robot's tail.
 _BEHIND_M: Final = 0.75
+# A startle lasts this long. With the usual relaxation, a step into the path covers 0.7 m in it.
+_STARTLE_S: Final = 1.0
+_ASIDE_MPS: Final = 0.7
+_INTO_PATH_MPS: Final = 1.3
 
 
 class ReactionModel:
@@ -137,8 +143,8 @@ class ReactionModel:
         self.first_reaction = self.first_reaction or self.reaction
         self._began_s, self._robot_waited_s = t_s, 0.0
         self._completed = self._passed = False
-        self._line = robot_line(robot)
-        side = left_of_line_m(place, robot, self._line)
+        self._line = _robot_line(robot)
+        side = _left_of_line_m(place, robot, self._line)
         # A person on the line leaves it to the side of the route, or to the left.
         onward = desired.speed_mps * (self._line[0] * desired.uy - self._line[1] * desired.ux)
         if abs(side) < 0.1:
@@ -159,7 +165,7 @@ class ReactionModel:
         """Return the desired velocity of the present reaction; update the encounter's state."""
         moves = math.hypot(robot.vx_mps, robot.vy_mps) > _ROBOT_STANDING_MPS
         if moves:
-            self._line = robot_line(robot)
+            self._line = _robot_line(robot)
         ux, uy = self._line
         dx, dy = place[0] - robot.x_m, place[1] - robot.y_m
         ahead = dx * ux + dy * uy
@@ -214,7 +220,49 @@ class ReactionModel:
         return DesiredVelocity(vx / speed, vy / speed, speed)
 
 
-def robot_line(robot: RobotBody) -> tuple[float, float]:
+class Startle:
+    """A startle: the person stops, steps aside, or steps into the robot's path for a second.
+
+    Args:
+        kind: what the person does.
+        from_s: time of its start.
+    """
+
+    def __init__(self, kind: StartleKind, from_s: float) -> None:
+        self._kind, self._from_s = kind, from_s
+        self._velocity: DesiredVelocity | None = None
+
+    def is_on(self, t_s: float) -> bool:
+        """Return whether the startle has begun and not ended."""
+        return self._from_s <= t_s < self._from_s + _STARTLE_S - 1e-9
+
+    def velocity(
+        self, t_s: float, place: tuple[float, float], robot: RobotBody
+    ) -> DesiredVelocity | None:
+        """Return the desired velocity; None before the start and after the end.
+
+        The step leads straight away from the line of the robot's course, or towards it and not past
+        it. Its direction stays that of the start.
+
+        Args:
+            t_s: now.
+            place: x, y of the person.
+            robot: the robot now.
+        """
+        if not self.is_on(t_s):
+            return None
+        if self._velocity is None:
+            ux, uy = line = _robot_line(robot)
+            side_m = _left_of_line_m(place, robot, line)
+            out = math.copysign(1.0, side_m)
+            speed_mps = {"stop": 0.0, "aside": _ASIDE_MPS, "into_path": _INTO_PATH_MPS}[self._kind]
+            if self._kind == "into_path":
+                speed_mps, out = min(speed_mps, abs(side_m) / RELAXATION_S), -out
+            self._velocity = DesiredVelocity(-out * uy, out * ux, speed_mps)
+        return self._velocity
+
+
+def _robot_line(robot: RobotBody) -> tuple[float, float]:
     """Return the unit vector of the robot's course, of its heading if it stands."""
     speed = math.hypot(robot.vx_mps, robot.vy_mps)
     if speed > _ROBOT_STANDING_MPS:
@@ -226,7 +274,7 @@ def _distance_m(place: tuple[float, float], robot: RobotBody) -> float:
     return math.hypot(place[0] - robot.x_m, place[1] - robot.y_m)
 
 
-def left_of_line_m(
+def _left_of_line_m(
     place: tuple[float, float], robot: RobotBody, line: tuple[float, float]
 ) -> float:
     """Return the distance of a place to the left of the robot's line."""

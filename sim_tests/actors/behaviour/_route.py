@@ -40,10 +40,11 @@ class DesiredVelocity:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """A stop after a length of route, and its duration; the last stop has no end."""
+    """A stop after a length of route, its duration and heading; the last stop has no end."""
 
     at_m: float
     for_s: float
+    heading_rad: float | None = None
 
 
 class Route:
@@ -52,13 +53,19 @@ class Route:
     Args:
         points: corners (x, y) in odom, at least one.
         stops: stops on the way, in order.
+        end_heading_rad: heading at the end; None for any.
 
     Attributes:
         length_m: length of the whole route.
         stops: the given stops, then the end.
     """
 
-    def __init__(self, points: list[tuple[float, float]], stops: list[Stop]) -> None:
+    def __init__(
+        self,
+        points: list[tuple[float, float]],
+        stops: list[Stop],
+        end_heading_rad: float | None = None,
+    ) -> None:
         self._points = points[:1]
         self._along_m = [0.0]  # length of the route up to each point
         for point in points[1:]:
@@ -68,13 +75,15 @@ class Route:
                 self._along_m.append(self._along_m[-1] + piece_m)
         self.length_m = self._along_m[-1]
         on_the_way = [stop for stop in stops if stop.at_m < self.length_m]
-        self.stops = (*on_the_way, Stop(self.length_m, math.inf))
+        self.stops = (*on_the_way, Stop(self.length_m, math.inf, end_heading_rad))
 
     @classmethod
     def from_spec(cls, spec: PersonSpec) -> Route:
         """Make the route of a person, back to the start if the person turns back."""
         points = [(point.x_m, point.y_m) for point in spec.route]
-        stops = [Stop(pause.at_m, pause.for_s) for pause in spec.pauses]
+        stops = [
+            Stop(pause.at_m, pause.for_s, _radians(pause.heading_deg)) for pause in spec.pauses
+        ]
         turn_m = spec.turns_back_at_m
         route = cls(points, [])
         if turn_m is not None and turn_m < route.length_m:
@@ -82,7 +91,8 @@ class Route:
             out = [*route._points[:passed], route.point(turn_m)]
             points = [*out, *out[-2::-1]]
             stops.append(Stop(turn_m, _ABOUT_TURN_S))
-        return cls(points, sorted(stops, key=lambda stop: stop.at_m))
+        stops.sort(key=lambda stop: stop.at_m)
+        return cls(points, stops, _radians(spec.end_heading_deg))
 
     @property
     def start(self) -> tuple[float, float]:
@@ -182,6 +192,13 @@ class RouteFollower:
         self.arrived_s: float | None = None
         self.walking = False
 
+    @property
+    def stop_heading_rad(self) -> float | None:
+        """Heading of somebody who stands at a stop; None for any, and elsewhere."""
+        if self.started_s is None or self.walking:
+            return None
+        return self.route.stops[self._next_stop].heading_rad
+
     def desired_velocity(self, t_s: float, x: float, y: float, speed_mps: float) -> DesiredVelocity:
         """Return the velocity along the route of a person at (x, y) with this speed."""
         self.walking = self._update(t_s, x, y, speed_mps)
@@ -251,3 +268,7 @@ class RouteFollower:
         if away <= (_PUSHED_AWAY_M if settled else _NOT_SETTLED_M):
             return DesiredVelocity(*self.route.direction(self.along_m), 0.0)
         return DesiredVelocity(dx / away, dy / away, min(_RETURN_MPS, _APPROACH_HZ * away))
+
+
+def _radians(angle_deg: float | None) -> float | None:
+    return None if angle_deg is None else math.radians(angle_deg)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import itertools
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -29,10 +30,12 @@ class Pause(SimConfig):
     Attributes:
         at_m: length of the route from its start to the stop.
         for_s: duration of the stop.
+        heading_deg: heading during the stop; default that of the person who stands.
     """
 
     at_m: float = Field(ge=0.0)
     for_s: float = Field(ge=0.0)
+    heading_deg: float | None = None
 
 
 class Glances(SimConfig):
@@ -79,6 +82,26 @@ class Glances(SimConfig):
                     f"{median:g} s, got {lower:g} and {upper:g} s"
                 )
         return self
+
+
+class GazeKey(SimConfig):
+    """Direction of the head at a time, in the gaze plan of a person.
+
+    ``look: ahead`` is the heading of the body, ``look: robot`` the direction to the robot's camera.
+    The head points ``yaw_deg`` to the left of it and ``pitch_deg`` above it, and turns smoothly
+    from one key to the next.
+
+    Attributes:
+        t_s: time from the start of the episode.
+        look: direction that the angles are counted from.
+        yaw_deg: yaw of the head, left positive.
+        pitch_deg: pitch of the head, up positive.
+    """
+
+    t_s: float
+    look: Literal["ahead", "robot"] = "ahead"
+    yaw_deg: float = 0.0
+    pitch_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
 
 
 class Reactions(SimConfig):
@@ -148,12 +171,15 @@ class PersonSpec(SimConfig):
             (not before ``start_s``) they set off, look away and walk as if no robot were there,
             until it touches them. None: at ``start_s``.
         heading_deg: heading while standing; default along the route.
+        end_heading_deg: heading at the end of the route; default that of the person who stands.
         backwards: walk backwards.
         pauses: stops on the way.
         turns_back_at_m: length of route after which the person walks back to the start; None never.
         activity: activity of the hands; or ``sitting`` or ``kneeling``, at a route of one point.
             Seated and kneeling people look, but never move.
         glances: glances at the robot.
+        gaze: a gaze plan in order of time, in place of glances: the person looks as planned,
+            whether or not they see the robot, and does not react to it.
         reactions: shares of the reactions to it.
         lapse: when the person forgets the robot after a look at it; None never.
         keeps_off_m: distance from the body's centre that the person keeps from a known robot ahead;
@@ -171,17 +197,26 @@ class PersonSpec(SimConfig):
     start_s: float = Field(default=0.0, ge=0.0)
     sets_off_within_m: float | None = Field(default=None, ge=0.0)
     heading_deg: float | None = None
+    end_heading_deg: float | None = None
     backwards: bool = False
     pauses: tuple[Pause, ...] = ()
     turns_back_at_m: float | None = Field(default=None, gt=0.0)
     activity: ActivityName = "none"
     glances: Glances = Glances()
+    gaze: tuple[GazeKey, ...] = ()
     reactions: Reactions = Reactions()
     lapse: Lapse | None = None
     keeps_off_m: float = Field(default=0.45, ge=0.3, le=3.0)
     social: bool = True
     hearing: Hearing | None = None
     as_written: bool = False
+
+    @model_validator(mode="after")
+    def _gaze_in_order_of_time(self) -> PersonSpec:
+        times = [key.t_s for key in self.gaze]
+        if any(later <= earlier for earlier, later in itertools.pairwise(times)):
+            raise ValueError(f"gaze must have increasing t_s, got {times}")
+        return self
 
     @model_validator(mode="after")
     def _low_people_stay(self) -> PersonSpec:

@@ -12,18 +12,24 @@ from ._asset import (
     JOINTS,
     MESH_UNITS,
     PARENTS,
-    SkinMesh,
     WorkerAsset,
     load_worker,
     worker_names,
 )
-from ._gait import Gait
-from ._gait_pose import GaitPose
-from ._online_footsteps import OnlineFootsteps
-from ._planned_footsteps import plan_footsteps
+from ._footsteps import OnlineFootsteps
+from ._gait import Gait, GaitPose
+from ._held_object import SeatKind
 from ._pose import BodyPose, link_transforms, skin_points
-from ._postures import ACTIVITIES, BOX_SIZE_M, PHONE_SIZE_M, STAYING, Activity, ActivityName
-from ._sitting import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Seat, SeatKind
+from ._postures import (
+    ACTIVITIES,
+    BOX_SIZE_M,
+    KNEELING_EYE_HEIGHT_SHARE,
+    PHONE_SIZE_M,
+    SEATED_EYE_HEIGHT_SHARE,
+    STAYING,
+    Activity,
+    ActivityName,
+)
 from ._skeleton import MAX_STATURE_M, MIN_STATURE_M, skeleton
 from ._skin import WorkerSkin
 from ._worker import (
@@ -57,15 +63,12 @@ __all__ = [
     "Gait",
     "GaitPose",
     "OnlineFootsteps",
-    "Seat",
     "SeatKind",
-    "SkinMesh",
     "Worker",
     "WorkerAsset",
     "WorkerSkin",
     "link_transforms",
     "load_worker",
-    "plan_footsteps",
     "skeleton",
     "skin_points",
     "worker_names",

@@ -1,44 +1,27 @@
-"""The gait of a worker: strides that follow the speed, feet that roll and never slide.
-
-The gait is periodic in the distance walked, not in time. A stance foot lands on the heel, lies flat
-and rolls off over the toes; it always turns about the point on which it rests. Inverse kinematics
-gives the legs. All functions are vectorised over instants.
-"""
+"""The gait of a body: strides that follow the speed, and the pose of feet, hips and trunk."""
 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
-from perception.arrays import FloatArray, finite_number
+from ._quaternions import subtract
+from ._skeleton import SIDES, SIGNS, Skeleton
 
-from ...world.errors import SimError
-from ._gait_pose import (
-    ARM_SWING_RAD,
-    FOOT_LIFT_M,
-    LOADING_S,
-    LOADING_SHARE,
-    LONGEST_SWING_S,
-    MIDSTANCE_PHASE,
-    MIDSTANCE_SHIFT,
-    PELVIS_LIST_RAD,
-    PELVIS_TWIST_SHARE,
-    PELVIS_YAW_RAD,
-    ROLL_OFF_S,
-    ROLL_OFF_SHARE,
-    SWAY_M,
-    SWING_CLEARANCE_M,
-    THORAX_YAW_RAD,
-    USED_REACH,
-    GaitPose,
-    landing_pitch_rad,
-    lift_off_pitch_rad,
-)
-from ._skeleton import LEFT, RIGHT, SIDES, SIGNS, Skeleton
+LONGEST_SWING_S: Final = 0.65
+# Part of a leg's reach that is used. Knees are never locked: this leaves a bend of 7 degrees.
+_USED_REACH: Final = 0.998
+
+# A cycle turns the body this far on the spot.
+_TURN_PER_CYCLE_RAD: Final = math.radians(60.0)
+# A sideways stride as a share of stature: the feet must not cross.
+_SIDE_STRIDE_SHARE: Final = 0.12
+# A backward stride as a share of a forward one.
+_BACKWARD_STRIDE_SHARE: Final = 0.75
+#: Largest cadence of any motion.
+MAX_CADENCE_HZ: Final = 1.8
 
 # Stride at the comfortable speed as a share of stature. Step length grows with speed to about this
 # power (Bertram and Ruina 2001, Journal of Theoretical Biology 209, 445-453).
@@ -46,8 +29,6 @@ _COMFORTABLE_MPS: Final = 1.2
 _STRIDE_SHARE: Final = 0.75
 _STRIDE_POWER: Final = 0.42
 _MAX_STRIDE_RATIO: Final = 1.3
-# A fixed stride shortens below this speed.
-_FIXED_STRIDE_FROM_MPS: Final = 0.3
 # The stance takes this share of a cycle, and less at speed. Where the longest swing leaves time
 # over, the rest is double support.
 _STANCE_SHARE: Final = 0.665
@@ -55,346 +36,187 @@ _STANCE_SHARE_PER_MPS: Final = -0.04
 _TOE_OUT_RAD: Final = math.radians(6.0)
 # A walk brings the feet this share nearer to the body's centre line than standing.
 _NARROWING: Final = 0.40
-_MAX_FOOT_SPEED_MPS: Final = 9.0
-# The hip height follows the reach of the legs over this time, so that it does not jerk.
-_SMOOTHING_S: Final = 0.14
-_SAMPLES_PER_CYCLE: Final = 96
+# Steps and ends of the look-up tables.
+_SPEED_STEP_MPS: Final = 0.05
+_MAX_SPEED_MPS: Final = 3.5
+_PITCH_STEP_RAD: Final = 0.005
+_MAX_PITCH_RAD: Final = 0.9
+
+#: x, y, z of an ankle in metres, yaw and pitch (toes down) of its foot in radians.
+FootPose = tuple[float, float, float, float, float]
+#: x, y, yaw of a flat foot or of a body.
+PlanarPose = tuple[float, float, float]
+
+
+class GaitPose(NamedTuple):
+    """Feet, hips and trunk at one instant.
+
+    Attributes:
+        feet: left and right foot: x, y, z of the ankle in metres, yaw and pitch (toes down) in
+            radians; in odom when given to :meth:`Worker.place`.
+        hip_height_m: height of the hips' midpoint above the floor.
+        sway_m: offset of the hips to the left of the body's centre line.
+        pelvis_yaw_rad: yaw of the pelvis to the left of the heading.
+        pelvis_list_rad: roll of the pelvis, left side up.
+        thorax_yaw_rad: yaw of the thorax to the left of the heading.
+        stride_ratio: stride divided by the stride at 1.2 m/s; 0 standing, negative backwards.
+        arm_swing_rad: angle of the left arm ahead of hanging, and of the right arm behind it.
+    """
+
+    feet: tuple[FootPose, FootPose]
+    hip_height_m: float
+    sway_m: float = 0.0
+    pelvis_yaw_rad: float = 0.0
+    pelvis_list_rad: float = 0.0
+    thorax_yaw_rad: float = 0.0
+    stride_ratio: float = 0.0
+    arm_swing_rad: float = 0.0
+
+    def moved(self, dx_m: float, dy_m: float) -> GaitPose:
+        """Return the same pose elsewhere in odom."""
+        (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = self.feet
+        left = ax + dx_m, ay + dy_m, az, ayaw, apitch
+        return self._replace(feet=(left, (bx + dx_m, by + dy_m, bz, byaw, bpitch)))
 
 
 class Gait:
-    """The gait of one body.
+    """The gait of one body: its figures for one speed, pitch or place at a time.
+
+    NumPy is slow on two feet, so the figures come from look-up tables of plain numbers.
 
     Args:
         skeleton: the body.
-        stride_m: distance of a full cycle (two steps), in [0.2, 1] × stature. None follows the
-            speed: 0.75 × stature × (v / 1.2 m/s)^0.42.
 
     Attributes:
-        skeleton: as given.
-        standing_height_m: height of the hips' midpoint when standing.
-
-    Raises:
-        SimError: for a stride that is out of range.
+        stature_m: height of the body.
+        comfortable_stride_m: stride at 1.2 m/s.
+        standing: the pose of standing at ease, in the body's frame.
     """
 
-    def __init__(self, skeleton: Skeleton, stride_m: float | None = None) -> None:
-        self.skeleton = skeleton
-        stature = skeleton.stature_m
-        self._comfortable_stride_m = _STRIDE_SHARE * stature
-        if stride_m is not None:
-            stride_m = finite_number(
-                "stride_m", stride_m, SimError, minimum=0.2 * stature, maximum=stature
-            )
-        self._stride_m = stride_m
-        self._ankles_m = [np.array(skeleton.joint_m(f"{side}_ankle")) for side in SIDES]
-        self._hips_m = [
-            np.array(skeleton.joint_m(f"{side}_hip")) - np.array(skeleton.hips_m) for side in SIDES
-        ]
-        self._cycle = lru_cache(maxsize=32)(self._cycle_table)
-        zero = np.zeros(1)
-        highest = self._hip_limits(self._standing_feet(), np.zeros((1, 2)), zero, np.zeros((1, 3)))
-        self.standing_height_m = min(float(highest[0]), skeleton.hips_m[2])
+    def __init__(self, skeleton: Skeleton) -> None:
+        bones = skeleton
+        self.stature_m = bones.stature_m
+        speeds = np.arange(0.0, _MAX_SPEED_MPS + _SPEED_STEP_MPS, _SPEED_STEP_MPS)
+        self.comfortable_stride_m = _STRIDE_SHARE * bones.stature_m
+        strides = self.comfortable_stride_m * (speeds / _COMFORTABLE_MPS) ** _STRIDE_POWER
+        shares = np.maximum(
+            _STANCE_SHARE + _STANCE_SHARE_PER_MPS * speeds,
+            1.0 - LONGEST_SWING_S * speeds / np.maximum(strides, 1e-9),
+        )
+        self._strides: list[float] = strides.tolist()
+        self._stance_shares: list[float] = shares.tolist()
+        ratios = np.minimum(strides / self.comfortable_stride_m, _MAX_STRIDE_RATIO)
+        self._stride_ratios: list[float] = ratios.tolist()
+        ankles = [bones.joint_m(f"{side}_ankle") for side in SIDES]
+        self._ahead_m = [ankle[0] for ankle in ankles]
+        self._half_widths_m = [abs(ankle[1]) for ankle in ankles]
+        pitches = np.arange(-_MAX_PITCH_RAD, _MAX_PITCH_RAD + _PITCH_STEP_RAD, _PITCH_STEP_RAD)
+        rolls = [sole.ankle(pitches) for sole in bones.soles]
+        self._rolls = [(ahead.tolist(), height.tolist()) for ahead, height in rolls]
+        self._hips_m = [subtract(bones.joint_m(f"{side}_hip"), bones.hips_m) for side in SIDES]
+        self._reach_m = [_USED_REACH * leg.reach_m for leg in bones.legs]
+        self.standing = self._standing_pose(bones)
 
-    def stride_m(self, speed_mps: Any) -> FloatArray:
-        """Return the distance of a full cycle at a speed ≥ 0."""
-        speed = np.asarray(speed_mps, dtype=np.float64)
-        if self._stride_m is not None:
-            return np.full_like(speed, self._stride_m)
-        return np.asarray(self._comfortable_stride_m * (speed / _COMFORTABLE_MPS) ** _STRIDE_POWER)
+    def _standing_pose(self, bones: Skeleton) -> GaitPose:
+        feet: list[FootPose] = []
+        hip_height = bones.hips_m[2]
+        for side, (hip_x, hip_y, hip_z) in enumerate(self._hips_m):
+            x, y, yaw = self.neutral(side, 0.0, 0.0, 0.0, 0.0)
+            ahead, height = (float(value[0]) for value in bones.soles[side].ankle(np.zeros(1)))
+            foot = x + ahead * math.cos(yaw), y + ahead * math.sin(yaw), height, yaw, 0.0
+            dx, dy, reach = foot[0] - hip_x, foot[1] - hip_y, self._reach_m[side]
+            up = math.sqrt(reach * reach - (dx * dx + dy * dy))
+            hip_height = min(hip_height, height + up - hip_z)
+            feet.append(foot)
+        return GaitPose((feet[0], feet[1]), hip_height)
 
-    def stance_share(self, speed_mps: Any) -> FloatArray:
+    def stride_m(self, speed_mps: float) -> float:
+        """Return the distance of a full cycle (two steps) at a speed ≥ 0."""
+        return _interpolated(self._strides, speed_mps / _SPEED_STEP_MPS)
+
+    def stance_share(self, speed_mps: float) -> float:
         """Return the share of the cycle for which a foot is on the floor."""
-        speed = np.asarray(speed_mps, dtype=np.float64)
-        stride = np.maximum(self.stride_m(speed), 1e-9)
-        share = _STANCE_SHARE + _STANCE_SHARE_PER_MPS * speed
-        return np.asarray(np.maximum(share, 1.0 - LONGEST_SWING_S * speed / stride))
+        return _interpolated(self._stance_shares, speed_mps / _SPEED_STEP_MPS)
 
-    def stride_ratio(self, forward_mps: FloatArray) -> FloatArray:
+    def stride_ratio(self, forward_mps: float) -> float:
         """Return the stride divided by the comfortable one, with the sign of the speed."""
-        speed = np.abs(forward_mps)
-        stride = self.stride_m(speed)
-        if self._stride_m is not None:
-            stride = stride * np.minimum(speed / _FIXED_STRIDE_FROM_MPS, 1.0)
-        ratio = np.minimum(stride / self._comfortable_stride_m, _MAX_STRIDE_RATIO)
-        return np.asarray(np.sign(forward_mps) * ratio)
+        size = _interpolated(self._stride_ratios, abs(forward_mps) / _SPEED_STEP_MPS)
+        return math.copysign(size, forward_mps)
 
-    @staticmethod
-    def midstance_share(stride_ratio: FloatArray) -> FloatArray:
-        """Return the share of a stance after which the body is over the foot."""
-        return np.asarray(0.5 - MIDSTANCE_SHIFT * np.clip(2.0 * stride_ratio, -1.0, 1.0))
+    def cadence_hz(self, forward_mps: float, left_mps: float, turning_radps: float) -> float:
+        """Return the cycles per second that walking and turning need together."""
+        forward = max(self.stride_m(math.hypot(forward_mps, left_mps)), 1e-6)
+        if forward_mps < 0.0:
+            forward *= _BACKWARD_STRIDE_SHARE
+        sideways = min(forward, _SIDE_STRIDE_SHARE * self.stature_m)
+        turn = turning_radps / _TURN_PER_CYCLE_RAD
+        return min(math.hypot(forward_mps / forward, left_mps / sideways, turn), MAX_CADENCE_HZ)
 
     def neutral(
-        self, side: int, position_m: FloatArray, heading_rad: FloatArray, stride_ratio: FloatArray
-    ) -> FloatArray:
-        """Return (N, 3) x, y, yaw of a flat foot at midstance, when the body is over it."""
-        ankle = self._ankles_m[side]
-        across = SIGNS[side] * self._half_width_m(side, stride_ratio)
-        cos, sin = np.cos(heading_rad), np.sin(heading_rad)
-        return np.column_stack(
-            [
-                position_m[:, 0] + cos * ankle[0] - sin * across,
-                position_m[:, 1] + sin * ankle[0] + cos * across,
-                heading_rad + SIGNS[side] * _TOE_OUT_RAD,
-            ]
+        self, side: int, x: float, y: float, heading_rad: float, stride_ratio: float
+    ) -> PlanarPose:
+        """Return the place of a flat foot at midstance, when the body is over it."""
+        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        ahead, sign = self._ahead_m[side], SIGNS[side]
+        across = sign * self.half_width_m(side, stride_ratio)
+        return (
+            x + cos * ahead - sin * across,
+            y + sin * ahead + cos * across,
+            heading_rad + sign * _TOE_OUT_RAD,
         )
 
-    def stance(
-        self,
-        side: int,
-        place: FloatArray,
-        since_landing_s: FloatArray,
-        until_lift_off_s: FloatArray,
-        ratios: tuple[float, float],
-    ) -> FloatArray:
-        """Return (N, 5) x, y, z, yaw, pitch of the ankle of a stance foot.
-
-        Args:
-            side: left or right.
-            place: (3,) x, y, yaw of the flat foot.
-            since_landing_s: (N,) ≥ 0.
-            until_lift_off_s: (N,) ≥ 0.
-            ratios: stride ratios of the steps with which it lands and lifts off.
-        """
-        duration = since_landing_s + until_lift_off_s
-        loading = np.minimum(LOADING_SHARE * duration, LOADING_S)
-        roll_off = np.minimum(ROLL_OFF_SHARE * duration, ROLL_OFF_S)
-        landed = _smoothstep(np.clip(since_landing_s / loading, 0.0, 1.0))
-        rolled = np.clip(1.0 - until_lift_off_s / roll_off, 0.0, 1.0)
-        landing, lift_off = landing_pitch_rad(ratios[0]), lift_off_pitch_rad(ratios[1])
-        pitch = landing * (1.0 - landed) + lift_off * rolled**2
-        places = np.broadcast_to(place, (len(since_landing_s), 3))
-        return self._ankle(side, places, pitch, np.zeros(1))
-
-    def swing(
-        self,
-        side: int,
-        start: FloatArray,
-        end: FloatArray,
-        progress: FloatArray,
-        swing_s: float,
-        stance_s: float,
-        ratios: tuple[float, float],
-        body: FloatArray,
-    ) -> FloatArray:
-        """Return (N, 5) x, y, z, yaw, pitch of the ankle of a swing foot.
-
-        Args:
-            side: left or right.
-            start: (3,) x, y, yaw of the flat foot before the swing.
-            end: (3,) the same after it; the yaws must differ by less than half a turn.
-            progress: (N,) share of the swing, in [0, 1].
-            swing_s: duration of the swing.
-            stance_s: duration of the stance before.
-            ratios: stride ratios of the steps with which it lifts off and lands.
-            body: (N, 3) x, y, heading of the body meanwhile. The foot stays on its side of it.
-        """
-        u = progress
-        lift_off, landing = lift_off_pitch_rad(ratios[0]), landing_pitch_rad(ratios[1])
-        # The foot lifts off with the pitch rate of its roll-off, and lands with none.
-        rate = 2.0 * lift_off * swing_s / min(ROLL_OFF_SHARE * stance_s, ROLL_OFF_S)
-        smooth = _smoothstep(u)
-        pitch = lift_off + (landing - lift_off) * smooth + rate * u * (1.0 - u) ** 2
-        place = start + smooth[:, None] * (end - start)
-        bump = np.minimum(1.6 * np.sin(math.pi * u) ** 2, 1.0)
-        sin, cos = np.sin(body[:, 2]), np.cos(body[:, 2])
-        beside = cos * (place[:, 1] - body[:, 1]) - sin * (place[:, 0] - body[:, 0])
-        clear = self._half_width_m(side, np.array(max(ratios, key=abs))) + SWING_CLEARANCE_M
-        aside = np.maximum(clear - SIGNS[side] * beside, 0.0) * bump
-        aside *= _circumduction_share(
-            place[:, :2], aside, (-SIGNS[side] * sin, SIGNS[side] * cos), u * swing_s
-        )
-        reach = math.hypot(*(end - start)[:2]) + 0.25 * abs(float(end[2] - start[2]))
-        reach += 4.0 * float(aside.max(initial=0.0))
-        strides = min(reach / self._comfortable_stride_m, 1.5)
-        lift = FOOT_LIFT_M * math.sqrt(strides) * np.sin(math.pi * u)
-        place[:, 0] -= SIGNS[side] * aside * sin
-        place[:, 1] += SIGNS[side] * aside * cos
-        return self._ankle(side, place, pitch, lift)
-
-    def table(
-        self,
-        feet: FloatArray,
-        position_m: FloatArray,
-        heading_rad: FloatArray,
-        phase: FloatArray,
-        stride_ratio: FloatArray,
-        dt_s: float,
-        *,
-        twist_rad: FloatArray | None = None,
-        periodic: bool = False,
-    ) -> FloatArray:
-        """Return (N, 17) rows of :class:`GaitPose` for given feet.
-
-        Args:
-            feet: (2, N, 5) ankles, as :meth:`stance` and :meth:`swing` return them.
-            position_m: (N, 2) the body's centre line.
-            heading_rad: (N,) of the body.
-            phase: (N,) cycles since the left foot landed.
-            stride_ratio: (N,) of the step.
-            dt_s: time between rows.
-            twist_rad: (N,) yaw of the feet to the left of the heading; None is 0.
-            periodic: the first row follows the last one.
-        """
-        turn = np.cos(math.tau * phase)
-        weight = np.cos(math.tau * (phase - MIDSTANCE_PHASE))
-        size = np.abs(stride_ratio)
-        sway = SWAY_M * np.minimum(2.0 * size, 1.0) * weight
-        pelvis = np.column_stack(
-            [sway, -PELVIS_YAW_RAD * stride_ratio * turn, PELVIS_LIST_RAD * size * weight]
-        )
-        if twist_rad is not None:
-            pelvis[:, 1] += PELVIS_TWIST_SHARE * twist_rad
-        limit = np.minimum(
-            self._hip_limits(feet, position_m, heading_rad, pelvis), self.standing_height_m
-        )
-        window = 2 * round(0.5 * _SMOOTHING_S / dt_s) + 1
-        mode = "wrap" if periodic else "nearest"
-        height = uniform_filter1d(minimum_filter1d(limit, window, mode=mode), window, mode=mode)
-        return np.column_stack(
-            [
-                feet[LEFT],
-                feet[RIGHT],
-                height,
-                pelvis,
-                THORAX_YAW_RAD * stride_ratio * turn,
-                stride_ratio,
-                -ARM_SWING_RAD * stride_ratio * turn,
-            ]
-        )
-
-    def pose(self, walked_m: float, speed_mps: float) -> GaitPose:
-        """Return the pose after ``walked_m`` of a straight walk at one speed, in the body's frame.
-
-        At standstill the feet stand side by side; strides become shorter towards it.
-        """
-        if speed_mps <= 0.0:
-            return GaitPose.from_row(self._cycle(0.0)[0].tolist())
-        rows = self._cycle(speed_mps)
-        place = (walked_m / float(self.stride_m(speed_mps)) % 1.0) * _SAMPLES_PER_CYCLE
-        row = int(place) % _SAMPLES_PER_CYCLE
-        share = place - int(place)
-        after = (row + 1) % _SAMPLES_PER_CYCLE
-        mixed = rows[row] + share * (rows[after] - rows[row])
-        phase = np.array([place / _SAMPLES_PER_CYCLE])
-        mixed[:10] = self._cycle_feet(phase, speed_mps).reshape(10)
-        return GaitPose.from_row(mixed.tolist())
-
-    def _cycle_table(self, speed_mps: float) -> FloatArray:
-        """Return (96, 17) rows of one cycle in the body's frame; one row when standing."""
-        zero = np.zeros(1)
-        if speed_mps <= 0.0:
-            return self.table(self._standing_feet(), np.zeros((1, 2)), zero, zero, zero, dt_s=1.0)
-        count = _SAMPLES_PER_CYCLE
-        phase = np.arange(count) / count
-        feet = self._cycle_feet(phase, speed_mps)
-        ratio = np.full(count, self.stride_ratio(np.array(speed_mps)))
-        dt_s = float(self.stride_m(speed_mps)) / speed_mps / count
-        return self.table(
-            feet, np.zeros((count, 2)), np.zeros(count), phase, ratio, dt_s, periodic=True
-        )
-
-    def _standing_feet(self) -> FloatArray:
-        """Return (2, 1, 5) ankles in the body's frame."""
-        zero = np.zeros(1)
-        places = [self.neutral(side, np.zeros((1, 2)), zero, zero) for side in (LEFT, RIGHT)]
-        return np.stack([self._ankle(side, place, zero, 0.0) for side, place in enumerate(places)])
-
-    def _cycle_feet(self, phase: FloatArray, speed_mps: float) -> FloatArray:
-        """Return (2, N, 5) ankles in the body's frame at phases since the left foot landed."""
-        stride = float(self.stride_m(speed_mps))
-        share = float(self.stance_share(speed_mps))
-        ratio = self.stride_ratio(np.array([speed_mps]))
-        ratios = (float(ratio[0]), float(ratio[0]))
-        ahead = float(self.midstance_share(ratio)[0]) * share * stride
-        cycle_s = stride / speed_mps
-        feet = np.empty((2, len(phase), 5))
-        for side in (LEFT, RIGHT):
-            (place,) = self.neutral(side, np.array([[ahead, 0.0]]), np.zeros(1), ratio)
-            own = (phase + 0.5 * side) % 1.0
-            down = own < share
-            since = own[down] * cycle_s
-            feet[side, down] = self.stance(side, place, since, share * cycle_s - since, ratios)
-            feet[side, ~down] = self.swing(
-                side,
-                place,
-                place + np.array([stride, 0.0, 0.0]),
-                (own[~down] - share) / (1.0 - share),
-                (1.0 - share) * cycle_s,
-                share * cycle_s,
-                ratios,
-                np.column_stack([stride * own[~down], np.zeros((np.count_nonzero(~down), 2))]),
-            )
-            feet[side, :, 0] -= stride * own
-        return feet
-
-    def _half_width_m(self, side: int, stride_ratio: FloatArray) -> FloatArray:
+    def half_width_m(self, side: int, stride_ratio: float) -> float:
         """Return the distance of an ankle from the body's centre line."""
-        narrow = 1.0 - _NARROWING * np.minimum(np.abs(stride_ratio), 1.0)
-        return np.asarray(abs(float(self._ankles_m[side][1])) * narrow)
+        standing = self._half_widths_m[side]
+        walking = standing * (1.0 - _NARROWING)
+        return standing + min(abs(stride_ratio), 1.0) * (walking - standing)
 
-    def _ankle(self, side: int, place: FloatArray, pitch: FloatArray, lift: Any) -> FloatArray:
-        """Return (N, 5) x, y, z, yaw, pitch of an ankle for flat feet that roll and lift."""
-        ahead, height = self.skeleton.soles[side].ankle(pitch)
-        yaw = place[:, 2]
-        return np.column_stack(
-            [
-                place[:, 0] + ahead * np.cos(yaw),
-                place[:, 1] + ahead * np.sin(yaw),
-                height + lift,
-                yaw,
-                pitch,
-            ]
+    def ankle(self, side: int, pitch_rad: float) -> tuple[float, float]:
+        """Return the ankle's distance ahead and its height for a rolling shoe."""
+        aheads, heights = self._rolls[side]
+        row = min(max((pitch_rad + _MAX_PITCH_RAD) / _PITCH_STEP_RAD, 0.0), len(aheads) - 1.001)
+        below = int(row)
+        share, ahead, height = row - below, aheads[below], heights[below]
+        return (
+            ahead + share * (aheads[below + 1] - ahead),
+            height + share * (heights[below + 1] - height),
         )
 
-    def _hip_limits(
+    def hip_limit_m(
         self,
-        feet: FloatArray,
-        position_m: FloatArray,
-        heading_rad: FloatArray,
-        pelvis: FloatArray,
-    ) -> FloatArray:
-        """Return (N,) the greatest hip height at which both ankles are in reach."""
-        sway, yaw, tilt = pelvis.T
-        limits = []
-        for side in (LEFT, RIGHT):
-            x, y, z = self._hips_m[side]
-            across = y * np.cos(tilt) - z * np.sin(tilt)
-            cos, sin = np.cos(heading_rad + yaw), np.sin(heading_rad + yaw)
-            hip_x = position_m[:, 0] - np.sin(heading_rad) * sway + cos * x - sin * across
-            hip_y = position_m[:, 1] + np.cos(heading_rad) * sway + sin * x + cos * across
-            foot = feet[side]
-            flat = (foot[:, 0] - hip_x) ** 2 + (foot[:, 1] - hip_y) ** 2
-            reach = USED_REACH * self.skeleton.legs[side].reach_m
-            up = np.sqrt(np.maximum(reach * reach - flat, (0.5 * reach) ** 2))
-            limits.append(foot[:, 2] + up - (y * np.sin(tilt) + z * np.cos(tilt)))
-        return np.asarray(np.minimum(limits[0], limits[1]))
+        feet: tuple[FootPose, FootPose],
+        place: PlanarPose,
+        sway: float,
+        yaw: float,
+        tilt: float,
+    ) -> float:
+        """Return the greatest hip height at which both ankles are in reach.
+
+        Args:
+            feet: left and right foot.
+            place: x, y and heading of the body.
+            sway: offset of the hips to the left.
+            yaw: of the pelvis from the heading.
+            tilt: of the pelvis, left side up.
+        """
+        x, y, heading = place
+        cos, sin = math.cos(heading + yaw), math.sin(heading + yaw)
+        cos_tilt, sin_tilt = math.cos(tilt), math.sin(tilt)
+        x, y = x - math.sin(heading) * sway, y + math.cos(heading) * sway
+        lowest = math.inf
+        for foot, (hip_x, hip_y, hip_z), reach in zip(
+            feet, self._hips_m, self._reach_m, strict=True
+        ):
+            across = hip_y * cos_tilt - hip_z * sin_tilt
+            dx = foot[0] - (x + cos * hip_x - sin * across)
+            dy = foot[1] - (y + sin * hip_x + cos * across)
+            up = math.sqrt(max(reach * reach - dx * dx - dy * dy, (0.5 * reach) ** 2))
+            lowest = min(lowest, foot[2] + up - (hip_y * sin_tilt + hip_z * cos_tilt))
+        return lowest
 
 
-def _circumduction_share(
-    place_m: FloatArray,
-    aside_m: FloatArray,
-    direction: tuple[FloatArray, FloatArray],
-    times_s: FloatArray,
-) -> float:
-    """Return the share, in [0, 1], of a swing's sideways arc that the foot has time for.
-
-    Args:
-        place_m: (N, 2) foot without the arc.
-        aside_m: (N,) width of the arc.
-        direction: (N,) x and (N,) y of the unit vectors to the side.
-        times_s: (N,) increasing.
-    """
-    dt_s = np.diff(times_s)[:, None]
-    straight = np.diff(place_m, axis=0) / dt_s
-    arc = np.diff(aside_m[:, None] * np.column_stack(direction), axis=0) / dt_s
-    # The largest share s with |straight + s arc| ≤ the greatest foot speed in every interval.
-    square, mixed = (arc**2).sum(axis=1), (arc * straight).sum(axis=1)
-    spare = _MAX_FOOT_SPEED_MPS**2 - (straight**2).sum(axis=1)
-    moves = square > 1e-12
-    root = np.sqrt(np.maximum(mixed[moves] ** 2 + square[moves] * spare[moves], 0.0))
-    return float(np.clip(((root - mixed[moves]) / square[moves]).min(initial=1.0), 0.0, 1.0))
-
-
-def _smoothstep(u: FloatArray) -> FloatArray:
-    """Rise from 0 at 0 to 1 at 1 with zero slope at both ends."""
-    return np.asarray(u * u * (3.0 - 2.0 * u))
+def _interpolated(table: list[float], row: float) -> float:
+    """Return the table's value at a row between two others, clipped to its ends."""
+    row = min(max(row, 0.0), len(table) - 1.001)
+    below = int(row)
+    return table[below] + (row - below) * (table[below + 1] - table[below])

@@ -1,10 +1,12 @@
-"""Visual actor of what a worker holds or sits on: a cardboard box, a phone, a seat."""
+"""What a worker holds or sits on: a cardboard box, a phone, a seat."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, Protocol
+from typing import Final, Literal, Protocol, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,17 +14,28 @@ from scipy.spatial.transform import Rotation
 from perception.arrays import FloatArray
 
 from ...world.bullet import pybullet
+from ...world.errors import SimError
 from ...world.hall import Mesh, box, merge
 from ...world.render import RenderView, Visuals
 from ...world.sightlines import PlacedSurface, TriangleSet
-from ._postures import BOX_SIZE_M, PHONE_SIZE_M
-from ._sitting import Seat
+from ._postures import BOX_SIZE_M, PHONE_SIZE_M, seated_pose
+from ._quaternions import Vector
+from ._skeleton import Skeleton
 
+SeatKind = Literal["stool", "box"]
+
+_MEAN_STATURE_M: Final = 1.75
 # One texel per colour: cardboard, tape, phone, its screen; wood for seats is cardboard's.
 _PALETTE: Final = np.array(
     [[[176, 136, 92], [206, 184, 142], [28, 28, 32], [150, 190, 220]]], dtype=np.uint8
 ).repeat(4, axis=0)
 _CARDBOARD_UV, _TAPE_UV, _PHONE_UV, _SCREEN_UV = ((0.125 + 0.25 * k, 0.5) for k in range(4))
+# The seat for a body of 1.75 m: depth and width, and its middle ahead of the hips.
+_SEAT_DEPTH_M: Final = 0.34
+_SEAT_WIDTH_M: Final = 0.42
+_SEAT_AHEAD_M: Final = 0.03
+# From the hip joints down to the seat, at 1.75 m.
+_HIPS_ABOVE_SEAT_M: Final = 0.115
 # Boards of a seat as shares of its height, how far those of a box stand out, and a stool's legs as
 # a share of its width.
 _BOARD_SHARE: Final = 0.12
@@ -31,6 +44,19 @@ _LEG_SHARE: Final = 0.1
 _TAPE_WIDTH_M: Final = 0.05
 # Radius of a sphere that holds either object in the hands.
 _REACH_M: Final = 0.5 * float(np.linalg.norm(BOX_SIZE_M))
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """A seat, which stands on the floor.
+
+    Attributes:
+        kind: a stool with four legs, or a closed box, which hides the legs behind it.
+        size_m: depth, width and height.
+    """
+
+    kind: SeatKind
+    size_m: Vector
 
 
 class Holder(Protocol):
@@ -186,3 +212,28 @@ def _coloured(parts: list[tuple[Mesh, tuple[float, float]]]) -> Mesh:
         Mesh(mesh.vertices_m, mesh.normals, mesh.indices, np.tile(uv, (len(mesh.vertices_m), 1)))
         for mesh, uv in parts
     )
+
+
+def fitting_seat(bones: Skeleton, kind: SeatKind) -> Seat:
+    """Return the seat that fits a body.
+
+    Raises:
+        SimError: for another kind.
+    """
+    if kind not in get_args(SeatKind):
+        valid = ", ".join(map(repr, get_args(SeatKind)))
+        raise SimError(f"seat must be one of {valid}, got {kind!r}")
+    size = bones.stature_m / _MEAN_STATURE_M
+    height = seated_pose(bones).hip_height_m - _HIPS_ABOVE_SEAT_M * size
+    return Seat(kind, (_SEAT_DEPTH_M * size, _SEAT_WIDTH_M * size, height))
+
+
+def seat_pose(seat: Seat, x_m: float, y_m: float, heading_rad: float) -> FloatArray:
+    """Return (4, 4) the pose in odom of a seat's middle under a body at this place."""
+    depth, _, height = seat.size_m
+    ahead = _SEAT_AHEAD_M / _SEAT_DEPTH_M * depth
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    T_odom_seat = np.eye(4)
+    T_odom_seat[:2, :2] = [[cos, -sin], [sin, cos]]
+    T_odom_seat[:3, 3] = x_m + cos * ahead, y_m + sin * ahead, 0.5 * height
+    return T_odom_seat

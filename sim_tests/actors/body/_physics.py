@@ -12,9 +12,9 @@ from perception.arrays import FloatArray
 from ...world import PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
 from ...world.bullet import pybullet
 from ._asset import JOINTS, PARENTS, Capsule
+from ._held_object import Seat
 from ._postures import BOX_SIZE_M, arm_postures
 from ._quaternions import IDENTITY, Quaternion, Vector, rotation_z, subtract
-from ._sitting import Seat
 from ._skeleton import Skeleton
 
 _SPINE: Final = JOINTS.index("spine")

@@ -20,6 +20,9 @@ _PARENTS: Final = np.array(PARENTS)
 # Component order of a cross product: y z − z y, z x − x z, x y − y x.
 _NEXT: Final = np.array([1, 2, 0])
 _AFTER: Final = np.array([2, 0, 1])
+# The matrix (0 −z y, z 0 −x, −y x 0), row by row: components of the vector, and their signs.
+_SKEW_ROWS: Final = np.array([0, 2, 1, 2, 0, 0, 1, 0, 0])
+_SKEW_SIGNS: Final = np.array([0.0, -1.0, 1.0, 1.0, 0.0, -1.0, -1.0, 1.0, 0.0])
 
 
 def _depth(joint: int) -> int:
@@ -70,46 +73,42 @@ def link_transforms(joints_m: FloatArray, pose: BodyPose) -> FloatArray:
     links[0] = pose.T_odom_body
     shifts = centres - np.einsum("nij,nj->ni", turns, centres)
     for joints, rows, parents in _GENERATIONS:
-        before = links[parents]
+        before = links.take(parents, axis=0)
         rotation = before[:, :3, :3]
-        place = before[:, :3, 3] + np.einsum("nij,nj->ni", rotation, shifts[joints])
-        before[:, :3, :3] = rotation @ turns[joints]
+        place = before[:, :3, 3] + np.einsum("nij,nj->ni", rotation, shifts.take(joints, axis=0))
+        before[:, :3, :3] = rotation @ turns.take(joints, axis=0)
         before[:, :3, 3] = place
         links[rows] = before
     return links
 
 
-def piece_transforms(
-    joints_m: FloatArray,
-    pose: BodyPose,
-    joints: NDArray[np.int64],
-    shares: FloatArray,
-    links: FloatArray | None = None,
-) -> FloatArray:
-    """Return (N, 4, 4) transforms of rigid pieces that follow a share of a joint's rotation.
+class RigidPieces:
+    """Rigid pieces that each follow a share of one joint's rotation, and its parents fully.
 
-    With share 1 a piece has the transform of its joint's link.
+    With share 1 a piece moves with its joint's link.
 
     Args:
         joints_m: (16, 3) joints of the asset at rest.
-        pose: the body's pose.
         joints: (N,) joint of each piece, −1 for the pelvis.
-        shares: (N,) in [0, 1]: the part of the joint's rotation angle by which a piece turns. It
-            follows the joint's parents fully. Ignored for the pelvis.
-        links: :func:`link_transforms` of this pose, if known.
+        shares: (N,) in [0, 1]: the part of the joint's rotation angle by which a piece turns;
+            ignored for the pelvis.
     """
-    if links is None:
-        links = link_transforms(joints_m, pose)
-    parents = np.where(joints < 0, -1, _PARENTS[joints])
-    before = links[1 + parents]
-    turning = np.where(joints < 0, 0.0, shares)[:, None]
-    turn = rotation_matrices(turning * pose.joint_rotvecs[joints])
-    centre = joints_m[joints] * pose.scale
-    pieces = np.array(before)
-    pieces[:, :3, :3] = before[:, :3, :3] @ turn
-    shift = centre - np.einsum("nij,nj->ni", turn, centre)
-    pieces[:, :3, 3] += np.einsum("nij,nj->ni", before[:, :3, :3], shift)
-    return pieces
+
+    def __init__(self, joints_m: FloatArray, joints: NDArray[np.int64], shares: FloatArray) -> None:
+        self._joints, self._centres_m = joints, joints_m[joints]
+        self._parent_rows = 1 + np.where(joints < 0, -1, _PARENTS[joints])
+        self._turning = np.where(joints < 0, 0.0, shares)[:, None]
+
+    def odom(self, pose: BodyPose, links: FloatArray) -> FloatArray:
+        """Return (N, 4, 4) transforms to odom, from the :func:`link_transforms` of the pose."""
+        pieces = links.take(self._parent_rows, axis=0)
+        before = np.array(pieces[:, :3, :3])
+        turn = rotation_matrices(self._turning * pose.joint_rotvecs.take(self._joints, axis=0))
+        centre = self._centres_m * pose.scale
+        pieces[:, :3, :3] = before @ turn
+        shift = centre - np.einsum("nij,nj->ni", turn, centre)
+        pieces[:, :3, 3] += np.einsum("nij,nj->ni", before, shift)
+        return np.asarray(pieces)
 
 
 class SkinnedPoints:
@@ -122,7 +121,6 @@ class SkinnedPoints:
     """
 
     def __init__(self, joints_m: FloatArray, points_m: FloatArray, weights: FloatArray) -> None:
-        self._joints_m = joints_m
         self._points_m = np.ascontiguousarray(points_m.T)
         self._passes: list[tuple[NDArray[np.int64], slice]] = []
         owners, shares, begin = [], [], 0
@@ -146,23 +144,25 @@ class SkinnedPoints:
             begin += row.size
         # All passes, one after the other.
         self._owner, self._share = np.concatenate(owners), np.concatenate(shares)
+        self._centres_m = np.ascontiguousarray(joints_m.T[:, self._owner])
 
     def odom_m(self, pose: BodyPose) -> FloatArray:
         """Return (N, 3) points in odom."""
         points = self._points_m * pose.scale
         rotvecs = pose.joint_rotvecs
         angles = np.sqrt(np.einsum("ij,ij->i", rotvecs, rotvecs))
-        axes = (rotvecs / np.maximum(angles, 1e-12)[:, None]).T[:, self._owner]
-        centres = (self._joints_m.T * pose.scale)[:, self._owner]
+        axes = (rotvecs / np.maximum(angles, 1e-12)[:, None]).T.take(self._owner, axis=1)
+        centres = self._centres_m * pose.scale
         turns = angles[self._owner] * self._share
         sines, versines = np.sin(turns), 1.0 - np.cos(turns)
-        nexts, afters = axes[_NEXT], axes[_AFTER]
+        nexts, afters = axes.take(_NEXT, axis=0), axes.take(_AFTER, axis=0)
         for rows, now in self._passes:
             axis, centre = axes[:, now], centres[:, now]
-            arm = points[:, rows] - centre
+            arm = points.take(rows, axis=1) - centre
             parts = axis * arm
             along = parts[0] + parts[1] + parts[2]
-            across = nexts[:, now] * arm[_AFTER] - afters[:, now] * arm[_NEXT]
+            across = nexts[:, now] * arm.take(_AFTER, axis=0)
+            across -= afters[:, now] * arm.take(_NEXT, axis=0)
             points[:, rows] = (
                 centre + arm + sines[now] * across + versines[now] * (along * axis - arm)
             )
@@ -185,17 +185,7 @@ def rotation_matrices(rotvecs: FloatArray) -> FloatArray:
     safe = np.where(small, 1.0, squares)
     sine = np.where(small, 1.0, np.sin(angles) / np.sqrt(safe))
     versine = np.where(small, 0.5, (1.0 - np.cos(angles)) / safe)
-    x, y, z = rotvecs.T
-    out = versine[:, None, None] * rotvecs[:, :, None] * rotvecs[:, None, :]
-    diagonal = 1.0 - versine * squares
-    sx, sy, sz = sine * x, sine * y, sine * z
-    out[:, 0, 0] += diagonal
-    out[:, 1, 1] += diagonal
-    out[:, 2, 2] += diagonal
-    out[:, 0, 1] -= sz
-    out[:, 1, 0] += sz
-    out[:, 0, 2] += sy
-    out[:, 2, 0] -= sy
-    out[:, 1, 2] -= sx
-    out[:, 2, 1] += sx
-    return np.asarray(out)
+    out = (versine[:, None, None] * rotvecs[:, :, None] * rotvecs[:, None, :]).reshape(-1, 9)
+    out[:, ::4] += (1.0 - versine * squares)[:, None]
+    out += (sine[:, None] * rotvecs).take(_SKEW_ROWS, axis=1) * _SKEW_SIGNS
+    return np.asarray(out.reshape(-1, 3, 3))

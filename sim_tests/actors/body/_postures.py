@@ -1,10 +1,13 @@
-"""Postures of the arms: swinging, carrying a box, reading a phone, resting, working low down."""
+"""Postures: what gait, activity, head and eyes ask of the trunk, the arms and the legs.
+
+Arms swing, carry a box, read a phone or rest. People low down sit, or kneel on both knees.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Final, Literal, get_args
 
 import numpy as np
@@ -13,11 +16,12 @@ from perception.arrays import FloatArray
 
 from ...world.errors import SimError
 from ._asset import JOINTS
-from ._gait_pose import GaitPose
+from ._gait import GaitPose
 from ._quaternions import (
     IDENTITY,
     Quaternion,
     Vector,
+    add,
     add_scaled,
     aligned,
     axis_angle,
@@ -28,6 +32,8 @@ from ._quaternions import (
     rotation_matrix,
     rotation_x,
     rotation_y,
+    rotation_z,
+    rotation_zy,
     slerp,
     subtract,
     unit,
@@ -39,6 +45,10 @@ ActivityName = Literal["none", "carry_box", "phone", "sitting", "kneeling"]
 ACTIVITIES: Final = get_args(ActivityName)
 #: The activities of people who stay at their place.
 STAYING: Final = ("sitting", "kneeling")
+#: Height of the eyes of a seated person as a share of the standing stature.
+SEATED_EYE_HEIGHT_SHARE: Final = 0.71
+#: The same of a person on both knees.
+KNEELING_EYE_HEIGHT_SHARE: Final = 0.67
 #: Depth, width and height of the carried box along its x, y and z.
 BOX_SIZE_M: Final = (0.30, 0.40, 0.28)
 #: Thickness, width and height of the phone along its x, y and z; its screen faces −x.
@@ -72,8 +82,23 @@ _HELD_SHARE: Final = 0.98
 # the radii of both: bones do not lie in the middle of a limb.
 _RESTING_SHARE: Final = 0.70
 _RESTING_ABOVE_M: Final = 0.066
+# Seated feet stand wider apart than the hips, and the toes point outwards.
+_FEET_APART: Final = 1.35
+_TOE_OUT_RAD: Final = math.radians(8.0)
+# Knees and stretched feet on the floor, at 1.75 m: height of the knees' and the ankles' joints, and
+# the pitch of the feet.
+_KNEE_HEIGHT_M: Final = 0.070
+_ANKLE_HEIGHT_M: Final = 0.075
+_FOOT_PITCH_RAD: Final = math.radians(155.0)
+# The trunk leans forward in a walk at 1.2 m/s.
+_LEAN_RAD: Final = math.radians(3.5)
+# The knee follows this share of the foot's yaw from the pelvis, the ankle the rest.
+_KNEE_YAW_SHARE: Final = 0.2
 
-Arm = tuple[Quaternion, Quaternion, Quaternion]  # shoulder, elbow, wrist
+#: Ankle, yaw and pitch of a foot.
+Foot = tuple[Vector, float, float]
+#: Rotations of shoulder, elbow and wrist.
+Arm = tuple[Quaternion, Quaternion, Quaternion]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +133,7 @@ class Activity:
                 )
 
     @classmethod
+    @cache
     def of(cls, name: str) -> Activity:
         """Return the activity of this name, with no other before it."""
         return cls(name, name)
@@ -308,3 +334,125 @@ def _arm_to(
         multiply(elbow, axis_angle(along, twist)),
         multiply(axis_angle(along, -twist), wrist),
     )
+
+
+@lru_cache(maxsize=64)
+def seated_pose(bones: Skeleton) -> GaitPose:
+    """Return feet and hips of a person who sits, in the body's frame; the hips are above it."""
+    feet = []
+    hips = 0.0
+    for number, name in enumerate(SIDES):
+        ankle, hip = bones.joint_m(f"{name}_ankle"), bones.joint_m(f"{name}_hip")
+        leg = bones.legs[number]
+        thigh, shank = math.hypot(*leg.first_m), math.hypot(*leg.second_m)
+        x = hip[0] - bones.hips_m[0] + thigh
+        yaw = SIGNS[number] * _TOE_OUT_RAD
+        feet.append((x, _FEET_APART * ankle[1], ankle[2], yaw, 0.0))
+        hips += 0.5 * (ankle[2] + shank - (hip[2] - bones.hips_m[2]))
+    return GaitPose((feet[0], feet[1]), hips)
+
+
+@lru_cache(maxsize=64)
+def kneeling_pose(bones: Skeleton) -> GaitPose:
+    """Return feet and hips of a person on both knees, in the body's frame; thighs are upright."""
+    size = bones.stature_m / _MEAN_STATURE_M
+    feet = []
+    hips = 0.0
+    for number, name in enumerate(SIDES):
+        hip = bones.joint_m(f"{name}_hip")
+        leg = bones.legs[number]
+        thigh, shank = math.hypot(*leg.first_m), math.hypot(*leg.second_m)
+        down = (_ANKLE_HEIGHT_M - _KNEE_HEIGHT_M) * size
+        x = hip[0] - bones.hips_m[0] - math.sqrt(shank**2 - down**2)
+        feet.append((x, hip[1], _ANKLE_HEIGHT_M * size, 0.0, _FOOT_PITCH_RAD))
+        hips += 0.5 * (_KNEE_HEIGHT_M * size + thigh - (hip[2] - bones.hips_m[2]))
+    return GaitPose((feet[0], feet[1]), hips)
+
+
+@dataclass(frozen=True, slots=True)
+class Trunk:
+    """Hips, trunk and head in the heading frame: the body's position with x along its heading.
+
+    Attributes:
+        hips_m: midpoint of the hips.
+        pelvis: rotation of the pelvis.
+        thorax: rotation of the thorax.
+        head: rotation of the head.
+    """
+
+    hips_m: Vector
+    pelvis: Quaternion
+    thorax: Quaternion
+    head: Quaternion
+
+
+class JointAngles:
+    """The joint angles of one body.
+
+    Args:
+        bones: the bones.
+    """
+
+    def __init__(self, bones: Skeleton) -> None:
+        self._legs = bones.legs
+        self._arms = arm_postures(bones)
+        self._hips = tuple(subtract(bones.joint_m(f"{side}_hip"), bones.hips_m) for side in SIDES)
+
+    @staticmethod
+    def trunk(gait_pose: GaitPose, upright: float, head_rad: tuple[float, float]) -> Trunk:
+        """Return the trunk; it takes a fifth of the time of :meth:`joints`.
+
+        Args:
+            gait_pose: hips and trunk of the gait.
+            upright: share in [0, 1] of the lean of a walk that is held back.
+            head_rad: yaw and pitch of the head from the body.
+        """
+        pelvis = multiply(
+            rotation_z(gait_pose.pelvis_yaw_rad), rotation_x(gait_pose.pelvis_list_rad)
+        )
+        lean = _LEAN_RAD * gait_pose.stride_ratio * (1.0 - upright)
+        thorax = rotation_zy(gait_pose.thorax_yaw_rad, lean)
+        facing = rotation_zy(head_rad[0], -head_rad[1])
+        return Trunk((0.0, gait_pose.sway_m, gait_pose.hip_height_m), pelvis, thorax, facing)
+
+    def joints(
+        self,
+        trunk: Trunk,
+        gait_pose: GaitPose,
+        feet: tuple[Foot, Foot],
+        eyes_rad: tuple[float, float],
+        activity: Activity,
+    ) -> tuple[Quaternion, ...]:
+        """Return the rotation of every joint in the order of :data:`JOINTS`.
+
+        Args:
+            trunk: of this posture.
+            gait_pose: the gait.
+            feet: left and right foot in the heading frame.
+            eyes_rad: yaw and pitch of the eyes from the head.
+            activity: of the hands.
+        """
+        pelvis = trunk.pelvis
+        back = inverse(pelvis)
+        legs: list[Quaternion] = []
+        for side in (LEFT, RIGHT):
+            ankle, yaw, pitch = feet[side]
+            hip = add(trunk.hips_m, rotate(pelvis, self._hips[side]))
+            knee_yaw = gait_pose.pelvis_yaw_rad + _KNEE_YAW_SHARE * (yaw - gait_pose.pelvis_yaw_rad)
+            across = rotate(back, (-math.sin(knee_yaw), math.cos(knee_yaw), 0.0))
+            leg = self._legs[side]
+            thigh, bend = leg.solve(rotate(back, subtract(ankle, hip)), across)
+            knee = axis_angle(leg.axis, bend)
+            turned_foot = multiply(back, rotation_zy(yaw, pitch))
+            legs += (thigh, knee, multiply(inverse(multiply(thigh, knee)), turned_foot))
+        eye = rotation_zy(eyes_rad[0], -eyes_rad[1])
+        left, right = self._arms.arms(gait_pose, activity)
+        return (
+            multiply(back, trunk.thorax),
+            multiply(inverse(trunk.thorax), trunk.head),
+            eye,
+            eye,
+            *left,
+            *right,
+            *legs,
+        )

@@ -72,6 +72,13 @@ def rotation_z(angle_rad: float) -> Quaternion:
     return (0.0, 0.0, math.sin(0.5 * angle_rad), math.cos(0.5 * angle_rad))
 
 
+def rotation_zy(yaw_rad: float, pitch_rad: float) -> Quaternion:
+    """Return the rotation about y by the pitch, and afterwards about z by the yaw."""
+    sin_yaw, cos_yaw = math.sin(0.5 * yaw_rad), math.cos(0.5 * yaw_rad)
+    sin_pitch, cos_pitch = math.sin(0.5 * pitch_rad), math.cos(0.5 * pitch_rad)
+    return (-sin_yaw * sin_pitch, cos_yaw * sin_pitch, sin_yaw * cos_pitch, cos_yaw * cos_pitch)
+
+
 def axis_angle(axis: Vector, angle_rad: float) -> Quaternion:
     """Return the rotation about a unit axis."""
     sin = math.sin(0.5 * angle_rad)
@@ -86,17 +93,17 @@ def from_axes(x_axis: Vector, y_axis: Vector, z_axis: Vector) -> Quaternion:
     m00, m10, m20 = x_axis
     m01, m11, m21 = y_axis
     m02, m12, m22 = z_axis
-    squares = (m00 - m11 - m22, m11 - m00 - m22, m22 - m00 - m11, m00 + m11 + m22)
-    largest = max(range(4), key=squares.__getitem__)
-    root = math.sqrt(max(1.0 + squares[largest], 0.0))
+    for_x, for_y, for_z, for_w = m00 - m11 - m22, m11 - m00 - m22, m22 - m00 - m11, m00 + m11 + m22
+    largest = max(for_x, for_y, for_z, for_w)
+    root = math.sqrt(max(1.0 + largest, 0.0))
     rest = 0.5 / root
-    if largest == 3:
-        return ((m21 - m12) * rest, (m02 - m20) * rest, (m10 - m01) * rest, 0.5 * root)
-    if largest == 0:
+    if for_x == largest:
         return (0.5 * root, (m01 + m10) * rest, (m02 + m20) * rest, (m21 - m12) * rest)
-    if largest == 1:
+    if for_y == largest:
         return ((m01 + m10) * rest, 0.5 * root, (m12 + m21) * rest, (m02 - m20) * rest)
-    return ((m02 + m20) * rest, (m12 + m21) * rest, 0.5 * root, (m10 - m01) * rest)
+    if for_z == largest:
+        return ((m02 + m20) * rest, (m12 + m21) * rest, 0.5 * root, (m10 - m01) * rest)
+    return ((m21 - m12) * rest, (m02 - m20) * rest, (m10 - m01) * rest, 0.5 * root)
 
 
 def aligned(x_axis: Vector, towards: Vector) -> Quaternion:
@@ -106,8 +113,15 @@ def aligned(x_axis: Vector, towards: Vector) -> Quaternion:
         x_axis: unit vector.
         towards: any vector that is not parallel to it.
     """
-    y_axis = unit(add_scaled(towards, x_axis, -dot(x_axis, towards)))
-    return from_axes(x_axis, y_axis, cross(x_axis, y_axis))
+    # Written out: every placing of a body takes four of them.
+    ax, ay, az = x_axis
+    tx, ty, tz = towards
+    back = -(ax * tx + ay * ty + az * tz)
+    bx, by, bz = tx + back * ax, ty + back * ay, tz + back * az
+    length = math.sqrt(bx * bx + by * by + bz * bz)
+    bx, by, bz = bx / length, by / length, bz / length
+    z_axis = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+    return from_axes(x_axis, (bx, by, bz), z_axis)
 
 
 def multiply(first: Quaternion, then: Quaternion) -> Quaternion:

@@ -146,7 +146,6 @@ class Skeleton:
         legs: left and right leg.
         arms: left and right arm.
         soles: left and right sole.
-        nose_m: tip of the nose.
         eyes_m: midpoint of the eye keypoints.
         shoulders_m: midpoint of the shoulder keypoints.
         hip_keypoints_m: midpoint of the hip keypoints.
@@ -160,47 +159,9 @@ class Skeleton:
     legs: tuple[TwoBoneLimb, TwoBoneLimb]
     arms: tuple[TwoBoneLimb, TwoBoneLimb]
     soles: tuple[SoleRoll, SoleRoll]
-    nose_m: Vector
     eyes_m: Vector
     shoulders_m: Vector
     hip_keypoints_m: Vector
-
-    @classmethod
-    def from_asset(cls, asset: WorkerAsset, stature_m: float | None = None) -> Skeleton:
-        """Scale an asset to a stature; None keeps its own.
-
-        Raises:
-            SimError: for a stature outside [1.0, 2.1] m.
-        """
-        stature = finite_number(
-            "stature_m",
-            asset.stature_m if stature_m is None else stature_m,
-            SimError,
-            minimum=MIN_STATURE_M,
-            maximum=MAX_STATURE_M,
-        )
-        scale = stature / asset.stature_m
-        joints = np.array(asset.joints_m * scale)
-        joints.setflags(write=False)
-        keypoints = asset.keypoints_m * scale
-
-        def between(rows: Sequence[int], points: FloatArray) -> Vector:
-            return _vector(points[list(rows)].mean(axis=0))
-
-        return cls(
-            asset=asset,
-            stature_m=stature,
-            scale=scale,
-            joints_m=joints,
-            hips_m=between([JOINTS.index(f"{side}_hip") for side in SIDES], joints),
-            legs=(_leg(joints, "left"), _leg(joints, "right")),
-            arms=(_arm(joints, "left"), _arm(joints, "right")),
-            soles=(_sole(asset, scale, "left"), _sole(asset, scale, "right")),
-            nose_m=_vector(keypoints[kp.NOSE]),
-            eyes_m=between((kp.LEFT_EYE, kp.RIGHT_EYE), keypoints),
-            shoulders_m=between((kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER), keypoints),
-            hip_keypoints_m=between((kp.LEFT_HIP, kp.RIGHT_HIP), keypoints),
-        )
 
     def joint_m(self, name: str) -> Vector:
         """Return a joint's position at rest."""
@@ -221,13 +182,32 @@ def skeleton(look: str | None, stature_m: float) -> Skeleton:
     stature = finite_number(
         "stature_m", stature_m, SimError, minimum=MIN_STATURE_M, maximum=MAX_STATURE_M
     )
-    return Skeleton.from_asset(
-        load_worker(nearest_look(stature) if look is None else look), stature
+    asset = load_worker(_nearest_look(stature) if look is None else look)
+    scale = stature / asset.stature_m
+    joints = np.array(asset.joints_m * scale)
+    joints.setflags(write=False)
+    keypoints = asset.keypoints_m * scale
+
+    def between(rows: Sequence[int], points: FloatArray) -> Vector:
+        return _vector(points[list(rows)].mean(axis=0))
+
+    return Skeleton(
+        asset=asset,
+        stature_m=stature,
+        scale=scale,
+        joints_m=joints,
+        hips_m=between([JOINTS.index(f"{side}_hip") for side in SIDES], joints),
+        legs=(_leg(joints, "left"), _leg(joints, "right")),
+        arms=(_arm(joints, "left"), _arm(joints, "right")),
+        soles=(_sole(asset, scale, "left"), _sole(asset, scale, "right")),
+        eyes_m=between((kp.LEFT_EYE, kp.RIGHT_EYE), keypoints),
+        shoulders_m=between((kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER), keypoints),
+        hip_keypoints_m=between((kp.LEFT_HIP, kp.RIGHT_HIP), keypoints),
     )
 
 
 @lru_cache(maxsize=64)
-def nearest_look(stature_m: float) -> str:
+def _nearest_look(stature_m: float) -> str:
     """Return the shipped worker of nearest stature; of equally near ones the first by name."""
 
     def order(name: str) -> tuple[float, str]:

@@ -27,7 +27,7 @@ from ...world.hall import Mesh
 from ...world.render import RenderView, Visuals, box_corners, in_view, to_camera
 from ...world.sightlines import PlacedSurface, TriangleSet
 from ._asset import DETAIL_LEVELS, JOINTS, PARENTS, SkinMesh, WorkerAsset, load_worker
-from ._pose import BodyPose, piece_transforms
+from ._pose import BodyPose, RigidPieces
 
 #: Row of the pelvis among the joints.
 PELVIS: Final = -1
@@ -129,14 +129,18 @@ def _leg_reflectance(look: str) -> float:
 
 
 @lru_cache(maxsize=64)
-def _surface(look: str, level: int) -> tuple[TriangleSet, NDArray[np.int64], FloatArray]:
-    """Return the triangles of all pieces, and the joint and share of each piece."""
+def _rigid(look: str, level: int) -> RigidPieces:
+    """Return the motion of the pieces."""
     pieces = _pieces(look, level)
-    return (
-        TriangleSet([(p.mesh.vertices_m, p.mesh.indices.reshape(-1, 3)) for p in pieces]),
-        np.array([piece.joint for piece in pieces]),
-        np.array([piece.share for piece in pieces]),
-    )
+    joints, shares = np.array([p.joint for p in pieces]), np.array([p.share for p in pieces])
+    return RigidPieces(load_worker(look).joints_m, joints, shares)
+
+
+@lru_cache(maxsize=64)
+def _triangles(look: str, level: int) -> TriangleSet:
+    """Return the triangles of the pieces."""
+    pieces = _pieces(look, level)
+    return TriangleSet([(p.mesh.vertices_m, p.mesh.indices.reshape(-1, 3)) for p in pieces])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,8 +148,7 @@ class _Level:
     """One level of detail in the render world, with one body per piece."""
 
     bodies: tuple[int, ...]
-    joints: NDArray[np.int64]
-    shares: FloatArray
+    rigid: RigidPieces
     boxes_m: FloatArray  # (P, 8, 3) corners of a box around each scaled piece at rest
 
 
@@ -214,10 +217,9 @@ class WorkerSkin:
             self._surface_pose = pose
             self._surfaces.clear()
         if detail not in self._surfaces:
-            asset = worker.asset
-            triangles, joints, shares = _surface(asset.name, detail)
-            places = piece_transforms(asset.joints_m, pose, joints, shares, worker.links_odom)
-            self._surfaces[detail] = PlacedSurface(triangles, places, pose.scale)
+            look = worker.asset.name
+            places = _rigid(look, detail).odom(pose, worker.links_odom)
+            self._surfaces[detail] = PlacedSurface(_triangles(look, detail), places, pose.scale)
         return self._surfaces[detail]
 
     @property
@@ -251,7 +253,7 @@ class WorkerSkin:
                 self._levels[number] = self._make(visuals, number)
                 self._shown |= set(self._levels[number].bodies)
             level = self._levels[number]
-            places = self._transforms(level)
+            places = level.rigid.odom(self.worker.pose, self.worker.links_odom)
             rows = _rows_in_view(level, places, view)
             shown = {level.bodies[row] for row in rows}
         for body in self._shown - shown:
@@ -273,8 +275,7 @@ class WorkerSkin:
         )
         return _Level(
             bodies,
-            np.array([piece.joint for piece in pieces]),
-            np.array([piece.share for piece in pieces]),
+            _rigid(asset.name, level),
             box_corners(
                 scale
                 * np.array(
@@ -285,11 +286,6 @@ class WorkerSkin:
                 )
             ),
         )
-
-    def _transforms(self, level: _Level) -> FloatArray:
-        """Return (P, 4, 4) transforms of the pieces from rest to odom."""
-        joints_m, pose = self.worker.asset.joints_m, self.worker.pose
-        return piece_transforms(joints_m, pose, level.joints, level.shares)
 
 
 def _rows_in_view(level: _Level, places: FloatArray, view: RenderView | None) -> list[int]:

@@ -14,13 +14,12 @@ from perception.layouts import LEFT_SHOULDER, RIGHT_SHOULDER
 from ...world import Warehouse
 from ...world.errors import SimError
 from ._asset import JOINTS, WorkerAsset, load_worker
-from ._gait import Gait
-from ._gait_pose import GaitPose
-from ._held_object import HeldObject
-from ._joint_angles import Foot, JointAngles
+from ._footsteps import steady_walk
+from ._gait import FootPose, Gait, GaitPose
+from ._held_object import HeldObject, Seat, SeatKind, fitting_seat, seat_pose
 from ._physics import WorkerBody
 from ._pose import BodyPose, SkinnedPoints, link_transforms
-from ._postures import Activity, arm_postures
+from ._postures import Activity, Foot, JointAngles, arm_postures, kneeling_pose, seated_pose
 from ._quaternions import (
     Quaternion,
     Vector,
@@ -32,7 +31,6 @@ from ._quaternions import (
     rotation_z,
     subtract,
 )
-from ._sitting import Seat, SeatKind, fitting_seat, kneeling_pose, seat_pose, seated_pose
 from ._skeleton import Skeleton, skeleton
 from ._skin import WorkerSkin
 
@@ -66,7 +64,6 @@ class Worker:
         stature_m: standing height with shoes, in [1.0, 2.1]; None is that of ``look``, or 1.75 m.
         look: name of a shipped worker (:func:`worker_names`), scaled to the stature; None is the
             one of nearest stature.
-        stride_m: distance of a full gait cycle, see :class:`Gait`; None follows the speed.
         position_odom_m: (2,) first position; None waits outside the warehouse.
         heading_odom_rad: first heading.
         seat: what the person sits on when seated.
@@ -93,7 +90,6 @@ class Worker:
         stature_m: float | None = None,
         *,
         look: str | None = None,
-        stride_m: float | None = None,
         position_odom_m: Any = None,
         heading_odom_rad: float = 0.0,
         seat: SeatKind = "stool",
@@ -101,7 +97,7 @@ class Worker:
         if stature_m is None:
             stature_m = _DEFAULT_STATURE_M if look is None else load_worker(look).stature_m
         self.skeleton: Skeleton = skeleton(look, stature_m)
-        self.gait = Gait(self.skeleton, stride_m)
+        self.gait = Gait(self.skeleton)
         if position_odom_m is None:
             position_odom_m = (warehouse.layout.x_min_m - 5.0, 0.0)
         finite_array("position_odom_m", position_odom_m, (2,), SimError)
@@ -146,7 +142,7 @@ class Worker:
         Args:
             position_odom_m: (2,) the body's centre line.
             heading_odom_rad: of the body, counter-clockwise from odom x.
-            walked_m: distance walked so far; it sets the phase of the gait.
+            walked_m: distance walked so far, which sets the phase of the gait.
             speed_mps: speed of a straight walk, in [0, 3]; 0 stands.
             head_yaw_rad: of the head from the body, left positive, within ±80°.
             head_pitch_rad: of the head, up positive, within ±40°.
@@ -154,8 +150,8 @@ class Worker:
             eye_pitch_rad: of the eyes from the head, up positive, within ±25°.
             activity: ``"none"``, ``"carry_box"``, ``"phone"``, or a change between two of them;
                 or ``"sitting"`` on the seat, or ``"kneeling"``; the hips are above the position.
-            feet: gait pose in odom, as :func:`plan_footsteps` and :class:`OnlineFootsteps` give it;
-                None takes the straight walk of ``walked_m`` and ``speed_mps``. Unused low down.
+            feet: gait pose in odom, as :class:`OnlineFootsteps` gives it; None takes the straight
+                walk of ``walked_m`` and ``speed_mps``, which are unused otherwise. Unused low down.
             collides: False leaves the collision body behind until :meth:`place_collision_body`,
                 which saves half the time.
 
@@ -164,8 +160,6 @@ class Worker:
         """
         x, y = finite_array("position_odom_m", position_odom_m, (2,), SimError).tolist()
         heading = finite_number("heading_odom_rad", heading_odom_rad, SimError)
-        walked = finite_number("walked_m", walked_m, SimError)
-        speed = finite_number("speed_mps", speed_mps, SimError, minimum=0.0, maximum=3.0)
         head = (
             _checked_angle("head_yaw_rad", head_yaw_rad, MAX_HEAD_YAW_RAD),
             _checked_angle("head_pitch_rad", head_pitch_rad, MAX_HEAD_PITCH_RAD),
@@ -175,11 +169,14 @@ class Worker:
             _checked_angle("eye_pitch_rad", eye_pitch_rad, MAX_EYE_PITCH_RAD),
         )
         doing = activity if isinstance(activity, Activity) else Activity.of(activity)
+        gait_pose, feet_are_local = feet, False
         if doing.stays:
-            low = seated_pose if doing.seated else kneeling_pose
-            feet, gait_pose = None, low(self.skeleton)
-        else:
-            gait_pose = self.gait.pose(walked, speed) if feet is None else feet
+            gait_pose = seated_pose(self.skeleton) if doing.seated else kneeling_pose(self.skeleton)
+            feet_are_local = True
+        elif gait_pose is None:
+            walked = finite_number("walked_m", walked_m, SimError)
+            speed = finite_number("speed_mps", speed_mps, SimError, minimum=0.0, maximum=3.0)
+            gait_pose, feet_are_local = steady_walk(self.gait, walked, speed), True
         self._x_m, self._y_m, self._heading_rad = x, y, heading
         self._activity, self._eyes = doing, eyes
         self._keypoints: FloatArray | None = None
@@ -187,7 +184,7 @@ class Worker:
         self._pose: BodyPose | None = None
         self._links: FloatArray | None = None
         self._head_rotation: FloatArray | None = None
-        self._gait_pose, self._feet_are_local = gait_pose, feet is None
+        self._gait_pose, self._feet_are_local = gait_pose, feet_are_local
         self._solved_joints: tuple[Quaternion, ...] | None = None
         self._solve_trunk(head)
         self.collision_left_behind = True
@@ -360,8 +357,8 @@ class Worker:
             )
         return self._solved_joints
 
-    def _local_foot(self, foot: tuple[float, float, float, float, float]) -> Foot:
-        """Return a foot in the heading frame; one of a gait without ``feet`` is given in it."""
+    def _local_foot(self, foot: FootPose) -> Foot:
+        """Return a foot in the heading frame."""
         x, y, z, yaw, pitch = foot
         if self._feet_are_local:
             return (x, y, z), yaw, pitch

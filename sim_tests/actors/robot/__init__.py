@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
-from ._amr import (
+from ._look import RobotLook, amr_meshes
+from ._model import (
     CAMERA_FORWARD_M,
     CAMERA_HEIGHT_M,
-    MAX_YAW_RATE_RADPS,
     NOVA_CARTER,
     TRACK_M,
     WHEEL_RADIUS_M,
-    Amr,
+    BodyPart,
+    RobotModel,
+    shipped_robots,
 )
-from ._kinematic_robot import KinematicRobot
-from ._look import AmrLook, KinematicLook, amr_meshes, model_meshes
-from ._model import BodyPart, RobotModel, shipped_robots
+from ._robots import Amr, KinematicRobot, Robot, robot_of
 
 __all__ = [
     "CAMERA_FORWARD_M",
     "CAMERA_HEIGHT_M",
-    "MAX_YAW_RATE_RADPS",
     "NOVA_CARTER",
     "TRACK_M",
     "WHEEL_RADIUS_M",
     "Amr",
-    "AmrLook",
     "BodyPart",
-    "KinematicLook",
     "KinematicRobot",
+    "Robot",
+    "RobotLook",
     "RobotModel",
     "amr_meshes",
-    "model_meshes",
+    "robot_of",
     "shipped_robots",
 ]

@@ -1,49 +1,57 @@
-"""Visual actors of robots."""
+"""The visual actor of a robot."""
 
 from __future__ import annotations
 
-import math
-from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import resources
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
-from ...world import Warehouse
 from ...world.bullet import pybullet
 from ...world.errors import SimError
 from ...world.hall import Colour, Mesh, box, merge, read_meshes, scenery_texture
 from ...world.render import RenderView, Visuals
 from ...world.sightlines import PlacedSurface, TriangleSet
-from ._amr import TRACK_M, WHEEL_RADIUS_M, Amr
-from ._kinematic_robot import KinematicRobot
-from ._model import RobotModel
+from ._model import TRACK_M, WHEEL_RADIUS_M, RobotModel
+from ._robots import Amr, KinematicRobot
 
 # Meshes of the Nova Carter; training/hall makes them.
 _AMR_FILE: Final = resources.files(__package__) / "nova_carter.npz"
 # Low and high corner of a box that holds the Nova Carter in its base frame.
 _AMR_BOUNDS_M: Final = np.array([[-0.38, -0.26, -0.01], [0.38, 0.26, 1.46]])
-_WHEELS: Final = ("left_wheel", "right_wheel")
 # Colour of a robot without parts, and how far above the floor it begins.
 _COLOUR: Final[Colour] = (0.2, 0.3, 0.45)
 _LOW_M: Final = 0.05
 
-#: T_odom_base (4, 4), and the rotation of the left and the right wheel about base y, radians.
-Pose = tuple[Any, float, float]
+
+class LookPart(NamedTuple):
+    """A rigid part of a robot's surface.
+
+    Attributes:
+        mesh: surface about the origin of the part.
+        colour: its colour; None takes the texture of the Nova Carter.
+        origin_m: the part's origin in the base frame; a wheel turns about base y there.
+    """
+
+    mesh: Mesh
+    colour: Colour | None = None
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-class RobotLook(ABC):
+class RobotLook:
     """The visual actor of a robot.
 
     Args:
+        parts: its parts; wheels come last.
         bounds_base_m: (2, 3) low and high corner of a box that holds the robot in its base frame.
         triangles: its surface in the base frame, in pieces.
         base_pose: returns the present T_odom_base (4, 4).
+        wheel_angles: returns the present rotation of each wheel about base y, radians.
 
     Attributes:
         kind: ``"robot"``.
@@ -53,17 +61,50 @@ class RobotLook(ABC):
 
     def __init__(
         self,
+        parts: Sequence[LookPart],
         bounds_base_m: FloatArray,
         triangles: TriangleSet,
         base_pose: Callable[[], FloatArray],
+        wheel_angles: Callable[[], tuple[float, ...]] = tuple,
     ) -> None:
+        self._parts = parts
         self._middle_m = 0.5 * (bounds_base_m[0] + bounds_base_m[1])
         self._half_m = 0.5 * (bounds_base_m[1] - bounds_base_m[0])
         self._triangles = triangles
-        self._base_pose = base_pose
+        self._base_pose, self._wheel_angles = base_pose, wheel_angles
         self._visuals: Visuals | None = None
         self._bodies: list[int] = []
         self._shown = True
+
+    @classmethod
+    def of(cls, robot: Amr | KinematicRobot) -> RobotLook:
+        """Make the visual actor of a robot in the physics world."""
+
+        def base_pose() -> FloatArray:
+            return robot.T_odom_base
+
+        if not isinstance(robot, KinematicRobot):
+            return cls.nova_carter(base_pose, lambda: robot.wheel_angles_rad)
+        parts = [LookPart(mesh, colour) for mesh, colour in model_meshes(robot.model)]
+        corners = np.vstack([part.mesh.vertices_m for part in parts])
+        surface = [(part.mesh.vertices_m, part.mesh.indices.reshape(-1, 3)) for part in parts]
+        bounds = np.array([corners.min(axis=0), corners.max(axis=0)])
+        return cls(parts, bounds, TriangleSet(surface), base_pose)
+
+    @classmethod
+    def nova_carter(
+        cls,
+        base_pose: Callable[[], FloatArray],
+        wheel_angles: Callable[[], tuple[float, ...]] = lambda: (0.0, 0.0),
+    ) -> RobotLook:
+        """Make the visual actor of a Nova Carter: its body and two wheels; args as the class's."""
+        meshes = amr_meshes()
+        parts = [
+            LookPart(meshes["base_link"]),
+            LookPart(meshes["left_wheel"], origin_m=(0.0, 0.5 * TRACK_M, WHEEL_RADIUS_M)),
+            LookPart(meshes["right_wheel"], origin_m=(0.0, -0.5 * TRACK_M, WHEEL_RADIUS_M)),
+        ]
+        return cls(parts, _AMR_BOUNDS_M, _amr_triangles(), base_pose, wheel_angles)
 
     def bounds_odom_m(self) -> FloatArray:
         """Return (2, 3) the low and high corner of a box that holds the robot now."""
@@ -84,7 +125,12 @@ class RobotLook(ABC):
     def build(self, visuals: Visuals) -> None:
         """Make the robot's bodies in the render world."""
         self._visuals = visuals
-        self._bodies = [visuals.add_body(shape) for shape in self._shapes(visuals)]
+        for part in self._parts:
+            if part.colour is None:
+                shape = visuals.shape(part.mesh, texture=visuals.texture(scenery_texture("amr")))
+            else:
+                shape = visuals.shape(part.mesh, part.colour)
+            self._bodies.append(visuals.add_body(shape))
 
     def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
         """Pose the bodies for the next image; None hides them.
@@ -92,7 +138,7 @@ class RobotLook(ABC):
         All levels of detail are the same.
         """
         if self._visuals is None:
-            raise SimError(f"{type(self).__name__}.show() needs bodies: call build() first")
+            raise SimError("RobotLook.show() needs bodies: call build() first")
         shown = pixels_per_m is not None
         if shown != self._shown:
             change = self._visuals.reveal if shown else self._visuals.hide
@@ -101,10 +147,14 @@ class RobotLook(ABC):
             self._shown = shown
         if not shown:
             return
-        for body, (position, turn) in zip(self._bodies, self._places(), strict=True):
+        T, wheels = self._base_pose(), self._wheel_angles()
+        base = Rotation.from_matrix(T[:3, :3])
+        turns = [base] * (len(self._parts) - len(wheels))
+        turns += [base * Rotation.from_rotvec((0.0, angle, 0.0)) for angle in wheels]
+        for body, part, turn in zip(self._bodies, self._parts, turns, strict=True):
             pybullet.resetBasePositionAndOrientation(
                 body,
-                position.tolist(),
+                (T[:3, :3] @ np.array(part.origin_m) + T[:3, 3]).tolist(),
                 turn.as_quat().tolist(),
                 physicsClientId=self._visuals.client,
             )
@@ -112,94 +162,6 @@ class RobotLook(ABC):
     def bodies(self) -> frozenset[int]:
         """Return the ids of the robot's bodies in the render world."""
         return frozenset(self._bodies)
-
-    @abstractmethod
-    def _shapes(self, visuals: Visuals) -> list[int]:
-        """Register the shape of each body."""
-
-    @abstractmethod
-    def _places(self) -> list[tuple[FloatArray, Rotation]]:
-        """Return the present place and rotation of each body in odom."""
-
-
-class AmrLook(RobotLook):
-    """The visual actor of the Nova Carter: its body and two wheels.
-
-    Args:
-        pose: returns the robot's present pose.
-        base_pose: returns T_odom_base alone, where that is quicker.
-    """
-
-    def __init__(
-        self, pose: Callable[[], Pose], base_pose: Callable[[], FloatArray] | None = None
-    ) -> None:
-
-        def own_base_pose() -> FloatArray:
-            return np.asarray(pose()[0])
-
-        super().__init__(_AMR_BOUNDS_M, _amr_triangles(), base_pose or own_base_pose)
-        self._pose = pose
-
-    @classmethod
-    def of(cls, warehouse: Warehouse, amr: Amr) -> AmrLook:
-        """Make the visual actor of a robot in the physics world."""
-        wheels = [
-            joint
-            for joint in range(pybullet.getNumJoints(amr.body, physicsClientId=warehouse.client))
-            if pybullet.getJointInfo(amr.body, joint, physicsClientId=warehouse.client)[12].decode()
-            in _WHEELS
-        ]
-
-        def pose() -> Pose:
-            left, right = pybullet.getJointStates(
-                amr.body, wheels, physicsClientId=warehouse.client
-            )
-            return amr.T_odom_base, left[0], right[0]
-
-        return cls(pose, lambda: amr.T_odom_base)
-
-    def _shapes(self, visuals: Visuals) -> list[int]:
-        texture = visuals.texture(scenery_texture("amr"))
-        meshes = amr_meshes()
-        return [visuals.shape(meshes[link], texture=texture) for link in ("base_link", *_WHEELS)]
-
-    def _places(self) -> list[tuple[FloatArray, Rotation]]:
-        T, *turns = self._pose()
-        T = np.asarray(T)
-        base = Rotation.from_matrix(T[:3, :3])
-        places = [(T[:3, :3] @ np.zeros(3) + T[:3, 3], base)]
-        for y, turn in zip((0.5 * TRACK_M, -0.5 * TRACK_M), turns, strict=True):
-            hub = T[:3, :3] @ np.array([0.0, y, WHEEL_RADIUS_M]) + T[:3, 3]
-            places.append((hub, base * Rotation.from_rotvec((0.0, turn, 0.0))))
-        return places
-
-
-class KinematicLook(RobotLook):
-    """The visual actor of a kinematic robot.
-
-    Args:
-        robot: the robot.
-    """
-
-    def __init__(self, robot: KinematicRobot) -> None:
-        self._robot = robot
-        self._meshes = model_meshes(robot.model)
-        corners = np.vstack([mesh.vertices_m for mesh, _ in self._meshes])
-        super().__init__(
-            np.array([corners.min(axis=0), corners.max(axis=0)]),
-            TriangleSet(
-                [(mesh.vertices_m, mesh.indices.reshape(-1, 3)) for mesh, _ in self._meshes]
-            ),
-            lambda: robot.T_odom_base,
-        )
-
-    def _shapes(self, visuals: Visuals) -> list[int]:
-        return [visuals.shape(mesh, colour) for mesh, colour in self._meshes]
-
-    def _places(self) -> list[tuple[FloatArray, Rotation]]:
-        T = self._robot.T_odom_base
-        turn = Rotation.from_euler("z", math.atan2(T[1, 0], T[0, 0]))
-        return [(T[:3, 3], turn)] * len(self._meshes)
 
 
 @cache
@@ -240,21 +202,18 @@ def model_meshes(model: RobotModel) -> tuple[tuple[Mesh, Colour], ...]:
 def _prism(outline_m: FloatArray, low_m: float, high_m: float) -> Mesh:
     """Return an outline (M, 2), counter-clockwise, extruded from one height to another."""
     count = len(outline_m)
-    vertices: list[FloatArray] = []
-    normals: list[FloatArray] = []
-    indices: list[int] = []
-    for k in range(count):
-        (ax, ay), (bx, by) = outline_m[k], outline_m[(k + 1) % count]
-        out = np.array([by - ay, ax - bx, 0.0])
-        at = len(vertices)
-        vertices += [
-            np.array(corner)
-            for corner in ((ax, ay, low_m), (bx, by, low_m), (bx, by, high_m), (ax, ay, high_m))
-        ]
-        normals += [out / np.linalg.norm(out)] * 4
-        indices += [at, at + 1, at + 2, at, at + 2, at + 3]
-    at = len(vertices)
-    vertices += [np.array([x, y, high_m]) for x, y in outline_m.tolist()]
-    normals += [np.array([0.0, 0.0, 1.0])] * count
-    indices += [at + k for fan in range(1, count - 1) for k in (0, fan, fan + 1)]
-    return Mesh(np.array(vertices), np.array(normals), np.array(indices, dtype=np.int64))
+    ends = np.roll(outline_m, -1, axis=0)
+    sides = np.stack([outline_m, ends, ends, outline_m], axis=1)  # (M, 4, 2) corners
+    heights = np.broadcast_to([low_m, low_m, high_m, high_m], (count, 4))
+    edges = ends - outline_m
+    out = np.column_stack([edges[:, 1], -edges[:, 0], np.zeros(count)])
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    top = np.column_stack([outline_m, np.full(count, high_m)])
+    quads = 4 * np.arange(count)[:, None] + [0, 1, 2, 0, 2, 3]
+    fans = np.arange(1, count - 1)
+    lid = 4 * count + np.column_stack([np.zeros_like(fans), fans, fans + 1])
+    return Mesh(
+        np.vstack([np.dstack([sides, heights]).reshape(-1, 3), top]),
+        np.vstack([np.repeat(out, 4, axis=0), np.tile([0.0, 0.0, 1.0], (count, 1))]),
+        np.concatenate([quads.ravel(), lid.ravel()]),
+    )

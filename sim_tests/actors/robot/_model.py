@@ -19,11 +19,27 @@ from perception.arrays import FloatArray
 from ...world.config import SimConfig
 from ...world.errors import SimError
 from ...world.scanner import DIAGONAL_SCANNERS, ScannerSpec
-from ._amr import CAMERA_FORWARD_M, CAMERA_HEIGHT_M, NOVA_CARTER
 
 _FOLDER: Final = resources.files("sim_tests.actors.robot") / "shipped"
 #: Name of the robot with its own body and wheels, the default of every crossing.
 NOVA_CARTER_NAME: Final = "nova_carter"
+
+#: Nova Carter's published outline; its centre is midway between the drive wheels.
+NOVA_CARTER: Final = RobotProfile(
+    footprint_m=np.array([[0.3625, 0.25], [-0.3625, 0.25], [-0.3625, -0.25], [0.3625, -0.25]]),
+    max_speed_mps=1.5,
+    max_acceleration_mps2=1.0,
+    max_deceleration_mps2=1.0,
+    reaction_time_s=0.3,
+    max_yaw_rate_radps=1.5,
+    max_yaw_acceleration_radps2=3.0,
+)
+
+WHEEL_RADIUS_M: Final = 0.14
+TRACK_M: Final = 0.414
+CAMERA_HEIGHT_M: Final = 1.4
+# Just ahead of the camera's housing, so that the robot does not see itself.
+CAMERA_FORWARD_M: Final = 0.165
 
 Point = tuple[float, float]
 

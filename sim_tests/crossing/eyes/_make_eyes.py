@@ -13,7 +13,6 @@ from perception.arrays import ImageRgb
 from perception.networks import OnnxSettings
 from perception.surround import FlatView
 
-from ...actors.behaviour import PersonSpec, WorkerScript
 from ...scenario import CameraSpec, Scenario
 from ...world.camera import CoarseSceneryRenderer
 from ...world.errors import SimError
@@ -77,8 +76,7 @@ def make_eyes(
 
 def unusual_size_probability(scenario: Scenario) -> float:
     """Return what a robot may assume: 0 where all people are adults who stand, else the default."""
-    everybody: list[WorkerScript | PersonSpec] = [*scenario.workers, *scenario.people]
-    if all(each.stature_m >= _LEAST_ADULT_M and not each.stays for each in everybody):
+    if all(each.stature_m >= _LEAST_ADULT_M and not each.stays for each in scenario.people):
         return 0.0
     return UNUSUAL_SIZE_PROBABILITY
 

@@ -59,10 +59,6 @@ def scenario_problems(scenario: Scenario) -> tuple[str, ...]:
                     f"people: {person.name}: the path from route point {number} to {number + 1} "
                     f"leads through or within {BODY_RADIUS_M:g} m of a rack, a prop or a wall"
                 )
-    for number, script in enumerate(scenario.workers):
-        for waypoint in script.path:
-            what = f"workers: {number}: the waypoint at {waypoint.t_s:g} s"
-            found += _place_problems(what, (waypoint.x_m, waypoint.y_m), boxes, inner, 0.0)
     if scenario.replay_csv is not None and not Path(scenario.replay_csv).is_file():
         found.append(f"replay_csv: there is no file {scenario.replay_csv}")
     return tuple(dict.fromkeys(found))

@@ -12,7 +12,6 @@ from awarenav.figures import Axes, Circle, Figure, MultipleLocator, Polygon, Wed
 from perception.arrays import FloatArray
 
 from ...actors.behaviour import PersonSpec, RecordedPath, read_recordings
-from .._population import person_of_script
 from .._scenario import Scenario
 from .._template import ScenarioTemplate
 from ._plans import closest_approaches, person_plan, planned_people, robot_plan
@@ -44,7 +43,7 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
     """
     scenario = template.median()
     recorded = () if scenario.replay_csv is None else read_recordings(scenario.replay_csv)
-    people = _everybody(scenario)
+    people = planned_people(scenario)
     x_min, y_min, x_max, y_max = _window(scenario, people, recorded)
     width, height = x_max - x_min, y_max - y_min
     figure = new_figure(_WIDTH_IN, max(_WIDTH_IN * height / width, 1.8) + 0.75, dpi=_DPI)
@@ -65,7 +64,7 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
     robot_m = _draw_robot(axes, scenario, now_s)
     if template.parameters():
         for seed in range(_DRAWS):
-            for spec in _everybody(template.for_seed(seed)):
+            for spec in template.for_seed(seed).people:
                 axes.plot(*_route(spec).T, color=_looks(spec)[0], lw=0.5, alpha=0.35)
     for spec in people:
         _draw_person(axes, spec, now_s, robot_m)
@@ -76,15 +75,6 @@ def scenario_figure(template: ScenarioTemplate) -> Figure:
     style: dict[str, Any] = {"ncols": 4, "fontsize": 7.5, "frameon": False, "columnspacing": 1.2}
     figure.legend(shown.values(), shown.keys(), loc="outside upper center", **style)
     return figure
-
-
-def _everybody(scenario: Scenario) -> list[PersonSpec]:
-    """Return the people, scripted workers with the routes of their scripts."""
-    scripted = [
-        person_of_script(script, f"worker {number}")
-        for number, script in enumerate(scenario.workers)
-    ]
-    return [*planned_people(scenario), *scripted]
 
 
 def _route(spec: PersonSpec) -> FloatArray:
@@ -216,6 +206,8 @@ def _draw_sector(
 
 def _looks(spec: PersonSpec) -> tuple[str, str]:
     """Return the colour of a person, and what it means."""
+    if spec.gaze:
+        return "#5b7a99", "looks as planned"
     if spec.glances.notices_within_m <= 0.0:
         return "#b3261e", "never looks at the robot"
     if spec.glances.watches:

@@ -90,7 +90,7 @@ def closest_approaches(scenario: Scenario) -> dict[str, tuple[float, float]]:
     Robot and people keep to their plans; only the time until the robot reaches its goal counts.
 
     Returns:
-        By name (``worker 0`` for the first scripted worker): distance of the centres in metres and
+        By name: distance of the centres in metres and
         time in seconds.
     """
     t_s = np.arange(0.0, scenario.duration_s, _STEP_S)
@@ -98,9 +98,6 @@ def closest_approaches(scenario: Scenario) -> dict[str, tuple[float, float]]:
     arrived = np.flatnonzero((robot == robot[-1]).all(axis=1))[0] + 1
     t_s, robot = t_s[:arrived], robot[:arrived]
     paths = {spec.name: person_plan(spec, t_s)[0] for spec in planned_people(scenario)}
-    for number, script in enumerate(scenario.workers):
-        positions = [script.motion(float(t)).position_odom_m for t in t_s]
-        paths[f"worker {number}"] = np.array(positions)
     closest = {}
     for name, path in paths.items():
         distances = np.linalg.norm(path - robot, axis=1)

@@ -32,7 +32,7 @@ def list_command(*, as_json: bool = False) -> int:
         print(f"{'scenario':{width}}  attention  people  varies")
         for template in templates:
             scenario = template.median()
-            people = len(scenario.people) + len(scenario.workers)
+            people = len(scenario.people)
             print(f"{template.id:{width}}  {template.attention:9}  {people:6}", end="")
             print(f"  {len(template.parameters()):6}")
             print(textwrap.indent(textwrap.fill(template.description, 88), "    "))
@@ -47,7 +47,7 @@ def _list_row(template: ScenarioTemplate, scenario_set: str) -> dict[str, Any]:
         "name": template.name,
         "version": template.version,
         "attention": template.attention,
-        "people": len(scenario.people) + len(scenario.workers),
+        "people": len(scenario.people),
         "varies": len(template.parameters()),
         "description": template.description,
     }
@@ -86,10 +86,6 @@ def description_lines(template: ScenarioTemplate) -> list[str]:
         f"robot   from ({task.start_x_m:g}, {task.start_y_m:g}) m to ({task.goal_x_m:g}, "
         f"{task.goal_y_m:g}) m within {scenario.duration_s:g} s",
         *(f"person  {_person_text(person)}" for person in scenario.people),
-        *(
-            f"worker  scripted, from {script.path[0].t_s:g} to {script.path[-1].t_s:g} s"
-            for script in scenario.workers
-        ),
     ]
     if scenario.replay_csv is not None:
         lines.append(f"replay  {scenario.replay_csv}")
@@ -145,7 +141,9 @@ def _person_text(spec: PersonSpec) -> str:
         f"at {spec.speed_mps:.2f} m/s from {_start_text(spec)}"
     )
     glances = spec.glances
-    if glances.notices_within_m <= 0.0:
+    if spec.gaze:
+        looks = "looks as planned"
+    elif glances.notices_within_m <= 0.0:
         looks = "never looks at the robot"
     else:
         looks = "watches" if glances.watches else "glances at"

@@ -1,4 +1,4 @@
-"""Parameters of a person who reacts; the person is a mapping, the YAML of ``PersonSpec``."""
+"""Parameters of a person; the person is a mapping, the YAML of ``PersonSpec``."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ def person_parameters(
         parameters["speed_mps"] = Parameter.of(SLOWEST_MPS, fastest, speed_mps)
         parameters |= ON_THE_WAY
     glances = person["glances"]
-    if glances["notices_within_m"] > 0.0:  # a person who never looks up keeps to that
+    # Somebody who never looks up, or looks as planned, keeps to that.
+    if glances["notices_within_m"] > 0.0 and not person["gaze"]:
         parameters |= {
             "notices_within_m": Parameter.of(1.0, 15.0, glances["notices_within_m"]),
             "first_glance_delay_s": Parameter.of(0.0, 3.0, glances["first_glance_delay_s"]),

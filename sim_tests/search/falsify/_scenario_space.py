@@ -24,7 +24,6 @@ from ._person_parameters import (
     person_parameters,
     person_path,
 )
-from ._script_parameters import changed_script, is_human, script_parameters, script_path
 from ._variation import (
     FASTEST_WALK_MPS,
     RACK_CLEARANCE_M,
@@ -37,18 +36,16 @@ from ._variation import (
 _SHARES: Final = (1.0, 0.75, 0.5, 0.25, 0.0)
 # Searched by quantile, because nothing exists between their values.
 _DISCRETE: Final = (Choice, Integers)
-# Kinds of people, by their keys in the scenario.
-_KINDS: Final = ("workers", "people")
 
 
 class ScenarioSpace:
     """The variations of a scenario that humans could act out.
 
     A variation changes the scenario's own distributions and the parameters of its first people
-    (:func:`person_parameters`, :func:`script_parameters`), and may add a companion or a parked
-    pallet, or exchange two people's ways (:func:`joint_parameters`). A variation that leads through
-    a rack, begins at the robot or exceeds human speed or acceleration is drawn back towards the
-    scenario as written, as far as needed. Every point of the space is therefore a scenario.
+    (:func:`person_parameters`), and may add a companion or a parked pallet, or exchange two
+    people's ways (:func:`joint_parameters`). A variation that leads through a rack or begins at the
+    robot is drawn back towards the scenario as written, as far as needed. Every point of the space
+    is therefore a scenario.
 
     The varied people of the recorded population do not draw their speed and glances. These begin at
     the population's medians instead (:func:`~sim_tests.actors.behaviour.median_person`), and are
@@ -73,19 +70,16 @@ class ScenarioSpace:
         self._longer_m = max(reach_m - NOVA_CARTER.circumscribed_radius_m, 0.0)
         self._asks = asks
         self._is_recorded = median.population == "recorded"
-        everybody = [(kind, row) for kind in _KINDS for row in range(len(self._median[kind]))]
-        varied = everybody[:people]
-        if not varied:
+        self._varied = range(min(people, len(self._median["people"])))
+        if not self._varied:
             raise SimError(f"scenario {template.name!r} has no people to vary")
-        self._varied_people = varied
         self._take_medians(self._median)
         self._distributions = template.parameters()
         self.parameters: dict[str, Parameter] = {}
-        for kind, row in varied:
-            for name, parameter in self._own_parameters(kind, row).items():
-                self.parameters[f"{kind}.{row}.{name}"] = parameter
-        reactive = [self._median[kind][row] for kind, row in varied if kind == "people"]
-        self._joint = joint_parameters(reactive)
+        for row in self._varied:
+            for name, parameter in self._own_parameters(row).items():
+                self.parameters[f"people.{row}.{name}"] = parameter
+        self._joint = joint_parameters([self._median["people"][row] for row in self._varied])
         self.parameters |= self._joint
         for path, distribution in self._distributions.items():
             if path not in self.parameters:
@@ -108,7 +102,7 @@ class ScenarioSpace:
                 name: each.neutral + share * (values[name] - each.neutral)
                 for name, each in self.parameters.items()
             }
-            data = self._varied(shared)
+            data = self._variation(shared)
             if share == 0.0 or self._is_possible(data, shared):
                 try:
                     return Scenario.model_validate(data)
@@ -119,7 +113,7 @@ class ScenarioSpace:
                         ) from cause
         raise AssertionError  # pragma: no cover - the last share always returns or raises
 
-    def _varied(self, values: Mapping[str, float]) -> dict[str, Any]:
+    def _variation(self, values: Mapping[str, float]) -> dict[str, Any]:
         drawn = {
             path: _distribution_value(each, values[path])
             for path, each in self._distributions.items()
@@ -127,27 +121,24 @@ class ScenarioSpace:
         data: dict[str, Any] = self.template.with_values(drawn).model_dump(mode="json")
         data["start_jitter_s"] = 0.0
         self._take_medians(data)
-        for kind, row in self._varied_people:
-            prefix = f"{kind}.{row}."
+        for row in self._varied:
+            prefix = f"people.{row}."
             own_values = {
                 name.removeprefix(prefix): value
                 for name, value in values.items()
                 if name.startswith(prefix)
             }
-            change = changed_script if kind == "workers" else changed_person
-            own = data[kind][row] = change(data[kind][row], own_values)
+            own = data["people"][row] = changed_person(data["people"][row], own_values)
             if self._asks:
                 own["hearing"] = changed_hearing(own["hearing"], data["hearing"], own_values)
         add_joint(data, {name: values[name] for name in self._joint})
         return data
 
-    def _own_parameters(self, kind: str, row: int) -> dict[str, Parameter]:
-        person = self._median[kind][row]
+    def _own_parameters(self, row: int) -> dict[str, Parameter]:
+        person = self._median["people"][row]
         answer: dict[str, Parameter] = {}
         if self._asks:
             answer = hearing_parameters(person["hearing"] or self._median["hearing"])
-        if kind == "workers":
-            return script_parameters(person) | answer
         fastest = FASTEST_RECORDED_MPS if self._is_recorded else FASTEST_WALK_MPS
         return person_parameters(person, fastest) | answer
 
@@ -155,10 +146,9 @@ class ScenarioSpace:
         """Give the varied people of the recorded population its medians."""
         if not self._is_recorded:
             return
-        for kind, row in self._varied_people:
-            if kind == "people":
-                person = PersonSpec.model_validate(data[kind][row])
-                data[kind][row] = median_person(person).model_dump(mode="json")
+        for row in self._varied:
+            person = PersonSpec.model_validate(data["people"][row])
+            data["people"][row] = median_person(person).model_dump(mode="json")
 
     def _is_possible(self, data: Mapping[str, Any], values: Mapping[str, float]) -> bool:
         if not is_joint_possible(data, values, self._boxes, self._longer_m):
@@ -167,14 +157,12 @@ class ScenarioSpace:
         added = data["people"][len(self._median["people"]) :]
         if not all(self._keeps_clear(person_path(person), robot) for person in added):
             return False
-        for kind, row in self._varied_people:
-            changed, original = data[kind][row], self._median[kind][row]
-            path_of = script_path if kind == "workers" else person_path
-            if not self._keeps_clear(path_of(changed), robot, path_of(original)):
-                return False
-            if kind == "workers" and not is_human(changed, original):
-                return False
-        return True
+        return all(
+            self._keeps_clear(
+                person_path(data["people"][row]), robot, person_path(self._median["people"][row])
+            )
+            for row in self._varied
+        )
 
     def _keeps_clear(
         self, path: FloatArray, robot: FloatArray, written: FloatArray | None = None

@@ -217,7 +217,7 @@ def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
     margin_m = record.min_margin_m if everybody else record.min_margin_unaware_m
     if margin_m is None:
         return NO_MARGIN_SCORE
-    return min(max(margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE)
+    return float(min(max(margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE))
 
 
 def falsify(

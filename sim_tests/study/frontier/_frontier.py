@@ -15,7 +15,6 @@ from ..measures import (
     EpisodeRecord,
     Interval,
     bootstrap_interval,
-    ratio_interval,
     resampled_interval,
     resampled_means,
 )
@@ -129,8 +128,12 @@ def frontier_of(records: Iterable[EpisodeRecord], level: float = 0.95) -> Fronti
             name,
             member_named(name),
             bootstrap_interval(lost_s[:, column], _rng(), level, strata=strata),
-            ratio_interval(
-                free_s + lost_s[:, column], free_s + lost_s[:, 0], _rng(), level, strata=strata
+            bootstrap_interval(
+                free_s + lost_s[:, column],
+                _rng(),
+                level,
+                over=free_s + lost_s[:, 0],
+                strata=strata,
             ),
             bootstrap_interval(impacts[:, column], _rng(), level, strata=strata),
         )

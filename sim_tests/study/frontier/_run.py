@@ -14,8 +14,7 @@ from ..measures import EpisodeRecord
 from ..runs import Conditions, RunFiles, policy_text, read_rows, run_jobs
 from ._family import TODAY, family, sensors_of_today
 from ._frontier import frontier_of
-from ._plot import draw_frontier
-from ._text import frontier_text
+from ._show import draw_frontier, frontier_text
 
 
 def frontier_command(

@@ -15,37 +15,33 @@ if TYPE_CHECKING:
         MeasuredAttention,
         measured_part,
     )
-    from ._bootstrap import (
-        bootstrap_interval,
-        ratio_interval,
-        resampled_interval,
-        resampled_means,
+    from ._driving import (
+        OVERSHOOT_MPS,
+        Conduct,
+        fastest_point_excess_mps,
+        limit_excess_mps,
+        path_length_m,
+        success_weighted,
     )
-    from ._conduct import OVERSHOOT_MPS, Conduct, fastest_point_excess_mps, limit_excess_mps
-    from ._driving import path_length_m, success_weighted
-    from ._interval import (
+    from ._log import measure
+    from ._metrics import COLUMNS, METRICS
+    from ._record import RECORD_COLUMNS, EpisodeRecord, read_records, record_row, write_records
+    from ._registry import RATIOS, SHARES, Metric
+    from ._statistics import (
         FEW_PAIRS,
         NOTHING,
         THIN,
         Interval,
+        bootstrap_interval,
         number_text,
-        percent,
-        proportion_interval,
-        zero_of_n_upper,
-    )
-    from ._measure import measure
-    from ._pairs import (
         paired,
         paired_difference,
-        paired_ratio,
+        percent,
+        proportion_interval,
+        resampled_interval,
+        resampled_means,
         violates_more,
-    )
-    from ._record import COLUMNS, METRICS, RATIOS, SHARES, EpisodeRecord, Metric
-    from ._record_file import (
-        RECORD_COLUMNS,
-        read_records,
-        record_row,
-        write_records,
+        zero_of_n_upper,
     )
     from ._step_out import StepOut, step_out_impacts
     from ._summary import (
@@ -97,11 +93,9 @@ __all__ = [
     "number_text",
     "paired",
     "paired_difference",
-    "paired_ratio",
     "path_length_m",
     "percent",
     "proportion_interval",
-    "ratio_interval",
     "read_records",
     "record_row",
     "resampled_interval",

@@ -151,7 +151,7 @@ def step_out_impacts(result: CrossingResult, model: StepOut = STEP_OUT) -> StepO
     instants = np.arange(0, len(t_s), every)
     lasts_s = np.diff(t_s[instants], append=t_s[-1])
     yaw_rates = np.array([frame.robot_state.yaw_rate_radps for frame in result.frames])
-    starts = _Starts.of(trace, yaw_rates, instants, result.robot, model)
+    starts = _Starts(trace, yaw_rates, instants, result.robot, model)
     closing_mps = starts.impacts(result.obstacle_boxes_odom_m)  # (M, 16), 0 without an impact
     since_look_s = since_look_of(trace)[starts.row, starts.person]
     rates_hz = -np.log1p(-np.array(model.start_shares))
@@ -184,75 +184,53 @@ def since_look_of(trace: Trace) -> FloatArray:
     return since
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class _Starts:
-    """M instants and people who may set off; vectors are in the base frame of the instant.
+    """The M starts that a moving robot can meet before it stands: an instant and a person each.
+
+    Vectors are in the base frame of the instant.
+
+    Args:
+        trace: course of the episode.
+        yaw_rates_radps: (N,) of the robot.
+        instants: rows of the trace at which people set off.
+        robot: the robot.
+        model: the people's constants.
 
     Attributes:
-        robot: the robot.
-        outline: its outline.
-        model: the people's constants.
         row: (M,) row of the trace.
         person: (M,) index of the person.
-        poses_odom: (M, 3) x, y and heading of the robot.
-        place_m: (M, 2) the person's centre line.
-        velocity_mps: (M, 2) the person's velocity.
-        robot_mps: (M, 2) the robot's velocity.
-        yaw_rate_radps: (M,).
     """
 
-    robot: RobotProfile
-    outline: Outline
-    model: StepOut
-    row: NDArray[np.intp]
-    person: NDArray[np.intp]
-    poses_odom: FloatArray
-    place_m: FloatArray
-    velocity_mps: FloatArray
-    robot_mps: FloatArray
-    yaw_rate_radps: FloatArray
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         trace: Trace,
         yaw_rates_radps: FloatArray,
         instants: NDArray[np.intp],
         robot: RobotProfile,
         model: StepOut,
-    ) -> _Starts:
-        """Return the starts that the robot, while it moves, can meet before it stands."""
-        outline = Outline(robot.footprint_m)
+    ) -> None:
+        self._robot, self._model = robot, model
+        self._outline = Outline(robot.footprint_m)
         places = trace.to_base(trace.people_odom_m - trace.robot_odom_m[:, None])
         velocities = trace.to_base(trace.people_odom_mps)
         speed = trace.travel_mps[:, None]
         brakes_s = speed / robot.max_deceleration_mps2
         until_s = robot.reaction_time_s + model.noticed_after_s + brakes_s
         reach_m = until_s * np.maximum(np.linalg.norm(velocities, axis=2), model.speed_mps)
-        reach_m += speed * (until_s - 0.5 * brakes_s) + outline.reach_m + BODY_RADIUS_M
+        reach_m += speed * (until_s - 0.5 * brakes_s) + self._outline.reach_m + BODY_RADIUS_M
         near = (np.linalg.norm(places, axis=2) <= reach_m) & (speed > STANDING_SPEED_MPS)
         chosen = np.zeros(len(near), dtype=np.bool_)
         chosen[instants] = True
-        row, person = np.nonzero(near & chosen[:, None])
-        poses = np.column_stack((trace.robot_odom_m, trace.heading_odom_rad))
-        return cls(
-            robot,
-            outline,
-            model,
-            row,
-            person,
-            poses[row],
-            places[row, person],
-            velocities[row, person],
-            trace.velocity_base_mps[row],
-            yaw_rates_radps[row],
-        )
+        self.row, self.person = row, person = np.nonzero(near & chosen[:, None])
+        self._poses_odom = np.column_stack((trace.robot_odom_m, trace.heading_odom_rad))[row]
+        self._place_m, self._velocity_mps = places[row, person], velocities[row, person]
+        self._robot_mps, self._yaw_rate_radps = trace.velocity_base_mps[row], yaw_rates_radps[row]
 
     def impacts(self, boxes_odom_m: FloatArray) -> FloatArray:
         """Return the (M, 16) closing speeds of the impacts; 0 for a start that ends in none."""
         found = np.zeros((len(self.row), _DIRECTIONS))
-        speed = float(np.linalg.norm(self.robot_mps, axis=1).max(initial=0.0))
-        until_s = self._holds_s + speed / self.robot.max_deceleration_mps2
+        speed = float(np.linalg.norm(self._robot_mps, axis=1).max(initial=0.0))
+        until_s = self._holds_s + speed / self._robot.max_deceleration_mps2
         t_s = np.arange(math.ceil(until_s / _STEP_S) + 1, dtype=np.float64) * _STEP_S
         at_once = max(_PLACES_AT_ONCE // (_DIRECTIONS * len(t_s)), 1)
         for first in range(0, len(self.row), at_once):
@@ -285,12 +263,12 @@ class _Starts:
     @property
     def _holds_s(self) -> float:
         """Time for which the robot holds its speed."""
-        return self.robot.reaction_time_s + self.model.noticed_after_s
+        return self._robot.reaction_time_s + self._model.noticed_after_s
 
     def _touch(self, start: Any, direction: Any, t_s: FloatArray) -> NDArray[np.bool_]:
         """Return whether body circle and outline touch; the arguments are broadcast."""
         x_m, y_m, _ = self._relative(start, direction, t_s)
-        low, high = self.outline.bounds_m
+        low, high = self._outline.bounds_m
         touch: NDArray[np.bool_] = (
             (x_m >= low[0] - BODY_RADIUS_M)
             & (x_m <= high[0] + BODY_RADIUS_M)
@@ -299,7 +277,7 @@ class _Starts:
         )
         # Only beside a box about both can they touch.
         points = np.stack([x_m[touch], y_m[touch]], axis=1)
-        touch[touch] = self.outline.distance(points) <= BODY_RADIUS_M
+        touch[touch] = self._outline.distance(points) <= BODY_RADIUS_M
         return touch
 
     def _closing_mps(
@@ -307,7 +285,7 @@ class _Starts:
     ) -> FloatArray:
         """Return the speed of the base origin towards the person's centre."""
         x_m, y_m, left = self._relative(start, direction, t_s)
-        ahead, aside = self.robot_mps[start].T
+        ahead, aside = self._robot_mps[start].T
         closing: FloatArray = left * (ahead * x_m + aside * y_m)
         return closing / np.maximum(np.hypot(x_m, y_m), 1e-9)
 
@@ -315,14 +293,14 @@ class _Starts:
         self, start: Any, direction: Any, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return x and y of people in the base frame then, and the share of its speed left."""
-        ahead, aside = self.robot_mps[start, 0], self.robot_mps[start, 1]
+        ahead, aside = self._robot_mps[start, 0], self._robot_mps[start, 1]
         speed = np.hypot(ahead, aside)
-        deceleration = self.robot.max_deceleration_mps2
+        deceleration = self._robot.max_deceleration_mps2
         braking_s = np.clip(t_s - self._holds_s, 0.0, speed / deceleration)
         left = 1.0 - deceleration * braking_s / speed
         # The way driven, as the time that it takes at the present velocity.
         driven_s = np.minimum(t_s, self._holds_s) + 0.5 * (1.0 + left) * braking_s
-        turned = self.yaw_rate_radps[start] * driven_s
+        turned = self._yaw_rate_radps[start] * driven_s
         # The chord of the curve lies in the middle between both headings.
         chord_s = driven_s * np.sinc(0.5 * turned / np.pi)
         cos, sin = np.cos(0.5 * turned), np.sin(0.5 * turned)
@@ -337,11 +315,11 @@ class _Starts:
         self, start: Any, direction: Any, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return x and y of people in the base frame of the start."""
-        lag_s, way_m = self.model.ways(t_s)
+        lag_s, way_m = self._model.ways(t_s)
         angle = 2.0 * np.pi / _DIRECTIONS * direction
         return (
-            self.place_m[start, 0] + self.velocity_mps[start, 0] * lag_s + np.cos(angle) * way_m,
-            self.place_m[start, 1] + self.velocity_mps[start, 1] * lag_s + np.sin(angle) * way_m,
+            self._place_m[start, 0] + self._velocity_mps[start, 0] * lag_s + np.cos(angle) * way_m,
+            self._place_m[start, 1] + self._velocity_mps[start, 1] * lag_s + np.sin(angle) * way_m,
         )
 
     def _blocked(
@@ -357,7 +335,7 @@ class _Starts:
             return blocked
         t_s = np.minimum(np.arange(0.0, touch_s.max() + _STEP_S, _STEP_S), touch_s[:, None])
         x_m, y_m = self._person_m(start[:, None], direction[:, None], t_s)
-        robot_x_m, robot_y_m, heading = self.poses_odom[start].T[..., None]
+        robot_x_m, robot_y_m, heading = self._poses_odom[start].T[..., None]
         cos, sin = np.cos(heading), np.sin(heading)
         x_m, y_m = robot_x_m + cos * x_m - sin * y_m, robot_y_m + sin * x_m + cos * y_m
         for x_min, y_min, x_max, y_max in boxes_odom_m:

@@ -12,15 +12,17 @@ import numpy as np
 from perception.short_repr import short_repr
 
 from ._awareness import measured_part
-from ._bootstrap import ratio_intervals
-from ._interval import Interval, proportion_interval
-from ._pairs import (
+from ._metrics import METRICS
+from ._record import EpisodeRecord
+from ._registry import RATIOS
+from ._statistics import (
+    Interval,
     paired,
     paired_difference,
-    paired_ratio,
+    proportion_interval,
+    ratio_intervals,
     violates_more,
 )
-from ._record import METRICS, RATIOS, EpisodeRecord
 
 #: Policy that others are compared with, unless another is named.
 BASELINE: Final = "blind"
@@ -252,7 +254,7 @@ def summarise_sources(
         for record in records:
             groups.setdefault(Variant.of(record, source), []).append(record)
     for group in groups.values():
-        group.sort(key=_episode_order)
+        group.sort(key=attrgetter("task"))
     ordered = {
         variant: groups[variant]
         for variant in sorted(
@@ -305,10 +307,6 @@ def summarise_sources(
     )
 
 
-def _episode_order(record: EpisodeRecord) -> tuple[str, int, int]:
-    return record.scenario, record.scenario_version, record.seed
-
-
 def _parts(groups: _Groups, part_of: _Part) -> list[str]:
     """Return every part that holds an episode."""
     return sorted({part_of(record) for group in groups.values() for record in group})
@@ -344,7 +342,7 @@ def _summary_row(
         np.hstack([present.astype(np.float64), parts[..., 1]]),
         rng,
         level,
-        strata=[(record.scenario, record.scenario_version) for record in ran],
+        strata=[record.task[:2] for record in ran],
     )
     worst = {}
     for metric, column, applies in zip(METRICS.values(), table.T, present.T, strict=True):
@@ -374,20 +372,20 @@ def _comparison(
     rng: np.random.Generator,
 ) -> Comparison:
     variant, baseline, part = names
+
+    def change(field: str, over: str = "", sign: float = 1.0) -> Interval:
+        return paired_difference(base, group, field, rng, level, over=over, sign=sign)
+
     return Comparison(
         variant=variant,
         baseline=baseline,
         part=part,
         pairs=len(paired(base, group)),
-        won_back=paired_ratio(base, group, "time_lost_s", "time_lost_s", rng, level, sign=-1.0),
-        time_lost_s=paired_difference(base, group, "time_lost_s", rng, level),
-        violation_excess=paired_ratio(
-            base, group, "violation_time_s", "violation_time_s", rng, level
-        ),
-        violation_excess_of_time=paired_ratio(
-            base, group, "violation_time_s", "duration_s", rng, level
-        ),
+        won_back=change("time_lost_s", "time_lost_s", -1.0),
+        time_lost_s=change("time_lost_s"),
+        violation_excess=change("violation_time_s", "violation_time_s"),
+        violation_excess_of_time=change("violation_time_s", "duration_s"),
         violates_more=violates_more(base, group, level),
-        min_separation_m=paired_difference(base, group, "min_separation_m", rng, level),
-        step_out_unaware=paired_difference(base, group, "step_out_unaware", rng, level),
+        min_separation_m=change("min_separation_m"),
+        step_out_unaware=change("step_out_unaware"),
     )

@@ -8,8 +8,10 @@ from typing import TypeVar
 from awarenav.errors import counted
 
 from ._awareness import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNCONFIRMED
-from ._interval import NOTHING, Interval, number_text, percent
-from ._record import METRICS, RATIOS, EpisodeRecord
+from ._metrics import METRICS
+from ._record import EpisodeRecord
+from ._registry import RATIOS
+from ._statistics import NOTHING, Interval, number_text, percent
 from ._summary import Comparison, Summary, SummaryRow
 
 _Row = TypeVar("_Row", Comparison, SummaryRow)

@@ -97,7 +97,7 @@ class Trace:
         x, y = vectors_odom[..., 0], vectors_odom[..., 1]
         return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
 
-    def time_with(self, condition: FloatArray) -> float:
+    def time_with(self, condition: NDArray[np.bool_]) -> float:
         """Return the seconds during which a condition (N,) held.
 
         Each instant stands for the time to the next one.

@@ -23,8 +23,8 @@ from ._sections import (
     reproduction_section,
     requests_section,
     scenarios_section,
+    stills_section,
 )
-from ._stills import stills_section
 
 _REPORT: Final = "report.html"
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ._episode import Outcome, SocialEpisode
     from ._files import read_track, write_episode
     from ._measures import SOCIAL_MEASURES, social_measures
-    from ._recorder import EpisodeRecorder
+    from ._runs import EpisodeRecorder
 
 __all__ = [
     "SOCIAL_MEASURES",

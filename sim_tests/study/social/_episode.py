@@ -141,8 +141,9 @@ class SocialEpisode:
 
     @property
     def robot_speed_mps(self) -> FloatArray:
-        """(N,) speeds along the heading, forward positive."""
-        return self.robot_base_mps[:, 0]
+        """(N,) speeds in the direction of travel, at least 0."""
+        speeds: FloatArray = np.hypot(self.robot_mps[:, 0], self.robot_mps[:, 1])
+        return speeds
 
     @property
     def robot_base_mps(self) -> FloatArray:

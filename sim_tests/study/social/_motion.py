@@ -1,22 +1,30 @@
-"""Measures of paths and motion: lengths, turning, accelerations and jerks, as others define them.
+"""Motion and social forces of robot and people, as the programmes of others compute them.
 
-docs/social_measures.md names the sources. Where a published programme departs from its own text,
-the page says which of the two is computed here.
+The force is that of Moussaïd et al. (2009, Proc. R. Soc. B 276:2755) with the constants of HuNavSim
+(class ``SFM`` of its evaluator, after the library lightsfm). Forces have the unit m/s².
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
-from ..measures import path_length_m
 from ._episode import SocialEpisode, wrapped
+
+# Constants of HuNavSim's evaluator: strengths (m/s²) and ranges (m), and those of the interaction.
+_SOCIAL_MPS2: Final = 2.1
+_OBSTACLE_MPS2: Final = 10.0
+_OBSTACLE_RANGE_M: Final = 0.2
+_LAMBDA: Final = 2.0
+_GAMMA: Final = 0.35
+_N: Final = 2.0
+_N_PRIME: Final = 3.0
 
 
 def heading_changes_rad(headings_rad: FloatArray) -> float:
@@ -24,43 +32,39 @@ def heading_changes_rad(headings_rad: FloatArray) -> float:
     return float(np.abs(wrapped(np.diff(headings_rad))).sum())
 
 
-def excess_rotation_rad(episode: SocialEpisode) -> float | None:
-    """Return the rotation of the robot over the least that the straight way to the goal needs.
+def speed_changes(episode: SocialEpisode, power: int) -> float:
+    """Return Σ Δv/Δtⁿ of the robot's speed over N − 1 steps, divided by N."""
+    speeds, steps = np.diff(episode.robot_speed_mps), np.diff(episode.t_s)
+    return float((speeds / steps**power).sum()) / len(episode.t_s)
 
-    None without a known goal. The straight way needs the turn from the first heading to the goal.
+
+def gym_motion(episode: SocialEpisode) -> tuple[FloatArray, ...]:
+    """Return SocNavGym's (N − 1,) magnitudes of velocity, acceleration and jerk of the robot.
+
+    They are those after the first instant. The velocity counts in the base frame, so that turning
+    is no acceleration. Velocity and acceleration before the first of these instants are 0, as after
+    a reset.
     """
-    if episode.goal_m is None:
-        return None
-    towards = episode.goal_m - episode.robot_m[0]
-    least = 0.0
-    if towards.any():
-        turn = math.atan2(towards[1], towards[0]) - float(episode.robot_heading_rad[0])
-        least = abs(float(wrapped(np.array(turn))))
-    return heading_changes_rad(episode.robot_heading_rad) - least
+    dt = np.diff(episode.t_s)[:, None]
+    velocity = episode.robot_base_mps[1:]
+    acceleration = np.diff(velocity, axis=0, prepend=np.zeros((1, 2))) / dt
+    jerk = np.diff(acceleration, axis=0, prepend=np.zeros((1, 2))) / dt
+    return tuple(np.hypot(each[:, 0], each[:, 1]) for each in (velocity, acceleration, jerk))
 
 
-def irregularity_radpm(episode: SocialEpisode) -> float | None:
-    """Return the excess rotation per metre of the driven path; None for a path of length 0."""
-    excess, length = excess_rotation_rad(episode), path_length_m(episode.robot_m)
-    return None if excess is None or length == 0.0 else excess / length
+def robot_motion(episode: SocialEpisode) -> tuple[float | None, float | None]:
+    """Return NavWareSet's mean |acceleration| (m/s²) and |jerk| (m/s³) of the robot."""
+    always = np.ones(len(episode.t_s), dtype=np.bool_)
+    return _navware_motion(episode.t_s, [(always, episode.robot_m)])
 
 
-def mean_goal_angle_rad(episode: SocialEpisode) -> float | None:
-    """Return the mean angle between heading and direction to the goal, over all instants.
-
-    Instants exactly at the goal have no direction and are left out.
-    """
-    if episode.goal_m is None:
-        return None
-    towards = episode.goal_m - episode.robot_m
-    away = np.hypot(towards[:, 0], towards[:, 1]) > 0.0
-    if not away.any():
-        return None
-    angles = np.arctan2(towards[:, 1], towards[:, 0]) - episode.robot_heading_rad
-    return float(np.abs(wrapped(angles[away])).mean())
+def people_motion(episode: SocialEpisode) -> tuple[float | None, float | None]:
+    """Return those of all people, each over the times at which they are there."""
+    tracks = zip(episode.present.T, np.moveaxis(episode.people_m, 1, 0), strict=True)
+    return _navware_motion(episode.t_s, tracks)
 
 
-def navware_motion(
+def _navware_motion(
     t_s: FloatArray, tracks: Iterable[tuple[NDArray[np.bool_], FloatArray]]
 ) -> tuple[float | None, float | None]:
     """Return NavWareSet's mean |acceleration| (m/s²) and |jerk| (m/s³) of tracks, weighted by time.
@@ -94,78 +98,93 @@ def navware_motion(
     )
 
 
-def robot_motion(episode: SocialEpisode) -> tuple[float | None, float | None]:
-    """Return :func:`navware_motion` of the robot."""
-    always = np.ones(len(episode.t_s), dtype=np.bool_)
-    return navware_motion(episode.t_s, [(always, episode.robot_m)])
+def social_force(
+    from_m: FloatArray, from_mps: FloatArray, on_m: FloatArray, on_mps: FloatArray
+) -> FloatArray:
+    """Return the social force that one body exerts on another.
 
+    Args:
+        from_m: (..., 2) position of the body that exerts it.
+        from_mps: (..., 2) its velocity.
+        on_m: (..., 2) position of the body on which it acts.
+        on_mps: (..., 2) its velocity.
 
-def people_motion(episode: SocialEpisode) -> tuple[float | None, float | None]:
-    """Return :func:`navware_motion` of all people, each over the times at which they are there."""
-    tracks = zip(episode.present.T, np.moveaxis(episode.people_m, 1, 0), strict=True)
-    return navware_motion(episode.t_s, tracks)
-
-
-def people_heading_changes_rad(episode: SocialEpisode) -> float | None:
-    """Return the heading changes of all people together; None without people."""
-    if not episode.people:
-        return None
-    return sum(
-        heading_changes_rad(episode.people_heading_rad[there, person])
-        for person, there in enumerate(episode.present.T)
+    Returns:
+        (..., 2) m/s²; 0 for two bodies at one place, which have no direction.
+    """
+    offset = from_m - on_m
+    distance = np.linalg.norm(offset, axis=-1)
+    direction = offset / np.where(distance > 0.0, distance, 1.0)[..., None]
+    interaction = _LAMBDA * (on_mps - from_mps) + direction
+    length = np.linalg.norm(interaction, axis=-1)
+    acts = (distance > 0.0) & (length > 0.0)
+    length = np.where(length > 0.0, length, 1.0)
+    along = interaction / length[..., None]
+    theta = wrapped(
+        np.arctan2(along[..., 1], along[..., 0]) - np.arctan2(direction[..., 1], direction[..., 0])
     )
+    reach = _GAMMA * length
+    slowing = -np.exp(-distance / reach - (_N_PRIME * reach * theta) ** 2)
+    turning = np.sign(theta) * np.exp(-distance / reach - (_N * reach * theta) ** 2)
+    left = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    force = _SOCIAL_MPS2 * (slowing[..., None] * along + turning[..., None] * left)
+    return np.where(acts[..., None], force, 0.0)
 
 
-def hunav_acceleration_mps2(episode: SocialEpisode) -> float:
-    """Return HuNavSim's average acceleration: Σ Δv/Δt over N − 1 steps, divided by N; signed."""
-    speeds, steps = np.diff(episode.robot_speed_mps), np.diff(episode.t_s)
-    return float((speeds / steps).sum()) / len(episode.t_s)
+def obstacle_force_mps2(points_m: FloatArray, radius_m: float, walls_m: FloatArray) -> FloatArray:
+    """Return the (N,) magnitudes of the force of the nearest wall on discs at (N, 2) points.
 
-
-def hunav_overacceleration_mps3(episode: SocialEpisode) -> float:
-    """Return HuNavSim's average over-acceleration: Σ Δv/Δt² over N − 1 steps, divided by N."""
-    speeds, steps = np.diff(episode.robot_speed_mps), np.diff(episode.t_s)
-    return float((speeds / steps**2).sum()) / len(episode.t_s)
-
-
-def hunav_people_speed_mps(episode: SocialEpisode) -> float | None:
-    """Return the mean speed of all people over all instants at which they are there."""
-    if not episode.present.any():
-        return None
-    velocities = episode.people_mps[episode.present]
-    return float(np.hypot(velocities[:, 0], velocities[:, 1]).mean())
+    Args:
+        points_m: (N, 2) centres.
+        radius_m: of the discs.
+        walls_m: (W, 4) straight walls; without any, the force is 0.
+    """
+    if not len(walls_m):
+        return np.zeros(len(points_m))
+    start, along = walls_m[:, :2], walls_m[:, 2:] - walls_m[:, :2]
+    length2 = (along**2).sum(axis=1)
+    to = points_m[:, None, :] - start
+    share = (to * along).sum(axis=-1) / np.where(length2 > 0.0, length2, 1.0)
+    feet = start + np.clip(share, 0.0, 1.0)[..., None] * along
+    distance = np.linalg.norm(points_m[:, None, :] - feet, axis=-1).min(axis=1)
+    strength: FloatArray = _OBSTACLE_MPS2 * np.exp(-(distance - radius_m) / _OBSTACLE_RANGE_M)
+    return np.where(distance > 0.0, strength, 0.0)  # on the wall it has no direction
 
 
 @dataclass(frozen=True, slots=True)
-class GymMotion:
-    """SocNavGym's motion of the robot: magnitudes at the N − 1 instants after the first.
-
-    The velocity counts in the base frame, so that turning is no acceleration. Velocity and
-    acceleration before the first of these instants are 0, as after a reset.
+class SocialWork:
+    """HuNavSim's sums of forces over all instants; they grow with the rate of the instants.
 
     Attributes:
-        speed_mps: (N − 1,) speeds.
-        acceleration_mps2: (N − 1,) accelerations.
-        jerk_mps3: (N − 1,) jerks.
-        path_length_m: Σ speed · Δt.
+        on_people: Σ of the magnitudes of the robot's forces on each person.
+        on_robot: Σ of the magnitudes of each person's force on the robot.
+        obstacles_on_robot: Σ of the magnitudes of the walls' force on the robot.
+        work: Σ of |sum of the people's forces on the robot| + |walls' force on the robot| +
+            ``on_people``.
     """
 
-    speed_mps: FloatArray
-    acceleration_mps2: FloatArray
-    jerk_mps3: FloatArray
-    path_length_m: float
+    on_people: float
+    on_robot: float
+    obstacles_on_robot: float
+    work: float
 
     @classmethod
-    def of(cls, episode: SocialEpisode) -> GymMotion:
-        """Return the motion of the robot in an episode."""
-        dt = np.diff(episode.t_s)[:, None]
-        velocity = episode.robot_base_mps[1:]
-        acceleration = np.diff(velocity, axis=0, prepend=np.zeros((1, 2))) / dt
-        jerk = np.diff(acceleration, axis=0, prepend=np.zeros((1, 2))) / dt
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    def of(cls, episode: SocialEpisode) -> SocialWork:
+        """Return the sums of an episode."""
+        there = episode.present[..., None]
+        robot = np.broadcast_to(episode.robot_m[:, None, :], episode.people_m.shape)
+        robot_mps = np.broadcast_to(episode.robot_mps[:, None, :], episode.people_m.shape)
+        people, people_mps = episode.people_m, episode.people_mps
+        on_people = np.where(there, social_force(robot, robot_mps, people, people_mps), 0.0)
+        on_robot = np.where(there, social_force(people, people_mps, robot, robot_mps), 0.0)
+        walls_sum = float(
+            obstacle_force_mps2(episode.robot_m, episode.robot_radius_m, episode.walls_m).sum()
+        )
+        people_sum = float(np.linalg.norm(on_people, axis=-1).sum())
+        together = float(np.linalg.norm(on_robot.sum(axis=1), axis=-1).sum())
         return cls(
-            speed,
-            np.hypot(acceleration[:, 0], acceleration[:, 1]),
-            np.hypot(jerk[:, 0], jerk[:, 1]),
-            float((speed * dt[:, 0]).sum()),
+            on_people=people_sum,
+            on_robot=float(np.linalg.norm(on_robot, axis=-1).sum()),
+            obstacles_on_robot=walls_sum,
+            work=together + walls_sum + people_sum,
         )

@@ -43,7 +43,7 @@ def measures(
     Prints SPL, STL, distances, zones, accelerations, social work and more: the mean over the
     episodes of each policy.
     """
-    from ._tables import measure_sources  # noqa: PLC0415 - help needs no runs
+    from ._runs import measure_sources  # noqa: PLC0415 - help needs no runs
 
     return measure_sources(sources, workers=workers, out=out, as_json=as_json)
 
@@ -82,7 +82,7 @@ def export_episode(**values: Any) -> int:
 
     The formats are the JSON of SocNav3 and the CSV columns of NavWareSet.
     """
-    from ._tables import export_episode as export_to_file  # noqa: PLC0415 - help needs no runs
+    from ._runs import export_episode as export_to_file  # noqa: PLC0415 - help needs no runs
 
     return export_to_file(**values)
 

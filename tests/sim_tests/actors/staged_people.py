@@ -82,8 +82,7 @@ def run_stage(
     cone = AttentionCone()
     times, rows, angles, places, awareness = [], [], [], [], []
     nearest_m = np.inf
-    offsets = np.zeros(len(case.workers))
-    with Stage(case, offsets, np.random.default_rng(seed)) as stage:
+    with Stage(case, np.random.default_rng(seed)) as stage:
         stage.amr.command(robot_mps, 0.0)
         for tick in range(round(seconds / DT_S)):
             observed = stage.observe(tick * DT_S, DT_S)

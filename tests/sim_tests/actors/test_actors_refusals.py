@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import numpy as np
 import pytest
 
 from sim_tests import Scenario
 from sim_tests.actors.behaviour import Hearing, PersonSpec
-from sim_tests.actors.body import Gait, load_worker, skeleton
+from sim_tests.actors.body import load_worker
 from sim_tests.crossing import Stage
 from sim_tests.scenario import ScenarioTemplate
 
@@ -21,15 +19,13 @@ def person(**fields: Any) -> dict[str, Any]:
 
 def stage(*people: dict[str, Any], layout: str = "open") -> Stage:
     case = {"name": "x", "duration_s": 1.0, "layout": layout, "robot": {"goal_x_m": 1.0}}
-    return Stage(Scenario.model_validate({**case, "people": list(people)}), np.zeros(0))
+    return Stage(Scenario.model_validate({**case, "people": list(people)}))
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: load_worker("nobody"), "must be one of .*got 'nobody'"),
-        (lambda: Gait(skeleton(None, 1.75), math.nan), "stride_m"),
-        (lambda: Gait(skeleton(None, 1.75), 2.0), "stride_m"),
         (lambda: Hearing(heard_within_m=20.0), "heard_within_m must be at most not_heard_beyond"),
         (lambda: Hearing.model_validate({"answer": 0.3}), "did you mean 'answers'"),
         (
@@ -39,6 +35,10 @@ def stage(*people: dict[str, Any], layout: str = "open") -> Stage:
         (
             lambda: PersonSpec.model_validate(person(sets_off_within_m=1.0)),
             "sets_off_within_m needs a route of at least two",
+        ),
+        (
+            lambda: PersonSpec.model_validate(person(gaze=[{"t_s": 1.0}, {"t_s": 1.0}])),
+            "gaze must have increasing t_s",
         ),
         (lambda: stage(person(), person()), "names of people must be unique"),
         (lambda: stage(person(reactions={"wait": 0.0})), "at least one share"),

@@ -13,7 +13,6 @@ from sim_tests import SimError
 from sim_tests.actors.robot import (
     CAMERA_FORWARD_M,
     CAMERA_HEIGHT_M,
-    MAX_YAW_RATE_RADPS,
     NOVA_CARTER,
     Amr,
 )
@@ -115,18 +114,14 @@ def test_camera_looks_along_the_heading_from_its_post(hall: Warehouse) -> None:
     )
     np.testing.assert_allclose(amr.T_odom_camera[:3, 2], (0.0, 1.0, 0.0), atol=1e-6)  # z: ahead
     np.testing.assert_allclose(amr.T_odom_camera[:3, 1], (0.0, 0.0, -1.0), atol=1e-6)  # y: down
-    tilted = Amr(hall, (1.0, -2.0), camera_pitch_rad=0.3)
-    assert math.asin(-tilted.T_odom_camera[2, 2]) == pytest.approx(0.3)
-    assert np.linalg.det(tilted.T_base_camera) == pytest.approx(1.0)
+    assert np.linalg.det(amr.T_base_camera) == pytest.approx(1.0)
 
 
 def test_commands_beyond_the_limits_are_clipped(hall: Warehouse) -> None:
     amr = Amr(hall, (-2.0, 0.0))
     assert _drive(hall, amr, 2.0, 99.0)[-1].speed_mps == pytest.approx(1.5, rel=0.02)
     _drive(hall, amr, 2.0, 0.0)
-    assert _drive(hall, amr, 1.5, 0.0, 99.0)[-1].yaw_rate_radps == pytest.approx(
-        MAX_YAW_RATE_RADPS, rel=0.02
-    )
+    assert _drive(hall, amr, 1.5, 0.0, 99.0)[-1].yaw_rate_radps == pytest.approx(1.5, rel=0.02)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), "fast", None])

@@ -13,7 +13,7 @@ from sim_tests.actors.robot import (
     CAMERA_HEIGHT_M,
     NOVA_CARTER,
     Amr,
-    AmrLook,
+    RobotLook,
     amr_meshes,
 )
 from sim_tests.world import Warehouse
@@ -34,7 +34,7 @@ def test_no_part_of_it_is_in_view_of_its_camera() -> None:
 def test_it_is_drawn_where_the_robot_is_and_its_camera_does_not_see_it(heading_rad: float) -> None:
     with Warehouse(WarehouseLayout.named("open")) as warehouse:
         amr = Amr(warehouse, (2.0, 1.0), heading_rad)
-        look = AmrLook.of(warehouse, amr)
+        look = RobotLook.of(amr)
         number = warehouse.visuals.add_actor(look)
         for _ in range(60):
             amr.command(1.0, 0.5)

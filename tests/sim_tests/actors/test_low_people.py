@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,11 +14,10 @@ from perception import layouts as kp
 from sim_tests import SimError
 from sim_tests.actors.behaviour import (
     MovingBody,
+    Person,
     PersonSpec,
     RobotBody,
     Surroundings,
-    Walker,
-    WorkerScript,
 )
 from sim_tests.actors.body import (
     KNEELING_EYE_HEIGHT_SHARE,
@@ -167,8 +167,6 @@ def test_low_people_watch_but_never_move(activity: str) -> None:
         PersonSpec(name="s", route=[here, {"x_m": 1.0, "y_m": 0.0}], activity=activity)
     with pytest.raises(SimError, match="stays"):
         Activity(activity, "none", 0.5)
-    script = {"path": [{"t_s": 0.0, **here}], "activities": [{"t_s": 0.0, "activity": activity}]}
-    assert WorkerScript.model_validate(script).stays
     # A robot before them, and somebody so near that they would step aside.
     robot = RobotBody(1.2, 0.0, math.pi, 0.0, 0.0, 0.3, 0.25, (0.9, 0.0, 0.6))
     near = (MovingBody(0.0, 0.4, 0.0, 0.0),)
@@ -177,15 +175,14 @@ def test_low_people_watch_but_never_move(activity: str) -> None:
         spec = PersonSpec(
             name="s", route=[here], activity=doing, heading_deg=0.0, glances={"watches": True}
         )
-        person = Walker(spec, np.random.default_rng(0), NO_BOXES)
+        person = Person(spec, np.random.default_rng(0), NO_BOXES)
         around = Surroundings(robot, near if doing == activity else (), lambda: True)
         for tick in range(60):
-            motion = person.motion(0.05 * tick, around)
+            touches = ((1.0, 0.0),) if doing == activity and tick == 41 else ()
+            motion = person.step(0.05 * tick, replace(around, touches=touches))
             if doing == activity:
                 np.testing.assert_array_equal(motion.position_odom_m, [0.0, 0.0])
                 assert motion.heading_odom_rad == 0.0
-                if tick == 40:
-                    person.touch(1.0, 0.0)
         assert person.noticed_s is not None
         pitches[doing] = motion.head_pitch_rad + motion.eye_pitch_rad
     # The eyes of somebody who stands are higher: they look further down.

@@ -27,7 +27,8 @@ WALKER = {
     "speed_mps": 1.0,
     "glances": {"notices_within_m": 0.0},
 }
-SCRIPT = {"path": [{"t_s": 0.0, "x_m": 4.0, "y_m": 0.6}, {"t_s": 8.0, "x_m": 12.0, "y_m": 0.6}]}
+# They look ahead as planned.
+PLANNED = {**WALKER, "gaze": [{"t_s": 0.0, "look": "ahead"}]}
 
 
 def run(
@@ -64,12 +65,12 @@ def recorded_csv(folder: Path) -> dict[str, Any]:
     return {"replay_csv": str(path)}
 
 
-KINDS = ("walker", "recorded walker", "scripted", "replayed", "displaced")
+KINDS = ("walker", "recorded walker", "planned gaze", "replayed", "displaced")
 
 
 def of_kind(kind: str, folder: Path) -> dict[str, Any]:
-    if kind == "scripted":
-        return {"workers": [SCRIPT]}
+    if kind == "planned gaze":
+        return {"people": [PLANNED]}
     if kind in ("replayed", "displaced"):
         return {**recorded_csv(folder), "replay_reacts": kind == "displaced"}
     return {"people": [WALKER], "population": "recorded" if "recorded" in kind else "classic"}
@@ -92,7 +93,7 @@ def test_who_walks_away_turns_back_and_looks(kind: str, tmp_path: Path) -> None:
     assert np.abs(np.diff(turned)).max() / DT_S <= 3.2 + 2.6 + 0.2
     assert np.abs(np.diff(headings)).max() / DT_S <= 2.6 + 0.2
     silent = run(**people, hearing=ANSWERS, seconds=8.0, at_s=())
-    if kind in ("scripted", "replayed"):
+    if kind == "replayed":
         assert np.array_equal(asked.places, silent.places)
         assert asked.angles[-1] == pytest.approx(silent.angles[-1])
     assert silent.awareness.max() == 0.0
@@ -130,13 +131,13 @@ def test_nobody_looks_through_a_rack() -> None:
     rack = {"x_m": 2.8, "y_m": 0.0, "length_m": 1.0, "width_m": 3.0}
     hidden = {**layout, "racks": [*layout["racks"], rack]}
     stands = {**WALKER, "route": [{"x_m": 5.0, "y_m": 0.3}]}
-    script = {"path": [{"t_s": 0.0, "x_m": 5.0, "y_m": 0.3}]}
-    for people in ({"people": [stands]}, {"workers": [script]}):
+    for person in (stands, {**stands, "gaze": [{"t_s": 0.0, "look": "ahead"}]}):
+        people = {"people": [person]}
         seen = run(**people, hearing=ANSWERS, layout=layout, robot_mps=0.0)
         asked = run(**people, hearing=ANSWERS, layout=hidden, robot_mps=0.0)
         assert seen.awareness.max() > 0.7
         assert asked.awareness.max() == 0.0
-        assert noticed_s(asked) in ((None,), ())
+        assert noticed_s(asked) == (None,)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -153,8 +154,10 @@ def test_a_startle_stays_within_the_speed_that_the_limit_counts_with(
     for seed in range(seeds):
         asked = run(**people, hearing=jumpy, seconds=9.0, seed=seed)
         moved_mps = np.linalg.norm(np.diff(asked.places, axis=0), axis=2) / DT_S
-        assert moved_mps.max() <= 1.5 if "recorded w" not in kind else 1.7
-        assert asked.speeds.max() <= 1.5 if "recorded w" not in kind else 1.7
+        # People of a recording catch up with it at 1.6 m/s at most.
+        most_mps = {"recorded walker": 1.7, "replayed": 1.61, "displaced": 1.61}.get(kind, 1.5)
+        assert moved_mps.max() <= most_mps
+        assert asked.speeds.max() <= most_mps
         y_m = asked.places[:, 0, 1]
         near = asked.times_s < 4.5
         if into:
@@ -178,13 +181,11 @@ def run_start(asked: StageRun, seed: int, silent: StageRun, people: Any, jumpy: 
     return silent.places[:53]
 
 
-@pytest.mark.parametrize("kind", ["workers", "people"])
-def test_a_step_never_leads_into_a_rack(kind: str) -> None:
+def test_a_step_never_leads_into_a_rack() -> None:
     """The step aside of people who walk 0.4 m beside a rack ends half a body's width before it."""
     rack_y_m = 1.6
     spots = [{"x_m": 2.0, "y_m": 1.2}, {"x_m": 6.0, "y_m": 1.2}]
-    script = {"path": [{"t_s": 4.0 * n, **spot} for n, spot in enumerate(spots)]}
-    people = {kind: [script if kind == "workers" else {**WALKER, "route": spots}]}
+    people = {"people": [{**WALKER, "route": spots}]}
     jumpy = {**DEAF, "startles": 1.0, "startles_into_path": 0.0, "delay_spread": 1.0}
     boxes = [
         shapely.box(*box) for box in WarehouseLayout.named("aisles").obstacle_boxes_odom.tolist()

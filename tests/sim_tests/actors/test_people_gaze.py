@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from sim_tests import SimError
-from sim_tests.actors.behaviour import Glances, RobotBody
+from sim_tests.actors.behaviour import (
+    Glances,
+    Person,
+    PersonMotion,
+    PersonSpec,
+    RobotBody,
+    Surroundings,
+)
 from sim_tests.actors.behaviour._gaze import Gaze, LogNormalDuration
 
 
@@ -88,3 +95,39 @@ def test_quartiles_must_lie_on_either_side_of_the_median():
         LogNormalDuration.fitted(1.0, (1.2, 2.0))
     with pytest.raises(ValueError, match="glance_quartiles_s"):
         Glances(glance_median_s=2.0)
+
+
+def planned(keys: list[dict[str, object]], robot: RobotBody, seconds: float) -> list[PersonMotion]:
+    """Return the motions of somebody at the origin who faces along x and looks as planned."""
+    spec = PersonSpec.model_validate(
+        {"name": "p", "route": [{"x_m": 0.0, "y_m": 0.0}], "heading_deg": 0.0, "gaze": keys}
+    )
+    person = Person(spec, np.random.default_rng(0), np.zeros((0, 4)))
+    around = Surroundings(robot, (), lambda: True)
+    motions = [person.step(0.05 * tick, around) for tick in range(round(20 * seconds))]
+    assert person.noticed_s is None
+    return motions
+
+
+def test_a_planned_gaze_is_as_planned_from_the_start_and_turns_from_key_to_key():
+    keys = [
+        {"t_s": 0.0, "look": "robot", "yaw_deg": 10.0},
+        {"t_s": 3.0, "look": "robot", "yaw_deg": 10.0},
+        {"t_s": 5.0, "yaw_deg": -40.0, "pitch_deg": -20.0},
+    ]
+    for side in (1.0, -1.0):
+        robot = robot_at(3.0, 3.0 * side)
+        motions = planned(keys, robot, 8.0)
+        yaw = np.degrees([motion.head_yaw_rad for motion in motions])
+        assert yaw[:60] == pytest.approx(45.0 * side + 10.0, abs=0.1)
+        assert yaw[80] == pytest.approx(0.5 * (45.0 * side + 10.0 - 40.0), abs=12.0)
+        assert yaw[-1] == pytest.approx(-40.0, abs=0.1)
+        assert math.degrees(motions[-1].head_pitch_rad) == pytest.approx(-20.0, abs=0.1)
+        assert motions[0].head_pitch_rad < 0.0  # the robot's camera is lower than the eyes
+
+
+def test_a_planned_gaze_turns_through_the_front_and_no_farther_than_a_head():
+    keys = [{"t_s": 0.0, "yaw_deg": 120.0}, {"t_s": 2.0, "yaw_deg": -120.0}]
+    yaw = np.degrees([each.head_yaw_rad for each in planned(keys, robot_at(3.0, 0.0), 4.0)])
+    assert (yaw[0], yaw[-1]) == pytest.approx((80.0, -80.0), abs=0.1)
+    assert np.diff(yaw).max() <= 1e-9

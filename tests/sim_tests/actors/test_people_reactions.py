@@ -167,7 +167,7 @@ def test_at_a_blind_corner_the_robot_is_noticed_only_past_the_rack():
     assert noticed_s > 2.4 + 1.0
 
 
-def test_people_are_ordered_scripted_then_reacting_then_replayed(tmp_path):
+def test_people_come_first_and_replayed_ones_after_them(tmp_path):
     table = tmp_path / "one.csv"
     table.write_text("t_s,id,x_m,y_m\n0,a,9,3\n2,a,10,3\n")
     case = Scenario.model_validate(
@@ -176,13 +176,12 @@ def test_people_are_ordered_scripted_then_reacting_then_replayed(tmp_path):
             "duration_s": 1.0,
             "layout": "open",
             "robot": {"goal_x_m": 12.0},
-            "workers": [{"path": [{"t_s": 0.0, "x_m": 7.0, "y_m": -3.0}]}],
             "people": [{"name": "p", "route": [{"x_m": 8.0, "y_m": 2.0}]}],
             "replay_csv": str(table),
         }
     )
     result = run_crossing(case, policy="balanced")
     xs = [view.position_odom_m[0] for view in result.frames[0].truth]
-    assert xs == pytest.approx([7.0, 8.0, 9.0])
+    assert xs == pytest.approx([8.0, 9.0])
     assert [person.name for person in result.people] == ["p"]
     assert not run_crossing(case.without_people(), policy="balanced").frames[0].truth

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,16 +12,15 @@ import pytest
 from sim_tests import SimError
 from sim_tests.actors.behaviour import (
     ALONE,
-    Displaced,
+    Person,
     PersonMotion,
-    Replayed,
     RobotBody,
     Surroundings,
-    displaced_people,
     read_recordings,
-    replayed_people,
 )
+from sim_tests.crossing._people import recorded_people
 
+NO_BOXES = np.empty((0, 4))
 TABLE = """t_s, id, x_m, y_m, heading_rad, head_yaw_rad
 0.0, anna, 0.0, 0.0, 3.0, 0.0
 0.4, anna, 0.5, 0.1, 3.1, 0.2
@@ -38,33 +38,32 @@ def table(tmp_path):
 
 
 def test_rows_are_met_exactly(table):
-    anna, seven = replayed_people(table)
-    assert (anna.recording.name, seven.recording.name) == ("anna", "7")
-    assert anna.look != seven.look
+    anna, seven = recorded_people(table, NO_BOXES)
+    assert (anna.spec.name, seven.spec.name) == ("anna", "7")
+    assert anna.spec.look != seven.spec.look
     for t, x, y, heading, yaw in (
         (0.0, 0.0, 0.0, 3.0, 0.0),
         (0.4, 0.5, 0.1, 3.1, 0.2),
         (0.8, 1.0, 0.1, -3.1, -0.4),
     ):
-        motion = anna.motion(t, ALONE)
+        motion = anna.step(t, ALONE)
         np.testing.assert_allclose(motion.position_odom_m, [x, y], atol=1e-12)
         assert math.remainder(motion.heading_odom_rad - heading, math.tau) == pytest.approx(0.0)
         assert motion.head_yaw_rad == pytest.approx(yaw, abs=1e-12)
 
 
 def test_between_rows_velocity_is_the_slope_and_headings_turn_the_short_way(table):
-    anna, seven = replayed_people(table)
+    anna, seven = recorded_people(table, NO_BOXES)
     for t in np.linspace(0.02, 0.78, 20):
-        before, now, after = (anna.motion(t + dt, ALONE) for dt in (-1e-5, 0.0, 1e-5))
+        before, now, after = (anna.step(t + dt, ALONE) for dt in (-1e-5, 0.0, 1e-5))
         slope = (after.position_odom_m - before.position_odom_m) / 2e-5
         np.testing.assert_allclose(now.velocity_odom_mps, slope, atol=1e-3)
         assert 3.0 <= now.heading_odom_rad <= math.tau - 3.1 + 1e-9
-    # Without headings the body faces along its path; before and after the rows it stands.
-    assert seven.motion(0.5, ALONE).heading_odom_rad == pytest.approx(math.pi / 2)
-    for t, y in ((-1.0, 5.0), (4.0, 6.0)):
-        motion = seven.motion(t, ALONE)
-        np.testing.assert_allclose(motion.position_odom_m, [5.0, y])
-        np.testing.assert_allclose(motion.velocity_odom_mps, 0.0)
+    # Without headings the body faces along its path; after the rows it stands.
+    assert seven.step(0.5, ALONE).heading_odom_rad == pytest.approx(math.pi / 2)
+    last = seven.step(4.0, ALONE)
+    np.testing.assert_allclose(last.position_odom_m, [5.0, 6.0])
+    np.testing.assert_allclose(last.velocity_odom_mps, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -72,8 +71,8 @@ def test_between_rows_velocity_is_the_slope_and_headings_turn_the_short_way(tabl
     [
         ("", "misses t_s, id, x_m, y_m"),
         ("t_s,id,x_m\n", "misses y_m"),
-        ("t_s,id,x_m,y_m,speed\n", "unknown columns 'speed'"),
-        ("t_s,id,x_m,y_m,x_m\n", "names x_m twice"),
+        ("t_s,id,x_m,y_m,speed\n0,a,1,1,1\n", "unknown columns 'speed'"),
+        ("t_s,id,x_m,y_m,x_m\n", "the header has twice x_m"),
         ("t_s,id,x_m,y_m\n", "holds no rows"),
         ("t_s,id,x_m,y_m\n0,a,1,north\n", "line 2: y_m must be a finite number, got 'north'"),
         ("t_s,id,x_m,y_m\n0,a,1\n", "line 2: y_m must be a finite number"),
@@ -94,7 +93,6 @@ def test_invalid_tables_are_refused(tmp_path, text, message):
         read_recordings(path)
 
 
-NO_BOXES = np.empty((0, 4))
 STEP_S = 1.0 / 60.0
 SPEED_MPS = 1.2
 
@@ -116,13 +114,13 @@ def robot_at(x_m: float, y_m: float, speed_mps: float = 0.0) -> RobotBody:
     return RobotBody(x_m, y_m, math.pi, -speed_mps, 0.0, 0.36, 0.25, (x_m, y_m, 1.0))
 
 
-def walk(person: Displaced, robot_mps: float, start_x_m: float, y_m: float) -> list[PersonMotion]:
+def walk(person: Person, robot_mps: float, start_x_m: float, y_m: float) -> list[PersonMotion]:
     """Motions at 60 Hz for 18 s before a robot that comes along x."""
     motions = []
     for tick in range(round(18.0 / STEP_S)):
         t_s = tick * STEP_S
         robot = robot_at(start_x_m - robot_mps * t_s, y_m, robot_mps)
-        motions.append(person.motion(t_s, Surroundings(robot, (), lambda: True)))
+        motions.append(person.step(t_s, Surroundings(robot, (), lambda: True)))
     return motions
 
 
@@ -132,22 +130,22 @@ def gap_m(motion: PersonMotion, robot: RobotBody) -> float:
 
 
 def test_a_far_robot_changes_nothing(bend: Path) -> None:
-    (person,) = displaced_people(bend, NO_BOXES)
-    (recorded,) = replayed_people(bend)
+    (person,) = recorded_people(bend, NO_BOXES, reacts=True)
+    (recorded,) = recorded_people(bend, NO_BOXES)
     for tick, motion in enumerate(walk(person, 1.0, 20.0, 9.0)):
-        exact = recorded.motion(tick * STEP_S, ALONE)
+        exact = recorded.step(tick * STEP_S, ALONE)
         np.testing.assert_array_equal(motion.position_odom_m, exact.position_odom_m)
         np.testing.assert_array_equal(motion.velocity_odom_mps, exact.velocity_odom_mps)
         assert motion.heading_odom_rad == pytest.approx(exact.heading_odom_rad)
-    assert person.farthest_m == 0.0
+    assert person.on_track
 
 
 @pytest.mark.parametrize("robot_mps", [0.0, 1.2])
 def test_a_person_in_the_way_goes_round_the_robot_and_comes_back_in_time(
     bend: Path, robot_mps: float
 ) -> None:
-    (person,) = displaced_people(bend, NO_BOXES)
-    (recorded,) = replayed_people(bend)
+    (person,) = recorded_people(bend, NO_BOXES, reacts=True)
+    (recorded,) = recorded_people(bend, NO_BOXES)
     start_x_m = 6.0 + robot_mps * 6.0
     motions = walk(person, robot_mps, start_x_m, 0.05)
     off_m = []
@@ -155,14 +153,13 @@ def test_a_person_in_the_way_goes_round_the_robot_and_comes_back_in_time(
         t_s = tick * STEP_S
         robot = robot_at(start_x_m - robot_mps * t_s, 0.05)
         assert gap_m(motion, robot) > 0.2
-        exact = recorded.motion(t_s, ALONE).position_odom_m
+        exact = recorded.step(t_s, ALONE).position_odom_m
         off_m.append(float(np.linalg.norm(motion.position_odom_m - exact)))
     assert 0.2 < max(off_m) < 2.0
-    assert person.farthest_m == pytest.approx(max(off_m))
     # Before the robot is near, and again at the end, the recording is met.
     assert max(off_m[:60]) == 0.0
     assert max(off_m[-60:]) < 0.011
-    assert not person.displaced
+    assert person.on_track
     # As fast and as hard as people are.
     steps = np.diff([each.position_odom_m for each in motions], axis=0)
     assert np.linalg.norm(steps, axis=1).max() < 1.61 * STEP_S + 0.011
@@ -172,39 +169,42 @@ def test_a_person_in_the_way_goes_round_the_robot_and_comes_back_in_time(
 
 def test_a_displaced_person_does_not_walk_through_a_wall(bend: Path) -> None:
     walls = np.array([[-1.0, 0.7, 14.0, 0.9], [-1.0, -0.9, 14.0, -0.7]])
-    (person,) = displaced_people(bend, walls)
+    (person,) = recorded_people(bend, walls, reacts=True)
     motions = walk(person, 1.0, 12.0, 0.0)
-    assert person.farthest_m > 0.1
+    assert not all(each.position_odom_m.tolist() == 0.0 for each in motions)
     assert max(abs(each.position_odom_m[1]) for each in motions) < 0.46
 
 
 def test_a_touched_person_steps_back_and_a_held_one_stays(bend: Path) -> None:
-    (person,) = displaced_people(bend, NO_BOXES)
+    (person,) = recorded_people(bend, NO_BOXES, reacts=True)
     robot = robot_at(50.0, 0.0)
     around = Surroundings(robot, (), lambda: True)
-    before = [person.motion(tick * STEP_S, around) for tick in range(240)][-1]
-    person.touch(1.0, 0.0)
-    after = person.motion(240 * STEP_S, around)
+    before = [person.step(tick * STEP_S, around) for tick in range(240)][-1]
+    after = person.step(240 * STEP_S, replace(around, touches=((1.0, 0.0),)))
     assert after.position_odom_m[0] < before.position_odom_m[0]
-    assert person.displaced
-    person.hold()
-    held = person.motion(240 * STEP_S, around)
+    assert not person.on_track
+    held = person.step(240 * STEP_S, replace(around, held=True))
     np.testing.assert_allclose(held.position_odom_m, before.position_odom_m, atol=1e-9)
+    # Somebody who does not react walks on, whatever the robot does.
+    (indifferent,) = recorded_people(bend, NO_BOXES)
+    for event in ({}, {"touches": ((1.0, 0.0),)}, {"held": True}):
+        indifferent.step(4.0, replace(around, **event))
+    assert indifferent.on_track
 
 
 def test_people_who_leave_are_away_before_and_after_their_rows(bend: Path) -> None:
-    (recording,) = read_recordings(bend)
-    person, stays = Replayed(recording, leaves=True), Replayed(recording)
+    (person,), (stays,) = (
+        recorded_people(bend, NO_BOXES, leaves=leaves) for leaves in (True, False)
+    )
     for t_s, away in ((0.9, True), (1.0, False), (7.3, False), (11.0, False), (11.1, True)):
-        assert person.is_away(t_s) == away
-        assert not stays.is_away(t_s)
-        motion, here = person.motion(t_s, ALONE), stays.motion(t_s, ALONE)
+        motion, here = person.step(t_s, ALONE), stays.step(t_s, ALONE)
         assert motion.away == away
+        assert not here.away
         moved = motion.position_odom_m - here.position_odom_m
         np.testing.assert_allclose(moved, [1000.0 if away else 0.0, 0.0])
         feet = np.array(motion.feet.feet)[:, :2] - np.array(here.feet.feet)[:, :2]
         np.testing.assert_allclose(feet, np.repeat([moved], 2, axis=0), atol=1e-9)
-    (reacting,) = displaced_people(bend, NO_BOXES, leaves=True)
+    (reacting,) = recorded_people(bend, NO_BOXES, reacts=True, leaves=True)
     motions = walk(reacting, 0.0, 6.0, 0.0)
     assert motions[0].position_odom_m[0] > 900.0
     assert motions[120].position_odom_m[0] < 5.0

@@ -16,11 +16,11 @@ from sim_tests.actors.behaviour import (
     DECISION_PERIOD_S,
     WALKER_RADIUS_M,
     MovingBody,
+    Person,
     PersonOutcome,
     PersonSpec,
     RobotBody,
     Surroundings,
-    Walker,
 )
 from sim_tests.world.hall import WarehouseLayout
 
@@ -28,17 +28,17 @@ NO_BOXES = np.empty((0, 4))
 HALL = WarehouseLayout.named("crossing").obstacle_boxes_odom
 
 
-def walker(route, boxes=NO_BOXES, seed: int = 0, **fields) -> Walker:
+def walker(route, boxes=NO_BOXES, seed: int = 0, **fields) -> Person:
     points = [{"x_m": x, "y_m": y} for x, y in route]
     spec = PersonSpec.model_validate({"name": "walker", "route": points, **fields})
-    return Walker(spec, np.random.default_rng(seed), boxes)
+    return Person(spec, np.random.default_rng(seed), boxes)
 
 
-def walk(person: Walker, seconds: float, around=ALONE, hz: float = 20.0) -> np.ndarray:
+def walk(person: Person, seconds: float, around=ALONE, hz: float = 20.0) -> np.ndarray:
     """Return rows t, x, y, vx, vy, heading."""
     rows = []
     for n in range(round(seconds * hz) + 1):
-        m = person.motion(n / hz, around)
+        m = person.step(n / hz, around)
         rows.append((n / hz, *m.position_odom_m, *m.velocity_odom_mps, m.heading_odom_rad))
     return np.array(rows)
 
@@ -65,6 +65,15 @@ def test_a_person_who_turns_back_ends_at_the_start_and_faces_back():
     assert rows[:, 1].max() == pytest.approx(3.0, abs=0.15)
     assert rows[-1, 1] == pytest.approx(0.0, abs=0.1)
     assert math.cos(rows[-1, 5]) == pytest.approx(-1.0, abs=0.01)
+
+
+def test_people_face_where_a_pause_and_the_end_of_the_route_say():
+    pauses = [{"at_m": 2.0, "for_s": 3.0, "heading_deg": -90.0}, {"at_m": 4.0, "for_s": 3.0}]
+    rows = walk(walker([(0, 0), (6, 0)], pauses=pauses, end_heading_deg=135.0), 16.0)
+    standing = np.hypot(rows[:, 3], rows[:, 4]) < 0.01
+    for x_m, heading_deg in ((2.0, -90.0), (4.0, 0.0), (6.0, 135.0)):
+        there = standing & (np.abs(rows[:, 1] - x_m) < 0.15)
+        assert math.degrees(rows[there][-1, 5]) == pytest.approx(heading_deg, abs=1.0)
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.34, 2.0, 3.0])
@@ -109,7 +118,7 @@ def test_rotating_the_world_rotates_the_walk(angle, shift):
                 (*place(-2.4 + 0.8 * t, 0.2), 1.4),
             )
             other = MovingBody(*place(0.4, 3.0 - t), *way(0.0, -1.0))
-            m = person.motion(t, Surroundings(robot, (other,), lambda: True))
+            m = person.step(t, Surroundings(robot, (other,), lambda: True))
             heading = m.heading_odom_rad
             out.append((*m.position_odom_m, math.cos(heading), math.sin(heading), m.head_yaw_rad))
         assert person.outcome().reaction == "pass_behind"
@@ -167,7 +176,7 @@ def test_two_people_who_meet_head_on_pass_each_other():
     for n in range(240):
         around = [Surroundings(None, (MovingBody(*states[1 - i]),), lambda: False) for i in (0, 1)]
         motions = [
-            p.motion(n * DECISION_PERIOD_S, a) for p, a in zip((left, right), around, strict=True)
+            p.step(n * DECISION_PERIOD_S, a) for p, a in zip((left, right), around, strict=True)
         ]
         states = [(*m.position_odom_m, *m.velocity_odom_mps) for m in motions]
         nearest = min(nearest, math.dist(states[0][:2], states[1][:2]))
@@ -191,9 +200,9 @@ def test_stance_feet_stay_and_legs_reach_them(fields):
     person = walker([(0, 0), (4, 0), (5, 2)], **fields)
     before = None
     steps = [0, 0]
-    standing_m = person.motion(0.0, ALONE).feet.feet[0][2]
+    standing_m = person.step(0.0, ALONE).feet.feet[0][2]
     for n in range(1, 480):
-        m = person.motion(n / 60.0, ALONE)
+        m = person.step(n / 60.0, ALONE)
         x, y = m.position_odom_m
         for side, foot in enumerate(m.feet.feet):
             assert foot[2] >= standing_m - 0.01
@@ -242,7 +251,7 @@ def test_somebody_who_is_blocked_is_later_by_every_second():
 def test_somebody_who_walks_alone_is_never_late(fields):
     route = [{"x_m": 0.0, "y_m": 0.0}, {"x_m": 6.0, "y_m": 0.0}]
     spec = PersonSpec.model_validate({"name": "alone", "route": route, **fields})
-    person = Walker(spec, np.random.default_rng(0), np.empty((0, 4)))
+    person = Person(spec, np.random.default_rng(0), np.empty((0, 4)))
     assert person.outcome().late_s is None
     for tick in range(600):
         person.advance(0.05 * tick, ALONE)

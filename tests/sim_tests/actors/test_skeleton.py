@@ -12,11 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from sim_tests import SimError
 from sim_tests.actors.body import JOINTS, PARENTS, load_worker, skeleton, skin_points, worker_names
-from sim_tests.actors.body._pose import (
-    BodyPose,
-    link_transforms,
-    piece_transforms,
-)
+from sim_tests.actors.body._pose import BodyPose, RigidPieces, link_transforms
 from sim_tests.actors.body._quaternions import axis_angle, multiply, rotate
 from sim_tests.actors.body._skeleton import TwoBoneLimb
 from sim_tests.actors.body._skin import PELVIS, skin_pieces
@@ -104,7 +100,7 @@ def test_kinematics_against_scipy_joint_by_joint(
         np.testing.assert_allclose(links[1 + joint], link(joint), atol=1e-9)
     joints = np.repeat(np.arange(-1, 16), 3)
     shares = np.tile([0.0, 0.4, 1.0], 17)
-    pieces = piece_transforms(asset.joints_m, pose, joints, shares)
+    pieces = RigidPieces(asset.joints_m, joints, shares).odom(pose, links)
     for joint, share, piece in zip(joints.tolist(), shares.tolist(), pieces, strict=True):
         expected = T_odom_body if joint < 0 else link(PARENTS[joint]) @ about_joint(joint, share)
         np.testing.assert_allclose(piece, expected, atol=1e-9)

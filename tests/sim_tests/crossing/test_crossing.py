@@ -5,6 +5,7 @@ import pytest
 
 from nav_adapter import NavError
 from sim_tests import Scenario, SimError, run_crossing
+from sim_tests.actors.behaviour import Glances
 from sim_tests.demo._comparison import write_episodes
 from sim_tests.world.camera import CameraTiming
 
@@ -156,12 +157,14 @@ def test_a_custom_planner_drives_the_robot_and_is_named_in_the_result():
 
 def test_a_robot_that_ignores_people_causes_a_contact_and_is_named_as_its_cause():
     """The metrics work: without a planner that avoids people the robot causes a contact."""
-    standing = ATTENTIVE.workers[0].model_copy(
-        update={"path": (ATTENTIVE.workers[0].path[0].model_copy(update={"x_m": 3.0, "y_m": 0.0}),)}
+    (worker,) = ATTENTIVE.people
+    here = worker.route[0].model_copy(update={"x_m": 3.0, "y_m": 0.0})
+    standing = worker.model_copy(
+        update={"route": (here,), "glances": Glances(notices_within_m=0.0)}
     )
     reckless = ATTENTIVE.model_copy(
         update={
-            "workers": (standing,),
+            "people": (standing,),
             "robot": ATTENTIVE.robot.model_copy(update={"straight_on_speed_mps": 0.8}),
             "duration_s": 5.0,
         }

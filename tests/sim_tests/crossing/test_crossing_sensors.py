@@ -111,7 +111,7 @@ def test_the_oracle_sees_in_all_directions_but_not_through_racks() -> None:
 
 def test_the_oracle_sees_everybody_who_is_not_hidden_by_a_high_box() -> None:
     scenario = ScenarioTemplate.shipped("crowd_of_eight").median()
-    with Stage(scenario, np.zeros(len(scenario.workers)), np.random.default_rng(0)) as stage:
+    with Stage(scenario, np.random.default_rng(0)) as stage:
         view = MapView.of(stage.warehouse)
         T_odom_camera = stage.amr.T_odom_camera
         truth = stage.truth(CONE, T_odom_camera)

@@ -40,12 +40,15 @@ control_hz: 20.0
 layout: open
 robot: {goal_x_m: 6.0}
 camera: {width_px: 640, height_px: 480, horizontal_fov_deg: 60.0}
-workers:
-  - path: [{t_s: 0.0, x_m: 4.0, y_m: 0.8}]
+people:
+  - name: left
+    route: [{x_m: 4.0, y_m: 0.8}]
+    heading_deg: 180.0
     gaze: [{t_s: 0.0, look: robot}]
-    heading: [{t_s: 0.0, heading_deg: 180.0}]
-  - path: [{t_s: 0.0, x_m: 4.5, y_m: -1.0}]
-    heading: [{t_s: 0.0, heading_deg: 0.0}]
+  - name: right
+    route: [{x_m: 4.5, y_m: -1.0}]
+    heading_deg: 0.0
+    gaze: [{t_s: 0.0, look: ahead}]
 """
 
 
@@ -58,7 +61,7 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
 
 @pytest.fixture
 def stage(scenario: Scenario) -> Iterator[Stage]:
-    with Stage(scenario, np.zeros(2)) as stage:
+    with Stage(scenario) as stage:
         yield stage
 
 

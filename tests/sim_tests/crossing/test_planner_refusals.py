@@ -21,7 +21,7 @@ EMPTY = Scenario.model_validate(
         "control_hz": 10.0,
         "layout": {"x_min_m": -3.0, "y_min_m": -3.0, "x_max_m": 6.0, "y_max_m": 3.0},
         "robot": {"goal_x_m": 2.0},
-        "workers": [],
+        "people": [],
     }
 )
 

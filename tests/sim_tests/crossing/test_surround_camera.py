@@ -28,15 +28,19 @@ duration_s: 1.0
 control_hz: 20.0
 layout: open
 robot: {goal_x_m: 6.0}
-workers:
-  - path: [{t_s: 0.0, x_m: 2.0, y_m: 2.0}]
+people:
+  - name: left
+    route: [{x_m: 2.0, y_m: 2.0}]
+    heading_deg: -135.0
     gaze: [{t_s: 0.0, look: robot}]
-    heading: [{t_s: 0.0, heading_deg: -135.0}]
-  - path: [{t_s: 0.0, x_m: -2.6, y_m: 0.0}]
+  - name: behind
+    route: [{x_m: -2.6, y_m: 0.0}]
+    heading_deg: 0.0
     gaze: [{t_s: 0.0, look: robot}]
-    heading: [{t_s: 0.0, heading_deg: 0.0}]
-  - path: [{t_s: 0.0, x_m: 0.0, y_m: -2.4}]
-    heading: [{t_s: 0.0, heading_deg: -90.0}]
+  - name: right
+    route: [{x_m: 0.0, y_m: -2.4}]
+    heading_deg: -90.0
+    gaze: [{t_s: 0.0, look: ahead}]
 """
 
 
@@ -80,7 +84,7 @@ def test_the_shipped_networks_detect_all_people_in_a_panorama(scenario: Scenario
     lens = PanoramaLens(2400, 1200)
     flat = Camera.from_fov(1092, 828, math.radians(110.0))
     pipeline = SurroundPipeline(lens, ring_of_views(flat, np.radians([0, 90, 180, -90])))
-    with Stage(scenario, np.zeros(3)) as stage:
+    with Stage(scenario) as stage:
         T_odom_camera = stage.amr.T_odom_camera
         truth = stage.truth(CONE, T_odom_camera)
         image = panorama(stage, T_odom_camera, lens.width_px)
@@ -106,7 +110,7 @@ def test_the_shipped_networks_detect_all_people_in_a_panorama(scenario: Scenario
 
 def test_a_surround_camera_reports_each_person_once_and_nobody_else(scenario: Scenario) -> None:
     noise = KeypointNoise(miss_rate=0.0)
-    with Stage(scenario, np.zeros(3)) as stage:
+    with Stage(scenario) as stage:
         camera = scenario.camera.camera()
         rng = np.random.default_rng(0)
         eyes = make_eyes("keypoints", stage, camera, rng, cone=CONE, noise=noise)

@@ -57,7 +57,7 @@ def test_time_lost_grows_to_the_difference_of_the_times_to_the_goal(free):
     assert time_behind_s(free.result.frames[100], free.result) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("t_s", [1.0, 4.0])
+@pytest.mark.parametrize("t_s", [1.6, 4.0])
 def test_the_circle_on_the_map_has_the_radius_and_place_of_the_obstacle(row, free, t_s):
     frames = list(row.result.frames)
     frame = frames[round(t_s * 20)]

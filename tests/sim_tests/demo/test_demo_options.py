@@ -20,7 +20,6 @@ def test_the_crossings_have_the_robot_and_the_people_asked_for() -> None:
     for scenario in (attentive, distracted):
         assert scenario.robot_model == RobotModel.shipped("omni")
         assert scenario.population == "recorded"
-        assert scenario.workers == ()
     assert attentive.people[0].route == distracted.people[0].route
     assert [each.people[0].glances.watches for each in (attentive, distracted)] == [True, False]
 

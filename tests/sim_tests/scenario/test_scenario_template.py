@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from perception.documents import yaml_text
 from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
 from sim_tests.scenario import read_distribution
 
@@ -150,7 +151,7 @@ def test_a_file_extends_shared_defaults_and_finds_its_recording_in_its_folder(tm
     assert mine.replay_csv == str(tmp_path / "people.csv")
     assert Scenario.from_yaml(path) == mine
     empty = mine.without_people()
-    assert (empty.people, empty.workers, empty.replay_csv) == ((), (), None)
+    assert (empty.people, empty.replay_csv) == ((), None)
 
 
 @pytest.mark.parametrize(
@@ -180,10 +181,23 @@ def test_impossible_values_are_refused_by_path(change, message):
 
 
 def test_only_numbers_of_people_and_robot_may_be_distributions():
-    with pytest.raises(SimError, match="duration_s: only numbers under people, workers, robot"):
+    with pytest.raises(SimError, match="duration_s: only numbers under people, robot"):
         ScenarioTemplate({**BASE, "duration_s": {"uniform": {"low": 10, "high": 20}}})
     varied = {**BASE, "robot": {"goal_x_m": {"choice": [10.0, 12.0]}}}
     assert {ScenarioTemplate(varied).for_seed(seed).robot.goal_x_m for seed in range(9)} == {10, 12}
+
+
+@pytest.mark.parametrize("start_s", [0.0, {"uniform": {"low": 0.0, "high": 1.0}}])
+def test_scripts_are_refused_with_the_way_to_convert_them(start_s, tmp_path):
+    old = {**BASE, "workers": [{"path": [{"t_s": start_s, "x_m": 3.0, "y_m": 1.0}]}]}
+    path = tmp_path / "old.yaml"
+    path.write_text(yaml_text(old))
+    for read in (ScenarioTemplate.from_yaml, Scenario.from_yaml):
+        with pytest.raises(SimError, match=r"old\.yaml: workers: .* under people: .* as route"):
+            read(path)
+    # Scenarios that were written with every key hold an empty list.
+    empty = ScenarioTemplate({**BASE, "workers": []})
+    assert empty.for_seed(2) == ScenarioTemplate(BASE).for_seed(2)
 
 
 def test_two_people_with_the_same_name_are_refused():
@@ -216,10 +230,12 @@ def test_a_name_may_ask_for_a_version():
 
 def test_attentive_and_distracted_differ_only_in_the_gaze():
     first, second = (Scenario.shipped(f"crossing_{who}") for who in ("attentive", "distracted"))
-    same = {"name": "", "description": "", "attention": "mixed", "workers": ()}
+    same = {"name": "", "description": "", "attention": "mixed", "people": ()}
     assert first.model_copy(update=same) == second.model_copy(update=same)
-    assert first.workers[0].path == second.workers[0].path
-    assert first.workers[0].gaze != second.workers[0].gaze
+    (one,), (other,) = first.people, second.people
+    assert one.model_copy(update={"glances": other.glances}) == other
+    assert one.glances.watches
+    assert other.glances.notices_within_m == 0.0
 
 
 def test_a_crossing_run_by_name_is_drawn_by_its_seed():

@@ -25,7 +25,6 @@ from sim_tests.search.falsify._joint_parameters import (
 )
 from sim_tests.search.falsify._person_parameters import person_path
 from sim_tests.search.falsify._scenario_space import ScenarioSpace
-from sim_tests.search.falsify._script_parameters import peak_speed_and_acceleration
 from sim_tests.search.falsify._variation import (
     RACK_CLEARANCE_M,
     ROBOT_CLEARANCE_M,
@@ -38,8 +37,9 @@ NAMES = (
     *("crossing_from_left", "runs_out", "blind_corner", "walking_backwards", "crowd_of_eight"),
     *("group_crossing", "head_on_in_aisle"),
 )
-SCRIPTED = ("crossing_attentive", "paper_encounter")
-SPACES = {name: ScenarioSpace(ScenarioTemplate.shipped(name)) for name in (*NAMES, *SCRIPTED)}
+SPACES = {
+    name: ScenarioSpace(ScenarioTemplate.shipped(name)) for name in (*NAMES, "paper_encounter")
+}
 
 
 def recorded(name: str) -> ScenarioSpace:
@@ -115,67 +115,12 @@ def test_people_keep_to_human_limits_and_what_is_added_is_in_nobodys_way(name, s
             assert shapely.box(*box).distance(place) >= PALLET_RADIUS_M - 1e-9
 
 
-@settings(max_examples=30)
-@given(name=st.sampled_from(SCRIPTED), seed=st.integers(0, 2**32))
-def test_scripted_workers_keep_to_human_limits(name, seed):
-    space = SPACES[name]
-    (written,) = space.template.median().workers
-    (worker,) = space.scenario(somewhere(space, seed)).workers
-    speed, rate = peak_speed_and_acceleration(worker.model_dump())
-    most_speed, most_rate = peak_speed_and_acceleration(written.model_dump())
-    assert speed <= max(2.0, most_speed) + 1e-6
-    assert rate <= max(3.0, most_rate) + 1e-6
-
-
-def test_a_pause_in_a_script_delays_everything_after_it_and_nothing_before():
-    (written,) = SPACES["crossing_attentive"].template.median().workers
-    levers = {"pace": 0.7, "pause_at": 0.5, "pause_s": 2.0}
-    (worker,) = varied("crossing_attentive", "workers.0.", **levers).workers
-    begin, end = written.path[0].t_s, written.path[-1].t_s
-    assert worker.path[0] == written.path[0]
-    assert worker.path[-1].t_s == pytest.approx(begin + (end - begin) / 0.7 + 2.0)
-    halt_s = begin + 0.5 * (end - begin) / 0.7
-    here = [worker.motion(halt_s + late_s).position_odom_m for late_s in (0.0, 1.0, 2.0)]
-    np.testing.assert_allclose(here, [here[0]] * 3, atol=1e-3)
-
-
-def test_a_scripted_worker_sets_off_after_the_end_of_the_script():
-    (written,) = SPACES["crossing_attentive"].template.median().workers
-    levers = {"sets_off_after_s": 1.5, "sets_off_x_m": -0.6, "sets_off_y_m": -1.1}
-    (worker,) = varied("crossing_attentive", "workers.0.", **levers, sets_off_mps=1.8).workers
-    end = written.path[-1]
-    assert worker.path[: len(written.path)] == written.path
-    for late_s, x_m, y_m in ((0.0, 0.0, 0.0), (1.5, 0.0, 0.0), (6.5, -0.6, -1.1)):
-        here = worker.motion(end.t_s + late_s).position_odom_m
-        np.testing.assert_allclose(here, [end.x_m + x_m, end.y_m + y_m], atol=1e-3)
-    # As fast as was asked for, but no faster than people accelerate.
-    times = np.arange(end.t_s + 1.5, end.t_s + 6.5, 0.01)
-    walked = np.array([worker.motion(t).position_odom_m for t in times.tolist()])
-    speeds = np.linalg.norm(np.diff(walked, axis=0), axis=1) / 0.01
-    length_m = math.hypot(0.6, 1.1)
-    lasts_s = max(1.5 * length_m / 1.8, math.sqrt(6.0 * length_m / 3.0) + 0.02)
-    assert speeds.max() == pytest.approx(1.5 * length_m / lasts_s, rel=0.01)
-    # The body turns to where it walks.
-    heading = worker.motion(times[0] + 0.6).heading_odom_rad
-    assert math.remainder(heading - math.atan2(-1.1, -0.6), math.tau) == pytest.approx(0.0, abs=0.1)
-
-
-@pytest.mark.parametrize(("after_s", "looks_s"), [(3.0, (0.0, 2.9)), (0.0, ())])
-def test_a_scripted_worker_forgets_the_robot_at_a_time(after_s, looks_s):
-    levers = {"looks_away_after_s": after_s, "away_yaw_deg": -60.0}
-    (worker,) = varied("crossing_attentive", "workers.0.", **levers).workers
-    begin = worker.path[0].t_s
-    for t_s in (*looks_s, after_s + 0.4, 20.0):
-        azimuth, _ = worker.gaze_angles(begin + t_s, 0.0, (0.3, -0.1))
-        assert azimuth == pytest.approx(0.3 if t_s in looks_s else -math.pi / 3), t_s
-
-
-def test_only_who_looks_at_the_robot_can_forget_it():
-    unaware = ScenarioSpace(ScenarioTemplate.shipped("crossing_distracted")).parameters
-    assert "workers.0.sets_off_after_s" in unaware
-    assert "workers.0.looks_away_after_s" not in unaware
-    for name in NAMES:
-        assert not [key for key in SPACES[name].parameters if key.startswith("workers.")]
+@pytest.mark.parametrize("name", ["crossing_distracted", "paper_encounter"])
+def test_only_who_notices_the_robot_can_forget_it(name):
+    unaware = ScenarioSpace(ScenarioTemplate.shipped(name)).parameters
+    assert "people.0.speed_mps" in unaware
+    assert "people.0.lapse_after_s" not in unaware
+    assert "people.0.lapse_after_s" in SPACES["crossing_from_left"].parameters
 
 
 def test_a_lapse_has_the_searched_values():
@@ -239,10 +184,9 @@ def test_how_people_answer_is_a_lever_where_the_robot_asks(name):
     """Neutral values change nothing; the others set one person's hearing alone."""
     template = ScenarioTemplate.shipped(name)
     space, silent = ScenarioSpace(template, asks=True), ScenarioSpace(template)
-    kind = "people" if template.median().people else "workers"
     added = set(space.parameters) - set(silent.parameters)
     answers, delay, into = (
-        f"{kind}.0.{key}" for key in ("answers", "answer_delay_s", "startles_into_path")
+        f"people.0.{key}" for key in ("answers", "answer_delay_s", "startles_into_path")
     )
     assert {answers, delay, into} <= added
     assert space.scenario(space.neutral) == silent.scenario(silent.neutral)
@@ -252,12 +196,12 @@ def test_how_people_answer_is_a_lever_where_the_robot_asks(name):
         ({into: 0.8}, {"startles": 1.0, "startles_into_path": 1.0}),
     ):
         scenario = space.scenario({**space.neutral, **values})
-        first, *others = getattr(scenario, kind)
+        first, *others = scenario.people
         assert first.hearing == Hearing().with_numbers(changes)
         assert [each.hearing for each in others] == [None] * len(others)
         assert scenario.hearing == Hearing()
     other = ScenarioSpace(template.with_population("phone_factor=0.2"), asks=True)
-    (first, *_) = getattr(other.scenario({**other.neutral, into: 0.8}), kind)
+    (first, *_) = other.scenario({**other.neutral, into: 0.8}).people
     assert first.hearing.phone_factor == 0.2
 
 
@@ -289,7 +233,6 @@ def test_a_search_begins_at_the_medians_of_recorded_people():
     assert person.route == written.route
     assert person.as_written
     assert not written.as_written
-    assert varied(recorded("crossing_attentive")).workers == ()
 
 
 def test_what_the_search_sets_is_not_drawn_again():

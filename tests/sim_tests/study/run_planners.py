@@ -105,6 +105,33 @@ class Leaves(Slow):
         return super().plan(robot_state, goal_odom_m, constraints, dt_s)
 
 
+class Counted(Slow):
+    """Adds a line to the marker when it is made."""
+
+    def __init__(self, robot):
+        super().__init__(robot)
+        with Path(os.environ[MARKER]).open("a") as file:
+            file.write("made\n")
+
+
+class Counted(Slow):
+    """Adds a line to the marker when it is made."""
+
+    def __init__(self, robot):
+        super().__init__(robot)
+        with Path(os.environ[MARKER]).open("a") as file:
+            file.write("made\n")
+
+
+class Counted(Slow):
+    """Adds a line to the marker when it is made."""
+
+    def __init__(self, robot):
+        super().__init__(robot)
+        with Path(os.environ[MARKER]).open("a") as file:
+            file.write("made\n")
+
+
 class Sleeps(Slow):
     """Sleeps in every cycle for as long as the environment says."""
 

@@ -12,9 +12,11 @@ duration_s: 2.0
 control_hz: 10.0
 layout: {{x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}}
 robot: {{goal_x_m: 0.6}}
-workers:
-  - path:
-      - {{t_s: 0.0, x_m: {{uniform: {{low: 3.0, high: 4.0}}}}, y_m: -1.0}}
+people:
+  - name: stands
+    route: [{{x_m: {{uniform: {{low: 3.0, high: 4.0}}}}, y_m: -1.0}}]
+    glances: {{notices_within_m: 0.0}}
+    social: false
 """
 
 

@@ -148,7 +148,7 @@ def hunav_differences(rows, power):
     """Σ Δv / Δt^power over the steps, divided by the number of instants."""
     total = 0.0
     for a, b in pairwise(rows):
-        total += (forward_speed(b) - forward_speed(a)) / (b["t"] - a["t"]) ** power
+        total += (math.hypot(*b["v"]) - math.hypot(*a["v"])) / (b["t"] - a["t"]) ** power
     return total / len(rows)
 
 
@@ -295,7 +295,7 @@ def reference_measures(episode, groups):
         "hunav_min_distance_m": min(d for d in surfaces if d is not None),
         **{f"hunav_{zone}_percent": percents[zone] for zone in percents},
         **{f"hunav_group_{zone}_percent": of_groups[zone] for zone in of_groups},
-        "hunav_speed_mps": sum(map(forward_speed, rows)) / len(rows),
+        "hunav_speed_mps": sum(math.hypot(*row["v"]) for row in rows) / len(rows),
         "hunav_acceleration_mps2": hunav_differences(rows, 1),
         "hunav_overacceleration_mps3": hunav_differences(rows, 2),
         "hunav_people_speed_mps": sum(walking) / len(walking),

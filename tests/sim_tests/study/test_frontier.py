@@ -171,8 +171,10 @@ duration_s: 6.0
 control_hz: 10.0
 layout: {{x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}}
 robot: {{goal_x_m: 2.0}}
-workers:
-  - path: [{{t_s: 0.0, x_m: 2.0, y_m: {y_m}}}]
+people:
+  - name: stands
+    route: [{{x_m: 2.0, y_m: {y_m}}}]
+    glances: {{notices_within_m: 0.0}}
 """
 
 

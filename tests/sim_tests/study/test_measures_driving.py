@@ -69,7 +69,8 @@ def test_spl_is_the_formula_of_anderson(path, shortest):
 
 
 def stops(profile, arrived=False):
-    return count_stops(np.array(profile), arrived, STANDING_SPEED_MPS)
+    speeds_mps = np.array(profile)
+    return count_stops(speeds_mps, speeds_mps <= STANDING_SPEED_MPS, arrived)
 
 
 def test_stops_are_counted_once_each_and_not_at_the_goal():

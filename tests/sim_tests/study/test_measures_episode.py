@@ -14,7 +14,6 @@ from sim_tests import run_crossing
 from sim_tests.actors.behaviour import PersonOutcome
 from sim_tests.study.measures import measure
 from sim_tests.study.measures._awareness import awareness_class, matched_tracks, nearest_person
-from sim_tests.study.measures._measure import human_cost, time_lost_s
 
 T_S = np.arange(0.0, 8.001, 0.05)
 
@@ -43,9 +42,6 @@ def test_way_and_time_against_the_same_task_without_people():
 
 
 def test_not_reaching_the_goal_loses_all_of_the_time():
-    assert time_lost_s(None, 40.0, 10.0) == 40.0
-    assert time_lost_s(12.0, 12.0, 10.0) == 2.0
-    assert time_lost_s(None, 40.0, None) is None
     record = measure(
         crossing(T_S, straight(1.0), reached=False),
         time_without_people_s=6.5,
@@ -116,42 +112,39 @@ def outcome(**values):
     return PersonOutcome(name="somebody", **values)
 
 
+def human_cost(*people):
+    record = measure(crossing(T_S, straight(1.0), people=people))
+    return record.human_delay_s, record.human_detour_m
+
+
 def test_people_are_delayed_by_what_is_over_their_free_walk():
     done = outcome(time_s=12.0, free_time_s=10.0, length_m=14.5, free_length_m=13.0)
     early = outcome(time_s=9.5, free_time_s=10.0, length_m=13.0, free_length_m=13.0)
     not_started = outcome(free_time_s=10.0, free_length_m=13.0)
     standing = outcome()
-    assert human_cost([done, early, not_started, standing]) == (1.5, 1.5)
-    assert human_cost([not_started, standing]) == (None, None)
+    assert human_cost(done, early, not_started, standing) == (1.5, 1.5)
+    assert human_cost(not_started, standing) == (None, None)
 
 
 def test_somebody_who_is_blocked_for_good_costs_more_than_somebody_who_is_delayed():
     delayed = outcome(time_s=15.0, free_time_s=10.0, length_m=13.0, free_length_m=13.0)
     blocked = outcome(late_s=24.0, free_time_s=10.0, length_m=5.0, free_length_m=13.0)
-
-    def cost(*people):
-        record = measure(crossing(T_S, straight(1.0), people=people))
-        return record.human_delay_s, record.human_detour_m
-
-    assert cost(delayed) == (5.0, 0.0)
-    assert cost(blocked) == (24.0, None)
-    assert cost(delayed, blocked) == (29.0, 0.0)
+    assert human_cost(delayed) == (5.0, 0.0)
+    assert human_cost(blocked) == (24.0, None)
+    assert human_cost(delayed, blocked) == (29.0, 0.0)
 
 
 def test_the_reaction_is_that_of_who_came_nearest():
-    """Scripted workers come first, then those who react, then replayed ones."""
+    """People of the scenario come first, then replayed ones, who have no outcome."""
     places = [(5.0, 3.0), (5.0, 1.0), (5.0, 2.0)]
     people = [walking(place, (0.0, 0.0)) for place in places]
     outcomes = (outcome(reaction="wait"), outcome(reaction="hurry"))
 
-    def reaction(scripted, outcomes):
-        result = crossing(T_S, straight(1.0), people, people=outcomes, scripted=scripted)
-        return measure(result).reaction
+    def reaction(outcomes):
+        return measure(crossing(T_S, straight(1.0), people, people=outcomes)).reaction
 
-    assert reaction(0, outcomes) == "hurry"
-    assert reaction(1, outcomes) == "wait"
-    assert reaction(2, outcomes[:1]) == ""  # a scripted worker came nearest
-    assert reaction(0, outcomes[:1]) == ""  # a replayed one
+    assert reaction(outcomes) == "hurry"
+    assert reaction(outcomes[:1]) == ""  # a replayed one came nearest
 
 
 def test_the_error_of_awareness_is_over_those_with_a_track():

@@ -1,7 +1,6 @@
 """Tables of episodes: what is written is read again, and what is broken is said."""
 
 import csv
-from dataclasses import fields
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -10,26 +9,26 @@ from hypothesis import strategies as st
 from sim_tests import SimError
 from sim_tests.demo._comparison import EPISODE_COLUMNS
 from sim_tests.study.measures import (
+    COLUMNS,
     RECORD_COLUMNS,
     EpisodeRecord,
     read_records,
     record_row,
     write_records,
 )
-from sim_tests.study.measures._record_file import rounded
+from sim_tests.study.measures._record import rounded
 
 numbers = st.none() | st.floats(-1e6, 1e6).map(rounded)
 texts = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
 KINDS = {
-    "str": texts,
-    "bool": st.booleans(),
-    "int": st.integers(-(2**40), 2**40),
-    "float | None": numbers,
-    "Awareness": st.sampled_from(["", "aware", "unaware", "falsely_aware", "missed_aware"]),
+    "text": texts,
+    "flag": st.booleans(),
+    "count": st.integers(-(2**40), 2**40),
+    "number": numbers,
 }
-records = st.builds(
-    EpisodeRecord, **{field.name: KINDS[field.type] for field in fields(EpisodeRecord)}
-)
+cells = {name: KINDS[each.kind] for name, each in COLUMNS.items()}
+cells["awareness"] = st.sampled_from(["", "aware", "unaware", "falsely_aware", "missed_aware"])
+records = st.builds(EpisodeRecord, **cells)
 PLAIN = EpisodeRecord("late_glance", 3, "balanced", "SamplingPlanner", "truth", success=True)
 in_one_folder = settings(
     max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture]

@@ -108,9 +108,11 @@ def test_no_measure_depends_on_the_way_in_which_a_square_robot_faces():
         result = crossing(
             T_S, drifting(braking, 0.3, heading), people, footprint_m=square_m, robot=robot
         )
-        return measure(result, time_without_people_s=5.0)
+        return measure(result, time_without_people_s=5.0), Conduct.of(result)
 
-    facing, aside = measured(0.3), measured(0.3 - 0.5 * math.pi)
+    (facing, obeys), (aside, obeys_aside) = measured(0.3), measured(0.3 - 0.5 * math.pi)
+    assert obeys.limit_excess_mps == pytest.approx(obeys_aside.limit_excess_mps, abs=1e-9)
+    assert facing.min_margin_m is not None
     assert facing.min_time_to_collision_s is not None
     assert facing.step_out_unaware > 0.0
     for name in facing.__dataclass_fields__:

@@ -34,9 +34,10 @@ duration_s: 9.0
 control_hz: 10.0
 layout: {x_min_m: -3.0, y_min_m: -4.0, x_max_m: 8.0, y_max_m: 4.0}
 robot: {goal_x_m: 2.0}
-workers:
-  - path:
-      - {t_s: 0.0, x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}
+people:
+  - name: stands
+    route: [{x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}]
+    glances: {notices_within_m: 0.0}
 """
 NAMES = ["straight_on", "run_planners:Raises", "run_planners:ReturnsNothing"]
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import random
+from typing import Any
 
 import numpy as np
 import pytest
+import run_planners
 from run_scenes import SHORT, short_jobs
 
-from sim_tests import run_crossing
+from sim_tests import CrossingFrame, run_crossing
+from sim_tests.conditions import Perception
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import read_records, summarise, summary_text
 from sim_tests.study.runs import (
@@ -16,6 +19,9 @@ from sim_tests.study.runs import (
     in_parallel,
     observed_episode,
     plan_jobs,
+    read_jobs,
+    read_jobs,
+    read_jobs,
     run_episode,
     run_jobs,
 )
@@ -92,38 +98,94 @@ _SHORT = SHORT.format(name="short")
 ADULT = _SHORT + "    gaze: [{t_s: 0.0, look: robot}]\n"
 CHILD = _SHORT + "    stature_m: 1.15\n"
 TWO_VIEWS = ADULT + "camera: {views_deg: [0.0, 90.0]}\n"
-PIXELS = [
-    pytest.param(text, "pixels", "camera", marks=pytest.mark.full)
-    for text in (ADULT, CHILD, TWO_VIEWS)
-]
+
+
+def signature(frame: CrossingFrame) -> tuple[Any, ...]:
+    """Return the numbers of a frame, for comparisons to the bit."""
+    limits = frame.constraints
+    return (
+        frame.t_s,
+        frame.robot_state.position_odom_m.tobytes(),
+        [(each.position_odom_m.tobytes(), each.awareness) for each in frame.truth],
+        [each.position_camera_m.tobytes() for each in frame.observations],
+        [
+            (each.id, each.position_odom_m.tobytes(), each.covariance_odom.tobytes())
+            + (each.awareness, each.awareness_lower)
+            for each in frame.tracks
+        ],
+        frame.scan_points_odom_m.tobytes(),
+        (limits.speed_limit_mps, limits.limited_by, limits.stale),
+        frame.command,
+        frame.separations_m,
+    )
 
 
 @pytest.mark.parametrize(
-    ("text", "perception", "sensors"),
+    ("text", "perception"),
     [
-        (ADULT, "truth", "camera"),
-        (ADULT, "keypoints", "camera"),
-        (CHILD, "keypoints", "camera+scanner"),
-        *PIXELS,
+        (ADULT, "truth"),
+        (ADULT, "oracle"),
+        (ADULT, "keypoints"),
+        pytest.param(CHILD, "keypoints+scanner", marks=pytest.mark.slow),
+        pytest.param(ADULT, "scanner", marks=pytest.mark.slow),
+        pytest.param(ADULT, "pixels", marks=pytest.mark.slow),
+        pytest.param(CHILD, "pixels+scanner", marks=pytest.mark.full),
+        pytest.param(TWO_VIEWS, "pixels", marks=pytest.mark.full),
     ],
 )
-def test_the_same_job_by_the_api_and_in_a_run_gives_the_same_frames(text, perception, sensors):
+def test_the_api_a_run_a_replay_and_gymnasium_give_the_same_frames(text, perception, tmp_path):
+    gymnasium = pytest.importorskip("gymnasium", reason="needs the extra awarenav[gym]")
     template = ScenarioTemplate.from_text(text)
-    (job,) = plan_jobs([template], ["balanced"], [3], perception=perception, sensors=[sensors])
-    in_a_run, _ = observed_episode(job)
-    by_the_api = run_crossing(
-        template.for_seed(3), policy="balanced", perception=job.perception, seed=3
+    oracle = perception == "oracle"
+    senses = Perception.named("keypoints" if oracle else perception)
+    kind, sensors = senses.kind or "keypoints", senses.sensors
+    jobs = plan_jobs(
+        [template],
+        ["oracle" if oracle else "balanced"],
+        [3],
+        perception=kind,
+        sensors=[sensors],
+        faults=["bursts"],
     )
-    assert len(in_a_run.frames) == len(by_the_api.frames)
-    seen = 0
-    for one, other in zip(in_a_run.frames, by_the_api.frames, strict=True):
-        assert one.command == other.command
-        assert one.constraints.speed_limit_mps == other.constraints.speed_limit_mps
-        assert np.array_equal(one.robot_state.position_odom_m, other.robot_state.position_odom_m)
-        assert len(one.tracks) == len(other.tracks)
-        for track, same in zip(one.tracks, other.tracks, strict=True):
-            assert np.array_equal(track.position_odom_m, same.position_odom_m)
-            assert np.array_equal(track.covariance_odom, same.covariance_odom)
-            assert track.awareness == same.awareness
-            seen += 1
-    assert seen > 5
+    by_the_api = run_crossing(
+        template, policy="balanced", perception=perception, seed=3, fault="bursts"
+    )
+    expected = [signature(each) for each in by_the_api.frames]
+    assert sum(len(each.tracks) for each in by_the_api.frames) > 5
+    (record,) = run_jobs(jobs, tmp_path / "run", workers=1)
+    assert record.duration_s == pytest.approx(by_the_api.duration_s)
+    assert record.perception == perception
+    (job,) = read_jobs(tmp_path / "run")
+    replayed, again = observed_episode(job)
+    assert again == record
+    assert [signature(each) for each in replayed.frames] == expected
+    env = gymnasium.make(
+        "sim_tests.learning:awarenav/Crossing-v0",
+        scenarios=template,
+        policy="balanced",
+        perception=perception,
+        fault="bursts",
+        normalised_actions=False,
+    ).unwrapped
+    env.reset(seed=3)
+    found = []
+    for frame in by_the_api.frames:
+        _, _, terminated, truncated, _ = env.step(np.array(frame.command))
+        found.append(signature(env.frame))
+        if terminated or truncated:
+            break
+    env.close()
+    # The last frame of a crossing that reaches its goal has a command that is not driven.
+    assert len(found) >= len(expected) - 1
+    assert found == expected[: len(found)]
+
+
+def test_a_task_without_people_is_driven_once_for_all_processes(tmp_path, monkeypatch):
+    """A line for every planner that is made: two for the task, and one for each episode."""
+    monkeypatch.setenv(run_planners.MARKER, str(tmp_path / "made"))
+    jobs = short_jobs(2, planners=["run_planners:Counted"])
+    records = run_jobs(jobs, tmp_path / "two", workers=2)
+    made = (tmp_path / "made").read_text().splitlines()
+    # One was made to see that it can be.
+    assert len(made) == 1 + 2 + len(jobs)
+    assert run_jobs(jobs, tmp_path / "one", workers=1) == records

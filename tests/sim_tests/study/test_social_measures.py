@@ -31,6 +31,19 @@ def test_the_random_episodes_reach_every_branch():
     assert {each["time_to_collision_s"] == 0.0 for each in found} == {True, False}
 
 
+def test_a_robot_that_strafes_is_measured_as_one_that_faces_its_way():
+    """The same course with the heading turned by 90°; only measures of the heading may differ."""
+    facing = random_episode(3)
+    fields = {name: getattr(facing, name) for name in type(facing).__dataclass_fields__}
+    turned = facing.robot_heading_rad + 0.5 * np.pi
+    aside = type(facing)(**{**fields, "robot_heading_rad": turned})
+    mine, yours = social_measures(facing), social_measures(aside)
+    of_the_heading = {name for name in mine if "irregularity" in name or "goal_angle" in name}
+    assert len(of_the_heading) == 3
+    for name in mine.keys() - of_the_heading:
+        assert mine[name] == pytest.approx(yours[name], abs=1e-9), name
+
+
 def test_without_people_their_measures_do_not_apply():
     measured = social_measures(random_episode(1, people=0))
     ours = random_episode(1, people=0)

@@ -14,10 +14,11 @@ control_hz: 20.0
 layout: {x_min_m: -3.0, y_min_m: -3.0, x_max_m: 6.0, y_max_m: 3.0}
 camera: {width_px: 640, height_px: 400}
 robot: {goal_x_m: 0.6}
-workers:
-  - path:
-      - {t_s: 0.0, x_m: 4.0, y_m: -0.8}
-      - {t_s: 2.0, x_m: 3.2, y_m: -0.8}
+people:
+  - name: walks
+    route: [{x_m: 4.0, y_m: -0.8}, {x_m: 3.2, y_m: -0.8}]
+    speed_mps: 0.4
+    glances: {notices_within_m: 0.0}
 """
 EPISODE = Episode(scenario="short", seed=0, policy="balanced", planner="SamplingPlanner")
 

@@ -53,7 +53,7 @@ DIVISOR = 3
 
 @pytest.fixture(scope="module")
 def stage() -> Iterator[Stage]:
-    with Stage(Scenario.shipped("crossing_attentive"), np.zeros(1)) as stage:
+    with Stage(Scenario.shipped("crossing_attentive")) as stage:
         yield stage
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from triangle_hits import shares_met
 
 from perception.laser import RobotMotion, scan_points
-from sim_tests.actors.robot import Amr, AmrLook
+from sim_tests.actors.robot import Amr, RobotLook
 from sim_tests.world import Warehouse
 from sim_tests.world.hall import WarehouseLayout, box
 from sim_tests.world.scanner import (
@@ -98,7 +98,7 @@ def test_tilted_sweeps_agree_with_a_test_of_every_ray_and_triangle(seed) -> None
 def test_the_diagonal_scanners_see_all_around_and_not_their_robot() -> None:
     with Warehouse(WarehouseLayout.named("open")) as warehouse:
         amr = Amr(warehouse)
-        warehouse.add_actor(AmrLook.of(warehouse, amr))
+        warehouse.add_actor(RobotLook.of(amr))
         scene = ScanScene(warehouse.layout, 0, warehouse.actors)
         angles = []
         for spec in DIAGONAL_SCANNERS:
@@ -125,7 +125,7 @@ def test_the_scanners_of_a_moving_robot_see_as_little_of_it(velocity_mps, yaw_ra
     """Its body moves with them, so that no ray starts behind its own front."""
     with Warehouse(WarehouseLayout.named("open")) as warehouse:
         amr = Amr(warehouse)
-        warehouse.add_actor(AmrLook.of(warehouse, amr))
+        warehouse.add_actor(RobotLook.of(amr))
         scene = ScanScene(warehouse.layout, 0, warehouse.actors)
         motion = RobotMotion(0.0, amr.T_odom_base, np.array(velocity_mps), yaw_rate_radps)
         for spec in DIAGONAL_SCANNERS:

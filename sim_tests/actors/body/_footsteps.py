@@ -1,42 +1,61 @@
-"""Footsteps of a walk that is not known beforehand: each step is placed while the body moves.
+"""Footsteps: each step is placed while the body moves.
 
-The gait is that of :func:`plan_footsteps`. A stance foot stays where it landed, rolls from heel to
-toe and lifts off. A swing foot aims at the place under the body at midstance, which is predicted
-from the body's velocity and acceleration. All arithmetic is scalar: NumPy is slow on two feet.
+A stance foot stays where it landed, rolls from heel to toe and lifts off. A swing foot aims at the
+place under the body at midstance, which is predicted from the body's velocity and acceleration. All
+arithmetic is scalar: NumPy is slow on two feet.
+
+A stance begins with the loading response (the toes come down after the heel) and ends with the
+roll-off (the heel lifts before the toes). Both take a share of the stance, up to a longest time.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Final
+from dataclasses import dataclass
+from typing import Any, Final
 
-from ._gait import Gait
-from ._gait_pose import (
-    ARM_SWING_RAD,
-    FOOT_LIFT_M,
-    LOADING_S,
-    LOADING_SHARE,
+from ._gait import (
     LONGEST_SWING_S,
     MAX_CADENCE_HZ,
-    MIDSTANCE_PHASE,
-    MIDSTANCE_SHIFT,
-    PELVIS_LIST_RAD,
-    PELVIS_TWIST_SHARE,
-    PELVIS_YAW_RAD,
-    ROLL_OFF_S,
-    ROLL_OFF_SHARE,
-    SWAY_M,
-    SWING_CLEARANCE_M,
-    THORAX_YAW_RAD,
-    TWIST_FROM_MPS,
-    TWIST_RAD,
+    FootPose,
+    Gait,
     GaitPose,
-    landing_pitch_rad,
-    lift_off_pitch_rad,
+    PlanarPose,
 )
-from ._gait_tables import GaitTables, PlanarPose
 from ._skeleton import LEFT, RIGHT, SIGNS
+
+_LOADING_SHARE: Final = 0.15
+_LOADING_S: Final = 0.18
+_ROLL_OFF_SHARE: Final = 0.43
+_ROLL_OFF_S: Final = 0.45
+# The weight is over the left foot at this phase, counted from its landing.
+_MIDSTANCE_PHASE: Final = 0.30
+# The body is over its foot earlier than halfway through a stance by this share of it.
+_MIDSTANCE_SHIFT: Final = 0.12
+# Lift of a foot in a swing as long as the comfortable stride.
+_FOOT_LIFT_M: Final = 0.035
+# A swing foot stays this much farther from the body's centre line than a stance foot.
+_SWING_CLEARANCE_M: Final = 0.010
+# A body that walks askew turns its feet towards the walk: at most by this angle, and less below
+# this speed.
+_TWIST_RAD: Final = math.radians(35.0)
+_TWIST_FROM_MPS: Final = 0.3
+
+# Amplitudes at the stride of a walk at 1.2 m/s.
+_PELVIS_YAW_RAD: Final = 0.07
+_PELVIS_LIST_RAD: Final = 0.035
+_THORAX_YAW_RAD: Final = 0.06
+_SWAY_M: Final = 0.016
+_ARM_SWING_RAD: Final = 0.36
+# Share of the angle between feet and heading that the pelvis follows.
+_PELVIS_TWIST_SHARE: Final = 0.75
+
+_LANDING_PITCH_RAD: Final = math.radians(-20.0)
+_LIFT_OFF_PITCH_RAD: Final = math.radians(40.0)
+# A backward step lands on the toes and lifts off from the heel.
+_BACKWARD_LANDING_PITCH_RAD: Final = math.radians(16.0)
+_BACKWARD_LIFT_OFF_PITCH_RAD: Final = math.radians(-12.0)
+_MAX_PITCH_FACTOR: Final = 1.15
 
 # Below both of these the body stands.
 _STANDING_BELOW_MPS: Final = 0.05
@@ -60,40 +79,35 @@ _MAX_TURN_RAD: Final = 0.7
 _SMOOTHING_S: Final = 0.15
 _HIPS_RISING_S: Final = 0.12
 _MAX_PITCH_RATE_RADPS: Final = 8.0
+# Longest time step of a steady walk.
+_STEADY_STEP_S: Final = 1.0 / 60.0
 
 
+@dataclass(slots=True)
 class _Foot:
     """One foot, in stance or in swing; its phase is the share of the cycle since it landed."""
 
-    __slots__ = (
-        "landed_for_s",
-        "lift_off_phase",
-        "lift_off_pitch",
-        "phase",
-        "pitch",
-        "place",
-        "swinging",
-        "target",
-    )
-
-    def __init__(self, place: PlanarPose) -> None:
-        self.place = self.target = place
-        self.swinging = False
-        self.phase = 0.0
-        self.lift_off_phase = 0.0
-        self.landed_for_s = math.inf
-        self.pitch = self.lift_off_pitch = 0.0
+    place: PlanarPose
+    target: PlanarPose
+    swinging: bool = False
+    phase: float = 0.0
+    lift_off_phase: float = 0.0
+    landed_for_s: float = math.inf
+    pitch: float = 0.0
+    lift_off_pitch: float = 0.0
 
     def copy(self) -> _Foot:
         """Return an independent foot in the same state."""
-        other = _Foot(self.place)
-        other.target = self.target
-        other.swinging = self.swinging
-        other.phase = self.phase
-        other.lift_off_phase = self.lift_off_phase
-        other.landed_for_s = self.landed_for_s
-        other.pitch, other.lift_off_pitch = self.pitch, self.lift_off_pitch
-        return other
+        return _Foot(
+            self.place,
+            self.target,
+            self.swinging,
+            self.phase,
+            self.lift_off_phase,
+            self.landed_for_s,
+            self.pitch,
+            self.lift_off_pitch,
+        )
 
 
 class OnlineFootsteps:
@@ -107,32 +121,20 @@ class OnlineFootsteps:
     """
 
     def __init__(self, gait: Gait, x_m: float, y_m: float, heading_rad: float) -> None:
-        self._tables = GaitTables(gait)
-        self._feet = [
-            _Foot(self._tables.neutral(side, x_m, y_m, heading_rad, 0.0)) for side in (LEFT, RIGHT)
-        ]
+        self._gait = gait
+        places = [gait.neutral(side, x_m, y_m, heading_rad, 0.0) for side in (LEFT, RIGHT)]
+        self._feet = [_Foot(place, place) for place in places]
         self._phase = 0.0
         self._walking = False
         self._stride_ratio = self._twist = 0.0
-        self._hip_height_m = self._tables.standing_height_m
+        self._hip_height_m = gait.standing.hip_height_m
         self._pose: GaitPose | None = None
-        self._before_step: (
-            tuple[float, bool, float, float, float, list[_Foot], GaitPose | None] | None
-        ) = None
+        # All attributes before the last step.
+        self._before_step: dict[str, Any] = {}
 
     def undo(self) -> None:
         """Take the last :meth:`step` back, because the body did not move."""
-        if self._before_step is not None:
-            (
-                self._phase,
-                self._walking,
-                self._stride_ratio,
-                self._twist,
-                self._hip_height_m,
-                self._feet,
-                self._pose,
-            ) = self._before_step
-            self._before_step = None
+        vars(self).update(self._before_step)
 
     def translate(self, dx_m: float, dy_m: float) -> GaitPose | None:
         """Shift feet and body without a step; return the pose, None before the first step."""
@@ -141,11 +143,8 @@ class OnlineFootsteps:
         for foot in self._feet:
             foot.place = (foot.place[0] + dx_m, foot.place[1] + dy_m, foot.place[2])
             foot.target = (foot.target[0] + dx_m, foot.target[1] + dy_m, foot.target[2])
-        (ax, ay, az, ayaw, apitch), (bx, by, bz, byaw, bpitch) = self._pose.feet
-        left = (ax + dx_m, ay + dy_m, az, ayaw, apitch)
-        right = (bx + dx_m, by + dy_m, bz, byaw, bpitch)
-        self._before_step = None
-        self._pose = replace(self._pose, feet=(left, right))
+        self._before_step = {}
+        self._pose = self._pose.moved(dx_m, dy_m)
         return self._pose
 
     def step(
@@ -163,15 +162,9 @@ class OnlineFootsteps:
             velocity: of the body, m/s and rad/s.
             acceleration: of the body, m/s².
         """
-        self._before_step = (
-            self._phase,
-            self._walking,
-            self._stride_ratio,
-            self._twist,
-            self._hip_height_m,
-            [foot.copy() for foot in self._feet],
-            self._pose,
-        )
+        left_foot, right_foot = self._feet
+        feet_before = [left_foot.copy(), right_foot.copy()]
+        self._before_step = {**vars(self), "_feet": feet_before, "_before_step": {}}
         x, y, heading = place
         vx, vy, turning = velocity
         speed = math.hypot(vx, vy)
@@ -179,16 +172,16 @@ class OnlineFootsteps:
         if speed > 1e-3:
             askew = math.atan2(vy, vx) - heading
         blend = 1.0 - math.exp(-dt_s / _SMOOTHING_S)
-        twist = TWIST_RAD * min(speed / TWIST_FROM_MPS, 1.0) * math.sin(2.0 * askew)
+        twist = _TWIST_RAD * min(speed / _TWIST_FROM_MPS, 1.0) * math.sin(2.0 * askew)
         self._twist += blend * (twist - self._twist)
         along = askew - self._twist
         forward, left = speed * math.cos(along), speed * math.sin(along)
-        stride_ratio = self._tables.stride_ratio(forward)
+        stride_ratio = self._gait.stride_ratio(forward)
         if speed <= _STANDING_BELOW_MPS:
             stride_ratio = 0.0
         self._stride_ratio += blend * (stride_ratio - self._stride_ratio)
-        share = min(self._tables.stance_share(speed), _MAX_STANCE_SHARE)
-        cadence = self._tables.cadence_hz(forward, left, turning)
+        share = min(self._gait.stance_share(speed), _MAX_STANCE_SHARE)
+        cadence = self._gait.cadence_hz(forward, left, turning)
         standing = speed <= _STANDING_BELOW_MPS and abs(turning) <= _STANDING_BELOW_RADPS
         facing = heading + self._twist
         if not self._walking and (
@@ -205,8 +198,12 @@ class OnlineFootsteps:
                 and not self._misplaced(x, y, facing, _REST_WITHIN_M, _REST_WITHIN_RAD)
             ):
                 self._walking = False
-        ankles = [self._ankle(side, dt_s, cadence, share, place) for side in (LEFT, RIGHT)]
-        self._pose = self._gait_pose(dt_s, (ankles[LEFT], ankles[RIGHT]), place)
+        rate = max(cadence, _MIN_CADENCE_HZ)
+        ankles = (
+            self._ankle(LEFT, dt_s, rate, share, place),
+            self._ankle(RIGHT, dt_s, rate, share, place),
+        )
+        self._pose = self._gait_pose(dt_s, ankles, place)
         return self._pose
 
     def _misplaced(
@@ -214,7 +211,7 @@ class OnlineFootsteps:
     ) -> bool:
         """Return whether a foot is too far from its neutral place in standing."""
         for side in (LEFT, RIGHT):
-            nx, ny, nyaw = self._tables.neutral(side, x, y, facing, 0.0)
+            nx, ny, nyaw = self._gait.neutral(side, x, y, facing, 0.0)
             px, py, pyaw = self._feet[side].place
             if math.hypot(nx - px, ny - py) > limit_m:
                 return True
@@ -242,7 +239,7 @@ class OnlineFootsteps:
         """Advance the cycle: feet land, lift off and aim at their next place."""
         x, y, facing = body[:3]
         rate = max(cadence, _MIN_CADENCE_HZ)
-        limit = _MAX_BEHIND_SHARE * self._tables.stature_m
+        limit = _MAX_BEHIND_SHARE * self._gait.stature_m
         for foot in self._feet:
             if not foot.swinging and math.hypot(x - foot.place[0], y - foot.place[1]) > limit:
                 rate = max(rate, min(_CATCH_UP_FACTOR * rate, MAX_CADENCE_HZ))
@@ -257,7 +254,7 @@ class OnlineFootsteps:
                 foot.landed_for_s += dt_s
                 other = self._feet[RIGHT - side]
                 if foot.phase >= share and not wrapped and not other.swinging:
-                    neutral = self._tables.neutral(side, x, y, facing, 0.0)
+                    neutral = self._gait.neutral(side, x, y, facing, 0.0)
                     if standing and _may_stay(foot.place, neutral):
                         continue
                     foot.swinging, foot.lift_off_phase = True, foot.phase
@@ -278,7 +275,7 @@ class OnlineFootsteps:
     ) -> PlanarPose:
         """Return the place of the swing foot under the body's predicted position at midstance."""
         x, y, facing, vx, vy, turning = body
-        midstance = 0.5 - MIDSTANCE_SHIFT * min(max(2.0 * self._stride_ratio, -1.0), 1.0)
+        midstance = 0.5 - _MIDSTANCE_SHIFT * min(max(2.0 * self._stride_ratio, -1.0), 1.0)
         ahead_s = (1.0 - self._feet[side].phase + midstance * share) / rate
         ax, ay = acceleration
         gain = vx * ax + vy * ay
@@ -290,16 +287,15 @@ class OnlineFootsteps:
         dx = vx * lasts_s + 0.5 * ax * lasts_s * lasts_s
         dy = vy * lasts_s + 0.5 * ay * lasts_s * lasts_s
         turn = min(max(turning * ahead_s, -_MAX_TURN_RAD), _MAX_TURN_RAD)
-        goal = self._tables.neutral(side, x + dx, y + dy, facing + turn, self._stride_ratio)
+        goal = self._gait.neutral(side, x + dx, y + dy, facing + turn, self._stride_ratio)
         start = self._feet[side].place
         return goal[0], goal[1], start[2] + math.remainder(goal[2] - start[2], math.tau)
 
     def _ankle(
-        self, side: int, dt_s: float, cadence: float, share: float, place: PlanarPose
-    ) -> tuple[float, float, float, float, float]:
-        """Return x, y, z, yaw, pitch of an ankle; advances the pitch of the foot."""
+        self, side: int, dt_s: float, rate: float, share: float, place: PlanarPose
+    ) -> FootPose:
+        """Return the pose of a foot; advances its pitch."""
         foot = self._feet[side]
-        rate = max(cadence, _MIN_CADENCE_HZ)
         stride_ratio = self._stride_ratio
         lift = 0.0
         x, y, yaw = foot.place
@@ -309,55 +305,53 @@ class OnlineFootsteps:
             tx, ty, tyaw = foot.target
             reach = math.hypot(tx - x, ty - y) + 0.25 * abs(tyaw - yaw)
             x, y, yaw = x + smooth * (tx - x), y + smooth * (ty - y), yaw + smooth * (tyaw - yaw)
-            lift_off, landing = foot.lift_off_pitch, landing_pitch_rad(stride_ratio)
+            lift_off, landing = foot.lift_off_pitch, _landing_pitch_rad(stride_ratio)
             swing_s = min((1.0 - share) / rate, LONGEST_SWING_S)
-            roll_off_s = min(ROLL_OFF_SHARE * share / rate, ROLL_OFF_S)
+            roll_off_s = min(_ROLL_OFF_SHARE * share / rate, _ROLL_OFF_S)
             pitch = lift_off + (landing - lift_off) * smooth
             pitch += 2.0 * lift_off * swing_s / roll_off_s * u * (1.0 - u) ** 2
             # The swing foot goes round the stance foot.
             sin, cos = math.sin(place[2] + self._twist), math.cos(place[2] + self._twist)
             beside = cos * (y - place[1]) - sin * (x - place[0])
-            clear = self._tables.half_width_m(side, stride_ratio) + SWING_CLEARANCE_M
+            clear = self._gait.half_width_m(side, stride_ratio) + _SWING_CLEARANCE_M
             bump = min(1.6 * math.sin(math.pi * u) ** 2, 1.0)
             aside = max(clear - SIGNS[side] * beside, 0.0) * bump
             x -= SIGNS[side] * aside * sin
             y += SIGNS[side] * aside * cos
             reach += 4.0 * aside
-            strides = min(reach / self._tables.comfortable_stride_m, 1.5)
-            lift = FOOT_LIFT_M * math.sqrt(strides) * math.sin(math.pi * u)
+            strides = min(reach / self._gait.comfortable_stride_m, 1.5)
+            lift = _FOOT_LIFT_M * math.sqrt(strides) * math.sin(math.pi * u)
         else:
             stance_s = share / rate
-            landed = min(foot.landed_for_s / min(LOADING_SHARE * stance_s, LOADING_S), 1.0)
+            landed = min(foot.landed_for_s / min(_LOADING_SHARE * stance_s, _LOADING_S), 1.0)
             landed = landed * landed * (3.0 - 2.0 * landed)
-            pitch = landing_pitch_rad(stride_ratio) * (1.0 - landed)
+            pitch = _landing_pitch_rad(stride_ratio) * (1.0 - landed)
             if self._walking and foot.phase < share:
                 until_lift_off_s = (share - foot.phase) / rate
-                roll_off_s = min(ROLL_OFF_SHARE * stance_s, ROLL_OFF_S)
+                roll_off_s = min(_ROLL_OFF_SHARE * stance_s, _ROLL_OFF_S)
                 rolled = max(1.0 - until_lift_off_s / roll_off_s, 0.0)
-                pitch += lift_off_pitch_rad(stride_ratio) * rolled * rolled
+                pitch += _lift_off_pitch_rad(stride_ratio) * rolled * rolled
         most = _MAX_PITCH_RATE_RADPS * dt_s
         foot.pitch += min(max(pitch - foot.pitch, -most), most)
-        ahead, height = self._tables.ankle(side, foot.pitch)
+        ahead, height = self._gait.ankle(side, foot.pitch)
         return x + ahead * math.cos(yaw), y + ahead * math.sin(yaw), height + lift, yaw, foot.pitch
 
     def _gait_pose(
         self,
         dt_s: float,
-        feet: tuple[
-            tuple[float, float, float, float, float], tuple[float, float, float, float, float]
-        ],
+        feet: tuple[FootPose, FootPose],
         place: PlanarPose,
     ) -> GaitPose:
         """Return the pose of hips and trunk over these feet; advances the hip height."""
         stride_ratio, size = self._stride_ratio, abs(self._stride_ratio)
         # The phase counts from the left foot's landing.
         turn = math.cos(math.tau * self._phase)
-        weight = math.cos(math.tau * (self._phase - MIDSTANCE_PHASE))
-        sway = SWAY_M * min(2.0 * size, 1.0) * weight
-        yaw = -PELVIS_YAW_RAD * stride_ratio * turn + PELVIS_TWIST_SHARE * self._twist
-        tilt = PELVIS_LIST_RAD * size * weight
+        weight = math.cos(math.tau * (self._phase - _MIDSTANCE_PHASE))
+        sway = _SWAY_M * min(2.0 * size, 1.0) * weight
+        yaw = -_PELVIS_YAW_RAD * stride_ratio * turn + _PELVIS_TWIST_SHARE * self._twist
+        tilt = _PELVIS_LIST_RAD * size * weight
         highest = min(
-            self._tables.hip_limit_m(feet, place, sway, yaw, tilt), self._tables.standing_height_m
+            self._gait.hip_limit_m(feet, place, sway, yaw, tilt), self._gait.standing.hip_height_m
         )
         if highest < self._hip_height_m:
             self._hip_height_m = highest
@@ -370,9 +364,9 @@ class OnlineFootsteps:
             sway,
             yaw,
             tilt,
-            THORAX_YAW_RAD * stride_ratio * turn,
+            _THORAX_YAW_RAD * stride_ratio * turn,
             stride_ratio,
-            -ARM_SWING_RAD * stride_ratio * turn,
+            -_ARM_SWING_RAD * stride_ratio * turn,
         )
 
 
@@ -382,3 +376,40 @@ def _may_stay(place: PlanarPose, neutral: PlanarPose) -> bool:
         math.hypot(neutral[0] - place[0], neutral[1] - place[1]) < _STAY_WITHIN_M
         and abs(math.remainder(neutral[2] - place[2], math.tau)) < _REST_WITHIN_RAD
     )
+
+
+def steady_walk(gait: Gait, walked_m: float, speed_mps: float) -> GaitPose:
+    """Return the pose in a straight walk at one speed, in the body's frame.
+
+    The feet have walked two to three cycles from standing; the distance gives the phase.
+
+    Args:
+        gait: the body's gait.
+        walked_m: distance walked so far.
+        speed_mps: speed ≥ 0; one too low to walk stands.
+    """
+    if speed_mps <= _STANDING_BELOW_MPS:
+        return gait.standing
+    cycle_m = speed_mps / max(gait.cadence_hz(speed_mps, 0.0, 0.0), _MIN_CADENCE_HZ)
+    start_m = -cycle_m * (2.0 + walked_m / cycle_m % 1.0)
+    steps = math.ceil(-start_m / speed_mps / _STEADY_STEP_S)
+    feet = OnlineFootsteps(gait, start_m, 0.0, 0.0)
+    pose = gait.standing
+    for step in range(steps):
+        x = start_m * (1.0 - (step + 1) / steps)
+        pose = feet.step(
+            -start_m / speed_mps / steps, (x, 0.0, 0.0), (speed_mps, 0.0, 0.0), (0.0, 0.0)
+        )
+    return pose
+
+
+def _landing_pitch_rad(stride_ratio: float) -> float:
+    """Return the pitch of a landing foot; toes down is positive."""
+    size = min(abs(stride_ratio), _MAX_PITCH_FACTOR)
+    return size * (_LANDING_PITCH_RAD if stride_ratio >= 0.0 else _BACKWARD_LANDING_PITCH_RAD)
+
+
+def _lift_off_pitch_rad(stride_ratio: float) -> float:
+    """Return the pitch of a foot that lifts off; toes down is positive."""
+    size = min(abs(stride_ratio), _MAX_PITCH_FACTOR)
+    return size * (_LIFT_OFF_PITCH_RAD if stride_ratio >= 0.0 else _BACKWARD_LIFT_OFF_PITCH_RAD)

@@ -1,4 +1,4 @@
-"""Forces that push a walker away from people, the robot, racks and walls.
+"""Forces that push a walker away from people, the robot, racks and walls, and ways round a robot.
 
 The social force of Helbing and Molnár 1995 (Physical Review E 51, 4282-4286) with the parameters
 that Moussaïd et al. 2009 (Proceedings of the Royal Society B 276, 2755-2762) measured:
@@ -12,7 +12,8 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
-from ._person import MovingBody, RobotBody
+from ._route import DesiredVelocity
+from ._surroundings import MovingBody, RobotBody
 
 #: Time constant with which a walker reaches the desired velocity.
 RELAXATION_S: Final = 0.54
@@ -28,6 +29,14 @@ _RANGE_M: Final = 5.0
 # The force is defined between the centres of two people. The nearest side of a robot counts as the
 # surface of a person, whose centre lies this far behind it.
 _SHOULDER_M: Final = 0.25
+# Ways lead round robots, and stop short of them, within this distance.
+_AVOIDED_WITHIN_M: Final = 3.0
+# A slower robot is walked around like an obstacle, with this clearance.
+_SLOW_MPS: Final = 0.15
+_CLEARANCE_M: Final = 0.45
+# A person walks no faster towards the robot than covers the distance beyond the standoff in this
+# time.
+_APPROACH_S: Final = 0.5
 
 
 def people_force(
@@ -91,3 +100,63 @@ def _interaction(dx: float, dy: float, closing_x: float, closing_y: float) -> tu
     # Head on, people step to the right, as on the European continent (Moussaïd et al. 2009).
     aside = base * math.exp(-((_ACROSS * reach * angle) ** 2)) * (1.0 if angle > -0.005 else -1.0)
     return -slower * tx + aside * ty, -slower * ty - aside * tx
+
+
+class SlowRobotDetour:
+    """A detour around a slow robot in the way, on one side of it until it is passed."""
+
+    def __init__(self) -> None:
+        self._side = 0.0  # +1 passes with the robot on the right, −1 on the left
+
+    def steer(
+        self, desired: DesiredVelocity, x: float, y: float, robot: RobotBody
+    ) -> DesiredVelocity:
+        """Return the desired velocity of a person at (x, y), turned to pass a slow robot."""
+        dx, dy = robot.x_m - x, robot.y_m - y
+        distance = math.hypot(dx, dy)
+        ahead = dx * desired.ux + dy * desired.uy
+        slow = math.hypot(robot.vx_mps, robot.vy_mps) < _SLOW_MPS
+        if not slow or desired.speed_mps <= 0.0 or ahead <= 0.0 or distance > _AVOIDED_WITHIN_M:
+            self._side = 0.0
+            return desired
+        robot_left_m = desired.ux * dy - desired.uy * dx
+        clearance_m = math.hypot(robot.half_length_m, robot.half_width_m) + _CLEARANCE_M
+        if abs(robot_left_m) >= clearance_m:
+            return desired
+        if self._side == 0.0:
+            self._side = -1.0 if robot_left_m > 0.0 else 1.0
+        # Along the tangent of the clearance circle; straight to the side from inside of it.
+        off = math.asin(min(clearance_m / max(distance, 1e-6), 1.0))
+        course = math.atan2(dy, dx) + self._side * off
+        return DesiredVelocity(math.cos(course), math.sin(course), desired.speed_mps)
+
+
+def limit_approach(
+    desired: DesiredVelocity, x: float, y: float, robot: RobotBody, standoff_m: float
+) -> DesiredVelocity:
+    """Return the desired velocity of a person at (x, y), without walking into the robot.
+
+    The standoff is the distance from the body's centre to the robot.
+    """
+    near_x, near_y = robot.nearest_point_m(x, y)
+    dx, dy = near_x - x, near_y - y
+    away = math.hypot(dx, dy)
+    if away > _AVOIDED_WITHIN_M or away < 1e-6:
+        return desired
+    nx, ny = dx / away, dy / away
+    vx, vy = desired.speed_mps * desired.ux, desired.speed_mps * desired.uy
+    limit = max(away - standoff_m, 0.0) / _APPROACH_S
+    excess = max(vx * nx + vy * ny - limit, 0.0)
+    if excess <= 0.0:
+        return desired
+    vx, vy = vx - excess * nx, vy - excess * ny
+    speed = math.hypot(vx, vy)
+    if speed < 1e-6:
+        return DesiredVelocity(desired.ux, desired.uy, 0.0)
+    return DesiredVelocity(vx / speed, vy / speed, speed)
+
+
+def without_part(vx: float, vy: float, nx: float, ny: float) -> tuple[float, float]:
+    """Return a velocity without its part along a direction; the opposite part stays."""
+    along = max(vx * nx + vy * ny, 0.0)
+    return vx - along * nx, vy - along * ny

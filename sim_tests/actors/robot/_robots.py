@@ -1,0 +1,492 @@
+"""Robots in the physics: the Nova Carter on driven wheels, and any outline moved within its limits.
+
+The base frame lies on the floor (REP-105's base_footprint): x forward, y left, z up.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from importlib import resources
+from typing import Any, Final, Literal, NamedTuple
+
+import numpy as np
+import shapely
+
+from nav_adapter import RobotProfile, RobotState
+from perception.arrays import FloatArray, finite_array, finite_number
+
+from ...world import ROBOT_GROUP, Warehouse
+from ...world.bullet import pybullet
+from ...world.errors import SimError
+from ._model import (
+    CAMERA_FORWARD_M,
+    CAMERA_HEIGHT_M,
+    NOVA_CARTER,
+    TRACK_M,
+    WHEEL_RADIUS_M,
+    RobotModel,
+)
+
+# Position of a camera that looks all around: above everything on the Nova Carter's post.
+_ABOVE_POST_M: Final = (0.12, 0.0, 1.55)
+# More than 98 kg at 1 m/s² need on two wheels (7 N·m each), and too little to spin the tyres.
+_MAX_WHEEL_TORQUE_NM: Final = 25.0
+_TYRE_FRICTION: Final = 1.0
+# The axes of the optical frame (x right, y down, z forward) in the base frame, as columns.
+_ROTATION_BASE_OPTICAL: Final = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+# A kinematic body ends this far above the floor.
+_FLOOR_GAP_M: Final = 0.02
+# A robot that is stopped again within this distance has not gone away meanwhile.
+_SAME_PLACE_M: Final = 0.05
+
+
+class Robot(ABC):
+    """A robot in a warehouse, with a camera that looks ahead.
+
+    Its speed (of a holonomic robot its velocity) follows the command within the accelerations of
+    the profile, its yaw rate within the yaw acceleration. The curve of a robot that steers is never
+    tighter than its turning radius.
+
+    Args:
+        warehouse: the world to drive in.
+        profile: footprint and limits, with those of the yaw rate.
+        camera_m: (x, y, z) of the camera in the base frame.
+
+    Attributes:
+        body: PyBullet's id of the robot.
+        profile: as given.
+        T_base_camera: (4, 4) pose of the optical frame in the base frame.
+    """
+
+    body: int
+
+    def __init__(
+        self, warehouse: Warehouse, profile: RobotProfile, camera_m: tuple[float, float, float]
+    ) -> None:
+        self.profile = profile
+        T_base_camera = np.eye(4)
+        T_base_camera[:3, :3], T_base_camera[:3, 3] = _ROTATION_BASE_OPTICAL, camera_m
+        T_base_camera.setflags(write=False)
+        self.T_base_camera: FloatArray = T_base_camera
+        self._client = warehouse.client
+        # Speed forward and to the left, and yaw rate: as commanded, and now.
+        self._targets = (0.0, 0.0, 0.0)
+        self._forward_mps, self._left_mps, self._yaw_rate_radps = 0.0, 0.0, 0.0
+        # T_odom_base and T_odom_camera of the same instant.
+        self._last_view: tuple[FloatArray | None, FloatArray] = None, np.eye(4)
+
+    def command(self, speed_mps: float, yaw_rate_radps: float, lateral_mps: float = 0.0) -> None:
+        """Set the target speed forward, yaw rate, and speed to the left of a holonomic robot.
+
+        A command beyond the robot's limits is clipped, as by its motor controller. Other robots
+        ignore ``lateral_mps``.
+
+        Raises:
+            SimError: for a number that is not finite; the targets stay.
+        """
+        forward = finite_number("speed_mps", speed_mps, SimError)
+        yaw_rate = finite_number("yaw_rate_radps", yaw_rate_radps, SimError)
+        left = finite_number("lateral_mps", lateral_mps, SimError)
+        limit, most = self.profile.max_speed_mps, self.profile.max_yaw_rate_radps or 0.0
+        if self.profile.drive == "holonomic":
+            over = max(math.hypot(forward, left) / limit, 1.0)
+            forward, left = forward / over, left / over
+        else:
+            forward, left = min(max(forward, -limit), limit), 0.0
+        self._targets = forward, left, min(max(yaw_rate, -most), most)
+
+    @abstractmethod
+    def advance(self, dt_s: float) -> None:
+        """Follow the command for ``dt_s`` > 0; call it before a physics step."""
+
+    @property
+    def driven_speed_mps(self) -> float:
+        """Speed of the drive along the direction of travel, negative backward.
+
+        A push from outside does not change it.
+        """
+        if self._left_mps == 0.0:
+            return self._forward_mps
+        return math.hypot(self._forward_mps, self._left_mps)
+
+    @abstractmethod
+    def state(self, stamp_s: float) -> RobotState:
+        """Return the robot's state."""
+
+    @property
+    @abstractmethod
+    def velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the base origin."""
+
+    @property
+    @abstractmethod
+    def T_odom_base(self) -> FloatArray:  # noqa: N802
+        """(4, 4) pose of the base frame in odom."""
+
+    @property
+    def T_odom_camera(self) -> FloatArray:  # noqa: N802
+        """(4, 4) pose of the camera's optical frame in odom."""
+        T_odom_base = self.T_odom_base
+        if self._last_view[0] is not T_odom_base:
+            T_odom_camera = np.asarray(T_odom_base @ self.T_base_camera)
+            T_odom_camera.setflags(write=False)
+            self._last_view = T_odom_base, T_odom_camera
+        return self._last_view[1]
+
+    @abstractmethod
+    def touches(self, body: int) -> bool:
+        """Return whether another body touches the robot."""
+
+    def _ramp(self, dt_s: float) -> bool:
+        """Bring speeds and yaw rate nearer to the command; return whether they change."""
+        before = self._forward_mps, self._left_mps, self._yaw_rate_radps
+        if before == self._targets:
+            return False
+        profile, (forward, left, yaw_rate) = self.profile, self._targets
+        rise, fall = profile.max_acceleration_mps2 * dt_s, profile.max_deceleration_mps2 * dt_s
+        if profile.drive == "holonomic":
+            change = forward - self._forward_mps, left - self._left_mps
+            size = math.hypot(*change)
+            slows = math.hypot(forward, left) < math.hypot(self._forward_mps, self._left_mps)
+            share = min((fall if slows else rise) / max(size, 1e-12), 1.0)
+            self._forward_mps += share * change[0]
+            self._left_mps += share * change[1]
+        else:
+            self._forward_mps = _ramped(self._forward_mps, forward, rise, fall)
+        step = (profile.max_yaw_acceleration_radps2 or 0.0) * dt_s
+        self._yaw_rate_radps = _ramped(self._yaw_rate_radps, yaw_rate, step, step)
+        if profile.min_turning_radius_m is not None:  # the yaw rate falls with the speed
+            most = abs(self._forward_mps) / profile.min_turning_radius_m
+            self._yaw_rate_radps = min(max(self._yaw_rate_radps, -most), most)
+        return before != (self._forward_mps, self._left_mps, self._yaw_rate_radps)
+
+
+class _Motion(NamedTuple):
+    """Pose and velocity of the base after one step of the physics."""
+
+    T_odom_base: FloatArray
+    heading_rad: float
+    speed_mps: float
+    yaw_rate_radps: float
+
+
+class Amr(Robot):
+    """The Nova Carter, a differential drive with a camera on a post; see :data:`NOVA_CARTER`.
+
+    The base frame lies midway between the drive wheels. Only the motors of the two wheel joints
+    move the robot, and their torque is limited.
+
+    Args:
+        warehouse: the world to drive in.
+        position_odom_m: (2,) start.
+        heading_odom_rad: heading at the start, counter-clockwise from odom x.
+        camera_mount: ``"front"`` or ``"top"`` of the post.
+
+    Raises:
+        SimError: for arguments that are not finite or out of range.
+    """
+
+    def __init__(
+        self,
+        warehouse: Warehouse,
+        position_odom_m: Any = (0.0, 0.0),
+        heading_odom_rad: float = 0.0,
+        camera_mount: Literal["front", "top"] = "front",
+    ) -> None:
+        x, y = finite_array("position_odom_m", position_odom_m, (2,), SimError).tolist()
+        heading = finite_number("heading_odom_rad", heading_odom_rad, SimError)
+        front_m = (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M)
+        camera_m = _ABOVE_POST_M if camera_mount == "top" else front_m
+        super().__init__(warehouse, NOVA_CARTER, camera_m)
+        self._warehouse = warehouse
+        source = resources.files("sim_tests.actors.robot") / "amr.urdf"
+        with resources.as_file(source) as path:
+            self.body = pybullet.loadURDF(
+                str(path),
+                basePosition=[x, y, 0.0],
+                baseOrientation=[0.0, 0.0, math.sin(0.5 * heading), math.cos(0.5 * heading)],
+                # A cylinder made of facets would roll bumpily.
+                flags=pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_IMPLICIT_CYLINDER,
+                physicsClientId=self._client,
+            )
+        self._set_up_dynamics()
+        # PyBullet reports the pose of the base link's centre of mass; this leads back to its frame.
+        dynamics = pybullet.getDynamicsInfo(self.body, -1, physicsClientId=self._client)
+        self._to_base_m = -np.array(dynamics[3])
+        self._read_at_step = -1
+        self._last_motion = _Motion(np.eye(4), 0.0, 0.0, 0.0)
+        self._drive()
+
+    def advance(self, dt_s: float) -> None:
+        """Ramp the wheels towards the command for ``dt_s`` > 0."""
+        dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
+        if self._ramp(dt):
+            self._drive()
+
+    def state(self, stamp_s: float) -> RobotState:
+        """Return the robot's state in the physics."""
+        motion = self._motion()
+        return RobotState(
+            stamp_s=stamp_s,
+            position_odom_m=motion.T_odom_base[:2, 3],
+            heading_odom_rad=motion.heading_rad,
+            speed_mps=motion.speed_mps,
+            yaw_rate_radps=motion.yaw_rate_radps,
+        )
+
+    @property
+    def velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the base origin, which points along the heading."""
+        motion = self._motion()
+        heading, speed = motion.heading_rad, motion.speed_mps
+        return np.array([speed * math.cos(heading), speed * math.sin(heading)])
+
+    @property
+    def T_odom_base(self) -> FloatArray:  # noqa: N802
+        """(4, 4) pose of the base frame in odom, with the slight pitch of its motion."""
+        return self._motion().T_odom_base
+
+    @property
+    def wheel_angles_rad(self) -> tuple[float, float]:
+        """Rotation of the left and the right wheel about base y."""
+        left, right = pybullet.getJointStates(self.body, self._wheels, physicsClientId=self._client)
+        return left[0], right[0]
+
+    def touches(self, body: int) -> bool:
+        """Return whether another body touches the robot."""
+        points = pybullet.getContactPoints(self.body, body, physicsClientId=self._client)
+        return any(point[8] <= 0.0 for point in points)
+
+    def _motion(self) -> _Motion:
+        """Return the motion after the latest step; it is read once per step."""
+        if self._read_at_step == self._warehouse.steps:
+            return self._last_motion
+        self._read_at_step = self._warehouse.steps
+        com, quaternion = pybullet.getBasePositionAndOrientation(
+            self.body, physicsClientId=self._client
+        )
+        velocity, angular = pybullet.getBaseVelocity(self.body, physicsClientId=self._client)
+        rotation = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+        arm = rotation @ self._to_base_m
+        (wx, wy, wz), (x, y, z), (vx, vy, vz) = angular, arm.tolist(), velocity
+        origin_velocity = np.array(
+            [vx + (wy * z - wz * y), vy + (wz * x - wx * z), vz + (wx * y - wy * x)]
+        )
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = rotation, com + arm
+        T.setflags(write=False)
+        self._last_motion = _Motion(
+            T,
+            math.atan2(rotation[1, 0], rotation[0, 0]),
+            float(origin_velocity @ rotation[:, 0]),
+            angular[2],
+        )
+        return self._last_motion
+
+    def _set_up_dynamics(self) -> None:
+        links = {
+            pybullet.getJointInfo(self.body, joint, physicsClientId=self._client)[
+                12
+            ].decode(): joint
+            for joint in range(pybullet.getNumJoints(self.body, physicsClientId=self._client))
+        }
+        self._wheels = [links["left_wheel"], links["right_wheel"]]
+        for link in (-1, *links.values()):
+            rolls = link in self._wheels
+            pybullet.changeDynamics(
+                self.body,
+                link,
+                # Casters and body slide without friction.
+                lateralFriction=_TYRE_FRICTION if rolls else 0.0,
+                rollingFriction=0.0,
+                spinningFriction=0.0,
+                restitution=0.0,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                physicsClientId=self._client,
+            )
+            pybullet.setCollisionFilterGroupMask(
+                self.body, link, ROBOT_GROUP, -1, physicsClientId=self._client
+            )
+
+    def _drive(self) -> None:
+        turn = 0.5 * TRACK_M * self._yaw_rate_radps
+        pybullet.setJointMotorControlArray(
+            self.body,
+            self._wheels,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[
+                (self._forward_mps - turn) / WHEEL_RADIUS_M,
+                (self._forward_mps + turn) / WHEEL_RADIUS_M,
+            ],
+            forces=[_MAX_WHEEL_TORQUE_NM, _MAX_WHEEL_TORQUE_NM],
+            physicsClientId=self._client,
+        )
+
+
+class KinematicRobot(Robot):
+    """Any robot that drives as its profile says, without wheels and motors.
+
+    The outline, extruded up to the height of the body, is what people touch. Racks and walls stop
+    it.
+
+    Args:
+        warehouse: the world to drive in.
+        model: the robot.
+        position_odom_m: (2,) start of the base origin.
+        heading_odom_rad: heading at the start, counter-clockwise from odom x.
+
+    Attributes:
+        model: as given.
+        bumps: number of times that a rack or a wall stopped it.
+
+    Raises:
+        SimError: for a position or heading that is not finite.
+    """
+
+    def __init__(
+        self,
+        warehouse: Warehouse,
+        model: RobotModel,
+        position_odom_m: Any = (0.0, 0.0),
+        heading_odom_rad: float = 0.0,
+    ) -> None:
+        x, y = finite_array("position_odom_m", position_odom_m, (2,), SimError).tolist()
+        self._x_m, self._y_m = x, y
+        self._heading_rad = finite_number("heading_odom_rad", heading_odom_rad, SimError)
+        super().__init__(warehouse, model.profile, model.camera_m)
+        self.model = model
+        self.bumps = 0
+        self._outline_m = model.outline_m
+        self._boxes = shapely.STRtree(shapely.box(*warehouse.obstacle_boxes_odom.T))
+        self._bumped_at_m: tuple[float, float] | None = None
+        self.body = self._make_body()
+        self._place()
+
+    def advance(self, dt_s: float) -> None:
+        """Move the body for ``dt_s`` > 0."""
+        dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
+        self._ramp(dt)
+        if self._forward_mps == self._left_mps == self._yaw_rate_radps == 0.0:
+            return
+        before = self._x_m, self._y_m, self._heading_rad
+        middle = self._heading_rad + 0.5 * self._yaw_rate_radps * dt
+        cos, sin = math.cos(middle), math.sin(middle)
+        self._x_m += (self._forward_mps * cos - self._left_mps * sin) * dt
+        self._y_m += (self._forward_mps * sin + self._left_mps * cos) * dt
+        self._heading_rad += self._yaw_rate_radps * dt
+        if self._hits_a_box():
+            self._x_m, self._y_m, self._heading_rad = before
+            self._forward_mps = self._left_mps = self._yaw_rate_radps = 0.0
+            self._count_bump()
+            return
+        self._place()
+
+    def state(self, stamp_s: float) -> RobotState:
+        """Return the robot's state."""
+        holonomic = self.profile.drive == "holonomic"
+        return RobotState(
+            stamp_s=stamp_s,
+            position_odom_m=np.array([self._x_m, self._y_m]),
+            heading_odom_rad=math.remainder(self._heading_rad, math.tau),
+            speed_mps=self._forward_mps,
+            yaw_rate_radps=self._yaw_rate_radps,
+            velocity_base_mps=(
+                np.array([self._forward_mps, self._left_mps]) if holonomic else None
+            ),
+        )
+
+    @property
+    def velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the base origin."""
+        cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
+        return np.array(
+            [
+                self._forward_mps * cos - self._left_mps * sin,
+                self._forward_mps * sin + self._left_mps * cos,
+            ]
+        )
+
+    @property
+    def T_odom_base(self) -> FloatArray:  # noqa: N802
+        """(4, 4) pose of the base frame in odom."""
+        return self._T_odom_base
+
+    def touches(self, body: int) -> bool:
+        """Return whether another body touches the outline."""
+        return bool(pybullet.getClosestPoints(self.body, body, 0.0, physicsClientId=self._client))
+
+    def _count_bump(self) -> None:
+        """Count a stop at a rack or wall, once for as long as the robot pushes on."""
+        here = self._x_m, self._y_m
+        last = self._bumped_at_m
+        self.bumps += last is None or math.dist(here, last) > _SAME_PLACE_M
+        self._bumped_at_m = here
+
+    def _hits_a_box(self) -> bool:
+        """Return whether the outline overlaps a rack, a wall or a prop."""
+        cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
+        corners = self._outline_m @ np.array([[cos, sin], [-sin, cos]]) + (self._x_m, self._y_m)
+        return bool(len(self._boxes.query(shapely.polygons(corners), predicate="intersects")))
+
+    def _make_body(self) -> int:
+        low, high = (
+            np.column_stack([self._outline_m, np.full(len(self._outline_m), z)])
+            for z in (_FLOOR_GAP_M, self.model.height_m)
+        )
+        shape = pybullet.createCollisionShape(
+            pybullet.GEOM_MESH,
+            vertices=np.vstack([low, high]).tolist(),
+            physicsClientId=self._client,
+        )
+        # A body without mass stays where it is put, and nothing pushes it.
+        body: int = pybullet.createMultiBody(
+            baseMass=0.0, baseCollisionShapeIndex=shape, physicsClientId=self._client
+        )
+        pybullet.setCollisionFilterGroupMask(
+            body, -1, ROBOT_GROUP, -1, physicsClientId=self._client
+        )
+        return body
+
+    def _place(self) -> None:
+        """Put the body where the robot is."""
+        half = 0.5 * self._heading_rad
+        pybullet.resetBasePositionAndOrientation(
+            self.body,
+            [self._x_m, self._y_m, 0.0],
+            [0.0, 0.0, math.sin(half), math.cos(half)],
+            physicsClientId=self._client,
+        )
+        cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
+        T = np.eye(4)
+        T[:2, :2] = [[cos, -sin], [sin, cos]]
+        T[:2, 3] = self._x_m, self._y_m
+        T.setflags(write=False)
+        self._T_odom_base: FloatArray = T
+
+
+def robot_of(
+    warehouse: Warehouse,
+    model: RobotModel | None,
+    position_odom_m: Any = (0.0, 0.0),
+    heading_odom_rad: float = 0.0,
+    *,
+    camera_mount: Literal["front", "top"] = "front",
+) -> Amr | KinematicRobot:
+    """Place the robot of a model; None is the Nova Carter, whose camera alone can be mounted."""
+    if model is None or model.body == "nova_carter":
+        return Amr(warehouse, position_odom_m, heading_odom_rad, camera_mount)
+    return KinematicRobot(warehouse, model, position_odom_m, heading_odom_rad)
+
+
+def _ramped(now: float, target: float, rise: float, fall: float) -> float:
+    """Return a step from ``now`` to ``target``: by ``rise`` away from zero, by ``fall`` towards it.
+
+    A change of sign stops at zero first.
+    """
+    if now * target < 0.0 or abs(target) < abs(now):
+        end = target if now * target >= 0.0 else 0.0
+        return max(now - fall, end) if now > 0.0 else min(now + fall, end)
+    return min(now + rise, target) if target > now else max(now - rise, target)

@@ -1,0 +1,477 @@
+"""The measures of an episode: each is one decorated function of the episode's log.
+
+A new measure is one function here: its name is the column of ``episodes.csv``, the end of the name
+its unit, its docstring its definition, and the order of the functions that of the columns. Tables,
+files, statistics, the report and the reference page of the documentation read the registry.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from . import _conflict, _driving
+from ._awareness import MeasuredAttention, awareness_class
+from ._registry import Awareness, Better, Column, Kind, Metric
+
+if TYPE_CHECKING:
+    from ...actors.behaviour import PersonOutcome
+    from ._log import Log
+
+#: Far edges of the intimate and the personal zone (E. T. Hall, The Hidden Dimension, 1966).
+INTIMATE_M: Final = 0.45
+PERSONAL_M: Final = 1.2
+# By what a measure returns, and what an episode without a log has.
+_KINDS: Final[dict[str, Kind]] = {
+    "str": "text",
+    "Awareness": "text",
+    "bool": "flag",
+    "int": "count",
+    "float": "number",
+    "float | None": "number",
+}
+_DEFAULTS: Final[dict[Kind, Any]] = {"text": "", "flag": False, "count": 0, "number": None}
+_UNITS: Final = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³"}
+
+#: The columns of ``episodes.csv`` by name, in their order.
+COLUMNS: Final[dict[str, Column]] = {}
+#: The measures, which are averaged over episodes, by name.
+METRICS: Final[dict[str, Metric]] = {}
+
+_Measure = Callable[["Log"], Any]
+
+
+def column(function: _Measure) -> _Measure:
+    """Make a function of the log a column that is no number to average."""
+    name = function.__name__
+    kind = _KINDS[function.__annotations__["return"]]
+    meaning = " ".join((inspect.getdoc(function) or "").split())
+    COLUMNS[name] = Column(name, kind, meaning, function, _DEFAULTS[kind])
+    return function
+
+
+def measure_of_log(
+    title: str, *, better: Better = "lower", decimals: int = 2
+) -> Callable[[_Measure], _Measure]:
+    """Make a function of the log a measure; :class:`Metric` describes the arguments."""
+
+    def register(function: _Measure) -> _Measure:
+        name = function.__name__
+        meaning = COLUMNS[column(function).__name__].meaning
+        unit = _UNITS.get(name.rpartition("_")[2], "")
+        METRICS[name] = Metric(name, title, unit, better, meaning, decimals)
+        return function
+
+    return register
+
+
+def condition(name: str, kind: Kind, meaning: str, default: Any = None) -> None:
+    """Add a column that says under which conditions the episode ran; without a default required."""
+    COLUMNS[name] = Column(name, kind, meaning, None, default, default is None and kind != "number")
+
+
+condition("scenario", "text", "Name of the scenario.")
+condition("seed", "count", "Of the episode.")
+condition("policy", "text", "Name of the policy.")
+condition("planner", "text", "Name of the planner.")
+condition(
+    "perception",
+    "text",
+    '``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are scanners too, '
+    'or ``"scanner"``.',
+)
+
+
+@column
+def success(log: Log) -> bool:
+    """The goal was reached and the robot touched nobody by its own motion."""
+    return log.result.success
+
+
+@column
+def contact(log: Log) -> bool:
+    """The robot, moving or not, and a person touched."""
+    return log.result.contact
+
+
+@column
+def contact_by(log: Log) -> str:
+    """``"robot"`` if the robot moved into a person, else ``"person"``, or empty."""
+    return log.result.contact_by
+
+
+@measure_of_log("Smallest separation", better="higher")
+def min_separation_m(log: Log) -> float | None:
+    """Smallest distance between the surfaces of robot and person."""
+    if not log.trace.people:
+        return None
+    return 0.0 if log.contacts else float(log.nearest_m.min())
+
+
+@measure_of_log("Time to goal")
+def time_to_goal_s(log: Log) -> float | None:
+    """Time until the goal was reached."""
+    return log.result.time_to_goal_s
+
+
+@measure_of_log("Highest speed within 2 m")
+def max_speed_within_2m_mps(log: Log) -> float | None:
+    """The robot's highest speed with a person's surface within 2 m."""
+    return log.result.max_speed_within_2m_mps if log.trace.people else None
+
+
+@measure_of_log("Smallest margin", better="higher")
+def min_margin_m(log: Log) -> float:
+    """Smallest separation margin S − S_p at a moving robot.
+
+    It is the surface distance less the protective separation of ISO 13855 and ISO/TS 15066.
+    """
+    return log.result.min_margin_m
+
+
+@measure_of_log("Margin violated", decimals=3)
+def violation_time_s(log: Log) -> float:
+    """Seconds an episode with the separation margin S − S_p below 0 at a moving robot."""
+    return log.result.violation_time_s
+
+
+@column
+def contacts(log: Log) -> int:
+    """Number of contacts."""
+    return len(log.contacts)
+
+
+@column
+def duration_s(log: Log) -> float:
+    """Simulated time."""
+    return log.result.duration_s
+
+
+condition("scenario_version", "count", "Version of the scenario.", 1)
+condition(
+    "attention",
+    "text",
+    'The scenario\'s ``attention``: ``"attentive"``, ``"unaware"`` or ``"mixed"``.',
+    "mixed",
+)
+condition("fault", "text", "Name of the fault, empty for none.", "")
+
+
+@column
+def time_without_people_s(log: Log) -> float | None:
+    """Time to goal of the same task in the empty hall."""
+    return log.time_without_people_s
+
+
+@measure_of_log("Time lost to people")
+def time_lost_s(log: Log) -> float | None:
+    """Time over that of the same task in the empty hall.
+
+    An episode that never arrives lost all its time.
+    """
+    if log.time_without_people_s is None:
+        return None
+    reached_s = log.result.time_to_goal_s
+    return log.result.duration_s if reached_s is None else reached_s - log.time_without_people_s
+
+
+@measure_of_log("Path length")
+def path_length_m(log: Log) -> float:
+    """Length of the path that the robot drove."""
+    return log.path_length_m
+
+
+@measure_of_log("Success weighted by path length", better="higher", decimals=3)
+def spl(log: Log) -> float | None:
+    """1 for every goal reached on the shortest way (Anderson et al. 2018)."""
+    return _driving.success_weighted(
+        log.result.success, log.path_length_m, log.length_without_people_m
+    )
+
+
+@measure_of_log("Speed when nearest")
+def speed_at_min_separation_mps(log: Log) -> float | None:
+    """The robot's speed at the instant of smallest separation."""
+    if not log.trace.people:
+        return None
+    fastest = log.fastest_mps(log.contacts)
+    if fastest is not None:
+        return fastest
+    return float(log.trace.travel_mps[int(np.argmin(log.nearest_m))])
+
+
+@measure_of_log("Smallest time to collision", better="higher")
+def min_time_to_collision_s(log: Log) -> float | None:
+    """Time until robot and person would touch if both went straight on, at its smallest."""
+    return _conflict.min_time_to_collision_s(log.trace, log.outline)
+
+
+@measure_of_log("Post-encroachment time", better="higher")
+def post_encroachment_s(log: Log) -> float | None:
+    """Smallest time between one leaving a place and the other entering it."""
+    return _conflict.post_encroachment_s(log.trace, log.outline)
+
+
+@measure_of_log("Time within 0.45 m")
+def intimate_s(log: Log) -> float:
+    """Seconds an episode with a person's surface in the intimate zone."""
+    return log.trace.time_with(log.nearest_m < INTIMATE_M)
+
+
+@measure_of_log("Time within 1.2 m")
+def personal_s(log: Log) -> float:
+    """Seconds an episode with a person's surface in the personal zone."""
+    return log.trace.time_with(log.nearest_m < PERSONAL_M)
+
+
+@measure_of_log("Contacts by the robot", decimals=3)
+def robot_contacts(log: Log) -> int:
+    """Contacts of a robot that moved into a person."""
+    return len(log.contacts_by_robot)
+
+
+@measure_of_log("Contacts by people", decimals=3)
+def person_contacts(log: Log) -> int:
+    """Contacts of people who walked into the robot."""
+    return len(log.contacts) - len(log.contacts_by_robot)
+
+
+@measure_of_log("Speed at contact")
+def contact_speed_mps(log: Log) -> float | None:
+    """The robot's highest speed at a contact that it caused."""
+    return log.fastest_mps(log.contacts_by_robot)
+
+
+@measure_of_log("Peak deceleration")
+def peak_deceleration_mps2(log: Log) -> float | None:
+    """The robot's strongest braking."""
+    return log.peak_deceleration_and_jerk[0]
+
+
+@measure_of_log("Peak jerk", decimals=1)
+def peak_jerk_mps3(log: Log) -> float | None:
+    """The robot's largest jerk."""
+    return log.peak_deceleration_and_jerk[1]
+
+
+@measure_of_log("Stops")
+def stops(log: Log) -> int:
+    """Number of times that the robot came to a stand before the goal."""
+    arrived = log.result.time_to_goal_s is not None
+    return _driving.count_stops(log.trace.travel_mps, ~log.moves, arrived)
+
+
+@measure_of_log("Delay of people")
+def human_delay_s(log: Log) -> float | None:
+    """Time that people took over their free walks, all people of an episode together.
+
+    Somebody who is still on the way counts with the delay so far.
+    """
+    # That is the least it can become: a robot that blocks somebody for good must not score better
+    # than one that delays them.
+    delays = [late for person in log.result.people if (late := _delay_s(person)) is not None]
+    return sum(delays) if delays else None
+
+
+@measure_of_log("Detour of people")
+def human_detour_m(log: Log) -> float | None:
+    """Way that people walked over their free ways, all people of an episode together.
+
+    Those count who reached the end of their route.
+    """
+    detours = [
+        person.length_m - person.free_length_m
+        for person in log.result.people
+        if None not in (person.time_s, person.free_time_s) and person.free_length_m is not None
+    ]
+    return sum(detours) if detours else None
+
+
+def _delay_s(person: PersonOutcome) -> float | None:
+    """Return the delay of a person, so far for somebody who is still on the way; None for none."""
+    if person.time_s is None or person.free_time_s is None:
+        return person.late_s
+    return person.time_s - person.free_time_s
+
+
+@measure_of_log("Warnings", better="neither")
+def warnings(log: Log) -> int:
+    """Warnings of a collision that the robot asked for."""
+    return sum(
+        alert.kind != "attention"
+        for frame in log.result.frames
+        for alert in frame.constraints.alerts
+    )
+
+
+@measure_of_log("Error of α", decimals=3)
+def awareness_error(log: Log) -> float | None:
+    """Mean |α of the track − true α| over the people tracked."""
+    tracked, _ = log.tracked_awareness
+    known = np.isfinite(tracked)
+    return float(np.abs(tracked - log.trace.awareness)[known].mean()) if known.any() else None
+
+
+@column
+def awareness(log: Log) -> Awareness:
+    """Awareness of the person who came nearest, and the robot's judgement of it."""
+    if log.nearest_person is None:
+        return ""
+    row, person = log.nearest_person
+    true, (_, lower) = log.trace.awareness, log.tracked_awareness
+    return awareness_class(log.trace.t_s, true[:, person], lower[:, person], row)
+
+
+@column
+def reaction(log: Log) -> str:
+    """Reaction of that person, see :class:`PersonOutcome`."""
+    if log.nearest_person is None:
+        return ""
+    person = log.nearest_person[1]
+    return log.result.people[person].reaction if person < len(log.result.people) else ""
+
+
+condition(
+    "error",
+    "text",
+    "The error that ended the episode, empty for none; with an error, every metric keeps its "
+    "default.",
+    "",
+)
+condition(
+    "nondeterministic",
+    "flag",
+    "The user's planner gave other commands when it drove the task without people a second time, "
+    "with the same seed; the row may differ in another run.",
+    False,
+)
+
+
+@measure_of_log("Least attentive person", better="neither")
+def attentive_share(log: Log) -> float | None:
+    """Smallest share of the time for which one of the people had a true α ≥ 0.5.
+
+    Counted while the robot was in front of them, in sight and within 5 m.
+    """
+    return MeasuredAttention.of(log.trace).least_aware_share
+
+
+@measure_of_log("Contacts with a moving robot", decimals=3)
+def moving_contacts(log: Log) -> int:
+    """Contacts of a person and a moving robot, by any cause."""
+    return len(log.moving_contacts)
+
+
+@measure_of_log("Speed at contact, any cause")
+def moving_contact_mps(log: Log) -> float | None:
+    """The robot's highest speed at a contact with a person, by any cause."""
+    return log.fastest_mps(log.moving_contacts)
+
+
+@measure_of_log("Step-out impacts, unaware")
+def step_out_unaware(log: Log) -> float:
+    """Expected impacts per 1 000 crossings with people who have not looked for 1 s or never.
+
+    They set off at any time and ignore the robot. An index, not a rate of accidents.
+    """
+    return log.step_out.unaware
+
+
+@measure_of_log("Step-out impacts above 0.25 m/s, unaware")
+def step_out_unaware_fast(log: Log) -> float:
+    """Those step-out impacts with unaware people in which the robot closes at over 0.25 m/s."""
+    return log.step_out.unaware_fast
+
+
+@measure_of_log("Step-out impacts, aware")
+def step_out_aware(log: Log) -> float:
+    """Expected impacts per 1 000 crossings with people who have looked within 1 s.
+
+    Everyone who sets off ignores the robot. Few do: an upper bound.
+    """
+    return log.step_out.aware
+
+
+@measure_of_log("Step-out impacts above 0.25 m/s, aware")
+def step_out_aware_fast(log: Log) -> float:
+    """Those step-out impacts with aware people in which the robot closes at over 0.25 m/s."""
+    return log.step_out.aware_fast
+
+
+@measure_of_log("Worst step-out impact, unaware")
+def step_out_worst_mps(log: Log) -> float:
+    """The robot's highest closing speed in a step-out impact with an unaware person."""
+    return log.step_out.worst_mps
+
+
+@measure_of_log("Step-out impacts of faster starts, unaware")
+def step_out_stress_unaware(log: Log) -> float:
+    """Step-out impacts with unaware people who start faster than recorded.
+
+    They come to 1.6 m/s with a time constant of 0.35 s.
+    """
+    return log.step_out_stress.unaware
+
+
+@measure_of_log("Worst step-out impact of faster starts, unaware")
+def step_out_stress_worst_mps(log: Log) -> float:
+    """The robot's highest closing speed in a step-out impact of a faster start.
+
+    The person is unaware, and starts faster than recorded.
+    """
+    return log.step_out_stress.worst_mps
+
+
+@measure_of_log("Contacts with a moving robot, unaware", decimals=3)
+def moving_contacts_unaware(log: Log) -> int:
+    """Contacts of a moving robot and a person who has not looked for 1 s, or never."""
+    return len(log.moving_contacts_unaware)
+
+
+@measure_of_log("Speed at contact, unaware")
+def moving_contact_unaware_mps(log: Log) -> float | None:
+    """The robot's highest speed at a contact with such a person, by any cause."""
+    return log.fastest_mps(log.moving_contacts_unaware)
+
+
+@measure_of_log("Smallest margin, unaware", better="higher")
+def min_margin_unaware_m(log: Log) -> float | None:
+    """Smallest separation margin at a moving robot to people unaware of it.
+
+    They have not looked for 1 s, or never.
+    """
+    counts = log.unaware & log.moves[:, None]
+    return float(log.margins_m[counts].min()) if counts.any() else None
+
+
+@measure_of_log("Requests for attention")
+def requests(log: Log) -> int:
+    """Number of times that an episode's robot asked somebody to look at it."""
+    return log.requests.requests
+
+
+@measure_of_log("Requests answered", better="higher")
+def requests_answered(log: Log) -> int:
+    """Requests whose person began to look at the robot within 2.5 s."""
+    return log.requests.answered
+
+
+@measure_of_log("Needless requests")
+def requests_needless(log: Log) -> int:
+    """Requests to somebody who, a second later, neither set the speed limit nor had looked."""
+    return log.requests.needless
+
+
+@measure_of_log("People asked twice")
+def asked_twice(log: Log) -> int:
+    """People of an episode who were asked more than once."""
+    return log.requests.asked_twice
+
+
+@measure_of_log("Requests after an answer")
+def requests_after_answer(log: Log) -> int:
+    """Requests to a track that had answered before; there should be none."""
+    return log.requests.after_answer

@@ -1,0 +1,148 @@
+"""The conditions of an episode: every axis reaches every place, and a new one is one field."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+from paths import ROOT
+from run_scenes import SHORT
+
+from awarenav.cli import app
+from sim_tests import run_crossing
+from sim_tests.actors.behaviour import POPULATIONS as KNOWN_POPULATIONS
+from sim_tests.actors.robot import RobotModel
+from sim_tests.conditions import AXES, OPTIONS, POPULATIONS, Conditions, Experiment
+from sim_tests.crossing import Setup
+from sim_tests.scenario import ScenarioTemplate
+from sim_tests.study.measures import RECORD_COLUMNS, EpisodeRecord
+from sim_tests.study.runs import Job, experiment_jobs
+
+#: Options that a command of crossings does not have.
+WITHOUT = {
+    "crossings": (),
+    "watch": ("scenario",),  # an argument
+    "tune": ("fault",),
+    "falsify": ("fault",),
+    "frontier": ("policy", "fault"),
+}
+
+
+def test_every_axis_has_an_option_a_column_and_a_place_in_job_and_key():
+    assert set(AXES) <= set(OPTIONS)
+    assert set(AXES) <= set(RECORD_COLUMNS)
+    assert issubclass(EpisodeRecord, Conditions)
+    assert issubclass(Job, Conditions)
+    key = Conditions(*map(str, range(len(AXES))))
+    record = EpisodeRecord(*map(str, range(len(AXES))), success=True)
+    assert record.conditions == key
+    assert POPULATIONS == KNOWN_POPULATIONS
+
+
+@pytest.mark.parametrize("name", WITHOUT)
+def test_every_command_has_the_options_of_the_axes(name):
+    command = app.get_command(None, name)
+    names = {parameter.name for parameter in command.params}
+    assert set(OPTIONS) - names == {each for each in WITHOUT[name] if each != "scenario"}
+
+
+def test_the_api_and_a_job_have_the_same_conditions():
+    given = {"policy": "blind", "robot": "omni", "camera": "surround", "population": "recorded"}
+    values = {**given, "scenario": "late_glance", "perception": "truth", "seed": 4}
+    (job,) = experiment_jobs(Experiment.taken_from({**values, "fault": "misses_30"}))
+    setup = Setup.of("late_glance", **given, seed=4, fault="misses_30")
+    assert setup.conditions == job.conditions
+    assert job.conditions.text == (
+        "late_glance_omni, seed 4, policy blind, SamplingPlanner, perception truth, "
+        "camera surround, robot omni, population recorded, fault misses_30"
+    )
+    drawn = ScenarioTemplate.from_text(job.scenario_text).for_seed(4)
+    assert setup.scenario == drawn
+    assert setup.scenario.population == "recorded"
+    assert setup.scenario.robot_model == RobotModel.shipped("omni")
+    assert len(setup.scenario.camera.views_deg) > 1
+
+
+def test_a_drawn_scenario_is_changed_as_its_template_is():
+    template = ScenarioTemplate.shipped("blind_corner")
+    changes = {"robot": RobotModel.shipped("forklift"), "population": "answers=0.9"}
+    first = Setup.of(template.for_seed(2), policy="blind", seed=2, **changes)
+    second = Setup.of(template, policy="blind", seed=2, **changes)
+    assert first.scenario == second.scenario
+    assert first.conditions.robot == "forklift"
+
+
+def test_an_unknown_axis_is_refused():
+    with pytest.raises(TypeError, match="unexpected keyword argument 'weather'"):
+        run_crossing("blind_corner", policy="blind", weather="rain")
+
+
+#: Adds a field to the conditions and its meaning to scenarios; nothing else.
+NEW_AXIS = """
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import sim_tests
+
+FIELD = '''
+    lasts: str = _axis(
+        "Time that the episode lasts.",
+        empty=True,
+        changes_scenario=True,
+        help="Another time that each scenario lasts.",
+        default="",
+        metavar="S",
+    )
+
+    @property
+    def conditions(self)'''
+path = Path(sim_tests.__file__).with_name("conditions.py")
+source = path.read_text().replace("\\n    @property\\n    def conditions(self)", FIELD, 1)
+module = ModuleType("sim_tests.conditions")
+module.__package__ = "sim_tests"
+sys.modules["sim_tests.conditions"] = sim_tests.conditions = module
+exec(compile(source, str(path), "exec"), module.__dict__)
+
+from sim_tests.scenario import ScenarioTemplate
+
+def with_lasts(template, text):
+    data = {**template._data, "duration_s": float(text)}
+    return ScenarioTemplate(data, template._source)
+
+ScenarioTemplate.with_lasts = with_lasts
+
+from awarenav.cli import main
+from sim_tests import run_crossing
+from sim_tests.learning import CrossingEnv
+
+scenario, out = sys.argv[1:]
+words = ["crossings", "--scenario", scenario, "--policy", "blind", "--perception", "truth"]
+assert main([*words, "--lasts", "0.5", "--workers", "1", "--no-report", "--out", out]) == 0
+result = run_crossing(scenario, policy="blind", lasts="0.5")
+assert 0.3 < result.duration_s < 0.5, result.duration_s
+env = CrossingEnv(scenario, lasts="0.5")
+env.reset(seed=0)
+assert env.crossing.scenario.duration_s == 0.5
+"""
+
+
+@pytest.mark.slow
+def test_a_new_axis_is_one_field_and_its_meaning(tmp_path):
+    pytest.importorskip("gymnasium", reason="needs the extra awarenav[gym]")
+    scenario, out = tmp_path / "short.yaml", tmp_path / "run"
+    scenario.write_text(SHORT.format(name="short"))
+    program = tmp_path / "program.py"
+    program.write_text(NEW_AXIS)
+    words = [sys.executable, str(program), str(scenario), str(out)]
+    subprocess.run(words, check=True, cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, timeout=120)
+    header, row = (out / "episodes.csv").read_text().splitlines()
+    cells = dict(zip(header.split(","), row.split(","), strict=True))
+    assert cells["lasts"] == "0.5"
+    assert float(cells["duration_s"]) < 0.5
+    assert json.loads((out / "jobs.jsonl").read_text())["lasts"] == "0.5"
+    about = json.loads((out / "run.json").read_text())
+    assert about["settings"]["lasts"] == "0.5"
+    assert "--lasts 0.5" in about["command"]
