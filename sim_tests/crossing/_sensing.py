@@ -10,26 +10,28 @@ import numpy as np
 from nav_adapter import AwarenessPolicy, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import FloatArray
-from perception.laser import AHEAD_RAD, RobotMotion, SeenDirections
+from perception.laser import AHEAD_RAD, SeenDirections
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
 from ..conditions import ORACLE, Perception
-from ..world.camera import CameraTiming
+from ..world.camera import CameraTiming, FrameQueue
 from ..world.errors import SimError
 from ._stage import Stage, TrueView
 from .eyes import (
+    Change,
+    Delivery,
     KeypointNoise,
     MapView,
+    OdometryReading,
     ScannerEyes,
     Sighting,
     TimedEyes,
     WorkerObservations,
-    known_motion,
     make_eyes,
     pixel_timing,
     scanner_sensors,
 )
-from .faults import Fault, FaultInjection, FaultyEyes
+from .faults import EpisodeFaults, Fault
 
 #: Random streams of an episode: one that is spare, of the camera's noise, its losses and delays,
 #: and the people.
@@ -92,25 +94,22 @@ class Sensing:
     ) -> None:
         self._stage = stage
         _, camera_rng, timing_rng, _ = np.random.default_rng(seed).spawn(STREAMS)
-        injection = FaultInjection(fault, seed)
         model, timing = _camera_and_timing(stage, perception.kind)
-        self._camera: FaultyEyes | None = None
+        faults = EpisodeFaults(fault, seed, model)
+        self._camera: TimedEyes | None = None
         if perception.kind:
             eyes = make_eyes(
                 perception.kind,
                 stage,
                 model,
-                AttentionCone() if cone is None else cone,
-                KeypointNoise() if noise is None else noise,
                 camera_rng,
-                pipeline,
-                injection.T_camera_assumed,
-                injection.picture,
+                cone=AttentionCone() if cone is None else cone,
+                noise=KeypointNoise() if noise is None else noise,
+                pipeline=pipeline,
+                pictures=faults.pictures(),
             )
-            self._camera = injection.eyes(
-                TimedEyes(eyes, timing, timing_rng), model, pictures=perception.kind == "pixels"
-            )
-        self._odometry = injection.odometry()
+            self._camera = TimedEyes(eyes, timing, timing_rng, faults.images())
+        self._odometry = Odometry(faults.odometry())
         self._scanners: ScannerEyes | None = None
         if perception.has_scanners:
             specs, body = stage.scenario.scanners, stage.amr.profile.footprint_m
@@ -119,17 +118,12 @@ class Sensing:
                     f"perception {perception.name!r} needs laser scanners, but the scenario "
                     f"{stage.scenario.name!r} has none (scanners: [])"
                 )
-            self._scanners = ScannerEyes(
-                stage.warehouse,
-                specs,
-                body,
-                seed,
-                mountings=injection.mountings(specs, body),
-                change=injection.scan_change(specs),
-            )
+            changes = [faults.scans(number, spec, body) for number, spec in enumerate(specs)]
+            self._scanners = ScannerEyes(stage.warehouse, specs, body, seed, changes)
         self._tracker = _make_tracker(perception, policy, stage, model)
         self._newest_s: dict[str, float] = {}
         self._seen = SeenDirections()
+        self._ahead_s: float | None = None
 
     def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
         """Take the images and scans that are due; return what the robot knows then.
@@ -140,12 +134,10 @@ class Sensing:
         """
         amr = self._stage.amr
         T_odom_camera, state = amr.T_odom_camera, amr.state(t_s)
-        known = self._odometry.update(state, T_odom_camera)
+        known = self._odometry.take(OdometryReading(state, T_odom_camera))
         sightings: tuple[Sighting, ...] = ()
         if self._scanners is not None:
-            velocity = np.array([state.speed_mps, state.lateral_mps])
-            motion = RobotMotion(t_s, amr.T_odom_base, velocity, state.yaw_rate_radps)
-            sightings = self._scanners.look(t_s, motion, known_motion(known.state))
+            sightings = self._scanners.look(t_s, amr.T_odom_base, state, known.state)
         if self._camera is not None:
             sightings += self._camera.look(t_s, T_odom_camera, known.T_odom_camera, truth)
         observed: WorkerObservations = ()
@@ -162,6 +154,7 @@ class Sensing:
             )
             if sighting.sight is not None:
                 self._seen.note(sighting.sight, sighting.stamp_s)
+                self._ahead_s = self._seen.stamp_s(0.0, AHEAD_RAD)
             if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
                 self._newest_s[sighting.sensor] = sighting.stamp_s
                 if sighting.points_odom_m is None:
@@ -182,8 +175,7 @@ class Sensing:
     def _perceived_s(self) -> float:
         """Return the time from which camera or scanners know what is ahead, as on a robot."""
         newest_s = self._newest_s.get("camera", -_NEVER_S)
-        seen_s = None if self._scanners is None else self._seen.stamp_s(0.0, AHEAD_RAD)
-        return newest_s if seen_s is None else max(newest_s, seen_s)
+        return newest_s if self._ahead_s is None else max(newest_s, self._ahead_s)
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:
         """Return whether the tracker takes a sighting.
@@ -197,6 +189,33 @@ class Sensing:
             return False
         newest_s = max(self._newest_s.values(), default=-_NEVER_S)
         return newest_s - sighting.stamp_s <= self._tracker.config.max_lag_s
+
+
+class Odometry:
+    """The robot's odometry: the newest message that has arrived, one of which is sent every cycle.
+
+    Args:
+        change: faults of the messages; None for none.
+    """
+
+    def __init__(self, change: Change[OdometryReading] | None) -> None:
+        self._change = change
+        self._queue: FrameQueue[OdometryReading] = FrameQueue()
+        self._known: OdometryReading | None = None
+
+    def take(self, reading: OdometryReading) -> OdometryReading:
+        """Return what the robot knows when the true reading is sent; stamps grow."""
+        if self._change is None:
+            return reading
+        now_s = reading.state.stamp_s
+        sent = self._change(Delivery(reading, now_s, now_s, reading.T_odom_camera))
+        if sent is not None:
+            self._queue.put(now_s, sent.arrives_s, sent.message)
+        if self._known is None:  # before the first message has arrived, the robot knows its start
+            self._known = reading if sent is None else sent.message
+        arrived = self._queue.take(now_s)
+        self._known = arrived[-1] if arrived else self._known
+        return self._known
 
 
 def _camera_and_timing(stage: Stage, kind: str) -> tuple[Camera, CameraTiming]:

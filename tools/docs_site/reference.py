@@ -17,7 +17,7 @@ from nav_adapter import AwarenessPolicy, InflationPolicy, SpeedPolicy
 from nav_adapter.policies import InterpolatedHumanSpeed, InterpolatedInflation
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, RobotFile, Topic
 from nav_adapter.ros2.messages import ros_type
-from sim_tests.crossing.faults import Fault
+from sim_tests.crossing.faults import FAULT_KINDS, Fault, SensorFault
 from sim_tests.dataset import RenderConfig
 from sim_tests.scenario import Scenario
 from sim_tests.study.measures import COLUMNS, METRICS, RATIOS, SHARES, Metric
@@ -156,7 +156,10 @@ class SettingsPage:
         return "\n".join(parts)
 
     def models(self) -> Iterator[tuple[str, type[BaseModel]]]:
-        """Yield every model once, with the path of the first key that holds it."""
+        """Yield every model once, with the path of the first key that holds it.
+
+        A model with a ``key`` names its own.
+        """
         seen: set[type[BaseModel]] = set()
         waiting: list[tuple[str, type[BaseModel]]] = [("", self.model)]
         while waiting:
@@ -166,7 +169,7 @@ class SettingsPage:
             seen.add(model)
             yield path, model
             inside = [
-                (f"{path}.{name}" if path else name, found)
+                (getattr(found, "key", "") or (f"{path}.{name}" if path else name), found)
                 for name, info in model.model_fields.items()
                 for found in self._held(info.annotation)
             ]
@@ -198,7 +201,13 @@ SETTINGS_PAGES: Final = {
     "tracker-keys": SettingsPage(
         "Tracker keys", "Settings of the tracker, for [tracking](../tracking.md).", TrackerConfig
     ),
-    "fault-keys": SettingsPage("Fault keys", "The keys of a fault.", Fault),
+    "fault-keys": SettingsPage(
+        "Fault keys",
+        "The keys of a fault's file. A heading below names the mapping that holds the keys; those "
+        "under `faults` stand in the file itself, those of scanners below `scanner`.",
+        Fault,
+        {SensorFault: FAULT_KINDS},
+    ),
     "robot-keys": SettingsPage(
         "Robot file of the bridge",
         "The file that `awarenav bridge --robot` reads, for [Nav2](../nav2.md).",

@@ -1,31 +1,41 @@
-"""Perception of people in a crossing: the truth, simulated keypoints, or pixels."""
+"""Perception of people in a crossing: the truth, simulated keypoints, pixels, or laser scans."""
 
 from __future__ import annotations
 
-from ._eyes import NOBODY, Eyes, Sighting, SurroundEyes, TimedEyes, WorkerObservations
+from ._camera_eyes import Exposure, Eyes, MapView, SurroundEyes, TimedEyes, TrueEyes
 from ._keypoint_camera import KeypointCamera, KeypointNoise
 from ._make_eyes import make_eyes
-from ._map_view import MapView
+from ._messages import (
+    NOBODY,
+    Change,
+    Delivery,
+    MountedScan,
+    OdometryReading,
+    Sighting,
+    WorkerObservations,
+)
 from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
-from ._scanner_eyes import ScanChange, ScannerEyes, known_motion, scanner_sensors
-from ._true_eyes import TrueEyes
+from ._scanner_eyes import ScannerEyes, scanner_sensors
 
 __all__ = [
     "NOBODY",
     "PIXEL_RATE_HZ",
+    "Change",
+    "Delivery",
+    "Exposure",
     "Eyes",
     "KeypointCamera",
     "KeypointNoise",
     "MapView",
+    "MountedScan",
+    "OdometryReading",
     "PixelEyes",
-    "ScanChange",
     "ScannerEyes",
     "Sighting",
     "SurroundEyes",
     "TimedEyes",
     "TrueEyes",
     "WorkerObservations",
-    "known_motion",
     "make_eyes",
     "match_to_workers",
     "pixel_timing",

@@ -14,13 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from perception import Camera, PersonDetection, PersonKeypoints
-from perception.anthropometry import MEAN_STATURE_M
+from perception import (
+    AttentionCone,
+    AwarenessPipeline,
+    Camera,
+    PersonDetection,
+    PersonKeypoints,
+)
+from perception.anthropometry import MEAN_STATURE_M, UNUSUAL_SIZE_PROBABILITY
 from perception.arrays import FloatArray
 
 from ...world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M
 from ...world.config import SimConfig
 from ...world.errors import SimError
+from ...world.sightlines import SightLines
+from .._stage import Stage
+from ._camera_eyes import Exposure
+from ._messages import WorkerObservations
 
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
@@ -247,6 +257,57 @@ class KeypointCamera:
         detail = np.where(face, _FACE_DETAIL, _BODY_DETAIL)
         unhidden = ~self._sight.blocked(eye_odom_m, ends, detail)
         return np.split(unhidden, np.cumsum(counts)[:-1])
+
+
+class KeypointEyes:
+    """Eyes with a keypoint camera and the awareness pipeline.
+
+    Args:
+        stage: the stage of the crossing.
+        camera: camera model.
+        cone: attention cone of the pipeline.
+        noise: noise of the keypoints.
+        rng: random generator of the noise.
+        sight: occlusion test of the hall.
+        unusual_size_probability: as the pipeline takes it.
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        camera: Camera,
+        cone: AttentionCone,
+        noise: KeypointNoise,
+        rng: np.random.Generator,
+        sight: SightLines,
+        unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
+    ) -> None:
+        self._stage = stage
+        self._keypoints = KeypointCamera(camera, sight, noise, rng)
+        self._pipeline = AwarenessPipeline(
+            camera,
+            self._keypoints,
+            self._keypoints,
+            cone=cone,
+            keypoint_std_px=max(noise.pixel_std_px, 0.1),
+            # Workers in a crossing turn their heads; their eyes follow.
+            eye_in_head_std_rad=0.0,
+            unusual_size_probability=unusual_size_probability,
+        )
+        self._blank = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
+
+    def observe(self, exposure: Exposure) -> WorkerObservations:
+        """Return the observations of the pipeline from the visible keypoints."""
+        workers = self._keypoints.look(exposure.T_odom_camera, self._stage.workers)
+        worker_of = {
+            detection.box_xyxy_px.tobytes(): worker
+            for detection, worker in zip(self._keypoints.detect(None), workers, strict=True)
+        }
+        return tuple(
+            (observation, worker_of[observation.box_xyxy_px.tobytes()])
+            for observation in self._pipeline.process(self._blank, exposure.stamp_s)
+            if observation.box_xyxy_px is not None
+        )
 
 
 def _frustum_normals(camera: Camera) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.anthropometry import UNUSUAL_SIZE_PROBABILITY
-from perception.arrays import FloatArray
+from perception.arrays import ImageRgb
 from perception.networks import OnnxSettings
 from perception.surround import FlatView
 
@@ -19,12 +19,10 @@ from ...world.camera import CoarseSceneryRenderer
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
 from .._stage import Stage
-from ._eyes import Eyes, SurroundEyes
-from ._keypoint_camera import KeypointNoise
-from ._keypoint_eyes import KeypointEyes
-from ._map_view import MapView
-from ._pixel_eyes import PictureChange, PixelEyes
-from ._true_eyes import TrueEyes
+from ._camera_eyes import Eyes, MapView, PicturelessEyes, SurroundEyes, TrueEyes
+from ._keypoint_camera import KeypointEyes, KeypointNoise
+from ._messages import Change
+from ._pixel_eyes import PixelEyes
 
 # Statures of adults: within two and a half standard deviations of the mean.
 _LEAST_ADULT_M: Final = 1.5
@@ -36,12 +34,12 @@ def make_eyes(
     kind: str,
     stage: Stage,
     camera: Camera,
+    rng: np.random.Generator,
+    *,
     cone: AttentionCone,
     noise: KeypointNoise,
-    rng: np.random.Generator,
     pipeline: AwarenessPipeline | None = None,
-    T_camera_assumed: FloatArray | None = None,
-    change: PictureChange | None = None,
+    pictures: Change[ImageRgb] | None = None,
 ) -> Eyes:
     """Return the eyes of a perception.
 
@@ -49,34 +47,33 @@ def make_eyes(
         kind: one of :data:`PerceptionKind`, or :data:`ORACLE`.
         stage: the stage of the crossing.
         camera: camera model of one view.
+        rng: random generator of the noise.
         cone: attention cone.
         noise: noise of the keypoint camera.
-        rng: random generator of the noise.
         pipeline: pipeline for pixels; None for the shipped networks.
-        T_camera_assumed: see :class:`PixelEyes`.
-        change: a fault of the pictures, for pixels; None for none.
+        pictures: faults of the pictures; None for none.
 
     Raises:
         SimError: for another kind.
     """
-    if kind == "truth":
-        return TrueEyes()
-    if kind == ORACLE:
-        return TrueEyes(MapView.of(stage.warehouse))
     views = stage.scenario.camera.flat_views(camera)
-    if kind == "keypoints":
+    eyes: list[Eyes]
+    if kind == "truth":
+        eyes = [TrueEyes()]
+    elif kind == ORACLE:
+        eyes = [TrueEyes(MapView.of(stage.warehouse))]
+    elif kind == "keypoints":
         warehouse = stage.warehouse
         sight = SightLines(warehouse.layout, warehouse.variant, warehouse.actors)
         unusual = unusual_size_probability(stage.scenario)
-        eyes: list[Eyes] = [
-            KeypointEyes(stage, camera, cone, noise, rng, sight, unusual) for _ in views
-        ]
+        eyes = [KeypointEyes(stage, camera, cone, noise, rng, sight, unusual) for _ in views]
     elif kind == "pixels":
-        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, T_camera_assumed, change)
+        eyes = _pixel_eyes(stage, views, cone, rng, pipeline, pictures)
     else:
         valid = ", ".join(map(repr, get_args(PerceptionKind)))
         raise SimError(f"perception must be one of {valid}, got {kind!r}")
-    return eyes[0] if len(views) == 1 else SurroundEyes(views, eyes)
+    made = eyes[0] if len(eyes) == 1 else SurroundEyes(views, eyes)
+    return made if pictures is None or kind == "pixels" else PicturelessEyes(made, pictures)
 
 
 def unusual_size_probability(scenario: Scenario) -> float:
@@ -115,8 +112,7 @@ def _pixel_eyes(
     cone: AttentionCone,
     rng: np.random.Generator,
     pipeline: AwarenessPipeline | None,
-    T_camera_assumed: FloatArray | None,
-    change: PictureChange | None,
+    pictures: Change[ImageRgb] | None,
 ) -> list[Eyes]:
     """Return the eyes of every view; they share networks and renderer."""
     spec, camera = stage.scenario.camera, views[0].camera
@@ -124,19 +120,6 @@ def _pixel_eyes(
     if pipeline is None:
         pipeline = _pipeline(spec, unusual_size_probability(stage.scenario), cone)
     return [
-        PixelEyes(
-            stage,
-            camera,
-            spec.sensor,
-            view_rng,
-            pipeline,
-            renderer,
-            None
-            if T_camera_assumed is None
-            else view.T_camera_view.T @ T_camera_assumed @ view.T_camera_view,
-            change,
-        )
-        for view, view_rng in zip(
-            views, [rng] if len(views) == 1 else rng.spawn(len(views)), strict=True
-        )
+        PixelEyes(stage, camera, spec.sensor, view_rng, pipeline, renderer, pictures)
+        for view_rng in ([rng] if len(views) == 1 else rng.spawn(len(views)))
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -11,15 +11,13 @@ from scipy.optimize import linear_sum_assignment
 
 from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
-from perception.no_view import why_no_view
 
 from ...world.camera import CameraTiming, CoarseSceneryRenderer, SensorConfig, expose
 from ...world.errors import SimError
 from .._stage import Stage, TrueView
-from ._eyes import NOBODY, WorkerObservations
+from ._camera_eyes import Exposure, delivered_picture
+from ._messages import NOBODY, Change, WorkerObservations
 
-#: A change of a picture on its way to the robot: picture and stamp give the one that arrives.
-PictureChange = Callable[[ImageRgb, float], ImageRgb]
 #: Frame rate of rendered cameras whose scenario gives none: images are costly to render.
 PIXEL_RATE_HZ: Final = 10.0
 # An observation shows a worker if the boxes overlap this much, or the positions are this close.
@@ -41,9 +39,7 @@ class PixelEyes:
         rng: random generator of the sensor's noise.
         pipeline: pipeline for the images.
         renderer: renderer of the images; None renders the scenery as finely as the people.
-        T_camera_assumed: (4, 4) pose of the camera as the robot assumes it, in the true camera's
-            frame; None where they are the same.
-        change: a fault of the pictures; None for none.
+        change: faults of the pictures; None for none.
 
     Raises:
         SimError: for a pipeline with another camera.
@@ -57,8 +53,7 @@ class PixelEyes:
         rng: np.random.Generator,
         pipeline: AwarenessPipeline,
         renderer: CoarseSceneryRenderer | None = None,
-        T_camera_assumed: FloatArray | None = None,
-        change: PictureChange | None = None,
+        change: Change[ImageRgb] | None = None,
     ) -> None:
         self._stage = stage
         self._pipeline = pipeline
@@ -72,32 +67,25 @@ class PixelEyes:
                 f"{camera.height_px} px, focal length {camera.fx_px:.1f} px, no distortion), got "
                 f"{theirs.width_px} x {theirs.height_px} px, {theirs.fx_px:.1f} px"
             )
-        self._T_camera_assumed = T_camera_assumed
         self._change = change
         self._camera, self._sensor = camera, sensor
         (self._noise_rng,) = rng.spawn(1)
         self._renderer = CoarseSceneryRenderer(stage.warehouse, 1) if renderer is None else renderer
 
-    def observe(
-        self, stamp_s: float, T_odom_camera: FloatArray, truth: tuple[TrueView, ...]
-    ) -> WorkerObservations | None:
+    def observe(self, exposure: Exposure) -> WorkerObservations | None:
         """Render an image; return the observations of the pipeline, each with its worker.
 
         None for an image that is no view, such as a black one.
         """
-        view = self._renderer.render(self._camera, T_odom_camera)
-        rgb = expose(view.rgb, self._sensor, self._noise_rng)
-        if self._change is not None:
-            rgb = self._change(rgb, stamp_s)
-        # Not compared with the image before: a sensor without noise sees the same thing twice.
-        if why_no_view(rgb) is not None:
+        view = self._renderer.render(self._camera, exposure.T_odom_camera)
+        taken = expose(view.rgb, self._sensor, self._noise_rng)
+        rgb = delivered_picture(self._change, taken, exposure)
+        if rgb is None:
             return None
-        assumed = T_odom_camera
-        if self._T_camera_assumed is not None:
-            assumed = assumed @ self._T_camera_assumed
-        observations = self._pipeline.process(rgb, stamp_s, floor=FloorPlane.from_pose(assumed))
+        floor = FloorPlane.from_pose(exposure.T_odom_camera_known)
+        observations = self._pipeline.process(rgb, exposure.stamp_s, floor=floor)
         boxes = [_box_of(view.actors == worker.actor) for worker in self._stage.workers]
-        workers = match_to_workers(observations, truth, boxes)
+        workers = match_to_workers(observations, exposure.truth, boxes)
         return tuple(zip(observations, workers, strict=True))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -15,7 +15,6 @@ from perception.laser import (
     LaserScan,
     LegDetector,
     RobotMotion,
-    Scanner,
     StaticMap,
     observations_of,
     scan_points,
@@ -26,12 +25,8 @@ from tracking import ScannerView, SensorConfig
 from ...world import Warehouse
 from ...world.camera import FrameClock, FrameQueue
 from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner, scan_all
-from ._eyes import NOBODY, Sighting
-from ._map_view import MapView
-
-#: A change of a scan on its way to the robot: the scan, its time of arrival, its scanner's number
-#: and the robot's true motion give the scan that arrives and its time; None for no scan.
-ScanChange = Callable[[LaserScan, float, int, RobotMotion], tuple[LaserScan, float] | None]
+from ._camera_eyes import MapView
+from ._messages import NOBODY, Change, Delivery, MountedScan, Sighting
 
 # Random streams of scanners are separate from all others of an episode.
 _STREAM: Final = 0x5CA7
@@ -44,7 +39,7 @@ _MAP_RESOLUTION_M: Final = 0.05
 class _Taken:
     """A scan on its way: its scanner, and the robot's motion as known when it was taken."""
 
-    scan: LaserScan
+    scan: MountedScan
     number: int
     known: RobotMotion
 
@@ -57,8 +52,7 @@ class ScannerEyes:
         specs: the scanners.
         body_base_m: (M, 2) outline of the robot in the base frame.
         seed: of the episode.
-        mountings: the mountings as the robot assumes them; None for the true ones.
-        change: a fault of the scans; None for none.
+        changes: faults of the scans of each scanner, None for none.
     """
 
     def __init__(
@@ -67,9 +61,7 @@ class ScannerEyes:
         specs: Sequence[ScannerSpec],
         body_base_m: FloatArray,
         seed: int,
-        *,
-        mountings: Sequence[Scanner] | None = None,
-        change: ScanChange | None = None,
+        changes: Sequence[Change[MountedScan] | None],
     ) -> None:
         scene = ScanScene(warehouse.layout, warehouse.variant, warehouse.actors)
         generators = np.random.default_rng([_STREAM, seed]).spawn(2 * len(specs))
@@ -80,52 +72,70 @@ class ScannerEyes:
         self._clocks = [
             FrameClock(spec.timing, rng) for spec, rng in zip(specs, generators[1::2], strict=True)
         ]
-        self._mountings = (
-            [spec.scanner(body_base_m) for spec in specs] if mountings is None else list(mountings)
-        )
+        self._mountings = [spec.scanner(body_base_m) for spec in specs]
         self._views = [scanner_view(spec) for spec in specs]
         self._map_view = MapView.of(warehouse)
-        self._change = change
+        self._changes = tuple(changes)
         self._queue: FrameQueue[_Taken] = FrameQueue()
         self._detector = LegDetector(static_map=map_of(warehouse))
         self._latest_s = [-math.inf] * len(specs)
 
-    def look(self, now_s: float, motion: RobotMotion, known: RobotMotion) -> tuple[Sighting, ...]:
+    def look(
+        self, now_s: float, T_odom_base: FloatArray, state: RobotState, known: RobotState
+    ) -> tuple[Sighting, ...]:
         """Take the scans that are due; return those that have arrived by now, in order of arrival.
 
         Args:
             now_s: time; grows from call to call.
-            motion: true motion of the robot now.
-            known: the same as the robot knows it.
+            T_odom_base: (4, 4) true pose of the robot.
+            state: its true state.
+            known: the state that it knows.
         """
         ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
-        taken = [(number, delivery_s) for number, due, delivery_s in ticks if due]
-        scans = scan_all([self._scanners[number] for number, _ in taken], motion)
-        for (number, delivery_s), scan in zip(taken, scans, strict=True):
-            if delivery_s is None:
-                continue
-            arriving: tuple[LaserScan, float] | None = scan, delivery_s
-            if self._change is not None:
-                arriving = self._change(scan, delivery_s, number, motion)
-            if arriving is not None:
-                self._queue.put(now_s, arriving[1], _Taken(arriving[0], number, known))
+        due = [(number, arrives_s) for number, is_due, arrives_s in ticks if is_due]
+        if due:
+            motion, known_motion = _motion(T_odom_base, state), _motion(_pose_of(known), known)
+            # The noise of a lost scan is drawn, so that a loss changes no other scan.
+            scans = scan_all([self._scanners[number] for number, _ in due], motion)
+            for (number, arrives_s), scan in zip(due, scans, strict=True):
+                if arrives_s is not None:
+                    self._send(scan, arrives_s, number, motion, known_motion)
         sightings = [
             self._sighting(taken) for taken in self._queue.take(now_s) if self._is_new(taken)
         ]
         return tuple(each for each in sightings if each is not None)
 
+    def _send(
+        self,
+        scan: LaserScan,
+        arrives_s: float,
+        number: int,
+        motion: RobotMotion,
+        known: RobotMotion,
+    ) -> None:
+        """Send a scan on its way, unless a fault loses it."""
+        message, change = MountedScan(scan, self._mountings[number]), self._changes[number]
+        if change is not None:
+            T_odom_scanner = motion.T_odom_base @ message.mounting.T_base_scanner
+            changed = change(Delivery(message, motion.stamp_s, arrives_s, T_odom_scanner))
+            if changed is None:
+                return
+            message, arrives_s = changed.message, changed.arrives_s
+        self._queue.put(motion.stamp_s, arrives_s, _Taken(message, number, known))
+
     def _is_new(self, taken: _Taken) -> bool:
         """Return whether a scan is later than those before it; the detector needs their order."""
-        if taken.scan.end_s <= self._latest_s[taken.number]:
+        end_s = taken.scan.scan.end_s
+        if end_s <= self._latest_s[taken.number]:
             return False
-        self._latest_s[taken.number] = taken.scan.end_s
+        self._latest_s[taken.number] = end_s
         return True
 
     def _sighting(self, taken: _Taken) -> Sighting | None:
         """Return the people in a scan; None for a scan that shows nothing, as on a robot."""
-        mounting = self._mountings[taken.number]
-        points = scan_points(taken.scan, mounting, taken.known)
-        sight = sight_of(taken.scan, mounting, points)
+        scan, mounting = taken.scan.scan, taken.scan.mounting
+        points = scan_points(scan, mounting, taken.known)
+        sight = sight_of(scan, mounting, points)
         if sight.nothing:
             return None
         found = self._detector.detect(points, taken.number)
@@ -162,14 +172,18 @@ def scanner_sensors(warehouse: Warehouse, specs: Iterable[ScannerSpec]) -> dict[
     }
 
 
-def known_motion(state: RobotState) -> RobotMotion:
-    """Return the motion of a robot whose state is known."""
+def _pose_of(state: RobotState) -> FloatArray:
+    """Return the pose (4, 4) of the base frame of a robot whose state is known."""
     cos, sin = math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)
     T = np.eye(4)
     T[:2, :2] = [[cos, -sin], [sin, cos]]
     T[:2, 3] = state.position_odom_m
+    return T
+
+
+def _motion(T_odom_base: FloatArray, state: RobotState) -> RobotMotion:
     velocity = np.array([state.speed_mps, state.lateral_mps])
-    return RobotMotion(state.stamp_s, T, velocity, state.yaw_rate_radps)
+    return RobotMotion(state.stamp_s, T_odom_base, velocity, state.yaw_rate_radps)
 
 
 def map_of(warehouse: Warehouse) -> StaticMap:

@@ -1,27 +1,8 @@
-"""Faults of camera, odometry, detections and scanners as data, and their injection."""
+"""Faults of camera, detections, odometry and scanners, as data and in an episode."""
 
 from __future__ import annotations
 
-from ._detections import FaultyDetections
-from ._fault import Bursts, Fault, Ghosts, shipped_faults
-from ._frames import FaultyEyes
-from ._injection import FaultInjection
-from ._outage import Onset, Outage
-from ._scanner_fault import Appearances, BlindSector, ScannerFault
-from ._scans import FaultyScans
+from ._fault import FAULT_KINDS, EpisodeFaults, Fault, shipped_faults
+from ._sensor_fault import SensorFault, Start
 
-__all__ = [
-    "Appearances",
-    "BlindSector",
-    "Bursts",
-    "Fault",
-    "FaultInjection",
-    "FaultyDetections",
-    "FaultyEyes",
-    "FaultyScans",
-    "Ghosts",
-    "Onset",
-    "Outage",
-    "ScannerFault",
-    "shipped_faults",
-]
+__all__ = ["FAULT_KINDS", "EpisodeFaults", "Fault", "SensorFault", "Start", "shipped_faults"]

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final, Generic, TypeVar
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 from perception.laser import LaserScan
-
-from ._scanner_fault import Appearances
 
 _MIRROR_WITHIN_M: Final = 8.0
 _MIRROR_HALF_WIDTH_M: Final = 0.4
@@ -26,8 +23,6 @@ _LEG_RADIUS_M: Final = 0.06
 _LEG_NOISE_M: Final = 0.015
 _HALF_STANCE_M: Final = (0.06, 0.20)
 _FASTEST_MPS: Final = 1.5
-
-_FalseT = TypeVar("_FalseT")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,41 +44,6 @@ class Legs:
     velocity_odom_mps: FloatArray
     half_odom_m: FloatArray
     appears_s: float
-
-
-class Appearing(Generic[_FalseT]):
-    """Things that appear as a Poisson process and stay for an exponential time.
-
-    Args:
-        settings: rate and lifetime.
-        rng: draws them.
-        make: returns a new thing at a time; None if there is no place for one.
-    """
-
-    def __init__(
-        self,
-        settings: Appearances,
-        rng: np.random.Generator,
-        make: Callable[[np.random.Generator, float], _FalseT | None],
-    ) -> None:
-        self._settings, self._rng, self._make = settings, rng, make
-        self._alive: list[tuple[float, _FalseT]] = []
-        self._next_s = self._interval_s()
-
-    def now(self, t_s: float) -> list[_FalseT]:
-        """Return what is there at ``t_s``, which grows from call to call."""
-        while self._next_s <= t_s:
-            until_s = self._next_s + float(self._rng.exponential(self._settings.for_s))
-            made = self._make(self._rng, self._next_s)
-            if made is not None:
-                self._alive.append((until_s, made))
-            self._next_s += self._interval_s()
-        self._alive = [each for each in self._alive if each[0] > t_s]
-        return [each for _, each in self._alive]
-
-    def _interval_s(self) -> float:
-        rate_hz = self._settings.rate_hz
-        return math.inf if rate_hz == 0.0 else float(self._rng.exponential(1.0 / rate_hz))
 
 
 def new_mirror(

@@ -1,99 +1,87 @@
-"""Faults of camera, detections, odometry and scanners as data."""
+"""Faults as files and names, joined, and in one episode."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import reduce
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import Field
+from pydantic import Field, ValidationError, model_serializer, model_validator
 
 from awarenav.errors import not_one_of
+from perception import Camera
+from perception.arrays import FloatArray, ImageRgb
 from perception.documents import parse_yaml, yaml_text
+from perception.errors import did_you_mean
+from tracking.config import complaint
 
 from ...world.config import SimConfig
 from ...world.errors import SimError
-from ._outage import Onset, Outage
-from ._scanner_fault import ScannerFault
+from ...world.scanner import ScannerSpec
+from ..eyes import Change, Delivery, MountedScan, OdometryReading, Sighting
+from ._camera import CAMERA_FAULTS
+from ._scans import SCAN_FAULTS
+from ._sensor_fault import (
+    ImageFault,
+    OdometryFault,
+    PictureFault,
+    ScanFault,
+    SensorFault,
+    Start,
+)
 
+#: Every kind of fault; those of one mapping act in this order.
+FAULT_KINDS: Final = (*CAMERA_FAULTS, *SCAN_FAULTS)
+_SCANNER: Final = "scanner"
 _JOINT: Final = "+"
 
 
-class Bursts(SimConfig):
-    """Periods in which the detector misses a person, independent for each person.
-
-    Attributes:
-        for_s: mean duration, exponentially distributed; 0 for none.
-        every_s: mean time between two of them, exponentially distributed.
-    """
-
-    for_s: float = Field(default=0.0, ge=0.0, le=600.0)
-    every_s: float = Field(default=3.0, gt=0.0, le=3600.0)
-
-
-class Ghosts(SimConfig):
-    """False detections of people.
-
-    A ghost stands where it appeared in the camera's view, 1 m to 8 m away. Half of them have a
-    face, with an α uniformly distributed in [0, 1]; the others give no evidence of awareness.
-
-    Attributes:
-        rate_hz: new ghosts per second (a Poisson process); 0 for none.
-        for_s: mean lifetime, exponentially distributed.
-    """
-
-    rate_hz: float = Field(default=0.0, ge=0.0, le=100.0)
-    for_s: float = Field(default=0.5, gt=0.0, le=600.0)
-
-
 class Fault(SimConfig):
-    """A fault of camera, detections, odometry or scanners; the default changes nothing at all.
+    """What is wrong with the sensors of a robot; the default is nothing at all.
 
-    Sensors and odometry follow the scenario; the fault is added to them. It draws from random
-    streams of its own, so that everything else in an episode stays the same, bit for bit.
+    Sensors and odometry follow the scenario; the faults are added to them, one after the other.
+    Each draws from random streams of its own, so that everything else in an episode stays the same,
+    bit for bit.
+
+    A file gives the keys of its faults beside ``name``, those of the scanners below ``scanner``;
+    the order of such keys does not matter. ``faults`` is a list of mappings with such keys, which
+    act one after the other.
 
     Attributes:
         name: name in tables.
         description: one sentence.
-        miss_rate: share of the observations that are lost, independently.
-        bursts: periods in which a person is missed.
-        ghosts: false detections.
-        drop_rate: share of the images that never arrive.
-        latency_s: delay of every image.
-        latency_jitter_s: largest additional delay, uniformly distributed.
-        frozen_camera: the last image is delivered again and again. With fresh stamps people seem to
-            stand still in the image, and so to move with the robot.
-        black_camera: pictures are black from a time on, while their stamps go on; None never. The
-            robot takes no such picture for a view.
-        pitch_error_deg: the robot assumes that its camera looks this much higher than it does.
-        yaw_error_deg: the same to the left.
-        odometry_delay_s: age of the newest pose and speed that the robot knows; they have their
-            true stamps. Images are placed with the newest known pose.
-        lost_odometry: pose and speed stay at the last known ones.
-        awareness_bias: added to every observed α; the sum is clipped to [0, 1].
-        awareness_std_factor: factor on the standard deviation of every observed α; below 1 is
-            over-confident.
-        scanner: fault of the laser scanners.
+        faults: the faults, in the order in which they act.
     """
 
     name: str = Field(default="none", min_length=1, pattern=r"^[A-Za-z0-9_.+-]+$")
     description: str = ""
-    miss_rate: float = Field(default=0.0, ge=0.0, le=1.0)
-    bursts: Bursts = Bursts()
-    ghosts: Ghosts = Ghosts()
-    drop_rate: float = Field(default=0.0, ge=0.0, le=1.0)
-    latency_s: float = Field(default=0.0, ge=0.0, le=10.0)
-    latency_jitter_s: float = Field(default=0.0, ge=0.0, le=10.0)
-    frozen_camera: Outage = Outage()
-    black_camera: Onset | None = None
-    pitch_error_deg: float = Field(default=0.0, ge=-45.0, le=45.0)
-    yaw_error_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
-    odometry_delay_s: float = Field(default=0.0, ge=0.0, le=10.0)
-    lost_odometry: Outage = Outage(fresh_stamps=False)
-    awareness_bias: float = Field(default=0.0, ge=-1.0, le=1.0)
-    awareness_std_factor: float = Field(default=1.0, ge=0.0, le=100.0)
-    scanner: ScannerFault = ScannerFault()
+    faults: tuple[SensorFault, ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any) -> Any:
+        """Turn the keys of faults into faults."""
+        if not isinstance(data, Mapping):
+            return data
+        own = {key: data[key] for key in ("name", "description") if key in data}
+        listed = data.get("faults", ())
+        if not isinstance(listed, list | tuple):
+            raise ValueError(f"faults must be a list, got {listed!r:.80}")
+        faults = list(_faults_of({key: data[key] for key in data if key not in cls.model_fields}))
+        for each in listed:
+            faults += [each] if isinstance(each, SensorFault) else _faults_of(each)
+        return {**own, "faults": tuple(faults)}
+
+    @model_serializer
+    def _as_keys(self) -> dict[str, Any]:
+        """Return name, description and the keys of the faults that differ from their defaults."""
+        head = {"name": self.name} | ({"description": self.description} if self.description else {})
+        mappings = list(_mappings(self.faults))
+        return head | (mappings[0] if len(mappings) == 1 else {"faults": mappings})
 
     @classmethod
     def shipped(cls, name: str) -> Fault:
@@ -108,37 +96,29 @@ class Fault(SimConfig):
         """Load a shipped fault, one from a ``.yaml`` or ``.yml`` file, or several at once.
 
         Args:
-            name: a name or a file; several are joined by ``+``, as in ``ghosts+scanner_late``.
+            name: a name or a file; several are joined by ``+``, as in ``ghosts+scanner_late``, and
+                act in this order.
 
         Raises:
-            SimError: for an unknown name, and for two faults that set the same thing.
+            SimError: for an unknown name, or a file that cannot be used.
         """
         if name.endswith((".yaml", ".yml")) and (Path(name).exists() or _JOINT not in name):
             return cls.from_yaml(name)
         if _JOINT in name:
-            return reduce(cls.joined_with, map(cls.of, name.split(_JOINT)))
+            return reduce(cls.then, map(cls.of, name.split(_JOINT)))
         return cls.shipped(name)
 
-    def joined_with(self, other: Fault) -> Fault:
-        """Return both faults at once.
-
-        Raises:
-            SimError: if both set the same thing, because only one of them could count.
-        """
-        own, others = (
-            each.model_dump(exclude_defaults=True, exclude={"name", "description"})
-            for each in (self, other)
-        )
-        name = f"{self.name}{_JOINT}{other.name}"
-        description = " ".join(each for each in (self.description, other.description) if each)
-        return Fault.model_validate(
-            {"name": name, "description": description, **_joined(own, others, name)}
+    def then(self, other: Fault) -> Fault:
+        """Return a fault of which these faults act first, then the others."""
+        return Fault(
+            name=f"{self.name}{_JOINT}{other.name}",
+            description=" ".join(filter(None, (self.description, other.description))),
+            faults=self.faults + other.faults,
         )
 
     def to_text(self) -> str:
         """Return the fault as YAML, without default values."""
-        data = self.model_dump(mode="json", exclude_defaults=True)
-        return yaml_text({"name": self.name, **data})
+        return yaml_text(self.model_dump())
 
 
 def shipped_faults() -> tuple[str, ...]:
@@ -148,20 +128,135 @@ def shipped_faults() -> tuple[str, ...]:
     return tuple(sorted(name.removesuffix(".yaml") for name in names))
 
 
-def _joined(first: dict[str, Any], second: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the settings of both; those of the scanners are joined one by one."""
-    both = {**first, **second}
-    for key in first.keys() & second.keys():
-        if key != "scanner":
-            raise SimError(f"the faults of {name!r} must set different things, both set {key!r}")
-        scanners = first[key], second[key]
-        if scanners[0].get("only") != scanners[1].get("only"):
-            raise SimError(f"the faults of {name!r} must have the same 'only'")
-        twice = set.intersection(*(set(each) - {"only"} for each in scanners))
-        if twice:
-            raise SimError(
-                f"the faults of {name!r} must set different things, both set "
-                f"{', '.join(sorted(twice))!r} of the scanners"
-            )
-        both[key] = {**scanners[0], **scanners[1]}
-    return both
+class EpisodeFaults:
+    """The faults of one episode, as changes of what the sensors deliver.
+
+    Args:
+        fault: the faults; None for none.
+        seed: seed of the episode.
+        camera: camera of the robot.
+    """
+
+    def __init__(self, fault: Fault | None, seed: int, camera: Camera) -> None:
+        self._faults: list[tuple[SensorFault, Start]] = []
+        counts: Counter[str] = Counter()
+        for each in () if fault is None else fault.faults:
+            name = type(each).__name__
+            self._faults.append((each, Start(seed, camera, name, counts[name])))
+            counts[name] += 1
+
+    def pictures(self) -> Change[ImageRgb] | None:
+        """Return the change of the camera's pictures; None without one."""
+        return _chain(self._begun(PictureFault))
+
+    def images(self) -> Change[Sighting] | None:
+        """Return the change of the camera's images; None without one."""
+        return _chain(self._begun(ImageFault))
+
+    def odometry(self) -> Change[OdometryReading] | None:
+        """Return the change of the robot's odometry; None without one."""
+        return _chain(self._begun(OdometryFault))
+
+    def scans(
+        self, number: int, scanner: ScannerSpec, body_base_m: FloatArray
+    ) -> Change[MountedScan] | None:
+        """Return the change of the scans of a scanner, counted from 0; None without one."""
+        mount = {"number": number, "scanner": scanner, "body_base_m": body_base_m}
+        return _chain(self._begun(ScanFault, **mount))
+
+    def _begun(self, kind: Any, **mount: Any) -> list[Change[Any]]:
+        """Return the changes of the faults of a kind; those of another scanner are left out."""
+        return [
+            each.begin(replace(start, **mount))
+            for each, start in self._faults
+            if isinstance(each, kind)
+            and not (isinstance(each, ScanFault) and each.only not in (None, mount["number"] + 1))
+        ]
+
+
+def _chain(changes: Sequence[Change[Any]]) -> Change[Any] | None:
+    """Return one change that makes several, one after the other; None for none."""
+    if not changes:
+        return None
+
+    def change(taken: Delivery[Any]) -> Delivery[Any] | None:
+        delivery: Delivery[Any] | None = taken
+        for each in changes:
+            if delivery is not None:
+                delivery = each(delivery)
+        return delivery
+
+    return change
+
+
+def _faults_of(keys: Any) -> Iterator[SensorFault]:
+    """Yield the faults of a mapping with their keys."""
+    given = _mapping("a fault", keys)
+    below = _mapping(_SCANNER, given.pop(_SCANNER, {}))
+    shared = {"only": below.pop("only")} if "only" in below else {}
+    yield from _validated(given, CAMERA_FAULTS, (), {}, also=(*Fault.model_fields, _SCANNER))
+    yield from _validated(below, SCAN_FAULTS, (_SCANNER,), shared, also=("only",))
+
+
+def _mapping(name: str, keys: Any) -> dict[str, Any]:
+    """Return a mapping without its keys of null, which is as if they were left out."""
+    if not isinstance(keys, Mapping):
+        raise ValueError(f"{name} must be a mapping of keys, got {keys!r:.80}")
+    return {key: value for key, value in keys.items() if value is not None}
+
+
+def _validated(
+    given: Mapping[str, Any],
+    kinds: Sequence[type[SensorFault]],
+    path: tuple[str, ...],
+    shared: Mapping[str, Any],
+    also: Iterable[str],
+) -> Iterator[SensorFault]:
+    """Yield the faults that a mapping below a path has keys of, in the order of their kinds.
+
+    ``shared`` are settings of all of them, ``also`` other keys that are valid in that place.
+    """
+    own = {kind: [each for each in kind.model_fields if each != "only"] for kind in kinds}
+    kind_of = {key: kind for kind in kinds for key in ([kind.key] if kind.key else own[kind])}
+    settings: dict[type[SensorFault], Any] = {}
+    for key, value in given.items():
+        if key not in kind_of:
+            valid = [*also, *kind_of]
+            hint = did_you_mean(key, valid, cutoff=0.5) or f"; valid keys: {', '.join(valid)}"
+            raise ValueError(f"unknown key {key!r} in {'.'.join(path) or 'Fault'}{hint}")
+        kind = kind_of[key]
+        settings[kind] = value if kind.key else {**settings.get(kind, {}), key: value}
+    for kind in (each for each in kinds if each in settings):
+        data = settings[kind]
+        try:
+            yield kind.model_validate({**data, **shared} if isinstance(data, Mapping) else data)
+        except ValidationError as cause:
+            place = (*path, kind.key) if kind.key else path
+            errors = cause.errors(include_url=False)
+            for each in errors:
+                each["loc"] = (*place, *each["loc"])
+            raise ValueError("; ".join(map(complaint, errors))) from cause
+
+
+def _mappings(faults: Iterable[SensorFault]) -> Iterator[dict[str, Any]]:
+    """Yield as few mappings of keys as hold the faults in their order."""
+    mapping: dict[str, Any] = {}
+    rank = -1
+    for each in faults:
+        before, rank = rank, FAULT_KINDS.index(type(each))
+        other_scanner = (
+            isinstance(each, ScanFault)
+            and _SCANNER in mapping
+            and mapping[_SCANNER].get("only") != each.only
+        )
+        if rank <= before or other_scanner:
+            yield mapping
+            mapping = {}
+        data = each.model_dump(mode="json", exclude_defaults=True)
+        only = {key: data.pop(key) for key in ("only",) if key in data}
+        keys = {each.key: data} if each.key else data
+        if isinstance(each, ScanFault):
+            mapping[_SCANNER] = {**mapping.get(_SCANNER, {}), **only, **keys}
+        else:
+            mapping.update(keys)
+    yield mapping

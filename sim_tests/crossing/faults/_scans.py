@@ -1,158 +1,260 @@
-"""Scans that are lost, late, frozen, blind or wrong on their way to the leg detector."""
+"""Faults of the laser scanners."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Final
+from dataclasses import replace
+from typing import ClassVar, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
-from perception.arrays import FloatArray
-from perception.laser import LaserScan, RobotMotion, Scanner
+from perception.laser import LaserScan
 
-from ...world.scanner import ScannerSpec
-from ._false_returns import Appearing, Legs, Mirror, new_legs, new_mirror, with_legs, with_mirror
-from ._fault import Fault
-from ._scanner_fault import NO_ANSWERS, BlindSector, ScannerFault
+from ..eyes import Change, Delivery, MountedScan
+from ._false_returns import Legs, Mirror, new_legs, new_mirror, with_legs, with_mirror
+from ._sensor_fault import Appearances, Appearing, Onset, Outage, ScanFault, SensorFault, Start
 
-# Streams of each scanner.
-_STREAMS: Final = 5
+# What a driver publishes for a ray without an answer.
+_NO_ANSWERS: Final = ("inf", "minus_inf", "nan", "zero", "below_min", "above_max")
+# Streams of scans: one that all scanners share, then five of each scanner.
+_SCANS: Final = 2
+_OUTAGES, _LOSSES, _NOISE, _MIRRORS, _LEGS = range(5)
 
 
-class FaultyScans:
-    """The scans of a robot's scanners with a fault.
+def _rng(start: Start, use: int) -> np.random.Generator:
+    return start.rng(_SCANS, 1 + 5 * start.number + use)
 
-    Args:
-        fault: the fault.
-        specs: the scanners.
-        rng: random generator of the fault.
+
+class Reflections(Appearing, ScanFault):
+    """Surfaces that reflect rays like a mirror, 0.8 m wide, at something measured within 8 m.
+
+    Beyond them the scan shows people, posts and racks a second time, mirrored; images of people
+    move as the people do.
     """
 
-    def __init__(
-        self, fault: Fault, specs: Sequence[ScannerSpec], rng: np.random.Generator
-    ) -> None:
-        common_rng, *own = rng.spawn(1 + _STREAMS * len(specs))
-        blind = _Blindness(fault.scanner.blind, common_rng)
-        self._scanners = [
-            _FaultyScanner(
-                fault.scanner,
-                spec.scanner(),
-                blind,
-                own[_STREAMS * number : _STREAMS * (number + 1)],
-            )
-            if fault.scanner.only in (None, number + 1)
-            else None
-            for number, spec in enumerate(specs)
-        ]
+    key: ClassVar[str] = "reflections"
 
-    def change(
-        self, scan: LaserScan, delivery_s: float, number: int, motion: RobotMotion
-    ) -> tuple[LaserScan, float] | None:
-        """Return the scan that is delivered instead of one, and its time; None for none.
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+        rng = _rng(start, _MIRRORS)
+        mirrors: Appearances[Mirror] = Appearances(self, rng)
 
-        Args:
-            scan: the scan that was taken.
-            delivery_s: the time of its arrival.
-            number: of its scanner, from 0.
-            motion: true motion of the robot when the scan ended.
-        """
-        scanner = self._scanners[number]
-        return (scan, delivery_s) if scanner is None else scanner.change(scan, delivery_s, motion)
+        def change(taken: Delivery[MountedScan]) -> Delivery[MountedScan]:
+            measured, T = taken.message.scan, taken.T_odom_sensor
+
+            def appear(t_s: float) -> tuple[float, Mirror] | None:
+                until_s = t_s + float(rng.exponential(self.for_s))
+                mirror = new_mirror(rng, measured, T)
+                return None if mirror is None else (until_s, mirror)
+
+            scan = measured
+            for mirror in mirrors.at(taken.taken_s, appear):
+                scan = with_mirror(scan, mirror, T)
+            return _with(taken, scan)
+
+        return change
 
 
-class _Blindness:
-    """The sector of an episode in which no scanner gets an answer."""
+class LegGhosts(Appearing, ScanFault):
+    """Pairs of legs that do not exist, 0.8 m to 6 m away.
 
-    def __init__(self, sector: BlindSector, rng: np.random.Generator) -> None:
+    Half of them stand; the others walk at up to 1.5 m/s. They hide what is behind them.
+    """
+
+    key: ClassVar[str] = "ghosts"
+
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+        rng, noise_rng = _rng(start, _LEGS), _rng(start, _NOISE)
+        ghosts: Appearances[Legs] = Appearances(self, rng)
+
+        def change(taken: Delivery[MountedScan]) -> Delivery[MountedScan]:
+            scan, T = taken.message.scan, taken.T_odom_sensor
+
+            def appear(t_s: float) -> tuple[float, Legs]:
+                until_s = t_s + float(rng.exponential(self.for_s))
+                return until_s, new_legs(rng, t_s, T[:2, 3])
+
+            noise = noise_rng.standard_normal(len(scan))
+            for legs in ghosts.at(taken.taken_s, appear):
+                scan = with_legs(scan, legs, taken.taken_s, T, noise)
+            return _with(taken, scan)
+
+        return change
+
+
+class BlindSector(Onset, ScanFault):
+    """A sector in which no ray returns, as behind dirt on the window; the default has none.
+
+    It begins at the same time for all scanners, and all are blind in the same direction, so that
+    none of them replaces another.
+
+    Attributes:
+        width_deg: width of the sector; 0 for none, 360 for a scanner that sees nothing.
+        at_deg: direction of its middle from the robot's heading, left positive; None draws it in
+            each episode, evenly over the circle.
+        returns: ``"inf"``: no return, as from empty space; ``"max"``: the longest range, as some
+            drivers write it; ``"nan"``: an invalid measurement; ``"zero"``: 0; ``"minus_inf"``: too
+            near; ``"below_min"``, ``"above_max"``: half the shortest and twice the longest range.
+            ``"any"`` draws one of all but ``"max"`` in each episode.
+    """
+
+    key: ClassVar[str] = "blind"
+    width_deg: float = Field(default=0.0, ge=0.0, le=360.0)
+    at_deg: float | None = Field(default=None, ge=-180.0, le=180.0)
+    returns: Literal["inf", "max", "nan", "zero", "minus_inf", "below_min", "above_max", "any"] = (
+        "inf"
+    )
+
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+        rng = start.rng(_SCANS, 0)
         drawn_deg = float(rng.uniform(-180.0, 180.0))
-        begins, form = rng.random(2).tolist()
-        at_deg = drawn_deg if sector.at_deg is None else sector.at_deg
-        self._width_deg, self._middle_rad = sector.width_deg, math.radians(at_deg)
-        self._begins_s = sector.begins_s(begins)
-        drawn = NO_ANSWERS[int(form * len(NO_ANSWERS))]
-        self._returns = drawn if sector.returns == "any" else sector.returns
+        onset, form = rng.random(2).tolist()
+        middle_rad = math.radians(drawn_deg if self.at_deg is None else self.at_deg)
+        begins_s = self.begins_s(onset)
+        returns = self.returns
+        if returns == "any":
+            returns = _NO_ANSWERS[int(form * len(_NO_ANSWERS))]
+        rotation = start.scanner.scanner().T_base_scanner[:2, :2]
+        least_cosine = math.cos(math.radians(0.5 * self.width_deg)) - 1e-9
 
-    def blinded(self, scan: LaserScan, t_s: float, mounting: Scanner) -> LaserScan:
-        """Return a scan taken at ``t_s`` without the answers of the sector."""
-        if self._width_deg == 0.0 or t_s < self._begins_s:
-            return scan
-        directions = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad)))
-        x, y = (mounting.T_base_scanner[:2, :2] @ directions.T).tolist()
-        off = np.arctan2(y, x) - self._middle_rad
-        inside = np.cos(off) >= math.cos(math.radians(0.5 * self._width_deg)) - 1e-9
-        no_answer = {
-            "inf": math.inf,
-            "max": scan.range_max_m,
-            "nan": math.nan,
-            "zero": 0.0,
-            "minus_inf": -math.inf,
-            "below_min": 0.5 * scan.range_min_m,
-            "above_max": 2.0 * scan.range_max_m,
-        }[self._returns]
-        return replace(scan, ranges_m=np.where(inside, no_answer, scan.ranges_m))
+        def change(taken: Delivery[MountedScan]) -> Delivery[MountedScan]:
+            scan = taken.message.scan
+            if self.width_deg == 0.0 or taken.taken_s < begins_s:
+                return taken
+            directions = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad)))
+            x, y = (rotation @ directions.T).tolist()
+            inside = np.cos(np.arctan2(y, x) - middle_rad) >= least_cosine
+            ranges = np.where(inside, _no_answer_m(returns, scan), scan.ranges_m)
+            return _with(taken, replace(scan, ranges_m=ranges))
+
+        return change
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
-    """A scan as it was measured, and the pose of its scanner in odom (4, 4)."""
+def _no_answer_m(returns: str, scan: LaserScan) -> float:
+    """Return the range that a driver publishes for a ray without an answer."""
+    return {
+        "inf": math.inf,
+        "max": scan.range_max_m,
+        "nan": math.nan,
+        "zero": 0.0,
+        "minus_inf": -math.inf,
+        "below_min": 0.5 * scan.range_min_m,
+        "above_max": 2.0 * scan.range_max_m,
+    }[returns]
 
-    scan: LaserScan
-    T_odom_scanner: FloatArray
+
+class FrozenScans(Outage, ScanFault):
+    """A scanner that delivers its last scan again and again.
+
+    With fresh stamps everything seems to move with the robot; with old ones the scanner falls
+    silent.
+    """
+
+    key: ClassVar[str] = "frozen"
+
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+        return self.frozen(float(_rng(start, _OUTAGES).random()), _restamped)
 
 
-class _FaultyScanner:
-    """One scanner with a fault."""
+def _restamped(last: MountedScan, taken: MountedScan) -> MountedScan:
+    return replace(last, scan=replace(last.scan, stamp_s=taken.scan.stamp_s))
 
-    def __init__(
-        self,
-        fault: ScannerFault,
-        mounting: Scanner,
-        blind: _Blindness,
-        rngs: Sequence[np.random.Generator],
-    ) -> None:
-        timing_rng, self._drop_rng, self._noise_rng, mirror_rng, legs_rng = rngs
-        self._fault, self._mounting, self._blind = fault, mounting, blind
-        freeze, death = timing_rng.random(2).tolist()
-        self._first_freeze_s = freeze * fault.frozen.every_s
-        within_s = fault.dies_within_s
-        self._dies_s = math.inf if within_s is None else death * within_s
-        self._mirrors = Appearing(fault.reflections, mirror_rng, self._new_mirror)
-        self._legs = Appearing(fault.ghosts, legs_rng, self._new_legs)
-        self._seen: _Seen | None = None
-        self._last: LaserScan | None = None
 
-    def change(
-        self, scan: LaserScan, delivery_s: float, motion: RobotMotion
-    ) -> tuple[LaserScan, float] | None:
-        """Return the scan that is delivered, and its time; None for none."""
-        # Every scan draws the same numbers, so that no part of the fault changes another.
-        lost = float(self._drop_rng.random()) < self._fault.drop_rate
-        noise = self._noise_rng.standard_normal(len(scan))
-        T_odom_scanner = motion.T_odom_base @ self._mounting.T_base_scanner
-        self._seen = _Seen(scan, T_odom_scanner)
-        for mirror in self._mirrors.now(motion.stamp_s):
-            scan = with_mirror(scan, mirror, T_odom_scanner)
-        for legs in self._legs.now(motion.stamp_s):
-            scan = with_legs(scan, legs, motion.stamp_s, T_odom_scanner, noise)
-        scan = self._blind.blinded(scan, motion.stamp_s, self._mounting)
-        if self._fault.frozen.holds(motion.stamp_s, self._first_freeze_s):
-            if self._last is None:
+class DeadScanner(ScanFault):
+    """A scanner of which no scan arrives any more from a time on.
+
+    Attributes:
+        dies_within_s: the time is evenly distributed from 0 to this; 0 for a scanner that is dead
+            from the start.
+    """
+
+    dies_within_s: float = Field(ge=0.0, le=600.0)
+
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+        _, death = _rng(start, _OUTAGES).random(2).tolist()  # the first is of a freeze
+        dies_s = death * self.dies_within_s
+        return lambda taken: taken if taken.taken_s < dies_s else None
+
+
+class LateScans(ScanFault):
+    """Scans that arrive late or not at all; their stamps stay true.
+
+    Attributes:
+        drop_rate: share of the scans that never arrive.
+        latency_s: delay of every scan.
+    """
+
+    drop_rate: float = Field(default=0.0, ge=0.0, le=1.0)
+    latency_s: float = Field(default=0.0, ge=0.0, le=10.0)
+
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+        rng = _rng(start, _LOSSES)
+
+        def change(taken: Delivery[MountedScan]) -> Delivery[MountedScan] | None:
+            if rng.random() < self.drop_rate:
                 return None
-            fresh = self._fault.frozen.fresh_stamps
-            scan = replace(self._last, stamp_s=scan.stamp_s) if fresh else self._last
-        else:
-            self._last = scan
-        if lost or motion.stamp_s >= self._dies_s:
-            return None
-        stamped = replace(scan, stamp_s=scan.stamp_s + self._fault.clock_error_s)
-        return stamped, delivery_s + self._fault.latency_s
+            return replace(taken, arrives_s=taken.arrives_s + self.latency_s)
 
-    def _new_mirror(self, rng: np.random.Generator, _: float) -> Mirror | None:
-        assert self._seen is not None  # only called from change()
-        return new_mirror(rng, self._seen.scan, self._seen.T_odom_scanner)
+        return change
 
-    def _new_legs(self, rng: np.random.Generator, t_s: float) -> Legs:
-        assert self._seen is not None  # only called from change()
-        return new_legs(rng, t_s, self._seen.T_odom_scanner[:2, 3])
+
+class WrongClock(ScanFault):
+    """A clock of a scanner that is ahead or behind.
+
+    The robot looks up its own pose at the wrong time as well.
+
+    Attributes:
+        clock_error_s: the clock is ahead by this; negative is behind.
+    """
+
+    clock_error_s: float = Field(ge=-10.0, le=10.0)
+
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+
+        def change(taken: Delivery[MountedScan]) -> Delivery[MountedScan]:
+            scan = taken.message.scan
+            return _with(taken, replace(scan, stamp_s=scan.stamp_s + self.clock_error_s))
+
+        return change
+
+
+class TurnedScanner(ScanFault):
+    """A scanner that does not look where the robot assumes it to look.
+
+    Attributes:
+        yaw_error_deg: the robot assumes that the scanner is turned this much farther to the left
+            than it is.
+    """
+
+    yaw_error_deg: float = Field(ge=-180.0, le=180.0)
+
+    def begin(self, start: Start) -> Change[MountedScan]:
+        """Return the change of the scans of one scanner in one episode."""
+        yaw_deg = start.scanner.yaw_deg + self.yaw_error_deg
+        turned = start.scanner.model_copy(update={"yaw_deg": yaw_deg}).scanner(start.body_base_m)
+        return lambda taken: replace(taken, message=MountedScan(taken.message.scan, turned))
+
+
+def _with(taken: Delivery[MountedScan], scan: LaserScan) -> Delivery[MountedScan]:
+    """Return a delivery with another scan."""
+    return replace(taken, message=MountedScan(scan, taken.message.mounting))
+
+
+#: In the order in which they act on a scan: from the rays to the driver.
+SCAN_FAULTS: Final[tuple[type[SensorFault], ...]] = (
+    Reflections,
+    LegGhosts,
+    BlindSector,
+    FrozenScans,
+    DeadScanner,
+    LateScans,
+    WrongClock,
+    TurnedScanner,
+)

@@ -5,21 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from perception.laser import LaserScan, RobotMotion
+from perception import Camera
+from perception.laser import LaserScan
 from sim_tests import Scenario, run_crossing
-from sim_tests.crossing.eyes import TimedEyes
-from sim_tests.crossing.faults import (
-    BlindSector,
-    Fault,
-    FaultInjection,
-    FaultyScans,
-    Onset,
-    ScannerFault,
-)
+from sim_tests.crossing.eyes import Delivery, MountedScan, TimedEyes
+from sim_tests.crossing.eyes._camera_eyes import PicturelessEyes
+from sim_tests.crossing.faults import EpisodeFaults, Fault
 from sim_tests.world.camera import CameraTiming
 from sim_tests.world.scanner import ScannerSpec
 
 ROUND = ScannerSpec(x_m=0.0, field_of_view_deg=(-180.0, 180.0), resolution_deg=1.0)
+CAMERA = Camera.from_fov(640, 480, math.radians(90.0))
 NO_ANSWERS = {
     "inf": math.inf,
     "minus_inf": -math.inf,
@@ -32,16 +28,17 @@ NO_ANSWERS = {
 
 def scans_of(fault: Fault, seed: int = 0, seconds: float = 11.0) -> dict[int, list[np.ndarray]]:
     """Return the ranges of each scan of two scanners, ten a second; all rays measure 5 m."""
-    specs = (ROUND, ROUND)
-    scans = FaultyScans(fault, specs, np.random.default_rng(seed))
+    faults = EpisodeFaults(fault, seed, CAMERA)
+    changes = [faults.scans(number, ROUND, np.zeros((0, 2))) for number in (0, 1)]
     found: dict[int, list[np.ndarray]] = {0: [], 1: []}
     for n in range(round(seconds * 10)):
         t_s = 0.1 * n
         scan = LaserScan(t_s, -math.pi, math.radians(1.0), np.full(360, 5.0), 0.05, 20.0)
-        for number in (0, 1):
-            changed = scans.change(scan, t_s, number, RobotMotion(t_s, np.eye(4)))
+        for number, change in enumerate(changes):
+            taken = Delivery(MountedScan(scan, ROUND.scanner()), t_s, t_s, np.eye(4))
+            changed = taken if change is None else change(taken)
             assert changed is not None, "a blind scanner goes on publishing"
-            found[number].append(changed[0].ranges_m)
+            found[number].append(changed.message.scan.ranges_m)
     return found
 
 
@@ -70,8 +67,8 @@ def test_from_a_drawn_time_on_no_ray_of_any_scanner_has_an_answer():
 
 @pytest.mark.parametrize("form", NO_ANSWERS)
 def test_time_form_and_scanner_can_be_set(form):
-    blind = BlindSector(width_deg=360.0, returns=form, after_s=2.0)
-    first, second = scans_of(Fault(scanner=ScannerFault(only=2, blind=blind)), 5).values()
+    blind = {"width_deg": 360.0, "returns": form, "after_s": 2.0}
+    first, second = scans_of(Fault(scanner={"only": 2, "blind": blind}), 5).values()
     assert all((each == 5.0).all() for each in first)
     assert begins(second) == 20
     np.testing.assert_array_equal(second[20], np.full(360, NO_ANSWERS[form]))
@@ -81,8 +78,8 @@ def test_time_form_and_scanner_can_be_set(form):
 
 
 def test_a_sector_is_blind_from_its_time_on():
-    blind = BlindSector(width_deg=90.0, at_deg=0.0, returns="nan", after_s=1.0)
-    (ranges, _) = scans_of(Fault(scanner=ScannerFault(blind=blind))).values()
+    blind = {"width_deg": 90.0, "at_deg": 0.0, "returns": "nan", "after_s": 1.0}
+    (ranges, _) = scans_of(Fault(scanner={"blind": blind})).values()
     assert [int(np.isnan(each).sum()) for each in ranges[9:12]] == [0, 91, 91]
 
 
@@ -92,16 +89,16 @@ class Watcher:
     def __init__(self) -> None:
         self.images = 0
 
-    def observe(self, stamp_s, T_odom_camera, truth):
+    def observe(self, exposure):
         self.images += 1
         return ()
 
 
 def arrivals(fault: Fault, seed: int = 0, seconds: float = 11.0) -> list[float]:
     """Return the stamps of the images that arrive."""
-    injection = FaultInjection(fault, seed)
-    timed = TimedEyes(Watcher(), CameraTiming(latency_s=0.3), np.random.default_rng(0))
-    eyes = injection.eyes(timed, Scenario.shipped("late_glance").camera.camera(), pictures=False)
+    change = EpisodeFaults(fault, seed, CAMERA).pictures()
+    watcher = Watcher() if change is None else PicturelessEyes(Watcher(), change)
+    eyes = TimedEyes(watcher, CameraTiming(latency_s=0.3), np.random.default_rng(0))
     stamps = []
     for n in range(round(seconds * 10)):
         seen = eyes.look(0.1 * n, np.eye(4), np.eye(4), ())
@@ -113,8 +110,8 @@ def test_from_a_drawn_time_on_no_image_arrives():
     lasts = [arrivals(Fault.shipped("black_camera"), seed)[-1] for seed in range(30)]
     assert min(lasts) < 2.0
     assert 8.0 < max(lasts) <= 10.0
-    assert arrivals(Fault(black_camera=Onset(after_s=4.0)))[-1] == pytest.approx(3.9)
-    assert arrivals(Fault(black_camera=Onset())) == []
+    assert arrivals(Fault(black_camera={"after_s": 4.0}))[-1] == pytest.approx(3.9)
+    assert arrivals(Fault(black_camera={})) == []
     assert arrivals(Fault())[-1] == pytest.approx(10.6)
 
 
@@ -125,7 +122,7 @@ MET = Scenario.shipped("head_on_in_aisle")
 def test_a_black_picture_is_no_view_for_the_judgement_of_real_pictures(views_deg):
     camera = MET.camera.model_copy(update={"views_deg": views_deg})
     scenario = MET.model_copy(update={"duration_s": 2.0, "camera": camera})
-    fault = Fault(name="black", black_camera=Onset(after_s=0.5))
+    fault = Fault(name="black", black_camera={"after_s": 0.5})
     result = run_crossing(scenario, policy="balanced", perception="pixels", fault=fault)
     assert not any(frame.constraints.stale for frame in result.frames if 0.1 < frame.t_s < 0.5)
     assert result.frames[-1].constraints.stale
@@ -144,7 +141,7 @@ def stops(result):
 @pytest.mark.parametrize("perception", ["truth", "keypoints"])
 def test_the_robot_stops_once_its_only_camera_shows_nothing(perception):
     scenario = MET.model_copy(update={"duration_s": 5.5})
-    fault = Fault(name="black", black_camera=Onset(after_s=2.0))
+    fault = Fault(name="black", black_camera={"after_s": 2.0})
     stops(run_crossing(scenario, policy="balanced", perception=perception, fault=fault))
 
 
@@ -153,11 +150,11 @@ def test_the_robot_stops_once_its_only_camera_shows_nothing(perception):
 )
 def test_a_robot_with_scanners_that_are_blind_ahead_stops(width_deg, form):
     """Whatever a driver writes for no answer: it is not a view of nobody."""
-    blind = BlindSector(width_deg=width_deg, at_deg=0.0, returns=form, after_s=2.0)
+    blind = {"width_deg": width_deg, "at_deg": 0.0, "returns": form, "after_s": 2.0}
     result = run_crossing(
         MET.model_copy(update={"duration_s": 5.5}),
         policy="balanced",
         perception="scanner",
-        fault=Fault(name="blind", scanner=ScannerFault(blind=blind)),
+        fault=Fault(name="blind", scanner={"blind": blind}),
     )
     stops(result)

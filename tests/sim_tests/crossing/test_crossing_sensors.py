@@ -9,7 +9,7 @@ from perception import AttentionCone
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.conditions import ORACLE, Perception
 from sim_tests.crossing import Stage
-from sim_tests.crossing.eyes import MapView, TrueEyes
+from sim_tests.crossing.eyes import Exposure, MapView, TrueEyes
 from sim_tests.scenario import ScenarioTemplate
 
 NAMES = ("truth", "keypoints", "pixels", "keypoints+scanner", "pixels+scanner", "scanner", ORACLE)
@@ -120,7 +120,8 @@ def test_the_oracle_sees_everybody_who_is_not_hidden_by_a_high_box() -> None:
         odom = positions @ T_odom_camera[:2, :3].T + T_odom_camera[:2, 3]
         free = view.visibility(odom, T_odom_camera) > 0.0
         near = np.linalg.norm(positions, axis=1) <= 20.0
-        seen = [worker for _, worker in TrueEyes(view).observe(0.0, T_odom_camera, truth)]
+        now = Exposure(0.0, T_odom_camera, T_odom_camera, truth)
+        seen = [worker for _, worker in TrueEyes(view).observe(now)]
         assert seen == np.flatnonzero(free & near).tolist()
-        everybody = [worker for _, worker in TrueEyes().observe(0.0, T_odom_camera, truth)]
+        everybody = [worker for _, worker in TrueEyes().observe(now)]
         assert everybody == np.flatnonzero(near).tolist()

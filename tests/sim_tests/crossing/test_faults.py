@@ -9,17 +9,9 @@ import yaml
 from nav_adapter import RobotState
 from perception import Camera, PersonObservation
 from sim_tests import Scenario, SimError, run_crossing
-from sim_tests.crossing.eyes import TimedEyes
-from sim_tests.crossing.faults import (
-    Bursts,
-    Fault,
-    FaultInjection,
-    FaultyDetections,
-    FaultyEyes,
-    Ghosts,
-    Outage,
-    shipped_faults,
-)
+from sim_tests.crossing._sensing import Odometry
+from sim_tests.crossing.eyes import Delivery, OdometryReading, Sighting, TimedEyes
+from sim_tests.crossing.faults import EpisodeFaults, Fault, shipped_faults
 from sim_tests.world.camera import CameraTiming
 
 CAMERA = Camera.from_fov(640, 480, math.radians(90.0))
@@ -45,16 +37,27 @@ def observation(stamp_s=0.0, awareness=0.5, std=0.1, x_m=4.0):
 class WalkerEyes:
     """Eyes that see one person, who approaches at 1 m/s from 100 m."""
 
-    def observe(self, stamp_s, T_odom_camera, truth):
-        return ((observation(stamp_s, x_m=100.0 - stamp_s), 0),)
+    def observe(self, exposure):
+        return ((observation(exposure.stamp_s, x_m=100.0 - exposure.stamp_s), 0),)
 
 
 def looks(fault, seconds=30.0, rate_hz=20.0, seed=0):
     """Return time and sightings of each tick of faulty eyes."""
-    rng = np.random.default_rng(seed)
-    eyes = FaultyEyes(fault, TimedEyes(WalkerEyes(), CameraTiming(), rng), CAMERA, rng)
+    faults = EpisodeFaults(fault, seed, CAMERA)
+    eyes = TimedEyes(WalkerEyes(), CameraTiming(), np.random.default_rng(0), faults.images())
     ticks = np.arange(round(seconds * rate_hz)) / rate_hz
     return [(float(t), eyes.look(float(t), T_ODOM_CAMERA, T_ODOM_CAMERA, ())) for t in ticks]
+
+
+def detections(fault, seed=0):
+    """Return a function of true observations and a time that gives the faulty ones."""
+    change = EpisodeFaults(fault, seed, CAMERA).images()
+
+    def apply(observations, t_s):
+        sighting = Sighting(t_s, T_ODOM_CAMERA, tuple(observations))
+        return change(Delivery(sighting, t_s, t_s, T_ODOM_CAMERA)).message.observations
+
+    return apply
 
 
 def trace(result):
@@ -77,11 +80,16 @@ def trace(result):
 def test_a_fault_of_strength_zero_changes_nothing_bit_for_bit(perception):
     zero = Fault(
         name="zero",
-        bursts=Bursts(for_s=0.0, every_s=1.0),
-        ghosts=Ghosts(rate_hz=0.0, for_s=5.0),
-        frozen_camera=Outage(for_s=0.0, every_s=0.1),
-        lost_odometry=Outage(for_s=0.0, every_s=0.1),
+        miss_rate=0.0,
+        bursts={"for_s": 0.0, "every_s": 1.0},
+        ghosts={"rate_hz": 0.0, "for_s": 5.0},
+        awareness_bias=0.0,
+        frozen_camera={"for_s": 0.0, "every_s": 0.1},
+        latency_s=0.0,
+        odometry_delay_s=0.0,
+        lost_odometry={"for_s": 0.0, "every_s": 0.1},
     )
+    assert len(zero.faults) == 8
     options = {"policy": "balanced", "perception": perception, "seed": 3}
     scenario = ATTENTIVE.model_copy(update={"duration_s": 1.5})
     plain = trace(run_crossing(scenario, **options))
@@ -90,7 +98,7 @@ def test_a_fault_of_strength_zero_changes_nothing_bit_for_bit(perception):
 
 
 def test_a_fault_depends_on_its_seed_alone():
-    fault = Fault(name="half", miss_rate=0.5, drop_rate=0.2, ghosts=Ghosts(rate_hz=1.0))
+    fault = Fault(name="half", miss_rate=0.5, drop_rate=0.2, ghosts={"rate_hz": 1.0})
 
     def seen(seed):
         return [[s.stamp_s for s in sightings] for _, sightings in looks(fault, 3.0, seed=seed)]
@@ -124,13 +132,16 @@ def test_shipped_faults_are_named_after_their_files_and_round_trip(tmp_path):
         ({"text": "scanner: {blind: {returns: nothing}}"}, "returns"),
         ({"name": "misses_3"}, "did you mean 'misses_30'"),
         ({"name": "ghosts+scanner_lat"}, "did you mean 'scanner_late'"),
-        ({"name": "ghosts+ghosts"}, "both set 'ghosts'"),
-        ({"name": "scanner_blind+scanner_blind_sector"}, "both set 'blind'"),
-        ({"name": "scanner_frozen+scanner_frozen_old_stamps"}, "both set 'frozen' of the scanners"),
-        ({"name": "scanner_one_dead+scanner_late"}, "same 'only'"),
+        ({"text": "scanner: {blind: {width: 3.0}}"}, "scanner.blind: unknown key 'width'"),
+        ({"text": "scanner: {late_s: 3.0}"}, "unknown key 'late_s' in scanner"),
+        ({"text": "scanner: 3"}, "scanner must be a mapping"),
+        ({"text": "faults: {ghosts: {}}"}, "faults must be a list"),
+        ({"text": "faults: [{gosts: {}}]"}, "did you mean 'ghosts'"),
+        ({"text": "bursts: 3"}, "bursts: .*got 3"),
+        ({"text": "drop_rate: yes"}, "drop_rate must be a number"),
     ],
 )
-def test_impossible_faults_and_pairs_are_refused(given, message, tmp_path):
+def test_impossible_faults_are_refused(given, message, tmp_path):
     path = tmp_path / "fault.yaml"
     path.write_text(given.get("text", ""))
     with pytest.raises(SimError, match=message):
@@ -138,25 +149,58 @@ def test_impossible_faults_and_pairs_are_refused(given, message, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "names", ["ghosts+scanner_late", "misses_30+scanner_late+scanner_yawed", "FILE+scanner_late"]
+    "names",
+    [
+        "ghosts+scanner_late",
+        "scanner_late+ghosts",
+        "ghosts+ghosts",
+        "scanner_one_dead+scanner_late",
+        "scanner_frozen+scanner_frozen_old_stamps+misses_30",
+        "FILE+scanner_late",
+    ],
 )
-def test_several_faults_are_joined_and_each_keeps_its_own(names, tmp_path):
+def test_several_faults_act_one_after_the_other(names, tmp_path):
     path = tmp_path / "mine.yaml"
-    Fault(name="mine", latency_s=0.1).to_yaml(path)
+    Fault(name="mine", latency_s=0.1, scanner={"only": 2, "drop_rate": 0.1}).to_yaml(path)
     joined = Fault.of(names.replace("FILE", str(path)))
     parts = [Fault.of(part.replace("FILE", str(path))) for part in names.split("+")]
-    for part in parts:
-        for name in part.model_fields_set - {"name", "description", "scanner"}:
-            assert getattr(joined, name) == getattr(part, name)
-    assert joined.scanner.latency_s == 0.2
-    assert joined.scanner.yaw_error_deg == (3.0 if "yawed" in names else 0.0)
-    assert Fault.model_validate(joined.model_dump()) == joined
+    assert joined.name == names.replace("FILE", "mine")
+    assert joined.faults == tuple(each for part in parts for each in part.faults)
+    assert Fault.model_validate(yaml.safe_load(joined.to_text())) == joined
+
+
+def test_faults_of_one_kind_add_up_and_draw_from_streams_of_their_own():
+    fault = Fault(name="third", miss_rate=1.0 / 3.0)
+    seen = [(observation(), index) for index in range(1000)]
+    (once, twice) = (detections(each)(seen, 0.0) for each in (fault, fault.then(fault)))
+    assert {index for _, index in twice} < {index for _, index in once}
+    assert len(twice) / 1000 == pytest.approx(4.0 / 9.0, abs=4.0 * math.sqrt(0.25 / 1000))
+
+
+def test_the_order_of_two_faults_counts():
+    """A biased α is clipped before or after another bias."""
+    up, down = Fault(name="up", awareness_bias=0.9), Fault(name="down", awareness_bias=-0.5)
+    for fault, expected in ((up.then(down), 0.5), (down.then(up), 0.9)):
+        ((seen, _),) = detections(fault)([(observation(awareness=0.5), 0)], 0.0)
+        assert seen.awareness == pytest.approx(expected)
+
+
+def test_a_fault_draws_the_same_beside_others():
+    ghosts, misses = Fault.shipped("ghosts"), Fault.shipped("misses_30")
+    alone, beside = detections(ghosts), detections(misses.then(ghosts))
+    seen = [(observation(), 0)]
+    for n in range(200):
+        shown = [
+            [each.position_camera_m.tolist() for each, index in apply(seen, 0.05 * n) if index < 0]
+            for apply in (alone, beside)
+        ]
+        assert shown[0] == shown[1]
 
 
 def test_the_miss_rate_is_the_share_of_lost_observations():
-    detections = FaultyDetections(Fault(miss_rate=0.3), CAMERA, np.random.default_rng(0))
+    apply = detections(Fault(miss_rate=0.3))
     seen = ((observation(), 0), (observation(), 1))
-    remaining = [len(detections.apply(seen, 0.05 * n, T_ODOM_CAMERA)) for n in range(4000)]
+    remaining = [len(apply(seen, 0.05 * n)) for n in range(4000)]
     share = 1.0 - np.mean(remaining) / 2.0
     assert share == pytest.approx(0.3, abs=4.0 * math.sqrt(0.3 * 0.7 / 8000))
     # Losses are independent: the number lost of two is binomial.
@@ -164,12 +208,12 @@ def test_the_miss_rate_is_the_share_of_lost_observations():
 
 
 def test_bursts_hide_a_person_for_their_share_of_the_time_independent_of_others():
-    fault = Fault(bursts=Bursts(for_s=0.5, every_s=2.0))
+    fault = Fault(bursts={"for_s": 0.5, "every_s": 2.0})
 
     def hidden(people):
-        detections = FaultyDetections(fault, CAMERA, np.random.default_rng(1))
+        apply = detections(fault, seed=1)
         seen = tuple((observation(), index) for index in people)
-        frames = (detections.apply(seen, 0.05 * n, T_ODOM_CAMERA) for n in range(40_000))
+        frames = (apply(seen, 0.05 * n) for n in range(40_000))
         return np.array([all(index != people[-1] for _, index in frame) for frame in frames])
 
     alone, beside = hidden((4,)), hidden((1, 4))
@@ -182,9 +226,9 @@ def test_bursts_hide_a_person_for_their_share_of_the_time_independent_of_others(
 
 
 def test_the_number_of_ghosts_follows_littles_law_and_they_stand_in_view():
-    fault = Fault(ghosts=Ghosts(rate_hz=2.0, for_s=0.5))
-    detections = FaultyDetections(fault, CAMERA, np.random.default_rng(2))
-    frames = [detections.apply((), 0.05 * n, T_ODOM_CAMERA) for n in range(20_000)]
+    fault = Fault(ghosts={"rate_hz": 2.0, "for_s": 0.5})
+    apply = detections(fault, seed=2)
+    frames = [apply((), 0.05 * n) for n in range(20_000)]
     # At each time a Poisson number of mean 1 is present; it is correlated over about 2 · 0.5 s.
     assert np.mean([len(frame) for frame in frames]) == pytest.approx(
         1.0, abs=4.0 / math.sqrt(1000)
@@ -207,8 +251,7 @@ def test_the_number_of_ghosts_follows_littles_law_and_they_stand_in_view():
 )
 def test_a_bias_is_added_and_clipped_but_creates_no_evidence(awareness, bias, expected):
     fault = Fault(awareness_bias=bias, awareness_std_factor=0.5)
-    detections = FaultyDetections(fault, CAMERA, np.random.default_rng(0))
-    ((seen, _),) = detections.apply(((observation(awareness=awareness), 0),), 0.0, T_ODOM_CAMERA)
+    ((seen, _),) = detections(fault)([(observation(awareness=awareness), 0)], 0.0)
     assert seen.awareness == (None if expected is None else pytest.approx(expected))
     assert seen.awareness_std == (None if expected is None else pytest.approx(0.05))
 
@@ -225,10 +268,10 @@ def test_dropped_images_never_arrive():
 
 @pytest.mark.parametrize("fresh", [True, False])
 def test_a_frozen_camera_repeats_its_last_image(fresh):
-    fault = Fault(frozen_camera=Outage(for_s=1.0, every_s=10.0, fresh_stamps=fresh))
+    fault = Fault(frozen_camera={"for_s": 1.0, "every_s": 10.0, "fresh_stamps": fresh})
     frozen = 0
     last_true_s = None
-    for t_s, (sighting,) in looks(fault, 40.0):
+    for t_s, (sighting,) in looks(fault, 40.0, seed=1):  # the last outage ends before 40 s
         ((seen, _),) = sighting.observations
         taken_s = 100.0 - seen.position_camera_m[2]
         assert seen.stamp_s == sighting.stamp_s
@@ -243,13 +286,13 @@ def test_a_frozen_camera_repeats_its_last_image(fresh):
 
 
 def known_states(fault, seconds=25.0):
-    odometry = FaultInjection(fault, 5).odometry()
+    odometry = Odometry(EpisodeFaults(fault, 5, CAMERA).odometry())
     for n in range(round(seconds * 20)):
         t_s = n / 20
         state = RobotState(t_s, [t_s, 0.0], 0.0, 1.0, 0.0)
         T = np.array(T_ODOM_CAMERA)
         T[0, 3] = t_s
-        yield t_s, odometry.update(state, T)
+        yield t_s, odometry.take(OdometryReading(state, T))
 
 
 def test_delayed_odometry_has_its_true_stamp():
@@ -261,7 +304,7 @@ def test_delayed_odometry_has_its_true_stamp():
 
 @pytest.mark.parametrize("fresh", [True, False])
 def test_lost_odometry_stays_at_the_last_known_pose(fresh):
-    fault = Fault(lost_odometry=Outage(for_s=2.0, every_s=10.0, fresh_stamps=fresh))
+    fault = Fault(lost_odometry={"for_s": 2.0, "every_s": 10.0, "fresh_stamps": fresh})
     lost = [
         (t_s, known)
         for t_s, known in known_states(fault, 20.0)
@@ -283,9 +326,9 @@ def test_lost_odometry_stays_at_the_last_known_pose(fresh):
 )
 def test_a_mounting_error_turns_the_assumed_camera_up_and_left(pitch_deg, yaw_deg, axis):
     fault = Fault(pitch_error_deg=pitch_deg, yaw_error_deg=yaw_deg)
-    injection = FaultInjection(fault, 0)
+    odometry = Odometry(EpisodeFaults(fault, 0, CAMERA).odometry())
     state = RobotState(0.0, [0.0, 0.0], 0.0, 0.0, 0.0)
-    assumed = injection.odometry().update(state, T_ODOM_CAMERA).T_odom_camera
+    assumed = odometry.take(OdometryReading(state, T_ODOM_CAMERA)).T_odom_camera
     np.testing.assert_allclose(assumed[:3, 2], axis, atol=1e-12)
     np.testing.assert_allclose(assumed[:3, 3], T_ODOM_CAMERA[:3, 3])
     np.testing.assert_allclose(assumed[:3, :3] @ assumed[:3, :3].T, np.eye(3), atol=1e-12)
@@ -293,7 +336,7 @@ def test_a_mounting_error_turns_the_assumed_camera_up_and_left(pitch_deg, yaw_de
 
 def test_the_robot_acts_on_faulty_odometry_and_frames_keep_the_truth():
     """After a second without odometry everybody counts as unaware and the robot stops."""
-    fault = Fault(lost_odometry=Outage(for_s=9.9, every_s=10.0, fresh_stamps=False))
+    fault = Fault(lost_odometry={"for_s": 9.9, "every_s": 10.0, "fresh_stamps": False})
     options = {"policy": "balanced", "seed": 0}
     plain, broken = (
         run_crossing(ATTENTIVE, **options),

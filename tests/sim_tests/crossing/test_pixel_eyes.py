@@ -21,6 +21,7 @@ from sim_tests.crossing import Stage, TrueView
 from sim_tests.crossing.eyes import (
     NOBODY,
     PIXEL_RATE_HZ,
+    Exposure,
     KeypointCamera,
     PixelEyes,
     match_to_workers,
@@ -100,7 +101,7 @@ def test_rendered_people_are_observed_at_their_true_positions(stage: Stage):
     T_odom_camera = stage.amr.T_odom_camera
     truth = stage.truth(cone, T_odom_camera)
     keypoints.look(T_odom_camera, stage.workers)
-    seen = eyes.observe(0.25, T_odom_camera, truth)
+    seen = eyes.observe(Exposure(0.25, T_odom_camera, T_odom_camera, truth))
     assert sorted(worker for _, worker in seen) == [0, 1]
     for each, worker in seen:
         assert each.stamp_s == 0.25

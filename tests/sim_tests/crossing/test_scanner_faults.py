@@ -6,18 +6,11 @@ import math
 import numpy as np
 import pytest
 
+from perception import Camera
 from perception.laser import LaserScan, RobotMotion
 from sim_tests import Scenario, run_crossing
-from sim_tests.crossing.faults import (
-    Appearances,
-    BlindSector,
-    Fault,
-    FaultInjection,
-    FaultyScans,
-    Outage,
-    ScannerFault,
-    shipped_faults,
-)
+from sim_tests.crossing.eyes import Delivery, MountedScan
+from sim_tests.crossing.faults import EpisodeFaults, Fault, shipped_faults
 from sim_tests.crossing.faults._false_returns import (
     Legs,
     Mirror,
@@ -31,6 +24,8 @@ from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 # One ray per degree all around, on the middle of the robot.
 ROUND = ScannerSpec(x_m=0.0, field_of_view_deg=(-180.0, 180.0), resolution_deg=1.0)
 PERIOD_S = 0.04
+CAMERA = Camera.from_fov(640, 480, math.radians(90.0))
+BODY = np.array([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2]])
 SCANNER_FAULTS = tuple(name for name in shipped_faults() if name.startswith("scanner_"))
 #: In every run of the tests; the others with --full.
 ALWAYS = ("scanner_late", "scanner_ghosts")
@@ -49,14 +44,24 @@ def motion_at(t_s, x_m=0.0, heading_rad=0.0):
     return RobotMotion(t_s, T)
 
 
-def delivered(fault, seconds=30.0, seed=0, specs=(ROUND,), number=0):
+def scan_change(fault, seed=0, spec=ROUND, number=0):
+    """Return the change of the scans of a scanner by the settings below ``scanner``."""
+    return EpisodeFaults(Fault(scanner=fault), seed, CAMERA).scans(number, spec, BODY)
+
+
+def delivered(fault, seconds=30.0, seed=0, spec=ROUND, number=0):
     """Return time, scan and delivery of each sweep; all rays of sweep n measure 5 m + n mm."""
-    scans = FaultyScans(Fault(scanner=fault), specs, np.random.default_rng(seed))
+    change = scan_change(fault, seed, spec, number)
     found = []
     for n in range(round(seconds / PERIOD_S)):
         t_s = n * PERIOD_S
-        changed = scans.change(scan_at(t_s, 5.0 + 0.001 * n), t_s, number, motion_at(t_s))
-        found.append((t_s, *(changed if changed is not None else (None, None))))
+        T_odom_scanner = motion_at(t_s).T_odom_base @ spec.scanner().T_base_scanner
+        message = MountedScan(scan_at(t_s, 5.0 + 0.001 * n), spec.scanner())
+        taken = Delivery(message, t_s, t_s, T_odom_scanner)
+        sent = taken if change is None else change(taken)
+        found.append(
+            (t_s, *((None, None) if sent is None else (sent.message.scan, sent.arrives_s)))
+        )
     return found
 
 
@@ -73,22 +78,22 @@ def test_the_issue_faults_are_shipped():
     } == set(SCANNER_FAULTS)  # fmt: skip
     for name in SCANNER_FAULTS:
         # Camera and odometry stay as they are.
-        assert set(Fault.shipped(name).model_dump(exclude_defaults=True)) == {
-            "name",
-            "description",
-            "scanner",
-        }
+        assert set(Fault.shipped(name).model_dump()) == {"name", "description", "scanner"}
 
 
 def test_no_fault_changes_no_scan_bit_for_bit():
-    assert FaultInjection(None, 3).scan_change(DIAGONAL_SCANNERS) is None
-    assert FaultInjection(Fault(miss_rate=0.5), 3).scan_change(DIAGONAL_SCANNERS) is None
-    zero = ScannerFault(
-        frozen=Outage(for_s=0.0, every_s=0.1),
-        blind=BlindSector(width_deg=0.0, at_deg=0.0),
-        reflections=Appearances(rate_hz=0.0, for_s=9.0),
-        ghosts=Appearances(rate_hz=0.0, for_s=9.0),
-    )
+    none = EpisodeFaults(None, 3, CAMERA)
+    assert none.pictures() is none.images() is none.odometry() is None
+    assert none.scans(0, ROUND, BODY) is None
+    assert EpisodeFaults(Fault(miss_rate=0.5), 3, CAMERA).scans(0, ROUND, BODY) is None
+    zero = {
+        "frozen": {"for_s": 0.0, "every_s": 0.1},
+        "blind": {"width_deg": 0.0, "at_deg": 0.0},
+        "reflections": {"rate_hz": 0.0, "for_s": 9.0},
+        "ghosts": {"rate_hz": 0.0, "for_s": 9.0},
+        "drop_rate": 0.0,
+        "clock_error_s": 0.0,
+    }
     for n, (t_s, scan, delivery_s) in enumerate(delivered(zero, 5.0)):
         assert (scan.stamp_s, delivery_s) == (t_s, t_s)
         np.testing.assert_array_equal(scan.ranges_m, 5.0 + 0.001 * n)
@@ -135,7 +140,7 @@ def test_a_scan_fault_changes_neither_people_nor_what_the_camera_sees(name, worl
 def test_a_frozen_scanner_repeats_its_last_scan(fresh):
     frozen = 0
     last = 0
-    fault = ScannerFault(frozen=Outage(for_s=1.0, every_s=10.0, fresh_stamps=fresh))
+    fault = {"frozen": {"for_s": 1.0, "every_s": 10.0, "fresh_stamps": fresh}}
     for n, (t_s, scan, _) in enumerate(delivered(fault, 40.0)):
         taken = round((scan.ranges_m[0] - 5.0) / 0.001)
         if taken == n:
@@ -151,9 +156,7 @@ def test_a_frozen_scanner_repeats_its_last_scan(fresh):
 def test_a_dead_scanner_stays_silent_from_a_time_that_the_seed_draws():
     deaths = []
     for seed in range(60):
-        silent = [
-            scan is None for _, scan, _ in delivered(ScannerFault(dies_within_s=5.0), 6.0, seed)
-        ]
+        silent = [scan is None for _, scan, _ in delivered({"dies_within_s": 5.0}, 6.0, seed)]
         first = silent.index(True)
         assert all(silent[first:])
         assert not any(silent[:first])
@@ -161,27 +164,20 @@ def test_a_dead_scanner_stays_silent_from_a_time_that_the_seed_draws():
     assert max(deaths) <= 5.0 + PERIOD_S
     # The mean of 60 uniform times has a standard deviation of 5 / √12 / √60 = 0.19 s.
     assert np.mean(deaths) == pytest.approx(2.5, abs=4.0 * 0.19)
-    assert all(scan is None for _, scan, _ in delivered(ScannerFault(dies_within_s=0.0), 1.0))
+    assert all(scan is None for _, scan, _ in delivered({"dies_within_s": 0.0}, 1.0))
 
 
 def test_only_one_scanner_has_the_fault():
-    fault = ScannerFault(only=2, dies_within_s=0.0)
     for number, dead in ((0, False), (1, True)):
-        scans = delivered(fault, 1.0, specs=(ROUND, ROUND), number=number)
+        scans = delivered({"only": 2, "dies_within_s": 0.0}, 1.0, number=number)
         assert all((scan is None) == dead for _, scan, _ in scans)
-    specs, body = DIAGONAL_SCANNERS, np.array([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2]])
-    yawed = FaultInjection(Fault(scanner=ScannerFault(only=2, yaw_error_deg=3.0)), 0)
-    true = [spec.scanner(body).T_base_scanner for spec in specs]
-    first, second = (each.T_base_scanner for each in yawed.mountings(specs, body))
-    np.testing.assert_array_equal(first, true[0])
-    assert not np.allclose(second, true[1])
 
 
 def test_late_and_lost_scans():
-    for t_s, scan, delivery_s in delivered(ScannerFault(latency_s=0.2), 5.0):
+    for t_s, scan, delivery_s in delivered({"latency_s": 0.2}, 5.0):
         assert scan.stamp_s == t_s
         assert delivery_s == pytest.approx(t_s + 0.2)
-    scans = delivered(ScannerFault(drop_rate=0.3), 160.0)
+    scans = delivered({"drop_rate": 0.3}, 160.0)
     assert np.mean([scan is None for _, scan, _ in scans]) == pytest.approx(
         0.3, abs=4.0 * math.sqrt(0.21 / 4000)
     )
@@ -189,31 +185,29 @@ def test_late_and_lost_scans():
 
 @pytest.mark.parametrize("error_s", [0.1, -0.1])
 def test_a_wrong_clock_moves_the_stamp_and_not_the_arrival(error_s):
-    for t_s, scan, delivery_s in delivered(ScannerFault(clock_error_s=error_s), 2.0):
+    for t_s, scan, delivery_s in delivered({"clock_error_s": error_s}, 2.0):
         assert scan.stamp_s == pytest.approx(t_s + error_s)
         assert delivery_s == t_s
 
 
 def test_the_assumed_scanner_is_turned_to_the_left():
-    body = np.array([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2]])
-    injection = FaultInjection(Fault(scanner=ScannerFault(yaw_error_deg=3.0)), 0)
-    for spec, assumed in zip(
-        DIAGONAL_SCANNERS, injection.mountings(DIAGONAL_SCANNERS, body), strict=True
-    ):
-        turn = spec.scanner(body).T_base_scanner[:3, :3].T @ assumed.T_base_scanner[:3, :3]
+    for number, spec in enumerate(DIAGONAL_SCANNERS):
+        true = spec.scanner(BODY).T_base_scanner
+        change = scan_change({"yaw_error_deg": 3.0}, spec=spec, number=number)
+        taken = Delivery(MountedScan(scan_at(0.0), spec.scanner(BODY)), 0.0, 0.0, true)
+        assumed = change(taken).message.mounting.T_base_scanner
+        turn = true[:3, :3].T @ assumed[:3, :3]
         assert math.degrees(math.atan2(turn[1, 0], turn[0, 0])) == pytest.approx(3.0)
-        np.testing.assert_allclose(
-            assumed.T_base_scanner[:3, 3], spec.scanner().T_base_scanner[:3, 3]
-        )
+        np.testing.assert_allclose(assumed[:3, 3], true[:3, 3])
 
 
 @pytest.mark.parametrize(
     ("returns", "value"), [("inf", math.inf), ("max", 20.0), ("nan", math.nan)]
 )
 def test_a_blind_sector_lies_where_it_is_said_to_for_every_mounting(returns, value):
-    blind = BlindSector(width_deg=60.0, at_deg=90.0, returns=returns)
+    blind = {"width_deg": 60.0, "at_deg": 90.0, "returns": returns}
     for spec in (ROUND, ROUND.model_copy(update={"yaw_deg": 70.0, "upside_down": True})):
-        ((_, scan, _), *_) = delivered(ScannerFault(blind=blind), 0.1, specs=(spec,))
+        ((_, scan, _), *_) = delivered({"blind": blind}, 0.1, spec=spec)
         T = spec.scanner().T_base_scanner
         base = np.column_stack((np.cos(scan.angles_rad), np.sin(scan.angles_rad))) @ T[:2, :2].T
         off = np.abs(np.degrees(np.arctan2(base[:, 1], base[:, 0])) - 90.0)
@@ -225,8 +219,7 @@ def test_a_blind_sector_lies_where_it_is_said_to_for_every_mounting(returns, val
 
 def test_a_drawn_blind_sector_is_the_same_for_all_scanners_and_even_over_seeds():
     def middle(seed, number):
-        fault = ScannerFault(blind=BlindSector(width_deg=40.0))
-        ((_, scan, _), *_) = delivered(fault, 0.1, seed, specs=(ROUND, ROUND), number=number)
+        ((_, scan, _), *_) = delivered({"blind": {"width_deg": 40.0}}, 0.1, seed, number=number)
         blind = scan.angles_rad[np.isposinf(scan.ranges_m)]
         return math.atan2(np.sin(blind).mean(), np.cos(blind).mean())
 
@@ -236,11 +229,11 @@ def test_a_drawn_blind_sector_is_the_same_for_all_scanners_and_even_over_seeds()
 
 
 def test_ghosts_follow_littles_law_and_a_scanner_without_them_is_left_alone():
-    fault = ScannerFault(ghosts=Appearances(rate_hz=1.0, for_s=1.0))
+    fault = {"ghosts": {"rate_hz": 1.0, "for_s": 1.0}}
     shown = [(scan.ranges_m < 5.0).any() for _, scan, _ in delivered(fault, 200.0)]
     # One ghost on average; some walk off or stand farther than the wall at 5 m to 21 m.
     assert 0.35 < np.mean(shown) < 1.0 - math.exp(-1.0) + 0.1
-    assert not any((scan.ranges_m < 5.0).any() for _, scan, _ in delivered(ScannerFault(), 2.0))
+    assert not any((scan.ranges_m < 5.0).any() for _, scan, _ in delivered({}, 2.0))
 
 
 def test_legs_stand_in_odom_while_the_robot_moves_and_hide_what_is_behind_them():

@@ -14,7 +14,7 @@ from perception import AttentionCone, Camera, FloorPlane
 from perception.surround import PanoramaLens, SurroundPipeline, ring_of_views
 from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
 from sim_tests.crossing import Stage
-from sim_tests.crossing.eyes import KeypointNoise, SurroundEyes, make_eyes
+from sim_tests.crossing.eyes import Exposure, KeypointNoise, SurroundEyes, make_eyes
 from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
 from sim_tests.study.runs import named_templates, plan_jobs
 
@@ -113,12 +113,13 @@ def test_a_surround_camera_reports_each_person_once_and_nobody_else(scenario: Sc
     with Stage(scenario) as stage:
         camera = scenario.camera.camera()
         rng = np.random.default_rng(0)
-        eyes = make_eyes("keypoints", stage, camera, CONE, noise, rng)
+        eyes = make_eyes("keypoints", stage, camera, rng, cone=CONE, noise=noise)
         assert isinstance(eyes, SurroundEyes)
         T_odom_camera = stage.amr.T_odom_camera
         truth = stage.truth(CONE, T_odom_camera)
+        now = Exposure(0.0, T_odom_camera, T_odom_camera, truth)
         for _ in range(50):
-            seen = {worker: each for each, worker in eyes.observe(0.0, T_odom_camera, truth)}
+            seen = {worker: each for each, worker in eyes.observe(now)}
             assert sorted(seen) == [0, 1, 2]
             for worker, observation in seen.items():
                 away = observation.position_camera_m - truth[worker].position_camera_m

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perception.arrays import FloatArray
 from sim_tests import SimError
-from sim_tests.crossing.eyes import TimedEyes
+from sim_tests.crossing.eyes import Exposure, TimedEyes
 from sim_tests.world.camera import CameraTiming, FrameClock, FrameQueue
 
 
@@ -102,8 +101,8 @@ class _Counting:
     def __init__(self) -> None:
         self.looked_s: list[float] = []
 
-    def observe(self, stamp_s: float, T_odom_camera: FloatArray, truth: object) -> tuple[()]:
-        self.looked_s.append(stamp_s)
+    def observe(self, exposure: Exposure) -> tuple[()]:
+        self.looked_s.append(exposure.stamp_s)
         return ()
 
 
@@ -115,7 +114,7 @@ def test_timed_eyes_deliver_late_what_they_saw_at_the_stamp() -> None:
     for tick in range(200):
         now = tick / 20.0
         pose = np.eye(4) * (1.0 + tick)
-        for sighting in timed.look(now, pose, ()):
+        for sighting in timed.look(now, pose, pose, ()):
             assert now - sighting.stamp_s == pytest.approx(0.15)  # the first tick after 0.12 s
             assert sighting.T_odom_camera[0, 0] == pytest.approx(1.0 + 20.0 * sighting.stamp_s)
             delivered.append(sighting.stamp_s)
