@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 from sim_tests.world import Warehouse
-from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import Mesh, box, merge
 from sim_tests.world.render import RenderView, Visuals
 from training.hall import ellipsoid, tube
@@ -69,9 +68,7 @@ class Clutter:
     def build(self, visuals: Visuals) -> None:
         """Make the body in the render world."""
         self._visuals = visuals
-        self._body = visuals.add_body(
-            visuals.shape(self._mesh, texture=visuals.texture(self._texture))
-        )
+        self._body = visuals.add_body(self._mesh, texture=visuals.texture(self._texture))
 
     def bodies(self) -> AbstractSet[int]:
         """Return the id of the body, once it is made."""
@@ -87,12 +84,10 @@ class Clutter:
             change(self._body)
             self._shown = shown
         if shown:
-            pybullet.resetBasePositionAndOrientation(
-                self._body,
-                self._position.tolist(),
-                self._rotation.as_quat().tolist(),
-                physicsClientId=self._visuals.client,
-            )
+            T_odom_body = np.eye(4)
+            T_odom_body[:3, :3] = self._rotation.as_matrix()
+            T_odom_body[:3, 3] = self._position
+            self._visuals.place([self._body], T_odom_body[None])
 
 
 def random_thing(rng: np.random.Generator) -> Mesh:

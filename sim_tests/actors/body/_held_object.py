@@ -9,11 +9,9 @@ from functools import lru_cache
 from typing import Final, Literal, Protocol, get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
-from ...world.bullet import pybullet
 from ...world.errors import SimError
 from ...world.hall import Mesh, box, merge
 from ...world.render import RenderView, Visuals
@@ -145,7 +143,7 @@ class HeldObject:
         held = None if pixels_per_m is None else self._worker.held
         if held is not None and held not in self._bodies:
             self._bodies[held] = visuals.add_body(
-                visuals.shape(_mesh(held, self._seat(held)), texture=visuals.texture(_PALETTE))
+                _mesh(held, self._seat(held)), texture=visuals.texture(_PALETTE)
             )
         elif held is not None and held != self._shown:
             visuals.reveal(self._bodies[held])
@@ -154,12 +152,7 @@ class HeldObject:
         self._shown = held
         place = self._worker.T_odom_held
         if held is not None and place is not None:
-            pybullet.resetBasePositionAndOrientation(
-                self._bodies[held],
-                place[:3, 3].tolist(),
-                Rotation.from_matrix(place[:3, :3]).as_quat().tolist(),
-                physicsClientId=visuals.client,
-            )
+            visuals.place([self._bodies[held]], place[None])
 
     def _seat(self, held: str) -> Seat | None:
         return self._worker.seat if held == "seat" else None

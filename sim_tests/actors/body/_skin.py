@@ -18,11 +18,9 @@ from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
-from ...world.bullet import pybullet
 from ...world.hall import Mesh
 from ...world.render import RenderView, Visuals, box_corners, in_view, to_camera
 from ...world.sightlines import PlacedSurface, TriangleSet
@@ -262,7 +260,7 @@ class WorkerSkin:
             visuals.reveal(body)
         self._shown = shown
         if shown:
-            _place_pieces(visuals.client, level, places, rows)
+            visuals.place([level.bodies[row] for row in rows], places[rows])
 
     def _make(self, visuals: Visuals, level: int) -> _Level:
         asset, scale = self.worker.asset, self.worker.pose.scale
@@ -270,8 +268,7 @@ class WorkerSkin:
         shipped, own = self.worker.asset.levels, self._textures
         texture = visuals.texture(shipped[level].texture_rgb if own is None else own[level])
         bodies = tuple(
-            visuals.add_body(visuals.shape(_scaled(piece.mesh, scale), texture=texture))
-            for piece in pieces
+            visuals.add_body(_scaled(piece.mesh, scale), texture=texture) for piece in pieces
         )
         return _Level(
             bodies,
@@ -295,14 +292,6 @@ def _rows_in_view(level: _Level, places: FloatArray, view: RenderView | None) ->
     corners = np.einsum("pij,pkj->pki", places[:, :3, :3], level.boxes_m) + places[:, None, :3, 3]
     rows: list[int] = np.flatnonzero(in_view(view, to_camera(view, corners))).tolist()
     return rows
-
-
-def _place_pieces(client: int, level: _Level, places: FloatArray, rows: list[int]) -> None:
-    turns = Rotation.from_matrix(places[rows, :3, :3]).as_quat().tolist()
-    for row, position, turn in zip(rows, places[rows, :3, 3].tolist(), turns, strict=True):
-        pybullet.resetBasePositionAndOrientation(
-            level.bodies[row], position, turn, physicsClientId=client
-        )
 
 
 def _level_for(samples_per_m: float) -> int:

@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
-from ...world.bullet import pybullet
 from ...world.errors import SimError
 from ...world.hall import Colour, Mesh, box, merge, read_meshes, scenery_texture
 from ...world.render import RenderView, Visuals
@@ -127,10 +126,10 @@ class RobotLook:
         self._visuals = visuals
         for part in self._parts:
             if part.colour is None:
-                shape = visuals.shape(part.mesh, texture=visuals.texture(scenery_texture("amr")))
+                texture = visuals.texture(scenery_texture("amr"))
+                self._bodies.append(visuals.add_body(part.mesh, texture=texture))
             else:
-                shape = visuals.shape(part.mesh, part.colour)
-            self._bodies.append(visuals.add_body(shape))
+                self._bodies.append(visuals.add_body(part.mesh, part.colour))
 
     def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
         """Pose the bodies for the next image; None hides them.
@@ -147,17 +146,12 @@ class RobotLook:
             self._shown = shown
         if not shown:
             return
-        T, wheels = self._base_pose(), self._wheel_angles()
-        base = Rotation.from_matrix(T[:3, :3])
-        turns = [base] * (len(self._parts) - len(wheels))
-        turns += [base * Rotation.from_rotvec((0.0, angle, 0.0)) for angle in wheels]
-        for body, part, turn in zip(self._bodies, self._parts, turns, strict=True):
-            pybullet.resetBasePositionAndOrientation(
-                body,
-                (T[:3, :3] @ np.array(part.origin_m) + T[:3, 3]).tolist(),
-                turn.as_quat().tolist(),
-                physicsClientId=self._visuals.client,
-            )
+        T_odom_base, wheels = self._base_pose(), self._wheel_angles()
+        T_base_parts = np.tile(np.eye(4), (len(self._parts), 1, 1))
+        T_base_parts[:, :3, 3] = [part.origin_m for part in self._parts]
+        for T, angle in zip(T_base_parts[len(self._parts) - len(wheels) :], wheels, strict=True):
+            T[:3, :3] = Rotation.from_rotvec((0.0, angle, 0.0)).as_matrix()
+        self._visuals.place(self._bodies, T_odom_base @ T_base_parts)
 
     def bodies(self) -> frozenset[int]:
         """Return the ids of the robot's bodies in the render world."""

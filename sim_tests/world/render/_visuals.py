@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import AbstractContextManager
 from types import TracebackType
@@ -13,13 +14,21 @@ from numpy.typing import NDArray
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
 
-from ..bullet import pybullet
 from ..errors import SimError
 from ..hall import Colour, Lighting, Mesh, WarehouseLayout, scenery, scenery_texture
-from ._backend import RENDERERS, Drawing, RenderBackend, RendererName, texture_key
+from ._backend import (
+    RENDERERS,
+    Drawing,
+    RenderBackend,
+    RendererName,
+    RenderView,
+    box_corners,
+    in_view,
+    texture_key,
+    to_camera,
+)
 from ._backend_gl import GlBackend, gl_works
 from ._backend_tiny import TinyBackend
-from ._view import RenderView, box_corners, in_view, to_camera
 
 _WHITE: Final[Colour] = (1.0, 1.0, 1.0)
 
@@ -53,7 +62,7 @@ class VisualActor(Protocol):
 
 
 class Visuals(AbstractContextManager["Visuals"]):
-    """The render world, a PyBullet client of its own without physics; use it in a ``with`` block.
+    """The render world, apart from the physics; use it in a ``with`` block.
 
     Scenery stands still; actors move. Before each image, :meth:`prepare` hides the actors outside
     the frustum, which never changes the image.
@@ -78,6 +87,7 @@ class Visuals(AbstractContextManager["Visuals"]):
         variant: int = 0,
     ) -> None:
         self._backend: RenderBackend = _start_backend(renderer)
+        self._closed = False
         self.renderer = self._backend.name
         # Numbers of the textures by content.
         self._textures: dict[bytes, int] = {}
@@ -94,11 +104,6 @@ class Visuals(AbstractContextManager["Visuals"]):
             self._backend.close()
             raise
 
-    @property
-    def client(self) -> int:
-        """PyBullet's id of this world; −1 once it is closed."""
-        return self._backend.client
-
     def __exit__(
         self,
         kind: type[BaseException] | None,
@@ -109,6 +114,7 @@ class Visuals(AbstractContextManager["Visuals"]):
 
     def close(self) -> None:
         """End the render world; a second call does nothing."""
+        self._closed = True
         self._backend.close()
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
@@ -123,68 +129,19 @@ class Visuals(AbstractContextManager["Visuals"]):
             self._textures[key] = self._backend.texture(image)
         return self._textures[key]
 
-    def shape(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
-        """Register a visual shape for :meth:`add_body`; return PyBullet's id of it.
+    def add_body(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
+        """Make a rigid body at the origin of odom; return its number.
 
-        The texture is multiplied by the colour.
+        The texture, of :meth:`texture`, is multiplied by the colour.
         """
         if texture is not None and mesh.uv is None:
             raise SimError("a mesh with a texture needs uv coordinates")
-        return self._backend.shape(mesh, colour, texture)
+        return self._backend.add_body(mesh, colour, texture)
 
-    def add_body(
-        self,
-        shape: int,
-        link_shapes: tuple[int, ...] = (),
-        joints_m: FloatArray | None = None,
-        parents: tuple[int, ...] = (),
-    ) -> int:
-        """Make a body of one shape, or of a tree of shapes connected by spherical joints.
-
-        Args:
-            shape: shape of the base, −1 for none.
-            link_shapes: shapes of the links, −1 for none.
-            joints_m: (L, 3) each link's joint in the frame of its parent.
-            parents: row of each link's parent among the links, −1 for the base.
-
-        Returns:
-            PyBullet's id; link i is its joint i.
-        """
-        count = len(link_shapes)
-        origins = np.zeros((count, 3)) if joints_m is None else np.asarray(joints_m)
-        parent_rows = parents or (-1,) * count
-        links = {
-            "linkMasses": [0.0] * count,
-            "linkCollisionShapeIndices": [-1] * count,
-            "linkVisualShapeIndices": list(link_shapes),
-            "linkPositions": origins.tolist(),
-            "linkOrientations": [(0.0, 0.0, 0.0, 1.0)] * count,
-            "linkInertialFramePositions": [(0.0, 0.0, 0.0)] * count,
-            "linkInertialFrameOrientations": [(0.0, 0.0, 0.0, 1.0)] * count,
-            "linkParentIndices": [parent + 1 for parent in parent_rows],
-            "linkJointTypes": [pybullet.JOINT_SPHERICAL] * count,
-            "linkJointAxis": [(0.0, 0.0, 1.0)] * count,
-        }
-        body = int(
-            pybullet.createMultiBody(
-                0.0,
-                -1,
-                shape,
-                useMaximalCoordinates=not count,
-                physicsClientId=self.client,
-                **(links if count else {}),
-            )
-        )
-        for link, link_shape in enumerate((shape, *link_shapes), start=-1):
-            if link_shape >= 0:
-                self._backend.attach(body, link, link_shape)
-        return body
-
-    def add_static(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
-        """Add a piece of scenery in odom; return PyBullet's id of its body."""
+    def add_static(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> None:
+        """Add a piece of scenery in odom, as :meth:`add_body` does."""
         self._show_statics(True)
-        self._static_bodies.append(self.add_body(self.shape(mesh, colour, texture)))
-        return self._static_bodies[-1]
+        self._static_bodies.append(self.add_body(mesh, colour, texture))
 
     def add_actor(self, actor: VisualActor) -> int:
         """Add something that moves; return its number in :attr:`RenderedView.actors`."""
@@ -195,6 +152,10 @@ class Visuals(AbstractContextManager["Visuals"]):
     def actors(self) -> tuple[VisualActor, ...]:
         """The actors in the order of their numbers."""
         return tuple(self._actors)
+
+    def place(self, bodies: Sequence[int], T_odom_bodies: FloatArray) -> None:
+        """Move bodies to their poses (N, 4, 4)."""
+        self._backend.place(bodies, T_odom_bodies)
 
     def hide(self, body: int) -> None:
         """Stop drawing a body, in every buffer."""
@@ -211,7 +172,7 @@ class Visuals(AbstractContextManager["Visuals"]):
             view: the view of the next image.
             only: numbers of the actors to draw, without scenery; None draws everything.
         """
-        if self.client < 0:
+        if self._closed:
             raise SimError("the render world is closed: it cannot draw any more")
         self._show_statics(only is None)
         bounds = np.array([actor.bounds_odom_m() for actor in self._actors], dtype=np.float64)

@@ -91,7 +91,7 @@ def test_equal_textures_are_kept_once_and_unusable_ones_are_refused() -> None:
         square = upright_square()
         bare = Mesh(square.vertices_m, square.normals, square.indices)
         with pytest.raises(SimError, match="uv"):
-            visuals.shape(bare, texture=first)
+            visuals.add_body(bare, texture=first)
 
 
 def test_rendering_never_changes_the_physics() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from perception.arrays import FloatArray
-from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import Mesh, quad
 from sim_tests.world.render import RenderView, Visuals
 from training.hall import ellipsoid
@@ -51,7 +50,7 @@ class ShapeActor:
         texture = None
         if self._texture_rgb is not None:
             texture = visuals.texture(self._texture_rgb.astype(np.uint8))
-        self.body = visuals.add_body(visuals.shape(self.mesh, self._colour, texture))
+        self.body = visuals.add_body(self.mesh, self._colour, texture)
 
     def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
         self.shown.append(pixels_per_m)
@@ -59,12 +58,9 @@ class ShapeActor:
             self._visuals.hide(self.body)
             return
         self._visuals.reveal(self.body)
-        pybullet.resetBasePositionAndOrientation(
-            self.body,
-            self.position_m.tolist(),
-            (0.0, 0.0, 0.0, 1.0),
-            physicsClientId=self._visuals.client,
-        )
+        T_odom_body = np.eye(4)
+        T_odom_body[:3, 3] = self.position_m
+        self._visuals.place([self.body], T_odom_body[None])
 
     def bodies(self) -> frozenset[int]:
         return frozenset({self.body})
