@@ -17,9 +17,21 @@ from perception.arrays import FloatArray
 
 from ..errors import SimError
 from ._layout import WarehouseLayout
-from ._meshes import WHOLE, Colour, Mesh, Region, SceneryChunk, box, merge, quad
+from ._meshes import (
+    FIXTURE_ATLAS,
+    GOODS_ATLAS,
+    MARKING_ATLAS,
+    TILE_M,
+    WHOLE,
+    Colour,
+    Mesh,
+    Region,
+    SceneryChunk,
+    box,
+    merge,
+    quad,
+)
 from ._scenery_goods import prop_chunk, rack_chunks
-from ._textures import FIXTURE_ATLAS, GOODS_ATLAS, MARKING_ATLAS, TILE_M
 
 # Width and height of each wall fixture, and the height of its lower edge, metres.
 _FIXTURES: Final[dict[str, tuple[float, float, float]]] = {
