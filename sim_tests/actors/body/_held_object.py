@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, Literal, Protocol, get_args
@@ -101,9 +100,7 @@ class HeldObject:
 
     def __init__(self, worker: Holder) -> None:
         self._worker = worker
-        self._visuals: Visuals | None = None
         self._bodies: dict[str, int] = {}
-        self._shown: str | None = None
 
     def bounds_odom_m(self) -> FloatArray:
         """Return (2, 3) the corners of a box that holds the object; a point with empty hands."""
@@ -127,32 +124,18 @@ class HeldObject:
             return None
         return PlacedSurface(_triangles(held, self._seat(held)), place[None])
 
-    def build(self, visuals: Visuals) -> None:
-        """Store the render world; each object is made when it is first held."""
-        self._visuals = visuals
-
-    def bodies(self) -> AbstractSet[int]:
-        """Return the ids of all objects made so far."""
-        return set(self._bodies.values())
-
-    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Place the object in the hands, or hide it. All levels of detail are the same."""
-        visuals = self._visuals
-        if visuals is None:
-            return
-        held = None if pixels_per_m is None else self._worker.held
-        if held is not None and held not in self._bodies:
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[list[int], FloatArray]:
+        """Return the object, made when it is first held; all levels of detail are the same."""
+        held, place = self._worker.held, self._worker.T_odom_held
+        if held is None or place is None:
+            return [], np.empty((0, 4, 4))
+        if held not in self._bodies:
             self._bodies[held] = visuals.add_body(
                 _mesh(held, self._seat(held)), texture=visuals.texture(_PALETTE)
             )
-        elif held is not None and held != self._shown:
-            visuals.reveal(self._bodies[held])
-        if self._shown is not None and held != self._shown:
-            visuals.hide(self._bodies[self._shown])
-        self._shown = held
-        place = self._worker.T_odom_held
-        if held is not None and place is not None:
-            visuals.place([self._bodies[held]], place[None])
+        return [self._bodies[held]], place[None]
 
     def _seat(self, held: str) -> Seat | None:
         return self._worker.seat if held == "seat" else None

@@ -11,7 +11,6 @@ otherwise its rim would stick out of a bent knee.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final, Protocol
@@ -197,9 +196,7 @@ class WorkerSkin:
     ) -> None:
         self.worker = worker
         self._textures = None if textures is None else tuple(textures)
-        self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
-        self._shown: set[int] = set()
         # Surfaces of the last requested pose by level of detail.
         self._surface_pose: BodyPose | None = None
         self._surfaces: dict[int, PlacedSurface] = {}
@@ -231,36 +228,17 @@ class WorkerSkin:
         reach = _REACH_M * max(self.worker.pose.scale, 1.0)
         return np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])
 
-    def build(self, visuals: Visuals) -> None:
-        """Store the render world; each level of detail is made when it is first needed."""
-        self._visuals = visuals
-
-    def bodies(self) -> AbstractSet[int]:
-        """Return the ids of all pieces made so far."""
-        return {body for level in self._levels.values() for body in level.bodies}
-
-    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Show the worker's pose at the level of detail for these samples per metre; None hides."""
-        visuals = self._visuals
-        if visuals is None:
-            return
-        shown: set[int] = set()
-        if pixels_per_m is not None:
-            number = _level_for(pixels_per_m)
-            if number not in self._levels:
-                self._levels[number] = self._make(visuals, number)
-                self._shown |= set(self._levels[number].bodies)
-            level = self._levels[number]
-            places = level.rigid.odom(self.worker.pose, self.worker.links_odom)
-            rows = _rows_in_view(level, places, view)
-            shown = {level.bodies[row] for row in rows}
-        for body in self._shown - shown:
-            visuals.hide(body)
-        for body in shown - self._shown:
-            visuals.reveal(body)
-        self._shown = shown
-        if shown:
-            visuals.place([level.bodies[row] for row in rows], places[rows])
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[list[int], FloatArray]:
+        """Return the pieces that the view may show, at this level of detail, and their poses."""
+        number = _level_for(samples_per_m)
+        if number not in self._levels:
+            self._levels[number] = self._make(visuals, number)
+        level = self._levels[number]
+        places = level.rigid.odom(self.worker.pose, self.worker.links_odom)
+        rows = _rows_in_view(level, places, view)
+        return [level.bodies[row] for row in rows], places[rows]
 
     def _make(self, visuals: Visuals, level: int) -> _Level:
         asset, scale = self.worker.asset, self.worker.pose.scale
@@ -285,10 +263,8 @@ class WorkerSkin:
         )
 
 
-def _rows_in_view(level: _Level, places: FloatArray, view: RenderView | None) -> list[int]:
+def _rows_in_view(level: _Level, places: FloatArray, view: RenderView) -> list[int]:
     """Return the rows of the pieces that the view may show."""
-    if view is None:
-        return list(range(len(level.bodies)))
     corners = np.einsum("pij,pkj->pki", places[:, :3, :3], level.boxes_m) + places[:, None, :3, 3]
     rows: list[int] = np.flatnonzero(in_view(view, to_camera(view, corners))).tolist()
     return rows

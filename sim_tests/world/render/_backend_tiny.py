@@ -117,6 +117,8 @@ class TinyBackend(RenderBackend):
 
     def place(self, bodies: Sequence[int], T_odom_bodies: FloatArray) -> None:
         """Move bodies."""
+        if not len(bodies):
+            return
         positions = T_odom_bodies[:, :3, 3].tolist()
         turns = Rotation.from_matrix(T_odom_bodies[:, :3, :3]).as_quat().tolist()
         for body, position, turn in zip(bodies, positions, turns, strict=True):
