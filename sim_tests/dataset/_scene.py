@@ -40,7 +40,6 @@ def frame_truth(
     T_odom_camera: FloatArray,
     view: RenderedView,
     workers: Sequence[Worker],
-    cone: AttentionCone | None = None,
 ) -> list[Record]:
     """Return one record per worker who is visible in ``view``.
 
@@ -50,9 +49,7 @@ def frame_truth(
         T_odom_camera: (4, 4) pose of the camera.
         view: the rendered image.
         workers: all workers of the warehouse.
-        cone: scores awareness; None for the default cone.
     """
-    cone = AttentionCone() if cone is None else cone
     people = []
     for index, worker in enumerate(workers):
         mask = view.actors == worker.actor
@@ -66,7 +63,7 @@ def frame_truth(
             {
                 "id": index,
                 "box_xyxy_px": [float(edge) for edge in box],
-                **_geometry(camera, T_odom_camera, view, worker, cone),
+                **_geometry(camera, T_odom_camera, view, worker),
                 "score": 1.0,
                 "occlusion": round(1.0 - min(visible / max(inside, visible), 1.0), 4),
                 "truncation": round(1.0 - inside / max(total, 1), 4),
@@ -112,7 +109,6 @@ def _geometry(
     T_odom_camera: FloatArray,
     view: RenderedView,
     worker: Worker,
-    cone: AttentionCone,
 ) -> dict[str, Any]:
     rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
     body = np.concatenate([worker.keypoints_odom_m, worker.neck_odom_m[None]])
@@ -120,7 +116,7 @@ def _geometry(
     pixels = camera.project(points)
     seen = keypoints_in_front(points, pixels, view.depth_m)
     gaze = worker.gaze_odom
-    awareness = float(cone.scores(worker.eyes_odom_m, gaze, origin))
+    awareness = float(AttentionCone().scores(worker.eyes_odom_m, gaze, origin))
     if awareness > 0.0 and not sees(worker, origin):
         awareness = 0.0
     return {

@@ -221,17 +221,6 @@ class CameraRenderer:
         """Return the camera's image (H, W, 3)."""
         return self.render(camera, T_odom_camera).rgb
 
-    def depth(
-        self,
-        camera: Camera,
-        T_odom_camera: Any,
-        roi_xyxy_px: Any = None,
-        size_px: tuple[int, int] | None = None,
-    ) -> FloatArray:
-        """Return the depth (h, w) along the optical axis; arguments as in :meth:`render`."""
-        view = RenderView.of_rectangle(camera, T_odom_camera, roi_xyxy_px, size_px)
-        return self._draw(view, None).depth_m
-
     def render(
         self,
         camera: Camera,
@@ -259,10 +248,10 @@ class CameraRenderer:
         view = RenderView.of_rectangle(camera, T_odom_camera, roi_xyxy_px, size_px)
         factor = self._supersampling
         if factor == 1:
-            drawing = self._draw(view, only, shadows=self._light.shadows)
+            drawing = self._draw(view, only)
             rgb = drawing.rgb
         else:
-            fine = self._draw(view.finer(factor), only, shadows=self._light.shadows)
+            fine = self._draw(view.finer(factor), only)
             rgb = np.asarray(
                 cv2.resize(fine.rgb, (view.width, view.height), interpolation=cv2.INTER_AREA),
                 dtype=np.uint8,
@@ -278,13 +267,11 @@ class CameraRenderer:
         actors = self._warehouse.visuals.actor_numbers(drawing.body_ids)
         return RenderedView(rgb, drawing.depth_m, drawing.body_ids, actors)
 
-    def _draw(
-        self, view: RenderView, only: AbstractSet[int] | None, *, shadows: bool = False
-    ) -> Drawing:
+    def _draw(self, view: RenderView, only: AbstractSet[int] | None) -> Drawing:
         visuals = self._warehouse.visuals
         visuals.prepare(view, only)
         drawing = visuals.draw(view, self._light)
-        if shadows and only is None:
+        if self._light.shadows and only is None:
             shade_floor(visuals, view, drawing, self._light)
         return drawing
 

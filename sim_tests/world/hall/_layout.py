@@ -127,6 +127,8 @@ class Prop(SimConfig):
 
 
 _Positive = Annotated[float, Field(gt=0.0)]
+# Thickness of the outer walls, outside the hall's extent.
+_WALL_THICKNESS_M: Final = 0.2
 #: Names of the shipped layouts.
 LAYOUTS: Final = ("crossing", "open", "blind_corner", "aisles", "staging_hall")
 
@@ -228,7 +230,7 @@ class WarehouseLayout(SimConfig):
     def obstacle_boxes_odom(self) -> FloatArray:
         """The bounds (N, 4) x_min, y_min, x_max, y_max in metres: racks, the four walls, props."""
         x_min, y_min, x_max, y_max = self.x_min_m, self.y_min_m, self.x_max_m, self.y_max_m
-        thick = self.wall_thickness_m
+        thick = _WALL_THICKNESS_M
         walls = [
             (x_min - thick, y_min - thick, x_min, y_max + thick),
             (x_max, y_min - thick, x_max + thick, y_max + thick),
@@ -248,11 +250,6 @@ class WarehouseLayout(SimConfig):
         heights = np.array([*racks, *[self.wall_height_m] * 4, *props])
         heights.setflags(write=False)
         return heights
-
-    @property
-    def wall_thickness_m(self) -> float:
-        """The thickness of the outer walls, outside the hall's extent."""
-        return 0.2
 
 
 @cache
