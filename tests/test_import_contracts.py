@@ -21,13 +21,13 @@ PLANTED = {
         "tracking/_size.py",
         "from nav_adapter import NavError",
     ),
-    "sim_tests: search > study | demo > viewing | learning > crossing > "
+    "sim_tests: search | demo > study > viewing | learning > crossing > "
     "scenario | dataset > actors > conditions > world": (
         "sim_tests/world/_visibility.py",
         "from ..crossing import run_crossing",
     ),
     "sim_tests.world: scanner > camera > warehouse > render | sightlines > hall": (
-        "sim_tests/world/hall/_props.py",
+        "sim_tests/world/hall/_layout.py",
         "from ..camera import CameraRenderer",
     ),
     "sim_tests.actors: behaviour > body, robot apart": (
