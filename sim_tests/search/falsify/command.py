@@ -88,7 +88,7 @@ def falsify(**values: Any) -> int:
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings
     --scenario` runs them again), episodes.csv, falsify.png, summary.json and the studies.
     """
-    from ._run import run_falsify  # noqa: PLC0415 - help needs no simulator
+    from ._results import run_falsify  # noqa: PLC0415 - help needs no simulator
 
     episodes = values.pop("episodes")
     return run_falsify(experiment=Experiment.taken_from(values), episodes=episodes, **values)

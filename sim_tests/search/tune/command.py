@@ -91,7 +91,7 @@ def tune(**values: Any) -> int:
     scenario, which no trial runs, and the next command. Writes study.log, trials.csv, tuning.png,
     importances.json, chosen.json, and chosen/*.yaml with their results on the held-out seeds.
     """
-    from ._run import run_tune  # noqa: PLC0415 - help needs no simulator
+    from ._results import run_tune  # noqa: PLC0415 - help needs no simulator
 
     seeds = values.pop("episodes")
     return run_tune(experiment=Experiment.taken_from(values), episodes=seeds, **values)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._family import TODAY, sensors_of_today
+    from ._frontier import TODAY, sensors_of_today
 
 __all__ = ["TODAY", "sensors_of_today"]
 

@@ -53,6 +53,6 @@ def frontier(**values: Any) -> int:
     They say what awareness wins at equal risk and at equal time, with 95 % intervals. With DIR,
     the folder of such episodes, it runs nothing and draws them again.
     """
-    from ._run import frontier_command  # noqa: PLC0415 - help needs no simulator
+    from ._show import frontier_command  # noqa: PLC0415 - help needs no simulator
 
     return frontier_command(experiment=Experiment.taken_from(values), **values)

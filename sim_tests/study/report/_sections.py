@@ -26,8 +26,7 @@ from ..measures import (
 from ..runs import Job, answering_note
 from ._charts import episode_chart, risk_chart
 from ._page import Cell, Row, Section, Still, Table, interval_cell, number_cell, share_cell
-from ._results import Arm, Results, moving_contacts
-from ._run import Episode, Run
+from ._results import Arm, Episode, Results, Run, moving_contacts
 
 #: Most episodes with pictures; of each scenario and arm only the worst.
 MOST_STILLS: Final = 4

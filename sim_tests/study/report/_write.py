@@ -8,10 +8,9 @@ from typing import Final
 from awarenav.errors import counted
 
 from ..measures import nondeterminism_notes
+from ._compare import planners_section
 from ._page import write_page
-from ._planners import planners_section
-from ._results import Results
-from ._run import Run
+from ._results import Results, Run
 from ._sections import (
     arms_section,
     awareness_section,
