@@ -2,13 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from perception.lazy import lazy_page
-
-if TYPE_CHECKING:
-    from ._no_floor_planner import NoFloorPlanner
+from ._no_floor_planner import NoFloorPlanner
 
 __all__ = ["NoFloorPlanner"]
-
-__getattr__ = lazy_page(__name__, __file__)

@@ -322,3 +322,25 @@ def _violates(against: Comparison, who: str) -> str:
     return (
         f"With {who}, margins are negative {'longer' if change.value > 0.0 else 'shorter'}: {text}."
     )
+
+
+def worst_first(episode: Episode) -> tuple[int, float, tuple[str, int, int]]:
+    """Return a sort key: contacts with the moving robot, then errors, then the smallest margins."""
+    record = episode.record
+    severity = 0 if record.moving_touched else 1 if record.error else 2
+    margin = float("inf") if record.min_margin_m is None else record.min_margin_m
+    return severity, margin, (record.scenario, record.scenario_version, record.seed)
+
+
+def outcome_of(episode: Episode) -> str:
+    """Return a remark on the outcome of an episode; empty for a success."""
+    record = episode.record
+    if record.error:
+        return f"failed: {record.error}"
+    if record.robot_touched:
+        return "robot moved into a person"
+    if record.moving_touched:
+        return "a person walked into the moving robot"
+    if record.person_contacts:
+        return "a person walked into the robot"
+    return "goal not reached" if record.time_to_goal_s is None else ""

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from perception.lazy import lazy_page
-
-if TYPE_CHECKING:
-    from ._episode import Outcome, SocialEpisode
-    from ._files import read_track, write_episode
-    from ._measures import SOCIAL_MEASURES, social_measures
-    from ._runs import EpisodeRecorder
+from ._episode import Outcome, SocialEpisode
+from ._files import read_track, write_episode
+from ._measures import SOCIAL_MEASURES, social_measures
+from ._runs import EpisodeRecorder
 
 __all__ = [
     "SOCIAL_MEASURES",
@@ -21,5 +16,3 @@ __all__ = [
     "social_measures",
     "write_episode",
 ]
-
-__getattr__ = lazy_page(__name__, __file__)

@@ -16,6 +16,7 @@ from sim_tests import ScenarioTemplate, SimError, run_crossing, shipped_scenario
 from sim_tests.actors.behaviour import FASTEST_RECORDED_MPS, Hearing, Lapse, draw_person
 from sim_tests.actors.robot import NOVA_CARTER, RobotModel
 from sim_tests.crossing.planner import StraightOn
+from sim_tests.search.command import falsify
 from sim_tests.search.falsify._parameters import (
     APART_M,
     COMPANION,
@@ -29,7 +30,6 @@ from sim_tests.search.falsify._parameters import (
     person_path,
 )
 from sim_tests.search.falsify._scenario_space import ScenarioSpace
-from sim_tests.search.falsify.command import falsify
 
 NAMES = (
     *("crossing_from_left", "runs_out", "blind_corner", "walking_backwards", "crowd_of_eight"),

@@ -11,10 +11,10 @@ import numpy as np
 from awarenav.figures import Axes, Circle, Figure, MultipleLocator, Polygon, Wedge, new_figure
 from perception.arrays import FloatArray
 
-from ...actors.behaviour import PersonSpec, RecordedPath, read_recordings
-from .._scenario import Scenario
-from .._template import ScenarioTemplate
-from ._plans import closest_approaches, person_plan, planned_people, robot_plan
+from ..actors.behaviour import PersonSpec, RecordedPath, read_recordings
+from ._scenario import Scenario
+from ._template import ScenarioTemplate
+from .catalogue import closest_approaches, person_plan, planned_people, robot_plan
 
 _WIDTH_IN: Final = 6.8
 _DPI: Final = 100
