@@ -31,7 +31,6 @@ CONFLICT_M: Final = 1.0
 #: Draws of a scenario that are checked.
 CHECKED_DRAWS: Final = 100
 _STEP_S: Final = 0.02
-_FORMATS: Final = (".png", ".svg", ".pdf")
 
 
 def robot_plan(task: RobotTask, t_s: FloatArray, robot: RobotProfile = NOVA_CARTER) -> FloatArray:
@@ -260,25 +259,16 @@ def _list_row(template: ScenarioTemplate, scenario_set: str) -> dict[str, Any]:
     }
 
 
-def show_command(name: str, *, yaml: bool, seed: int | None, out: Path | None) -> int:
-    """Print one scenario, in words or as YAML, and draw it."""
+def show_command(name: str, *, yaml: bool, seed: int | None) -> int:
+    """Print one scenario, in words or as YAML."""
     template = ScenarioTemplate.named(name)
     if seed is not None and not yaml:
         raise SimError("--seed needs --yaml: the description covers all draws of a scenario")
     if yaml:
         text = template.to_text() if seed is None else template.for_seed(seed).to_text()
         print(text, end="")
-        return 0
-    print("\n".join(description_lines(template)))
-    if out is not None:
-        if out.suffix.lower() not in _FORMATS:
-            raise SimError(f"--out must end in {', '.join(_FORMATS)}, got {out}")
-        from awarenav.figures import save_figure  # noqa: PLC0415 - needs matplotlib
-
-        from ._drawing import scenario_figure  # noqa: PLC0415
-
-        save_figure(scenario_figure(template), out)
-        print(f"\nWritten: {out}")
+    else:
+        print("\n".join(description_lines(template)))
     return 0
 
 

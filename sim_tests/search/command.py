@@ -91,7 +91,7 @@ def tune(**values: Any) -> int:
     scenario, which no trial runs, and the next command. Writes study.log, trials.csv, tuning.png,
     importances.json, chosen.json, and chosen/*.yaml with their results on the held-out seeds.
     """
-    from .tune._results import run_tune  # noqa: PLC0415 - help needs no simulator
+    from .tune import run_tune  # noqa: PLC0415 - help needs no simulator
 
     seeds = values.pop("episodes")
     return run_tune(experiment=Experiment.taken_from(values), episodes=seeds, **values)
@@ -176,7 +176,7 @@ def falsify(**values: Any) -> int:
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings
     --scenario` runs them again), episodes.csv, falsify.png, summary.json and the studies.
     """
-    from .falsify._results import run_falsify  # noqa: PLC0415 - help needs no simulator
+    from .falsify import run_falsify  # noqa: PLC0415 - help needs no simulator
 
     episodes = values.pop("episodes")
     return run_falsify(experiment=Experiment.taken_from(values), episodes=episodes, **values)

@@ -278,7 +278,7 @@ def frontier(**values: Any) -> int:
     They say what awareness wins at equal risk and at equal time, with 95 % intervals. With DIR,
     the folder of such episodes, it runs nothing and draws them again.
     """
-    from .frontier._show import frontier_command  # noqa: PLC0415 - help needs no simulator
+    from .frontier import frontier_command  # noqa: PLC0415 - help needs no simulator
 
     return frontier_command(experiment=Experiment.taken_from(values), **values)
 
@@ -315,7 +315,7 @@ def measures(
     Prints SPL, STL, distances, zones, accelerations, social work and more: the mean over the
     episodes of each policy.
     """
-    from .social._runs import measure_sources  # noqa: PLC0415 - help needs no runs
+    from .social import measure_sources  # noqa: PLC0415 - help needs no runs
 
     return measure_sources(sources, workers=workers, out=out, as_json=as_json)
 
@@ -354,7 +354,7 @@ def export_episode(**values: Any) -> int:
 
     The formats are the JSON of SocNav3 and the CSV columns of NavWareSet.
     """
-    from .social._runs import export_episode as export_to_file  # noqa: PLC0415 - help needs no runs
+    from .social import export_episode as export_to_file  # noqa: PLC0415 - help needs no runs
 
     return export_to_file(**values)
 

@@ -169,7 +169,7 @@ class Frontier:
         return tuple(self.points[column] for column in on_line)
 
 
-def frontier_of(records: Iterable[EpisodeRecord], level: float = 0.95) -> Frontier:
+def frontier_of(records: Iterable[EpisodeRecord]) -> Frontier:
     """Return the frontier of episodes; it does not depend on their order.
 
     Only scenarios and seeds count of which every policy has an episode with a time lost and
@@ -196,22 +196,21 @@ def frontier_of(records: Iterable[EpisodeRecord], level: float = 0.95) -> Fronti
         Point(
             name,
             member_named(name),
-            bootstrap_interval(lost_s[:, column], _rng(), level, strata=strata),
+            bootstrap_interval(lost_s[:, column], _rng(), strata=strata),
             bootstrap_interval(
                 free_s + lost_s[:, column],
                 _rng(),
-                level,
                 over=free_s + lost_s[:, 0],
                 strata=strata,
             ),
-            bootstrap_interval(impacts[:, column], _rng(), level, strata=strata),
+            bootstrap_interval(impacts[:, column], _rng(), strata=strata),
         )
         for column, name in enumerate(names)
     )
     attentive = np.array([row[0].attention == _ATTENTIVE for row in rows], dtype=np.float64)
     return Frontier(
         points,
-        _worth(points, _Means.of(lost_s, impacts, attentive, strata), len(rows), level),
+        _worth(points, _Means.of(lost_s, impacts, attentive, strata), len(rows)),
         float(free_s.mean()),
         len(rows),
         len(set(strata)),
@@ -276,7 +275,7 @@ class _Means:
         return cls(means[:, :count], means[:, count : 2 * count], attentive_s)
 
 
-def _worth(points: Sequence[Point], means: _Means, n: int, level: float) -> tuple[Worth, ...]:
+def _worth(points: Sequence[Point], means: _Means, n: int) -> tuple[Worth, ...]:
     line, found = _without_awareness(points), []
     for column, point in enumerate(points):
         if point.member is None or point.member.kind == "blind":
@@ -285,7 +284,7 @@ def _worth(points: Sequence[Point], means: _Means, n: int, level: float) -> tupl
         found.append(
             Worth(
                 point.member,
-                *(resampled_interval(float(each[0]), each[1:], n, level) for each in won.T),
+                *(resampled_interval(float(each[0]), each[1:], n) for each in won.T),
             )
         )
     return tuple(found)
