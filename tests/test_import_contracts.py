@@ -34,7 +34,7 @@ PLANTED = {
         "sim_tests/actors/body/_asset.py",
         "from ..behaviour import Person",
     ),
-    "sim_tests.study: command > report > social > runs | scenarios > measures": (
+    "sim_tests.study: command > frontier > report > social > runs | scenarios > measures": (
         "sim_tests/study/measures/_summary.py",
         "from ..runs import run_jobs",
     ),
