@@ -151,12 +151,9 @@ def limit_mps(person: Reach, course: Course, at_most_mps: float = math.inf) -> f
             later = t + step_s
             if t >= looked_until_s:
                 # Mostly nothing is met in several steps, which one look at all of them shows.
-                looked_until_s = later
-                for _ in range(1, _STEPS_A_LOOK):
-                    looked_until_s += step_s
-                if not (
-                    _lowest_mps(person, course, size_m, maximum, T, t, looked_until_s) < maximum
-                ):
+                looked_until_s = _later_s(t, step_s)
+                lowest = _lowest_mps(person, course, size_m, maximum, T, t, looked_until_s)
+                if not lowest < maximum:
                     t = looked_until_s
                     continue
             lowest = _lowest_mps(person, course, size_m, maximum, T, t, later)
@@ -330,6 +327,13 @@ def _size_m(course: Course) -> float:
 def _step_s(course: Course) -> float:
     """Return the step of time, which depends on neither reaction time nor age."""
     return course.maximum_mps / ROOM / course.deceleration_mps2 / STEPS
+
+
+def _later_s(t: float, step_s: float) -> float:
+    """Return the end of the steps from t that are looked at as one, summed up as they are."""
+    for _ in range(_STEPS_A_LOOK):
+        t += step_s
+    return t
 
 
 def _off_heading_rad(state: RobotState) -> float:
