@@ -146,7 +146,8 @@ _CONVERGED_CHI2: Final = 1e-2
 _MIN_DEPTH_M: Final = 0.05
 _EYE: Final = np.eye(3)
 _EYE_2: Final = np.eye(2)
-_EYE_6: Final = np.eye(6)
+# No step turns a head farther.
+_MAX_TURN_RAD: Final = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -321,8 +322,8 @@ def refine(
         )
         fit = (whitening @ state[3].reshape(count, -1, 1))[..., 0]
     cost, _, information, residual = state
-    chi2 = np.einsum("bk,bk->b", fit, fit)
-    error_px = keypoint_std_px * np.sqrt(np.einsum("bni,bni->bn", residual, residual))
+    chi2 = np.add.reduce(fit * fit, axis=1)
+    error_px = keypoint_std_px * np.sqrt(np.add.reduce(residual * residual, axis=2))
     return [
         RefinedPose(
             rotation[index],
@@ -369,8 +370,10 @@ def _descend(
     state = linearise(rotation, translation)
     for _ in range(iterations):
         cost, gradient, information, _ = state
-        scale = information.reshape(count, 36)[:, ::7]  # the diagonals
-        damped = information + (damping[:, None] * scale + 1e-9)[..., None] * _EYE_6
+        damped = information.copy()
+        diagonal = damped.reshape(count, 36)[:, ::7]
+        diagonal *= 1.0 + damping[:, None]
+        diagonal += 1e-9
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
         # The decrease of χ² that the local model still promises.
         promise = np.maximum.reduceat(-np.add.reduce(gradient * step, axis=1), first)
@@ -378,8 +381,9 @@ def _descend(
         if not np.logical_or.reduce(active):
             break
         turn = step[:, :3]
-        length = np.sqrt(np.einsum("bi,bi->b", turn, turn))[:, None]
-        turn = turn * np.minimum(1.0, 0.7 / np.maximum(length, 1e-12))
+        length = np.sqrt(np.add.reduce(turn * turn, axis=1, keepdims=True))
+        if np.maximum.reduce(length, axis=None) > _MAX_TURN_RAD:
+            turn = turn * np.minimum(1.0, _MAX_TURN_RAD / np.maximum(length, 1e-12))
         trial_rotation = rotation_exp(turn) @ rotation
         trial_translation = translation + step[:, 3:]
         trial = linearise(trial_rotation, trial_translation)
