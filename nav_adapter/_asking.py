@@ -227,13 +227,18 @@ class Addressing:
         others_mps, now_mps, then_mps = self._robot.max_speed_mps, math.inf, math.inf
         for track_id, each in people.items():
             moved = _moved(each, _ANSWER_S)
-            own_mps, _ = self._governor.person_mps(moved, straight, courses, now)
+            # A limit that others undercut counts for nothing.
+            counts_mps = min(others_mps, now_mps)
+            if track_id not in group:
+                counts_mps = others_mps
+            own_mps, _ = self._governor.person_mps(moved, straight, courses, now, counts_mps)
             if track_id not in group:
                 others_mps = min(others_mps, own_mps)
                 continue
             lower = max(each.awareness_lower, self._looked_lower)
             aware = moved._replace(awareness_lower=lower)
-            aware_mps, _ = self._governor.person_mps(aware, straight, courses, now)
+            counts_mps = min(others_mps, then_mps)
+            aware_mps, _ = self._governor.person_mps(aware, straight, courses, now, counts_mps)
             now_mps, then_mps = min(now_mps, own_mps), min(then_mps, aware_mps)
         now_mps, then_mps = min(now_mps, others_mps), min(then_mps, others_mps)
         x, y = _moved(person, _ANSWER_S).position_odom_m

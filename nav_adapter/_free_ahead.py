@@ -59,10 +59,7 @@ def is_free_ahead(
     needed_mps += robot.circumscribed_radius_m * abs(yaw_rate)
     needed_mps = min(needed_mps, robot.max_speed_mps) + _ROUNDING_MPS
     middle_s, half_s = 0.5 * (first_s + last_s), 0.5 * (last_s - first_s)
-    motions = [
-        _MotionAhead.of(basis, robot, robot_state, velocity, middle_s, half_s)
-        for velocity in ((forward, left, yaw_rate), present)
-    ]
+    motions: list[_MotionAhead] = []
     stop_s = (
         robot.reaction_time_s + _YOUNG_S + 1.2 * robot.max_speed_mps / robot.max_deceleration_mps2
     )
@@ -75,9 +72,13 @@ def is_free_ahead(
                 farthest_m += reach.farthest_m(stop_s)
             if reach.elapsed_s > _YOUNG_S or farthest_m > _FARTHEST_M:
                 return False
-            if not allows and not all(
-                motion.keeps(needed_mps, person, reach, basis.policy) for motion in motions
-            ):
+            if allows:
+                continue
+            motions = motions or [
+                _MotionAhead.of(basis, robot, robot_state, velocity, middle_s, half_s)
+                for velocity in ((forward, left, yaw_rate), present)
+            ]
+            if not all(motion.keeps(needed_mps, person, reach, basis.policy) for motion in motions):
                 return False
     return True
 

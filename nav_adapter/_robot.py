@@ -180,10 +180,10 @@ class RobotState:
         set_fields(
             self,
             position_odom_m=finite_array("position_odom_m", self.position_odom_m, (2,), NavError),
-            **{
-                name: finite_number(name, getattr(self, name), NavError)
-                for name in ("stamp_s", "heading_odom_rad", "speed_mps", "yaw_rate_radps")
-            },
+            stamp_s=finite_number("stamp_s", self.stamp_s, NavError),
+            heading_odom_rad=finite_number("heading_odom_rad", self.heading_odom_rad, NavError),
+            speed_mps=finite_number("speed_mps", self.speed_mps, NavError),
+            yaw_rate_radps=finite_number("yaw_rate_radps", self.yaw_rate_radps, NavError),
         )
         if self.velocity_base_mps is None:
             return

@@ -57,6 +57,8 @@ FINEST: Final = 0.13
 PASSING_MPS: Final = 0.3
 #: The room above the robot's maximum up to which limits are computed.
 ROOM: Final = 1.5
+# So many steps are first looked at as one.
+_STEPS_A_LOOK: Final = 6
 # More than the rounding of any distance that matters.
 _ROUNDING_M: Final = 1e-9
 
@@ -142,11 +144,18 @@ def limit_mps(person: Reach, course: Course, at_most_mps: float = math.inf) -> f
     finest_s = FINEST * step_s
     # Intervals of time whose reach is met, the one with the lowest speed first.
     meetings: list[tuple[float, float, float]] = []
-    t = 0.0
+    t = looked_until_s = 0.0
     limit = maximum
     while True:
         if a * (t - T) < limit:  # a robot at the limit so far still moves at t
             later = t + step_s
+            if t >= looked_until_s:
+                # Mostly nothing is met in several steps, which one look at all of them shows.
+                looked_until_s = _later_s(t, step_s)
+                lowest = _lowest_mps(person, course, size_m, maximum, T, t, looked_until_s)
+                if not lowest < maximum:
+                    t = looked_until_s
+                    continue
             lowest = _lowest_mps(person, course, size_m, maximum, T, t, later)
             if lowest < maximum:
                 heappush(meetings, (lowest, t, later))
@@ -318,6 +327,13 @@ def _size_m(course: Course) -> float:
 def _step_s(course: Course) -> float:
     """Return the step of time, which depends on neither reaction time nor age."""
     return course.maximum_mps / ROOM / course.deceleration_mps2 / STEPS
+
+
+def _later_s(t: float, step_s: float) -> float:
+    """Return the end of the steps from t that are looked at as one, summed up as they are."""
+    for _ in range(_STEPS_A_LOOK):
+        t += step_s
+    return t
 
 
 def _off_heading_rad(state: RobotState) -> float:

@@ -186,7 +186,22 @@ def _clipped(
             f"left between them, got shape {given.shape}"
         )
     limit_mps, fastest_mps, radius_m, highest_radps = _limits_of(constraints)
-    if (curve_m := _tightest_curve_m(constraints)) > 0.0:
+    curve_m = _tightest_curve_m(constraints)
+    if given.ndim == 1 and isinstance(ahead_mps, float):
+        # The same for one twist, in a tenth of the time.
+        *velocity, turn = given.tolist()
+        if curve_m > 0.0:
+            most = abs(velocity[0]) / curve_m
+            turn = min(max(turn, -most), most)
+        pace, turning = math.sqrt(sum(part * part for part in velocity)), abs(turn)
+        point_mps = max(min(fastest_mps, ahead_mps) - slack_mps, 0.0)
+        share = min(
+            _share_of_one(pace, limit_mps),
+            _share_of_one(turning, highest_radps),
+            _share_of_one(pace + radius_m * turning, point_mps),
+        )
+        return np.array([share * part for part in (*velocity, turn)])
+    if curve_m > 0.0:
         given = given.copy()
         most_radps = np.abs(given[..., 0]) / curve_m
         given[..., -1] = np.minimum(np.maximum(given[..., -1], -most_radps), most_radps)
@@ -339,6 +354,11 @@ def _share(value: FloatArray, most: float | FloatArray) -> FloatArray:
     """Return the factor of at most 1 that brings each value down to ``most``."""
     above = value > most
     return np.asarray(np.where(above, most / np.where(above, value, 1.0), 1.0))
+
+
+def _share_of_one(value: float, most: float) -> float:
+    """Return the factor of at most 1 that brings a value down to ``most``."""
+    return most / value if value > most else 1.0
 
 
 def _limits_alone(robot: RobotProfile) -> NavConstraints:

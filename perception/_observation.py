@@ -105,3 +105,37 @@ class PersonObservation:
             ),
             eyes_seen=bool(self.eyes_seen),
         )
+
+    @classmethod
+    def true(
+        cls,
+        stamp_s: float,
+        position_camera_m: FloatArray,
+        position_covariance_m2: FloatArray,
+        gaze_camera: FloatArray,
+        awareness: float,
+        awareness_std: float,
+    ) -> PersonObservation:
+        """Return the observation that a simulator makes of a person whose truth it knows.
+
+        Nothing is checked or copied, which takes a fifth of the time: the arrays must be valid,
+        read-only float64, and all numbers floats within their ranges. The score is 1.
+        """
+        observation = object.__new__(cls)
+        set_fields(
+            observation,
+            stamp_s=stamp_s,
+            position_camera_m=position_camera_m,
+            position_covariance_m2=position_covariance_m2,
+            gaze_camera=gaze_camera,
+            awareness=awareness,
+            awareness_std=awareness_std,
+            score=1.0,
+            box_xyxy_px=None,
+            awareness_reason=None,
+            range_lasting_relative_std=0.0,
+            size_range_m=None,
+            size_range_relative_std=None,
+            eyes_seen=False,
+        )
+        return observation

@@ -28,8 +28,10 @@ ORACLE: Final = "oracle"
 REFERENCE_PLANNER: Final = "reference"
 #: The name that stands for "without a fault".
 NO_FAULT: Final = "none"
-#: The habits that people can have.
-POPULATIONS: Final = ("classic", "recorded")
+#: The name of the habits that people have.
+PopulationName = Literal["classic", "recorded"]
+#: All of them.
+POPULATIONS: Final[tuple[PopulationName, ...]] = get_args(PopulationName)
 
 #: Completion of scenarios on the command line.
 COMPLETE_SCENARIOS: Final = completion_of(

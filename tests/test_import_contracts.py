@@ -21,20 +21,20 @@ PLANTED = {
         "tracking/_size.py",
         "from nav_adapter import NavError",
     ),
-    "sim_tests: search > study | demo > viewing | learning > crossing > "
+    "sim_tests: search | demo > study > viewing | learning > crossing > "
     "scenario | dataset > actors > conditions > world": (
         "sim_tests/world/_visibility.py",
         "from ..crossing import run_crossing",
     ),
     "sim_tests.world: scanner > camera > warehouse > render | sightlines > hall": (
-        "sim_tests/world/hall/_props.py",
+        "sim_tests/world/hall/_layout.py",
         "from ..camera import CameraRenderer",
     ),
     "sim_tests.actors: behaviour > body, robot apart": (
         "sim_tests/actors/body/_asset.py",
         "from ..behaviour import Person",
     ),
-    "sim_tests.study: command > report > social > runs | scenarios > measures": (
+    "sim_tests.study: command > frontier > report > social > runs | scenarios > measures": (
         "sim_tests/study/measures/_summary.py",
         "from ..runs import run_jobs",
     ),

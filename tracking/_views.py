@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -270,13 +271,25 @@ def _towards(
     The place's distance along each ray (N, R) and to its left (N, R), the distance over which each
     ray met nothing (R,), and whether it then met something (R,); all on the floor plane.
     """
-    known = np.isfinite(points.ends_odom_m[:, 0])
-    origins, ends = points.origins_odom_m[known, :2], points.ends_odom_m[known, :2]
-    x, y = (ends - origins).T
+    origins, x, y, free, measured = _rays_of(points)
+    to_x, to_y = positions_m.T[..., None] - origins[:, None]
+    return to_x * x + to_y * y, to_y * x - to_x * y, free, measured
+
+
+@lru_cache(maxsize=4)  # the last scan of each scanner is asked several times
+def _rays_of(
+    points: ScanPoints,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Return the R rays of a scan that saw something, on the floor plane.
+
+    They are their starts (2, R), their directions' x and y (R,), and the last two of
+    :func:`_towards`.
+    """
+    known = np.isfinite(points.ends_odom_m[:, 0]).nonzero()[0]
+    origins = points.origins_odom_m.T[:2].take(known, axis=1)
+    x, y = points.ends_odom_m.T[:2].take(known, axis=1) - origins
     free = np.hypot(x, y)
-    x, y = x / free, y / free
-    to_x, to_y = np.moveaxis(positions_m[:, None] - origins, 2, 0)
-    return to_x * x + to_y * y, to_y * x - to_x * y, free, points.usable[known]
+    return origins, x / free, y / free, free, points.usable[known]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -93,11 +93,11 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Print tables of finished runs, with confidence intervals.",
         ),
         "measures": _Entry(
-            "sim_tests.study.social.command:measures",
+            "sim_tests.study.command:measures",
             "Measure episodes as HuNavSim, SocNavGym and NavWareSet do.",
         ),
         "export": _Entry(
-            "sim_tests.study.social.command:export",
+            "sim_tests.study.command:export",
             "Write episodes in the formats of other projects; check such files.",
         ),
         "report": _Entry(
@@ -117,15 +117,15 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
             "Render images of people in warehouses, with the truth about them.",
         ),
         "frontier": _Entry(
-            "sim_tests.study.frontier.command:frontier",
+            "sim_tests.study.command:frontier",
             "Draw what awareness is worth: time lost over step-out impacts.",
         ),
         "tune": _Entry(
-            "sim_tests.search.tune.command:tune",
+            "sim_tests.search.command:tune",
             "Search for the policy that loses the least time at a given risk.",
         ),
         "falsify": _Entry(
-            "sim_tests.search.falsify.command:falsify",
+            "sim_tests.search.command:falsify",
             "Search for the situations in which a policy does worst.",
         ),
     },

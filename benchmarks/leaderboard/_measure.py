@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import Final
@@ -56,7 +56,9 @@ def measure(
     workers: int = 1,
     again: bool = False,
 ) -> None:
-    """Run the rows whose results are missing or not whole; an interrupted run goes on.
+    """Run the episodes whose results are missing; an interrupted run goes on.
+
+    Results of another version of a scenario count as missing.
 
     Args:
         board: the board.
@@ -79,23 +81,32 @@ def measure(
                 f"the results of {row.name!r} belong to another policy, other sensors or "
                 "another planner; give --again to measure the row from the beginning"
             )
-        jobs = row.jobs(board.templates, range(board.seeds))
-        if len(read_results(board, row, folder)) == len(jobs):
+        kept = read_results(board, row, folder)
+        done = {(each.scenario, each.seed) for each in kept}
+        jobs = [
+            job
+            for job in row.jobs(board.templates, range(board.seeds))
+            if (job.conditions.scenario, job.conditions.seed) not in done
+        ]
+        if not jobs:
             continue
         run = work / row.name
         begun = RunFiles(run).jobs.exists() and not again
         records = run_jobs(jobs, run, workers=workers, resume=begun, overwrite=again, progress=True)
-        about = {**read_about(folder), row.name: _about(row)}
+        earlier = read_about(folder)
+        about = {**earlier, row.name: _about(row, earlier.get(row.name, {}) if kept else {})}
         text = json.dumps(about, indent=1, sort_keys=True) + "\n"
         write_text(folder / _ABOUT_FILE, text, SimError)
-        write_records(path, sorted(records, key=lambda each: (each.scenario, each.seed)))
+        whole = sorted((*kept, *records), key=lambda each: (each.scenario, each.seed))
+        write_records(path, whole)
         shutil.rmtree(run)  # what is measured later is another run
 
 
-def _about(row: Row) -> dict[str, str]:
-    """Return what the results of a row were measured with."""
+def _about(row: Row, earlier: Mapping[str, str]) -> dict[str, str]:
+    """Return what a row was measured with; the commits of earlier episodes stand before today's."""
+    commits = dict.fromkeys([*earlier.get("commit", "").split(), _commit()])
     return {
-        "commit": _commit(),
+        "commit": " ".join(filter(None, commits)),
         "date": date.today().isoformat(),
         "digest": row.digest,
         "version": awarenav.__version__,

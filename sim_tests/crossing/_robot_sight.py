@@ -33,15 +33,17 @@ class RobotSight:
     def seen_by(self, worker: Worker) -> bool:
         """Return whether nothing stands between a person's eyes and the camera."""
         camera = self._amr.T_odom_camera[:3, 3]
-        camera_x, camera_y = camera[:2].tolist()
-        line = worker.place_odom_m, (camera_x, camera_y)
-        for other in self._workers:
-            if other is worker or not other.collision_left_behind:
-                continue
-            if _near_line(other.collision_place_odom_m, *line) or _near_line(
-                other.place_odom_m, *line
-            ):
-                other.place_collision_body()
+        left_behind = [
+            other for other in self._workers if other.collision_left_behind and other is not worker
+        ]
+        if left_behind:
+            camera_x, camera_y, _ = camera.tolist()
+            line = worker.place_odom_m, (camera_x, camera_y)
+            for other in left_behind:
+                if _near_line(other.collision_place_odom_m, *line) or _near_line(
+                    other.place_odom_m, *line
+                ):
+                    other.place_collision_body()
         first = first_body_before(worker, camera)
         if first == -1 or first in self._through:
             return True

@@ -36,8 +36,10 @@ from ._separations import STANDING_SPEED_MPS, ContactEvent, Separations
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.
 _EXACT_WITHIN_M: Final = 4.0
-# A body with arms down is at most this much farther away than its lower bound.
+# A body with arms down is at most this much farther away than its lower bound, and mostly at most
+# this much farther away than in the observation before.
 _NEARER_THAN_BOUND_M: Final = 0.45
+_MOVED_M: Final = 0.1
 # Bodies move at their full rate, and contacts are checked, once surfaces were closer than this in
 # the last control cycle; nobody covers this distance within one.
 _TOUCH_WITHIN_M: Final = 0.8
@@ -126,6 +128,7 @@ class Stage(AbstractContextManager["Stage"]):
         self.contacts: list[ContactEvent] = []
         self._touching = [False] * len(self.workers)
         self._near_robot = [False] * len(self.workers)
+        self._last_separation_m = [math.inf] * len(self.workers)
         corners = self.amr.profile.footprint_m
         low, high = corners.min(axis=0), corners.max(axis=0)
         half_length, half_width = (0.5 * (high - low)).tolist()
@@ -340,9 +343,12 @@ class Stage(AbstractContextManager["Stage"]):
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
             return bound, towards
-        # Pairs of shapes beyond the given distance cost nothing. One pair is always closer than the
-        # first distance, except for what a person carries on the far side.
-        for within in (max(bound, 0.0) + _NEARER_THAN_BOUND_M, _EXACT_WITHIN_M):
+        # Pairs of shapes beyond the given distance cost nothing. One pair is nearly always closer
+        # than the first distance, and except for what a person carries on the far side always
+        # closer than the second.
+        first = self._last_separation_m[index] + _MOVED_M
+        second = max(bound, 0.0) + _NEARER_THAN_BOUND_M
+        for within in (min(first, second), second, _EXACT_WITHIN_M):
             pairs = pybullet.getClosestPoints(
                 self.amr.body,
                 self.workers[index].body,
@@ -356,7 +362,7 @@ class Stage(AbstractContextManager["Stage"]):
         closest = min(pairs, key=lambda pair: pair[8])
         gap = np.array(closest[6][:2]) - np.array(closest[5][:2])
         length = math.sqrt(gap @ gap)
-        separation = max(float(closest[8]), 0.0)
+        separation = self._last_separation_m[index] = max(float(closest[8]), 0.0)
         return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
 
     def _update_contact(

@@ -1,33 +1,83 @@
-"""One crossing with and without awareness: its runs, its table and its ``episodes.csv``."""
+"""One crossing with and without awareness: its runs, its table, its picture, and portraits."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
+import cv2
 import numpy as np
 from tqdm import tqdm
 
-from awarenav.files import csv_number, write_csv
-from perception.arrays import ImageRgb
+from awarenav.figures import Axes, new_figure, save_figure
+from perception.arrays import FloatArray, ImageRgb
 
 from ..conditions import Perception, changed_scenario
-from ..crossing import CrossingFrame, CrossingResult, run_crossing
+from ..crossing import CrossingFrame, CrossingResult, Stage, run_crossing
 from ..scenario import Scenario, ScenarioTemplate
-from ..world.errors import SimError
-from ._portraits import PortraitRecorder
+from ..world import sees
+from ..world.camera import CameraRenderer
+
+#: Pictures per second; the film runs at the speed of the crossing.
+FILM_HZ: Final = 10
+#: Width and height of the worker's portrait, pixels.
+PORTRAIT_PX: Final = (136, 150)
+# Height of the part of the hall, at the worker's distance, that a portrait shows.
+_PORTRAIT_HEIGHT_M: Final = 0.75
+_PORTRAIT_BELOW_EYES_M: Final = 0.14
+
+
+class PortraitRecorder:
+    """An observer of a crossing that takes the pictures of the first worker for the film.
+
+    A portrait is a part of the image of the robot's camera, with more pixels.
+
+    Args:
+        scenario: the scenario of the crossing.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._camera = scenario.camera.camera()
+        self._every = max(round(scenario.control_hz / FILM_HZ), 1)
+        self._cycles = 0
+        self._portraits: list[ImageRgb | None] = []
+
+    @property
+    def portraits(self) -> tuple[ImageRgb | None, ...]:
+        """The portraits, one per picture of the film; None where the camera sees no worker."""
+        return tuple(self._portraits)
+
+    def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
+        if self._cycles % self._every == 0:
+            self._portraits.append(self._portrait(frame, stage))
+        self._cycles += 1
+
+    def _portrait(self, frame: CrossingFrame, stage: Stage) -> ImageRgb | None:
+        T = frame.T_odom_camera
+        robot = frozenset({stage.amr.body})
+        if not stage.workers or not sees(stage.workers[0], T[:3, 3], through=robot):
+            return None
+        middle = (stage.workers[0].eyes_odom_m - T[:3, 3]) @ T[:3, :3]
+        middle[1] += _PORTRAIT_BELOW_EYES_M
+        if middle[2] <= 0.1:
+            return None
+        (u, v) = self._camera.project(middle[None])[0].tolist()
+        if not 0.0 <= u <= self._camera.width_px:
+            return None
+        half_height = 0.5 * _PORTRAIT_HEIGHT_M * self._camera.fy_px / middle[2]
+        half_width = half_height * PORTRAIT_PX[0] / PORTRAIT_PX[1]
+        part = (u - half_width, v - half_height, u + half_width, v + half_height)
+        size = (2 * PORTRAIT_PX[0], 2 * PORTRAIT_PX[1])
+        view = CameraRenderer(stage.warehouse).render(self._camera, T, part, size)
+        small = cv2.resize(view.rgb, PORTRAIT_PX, interpolation=cv2.INTER_AREA)
+        return np.asarray(small, np.uint8)
+
 
 #: Policies that ignore awareness: α says nothing about what the robot does.
 WITHOUT_AWARENESS: Final = ("blind", "scanner")
-#: Attributes of :class:`~sim_tests.CrossingResult` in the columns of ``episodes.csv``.
-EPISODE_COLUMNS: Final = (
-    *("scenario", "seed", "policy", "planner", "perception", "success", "contact", "contact_by"),
-    *("min_separation_m", "time_to_goal_s", "max_speed_within_2m_mps", "min_margin_m"),
-    *("violation_time_s", "contacts", "duration_s"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,21 +195,6 @@ def delay_won_back(rows: Sequence[ComparisonRow]) -> float | None:
     return (blind - aware) / (blind - free)
 
 
-def write_episodes(path: Path, results: Iterable[CrossingResult]) -> None:
-    """Write ``episodes.csv``, one row per crossing; the file appears whole or not at all."""
-    rows = ([_cell(getattr(result, name)) for name in EPISODE_COLUMNS] for result in results)
-    write_csv(path, EPISODE_COLUMNS, rows, SimError)
-
-
-def _cell(value: Any) -> object:
-    """Return the cell of a value: truth in small letters, a number with six decimals, a count."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, tuple):
-        return len(value)
-    return csv_number(value) if value is None or isinstance(value, float) else value
-
-
 def lowest_bound(frame: CrossingFrame) -> float | None:
     """Return the lowest bound of α that was used for an obstacle; None without obstacles."""
     return min((each.awareness_lower for each in frame.constraints.obstacles), default=None)
@@ -191,3 +226,130 @@ def time_behind_s(frame: CrossingFrame, free: CrossingResult) -> float | None:
     now = float((frame.robot_state.position_odom_m - places[0]) @ way)
     was_there_s = float(np.interp(now, along, np.array([each.t_s for each in free.frames])[first]))
     return max(frame.t_s - was_there_s, 0.0)
+
+
+_COLOURS: Final = {
+    "nobody there": "#8a8f98",
+    "today's AMR": "#1f4e79",
+    "awareness-blind": "#b3261e",
+    "aware, attentive worker": "#2e7d4f",
+    "aware, distracted worker": "#b8651b",
+}
+_QUIET: Final = "#5c6069"
+_TEXT_PT: Final = 13
+_SMALL_PT: Final = 12
+# A limit this far below the speed of the free robot slows the robot down.
+_SLOWER_MPS: Final = 0.002
+
+Rows = Sequence[ComparisonRow]
+
+
+def plot_comparison(path: Path, rows: Rows) -> None:
+    """Plot the time that each crossing loses, and why: speed, awareness and radius over its way.
+
+    Args:
+        path: the PNG file.
+        rows: the crossings; the first has nobody in it, and the others lose time against it.
+    """
+    figure = new_figure(7.4, 9.6, dpi=110.0)
+    bars, speed, bound, radius = figure.subplots(
+        4, 1, gridspec_kw={"height_ratios": [1.4, 1.25, 1.0, 1.0]}
+    )
+    figure.suptitle(headline(rows), fontsize=16, fontweight="bold", x=0.02, ha="left")
+    _plot_time_lost(bars, rows)
+    met = [row for row in rows if row.result.frames[0].truth]
+    aware = [row for row in met if row.result.policy not in WITHOUT_AWARENESS]
+    _plot_curves(speed, "speed (m/s)", 1.8, rows, lambda frame: frame.robot_state.travel_mps)
+    _mark_limits(speed, rows)
+    _plot_curves(bound, "awareness α: the lower bound that acts", 1.1, aware, lowest_bound)
+    for number, row in enumerate(aware):
+        _mark_memory(bound, row.result, named=number == 0)
+    _plot_curves(radius, "obstacle radius (m)", 2.5, met, largest_radius_m)
+    for axes in (speed, bound, radius) if met else ():
+        place_m = float(met[0].result.frames[-1].truth[0].position_odom_m[0])
+        axes.axvline(place_m, color="0.5", lw=1.2, ls=":", zorder=0)
+        if axes is speed:
+            axes.text(place_m + 0.1, 0.05, "worker", fontsize=_SMALL_PT, color=_QUIET)
+    radius.set_xlabel("robot's way along the aisle (m)", fontsize=_TEXT_PT)
+    save_figure(figure, path)
+
+
+def headline(rows: Rows) -> str:
+    """Return the result in two lines: the time that the aware robot loses to each worker."""
+    lost = {row.label: time_lost_s(row.result, rows[0].result) for row in rows}
+    watched, ignored = (lost[f"aware, {kind} worker"] for kind in ("attentive", "distracted"))
+    if watched is None or ignored is None:
+        return "The aware robot does not reach\nits goal in both runs"
+    return (
+        f"The aware robot loses {watched:.1f} s to a worker\n"
+        f"who watches it, and {ignored:.1f} s to one who looks away"
+    )
+
+
+def _plot_time_lost(axes: Axes, rows: Rows) -> None:
+    """Plot one bar a crossing; its text above names it, in the colour of its curves below."""
+    free = rows[0].result
+    for place, row in enumerate(rows):
+        lost = time_lost_s(row.result, free)
+        text = "does not arrive" if lost is None else f"{lost:.1f} s"
+        if row.result.frames[0].truth:
+            text += f", passes at up to {row.result.max_speed_within_2m_mps:.2f} m/s"
+        colour = _COLOURS[row.label]
+        axes.barh(place, lost or 0.0, color=colour, height=0.28)
+        axes.text(
+            0.0, place - 0.2, f"{row.label}: {text}", va="bottom", fontsize=_TEXT_PT, color=colour
+        )
+    axes.set_ylim(len(rows) - 0.6, -0.85)
+    axes.set_xlim(0.0, max(*(time_lost_s(row.result, free) or 0.0 for row in rows), 1.0))
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.spines[["top", "right", "bottom", "left"]].set_visible(False)
+    time = "" if free.time_to_goal_s is None else f" (nobody there: {free.time_to_goal_s:.2f} s)"
+    axes.set_title(f"time lost{time}", fontsize=_TEXT_PT, fontweight="bold", loc="left")
+
+
+def _plot_curves(
+    axes: Axes, title: str, top: float, rows: Rows, pick: Callable[[CrossingFrame], float | None]
+) -> None:
+    """Plot one quantity of each crossing over its way; a gap where it has no value."""
+    axes.set_title(title, fontsize=_TEXT_PT, fontweight="bold", loc="left")
+    axes.set_xlim(0.0, 13.1)
+    axes.set_ylim(0.0, top)
+    axes.tick_params(labelsize=_SMALL_PT)
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+    for number, row in enumerate(rows):
+        values = [np.nan if (v := pick(frame)) is None else v for frame in row.result.frames]
+        # Thinner lines lie on top, so that curves that coincide all show.
+        width = 4.5 - 0.8 * number
+        axes.plot(_along_m(row.result), values, color=_COLOURS[row.label], lw=width)
+
+
+def _along_m(result: CrossingResult) -> FloatArray:
+    return np.array([frame.robot_state.position_odom_m[0] for frame in result.frames])
+
+
+def _mark_limits(axes: Axes, rows: Rows) -> None:
+    """Mark the places at which the worker begins to limit the speed of a robot."""
+    free = rows[0].result
+    along, speeds = _along_m(free), [frame.robot_state.travel_mps for frame in free.frames]
+    for number, row in enumerate(rows[1:]):
+        for x, frame in zip(_along_m(row.result).tolist(), row.result.frames, strict=True):
+            if frame.constraints.speed_limit_mps < np.interp(x, along, speeds) - _SLOWER_MPS:
+                colour = _COLOURS[row.label]
+                axes.plot(x, frame.robot_state.travel_mps, "o", color=colour, ms=7)
+                place = (1.3, 0.08 + 0.2 * number)
+                axes.text(*place, f"limit from {x:.1f} m", fontsize=_SMALL_PT, color=colour)
+                break
+
+
+def _mark_memory(axes: Axes, result: CrossingResult, *, named: bool) -> None:
+    """Mark where the worker is out of the camera's view and still counts as aware."""
+    along, frames = _along_m(result).tolist(), result.frames
+    seen = [x for x, frame in zip(along, frames, strict=True) if frame.observation_of(0)]
+    aware = [x for x, frame in zip(along, frames, strict=True) if lowest_bound(frame)]
+    if seen and aware and aware[-1] > seen[-1]:
+        axes.axvspan(seen[-1], aware[-1], color=_QUIET, alpha=0.12, lw=0)
+    if named and seen:
+        text = "out of camera's view:\nremembered"
+        axes.text(seen[-1] + 0.1, 0.85, text, fontsize=_SMALL_PT, color=_QUIET, va="center")

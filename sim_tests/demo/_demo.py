@@ -11,6 +11,7 @@ from awarenav.files import json_text
 from perception import AwarenessPipeline, Camera
 
 from ..crossing import CrossingResult
+from ..study.measures import measure, write_records
 from ..world.bullet import require_pybullet
 from ._comparison import (
     ComparisonRow,
@@ -18,9 +19,8 @@ from ._comparison import (
     compared_scenarios,
     comparison_table,
     delay_won_back,
-    write_episodes,
+    plot_comparison,
 )
-from ._comparison_plot import plot_comparison
 from ._encounter import case_values, encounter_table, run_encounter
 from ._film import write_crossing_film
 
@@ -63,7 +63,7 @@ def run_demo(
     print(encounter_table(encounter), file=text_stream)
     print("\nThe same crossing, with and without awareness", file=text_stream)
     rows = compare_policies(seed, perception, filmed=video, **axes)
-    write_episodes(out / "episodes.csv", [row.result for row in rows])
+    write_records(out / "episodes.csv", [measure(row.result) for row in rows])
     plot_comparison(out / "crossings.png", rows)
     print(comparison_table(rows), file=text_stream)
     share = delay_won_back(rows)

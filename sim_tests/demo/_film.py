@@ -17,6 +17,8 @@ from perception.arrays import FloatArray, ImageRgb
 
 from ..crossing import CrossingFrame, CrossingResult, RequestMemory
 from ._comparison import (
+    FILM_HZ,
+    PORTRAIT_PX,
     WITHOUT_AWARENESS,
     ComparisonRow,
     largest_radius_m,
@@ -24,7 +26,6 @@ from ._comparison import (
     time_behind_s,
     time_lost_s,
 )
-from ._portraits import FILM_HZ, PORTRAIT_PX
 
 #: Time for which the last picture, with the results, is shown.
 HOLD_S: Final = 4.0

@@ -14,8 +14,7 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._environment import CrossingEnv, RewardWeights
-    from ._observations import ObservationEncoder
-    from ._policy_planner import PolicyPlanner, command_of
+    from ._policy_planner import ObservationEncoder, PolicyPlanner, command_of
 
 __all__ = [
     "CrossingEnv",

@@ -42,8 +42,7 @@ from ..scenario import Scenario, ScenarioTemplate
 from ..world.camera import CameraRenderer
 from ..world.config import SimConfig
 from ..world.errors import SimError
-from ._observations import Observation, ObservationEncoder
-from ._policy_planner import action_limits, command_of
+from ._policy_planner import Observation, ObservationEncoder, action_limits, command_of
 
 try:
     import gymnasium

@@ -1,7 +1,8 @@
-"""The commands ``awarenav crossings``, ``replay``, ``watch`` and ``compare``."""
+"""The commands of studies, from ``awarenav crossings`` to ``awarenav export``."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from awarenav.cli import (
@@ -10,14 +11,19 @@ from awarenav.cli import (
     FilePath,
     FolderPath,
     Number,
+    OneOf,
     Whole,
     argument,
     command,
+    group,
     option,
     options,
 )
 
 from ..conditions import COMPLETE_SCENARIOS, Experiment, conditions_options
+
+#: Names of the formats of exported episodes; those of ``_files.FORMATS``.
+FORMAT_NAMES = ("socnav3", "navwareset")
 
 
 @command(
@@ -78,7 +84,7 @@ def crossings(**values: Any) -> int:
     Every episode that ends appends a row to episodes.csv. At the end the rows are sorted and the
     report is written. The row of a failed episode has the reason; the other episodes still run.
     """
-    from ._crossings import crossings_command  # noqa: PLC0415 - help needs no simulator
+    from ._commands import crossings_command  # noqa: PLC0415 - help needs no simulator
 
     return crossings_command(Experiment.taken_from(values), **values)
 
@@ -184,7 +190,7 @@ def watch(**values: Any) -> int:
     Shows the hall from above and the robot's camera, with attention cones, tracks, scans and radii;
     and over time each person's α with its bound, the speed limit and what sets it.
     """
-    from ._watch import watch_command  # noqa: PLC0415 - help needs no simulator
+    from ._commands import watch_command  # noqa: PLC0415 - help needs no simulator
 
     return watch_command(Experiment.taken_from(values), **values)
 
@@ -226,3 +232,131 @@ def compare(**values: Any) -> int:
     from ._compare import compare_command  # noqa: PLC0415 - help needs no statistics
 
     return compare_command(**values)
+
+
+@command(
+    "frontier",
+    examples=[
+        "awarenav frontier --episodes 4 --sensors camera+scanner --out frontier",
+        "awarenav frontier frontier",
+        "awarenav frontier --scenario blind_corner --scenario runs_out --perception truth",
+    ],
+    exit_status={
+        0: "Success.",
+        1: "Some episodes failed; DIR/errors.log has the tracebacks.",
+        2: "Bad input; nothing was run.",
+        130: "Interrupted; the episodes so far are kept.",
+    },
+    epilog="A killed or interrupted run continues with the same command and --resume. "
+    "docs/what_it_wins.md explains the picture. Needs the extra 'plot'.",
+)
+@argument(
+    "folder",
+    type=FolderPath(),
+    required=False,
+    metavar="[DIR]",
+    help="Folder of finished episodes, to draw them again; nothing is run.",
+)
+@conditions_options(
+    many=("scenario",),
+    repeated=True,
+    without=("policy", "fault"),
+    seed={"note": " It is that of the first episode; the next ones count up."},
+)
+@option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
+@options.workers()
+@options.out_folder("frontier")
+@options.resume()
+@options.overwrite()
+@options.as_json("the frontier")
+def frontier(**values: Any) -> int:
+    """Show what awareness is worth: time lost over step-out impacts.
+
+    Runs `balanced` with other speeds U of unaware people, each without awareness, with it, and,
+    with laser scanners, with a memory of 3 s; and today's AMR, the policy `scanner`. Writes
+    frontier.png, frontier.svg, frontier.md and frontier.json, and the policies into DIR/policies.
+    They say what awareness wins at equal risk and at equal time, with 95 % intervals. With DIR,
+    the folder of such episodes, it runs nothing and draws them again.
+    """
+    from .frontier import frontier_command  # noqa: PLC0415 - help needs no simulator
+
+    return frontier_command(experiment=Experiment.taken_from(values), **values)
+
+
+@command(
+    "measures",
+    examples=[
+        "awarenav measures crossings",
+        "awarenav measures crossings --workers 2 --out social.csv",
+        "awarenav measures track_scene1_col1.csv",
+    ],
+    exit_status={0: "Success.", 1: "An episode broke off with an error.", 2: "Bad input."},
+    epilog="docs/social_measures.md defines every measure and names its source. The episodes of a "
+    "run are run again, which takes as long as the run. Needs the extra 'bench'.",
+)
+@argument(
+    "sources",
+    nargs=-1,
+    required=True,
+    type=FilePath(),
+    metavar="DIR|FILE.csv...",
+    help="Folders of runs, or tracks with the columns of NavWareSet.",
+)
+@options.workers()
+@options.out_file(
+    None, "Table with a row for each episode.", "FILE.csv", show_default="DIR/social.csv of one run"
+)
+@options.as_json("the means")
+def measures(
+    sources: tuple[Path, ...], workers: int | None, out: Path | None, as_json: bool
+) -> int:
+    """Measure episodes as other projects do: HuNavSim, SocNavGym, NavWareSet.
+
+    Prints SPL, STL, distances, zones, accelerations, social work and more: the mean over the
+    episodes of each policy.
+    """
+    from .social import measure_sources  # noqa: PLC0415 - help needs no runs
+
+    return measure_sources(sources, workers=workers, out=out, as_json=as_json)
+
+
+@group("export")
+def export() -> None:
+    """Write episodes in the formats of other projects."""
+
+
+@command(
+    "episode",
+    short_help="Write one episode of a run.",
+    examples=[
+        "awarenav export episode run 12",
+        "awarenav export episode run blind_corner:3:balanced --format navwareset",
+    ],
+    exit_status={0: "Success.", 2: "Bad input; nothing was written."},
+    epilog="docs/social_measures.md describes the formats.",
+)
+@argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")
+@argument(
+    "episode",
+    help="The number of the episode in episodes.csv, from 0; or SCENARIO:SEED:POLICY, followed by "
+    ":PLANNER and :FAULT if the run has several.",
+)
+@option(
+    "--format",
+    type=OneOf(FORMAT_NAMES),
+    default=None,
+    show_default="that of --out, or socnav3",
+    help="Format of the file.",
+)
+@options.out_file(None, "The file.", "FILE.json|csv", show_default="DIR/exports/episode_NUMBER")
+def export_episode(**values: Any) -> int:
+    """Run one episode of a run again and write the paths of robot and people.
+
+    The formats are the JSON of SocNav3 and the CSV columns of NavWareSet.
+    """
+    from .social import export_episode as export_to_file  # noqa: PLC0415 - help needs no runs
+
+    return export_to_file(**values)
+
+
+export.add_command(export_episode)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ._live import LivePage
-from ._page import page_text, show_page, write_page
+from ._page import LivePage, page_text, show_page, write_page
 from ._recorder import CameraPictures, CrossingRecorder, begin_of, outcome_text, state_of
 
 __all__ = [

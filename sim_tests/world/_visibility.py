@@ -74,13 +74,14 @@ def sees(viewer: Viewer, target_odom_m: FloatArray, through: frozenset[int] = fr
 
 def first_body_before(viewer: Viewer, target_odom_m: FloatArray) -> int:
     """Return the id of the first body between a person's eyes and a point (3,); −1 for none."""
-    eyes = viewer.eyes_odom_m
-    ray = target_odom_m - eyes
-    distance = math.sqrt(ray.dot(ray))
+    eyes: list[float] = viewer.eyes_odom_m.tolist()
+    target: list[float] = target_odom_m.tolist()
+    distance = math.dist(eyes, target)
     if distance <= _HEAD_M:
         return -1
-    start = eyes + ray * (_HEAD_M / distance)
-    hit = pybullet.rayTest(start.tolist(), target_odom_m.tolist(), physicsClientId=viewer.client)
+    share = _HEAD_M / distance
+    start = [eye + share * (end - eye) for eye, end in zip(eyes, target, strict=True)]
+    hit = pybullet.rayTest(start, target, physicsClientId=viewer.client)
     return int(hit[0][0])
 
 

@@ -101,6 +101,17 @@ def test_worlds_beyond_the_model_have_contacts(change: dict[str, float]) -> None
 
 
 @given(place=PLACES, walk=WALKS, turn=TURNS, yaw_rate=st.floats(-1.0, 1.0))
+def test_a_look_at_several_steps_at_once_changes_no_limit(
+    place: tuple[float, float], walk: tuple[float, float], turn: float, yaw_rate: float
+) -> None:
+    reach, at = person(place, walk), course(turn, yaw_rate=yaw_rate)
+    together = limit_mps(reach, at)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("nav_adapter.limit._STEPS_A_LOOK", 1)
+        assert limit_mps(reach, at) == together
+
+
+@given(place=PLACES, walk=WALKS, turn=TURNS, yaw_rate=st.floats(-1.0, 1.0))
 def test_whatever_makes_people_or_the_robot_worse_lowers_the_limit(
     place: tuple[float, float], walk: tuple[float, float], turn: float, yaw_rate: float
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -241,3 +242,10 @@ LASER: list[Refused] = [
 def test_it_is_refused(make: Callable[[], object], message: str) -> None:
     with pytest.raises(PerceptionError, match=message):
         make()
+
+
+def test_the_observation_of_the_truth_is_the_one_that_is_checked() -> None:
+    truth = (0.5, np.array([0.1, 0.2, 3.0]), 0.01 * np.eye(3), np.array([0.0, 0.6, -0.8]), 0.7, 0.1)
+    checked, true = PersonObservation(*truth, score=1.0), PersonObservation.true(*truth)
+    for field in fields(PersonObservation):
+        np.testing.assert_array_equal(getattr(true, field.name), getattr(checked, field.name))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Set as AbstractSet
 from typing import Any, Final
 
 import numpy as np
@@ -11,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 from sim_tests.world import Warehouse
-from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import Mesh, box, merge
 from sim_tests.world.render import RenderView, Visuals
 from training.hall import ellipsoid, tube
@@ -42,9 +40,7 @@ class Clutter:
         self._texture = random_texture(rng, (_TEXTURE_PX, _TEXTURE_PX))
         self._radius_m = float(np.linalg.norm(mesh.vertices_m, axis=1).max())
         self._outside = np.array([warehouse.layout.x_min_m + _FAR_M, 0.0, 0.0])
-        self._visuals: Visuals | None = None
         self._body: int | None = None
-        self._shown = True
         self.remove()
         self.actor: int = warehouse.add_actor(self)
 
@@ -66,33 +62,16 @@ class Clutter:
         """Return (2, 3) the low and high corner of a box that holds the thing."""
         return np.array([self._position - self._radius_m, self._position + self._radius_m])
 
-    def build(self, visuals: Visuals) -> None:
-        """Make the body in the render world."""
-        self._visuals = visuals
-        self._body = visuals.add_body(
-            visuals.shape(self._mesh, texture=visuals.texture(self._texture))
-        )
-
-    def bodies(self) -> AbstractSet[int]:
-        """Return the id of the body, once it is made."""
-        return set() if self._body is None else {self._body}
-
-    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Place the body, or hide it; it has one level of detail."""
-        if self._visuals is None or self._body is None:
-            return
-        shown = pixels_per_m is not None
-        if shown != self._shown:
-            change = self._visuals.reveal if shown else self._visuals.hide
-            change(self._body)
-            self._shown = shown
-        if shown:
-            pybullet.resetBasePositionAndOrientation(
-                self._body,
-                self._position.tolist(),
-                self._rotation.as_quat().tolist(),
-                physicsClientId=self._visuals.client,
-            )
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[list[int], FloatArray]:
+        """Return the body, made when it is first needed, and its pose."""
+        if self._body is None:
+            self._body = visuals.add_body(self._mesh, texture=visuals.texture(self._texture))
+        T_odom_body = np.eye(4)
+        T_odom_body[:3, :3] = self._rotation.as_matrix()
+        T_odom_body[:3, 3] = self._position
+        return [self._body], T_odom_body[None]
 
 
 def random_thing(rng: np.random.Generator) -> Mesh:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from ...conditions import POPULATIONS, PopulationName
 from ._habits import (
     DEFAULT_POPULATION,
     FASTEST_RECORDED_MPS,
-    POPULATIONS,
-    PopulationName,
     draw_person,
     habits_of,
     known_population,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final
 
 import numpy as np
 
 from awarenav.errors import did_you_mean
 
+from ...conditions import POPULATIONS, PopulationName
 from ...world.errors import SimError
 from ._gaze import EyeRest
 from ._hearing import Hearing
@@ -19,9 +20,6 @@ from ._spec import PersonSpec
 from ._starting import StartingModel
 from ._surroundings import RobotBody
 
-PopulationName = Literal["classic", "recorded"]
-#: Names of the populations.
-POPULATIONS: Final[tuple[PopulationName, ...]] = get_args(PopulationName)
 #: The population of a scenario that names none.
 DEFAULT_POPULATION: Final[PopulationName] = "classic"
 

@@ -18,7 +18,6 @@ from ._asset import (
 )
 from ._footsteps import OnlineFootsteps
 from ._gait import Gait, GaitPose
-from ._held_object import SeatKind
 from ._pose import BodyPose, link_transforms, skin_points
 from ._postures import (
     ACTIVITIES,
@@ -31,7 +30,7 @@ from ._postures import (
     ActivityName,
 )
 from ._skeleton import MAX_STATURE_M, MIN_STATURE_M, skeleton
-from ._skin import WorkerSkin
+from ._skin import SeatKind, WorkerSkin
 from ._worker import (
     MAX_EYE_PITCH_RAD,
     MAX_EYE_YAW_RAD,

@@ -12,10 +12,10 @@ from perception.arrays import FloatArray
 from ...world import PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
 from ...world.bullet import pybullet
 from ._asset import JOINTS, PARENTS, Capsule
-from ._held_object import Seat
 from ._postures import BOX_SIZE_M, arm_postures
 from ._quaternions import IDENTITY, Quaternion, Vector, rotation_z, subtract
 from ._skeleton import Skeleton
+from ._skin import Seat
 
 _SPINE: Final = JOINTS.index("spine")
 # Row of the box. A prismatic joint on the thorax takes it away while the hands are empty.

@@ -1,4 +1,6 @@
-"""Visual actor of a worker: skin, hair and clothes, cut into rigid pieces.
+"""Visual actors of a worker: the skin, cut into rigid pieces, and what they hold or sit on.
+
+The skin includes hair and clothes. A box, a phone or a seat is an actor of its own.
 
 The simulator draws only rigid bodies. At a joint whose rotation is R, skin of weight w should turn
 by R to the power w. The weights between 0 and 1 are divided into ``bands`` equal steps, and each
@@ -10,24 +12,26 @@ otherwise its rim would stick out of a bent knee.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, Protocol
+from typing import Final, Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
-from ...world.bullet import pybullet
-from ...world.hall import Mesh
+from ...world.errors import SimError
+from ...world.hall import Mesh, box, merge
 from ...world.render import RenderView, Visuals, box_corners, in_view, to_camera
 from ...world.sightlines import PlacedSurface, TriangleSet
 from ._asset import DETAIL_LEVELS, JOINTS, PARENTS, SkinMesh, WorkerAsset, load_worker
 from ._pose import BodyPose, RigidPieces
+from ._postures import BOX_SIZE_M, PHONE_SIZE_M, seated_pose
+from ._quaternions import Vector
+from ._skeleton import Skeleton
 
 #: Row of the pelvis among the joints.
 PELVIS: Final = -1
@@ -199,9 +203,7 @@ class WorkerSkin:
     ) -> None:
         self.worker = worker
         self._textures = None if textures is None else tuple(textures)
-        self._visuals: Visuals | None = None
         self._levels: dict[int, _Level] = {}
-        self._shown: set[int] = set()
         # Surfaces of the last requested pose by level of detail.
         self._surface_pose: BodyPose | None = None
         self._surfaces: dict[int, PlacedSurface] = {}
@@ -233,36 +235,17 @@ class WorkerSkin:
         reach = _REACH_M * max(self.worker.pose.scale, 1.0)
         return np.array([points.min(axis=0) - reach, points.max(axis=0) + reach])
 
-    def build(self, visuals: Visuals) -> None:
-        """Store the render world; each level of detail is made when it is first needed."""
-        self._visuals = visuals
-
-    def bodies(self) -> AbstractSet[int]:
-        """Return the ids of all pieces made so far."""
-        return {body for level in self._levels.values() for body in level.bodies}
-
-    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Show the worker's pose at the level of detail for these samples per metre; None hides."""
-        visuals = self._visuals
-        if visuals is None:
-            return
-        shown: set[int] = set()
-        if pixels_per_m is not None:
-            number = _level_for(pixels_per_m)
-            if number not in self._levels:
-                self._levels[number] = self._make(visuals, number)
-                self._shown |= set(self._levels[number].bodies)
-            level = self._levels[number]
-            places = level.rigid.odom(self.worker.pose, self.worker.links_odom)
-            rows = _rows_in_view(level, places, view)
-            shown = {level.bodies[row] for row in rows}
-        for body in self._shown - shown:
-            visuals.hide(body)
-        for body in shown - self._shown:
-            visuals.reveal(body)
-        self._shown = shown
-        if shown:
-            _place_pieces(visuals.client, level, places, rows)
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[list[int], FloatArray]:
+        """Return the pieces that the view may show, at this level of detail, and their poses."""
+        number = _level_for(samples_per_m)
+        if number not in self._levels:
+            self._levels[number] = self._make(visuals, number)
+        level = self._levels[number]
+        places = level.rigid.odom(self.worker.pose, self.worker.links_odom)
+        rows = _rows_in_view(level, places, view)
+        return [level.bodies[row] for row in rows], places[rows]
 
     def _make(self, visuals: Visuals, level: int) -> _Level:
         asset, scale = self.worker.asset, self.worker.pose.scale
@@ -270,8 +253,7 @@ class WorkerSkin:
         shipped, own = self.worker.asset.levels, self._textures
         texture = visuals.texture(shipped[level].texture_rgb if own is None else own[level])
         bodies = tuple(
-            visuals.add_body(visuals.shape(_scaled(piece.mesh, scale), texture=texture))
-            for piece in pieces
+            visuals.add_body(_scaled(piece.mesh, scale), texture=texture) for piece in pieces
         )
         return _Level(
             bodies,
@@ -288,21 +270,11 @@ class WorkerSkin:
         )
 
 
-def _rows_in_view(level: _Level, places: FloatArray, view: RenderView | None) -> list[int]:
+def _rows_in_view(level: _Level, places: FloatArray, view: RenderView) -> list[int]:
     """Return the rows of the pieces that the view may show."""
-    if view is None:
-        return list(range(len(level.bodies)))
     corners = np.einsum("pij,pkj->pki", places[:, :3, :3], level.boxes_m) + places[:, None, :3, 3]
     rows: list[int] = np.flatnonzero(in_view(view, to_camera(view, corners))).tolist()
     return rows
-
-
-def _place_pieces(client: int, level: _Level, places: FloatArray, rows: list[int]) -> None:
-    turns = Rotation.from_matrix(places[rows, :3, :3]).as_quat().tolist()
-    for row, position, turn in zip(rows, places[rows, :3, 3].tolist(), turns, strict=True):
-        pybullet.resetBasePositionAndOrientation(
-            level.bodies[row], position, turn, physicsClientId=client
-        )
 
 
 def _level_for(samples_per_m: float) -> int:
@@ -314,3 +286,195 @@ def _level_for(samples_per_m: float) -> int:
 
 def _scaled(mesh: Mesh, scale: float) -> Mesh:
     return Mesh(mesh.vertices_m * scale, mesh.normals, mesh.indices, mesh.uv)
+
+
+SeatKind = Literal["stool", "box"]
+
+_MEAN_STATURE_M: Final = 1.75
+# One texel per colour: cardboard, tape, phone, its screen; wood for seats is cardboard's.
+_PALETTE: Final = np.array(
+    [[[176, 136, 92], [206, 184, 142], [28, 28, 32], [150, 190, 220]]], dtype=np.uint8
+).repeat(4, axis=0)
+_CARDBOARD_UV, _TAPE_UV, _PHONE_UV, _SCREEN_UV = ((0.125 + 0.25 * k, 0.5) for k in range(4))
+# The seat for a body of 1.75 m: depth and width, and its middle ahead of the hips.
+_SEAT_DEPTH_M: Final = 0.34
+_SEAT_WIDTH_M: Final = 0.42
+_SEAT_AHEAD_M: Final = 0.03
+# From the hip joints down to the seat, at 1.75 m.
+_HIPS_ABOVE_SEAT_M: Final = 0.115
+# Boards of a seat as shares of its height, how far those of a box stand out, and a stool's legs as
+# a share of its width.
+_BOARD_SHARE: Final = 0.12
+_BOARD_M: Final = 0.006
+_LEG_SHARE: Final = 0.1
+_TAPE_WIDTH_M: Final = 0.05
+# Radius of a sphere that holds either object in the hands.
+_HELD_REACH_M: Final = 0.5 * float(np.linalg.norm(BOX_SIZE_M))
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """A seat, which stands on the floor.
+
+    Attributes:
+        kind: a stool with four legs, or a closed box, which hides the legs behind it.
+        size_m: depth, width and height.
+    """
+
+    kind: SeatKind
+    size_m: Vector
+
+
+class Holder(PosedBody, Protocol):
+    """A body that may hold an object or sit on one; :class:`Worker` is one."""
+
+    @property
+    def held(self) -> str | None:
+        """The object in the hands, or the seat; None for neither."""
+        ...
+
+    @property
+    def seat(self) -> Seat:
+        """The seat that the body takes when seated."""
+        ...
+
+    @property
+    def T_odom_held(self) -> FloatArray | None:  # noqa: N802
+        """(4, 4) pose of the object; None with empty hands."""
+        ...
+
+    @property
+    def chest_odom_m(self) -> FloatArray:
+        """(3,) middle of the chest."""
+        ...
+
+
+class HeldObject:
+    """The visual actor of the object that a :class:`Worker` holds or sits on.
+
+    It is separate from the person's actor, so that a box hides the chest behind it.
+
+    Args:
+        worker: the person who holds it.
+
+    Attributes:
+        kind: ``"prop"``.
+    """
+
+    kind = "prop"
+
+    def __init__(self, worker: Holder) -> None:
+        self._worker = worker
+        self._bodies: dict[str, int] = {}
+
+    def bounds_odom_m(self) -> FloatArray:
+        """Return (2, 3) the corners of a box that holds the object; a point with empty hands."""
+        place = self._worker.T_odom_held
+        if place is None:
+            return np.array([self._worker.chest_odom_m] * 2)
+        reach = _HELD_REACH_M
+        if self._worker.held == "seat":
+            reach = 0.5 * float(np.linalg.norm(self._worker.seat.size_m)) + _BOARD_M
+        return np.array([place[:3, 3] - reach, place[:3, 3] + reach])
+
+    def reach_odom_m(self) -> FloatArray:
+        """Return the worker's reach; a point with empty hands."""
+        reach = self._worker.reach_odom_m()
+        return reach if self._worker.held is not None else np.array([reach[0], reach[0]])
+
+    def surface(self, detail: int) -> PlacedSurface | None:
+        """Return the object's surface; None with empty hands. All levels of detail are the same."""
+        held, place = self._worker.held, self._worker.T_odom_held
+        if held is None or place is None:
+            return None
+        return PlacedSurface(_object_triangles(held, self._seat(held)), place[None])
+
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[list[int], FloatArray]:
+        """Return the object, made when it is first held; all levels of detail are the same."""
+        held, place = self._worker.held, self._worker.T_odom_held
+        if held is None or place is None:
+            return [], np.empty((0, 4, 4))
+        if held not in self._bodies:
+            self._bodies[held] = visuals.add_body(
+                _object_mesh(held, self._seat(held)), texture=visuals.texture(_PALETTE)
+            )
+        return [self._bodies[held]], place[None]
+
+    def _seat(self, held: str) -> Seat | None:
+        return self._worker.seat if held == "seat" else None
+
+
+@lru_cache(maxsize=64)
+def _object_triangles(held: str, seat: Seat | None) -> TriangleSet:
+    mesh = _object_mesh(held, seat)
+    return TriangleSet([(mesh.vertices_m, mesh.indices.reshape(-1, 3))])
+
+
+def _object_mesh(held: str, seat: Seat | None) -> Mesh:
+    """Return the mesh of an object about its middle."""
+    middle = (0.0, 0.0, 0.0)
+    if seat is not None and seat.kind == "stool":
+        depth, width, height = seat.size_m
+        top, leg = _BOARD_SHARE * height, _LEG_SHARE * width
+        parts = [(box((0.0, 0.0, 0.5 * (height - top)), (depth, width, top)), _TAPE_UV)]
+        parts += [
+            (
+                box(
+                    (0.5 * x * (depth - leg), 0.5 * y * (width - leg), -0.5 * top),
+                    (leg, leg, height - top),
+                ),
+                _CARDBOARD_UV,
+            )
+            for x in (-1.0, 1.0)
+            for y in (-1.0, 1.0)
+        ]
+    elif seat is not None:
+        depth, width, height = seat.size_m
+        board = (depth + 2.0 * _BOARD_M, width + 2.0 * _BOARD_M, _BOARD_SHARE * height)
+        rim = 0.5 * (1.0 - _BOARD_SHARE) * height
+        parts = [(box(middle, seat.size_m), _CARDBOARD_UV)]
+        parts += [(box((0.0, 0.0, z), board), _TAPE_UV) for z in (-rim, rim)]
+    elif held == "box":
+        length, _, height = BOX_SIZE_M
+        tape = (length + 0.004, _TAPE_WIDTH_M, height + 0.004)
+        parts = [(box(middle, BOX_SIZE_M), _CARDBOARD_UV), (box(middle, tape), _TAPE_UV)]
+    else:
+        thick, width, height = PHONE_SIZE_M
+        screen = box((-0.5 * thick, 0.0, 0.0), (0.002, 0.9 * width, 0.92 * height))
+        parts = [(box(middle, PHONE_SIZE_M), _PHONE_UV), (screen, _SCREEN_UV)]
+    return _coloured(parts)
+
+
+def _coloured(parts: list[tuple[Mesh, tuple[float, float]]]) -> Mesh:
+    """Return one mesh of all parts, each with one texel of the palette."""
+    return merge(
+        Mesh(mesh.vertices_m, mesh.normals, mesh.indices, np.tile(uv, (len(mesh.vertices_m), 1)))
+        for mesh, uv in parts
+    )
+
+
+def fitting_seat(bones: Skeleton, kind: SeatKind) -> Seat:
+    """Return the seat that fits a body.
+
+    Raises:
+        SimError: for another kind.
+    """
+    if kind not in get_args(SeatKind):
+        valid = ", ".join(map(repr, get_args(SeatKind)))
+        raise SimError(f"seat must be one of {valid}, got {kind!r}")
+    size = bones.stature_m / _MEAN_STATURE_M
+    height = seated_pose(bones).hip_height_m - _HIPS_ABOVE_SEAT_M * size
+    return Seat(kind, (_SEAT_DEPTH_M * size, _SEAT_WIDTH_M * size, height))
+
+
+def seat_pose(seat: Seat, x_m: float, y_m: float, heading_rad: float) -> FloatArray:
+    """Return (4, 4) the pose in odom of a seat's middle under a body at this place."""
+    depth, _, height = seat.size_m
+    ahead = _SEAT_AHEAD_M / _SEAT_DEPTH_M * depth
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    T_odom_seat = np.eye(4)
+    T_odom_seat[:2, :2] = [[cos, -sin], [sin, cos]]
+    T_odom_seat[:3, 3] = x_m + cos * ahead, y_m + sin * ahead, 0.5 * height
+    return T_odom_seat

@@ -16,7 +16,6 @@ from ...world.errors import SimError
 from ._asset import JOINTS, WorkerAsset, load_worker
 from ._footsteps import steady_walk
 from ._gait import FootPose, Gait, GaitPose
-from ._held_object import HeldObject, Seat, SeatKind, fitting_seat, seat_pose
 from ._physics import WorkerBody
 from ._pose import BodyPose, SkinnedPoints, link_transforms
 from ._postures import Activity, Foot, JointAngles, arm_postures, kneeling_pose, seated_pose
@@ -32,7 +31,7 @@ from ._quaternions import (
     subtract,
 )
 from ._skeleton import Skeleton, skeleton
-from ._skin import WorkerSkin
+from ._skin import HeldObject, Seat, SeatKind, WorkerSkin, fitting_seat, seat_pose
 
 #: Largest yaw and pitch of the head from the body.
 MAX_HEAD_YAW_RAD: Final = math.radians(80.0)

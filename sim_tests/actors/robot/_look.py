@@ -12,8 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
-from ...world.bullet import pybullet
-from ...world.errors import SimError
 from ...world.hall import Colour, Mesh, box, merge, read_meshes, scenery_texture
 from ...world.render import RenderView, Visuals
 from ...world.sightlines import PlacedSurface, TriangleSet
@@ -72,9 +70,7 @@ class RobotLook:
         self._half_m = 0.5 * (bounds_base_m[1] - bounds_base_m[0])
         self._triangles = triangles
         self._base_pose, self._wheel_angles = base_pose, wheel_angles
-        self._visuals: Visuals | None = None
         self._bodies: list[int] = []
-        self._shown = True
 
     @classmethod
     def of(cls, robot: Amr | KinematicRobot) -> RobotLook:
@@ -122,46 +118,24 @@ class RobotLook:
         places = np.broadcast_to(self._base_pose(), (self._triangles.pieces, 4, 4))
         return PlacedSurface(self._triangles, places)
 
-    def build(self, visuals: Visuals) -> None:
-        """Make the robot's bodies in the render world."""
-        self._visuals = visuals
-        for part in self._parts:
-            if part.colour is None:
-                shape = visuals.shape(part.mesh, texture=visuals.texture(scenery_texture("amr")))
-            else:
-                shape = visuals.shape(part.mesh, part.colour)
-            self._bodies.append(visuals.add_body(shape))
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[list[int], FloatArray]:
+        """Return the parts and their poses; all levels of detail are the same."""
+        if not self._bodies:
+            self._bodies = [self._make(visuals, part) for part in self._parts]
+        T_odom_base, wheels = self._base_pose(), self._wheel_angles()
+        T_base_parts = np.tile(np.eye(4), (len(self._parts), 1, 1))
+        T_base_parts[:, :3, 3] = [part.origin_m for part in self._parts]
+        for T, angle in zip(T_base_parts[len(self._parts) - len(wheels) :], wheels, strict=True):
+            T[:3, :3] = Rotation.from_rotvec((0.0, angle, 0.0)).as_matrix()
+        return self._bodies, T_odom_base @ T_base_parts
 
-    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Pose the bodies for the next image; None hides them.
-
-        All levels of detail are the same.
-        """
-        if self._visuals is None:
-            raise SimError("RobotLook.show() needs bodies: call build() first")
-        shown = pixels_per_m is not None
-        if shown != self._shown:
-            change = self._visuals.reveal if shown else self._visuals.hide
-            for body in self._bodies:
-                change(body)
-            self._shown = shown
-        if not shown:
-            return
-        T, wheels = self._base_pose(), self._wheel_angles()
-        base = Rotation.from_matrix(T[:3, :3])
-        turns = [base] * (len(self._parts) - len(wheels))
-        turns += [base * Rotation.from_rotvec((0.0, angle, 0.0)) for angle in wheels]
-        for body, part, turn in zip(self._bodies, self._parts, turns, strict=True):
-            pybullet.resetBasePositionAndOrientation(
-                body,
-                (T[:3, :3] @ np.array(part.origin_m) + T[:3, 3]).tolist(),
-                turn.as_quat().tolist(),
-                physicsClientId=self._visuals.client,
-            )
-
-    def bodies(self) -> frozenset[int]:
-        """Return the ids of the robot's bodies in the render world."""
-        return frozenset(self._bodies)
+    @staticmethod
+    def _make(visuals: Visuals, part: LookPart) -> int:
+        if part.colour is None:
+            return visuals.add_body(part.mesh, texture=visuals.texture(scenery_texture("amr")))
+        return visuals.add_body(part.mesh, part.colour)
 
 
 @cache

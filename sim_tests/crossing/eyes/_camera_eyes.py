@@ -23,6 +23,7 @@ from ._messages import Change, Delivery, Sighting, WorkerObservations
 
 # Standard deviations that are reported with the truth: small, but not zero.
 _TRUE_POSITION_COVARIANCE_M2: Final = 0.01**2 * np.eye(3)
+_TRUE_POSITION_COVARIANCE_M2.setflags(write=False)
 _TRUE_AWARENESS_STD: Final = 0.02
 _TRUE_RANGE_M: Final = 20.0
 # Boxes lower than this hide at most the legs of a person.
@@ -123,19 +124,7 @@ class TrueEyes:
         truth = exposure.truth
         visible = self._visible(exposure)
         return tuple(
-            (
-                PersonObservation(
-                    stamp_s=exposure.stamp_s,
-                    position_camera_m=view.position_camera_m,
-                    position_covariance_m2=_TRUE_POSITION_COVARIANCE_M2,
-                    gaze_camera=view.gaze_camera,
-                    awareness=view.awareness,
-                    awareness_std=_TRUE_AWARENESS_STD,
-                    score=1.0,
-                    box_xyxy_px=None,
-                ),
-                index,
-            )
+            (_true_observation(exposure.stamp_s, view), index)
             for index, view in enumerate(truth)
             if visible[index] and math.hypot(*view.position_camera_m.tolist()) <= _TRUE_RANGE_M
         )
@@ -148,6 +137,22 @@ class TrueEyes:
         positions_odom = positions_camera @ T_odom_camera[:2, :3].T + T_odom_camera[:2, 3]
         visible: list[bool] = (self._view.visibility(positions_odom, T_odom_camera) > 0.0).tolist()
         return visible
+
+
+def _true_observation(stamp_s: float, view: TrueView) -> PersonObservation:
+    """Return what a perception without errors says about a person."""
+    position_m, gaze = view.position_camera_m, view.gaze_camera
+    gaze = gaze / math.hypot(*gaze.tolist())
+    for array in (position_m, gaze):
+        array.setflags(write=False)
+    return PersonObservation.true(
+        stamp_s,
+        position_m,
+        _TRUE_POSITION_COVARIANCE_M2,
+        gaze,
+        view.awareness,
+        _TRUE_AWARENESS_STD,
+    )
 
 
 class SurroundEyes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from itertools import compress
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -129,15 +130,11 @@ class Candidates:
         index of a command that is not allowed is N.
         """
         size = self.commands.shape[-1]
-        index: dict[tuple[float, ...], int] = {}
-        commands = map(tuple, self.commands.reshape(-1, size).tolist())
-        allowed = self.allowed.ravel().tolist()
-        index_of = [
-            index.setdefault(command, len(index)) if may else -1
-            for command, may in zip(commands, allowed, strict=True)
-        ]
-        where = np.array(index_of, dtype=np.intp).reshape(self.allowed.shape)
-        where[where < 0] = len(index)
+        commands = list(map(tuple, self.commands.reshape(-1, size).tolist()))
+        distinct = dict.fromkeys(compress(commands, self.allowed.ravel().tolist()))
+        index = dict(zip(distinct, range(len(distinct)), strict=True))
+        where = np.array([index.get(command, -1) for command in commands], dtype=np.intp)
+        where = np.where(self.allowed, where.reshape(self.allowed.shape), len(index))
         return np.array(list(index), dtype=np.float64).reshape(-1, size), where
 
 

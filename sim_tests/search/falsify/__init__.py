@@ -8,7 +8,8 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._no_floor_planner import NoFloorPlanner
+    from ._results import run_falsify
 
-__all__ = ["NoFloorPlanner"]
+__all__ = ["NoFloorPlanner", "run_falsify"]
 
 __getattr__ = lazy_page(__name__, __file__)

@@ -1,8 +1,9 @@
-"""The results of a falsification: its files, its table, and the verdict beside another policy."""
+"""The results of a falsification: its command, files, table, verdict and next command."""
 
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,17 +12,88 @@ from typing import Any, Final
 from awarenav.errors import counted
 from awarenav.files import write_csv
 
+from ...conditions import Experiment
 from ...crossing import named_policy
 from ...study.measures import EpisodeRecord
 from ...study.runs import policy_of, policy_text, run_episode
 from ...world.errors import SimError
-from .._settings import write_json
-from ._search import CONTACT_SCORE, Falsification, FalsifySettings
-from ._worst_cases import WorstCase
+from .._settings import command_text, common_settings, episode_words, print_results, write_json
+from ._search import CONTACT_SCORE, Falsification, FalsifySettings, falsify
+from ._worst_cases import POLICY_FILE, WorstCase, draw_falsification, write_worst
 
 #: Default of ``--against``, and the other policy for that one itself.
 _BASE: Final = "balanced"
 _BASE_OF_BASE: Final = "blind"
+
+
+def run_falsify(
+    *,
+    experiment: Experiment,
+    episodes: int,
+    against: str,
+    people: int,
+    worst: int,
+    generation: int,
+    unsafe_no_floor: bool,
+    workers: int,
+    out: Path,
+    resume: bool,
+    overwrite: bool,
+    as_json: bool,
+) -> int:
+    """Run the command, whose options these are, and return its exit status.
+
+    Raises:
+        SimError: an unusable option.
+        NavError: an unusable policy.
+    """
+    settings = FalsifySettings(
+        **common_settings(experiment),
+        episodes=episodes,
+        generation=generation,
+        people=people,
+        unsafe_no_floor=unsafe_no_floor,
+    )
+    if unsafe_no_floor:
+        print(
+            "UNSAFE: the adapter's floor is taken away on purpose. No robot may drive like this.",
+            file=sys.stderr,
+        )
+    other = policy_against(against, settings)
+    found = falsify(settings, out, workers=workers, resume=resume, overwrite=overwrite)
+    write_episodes(found, out / "episodes.csv")
+    cases = write_worst(found, out, worst)
+    others = records_against(cases, other, settings)
+    text = verdict_text(found, cases, others)
+    write_summary(found, cases, out / "summary.json", verdict=text, against=others)
+    draw_falsification(found, cases, out / "falsify.png")
+    rival = against or (other[0] if other else "")
+    following = _next_command(found, experiment, rival, out)
+    table = table_lines(found, cases)
+    print_results(out / "summary.json", table, text, following, as_json=as_json)
+    return 1 if found.contacts else 0
+
+
+def _next_command(found: Falsification, experiment: Experiment, other: str, out: Path) -> str:
+    """Return the command to run after the search."""
+    if found.settings.unsafe_no_floor:
+        return command_text(
+            *("falsify", "--policy", experiment.one("policy"), *episode_words(experiment)),
+            *("--episodes", found.settings.episodes, "--out", f"{out}_with_floor"),
+        )
+    own = out / POLICY_FILE
+    if found.contacts:
+        # The file has the camera, the robot and the population.
+        case = (str(out / "worst_001.yaml"),)
+        of_case = experiment.replaced(scenario=case, **dict.fromkeys(experiment.changes, ""))
+        return command_text(
+            *("crossings", *episode_words(of_case), "--policy", own, other),
+            *("--seed", experiment["seed"], "--episodes", 1, "--out", out / "worst"),
+        )
+    return command_text(
+        *("crossings", *episode_words(experiment), "--policy", other, own, "--episodes", 44),
+        *("--out", out / "crossings"),
+    )
 
 
 def write_episodes(falsification: Falsification, path: Path) -> None:

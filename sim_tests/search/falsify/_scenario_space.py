@@ -16,16 +16,18 @@ from ...actors.robot import NOVA_CARTER
 from ...scenario import Choice, Distribution, Integers, Scenario, ScenarioTemplate
 from ...world.errors import SimError
 from .._study import Range
-from ._joint_parameters import add_joint, is_joint_possible, joint_parameters
-from ._person_parameters import (
+from ._parameters import (
     FASTEST_WALK_MPS,
     RACK_CLEARANCE_M,
     ROBOT_CLEARANCE_M,
     Parameter,
+    add_joint,
     changed_hearing,
     changed_person,
     clearance_m,
     hearing_parameters,
+    is_joint_possible,
+    joint_parameters,
     person_parameters,
     person_path,
 )

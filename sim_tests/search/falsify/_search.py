@@ -25,8 +25,7 @@ from ...scenario import Scenario
 from ...study.measures import EpisodeRecord
 from ...study.runs import Job, job_of, policy_of
 from ...world.errors import SimError
-from .._episodes import EpisodeRunner
-from .._settings import SearchSettings, write_or_check_settings
+from .._settings import EpisodeRunner, SearchSettings, write_or_check_settings
 from .._study import Optimizer, Outcome, ParameterValues, Range, SharedStudy, Trial
 from ._no_floor_planner import LABEL, PLANNER
 from ._scenario_space import ScenarioSpace

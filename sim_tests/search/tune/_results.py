@@ -1,28 +1,116 @@
-"""The results of a tuning: its files, its table and its verdict against the base policy."""
+"""The results of a tuning: its command, files, plot, table, verdict and next command."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from awarenav.errors import counted
+from awarenav.figures import new_figure, save_figure, scale_by_roots
 from awarenav.files import csv_number, write_csv, write_text
 
 from ...actors.behaviour import DEFAULT_POPULATION
+from ...conditions import Experiment
+from ...scenario import ScenarioTemplate
 from ...study.measures import FEW_PAIRS, Interval, zero_of_n_upper
 from ...study.runs import policy_text
 from ...world.errors import SimError
-from .._settings import write_json
+from .._settings import command_text, common_settings, episode_words, print_results, write_json
 from .._study import importances
 from ._evaluation import BEATS_BASE, FIGURES, OBJECTIVE, REASONS, RISK, Candidate, level_of
-from ._plot import draw_tuning
-from ._tune import Tuning
+from ._policy_space import read_ranges, shipped_ranges
+from ._tune import TuneSettings, Tuning, held_out_scenarios, tune
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Words and unit of each figure.
 _LABELS: Final = {
     OBJECTIVE: ("time lost", " s"),
     RISK: ("step-out impacts with unaware people per 1 000 crossings", ""),
 }
+_TRIAL: Final = "#9aa3ad"
+_WITHIN: Final = "#1f5fa8"
+_CONTACT: Final = "#b3261e"
+_ANCHOR: Final = "#d9822b"
+_CHOSEN: Final = "#2e7d4f"
+_BARS: Final = 8
+_MARKERS: Final = ("D", "s", "^", "v", "P", "*")
+_WORDS: Final = {"time_lost_s": "the time lost", "step_out_unaware": "the step-out impacts"}
+
+
+def run_tune(
+    *,
+    experiment: Experiment,
+    ranges: Path | None,
+    workers: int,
+    out: Path,
+    resume: bool,
+    overwrite: bool,
+    as_json: bool,
+    **fields: Any,
+) -> int:
+    """Run the command, whose options these are, and return its exit status.
+
+    The other options are fields of :class:`TuneSettings`, by their names.
+
+    Raises:
+        SimError: an unusable option.
+        NavError: an unusable policy.
+    """
+    common = common_settings(experiment)
+    templates = [ScenarioTemplate.from_text(text) for text in common["scenarios"]]
+    searched = shipped_ranges() if ranges is None else read_ranges(ranges)
+    settings = TuneSettings(
+        **common,
+        **fields,
+        ranges={key: each.model_dump(mode="json") for key, each in searched.items()},
+        hold_out_scenarios=held_out_scenarios(templates),
+    )
+    given = {
+        "--policy": experiment.one("policy"),
+        "--ranges": ranges,
+        "--workers": workers,
+        "--out": out,
+    }
+
+    def report(tuning: Tuning) -> None:
+        write_tuning(tuning, out)
+        following = _next_command(tuning, experiment, given)
+        table, verdict = table_lines(tuning), verdict_text(tuning)
+        print_results(out / "chosen.json", table, verdict, following, as_json=as_json)
+
+    tune(settings, out, workers=workers, resume=resume, overwrite=overwrite, report=report)
+    return 0
+
+
+def _next_command(tuning: Tuning, experiment: Experiment, given: Mapping[str, Any]) -> str:
+    """Return the next command: falsify the winner, or go on with more seeds or more trials."""
+    settings, out = tuning.settings, given["--out"]
+    if tuning.winner is not None:
+        return command_text(
+            *("falsify", "--policy", out / "chosen" / f"{BEATS_BASE}.yaml"),
+            *("--against", given["--policy"], *episode_words(experiment)),
+            *("--workers", given["--workers"], "--out", out / "falsify"),
+        )
+    more_seeds = is_undecided(tuning)
+    words = ["tune", "--policy", given["--policy"], *episode_words(experiment)]
+    for name, value in (
+        ("--ranges", given["--ranges"]),
+        ("--risk", settings.risk),
+        ("--requests", settings.requests),
+        ("--trials", settings.trials * (1 if more_seeds else 2)),
+        ("--episodes", settings.episodes),
+        ("--held-out", settings.held_out * (2 if more_seeds else 1)),
+    ):
+        if value is not None:
+            words += [name, value]
+    return command_text(
+        *words,
+        *("--generation", settings.generation, "--sampler", settings.sampler),
+        *("--seed", settings.seed, "--workers", given["--workers"], "--out", out, "--resume"),
+    )
 
 
 def write_tuning(tuning: Tuning, folder: Path) -> None:
@@ -323,3 +411,79 @@ def _scenarios(tuning: Tuning) -> list[str]:
 
 def _ends(seeds: range) -> str:
     return f"{seeds[0]} to {seeds[-1]}"
+
+
+def draw_tuning(tuning: Tuning, importance: Mapping[str, Mapping[str, float]], path: Path) -> None:
+    """Draw trials, the risk, presets and chosen policies, and the importances beside them."""
+    figure = new_figure(12.0, 6.0)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.7, 1.0))
+    _draw_trials(figure.add_subplot(grid[:, 0]), tuning)
+    for row, name in enumerate(FIGURES):
+        _draw_importances(figure.add_subplot(grid[row, 1]), name, importance[name])
+    save_figure(figure, path)
+
+
+def _draw_trials(axes: Axes, tuning: Tuning) -> None:
+    groups: dict[tuple[str, str, str], list[tuple[float, float]]] = {
+        (_TRIAL, "o", "trial"): [],
+        (_WITHIN, "o", "trial within the bounds"): [],
+        (_CONTACT, "x", "trial with a contact"): [],
+    }
+    other, fine, touched = groups.values()
+    for trial in tuning.trials:
+        time_s, notes = trial.outcome.value, trial.outcome.notes
+        if time_s is not None:
+            kind = (
+                touched if notes["moving_contacts"] else fine if trial in tuning.ranked else other
+            )
+            kind.append((time_s, max(notes[RISK], 0.0)))
+    for (colour, marker, label), points in groups.items():
+        if points:
+            times_s, risks = zip(*points, strict=True)
+            axes.scatter(times_s, risks, c=colour, marker=marker, s=26, label=label)
+    axes.axhline(tuning.risk, color=_WITHIN, lw=1.0, ls="--", label="the given risk")
+    for anchor, marker in zip(tuning.anchors, _MARKERS, strict=False):
+        x, y = anchor.tuning.figures
+        colour = _CONTACT if anchor.tuning.moving_contacts else _ANCHOR
+        axes.scatter([x], [y], marker=marker, s=60, c=colour, zorder=3, label=anchor.name)
+    places: dict[tuple[float, float], list[str]] = {}
+    for chosen in tuning.chosen:
+        places.setdefault(chosen.tuning.figures, []).append(chosen.name.replace("_", " "))
+    for row, ((x, y), names) in enumerate(sorted(places.items())):
+        below = row % 2 == 0  # so that the names of neighbours do not overlap
+        axes.scatter([x], [y], marker="o", s=120, facecolors="none", edgecolors=_CHOSEN, lw=2)
+        axes.annotate(
+            ",\n".join(names),
+            (x, y),
+            xytext=(9, -7 if below else 7),
+            textcoords="offset points",
+            color=_CHOSEN,
+            va="top" if below else "bottom",
+        )
+    settings = tuning.settings
+    axes.set_title(
+        f"{counted(len(tuning.trials), 'trial')} in "
+        f"{counted(len(settings.tuning_templates), 'scenario')}, "
+        f"{counted(settings.episodes, 'seed')} each unless it ended early",
+        loc="left",
+        fontsize=10,
+    )
+    axes.set_xlabel("mean time lost (s an episode)")
+    axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
+    axes.grid(alpha=0.25)
+    axes.margins(0.12)
+    scale_by_roots(axes, max(anchor.tuning.risk for anchor in tuning.anchors))
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _draw_importances(axes: Axes, figure: str, importance: Mapping[str, float]) -> None:
+    first = sorted(importance.items(), key=lambda each: -each[1])[:_BARS][::-1]
+    names, values = [name for name, _ in first], [value for _, value in first]
+    axes.barh(names, values, color=_WITHIN)
+    axes.set_title(f"what decided {_WORDS[figure]}", loc="left", fontsize=10)
+    axes.tick_params(labelsize=8)
+    if not any(values):
+        axes.set_axis_off()
+        axes.text(0.0, 0.9, "nothing: all trials are equal", transform=axes.transAxes, va="top")
+    axes.set_xlim(0.0, max(1e-9, *values) * 1.1 if any(values) else 1.0)
+    axes.grid(alpha=0.25, axis="x")

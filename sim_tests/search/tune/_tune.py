@@ -19,8 +19,7 @@ from ...study.frontier import TODAY, sensors_of_today
 from ...study.measures import EpisodeRecord, Interval, read_records, write_records
 from ...study.runs import Job, plan_jobs, policy_of
 from ...world.errors import SimError
-from .._episodes import EpisodeRunner
-from .._settings import SearchSettings, write_or_check_settings
+from .._settings import EpisodeRunner, SearchSettings, write_or_check_settings
 from .._study import Optimizer, Outcome, ParameterValues, SamplerName, SharedStudy, Trial
 from ._evaluation import (
     BEATS_BASE,

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from ._frontier import TODAY, sensors_of_today
+from ._show import frontier_command
 
-from perception.lazy import lazy_page
-
-if TYPE_CHECKING:
-    from ._family import TODAY, sensors_of_today
-
-__all__ = ["TODAY", "sensors_of_today"]
-
-__getattr__ = lazy_page(__name__, __file__)
+__all__ = ["TODAY", "frontier_command", "sensors_of_today"]

@@ -1,9 +1,9 @@
-"""The frontier shown: a table and two sentences, and the picture with today's AMR on it."""
+"""The command ``awarenav frontier``: run the policies, then print and draw what they found."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,11 +11,15 @@ import numpy as np
 
 from awarenav.errors import counted
 from awarenav.figures import Axes, new_figure, save_figure, scale_by_roots
+from awarenav.files import json_text, write_text
 from perception.arrays import FloatArray
 
-from ..measures import NOTHING, Interval
+from ...conditions import Experiment
+from ...world.errors import SimError
+from ..measures import NOTHING, EpisodeRecord, Interval
 from ..report import Table
-from ._frontier import Frontier, Point, Worth
+from ..runs import RunFiles, about_run, experiment_jobs, policy_text, read_rows, run_jobs
+from ._frontier import TODAY, Frontier, Point, Worth, family, frontier_of, sensors_of_today
 
 # The policy of the sentences, chosen beforehand: that of `balanced`.
 _SPEED_MPS: Final = 1.5
@@ -37,6 +41,57 @@ _LINES: Final = {
     "aware": ("#1f4e79", "o", "with awareness"),
     "memory": ("#2e7d4f", "D", "with awareness, 3 s of memory"),
 }
+
+
+def frontier_command(
+    folder: Path | None, experiment: Experiment, out: Path, *, as_json: bool, **running: Any
+) -> int:
+    """Run the family unless a folder of episodes is given, and write what it shows.
+
+    Args:
+        folder: of episodes; None to run the family.
+        experiment: the episodes to run.
+        out: folder of the episodes to run.
+        as_json: print the frontier as JSON.
+        running: ``workers``, ``resume`` and ``overwrite`` of
+            :func:`~sim_tests.study.runs.run_jobs`.
+
+    Raises:
+        SimError: an unusable option or folder, or no episode to compare.
+    """
+    failed = 0
+    if folder is None:
+        folder, records = out, _run(experiment, out, **running)
+        failed = sum(bool(record.error) for record in records)
+    else:
+        records = read_rows(folder)
+    frontier = frontier_of(records)
+    text, data = frontier_text(frontier), json_text(asdict(frontier))
+    write_text(folder / "frontier.md", text, SimError)
+    write_text(folder / "frontier.json", data, SimError)
+    for suffix in ("png", "svg"):
+        draw_frontier(frontier, folder / f"frontier.{suffix}")
+    if as_json:
+        print(data, end="")
+    else:
+        print(text)
+        print(f"Written to {folder}: frontier.png, frontier.svg, frontier.md, frontier.json")
+    if failed:
+        print(f"{counted(failed, 'episode')} failed; {RunFiles(folder).errors} has the tracebacks")
+    return 1 if failed else 0
+
+
+def _run(experiment: Experiment, out: Path, **running: Any) -> tuple[EpisodeRecord, ...]:
+    """Run the family and today's AMR, and write the policies beside the episodes."""
+    sensors = experiment.one("sensors")
+    members = [(each.name, each.policy()) for each in family(memory="scanner" in sensors)]
+    today = experiment.replaced(sensors=sensors_of_today(sensors))
+    jobs = experiment_jobs(experiment, members) + experiment_jobs(today, [TODAY])
+    about = about_run(experiment, "frontier", out)
+    records = run_jobs(jobs, out, progress=True, about=about, **running)
+    for name, policy in members:
+        write_text(out / "policies" / f"{name}.yaml", policy_text(policy), SimError)
+    return records
 
 
 def frontier_text(frontier: Frontier) -> str:

@@ -1,8 +1,4 @@
-"""The comparison of planners: ``awarenav planners compare``.
-
-Every planner runs with every policy and with ``blind``, and so does the reference planner. Wider
-radii, with everything else the same, tell whether a planner uses radii.
-"""
+"""The comparison of planners: ``awarenav planners compare``."""
 
 from __future__ import annotations
 
@@ -22,9 +18,13 @@ from ...conditions import ORACLE, REFERENCE_PLANNER
 from ...crossing.planner import KNOWN_PLANNERS, SamplingPlanner
 from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
-from ..measures import BASELINE, EpisodeRecord, table_text
+from ..measures import (
+    BASELINE,
+    EpisodeRecord,
+    table_text,
+)
 from ..runs import Job, plan_jobs, policy_of, run_jobs, template_of
-from ._run import WIDE_KEY, Run
+from ._results import WIDE_KEY, Results, Run
 
 #: Radii of the probe, as a multiple of the policy's.
 RADII_FACTOR: Final = 2.0
@@ -190,9 +190,7 @@ def _scaled(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 def print_comparison(folder: Path, *, as_json: bool) -> None:
     """Print the figures of a comparison that fit on a terminal, and what its planners obey."""
-    from ._planners import planners_section  # noqa: PLC0415 - makes tables of results
-    from ._results import Results  # noqa: PLC0415
-    from ._sections import arms_section  # noqa: PLC0415
+    from ._write import arms_section, planners_section  # noqa: PLC0415 - needs the extra bench
 
     run = Run.read(folder)
     results = Results.of(run)

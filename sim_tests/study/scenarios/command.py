@@ -61,7 +61,12 @@ def show(scenario: str, *, yaml: bool, seed: int | None, out: Path | None) -> in
     """
     from ...scenario.catalogue import show_command  # noqa: PLC0415 - help needs no scenarios
 
-    return show_command(scenario, yaml=yaml, seed=seed, out=out)
+    status = show_command(scenario, yaml=yaml, seed=seed)
+    if out is not None and not yaml:
+        from ...scenario.drawing import draw_scenario  # noqa: PLC0415 - needs matplotlib
+
+        draw_scenario(scenario, out)
+    return status
 
 
 @command(

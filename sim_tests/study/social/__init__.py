@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from perception.lazy import lazy_page
-
-if TYPE_CHECKING:
-    from ._episode import Outcome, SocialEpisode
-    from ._files import read_track, write_episode
-    from ._measures import SOCIAL_MEASURES, social_measures
-    from ._runs import EpisodeRecorder
+from ._episode import Outcome, SocialEpisode
+from ._files import read_track, write_episode
+from ._measures import SOCIAL_MEASURES, social_measures
+from ._runs import EpisodeRecorder, export_episode, measure_sources
 
 __all__ = [
     "SOCIAL_MEASURES",
     "EpisodeRecorder",
     "Outcome",
     "SocialEpisode",
+    "export_episode",
+    "measure_sources",
     "read_track",
     "social_measures",
     "write_episode",
 ]
-
-__getattr__ = lazy_page(__name__, __file__)

@@ -20,14 +20,15 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray
 
 from ..measures import path_length_m, success_weighted
-from ._episode import SocialEpisode, wrapped
-from ._motion import (
+from ._episode import (
+    SocialEpisode,
     SocialWork,
     gym_motion,
     heading_changes_rad,
     people_motion,
     robot_motion,
     speed_changes,
+    wrapped,
 )
 
 Better = Literal["lower", "higher", "neither"]

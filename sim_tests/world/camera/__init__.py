@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from ._coarse_scenery import FINE_PX_PER_M, CoarseSceneryRenderer
-from ._renderer import CameraRenderer, RenderedView
-from ._sensor import SensorConfig, expose, to_linear, to_srgb
-from ._timing import CameraTiming, FrameClock, FrameQueue
+from ._renderer import FINE_PX_PER_M, CameraRenderer, CoarseSceneryRenderer, RenderedView
+from ._sensor import CameraTiming, FrameClock, FrameQueue, SensorConfig, expose, to_linear, to_srgb
 
 __all__ = [
     "FINE_PX_PER_M",

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ._layout import LAYOUTS, RackBox, WarehouseLayout
-from ._lighting import LIGHTINGS, Lighting
+from ._layout import LAYOUTS, LIGHTINGS, PROP_PARTS, Lighting, Prop, RackBox, WarehouseLayout
 from ._meshes import (
     BOX_FACES,
+    TEXTURE_NAMES,
+    Atlas,
     Colour,
     Mesh,
     Region,
@@ -14,10 +15,9 @@ from ._meshes import (
     merge,
     quad,
     read_meshes,
+    scenery_texture,
 )
-from ._props import PROP_PARTS, Prop
 from ._scenery import scenery
-from ._textures import TEXTURE_NAMES, Atlas, scenery_texture
 
 __all__ = [
     "BOX_FACES",

@@ -17,9 +17,21 @@ from perception.arrays import FloatArray
 
 from ..errors import SimError
 from ._layout import WarehouseLayout
-from ._meshes import WHOLE, Colour, Mesh, Region, SceneryChunk, box, merge, quad
+from ._meshes import (
+    FIXTURE_ATLAS,
+    GOODS_ATLAS,
+    MARKING_ATLAS,
+    TILE_M,
+    WHOLE,
+    Colour,
+    Mesh,
+    Region,
+    SceneryChunk,
+    box,
+    merge,
+    quad,
+)
 from ._scenery_goods import prop_chunk, rack_chunks
-from ._textures import FIXTURE_ATLAS, GOODS_ATLAS, MARKING_ATLAS, TILE_M
 
 # Width and height of each wall fixture, and the height of its lower edge, metres.
 _FIXTURES: Final[dict[str, tuple[float, float, float]]] = {
@@ -36,11 +48,16 @@ _FIXTURES: Final[dict[str, tuple[float, float, float]]] = {
     "heater": (1.0, 0.7, 3.4),
     "clock": (0.5, 0.5, 3.0),
     "pipe": (0.1, 3.0, 0.0),
-    "number0": (0.7, 0.7, 3.5),
-    "number1": (0.7, 0.7, 3.5),
-    "number2": (0.7, 0.7, 3.5),
-    "number3": (0.7, 0.7, 3.5),
+    **{f"number{k}": (0.7, 0.7, 3.5) for k in range(4)},
 }
+# Fixtures that hang together, and their distance to the right of the middle of a piece of wall.
+_GROUPS: Final = (
+    (("door", 0.0), ("exit", 0.0), ("extinguisher", 1.1)),
+    (("board", 0.0), ("clock", 0.0)),
+    (("cabinet", -0.8), ("warning", 0.1), ("pipe", -1.35)),
+    (("extinguisher", -0.6), ("heater", 0.4)),
+    (("duty", 0.0), ("pipe", 1.2)),
+)
 # Distance of a fixture's face from the wall.
 _OFFSET_M: Final = 0.012
 # Depth that is free of racks in front of a dock door.
@@ -165,24 +182,8 @@ def _fixtures(
         yield ("dock_open" if rng.random() < 0.3 else "dock"), middle + 0.1
         yield f"number{k % 4}", middle + 0.1
         return
-    kind = int(rng.integers(5))
-    if kind == 0:
-        yield "door", middle
-        yield "exit", middle
-        yield "extinguisher", middle + 1.1
-    elif kind == 1:
-        yield "board", middle
-        yield "clock", middle
-    elif kind == 2:
-        yield "cabinet", middle - 0.8
-        yield "warning", middle + 0.1
-        yield "pipe", middle - 1.35
-    elif kind == 3:
-        yield "extinguisher", middle - 0.6
-        yield "heater", middle + 0.4
-    else:
-        yield "duty", middle
-        yield "pipe", middle + 1.2
+    for name, right in _GROUPS[int(rng.integers(len(_GROUPS)))]:
+        yield name, middle + right
     if rng.random() < 0.6:
         yield "window", middle + 0.1
 

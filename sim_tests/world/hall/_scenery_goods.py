@@ -14,10 +14,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from ._layout import RackBox
-from ._meshes import Mesh, SceneryChunk, box, merge, quad, read_meshes
-from ._props import PROP_PARTS, Prop
-from ._textures import GOODS_ATLAS, GOODS_SETS
+from ._layout import PROP_PARTS, Prop, RackBox
+from ._meshes import GOODS_ATLAS, GOODS_SETS, Mesh, SceneryChunk, box, merge, quad, read_meshes
 
 #: The load of a pallet: ``"cartons"`` are of one kind, ``"heaps"`` are two stacks of different
 #: cartons, ``"pallets"`` is a stack of empty pallets, and ``"nothing"`` has not even a pallet.

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from ._backend import RENDERERS, Drawing, RendererName
+from ._backend import (
+    RENDERERS,
+    Drawing,
+    RendererName,
+    RenderView,
+    box_corners,
+    in_view,
+    to_camera,
+)
 from ._backend_gl import gl_works
-from ._view import RenderView, box_corners, in_view, to_camera
 from ._visuals import VisualActor, Visuals
 
 __all__ = [

@@ -1,8 +1,8 @@
 """The renderer ``"gl"``: OpenGL 3.3 without a window, through moderngl (extra ``awarenav[sim]``).
 
-It is the fastest renderer, on Mesa's software rasteriser as well. PyBullet holds the poses of the
-bodies, this module holds their meshes and textures. One pass draws an image: it writes colour, the
-depth as a distance (so the near plane does not limit its precision) and the number of the body.
+It is the fastest renderer, on Mesa's software rasteriser as well, and needs no PyBullet. One pass
+draws an image: it writes colour, the depth as a distance (so the near plane does not limit its
+precision) and the number of the body.
 
 The OpenGL context comes from EGL on Linux, and from the system (CGL, WGL) on macOS and Windows. It
 is tested on Linux only; ``gl_works`` tells whether a context starts, and the renderer ``"auto"``
@@ -13,22 +13,20 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 from perception.installation import install_command
 
-from ..bullet import pybullet
 from ..errors import SimError
 from ..hall import Colour, Lighting, Mesh
-from ._backend import BackendName, Drawing
-from ._view import RenderView
+from ._backend import BackendName, Drawing, RenderBackend, RenderView
 
 _VERTEX_SHADER: Final = """
 #version 330
@@ -66,23 +64,23 @@ void main() {
     out_depth_and_label = vec2(depth, label);
 }
 """
-# Half extent of the placeholder that PyBullet holds for each shape; it is never drawn.
-_PLACEHOLDER_M: Final = 0.01
 # A body's label is its number plus this: buffers are cleared with ones, which label nothing.
 _FIRST_LABEL: Final = 2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Shape:
-    """A mesh in OpenGL's memory: its vertex array and buffers, colour and texture."""
+@dataclass(slots=True, eq=False)
+class _Body:
+    """A mesh in OpenGL's memory: its vertex array and buffers, colour and texture, and its pose."""
 
     array: Any
     buffers: tuple[Any, ...]
     colour: Colour
     texture: Any
+    T_odom_body: FloatArray
+    hidden: bool = False
 
 
-class GlBackend:
+class GlBackend(RenderBackend):
     """See :class:`RenderBackend`.
 
     Raises:
@@ -92,46 +90,30 @@ class GlBackend:
     name: BackendName = "gl"
 
     def __init__(self) -> None:
-        self.client = -1
         self._context, self._program = _context_and_program(os.getpid())
-        client: int = pybullet.connect(pybullet.DIRECT)
-        if client < 0:
-            raise SimError("PyBullet could not start another render world")
-        self.client = client
         self._textures = [self._upload(np.full((1, 1, 3), 255, dtype=np.uint8))]
-        self._shapes: dict[int, _Shape] = {}
-        # Links (−1: base) with their shapes, by body.
-        self._bodies: dict[int, list[tuple[int, _Shape]]] = {}
-        self._hidden: set[int] = set()
+        self._bodies: list[_Body] = []
         self._framebuffer: Any = None
 
     def close(self) -> None:
-        """End the client and free the memory of meshes, textures and buffers."""
-        if self.client < 0:
-            return
-        pybullet.disconnect(physicsClientId=self.client)
-        self.client = -1
+        """Free the memory of meshes, textures and buffers."""
         with self._context:
-            for shape in self._shapes.values():
-                for buffer in (shape.array, *shape.buffers):
+            for body in self._bodies:
+                for buffer in (body.array, *body.buffers):
                     buffer.release()
             for texture in self._textures:
                 texture.release()
             if self._framebuffer is not None:
                 _release_framebuffer(self._framebuffer)
+        self._bodies, self._textures, self._framebuffer = [], [], None
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
         """Register a texture (H, W, 3)."""
         self._textures.append(self._upload(rgb))
         return len(self._textures) - 1
 
-    def shape(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
-        """Register a visual shape with its texture."""
-        number = int(
-            pybullet.createVisualShape(
-                pybullet.GEOM_BOX, halfExtents=[_PLACEHOLDER_M] * 3, physicsClientId=self.client
-            )
-        )
+    def add_body(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
+        """Upload a mesh with its texture."""
         uv = np.zeros((len(mesh.vertices_m), 2)) if mesh.uv is None else mesh.uv
         vertices = np.concatenate([mesh.vertices_m, mesh.normals, uv], axis=1).astype(np.float32)
         with self._context:
@@ -144,20 +126,22 @@ class GlBackend:
                 [(buffers[0], "3f 3f 2f", "position", "normal", "uv")],
                 buffers[1],
             )
-        self._shapes[number] = _Shape(array, buffers, colour, self._textures[texture or 0])
-        return number
+        surface = self._textures[texture or 0]
+        self._bodies.append(_Body(array, buffers, colour, surface, np.eye(4)))
+        return len(self._bodies) - 1
 
-    def attach(self, body: int, link: int, shape: int) -> None:
-        """Draw a shape on a link."""
-        self._bodies.setdefault(body, []).append((link, self._shapes[shape]))
+    def place(self, bodies: Sequence[int], T_odom_bodies: FloatArray) -> None:
+        """Move bodies."""
+        for body, T_odom_body in zip(bodies, T_odom_bodies, strict=True):
+            self._bodies[body].T_odom_body = T_odom_body
 
     def hide(self, body: int) -> None:
         """Stop drawing a body."""
-        self._hidden.add(body)
+        self._bodies[body].hidden = True
 
     def reveal(self, body: int) -> None:
         """Draw a hidden body again."""
-        self._hidden.discard(body)
+        self._bodies[body].hidden = False
 
     def draw(self, view: RenderView, light: Lighting) -> Drawing:
         """Draw the view as if the light were white, in one pass."""
@@ -176,50 +160,26 @@ class GlBackend:
             return _read(framebuffer, viewport)
 
     def _draw_bodies(self, clip_odom: FloatArray) -> None:
-        """Draw every body that is not hidden, at PyBullet's poses."""
-        parts: list[tuple[int, _Shape]] = []
-        poses: list[tuple[float, ...]] = []
-        for body, links in self._bodies.items():
-            if body in self._hidden:
-                continue
-            for link, shape in links:
-                parts.append((body, shape))
-                poses.append(self._pose(body, link))
-        if not parts:
+        """Draw every body that is not hidden."""
+        shown = [(number, body) for number, body in enumerate(self._bodies) if not body.hidden]
+        if not shown:
             return
-        pose = np.array(poses)
-        T_odom_body = np.zeros((len(parts), 4, 4))
-        T_odom_body[:, :3, :3] = Rotation.from_quat(pose[:, 3:]).as_matrix()
-        T_odom_body[:, :3, 3] = pose[:, :3]
-        T_odom_body[:, 3, 3] = 1.0
+        T_odom_body = np.stack([body.T_odom_body for _, body in shown])
         # OpenGL takes matrices column by column.
         clip_bodies = np.swapaxes(clip_odom @ T_odom_body, 1, 2).astype(np.float32)
         odom_bodies = np.swapaxes(T_odom_body[:, :3, :3], 1, 2).astype(np.float32)
         clip_uniform, odom_uniform, colour_uniform, label_uniform = (
             self._program[name] for name in ("clip_body", "odom_body", "colour", "label")
         )
-        for (body, shape), clip_body, odom_body in zip(
-            parts, clip_bodies, odom_bodies, strict=True
+        for (number, body), clip_body, odom_body in zip(
+            shown, clip_bodies, odom_bodies, strict=True
         ):
             clip_uniform.write(clip_body.tobytes())
             odom_uniform.write(odom_body.tobytes())
-            colour_uniform.value = shape.colour
-            label_uniform.value = float(body + _FIRST_LABEL)
-            shape.texture.use(0)
-            shape.array.render()
-
-    def _pose(self, body: int, link: int) -> tuple[float, ...]:
-        """Return position and quaternion (7 numbers) of a link in odom."""
-        if link < 0:
-            position, quaternion = pybullet.getBasePositionAndOrientation(
-                body, physicsClientId=self.client
-            )
-        else:
-            state = pybullet.getLinkState(
-                body, link, computeForwardKinematics=1, physicsClientId=self.client
-            )
-            position, quaternion = state[4], state[5]
-        return (*position, *quaternion)
+            colour_uniform.value = body.colour
+            label_uniform.value = float(number + _FIRST_LABEL)
+            body.texture.use(0)
+            body.array.render()
 
     def _upload(self, rgb: NDArray[np.uint8]) -> Any:
         """Return an OpenGL texture; its rows are reversed, since v counts from the bottom."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -12,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 
 from ..bullet import pybullet
 from ..errors import SimError
 from ..hall import Colour, Lighting, Mesh
-from ._backend import BackendName, Drawing, texture_key
-from ._view import RenderView
+from ._backend import BackendName, Drawing, RenderBackend, RenderView, texture_key
 
 # The last half metre before the far plane counts as nothing: float32 depth is coarse there.
 _FAR_MARGIN_M: Final = 0.5
@@ -41,38 +42,36 @@ _ROW_TEXELS: Final = 4
 Texture = NDArray[np.uint8]
 
 
-class TinyBackend:
-    """See :class:`RenderBackend`. A body hidden by zero opacity costs 0.06 µs per image."""
+class TinyBackend(RenderBackend):
+    """See :class:`RenderBackend`: a PyBullet client of its own holds the bodies."""
 
     name: BackendName = "tiny"
 
     def __init__(self) -> None:
-        self.client: int = pybullet.connect(pybullet.DIRECT)
-        if self.client < 0:
+        self._client: int = pybullet.connect(pybullet.DIRECT)
+        if self._client < 0:
             raise SimError("PyBullet could not start another render world")
         self._folder: tempfile.TemporaryDirectory[str] | None = None
-        self._textures: list[NDArray[np.uint8]] = []
-        # PyBullet's numbers of the cut textures by content, and of each shape's texture.
+        self._textures: list[Texture] = []
+        # PyBullet's numbers of the cut textures by content.
         self._loaded: dict[bytes, int] = {}
-        self._texture_of_shape: dict[int, int] = {}
-        # Each link that has a shape, with its colour, by body.
-        self._colours: dict[int, tuple[tuple[int, Colour], ...]] = {}
+        self._colours: list[Colour] = []
 
     def close(self) -> None:
         """End the client."""
         if self._folder is not None:
             self._folder.cleanup()
             self._folder = None
-        if self.client >= 0:
-            pybullet.disconnect(physicsClientId=self.client)
-            self.client = -1
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = -1
 
-    def texture(self, rgb: NDArray[np.uint8]) -> int:
-        """Register a texture (H, W, 3); PyBullet loads the parts of it that shapes use."""
+    def texture(self, rgb: Texture) -> int:
+        """Register a texture (H, W, 3); PyBullet loads the parts of it that bodies use."""
         self._textures.append(rgb)
         return len(self._textures) - 1
 
-    def _load(self, rgb: NDArray[np.uint8]) -> int:
+    def _load(self, rgb: Texture) -> int:
         """Return PyBullet's number of a texture; equal textures are loaded once."""
         key = texture_key(rgb)
         if key in self._loaded:
@@ -83,45 +82,52 @@ class TinyBackend:
         path = Path(self._folder.name) / f"{len(self._loaded)}.bmp"
         if not cv2.imwrite(str(path), np.ascontiguousarray(rgb[..., ::-1])):
             raise SimError(f"cannot write the texture {path.name}")
-        number = int(pybullet.loadTexture(str(path), physicsClientId=self.client))
+        number = int(pybullet.loadTexture(str(path), physicsClientId=self._client))
         path.unlink()
         if number < 0:
             raise SimError(f"PyBullet did not take a texture of shape {rgb.shape}")
         self._loaded[key] = number
         return number
 
-    def shape(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
-        """Register a visual shape; :meth:`attach` adds its texture."""
+    def add_body(self, mesh: Mesh, colour: Colour, texture: int | None) -> int:
+        """Make a body whose texture is cut to the parts that its mesh shows."""
         uv, number = mesh.uv, None
         if texture is not None and uv is not None:
             uv, rgb = cut_texture(uv, mesh.indices.ravel(), self._textures[texture])
             number = self._load(rgb)
-        shape = int(
-            pybullet.createVisualShape(
-                pybullet.GEOM_MESH,
-                vertices=mesh.vertices_m.tolist(),
-                indices=mesh.indices.ravel().tolist(),
-                normals=mesh.normals.tolist(),
-                rgbaColor=[*colour, 1.0],
-                specularColor=[0.0, 0.0, 0.0],
-                physicsClientId=self.client,
-                **({} if uv is None else {"uvs": uv.tolist()}),
-            )
+        shape = pybullet.createVisualShape(
+            pybullet.GEOM_MESH,
+            vertices=mesh.vertices_m.tolist(),
+            indices=mesh.indices.ravel().tolist(),
+            normals=mesh.normals.tolist(),
+            rgbaColor=[*colour, 1.0],
+            specularColor=[0.0, 0.0, 0.0],
+            physicsClientId=self._client,
+            **({} if uv is None else {"uvs": uv.tolist()}),
+        )
+        body: int = pybullet.createMultiBody(
+            0.0, -1, shape, useMaximalCoordinates=True, physicsClientId=self._client
         )
         if number is not None:
-            self._texture_of_shape[shape] = number
-        return shape
-
-    def attach(self, body: int, link: int, shape: int) -> None:
-        """Set the texture of a link."""
-        texture = self._texture_of_shape.get(shape)
-        if texture is not None:
             pybullet.changeVisualShape(
-                body, link, textureUniqueId=texture, physicsClientId=self.client
+                body, -1, textureUniqueId=number, physicsClientId=self._client
+            )
+        self._colours.append(colour)
+        return body
+
+    def place(self, bodies: Sequence[int], T_odom_bodies: FloatArray) -> None:
+        """Move bodies."""
+        if not len(bodies):
+            return
+        positions = T_odom_bodies[:, :3, 3].tolist()
+        turns = Rotation.from_matrix(T_odom_bodies[:, :3, :3]).as_quat().tolist()
+        for body, position, turn in zip(bodies, positions, turns, strict=True):
+            pybullet.resetBasePositionAndOrientation(
+                body, position, turn, physicsClientId=self._client
             )
 
     def hide(self, body: int) -> None:
-        """Make a body fully transparent, so the renderer skips it."""
+        """Make a body fully transparent: the renderer skips it, at 0.06 µs per image."""
         self._set_opacity(body, 0.0)
 
     def reveal(self, body: int) -> None:
@@ -129,15 +135,9 @@ class TinyBackend:
         self._set_opacity(body, 1.0)
 
     def _set_opacity(self, body: int, opacity: float) -> None:
-        colours = self._colours.get(body)
-        if colours is None:
-            shapes = pybullet.getVisualShapeData(body, physicsClientId=self.client)
-            colours = tuple((shape[1], tuple(shape[7][:3])) for shape in shapes)
-            self._colours[body] = colours
-        for link, colour in colours:
-            pybullet.changeVisualShape(
-                body, link, rgbaColor=(*colour, opacity), physicsClientId=self.client
-            )
+        pybullet.changeVisualShape(
+            body, -1, rgbaColor=(*self._colours[body], opacity), physicsClientId=self._client
+        )
 
     def draw(self, view: RenderView, light: Lighting) -> Drawing:
         """Draw the view as if the light were white."""
@@ -154,7 +154,7 @@ class TinyBackend:
             lightSpecularCoeff=light.specular,
             shadow=0,
             renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self.client,
+            physicsClientId=self._client,
         )
         near, far = view.near_m, view.far_m
         buffer = np.asarray(depth, dtype=np.float64).reshape(height, width)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import AbstractContextManager
 from types import TracebackType
@@ -13,15 +15,25 @@ from numpy.typing import NDArray
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
 
-from ..bullet import pybullet
 from ..errors import SimError
 from ..hall import Colour, Lighting, Mesh, WarehouseLayout, scenery, scenery_texture
-from ._backend import RENDERERS, Drawing, RenderBackend, RendererName, texture_key
+from ._backend import (
+    RENDERERS,
+    Drawing,
+    RenderBackend,
+    RendererName,
+    RenderView,
+    box_corners,
+    in_view,
+    texture_key,
+    to_camera,
+)
 from ._backend_gl import GlBackend, gl_works
 from ._backend_tiny import TinyBackend
-from ._view import RenderView, box_corners, in_view, to_camera
 
 _WHITE: Final[Colour] = (1.0, 1.0, 1.0)
+# The number that stands for no actor.
+_SCENERY: Final = -1
 
 
 class VisualActor(Protocol):
@@ -36,24 +48,24 @@ class VisualActor(Protocol):
         """Return the low and high corner (2, 3) of a box around all of it now; cheap."""
         ...
 
-    def build(self, visuals: Visuals) -> None:
-        """Make its bodies in the render world; called once, before it is first drawn."""
-        ...
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[Sequence[int], FloatArray]:
+        """Return its bodies that the next image may show, and their poses (N, 4, 4) in odom.
 
-    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        """Pose its bodies for the next image at this level of detail; None: hide them.
+        Bodies are made by :meth:`Visuals.add_body` when they are first needed. The others that it
+        has made are hidden.
 
-        An actor of many bodies may hide those outside ``view``.
+        Args:
+            visuals: the render world, always the same one.
+            samples_per_m: samples of the image per metre of the actor, for its level of detail.
+            view: the view of the next image; bodies outside it may be left out.
         """
-        ...
-
-    def bodies(self) -> AbstractSet[int]:
-        """Return the ids of its bodies in the render world."""
         ...
 
 
 class Visuals(AbstractContextManager["Visuals"]):
-    """The render world, a PyBullet client of its own without physics; use it in a ``with`` block.
+    """The render world, apart from the physics; use it in a ``with`` block.
 
     Scenery stands still; actors move. Before each image, :meth:`prepare` hides the actors outside
     the frustum, which never changes the image.
@@ -78,26 +90,22 @@ class Visuals(AbstractContextManager["Visuals"]):
         variant: int = 0,
     ) -> None:
         self._backend: RenderBackend = _start_backend(renderer)
+        self._closed = False
         self.renderer = self._backend.name
         # Numbers of the textures by content.
         self._textures: dict[bytes, int] = {}
         self._actors: list[VisualActor] = []
-        self._built: set[int] = set()
-        self._shown_actors: set[int] = set()
-        self._static_bodies: list[int] = []
-        self._statics_shown = True
-        self._actor_numbers = np.full(1, -1, dtype=np.int32)
+        self._scenery: set[int] = set()
+        # The actor whose bodies are being made, the actor of each body, the visible ones by actor.
+        self._making = _SCENERY
+        self._owners: list[int] = []
+        self._visible: defaultdict[int, set[int]] = defaultdict(set)
         try:
             if layout is not None:
                 self._build_scenery(layout, variant)
         except BaseException:
             self._backend.close()
             raise
-
-    @property
-    def client(self) -> int:
-        """PyBullet's id of this world; −1 once it is closed."""
-        return self._backend.client
 
     def __exit__(
         self,
@@ -109,6 +117,7 @@ class Visuals(AbstractContextManager["Visuals"]):
 
     def close(self) -> None:
         """End the render world; a second call does nothing."""
+        self._closed = True
         self._backend.close()
 
     def texture(self, rgb: NDArray[np.uint8]) -> int:
@@ -123,68 +132,21 @@ class Visuals(AbstractContextManager["Visuals"]):
             self._textures[key] = self._backend.texture(image)
         return self._textures[key]
 
-    def shape(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
-        """Register a visual shape for :meth:`add_body`; return PyBullet's id of it.
+    def add_body(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
+        """Make a rigid body at the origin of odom; return its number.
 
-        The texture is multiplied by the colour.
+        The texture, of :meth:`texture`, is multiplied by the colour.
         """
         if texture is not None and mesh.uv is None:
             raise SimError("a mesh with a texture needs uv coordinates")
-        return self._backend.shape(mesh, colour, texture)
-
-    def add_body(
-        self,
-        shape: int,
-        link_shapes: tuple[int, ...] = (),
-        joints_m: FloatArray | None = None,
-        parents: tuple[int, ...] = (),
-    ) -> int:
-        """Make a body of one shape, or of a tree of shapes connected by spherical joints.
-
-        Args:
-            shape: shape of the base, −1 for none.
-            link_shapes: shapes of the links, −1 for none.
-            joints_m: (L, 3) each link's joint in the frame of its parent.
-            parents: row of each link's parent among the links, −1 for the base.
-
-        Returns:
-            PyBullet's id; link i is its joint i.
-        """
-        count = len(link_shapes)
-        origins = np.zeros((count, 3)) if joints_m is None else np.asarray(joints_m)
-        parent_rows = parents or (-1,) * count
-        links = {
-            "linkMasses": [0.0] * count,
-            "linkCollisionShapeIndices": [-1] * count,
-            "linkVisualShapeIndices": list(link_shapes),
-            "linkPositions": origins.tolist(),
-            "linkOrientations": [(0.0, 0.0, 0.0, 1.0)] * count,
-            "linkInertialFramePositions": [(0.0, 0.0, 0.0)] * count,
-            "linkInertialFrameOrientations": [(0.0, 0.0, 0.0, 1.0)] * count,
-            "linkParentIndices": [parent + 1 for parent in parent_rows],
-            "linkJointTypes": [pybullet.JOINT_SPHERICAL] * count,
-            "linkJointAxis": [(0.0, 0.0, 1.0)] * count,
-        }
-        body = int(
-            pybullet.createMultiBody(
-                0.0,
-                -1,
-                shape,
-                useMaximalCoordinates=not count,
-                physicsClientId=self.client,
-                **(links if count else {}),
-            )
-        )
-        for link, link_shape in enumerate((shape, *link_shapes), start=-1):
-            if link_shape >= 0:
-                self._backend.attach(body, link, link_shape)
+        body = self._backend.add_body(mesh, colour, texture)
+        self._owners.append(self._making)
+        self._visible[self._making].add(body)
         return body
 
-    def add_static(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> int:
-        """Add a piece of scenery in odom; return PyBullet's id of its body."""
-        self._show_statics(True)
-        self._static_bodies.append(self.add_body(self.shape(mesh, colour, texture)))
-        return self._static_bodies[-1]
+    def add_static(self, mesh: Mesh, colour: Colour = _WHITE, texture: int | None = None) -> None:
+        """Add a piece of scenery in odom, as :meth:`add_body` does."""
+        self._scenery.add(self.add_body(mesh, colour, texture))
 
     def add_actor(self, actor: VisualActor) -> int:
         """Add something that moves; return its number in :attr:`RenderedView.actors`."""
@@ -196,14 +158,6 @@ class Visuals(AbstractContextManager["Visuals"]):
         """The actors in the order of their numbers."""
         return tuple(self._actors)
 
-    def hide(self, body: int) -> None:
-        """Stop drawing a body, in every buffer."""
-        self._backend.hide(body)
-
-    def reveal(self, body: int) -> None:
-        """Draw a hidden body again."""
-        self._backend.reveal(body)
-
     def prepare(self, view: RenderView, only: AbstractSet[int] | None = None) -> None:
         """Pose the actors in view, and hide the others.
 
@@ -211,12 +165,30 @@ class Visuals(AbstractContextManager["Visuals"]):
             view: the view of the next image.
             only: numbers of the actors to draw, without scenery; None draws everything.
         """
-        if self.client < 0:
+        if self._closed:
             raise SimError("the render world is closed: it cannot draw any more")
-        self._show_statics(only is None)
+        self._show(_SCENERY, self._scenery if only is None else set())
         bounds = np.array([actor.bounds_odom_m() for actor in self._actors], dtype=np.float64)
-        in_camera = to_camera(view, box_corners(bounds.reshape(-1, 2, 3)))
-        self._show_actors(view, in_view(view, in_camera), in_camera, only)
+        corners_camera_m = to_camera(view, box_corners(bounds.reshape(-1, 2, 3)))
+        seen = in_view(view, corners_camera_m).tolist()
+        for number, actor in enumerate(self._actors):
+            bodies: Sequence[int] = ()
+            if seen[number] and (only is None or number in only):
+                depth = max(float(corners_camera_m[number, :, 2].mean()), view.near_m)
+                self._making = number
+                bodies, T_odom_bodies = actor.bodies(self, view.samples_per_m / depth, view)
+                self._making = _SCENERY
+                self._backend.place(bodies, T_odom_bodies)
+            self._show(number, set(bodies))
+
+    def _show(self, actor: int, bodies: set[int]) -> None:
+        """Draw these bodies of an actor from now on, and none of its others."""
+        visible = self._visible[actor]
+        for body in visible - bodies:
+            self._backend.hide(body)
+        for body in bodies - visible:
+            self._backend.reveal(body)
+        self._visible[actor] = set(bodies)
 
     def draw(self, view: RenderView, light: Lighting) -> Drawing:
         """Draw the bodies that are not hidden; :meth:`prepare` is called with the view before."""
@@ -224,48 +196,9 @@ class Visuals(AbstractContextManager["Visuals"]):
 
     def actor_numbers(self, body_ids: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the number of the actor that each body belongs to, −1 for scenery and nothing."""
-        self._grow_actor_numbers(int(body_ids.max(initial=-1)))
-        # Id −1 is the last row, which stands for "nothing".
-        return np.asarray(self._actor_numbers[body_ids])
-
-    def _show_statics(self, shown: bool) -> None:
-        if shown != self._statics_shown:
-            for body in self._static_bodies:
-                (self._backend.reveal if shown else self._backend.hide)(body)
-            self._statics_shown = shown
-
-    def _show_actors(
-        self,
-        view: RenderView,
-        shown: NDArray[np.bool_],
-        corners_camera_m: FloatArray,
-        only: AbstractSet[int] | None,
-    ) -> None:
-        for number, actor in enumerate(self._actors):
-            if shown[number] and (only is None or number in only):
-                if number not in self._built:
-                    actor.build(self)
-                    self._built.add(number)
-                depth = max(float(corners_camera_m[number, :, 2].mean()), view.near_m)
-                actor.show(view.samples_per_m / depth, view)
-                self._shown_actors.add(number)
-                self._register_bodies(number, actor.bodies())
-            elif number in self._shown_actors:
-                actor.show(None)
-                self._shown_actors.discard(number)
-
-    def _register_bodies(self, number: int, bodies: AbstractSet[int]) -> None:
-        """Record an actor's bodies; it may make more of them as it comes closer."""
-        self._grow_actor_numbers(max(bodies, default=-1))
-        for body in bodies:
-            self._actor_numbers[body] = number
-
-    def _grow_actor_numbers(self, highest_body: int) -> None:
-        size = len(self._actor_numbers)
-        if highest_body + 2 > size:
-            grown = np.full(max(highest_body + 2, 2 * size), -1, dtype=np.int32)
-            grown[: size - 1] = self._actor_numbers[:-1]
-            self._actor_numbers = grown
+        # Id −1, which stands for "nothing", is the last row.
+        owners = np.array([*self._owners, _SCENERY], dtype=np.int32)
+        return np.asarray(owners[body_ids])
 
     def _build_scenery(self, layout: WarehouseLayout, variant: int) -> None:
         chunks = scenery(layout, variant)

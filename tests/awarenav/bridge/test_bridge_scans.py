@@ -59,7 +59,9 @@ def test_scans_on_dds_give_a_person_and_a_speed_limit(
 
     def found() -> bool:
         people = heard["people"][-1].people if heard["people"] else ()
-        return any(each.reliability == 1.0 for each in people)
+        # On a busy computer the limit is still rising from the stop of the start.
+        limits = [each.speed_limit for each in heard["speed_limit"]]
+        return any(each.reliability == 1.0 for each in people) and limits[-1:] > [0.1]
 
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as bridge:
         try:

@@ -16,8 +16,8 @@ name: short
 description: Half a second.
 duration_s: 0.5
 robot: {goal_x_m: 1.0}
-workers:
-  - path: [{t_s: 0.0, x_m: 3.0, y_m: -1.0}]
+people:
+  - {name: stands, route: [{x_m: 3.0, y_m: -1.0}], social: false}
 """
 
 

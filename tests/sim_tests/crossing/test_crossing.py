@@ -6,7 +6,7 @@ import pytest
 from nav_adapter import NavError
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.actors.behaviour import Glances
-from sim_tests.demo._comparison import write_episodes
+from sim_tests.study.measures import measure, write_records
 from sim_tests.world.camera import CameraTiming
 
 ATTENTIVE = Scenario.shipped("crossing_attentive")
@@ -107,7 +107,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_does_not(tmp_path):
     for run, seed in enumerate((5, 5, 6)):
         path = tmp_path / f"{run}.csv"
         result = run_crossing(short, policy="balanced", perception="keypoints", seed=seed)
-        write_episodes(path, [result])
+        write_records(path, [measure(result)])
         texts.append(path.read_bytes())
     assert texts[0] == texts[1]
     assert texts[0] != texts[2].replace(b",6,", b",5,", 1)

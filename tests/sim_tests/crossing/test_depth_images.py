@@ -48,7 +48,7 @@ class Look:
             CAMERA, Clear(), KeypointNoise(miss_rate=0.0), np.random.default_rng(seed)
         )
         camera.look(T_ODOM_CAMERA, [worker])
-        self.depth_m = CameraRenderer(hall).depth(CAMERA, T_ODOM_CAMERA)
+        self.depth_m = CameraRenderer(hall).render(CAMERA, T_ODOM_CAMERA).depth_m
         self.trunk_px = camera.estimate(None, camera.detect(None))[0].keypoints_px[[5, 6, 11, 12]]
         self._pipeline = AwarenessPipeline(CAMERA, camera, camera)
         worker.place((hall.layout.x_min_m - 5.0, 0.0), 0.0)

@@ -10,8 +10,16 @@ from awarenav.errors import AwarenavError
 from awarenav.figures import Image
 from nav_adapter import Alert
 from sim_tests import Scenario, run_crossing
-from sim_tests.demo._comparison import ComparisonRow, time_behind_s, time_lost_s, write_episodes
-from sim_tests.demo._comparison_plot import headline, plot_comparison
+from sim_tests.demo._comparison import (
+    FILM_HZ,
+    PORTRAIT_PX,
+    ComparisonRow,
+    PortraitRecorder,
+    headline,
+    plot_comparison,
+    time_behind_s,
+    time_lost_s,
+)
 from sim_tests.demo._film import (
     HOLD_S,
     MAP_PX_PER_M,
@@ -20,7 +28,7 @@ from sim_tests.demo._film import (
     map_px,
     write_crossing_film,
 )
-from sim_tests.demo._portraits import FILM_HZ, PORTRAIT_PX, PortraitRecorder
+from sim_tests.study.measures import measure, write_records
 
 
 def crossed(label, scenario, **more):
@@ -140,8 +148,8 @@ def test_the_headline_gives_the_time_that_each_worker_costs(row, free, tmp_path)
 
 
 def test_a_table_of_episodes_has_no_infinities(free, tmp_path):
-    write_episodes(tmp_path / "episodes.csv", [free.result])
+    write_records(tmp_path / "episodes.csv", [measure(free.result)])
     header, line = (tmp_path / "episodes.csv").read_text().splitlines()
     assert np.isinf(free.result.min_separation_m)
     assert "inf" not in line
-    assert line.count(",") == header.count(",") == 14
+    assert line.count(",") == header.count(",")

@@ -17,7 +17,7 @@ from sim_tests.scenario.catalogue import (
 )
 from sim_tests.study.scenarios._validate import AttentionCheck
 
-# Their scripted people stop beside the robot's path on purpose.
+# Their people stop beside the robot's path on purpose.
 BESIDE = {"crossing_attentive", "crossing_distracted", "paper_encounter"}
 
 

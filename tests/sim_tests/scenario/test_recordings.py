@@ -15,7 +15,7 @@ from sim_tests import CrossingResult, ScenarioTemplate, SimError, run_crossing
 from sim_tests.actors.behaviour import read_recordings
 from sim_tests.scenario.catalogue import template_problems
 from sim_tests.scenario.recordings import RecordingOptions, read_table, scenario_from_recording
-from sim_tests.study.report._sections import recorded_people
+from sim_tests.study.report._write import recorded_people
 from sim_tests.study.runs import plan_jobs
 from sim_tests.study.social import EpisodeRecorder
 

@@ -16,14 +16,13 @@ from sim_tests import ScenarioTemplate, SimError, run_crossing, shipped_scenario
 from sim_tests.actors.behaviour import FASTEST_RECORDED_MPS, Hearing, Lapse, draw_person
 from sim_tests.actors.robot import NOVA_CARTER, RobotModel
 from sim_tests.crossing.planner import StraightOn
-from sim_tests.search.falsify._joint_parameters import (
+from sim_tests.search.command import falsify
+from sim_tests.search.falsify._parameters import (
     APART_M,
     COMPANION,
     PALLET_CLEARANCE_M,
     PALLET_LANE_CLEARANCE_M,
     PALLET_RADIUS_M,
-)
-from sim_tests.search.falsify._person_parameters import (
     RACK_CLEARANCE_M,
     ROBOT_CLEARANCE_M,
     bent_path,
@@ -31,7 +30,6 @@ from sim_tests.search.falsify._person_parameters import (
     person_path,
 )
 from sim_tests.search.falsify._scenario_space import ScenarioSpace
-from sim_tests.search.falsify.command import falsify
 
 NAMES = (
     *("crossing_from_left", "runs_out", "blind_corner", "walking_backwards", "crowd_of_eight"),

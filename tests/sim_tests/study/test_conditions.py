@@ -13,9 +13,8 @@ from run_scenes import SHORT
 
 from awarenav.cli import app
 from sim_tests import run_crossing
-from sim_tests.actors.behaviour import POPULATIONS as KNOWN_POPULATIONS
 from sim_tests.actors.robot import RobotModel
-from sim_tests.conditions import AXES, OPTIONS, POPULATIONS, Conditions, Experiment
+from sim_tests.conditions import AXES, OPTIONS, Conditions, Experiment
 from sim_tests.crossing import Setup
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import RECORD_COLUMNS, EpisodeRecord, Variant, labels
@@ -38,7 +37,6 @@ def test_every_axis_has_an_option_a_column_and_a_place_in_job_and_key():
     key = Conditions(*map(str, range(len(AXES))))
     record = EpisodeRecord(**asdict(key), success=True)
     assert record.conditions == key
-    assert POPULATIONS == KNOWN_POPULATIONS
 
 
 @pytest.mark.parametrize("name", WITHOUT)

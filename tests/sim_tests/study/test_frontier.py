@@ -11,8 +11,7 @@ import pytest
 
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
-from sim_tests.study.frontier._family import SPEEDS_MPS, TODAY, Member, family
-from sim_tests.study.frontier._frontier import frontier_of
+from sim_tests.study.frontier._frontier import SPEEDS_MPS, TODAY, Member, family, frontier_of
 from sim_tests.study.measures import EpisodeRecord, read_records, write_records
 
 # Mean time lost (s) and impacts of each policy. The line without awareness goes through

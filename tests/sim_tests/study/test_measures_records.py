@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from paths import ROOT
 
 from sim_tests import SimError
-from sim_tests.demo._comparison import EPISODE_COLUMNS
 from sim_tests.study.measures import (
     COLUMNS,
     RECORD_COLUMNS,
@@ -22,6 +21,12 @@ from sim_tests.study.measures import (
 )
 from sim_tests.study.measures._record import rounded
 
+#: The columns of the first tables.
+EPISODE_COLUMNS = (
+    *("scenario", "seed", "policy", "planner", "perception", "success", "contact", "contact_by"),
+    *("min_separation_m", "time_to_goal_s", "max_speed_within_2m_mps", "min_margin_m"),
+    *("violation_time_s", "contacts", "duration_s"),
+)
 numbers = st.none() | st.floats(-1e6, 1e6).map(rounded)
 texts = st.text(st.characters(exclude_categories=("C", "Zl", "Zp")), max_size=20)
 KINDS = {

@@ -15,9 +15,8 @@ from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import Conduct
 from sim_tests.study.report import compare_planners
 from sim_tests.study.report._compare import plan_comparison
-from sim_tests.study.report._planners import planners_section
-from sim_tests.study.report._results import Results
-from sim_tests.study.report._run import Run
+from sim_tests.study.report._results import Results, Run
+from sim_tests.study.report._write import planners_section
 from sim_tests.study.report.command import command_line
 from sim_tests.study.runs import (
     policy_of,

@@ -20,7 +20,7 @@ from run_scenes import SHORT
 from awarenav.cli import main
 from sim_tests.actors.robot import RobotModel
 from sim_tests.conditions import Experiment
-from sim_tests.study._watch import _job
+from sim_tests.study._commands import _job
 from sim_tests.study.runs import plan_jobs, template_of
 
 #: Three seconds of a robot on its way, with control at 20 Hz.

@@ -115,7 +115,7 @@ def test_visibility_agrees_with_a_depth_image(hall: tuple[Warehouse, list[Worker
                 half_px = 0.5 * CAMERA.fx_px / points[row, 2] / (100.0 if face else 28.0)
                 corner = pixels[row] + 0.5
                 rectangle = np.concatenate([corner - half_px, corner + half_px])
-                front = renderer.depth(CAMERA, T, rectangle, (1, 1))[0, 0]
+                front = renderer.render(CAMERA, T, rectangle, (1, 1)).depth_m[0, 0]
                 visible = points[row, 2] <= front + (FACE_DEPTH_M if face else JOINT_DEPTH_M)
                 same[face].append(visible == (keypoints.scores[row] > 0.0))
     assert min(len(same[True]), len(same[False])) > 25

@@ -23,7 +23,7 @@ CAMERA = Camera(160, 120, 150.0, 150.0, 79.5, 59.5)
 AHEAD = level_pose((0.0, 0.0, 1.4), 0.0)
 
 
-def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(
+def test_an_actor_is_asked_for_its_bodies_only_while_it_is_in_view(
     hall: Warehouse, add_actor: Callable[[ShapeActor], int]
 ) -> None:
     actor = ball(position_m=(3.0, 0.0, 1.4))
@@ -38,8 +38,7 @@ def test_an_actor_is_built_once_and_told_when_it_is_out_of_view(
     back = renderer.render(CAMERA, AHEAD)
     np.testing.assert_array_equal(back.rgb, view.rgb)
     # 150 px across a metre at 1 m distance.
-    assert actor.shown == [pytest.approx(50.0), None, pytest.approx(50.0)]
-    assert actor.builds == 1
+    assert actor.shown == [pytest.approx(50.0), pytest.approx(50.0)]
 
 
 def test_only_shows_silhouettes_through_everything(
@@ -91,7 +90,7 @@ def test_equal_textures_are_kept_once_and_unusable_ones_are_refused() -> None:
         square = upright_square()
         bare = Mesh(square.vertices_m, square.normals, square.indices)
         with pytest.raises(SimError, match="uv"):
-            visuals.shape(bare, texture=first)
+            visuals.add_body(bare, texture=first)
 
 
 def test_rendering_never_changes_the_physics() -> None:

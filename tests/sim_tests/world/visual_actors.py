@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from perception.arrays import FloatArray
-from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import Mesh, quad
 from sim_tests.world.render import RenderView, Visuals
 from training.hall import ellipsoid
@@ -35,8 +34,7 @@ class ShapeActor:
         self.mesh = mesh
         self.position_m = np.array(position_m, dtype=float)
         self.kind = kind
-        self.shown: list[float | None] = []
-        self.builds = 0
+        self.shown: list[float] = []
         self.body = -1
         self._colour = colour
         self._texture_rgb = texture_rgb
@@ -45,29 +43,18 @@ class ShapeActor:
         vertices = self.mesh.vertices_m
         return np.array([vertices.min(axis=0), vertices.max(axis=0)]) + self.position_m
 
-    def build(self, visuals: Visuals) -> None:
-        self.builds += 1
-        self._visuals = visuals
-        texture = None
-        if self._texture_rgb is not None:
-            texture = visuals.texture(self._texture_rgb.astype(np.uint8))
-        self.body = visuals.add_body(visuals.shape(self.mesh, self._colour, texture))
-
-    def show(self, pixels_per_m: float | None, view: RenderView | None = None) -> None:
-        self.shown.append(pixels_per_m)
-        if pixels_per_m is None:
-            self._visuals.hide(self.body)
-            return
-        self._visuals.reveal(self.body)
-        pybullet.resetBasePositionAndOrientation(
-            self.body,
-            self.position_m.tolist(),
-            (0.0, 0.0, 0.0, 1.0),
-            physicsClientId=self._visuals.client,
-        )
-
-    def bodies(self) -> frozenset[int]:
-        return frozenset({self.body})
+    def bodies(
+        self, visuals: Visuals, samples_per_m: float, view: RenderView
+    ) -> tuple[list[int], FloatArray]:
+        self.shown.append(samples_per_m)
+        if self.body < 0:
+            texture = None
+            if self._texture_rgb is not None:
+                texture = visuals.texture(self._texture_rgb.astype(np.uint8))
+            self.body = visuals.add_body(self.mesh, self._colour, texture)
+        T_odom_body = np.eye(4)
+        T_odom_body[:3, 3] = self.position_m
+        return [self.body], T_odom_body[None]
 
 
 def ball(radius_m: float = 0.06, **others: object) -> ShapeActor:

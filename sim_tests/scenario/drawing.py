@@ -4,18 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from awarenav.figures import Axes, Circle, Figure, MultipleLocator, Polygon, Wedge, new_figure
+from awarenav.figures import (
+    Axes,
+    Circle,
+    Figure,
+    MultipleLocator,
+    Polygon,
+    Wedge,
+    new_figure,
+    save_figure,
+)
 from perception.arrays import FloatArray
 
-from ...actors.behaviour import PersonSpec, RecordedPath, read_recordings
-from .._scenario import Scenario
-from .._template import ScenarioTemplate
-from ._plans import closest_approaches, person_plan, planned_people, robot_plan
+from ..actors.behaviour import PersonSpec, RecordedPath, read_recordings
+from ..world.errors import SimError
+from ._scenario import Scenario
+from ._template import ScenarioTemplate
+from .catalogue import closest_approaches, person_plan, planned_people, robot_plan
 
+_FORMATS: Final = (".png", ".svg", ".pdf")
 _WIDTH_IN: Final = 6.8
 _DPI: Final = 100
 _RACK: Final = "#c9ccd1"
@@ -32,6 +44,18 @@ _BODY_M: Final = 0.25
 # Space around the paths in the drawing.
 _MARGIN_M: Final = 0.8
 _RECORDED: Final = "#6a4c93"
+
+
+def draw_scenario(name: str, out: Path) -> None:
+    """Draw a scenario, a shipped one or a YAML file, into a picture, and print its path.
+
+    Raises:
+        SimError: the picture has another ending than .png, .svg or .pdf.
+    """
+    if out.suffix.lower() not in _FORMATS:
+        raise SimError(f"--out must end in {', '.join(_FORMATS)}, got {out}")
+    save_figure(scenario_figure(ScenarioTemplate.named(name)), out)
+    print(f"\nWritten: {out}")
 
 
 def scenario_figure(template: ScenarioTemplate) -> Figure:
