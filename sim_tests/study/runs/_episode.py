@@ -140,6 +140,19 @@ def task_of(job: Job) -> tuple[str, int, str]:
     return job.scenario_text, job.seed if varies else 0, job.planner_text
 
 
+def people_in(job: Job) -> int:
+    """Return the number of people in an episode, to which its cost is about proportional."""
+    return _people_in(job.scenario_text)
+
+
+@lru_cache(maxsize=256)
+def _people_in(scenario_text: str) -> int:
+    try:
+        return len(template_of(scenario_text).median().people)
+    except SimError:  # its episodes say it
+        return 0
+
+
 def free_run_of(job: Job) -> FreeRun:
     """Return the figures of a job's task without people; unknown for a robot without a planner."""
     scenario = template_of(job.scenario_text).for_seed(job.seed)

@@ -25,7 +25,7 @@ from perception.arrays import finite_number
 from ...world.bullet import require_pybullet
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, write_records
-from ._episode import FreeRun, attempt, died, failed, free_run_or_none, task_of
+from ._episode import FreeRun, attempt, died, failed, free_run_or_none, people_in, task_of
 from ._parallel import Workers
 from ._run_files import (
     JOB_FIELDS,
@@ -110,6 +110,8 @@ def run_jobs(
         some = Workers(
             workers, scheduler=scheduler, own_process=limit_s is not None, most=len(remaining)
         )
+        if not some.is_this_process:  # the long ones first: none is left to one process at the end
+            remaining.sort(key=lambda number: people_in(jobs[number]), reverse=True)
         bar = tqdm(
             total=len(jobs),
             initial=len(folder.done),
