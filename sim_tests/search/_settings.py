@@ -105,9 +105,10 @@ def write_or_check_settings(
 
     Raises:
         SimError: the folder holds a search and neither ``resume`` nor ``overwrite`` is True, it
-            holds none and ``resume`` is True, it holds results of something else, or the settings
-            differ.
+            holds none and ``resume`` is True, it holds results of something else, the settings
+            differ, or PyBullet is not installed.
     """
+    require_pybullet()
     folder = path.parent
     text = json.dumps(asdict(settings), indent=1) + "\n"
     old = [each for pattern in (*_FILES, *results) for each in sorted(folder.glob(pattern))]
@@ -206,7 +207,6 @@ class EpisodeRunner:
         self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
 
     def __enter__(self) -> EpisodeRunner:
-        require_pybullet()
         return self
 
     def __exit__(self, *_: object) -> None:

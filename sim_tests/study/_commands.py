@@ -15,6 +15,7 @@ from perception import AwarenessPipeline, Camera
 from ..conditions import Experiment
 from ..crossing import drive
 from ..viewing import LivePage, outcome_text, page_text, show_page, write_page
+from ..world.bullet import require_pybullet
 from ..world.errors import SimError
 from .measures import (
     nondeterminism_notes,
@@ -131,6 +132,7 @@ def watch_command(
         NavError: an unknown preset or unusable policy file.
         PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
+    require_pybullet()
     job = _job(experiment)
     if out is not None and not out.parent.is_dir():
         raise SimError(f"cannot write {out}: there is no folder {out.parent}")

@@ -53,6 +53,9 @@ def test_what_simulates_refuses_without_pybullet_and_writes_nothing(tmp_path) ->
         ["crossings", "--scenario", "crossing_attentive", "--out", "run"],
         ["demo", "--out", "demo"],
         ["render", "--out", "images"],
+        ["tune", "--scenario", "crossing_attentive", "--out", "tune"],
+        ["falsify", "--scenario", "crossing_attentive", "--out", "falsify"],
+        ["watch", "crossing_attentive"],
     ]
     found, said = statuses_without_pybullet(commands, tmp_path)
     assert found == [2] * len(commands), said
