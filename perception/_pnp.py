@@ -329,18 +329,17 @@ def _costs(
     The cost is χ² of fit and prior, plus a fixed cost for each keypoint that should be visible and
     was not seen, or the reverse. Without a body, a head that is far from upright costs too.
     """
-    rotations = np.array([pose.rotation for pose in poses])
-    translations = np.array([pose.translation_m for pose in poses])
-    depths = (points @ rotations[:, 2, :, None])[..., 0].min(axis=1) + translations[:, 2]
-    turned = rotations.swapaxes(1, 2)
-    origins = HEAD_TEMPLATE_M @ turned + translations[:, None]
-    facing = -((_FACING @ turned) * origins).sum(axis=2) / np.sqrt((origins * origins).sum(axis=2))
-    wrong = ((facing > _SIGHT_LIMIT) != seen).sum(axis=1)
     costs = []
-    for row in (depths > 0.0).nonzero()[0].tolist():
-        pose = poses[row]
-        cost = pose.cost + _VISIBILITY_COST * float(wrong[row])
-        tilt_rad = math.acos(min(max(float(pose.rotation[1, 0]), -1.0), 1.0))
+    for pose in poses:
+        depth = points @ pose.rotation[2] + pose.translation_m[2]
+        if depth.min() <= 0.0:
+            continue
+        origin = HEAD_TEMPLATE_M @ pose.rotation.T + pose.translation_m
+        to_camera = -origin / np.linalg.norm(origin, axis=1, keepdims=True)
+        facing = np.sum((_FACING @ pose.rotation.T) * to_camera, axis=1)
+        expected = facing > _SIGHT_LIMIT
+        cost = pose.cost + _VISIBILITY_COST * float(np.count_nonzero(expected != seen))
+        tilt_rad = math.acos(min(max(pose.rotation[1, 0], -1.0), 1.0))
         # Smaller tilts tell no optimum from another, and starts that end in one differ a little.
         if without_body and tilt_rad > 2.0 * UPRIGHT_STD_RAD:
             cost += (tilt_rad / UPRIGHT_STD_RAD) ** 2

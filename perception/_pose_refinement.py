@@ -33,11 +33,6 @@ _PIVOT_STD_M: Final = 0.04
 UPRIGHT_STD_RAD: Final = math.radians(30.0)
 # It may look anywhere.
 _UNKNOWN_YAW_STD_RAD: Final = math.radians(150.0)
-# As in HeadPrior.rotation_root.
-_TORSO_ROOT: Final = np.diag([1.0 / _YAW_STD_RAD, 1.0 / _ROLL_STD_RAD, 1.0 / _PITCH_STD_RAD])
-_UPRIGHT_ROOT: Final = np.diag(
-    [1.0 / _UNKNOWN_YAW_STD_RAD, 1.0 / UPRIGHT_STD_RAD, 1.0 / UPRIGHT_STD_RAD]
-)
 _DOWN_CAMERA: Final = np.array([0.0, 1.0, 0.0])
 # Relative standard deviation of the body's range where the head has a range of its own.
 _LOOSE_SCALE_STD: Final = 0.25
@@ -50,18 +45,18 @@ class HeadPrior:
 
     Attributes:
         rotation_camera_head: (3, 3) rotation of a head that looks straight ahead of the torso.
-        rotation_root: (3, 3) W with Wᵀ W the inverse covariance of the head's rotation relative to
-            that, as a rotation vector in head axes (x yaw, y roll, z pitch).
+        rotation_information: (3, 3) inverse covariance of the head's rotation relative to that, as
+            a rotation vector in head axes (x yaw, y roll, z pitch).
         pivot_head_m: (3,) joint of head and neck in the head frame.
         pivot_camera_m: (3,) position of that joint according to the body.
-        position_root: (3, 3) the same of that position, camera frame.
+        position_information: (3, 3) inverse covariance of that position, camera frame.
     """
 
     rotation_camera_head: FloatArray
-    rotation_root: FloatArray
+    rotation_information: FloatArray
     pivot_head_m: FloatArray
     pivot_camera_m: FloatArray
-    position_root: FloatArray
+    position_information: FloatArray
 
 
 def body_prior(body: BodyPlacement | None, *, whole: bool) -> HeadPrior | None:
@@ -77,14 +72,17 @@ def body_prior(body: BodyPlacement | None, *, whole: bool) -> HeadPrior | None:
     rotation_camera_torso, neck = torso
     forward, left, up = rotation_camera_torso.T
     pivot = neck + rotation_camera_torso @ _NECK_TO_PIVOT_M
+    ray = pivot / np.linalg.norm(pivot)
     relative = max(body.scale_relative_std, _LOOSE_SCALE_STD if whole else 0.0)
-    along_m = math.hypot(relative * math.hypot(*pivot.tolist()), _PIVOT_STD_M)
+    along = (relative * np.linalg.norm(pivot)) ** 2 + _PIVOT_STD_M**2
+    covariance = _PIVOT_STD_M**2 * (np.eye(3) - np.outer(ray, ray)) + along * np.outer(ray, ray)
+    stds = np.array([_YAW_STD_RAD, _ROLL_STD_RAD, _PITCH_STD_RAD])
     return HeadPrior(
         np.stack([-up, forward, -left], axis=1),
-        _TORSO_ROOT,
+        np.diag(1.0 / stds**2),
         _PIVOT_HEAD_M,
         pivot,
-        _position_root(pivot, _PIVOT_STD_M, along_m),
+        np.linalg.inv(covariance),
     )
 
 
@@ -98,21 +96,16 @@ def upright_prior(points: FloatArray, rays: FloatArray) -> HeadPrior:
     right = skew(_DOWN_CAMERA) @ -ray
     right = right / np.linalg.norm(right)
     down = skew(-ray) @ right
-    across_m, along_m = _PIVOT_STD_M + 0.1, 0.5 * float(np.linalg.norm(pivot))
+    across, along = _PIVOT_STD_M + 0.1, 0.5 * float(np.linalg.norm(pivot))
+    covariance = across**2 * (np.eye(3) - np.outer(ray, ray)) + along**2 * np.outer(ray, ray)
+    stds = np.array([_UNKNOWN_YAW_STD_RAD, UPRIGHT_STD_RAD, UPRIGHT_STD_RAD])
     return HeadPrior(
         np.stack([down, -ray, right], axis=1),
-        _UPRIGHT_ROOT,
+        np.diag(1.0 / stds**2),
         HEAD_CENTRE_HEAD_M,
         pivot,
-        _position_root(pivot, across_m, along_m),
+        np.asarray(np.linalg.inv(covariance), dtype=np.float64),
     )
-
-
-def _position_root(place_m: FloatArray, across_std_m: float, along_std_m: float) -> FloatArray:
-    """Return W (3, 3) of a place seen from the camera; its errors are along its ray and across."""
-    ray = place_m / math.hypot(*place_m.tolist())
-    along = ray[:, None] * ray
-    return np.asarray((_EYE - along) / across_std_m + along / along_std_m)
 
 
 def _torso_axes(body: BodyPlacement) -> tuple[FloatArray, FloatArray] | None:
@@ -146,63 +139,45 @@ _CONVERGED_CHI2: Final = 1e-2
 _MIN_DEPTH_M: Final = 0.05
 _EYE: Final = np.eye(3)
 _EYE_2: Final = np.eye(2)
-# No step turns a head farther.
-_MAX_TURN_RAD: Final = 0.7
+_EYE_6: Final = np.eye(6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Priors:
-    """Priors of B starts as residuals in units of their standard deviations, six each.
+    """Priors of B starts; arrays as in :class:`HeadPrior` with B in front.
 
-    They follow the 2 N residuals of the points. Those of a start without a prior are 0.
-
-    Attributes:
-        rotation_camera_head: (B, 3, 3) as in :class:`HeadPrior`.
-        pivot_head_m: (B, 3) as well.
-        pivot_camera_m: (B, 3) as well.
-        rotation_root: (B, 3, 3) W, in camera axes, with Wᵀ W the information of the rotation.
-        position_root: (B, 3, 3) the same of the position.
+    ``rotation_information`` is in camera axes here. ``rows`` are the rows of these starts among
+    all starts.
     """
 
+    rows: slice | NDArray[np.int64]
     rotation_camera_head: FloatArray
+    rotation_information: FloatArray
     pivot_head_m: FloatArray
     pivot_camera_m: FloatArray
-    rotation_root: FloatArray
-    position_root: FloatArray
+    position_information: FloatArray
 
     @classmethod
     def of(cls, priors: Sequence[HeadPrior | None], owner: NDArray[np.int64]) -> _Priors | None:
         """Return the priors of starts that belong to the heads ``owner``; None without priors."""
-        if not any(priors):
+        known = [prior for prior in priors if prior is not None]
+        if not known:
             return None
-        axes = np.array([_EYE if each is None else each.rotation_camera_head for each in priors])
-        zero = np.zeros((3, 3))
-        rotation = np.array([zero if each is None else each.rotation_root for each in priors])
-        rotation = rotation @ axes.swapaxes(1, 2)
-        position = np.array([zero if each is None else each.position_root for each in priors])
-        zero = zero[0]
-        head = np.array([zero if each is None else each.pivot_head_m for each in priors])
-        camera = np.array([zero if each is None else each.pivot_camera_m for each in priors])
-        return cls(*(each[owner] for each in (axes, head, camera, rotation, position)))
-
-    def residuals(
-        self, rotation: FloatArray, translation_m: FloatArray, jacobian: FloatArray
-    ) -> FloatArray:
-        """Return the residuals (B, 6) at some poses; write their derivatives (B, 6, 6)."""
-        # In camera axes, R log(Rᵀ R0) is the rotation that takes the head to the prior.
-        away = (
-            rotation @ rotation_log(rotation.swapaxes(1, 2) @ self.rotation_camera_head)[..., None]
+        rows: slice | NDArray[np.int64] = slice(None)
+        if len(known) < len(priors):
+            has = np.array([prior is not None for prior in priors])
+            rows = np.flatnonzero(has[owner])
+            owner = (np.cumsum(has) - 1)[owner[rows]]
+        axes = np.array([prior.rotation_camera_head for prior in known])
+        information = np.array([prior.rotation_information for prior in known])
+        return cls(
+            rows,
+            axes[owner],
+            (axes @ information @ np.swapaxes(axes, 1, 2))[owner],
+            np.array([prior.pivot_head_m for prior in known])[owner],
+            np.array([prior.pivot_camera_m for prior in known])[owner],
+            np.array([prior.position_information for prior in known])[owner],
         )
-        pivot = (rotation @ self.pivot_head_m[..., None])[..., 0]
-        offset = pivot + translation_m - self.pivot_camera_m
-        jacobian[:, :3, :3] = self.rotation_root
-        jacobian[:, :3, 3:] = 0.0
-        np.matmul(self.position_root, skew(-pivot), out=jacobian[:, 3:, :3])
-        jacobian[:, 3:, 3:] = self.position_root
-        residuals = np.empty((len(rotation), 6, 1))
-        np.matmul(self.rotation_root, -away, out=residuals[:, :3])
-        np.matmul(self.position_root, offset[..., None], out=residuals[:, 3:])
-        return residuals[..., 0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,37 +217,54 @@ def _linearise(
 
     The state is a rotation in camera axes, applied from the left, then the translation.
     """
-    count, values = len(rotation), 2 * rays.shape[1]
     turned = model @ rotation.swapaxes(1, 2)
     points = turned + translation[:, None]
     nearest = points[..., 2]
-    deep = np.maximum(nearest, _MIN_DEPTH_M)[..., None]
+    depth = np.maximum(nearest, _MIN_DEPTH_M)
+    deep = depth[..., None]
     image = points[..., :2] / deep
     residual = (image - rays) * weight_px
-    jacobian = np.empty((*nearest.shape, 2, 6))
+    jacobian = np.empty((*depth.shape, 2, 6))
     slope = jacobian[..., 3:]
     slope[..., :2] = _EYE_2 / deep[..., None]
     np.divide(image, -deep, out=slope[..., 2])
     slope *= weight_px[..., None]
     np.matmul(slope, skew(-turned), out=jacobian[..., :3])
-    # All residuals and their derivatives, those of the prior after those of the points.
-    extra = 0 if prior is None else 6
-    flat, slopes = np.empty((count, values + extra)), np.empty((count, values + extra, 6))
-    flat[:, :values] = residual.reshape(count, -1)
-    slopes[:, :values] = jacobian.reshape(count, -1, 6)
+    flat = jacobian.reshape(len(rotation), -1, 6)
+    flat_residual = residual.reshape(len(rotation), -1)
     if whitening is not None:
-        flat[:, :values] = (whitening @ flat[:, :values, None])[..., 0]
-        slopes[:, :values] = whitening @ slopes[:, :values]
-    if prior is not None:
-        flat[:, values:] = prior.residuals(rotation, translation, slopes[:, values:])
-    transposed = slopes.swapaxes(1, 2)
-    information = transposed @ slopes
-    gradient = (transposed @ flat[..., None])[..., 0]
-    cost = np.add.reduce(flat * flat, axis=1)
+        flat = whitening @ flat
+        flat_residual = (whitening @ flat_residual[..., None])[..., 0]
+    information = flat.swapaxes(1, 2) @ flat
+    gradient = np.einsum("bki,bk->bi", flat, flat_residual)
+    cost = np.add.reduce(flat_residual * flat_residual, axis=1)
     # The penalty keeps a point behind the camera from being a good fit.
     if np.minimum.reduce(nearest, axis=None) < _MIN_DEPTH_M:
         behind = np.maximum(_MIN_DEPTH_M - nearest, 0.0)
         cost += 1e6 * np.add.reduce(behind * (weight_px[..., 0] > 0.0), axis=1)
+    if prior is not None:
+        rows = prior.rows
+        rotation, translation = rotation[rows], translation[rows]
+        away = rotation_log(rotation.swapaxes(1, 2) @ prior.rotation_camera_head)
+        # In camera axes, R log(Rᵀ R0) is the rotation that takes the head to the prior.
+        away = -np.einsum("bij,bj->bi", rotation, away)
+        rotation_information = prior.rotation_information
+        pivot = np.einsum("bij,bj->bi", rotation, prior.pivot_head_m)
+        offset = pivot + translation - prior.pivot_camera_m
+        motion = np.empty((len(pivot), 3, 6))
+        motion[..., :3] = skew(-pivot)
+        motion[..., 3:] = _EYE
+        weighted = prior.position_information @ motion
+        own_information = information[rows] + motion.swapaxes(1, 2) @ weighted
+        own_information[:, :3, :3] += rotation_information
+        information[rows] = own_information
+        own_gradient = gradient[rows] + np.einsum("bji,bj->bi", weighted, offset)
+        turning = np.einsum("bij,bj->bi", rotation_information, away)
+        own_gradient[:, :3] += turning
+        gradient[rows] = own_gradient
+        shifting = np.einsum("bij,bj->bi", prior.position_information, offset)
+        own_cost = cost[rows] + np.einsum("bi,bi->b", away, turning)
+        cost[rows] = own_cost + np.einsum("bi,bi->b", offset, shifting)
     return cost, gradient, information, residual
 
 
@@ -322,8 +314,8 @@ def refine(
         )
         fit = (whitening @ state[3].reshape(count, -1, 1))[..., 0]
     cost, _, information, residual = state
-    chi2 = np.add.reduce(fit * fit, axis=1)
-    error_px = keypoint_std_px * np.sqrt(np.add.reduce(residual * residual, axis=2))
+    chi2 = np.einsum("bk,bk->b", fit, fit)
+    error_px = keypoint_std_px * np.sqrt(np.einsum("bni,bni->bn", residual, residual))
     return [
         RefinedPose(
             rotation[index],
@@ -370,10 +362,8 @@ def _descend(
     state = linearise(rotation, translation)
     for _ in range(iterations):
         cost, gradient, information, _ = state
-        damped = information.copy()
-        diagonal = damped.reshape(count, 36)[:, ::7]
-        diagonal *= 1.0 + damping[:, None]
-        diagonal += 1e-9
+        scale = information.reshape(count, 36)[:, ::7]  # the diagonals
+        damped = information + (damping[:, None] * scale + 1e-9)[..., None] * _EYE_6
         step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
         # The decrease of χ² that the local model still promises.
         promise = np.maximum.reduceat(-np.add.reduce(gradient * step, axis=1), first)
@@ -381,9 +371,8 @@ def _descend(
         if not np.logical_or.reduce(active):
             break
         turn = step[:, :3]
-        length = np.sqrt(np.add.reduce(turn * turn, axis=1, keepdims=True))
-        if np.maximum.reduce(length, axis=None) > _MAX_TURN_RAD:
-            turn = turn * np.minimum(1.0, _MAX_TURN_RAD / np.maximum(length, 1e-12))
+        length = np.sqrt(np.einsum("bi,bi->b", turn, turn))[:, None]
+        turn = turn * np.minimum(1.0, 0.7 / np.maximum(length, 1e-12))
         trial_rotation = rotation_exp(turn) @ rotation
         trial_translation = translation + step[:, 3:]
         trial = linearise(trial_rotation, trial_translation)

@@ -64,7 +64,7 @@ def skew(vectors: FloatArray) -> FloatArray:
 
 def rotation_exp(vectors: FloatArray) -> FloatArray:
     """Return rotations (…, 3, 3) of rotation vectors (…, 3), by Rodrigues' formula."""
-    angle = np.sqrt(np.add.reduce(vectors * vectors, axis=-1))[..., None, None]
+    angle = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None, None]
     cross = skew(vectors)
     if np.minimum.reduce(angle, axis=None, initial=1.0) >= 1e-8:
         first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / (angle * angle)
@@ -84,7 +84,7 @@ def rotation_log(rotations: FloatArray) -> FloatArray:
     axis[..., 0] = rotations[..., 2, 1] - rotations[..., 1, 2]
     axis[..., 1] = rotations[..., 0, 2] - rotations[..., 2, 0]
     axis[..., 2] = rotations[..., 1, 0] - rotations[..., 0, 1]
-    length = np.sqrt(np.add.reduce(axis * axis, axis=-1))
+    length = np.sqrt(np.einsum("...i,...i->...", axis, axis))
     if length.min(initial=1.0) > 1e-6:
         return np.asarray((angle / length)[..., None] * axis)
     # Near a half turn the antisymmetric part vanishes; the diagonal still gives the axis.

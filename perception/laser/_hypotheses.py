@@ -90,6 +90,7 @@ def hypotheses_of(
     right_m, left_m = centres.take(first, axis=1), centres.take(left, axis=1)
     middle = right_m + left_m
     middle *= 0.5
+    kept, every_middle = np.arange(len(first)), middle
     if ruled_out is not None:
         kept = (~(ruled_out[first] | ruled_out[left])).nonzero()[0]
         singles = int(np.searchsorted(kept, singles))
@@ -120,7 +121,10 @@ def hypotheses_of(
     np.log(_of_both(clusters.counts, first, other), out=pair[4])
     np.divide(0.1 * _MAX_LEG_M, np.maximum(ranges * step, 0.005), out=pair[5])
     returned = np.isfinite(ranges_m).nonzero()[0]
-    around = _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, middle)
+    # The sums of all hypotheses, so that their rounding does not depend on those that are kept.
+    around = _around(points_m.T.take(returned, axis=1), ranges_m[returned] * step, every_middle)[
+        :, kept
+    ]
     around -= _of_both(clusters.lengths_m, first, other)
     np.minimum(np.maximum(around, 0.0, out=around), _MAX_AROUND_M, out=pair[6:])
     out[:, 2 * CLUSTER_FEATURES : -CUTOUT] = pair.T
