@@ -27,7 +27,6 @@ from ..actors.body import Worker
 from ..actors.robot import Amr, KinematicRobot, RobotLook, robot_of
 from ..scenario import Scenario
 from ..world import Warehouse
-from ..world.bullet import pybullet
 from ..world.render import RendererName
 from ._audience import Audience
 from ._people import staged_people
@@ -308,10 +307,8 @@ class Stage(AbstractContextManager["Stage"]):
 
     def _depth_m(self, worker: Worker) -> float:
         """Return how deep body and robot overlap, 0 when apart."""
-        pairs = pybullet.getClosestPoints(
-            self.amr.body, worker.body, 0.0, physicsClientId=self.warehouse.client
-        )
-        return -min((float(pair[8]) for pair in pairs), default=0.0)
+        nearest = self.warehouse.nearest(self.amr.body, worker.body, 0.0)
+        return 0.0 if nearest is None else -nearest.distance_m
 
     def _robot_body(self) -> RobotBody:
         (xx, xy, _, x), (yx, yy, _, y) = self.amr.T_odom_base[:2].tolist()
@@ -343,26 +340,19 @@ class Stage(AbstractContextManager["Stage"]):
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         if distance > _EXACT_WITHIN_M:
             return bound, towards
-        # Pairs of shapes beyond the given distance cost nothing. One pair is nearly always closer
-        # than the first distance, and except for what a person carries on the far side always
-        # closer than the second.
+        # The surfaces are nearly always closer than the first distance, and except for what a
+        # person carries on the far side always closer than the second.
         first = self._last_separation_m[index] + _MOVED_M
         second = max(bound, 0.0) + _NEARER_THAN_BOUND_M
         for within in (min(first, second), second, _EXACT_WITHIN_M):
-            pairs = pybullet.getClosestPoints(
-                self.amr.body,
-                self.workers[index].body,
-                within,
-                physicsClientId=self.warehouse.client,
-            )
-            if pairs:
+            nearest = self.warehouse.nearest(self.amr.body, self.workers[index].body, within)
+            if nearest is not None:
                 break
         else:
             return bound, towards
-        closest = min(pairs, key=lambda pair: pair[8])
-        gap = np.array(closest[6][:2]) - np.array(closest[5][:2])
+        gap = np.array(nearest.second_odom_m[:2]) - np.array(nearest.first_odom_m[:2])
         length = math.sqrt(gap @ gap)
-        separation = self._last_separation_m[index] = max(float(closest[8]), 0.0)
+        separation = self._last_separation_m[index] = max(nearest.distance_m, 0.0)
         return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
 
     def _update_contact(

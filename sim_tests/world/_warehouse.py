@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from types import TracebackType
-from typing import Final
+from typing import Final, NamedTuple
 
 from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
@@ -22,6 +22,20 @@ RAY_GROUP: Final = 1
 STATIC_GROUP: Final = 2
 ROBOT_GROUP: Final = 4
 PERSON_GROUP: Final = 8
+
+
+class Nearest(NamedTuple):
+    """The places where the surfaces of two bodies are nearest to each other.
+
+    Attributes:
+        distance_m: between them; negative where the bodies overlap.
+        first_odom_m: (3,) the place on the first body.
+        second_odom_m: (3,) the place on the second.
+    """
+
+    distance_m: float
+    first_odom_m: tuple[float, float, float]
+    second_odom_m: tuple[float, float, float]
 
 
 class Warehouse(AbstractContextManager["Warehouse"]):
@@ -134,6 +148,20 @@ class Warehouse(AbstractContextManager["Warehouse"]):
             raise SimError("the warehouse is closed: it cannot step any more")
         pybullet.stepSimulation(physicsClientId=self.client)
         self.steps += 1
+
+    def nearest(self, first: int, second: int, within_m: float) -> Nearest | None:
+        """Return where two bodies are nearest to each other; None if that is farther than given.
+
+        Args:
+            first: id of a body.
+            second: id of another.
+            within_m: the distance. Pairs of shapes beyond it cost nothing.
+        """
+        pairs = pybullet.getClosestPoints(first, second, within_m, physicsClientId=self.client)
+        if not pairs:
+            return None
+        closest = min(pairs, key=lambda pair: pair[8])
+        return Nearest(float(closest[8]), closest[5], closest[6])
 
     def _add_floor(self) -> None:
         shape = pybullet.createCollisionShape(

@@ -70,7 +70,7 @@ class Robot(ABC):
         T_base_camera[:3, :3], T_base_camera[:3, 3] = _ROTATION_BASE_OPTICAL, camera_m
         T_base_camera.setflags(write=False)
         self.T_base_camera: FloatArray = T_base_camera
-        self._client = warehouse.client
+        self._warehouse, self._client = warehouse, warehouse.client
         # Speed forward and to the left, and yaw rate: as commanded, and now.
         self._targets = (0.0, 0.0, 0.0)
         self._forward_mps, self._left_mps, self._yaw_rate_radps = 0.0, 0.0, 0.0
@@ -200,7 +200,6 @@ class Amr(Robot):
         front_m = (CAMERA_FORWARD_M, 0.0, CAMERA_HEIGHT_M)
         camera_m = _ABOVE_POST_M if camera_mount == "top" else front_m
         super().__init__(warehouse, NOVA_CARTER, camera_m)
-        self._warehouse = warehouse
         source = resources.files("sim_tests.actors.robot") / "amr.urdf"
         with resources.as_file(source) as path:
             self.body = pybullet.loadURDF(
@@ -419,7 +418,7 @@ class KinematicRobot(Robot):
 
     def touches(self, body: int) -> bool:
         """Return whether another body touches the outline."""
-        return bool(pybullet.getClosestPoints(self.body, body, 0.0, physicsClientId=self._client))
+        return self._warehouse.nearest(self.body, body, 0.0) is not None
 
     def _count_bump(self) -> None:
         """Count a stop at a rack or wall, once for as long as the robot pushes on."""
