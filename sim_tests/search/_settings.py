@@ -1,4 +1,4 @@
-"""What both searches share: settings, episodes, printed results and the command to run next."""
+"""The common part of both searches: settings, episodes, printed results, the next command."""
 
 from __future__ import annotations
 

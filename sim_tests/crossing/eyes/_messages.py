@@ -1,4 +1,4 @@
-"""What the sensors of a robot deliver: images, scans and odometry on their way to the robot."""
+"""Messages of the sensors: images, scans and odometry on their way to the robot."""
 
 from __future__ import annotations
 

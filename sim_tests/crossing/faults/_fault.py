@@ -41,7 +41,7 @@ _JOINT: Final = "+"
 
 
 class Fault(SimConfig):
-    """What is wrong with the sensors of a robot; the default is nothing at all.
+    """The faults of a robot's sensors; the default is none at all.
 
     Sensors and odometry follow the scenario; the faults are added to them, one after the other.
     Each draws from random streams of its own, so that everything else in an episode stays the same,

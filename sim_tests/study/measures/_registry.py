@@ -1,4 +1,4 @@
-"""What the registry of measures holds: columns of ``episodes.csv``, and numbers of episodes."""
+"""The registry of measures: columns of ``episodes.csv``, and numbers of episodes."""
 
 from __future__ import annotations
 
