@@ -158,10 +158,9 @@ def changed(
     """
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.named(scenario)
-    given = {name: value for name, value in axes.items() if value not in (None, "")}
-    if isinstance(scenario, Scenario) and given:
+    if isinstance(scenario, Scenario) and any(each not in (None, "") for each in axes.values()):
         scenario = ScenarioTemplate(scenario.model_dump(mode="json"), scenario.name)
-    return changed_scenario(scenario, given)
+    return changed_scenario(scenario, axes)
 
 
 def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
