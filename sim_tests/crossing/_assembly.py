@@ -158,9 +158,10 @@ def changed(
     """
     if isinstance(scenario, str):
         scenario = ScenarioTemplate.named(scenario)
-    if isinstance(scenario, Scenario) and any(each not in (None, "") for each in axes.values()):
+    given = {name: value for name, value in axes.items() if value not in (None, "")}
+    if isinstance(scenario, Scenario) and given:
         scenario = ScenarioTemplate(scenario.model_dump(mode="json"), scenario.name)
-    return changed_scenario(scenario, axes)
+    return changed_scenario(scenario, given)
 
 
 def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPolicy]:
