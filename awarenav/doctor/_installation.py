@@ -33,6 +33,7 @@ _EXTRAS: Final = (
     ("plot", "matplotlib", "plots"),
     ("smooth", "filterpy", "smoothed tracks"),
     ("mediapipe", "mediapipe", "MediaPipe's pose network"),
+    ("movenet", "onnx", "fetching MoveNet"),
 )
 
 
