@@ -178,19 +178,20 @@ def as_json(what: str = "the table") -> Decorator:
 
 
 _NETWORKS: Final = "Networks"
+_BY_PICTURES: Final = "of the set 'real' once fetched; for renders 'shipped'"
 _NETWORK_OPTIONS: Final = (
     option(
         "--networks",
         group=_NETWORKS,
         type=FilePath(),
         metavar="FILE",
-        help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
+        help="Detector, pose and head from a file, as `awarenav models fetch` writes it.",
     ),
     option(
         "--detector",
         group=_NETWORKS,
         excludes="--networks",
-        default="shipped",
+        show_default=_BY_PICTURES,
         metavar="NAME|FILE",
         help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
         "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet). yolox:FILE, "
@@ -215,7 +216,7 @@ _NETWORK_OPTIONS: Final = (
         "--pose",
         group=_NETWORKS,
         excludes="--networks",
-        default="shipped",
+        show_default=_BY_PICTURES,
         metavar="NAME|FILE",
         help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
         "lists, an ONNX file (RTMPose, RTMW, RTMW3D), or 'mediapipe' (needs the extra "
@@ -225,7 +226,7 @@ _NETWORK_OPTIONS: Final = (
         "--head",
         group=_NETWORKS,
         excludes="--networks",
-        default="auto",
+        show_default="as the set says, else auto",
         metavar="NAME|FILE",
         help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
         "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
@@ -235,7 +236,7 @@ _NETWORK_OPTIONS: Final = (
         "--eyes",
         group=_NETWORKS,
         excludes="--networks",
-        default="auto",
+        show_default="as the set says, else auto",
         metavar="auto|mediapipe|none",
         help="Eyes of people nearer than about 2.5 m: 'mediapipe' (needs the extra 'mediapipe'), "
         "'none' (the gaze is the head's direction), or 'auto': 'mediapipe' with --pose mediapipe.",

@@ -109,7 +109,7 @@ def _source_findings(options: Any) -> list[Finding]:
 
 def _image_findings(options: Any) -> list[Finding]:
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
-        choice = NetworkChoice.of_options(options)
+        choice = NetworkChoice.of_options(options, rendered=source.rendered)
         networks = choose_networks(**choice.model_dump())
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)

@@ -205,7 +205,7 @@ def _estimator(
         _log("the images are rectified: P of the calibration counts, without distortion")
     for note in source.notes:
         _log(note)
-    choice = NetworkChoice.of_options(options)
+    choice = NetworkChoice.of_options(options, rendered=source.rendered, log=_log)
     if networks is None:
         networks = choose_networks(
             **choice.model_dump(), min_score=options.min_score, **running_options(options)
