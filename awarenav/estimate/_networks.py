@@ -136,8 +136,9 @@ class NetworkChoice(StrictConfig):
         known = {each.name for each in store.catalogue.models}
         for each in store.catalogue.sets:
             if each.name == _DEFAULT_SET:
-                chosen = cls(**each.model_dump(include=set(cls.model_fields)))
-                wanted = known.intersection(map(str, chosen.model_dump().values()))
+                named = each.model_dump(include=set(cls.model_fields), exclude_none=True)
+                chosen = cls(**named)
+                wanted = known.intersection(map(str, named.values()))
                 return chosen if all(map(store.is_fetched, wanted)) else None
         return None
 
@@ -146,9 +147,8 @@ class NetworkChoice(StrictConfig):
 
         A file is known by its SHA-256. A network that is not in the catalogue is left out.
         """
-        found = {
-            role: _catalogued(str(getattr(self, role))) for role in ("detector", "pose", "head")
-        }
+        named = self.model_dump(exclude_none=True)
+        found = {role: _catalogued(str(name)) for role, name in named.items()}
         return {role: model for role, model in found.items() if model is not None}
 
 

@@ -273,7 +273,8 @@ def _head_px(box: FloatArray, keypoints: PersonKeypoints | None) -> FloatArray:
             around = _around(points)
             # From ear to ear a head is two thirds of its height; a profile shows less.
             wide = float((around[2:] - around[:2]).max())
-            return around + max(0.75 * wide, 0.06 * height) * np.array([-1.0, -1.0, 1.0, 1.0])
+            margin = max(0.75 * wide, 0.06 * height)
+            return np.asarray(around + np.array([-margin, -margin, margin, margin]))
     return np.array([box[0], box[1], box[2], box[1] + 0.2 * height])
 
 

@@ -18,7 +18,7 @@ from paths import ROOT
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
 from awarenav.estimate import NetworkChoice, admit_networks, choose_networks
-from awarenav.models._catalogue import Catalogue
+from awarenav.models._catalogue import Catalogue, NetworkSet
 from perception.networks import OnnxModel
 from perception.shipped import DETECTOR, POSE, shipped_model_path, shipped_models
 
@@ -148,34 +148,22 @@ def test_a_file_names_the_networks(photograph, capsys):
     assert "did you mean 'pose'" in capsys.readouterr().err
 
 
-def catalogue_of(*files: Path) -> Catalogue:
+def catalogue_of(detector: Path, pose: Path) -> Catalogue:
     """A catalogue with a set 'real' of a detector and a pose network."""
-    return Catalogue.model_validate(
-        {
-            "models": [
-                {
-                    "name": file.stem,
-                    "role": role,
-                    "url": f"https://networks.example/{file.name}",
-                    "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
-                    "size_mb": 1.0,
-                    "licence": "MIT",
-                    "publisher": "Example",
-                    "purpose": "tests",
-                }
-                for role, file in zip(("detector", "pose"), files, strict=True)
-            ],
-            "sets": [
-                {
-                    "name": "real",
-                    "detector": files[0].stem,
-                    "pose": files[1].stem,
-                    "head": "pnp",
-                    "purpose": "tests",
-                }
-            ],
-        }
+    some = next(each for each in Catalogue.shipped().models if each.file.endswith(".onnx"))
+    models = tuple(
+        some.model_copy(
+            update={
+                "name": file.stem,
+                "role": role,
+                "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+                "publisher": "Example",
+            }
+        )
+        for role, file in (("detector", detector), ("pose", pose))
     )
+    names = {"detector": detector.stem, "pose": pose.stem, "head": "pnp"}
+    return Catalogue(models=models, sets=(NetworkSet(name="real", purpose="tests", **names),))
 
 
 @pytest.fixture
