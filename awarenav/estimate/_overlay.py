@@ -148,7 +148,7 @@ def _draw_gaze(
     rim = camera.project(np.vstack([apex, apex + length * _cone_rim(gaze, cone.half_angle_rad)]))
     if drawable(rim):
         # The cone of a gaze away from the camera lies behind the body: it is drawn fainter.
-        fill_hull(image, rim, colour, 0.26 if gaze[2] < 0.0 else 0.13)
+        fill_hull(image, rim, colour, 0.16 if gaze[2] < 0.0 else 0.08)
         draw_line(image, np.vstack([rim[1:], rim[1:2]]), colour, 1)
     arrow = min(_ARROW_LENGTH_M, 0.7 * float(apex[2]))
     ray = camera.project(np.stack([apex, apex + arrow * gaze]))
