@@ -103,7 +103,7 @@ def _fetched() -> list[Finding]:
         Finding.warning(
             "fetched networks",
             "none, so that there is no network for photographs",
-            "awarenav models fetch robot",
+            "awarenav models fetch real",
         )
     ]
 
