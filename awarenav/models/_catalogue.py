@@ -13,11 +13,12 @@ from tracking.config import StrictConfig
 
 from ..errors import AwarenavError, not_one_of
 
-Role = Literal["detector", "pose", "head", "face"]
+Role = Literal["detector", "pose", "face", "head"]
 
 _FILE: Final = Path(__file__).parent / "catalogue.yaml"
-#: Ends of the names of archives; a bundle of MediaPipe, .task, is a ZIP archive.
-ARCHIVES: Final = (".zip", ".whl", ".task", ".tgz")
+# Archives and networks. A bundle of MediaPipe, .task, is both: a ZIP archive of networks.
+_ARCHIVES: Final = (".zip", ".whl", ".task", ".tgz")
+_NETWORKS: Final = (".onnx", ".tflite", ".task")
 _SHA256: Final = r"^[0-9a-f]{64}$"
 
 
@@ -92,13 +93,13 @@ class RealModel(StrictConfig):
     trained_on: str
     #: The kind of these pictures.
     training_domain: TrainingDomain = "photographs"
-    #: Of a detector: the score from which on a box counts as a person; None for the usual one.
-    score_threshold: float | None = Field(default=None, gt=0.0, lt=1.0)
+    #: Of a detector: detections with a lower score are dropped; None for the default.
+    score_threshold: float | None = Field(default=None, ge=0.0, le=1.0)
     note: str | None = None
 
     @property
     def file(self) -> str:
-        """Name of the fetched file, which ends in .onnx or .tflite."""
+        """Name of the fetched file, which ends in .onnx, .tflite or .task."""
         return self.name + self._suffix(self.sources[0])
 
     def parts(self, source: Source) -> tuple[tuple[tuple[str, ...], str], ...]:
@@ -123,19 +124,17 @@ class RealModel(StrictConfig):
     def _consistent(self) -> RealModel:
         for source in self.sources:
             for members, _ in self.parts(source):
-                archives = [
-                    name.endswith(ARCHIVES) for name in (source.file, *members)[: len(members) or 1]
-                ]
-                if all(archives) != bool(members):
+                archives = (source.file, *members)[: len(members)]
+                if not all(name.endswith(_ARCHIVES) for name in archives):
                     raise ValueError(
-                        f"{self.name}: 'member' goes with archives, whose names end in "
-                        f"{', '.join(ARCHIVES)}; {source.place} with {list(members)}"
+                        f"{self.name}: a 'member' needs an archive ({', '.join(_ARCHIVES)}), got "
+                        f"{', '.join(archives)}"
                     )
         found = {self._suffix(source) for source in self.sources}
-        if len(found) > 1 or not found <= {".onnx", ".tflite"}:
+        if len(found) > 1 or not found <= set(_NETWORKS):
             raise ValueError(
-                f"{self.name}: all sources must hold .onnx files or .tflite files, got "
-                f"{', '.join(sorted(found))}"
+                f"{self.name}: all sources must hold one kind of network ({', '.join(_NETWORKS)}), "
+                f"got {', '.join(sorted(found))}"
             )
         if self.score_threshold is not None and self.role != "detector":
             raise ValueError(f"{self.name}: 'score_threshold' is for detectors")
@@ -215,6 +214,10 @@ class Catalogue(StrictConfig):
         """Read the catalogue of this package."""
         return cls.from_yaml(_FILE)
 
+    def known(self, sha256: str) -> RealModel | None:
+        """Return the network whose file has this SHA-256; None if there is none."""
+        return next((model for model in self.models if model.sha256 == sha256), None)
+
     def __getitem__(self, name: str) -> RealModel:
         """Return the network called ``name``.
 
@@ -233,7 +236,3 @@ class Catalogue(StrictConfig):
             raise AwarenavError(f"{name} is a set of networks: {networks}")
         names = [*sets, *(model.name for model in self.models)]
         raise AwarenavError(not_one_of("name", name, names))
-
-    def known(self, sha256: str) -> RealModel | None:
-        """Return the network whose file has this sha256, or None."""
-        return next((model for model in self.models if model.sha256 == sha256), None)

