@@ -16,8 +16,8 @@ from perception import (
     PersonDetection,
     PersonKeypoints,
 )
-from perception.confirmation import DISOWNED, disowned_keypoints, without_disowned
 from perception.layouts import HEAD
+from perception.ownership import DISOWNED, disowned_keypoints, without_disowned
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 WIDE = Camera.from_fov(1920, 1200, math.radians(120.0))
