@@ -32,7 +32,8 @@ _EXTRAS: Final = (
     ("rosbag", "rosbags", "recordings"),
     ("plot", "matplotlib", "plots"),
     ("smooth", "filterpy", "smoothed tracks"),
-    ("mediapipe", "mediapipe", "MediaPipe's pose network"),
+    ("litert", "ai_edge_litert", "TFLite networks at full speed"),
+    ("movenet", "onnx", "fetching MoveNet"),
 )
 
 
@@ -103,7 +104,7 @@ def _fetched() -> list[Finding]:
         Finding.warning(
             "fetched networks",
             "none, so that there is no network for photographs",
-            "awarenav models fetch robot",
+            "awarenav models fetch real",
         )
     ]
 

@@ -12,7 +12,7 @@ from tracking.config import StrictConfig
 
 from ..errors import AwarenavError, not_one_of
 
-Role = Literal["detector", "pose", "head"]
+Role = Literal["detector", "pose", "face", "head"]
 
 _FILE: Final = Path(__file__).parent / "catalogue.yaml"
 
@@ -37,6 +37,8 @@ class RealModel(StrictConfig):
     #: What it has seen in training.
     training_domain: TrainingDomain = "photographs"
     note: str | None = None
+    #: Of a detector: detections with a lower score are dropped; None for the default.
+    score_threshold: float | None = Field(None, ge=0.0, le=1.0)
 
     @property
     def file(self) -> str:
@@ -117,6 +119,10 @@ class Catalogue(StrictConfig):
     def shipped(cls) -> Catalogue:
         """Read the catalogue of this package."""
         return cls.from_yaml(_FILE)
+
+    def known(self, sha256: str) -> RealModel | None:
+        """Return the network whose file has this SHA-256; None if there is none."""
+        return next((model for model in self.models if model.sha256 == sha256), None)
 
     def __getitem__(self, name: str) -> RealModel:
         """Return the network called ``name``.
