@@ -33,6 +33,7 @@ _EXTRAS: Final = (
     ("plot", "matplotlib", "plots"),
     ("smooth", "filterpy", "smoothed tracks"),
     ("litert", "ai_edge_litert", "TFLite networks at full speed"),
+    ("movenet", "onnx", "fetching MoveNet"),
 )
 
 
