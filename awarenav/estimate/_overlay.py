@@ -258,24 +258,33 @@ def _labelled(person: _Person, camera: Camera, font: Font, picture: Size) -> Lab
         box = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
     return Labelled(
         _inside(box, picture),
-        _inside(_head_px(box, person.keypoints), picture),
+        _inside(_head_px(box, person), picture),
         _label_sizes(person, font),
         None if person.arrow_px is None else _inside(_around(person.arrow_px), picture),
     )
 
 
-def _head_px(box: FloatArray, keypoints: PersonKeypoints | None) -> FloatArray:
-    """Return the box (4,) around a head: around its keypoints, else the top fifth of the person."""
+def _head_px(box: FloatArray, person: _Person) -> FloatArray:
+    """Return the box (4,) around a head: around its keypoints, else the top fifth of the person.
+
+    Keypoints that gave no α may lie elsewhere: then it is around both.
+    """
     height = box[3] - box[1]
-    if keypoints is not None:
-        points = keypoints.keypoints_px[list(_HEAD)][keypoints.scores[list(_HEAD)] >= _SEEN_SCORE]
-        if len(points):
-            around = _around(points)
-            # From ear to ear a head is two thirds of its height; a profile shows less.
-            wide = float((around[2:] - around[:2]).max())
-            margin = max(0.75 * wide, 0.06 * height)
-            return np.asarray(around + np.array([-margin, -margin, margin, margin]))
-    return np.array([box[0], box[1], box[2], box[1] + 0.2 * height])
+    top = np.array([box[0], box[1], box[2], box[1] + 0.2 * height])
+    keypoints = person.keypoints
+    if keypoints is None:
+        return top
+    points = keypoints.keypoints_px[list(_HEAD)][keypoints.scores[list(_HEAD)] >= _SEEN_SCORE]
+    if not len(points):
+        return top
+    around = _around(points)
+    # From ear to ear a head is two thirds of its height; a profile shows less.
+    wide = float((around[2:] - around[:2]).max())
+    margin = max(0.75 * wide, 0.06 * height)
+    around += np.array([-margin, -margin, margin, margin])
+    if person.observation.awareness is None:
+        return _around(np.stack([around[:2], around[2:], top[:2], top[2:]]))
+    return around
 
 
 def _around(points: FloatArray) -> FloatArray:
