@@ -119,9 +119,9 @@ def _around(points: FloatArray) -> FloatArray:
 
 def _inside(box: FloatArray, picture: Size) -> Box:
     """Return the part of a box (4,) in the picture, in whole pixels."""
-    limits = (picture[0], picture[1])
-    left, top = (int(np.clip(math.floor(box[k]), 0, limits[k])) for k in (0, 1))
-    right, bottom = (int(np.clip(math.ceil(box[2 + k]), 0, limits[k])) for k in (0, 1))
+    clipped = np.clip(np.nan_to_num(box), 0.0, (*picture, *picture))
+    left, top = np.floor(clipped[:2]).astype(int).tolist()
+    right, bottom = np.ceil(clipped[2:]).astype(int).tolist()
     return left, top, right, bottom
 
 

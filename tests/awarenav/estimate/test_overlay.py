@@ -203,9 +203,7 @@ def test_any_estimate_can_be_drawn(x_m, z_m, yaw, pitch, alpha, std, box, size):
     image = numbered(3, size)
     camera = Camera.from_fov(*size, 1.0)
     person = standing_at(x_m, z_m + 1.0)
-    keypoints = PersonKeypoints(
-        np.nan_to_num(person.keypoints_px), person.keypoints_root_m, person.scores, "coco"
-    )
+    keypoints = PersonKeypoints(person.keypoints_px, person.keypoints_root_m, person.scores, "coco")
     drawn = draw_overlay(estimate(seen, keypoints=(keypoints,), image=image, camera=camera), CONE)
     assert drawn.shape == image.shape
 
