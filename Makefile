@@ -44,7 +44,6 @@ bench: setup ## measure the speed of crossings and of perception
 docs: setup ## build the documentation site in site/; a link that leads nowhere is an error
 	$(PY) -m mkdocs build
 
-# The extra mediapipe brings another build of OpenCV, so it is not in the lock.
 lock: setup ## pin the newest packages that pyproject.toml allows, for every supported Python
 	@command -v uv >/dev/null || $(PY) -m pip install --quiet uv
 	PATH="$$PATH:$(VENV)/bin" uv pip compile --universal --python-version 3.10 --extra dev \

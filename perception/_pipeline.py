@@ -88,8 +88,8 @@ class AwarenessPipeline:
             then follow each other; a jump in time needs the detector. Each camera needs a
             pipeline of its own (:meth:`for_another_view`): one for two may find nobody.
         eye_estimator: measures the eyes of near people, for instance
-            :class:`~perception.networks.MediaPipeEyeEstimator`; default none, then the gaze is the
-            head's direction.
+            :class:`~perception.networks.faces.FaceMeshEyeEstimator`; default none, then the gaze is
+            the head's direction.
         unusual_size_probability: probability in [0, 0.9] that a person has not the size of an adult
             who stands: a child, somebody bent or seated. 0 where only adults walk and stand: then
             5 % of range are left of unknown stature, which count as noise of each image.

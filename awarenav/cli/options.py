@@ -218,8 +218,7 @@ _NETWORK_OPTIONS: Final = (
         default="shipped",
         metavar="NAME|FILE",
         help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
-        "lists, an ONNX file (RTMPose, RTMW, RTMW3D), or 'mediapipe' (needs the extra "
-        "'mediapipe').",
+        "lists, or a file: ONNX (RTMPose, RTMW, RTMW3D, MoveNet), TFLite (BlazePose).",
     ),
     option(
         "--head",
@@ -232,13 +231,22 @@ _NETWORK_OPTIONS: Final = (
         "network, else 'pnp'.",
     ),
     option(
+        "--face",
+        group=_NETWORKS,
+        excludes="--networks",
+        default="none",
+        metavar="NAME|FILE",
+        help="Network of faces for any pose network: 'face-mesh' (`awarenav models fetch real`), a "
+        "file face_landmarker.task, or 'none'.",
+    ),
+    option(
         "--eyes",
         group=_NETWORKS,
         excludes="--networks",
         default="auto",
-        metavar="auto|mediapipe|none",
-        help="Eyes of people nearer than about 2.5 m: 'mediapipe' (needs the extra 'mediapipe'), "
-        "'none' (the gaze is the head's direction), or 'auto': 'mediapipe' with --pose mediapipe.",
+        metavar="auto|none",
+        help="Eyes of people nearer than about 2.5 m: 'auto' (with --face, by its irises), or "
+        "'none' (the gaze is the head's direction).",
     ),
 )
 

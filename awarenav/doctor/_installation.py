@@ -32,7 +32,7 @@ _EXTRAS: Final = (
     ("rosbag", "rosbags", "recordings"),
     ("plot", "matplotlib", "plots"),
     ("smooth", "filterpy", "smoothed tracks"),
-    ("mediapipe", "mediapipe", "MediaPipe's pose network"),
+    ("litert", "ai_edge_litert", "TFLite networks at full speed"),
 )
 
 

@@ -22,12 +22,15 @@ from perception import (
 )
 from perception.confirmation import KeypointConfirmation
 from perception.networks import (
-    MediaPipeEyeEstimator,
-    MediaPipePoseEstimator,
+    BlazePoseEstimator,
+    EfficientDetPersonDetector,
     OnnxModel,
     OnnxSettings,
+    TfliteModel,
+    is_tflite,
     parse_provider_options,
 )
+from perception.networks.faces import FaceMesh, FaceMeshEyeEstimator, FaceMeshPoseEstimator
 from perception.shipped import (
     DETECTOR,
     HEAD,
@@ -44,14 +47,14 @@ from perception.shipped import (
 from tracking.config import StrictConfig
 
 from ..errors import AwarenavError
-from ..models import ModelStore
+from ..models import ModelStore, RealModel
 from ._estimator import Networks
 
 #: The name of the networks that come with the package.
 SHIPPED: Final = "shipped"
-_MEDIAPIPE: Final = "mediapipe"
+_NONE: Final = "none"
 _WITHOUT_NETWORK: Final = "pnp"
-_EYES: Final = ("auto", _MEDIAPIPE, "none")
+_EYES: Final = ("auto", _NONE)
 # What can be said of a detector of one's own.
 _OWN: Final = ("person_class", "input_size")
 # What the messages of the networks' classes advise, and what the command has for it.
@@ -78,6 +81,7 @@ class NetworkChoice(StrictConfig):
         detector: as :func:`choose_networks` takes it; so are the others.
         pose: pose network.
         head: head pose.
+        face: network of faces.
         eyes: eyes of near people.
         person_class: of the detector.
         input_size: of the detector.
@@ -88,6 +92,7 @@ class NetworkChoice(StrictConfig):
     detector: str = SHIPPED
     pose: str = SHIPPED
     head: str = _HEADS[0]
+    face: str = _NONE
     eyes: str = _EYES[0]
     person_class: int | None = None
     input_size: str | None = None
@@ -125,11 +130,12 @@ def choose_networks(
     detector: str = SHIPPED,
     pose: str = SHIPPED,
     head: str = _HEADS[0],
+    face: str = _NONE,
     eyes: str = _EYES[0],
     person_class: int | None = None,
     input_size: str | None = None,
     *,
-    min_score: float = 0.25,
+    min_score: float | None = None,
     threads: int | None = None,
     provider: str = "cpu",
     provider_options: Sequence[str] = (),
@@ -138,21 +144,23 @@ def choose_networks(
     """Load the networks.
 
     Args:
-        detector: ``"shipped"``, an ONNX file, or the name of a network that
-            ``awarenav models fetch`` has downloaded (this holds for the other two as well).
+        detector: ``"shipped"``, an ONNX or TFLite file, or the name of a network that
+            ``awarenav models fetch`` has downloaded (this holds for the others as well).
             ``rtmdet:FILE``, ``yolox:FILE`` and ``ultralytics:FILE`` say what a file is that does
             not tell it.
-        pose: ``"shipped"``, ``"mediapipe"`` (needs the extra), or an ONNX file.
+        pose: ``"shipped"``, or an ONNX or TFLite file.
         head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
             weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with
             the shipped pose network, else PnP.
-        eyes: ``"mediapipe"`` (needs the extra), ``"none"``, or ``"auto"``: MediaPipe's with
-            its pose network, else none.
+        face: ``"none"``, or a file ``face_landmarker.task`` of MediaPipe: faces of near people, and
+            evidence that there is one.
+        eyes: ``"none"``, or ``"auto"``: from the irises that the network of faces finds.
         person_class: number of the class that counts, for a detector of your own; None for the one
             that it calls "person", else the first.
         input_size: width and height in pixels, as ``"640x480"``, for a detector of your own that
             leaves them free.
-        min_score: people with a lower detection score are dropped.
+        min_score: people with a lower detection score are dropped; None for the detector's own
+            threshold (the catalogue's, else 0.25).
         threads: of each network; None leaves the number to onnxruntime.
         provider: one of :data:`~perception.networks.PROVIDERS`.
         provider_options: its options, as ``KEY=VALUE``.
@@ -164,14 +172,12 @@ def choose_networks(
     """
     if eyes not in _EYES:
         raise AwarenavError(f"--eyes must be {', '.join(map(repr, _EYES))}, got {eyes!r}")
-    if eyes == "auto":
-        eyes = pose if pose == _MEDIAPIPE else "none"
     if head == "auto":
         head = "network" if pose == SHIPPED else _WITHOUT_NETWORK
     settings = OnnxSettings(((provider, parse_provider_options(provider_options)),), threads)
     options: dict[str, Any] = {"detect_every_s": detect_every_s}
     if (detector, pose) == (SHIPPED, SHIPPED):
-        confirmation = KeypointConfirmation(score_threshold=min_score)
+        confirmation = KeypointConfirmation(**_threshold(min_score))
         options["confirmation"] = confirmation
         min_score = confirmation.detector_threshold
     own: dict[str, Any] = {
@@ -182,12 +188,17 @@ def choose_networks(
         detector_used, detector_domain = _detector(detector, min_score, settings, own)
     with _in_words_of_options("--pose"):
         pose_used, pose_domain = _pose(pose, settings)
-    head_used, head_domain = _head(head, settings)
     domains = {"detector": detector_domain, "pose": pose_domain}
+    if face != _NONE:
+        path, entry = _file("--face", face, (_NONE,))
+        mesh = FaceMesh(path, settings=settings, sha256=entry.sha256 if entry else None)
+        pose_used = FaceMeshPoseEstimator(pose_used, mesh)
+        domains["face"] = "photographs"
+        if eyes == "auto":
+            options["eye_estimator"] = FaceMeshEyeEstimator(mesh)
+    head_used, head_domain = _head(head, settings)
     if head != _WITHOUT_NETWORK:
         domains["head"] = head_domain
-    if eyes == _MEDIAPIPE:
-        options["eye_estimator"] = MediaPipeEyeEstimator()
     return Networks(detector_used, pose_used, head_used, options, training_domains=domains)
 
 
@@ -238,28 +249,39 @@ def _height_width(size: str | None) -> tuple[int, int] | None:
 
 
 def _detector(
-    name: str, min_score: float, settings: OnnxSettings, own: dict[str, Any]
+    name: str, min_score: float | None, settings: OnnxSettings, own: dict[str, Any]
 ) -> tuple[PersonDetector | Callable[[Camera], PersonDetector], TrainingDomain | None]:
     if name == SHIPPED:
         if any(value is not None for value in own.values()):
             raise AwarenavError("--person-class and --input-size are for a --detector of your own")
         verify_shipped_model(DETECTOR)  # now, not at the first frame
         return (
-            lambda camera: shipped_detector(settings, camera, score_threshold=min_score),
+            lambda camera: shipped_detector(settings, camera, **_threshold(min_score)),
             shipped_model(DETECTOR).training_domain,
         )
     prefix, colon, file = name.partition(":")
     family = prefix if colon and prefix in _FAMILIES else None
-    model, domain = _onnx_model("--detector", file if family else name, (SHIPPED,), settings)
-    return OnnxPersonDetector(model, score_threshold=min_score, family=family, **own), domain
+    model, entry = _model("--detector", file if family else name, (SHIPPED,), settings)
+    if min_score is None and entry is not None:
+        min_score = entry.score_threshold
+    domain = model.training_domain if entry is None else entry.training_domain
+    if isinstance(model, TfliteModel):
+        return EfficientDetPersonDetector(model, **_threshold(min_score)), domain
+    return OnnxPersonDetector(model, family=family, **_threshold(min_score), **own), domain
+
+
+def _threshold(min_score: float | None) -> dict[str, Any]:
+    """Return the argument of a detector's class; none leaves it to the class."""
+    return {} if min_score is None else {"score_threshold": min_score}
 
 
 def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDomain | None]:
     if name == SHIPPED:
         return shipped_pose_estimator(settings), shipped_model(POSE).training_domain
-    if name == _MEDIAPIPE:
-        return MediaPipePoseEstimator(), "photographs"
-    model, domain = _onnx_model("--pose", name, (SHIPPED, _MEDIAPIPE), settings)
+    model, entry = _model("--pose", name, (SHIPPED,), settings)
+    domain = model.training_domain if entry is None else entry.training_domain
+    if isinstance(model, TfliteModel):
+        return BlazePoseEstimator(model), domain
     return OnnxPoseEstimator(model), domain
 
 
@@ -272,21 +294,35 @@ def _head(name: str, settings: OnnxSettings) -> tuple[HeadPoseEstimator, Trainin
         if name == "network":
             return shipped, domain
         return FusedHeadPoseEstimator(shipped, PnpHeadPoseEstimator()), domain
-    model, own_domain = _onnx_model("--head", name, _HEADS, settings)
+    model, entry = _model("--head", name, _HEADS, settings)
+    own_domain = model.training_domain if entry is None else entry.training_domain
+    if isinstance(model, TfliteModel):
+        raise AwarenavError(f"--head takes an ONNX file, got the TFLite file {name}")
     return OnnxHeadPoseEstimator(model), own_domain
 
 
-def _onnx_model(
+def _model(
     option: str, name: str, names: tuple[str, ...], settings: OnnxSettings
-) -> tuple[OnnxModel, TrainingDomain | None]:
-    """Load an ONNX file, or a network that ``awarenav models fetch`` has downloaded."""
+) -> tuple[OnnxModel | TfliteModel, RealModel | None]:
+    """Load a network from a file, or one that is fetched, and return its entry if it is known.
+
+    The sha256 of a fetched network is checked on the bytes that are loaded.
+    """
+    path, entry = _file(option, name, names)
+    sha256 = None if entry is None else entry.sha256
+    with path.open("rb") as file:
+        tflite = is_tflite(file.read(8))
+    return (TfliteModel if tflite else OnnxModel)(path, settings=settings, sha256=sha256), entry
+
+
+def _file(option: str, name: str, names: tuple[str, ...]) -> tuple[Path, RealModel | None]:
+    """Return the file of a network, and its entry if the catalogue knows it."""
     if Path(name).is_file():
-        model = OnnxModel(name, settings=settings)
-        return model, model.training_domain
+        return Path(name), None
     store = ModelStore()
     if name in {each.name for each in store.catalogue.models}:
-        return store.load(name, settings), store.catalogue[name].training_domain
+        return store.path(name), store.catalogue[name]
     raise AwarenavError(
-        f"{option} must be {', '.join(map(repr, names))}, an ONNX file, or a network that "
+        f"{option} must be {', '.join(map(repr, names))}, a file of a network, or a network that "
         f"'awarenav models list' names; there is no file {name!r}"
     )

@@ -58,7 +58,7 @@ _CAMERA: Final = "Camera"
     "--min-score",
     group=_NETWORKS,
     type=SHARE,
-    default=0.25,
+    show_default="the detector's own, else 0.25",
     metavar="P",
     help="Drop people whose detection score, from 0 to 1, is below this.",
 )

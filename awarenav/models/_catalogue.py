@@ -12,7 +12,7 @@ from tracking.config import StrictConfig
 
 from ..errors import AwarenavError, not_one_of
 
-Role = Literal["detector", "pose", "head"]
+Role = Literal["detector", "pose", "face", "head"]
 
 _FILE: Final = Path(__file__).parent / "catalogue.yaml"
 
@@ -37,6 +37,8 @@ class RealModel(StrictConfig):
     #: What it has seen in training.
     training_domain: TrainingDomain = "photographs"
     note: str | None = None
+    #: Of a detector: detections with a lower score are dropped; None for the default.
+    score_threshold: float | None = Field(None, ge=0.0, le=1.0)
 
     @property
     def file(self) -> str:

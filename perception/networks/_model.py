@@ -114,9 +114,7 @@ class OnnxModel:
     ) -> None:
         self.settings = OnnxSettings() if settings is None else settings
         self._source = path_or_bytes
-        self.path, content = _read(path_or_bytes)
-        if sha256 is not None:
-            self._check_sha256(content, sha256)
+        self.path, content = read_model(path_or_bytes, sha256)
         self._session = self._load(content, sealed=sha256 is not None)
         self.inputs = tuple(_tensor(entry) for entry in self._session.get_inputs())
         self.outputs = tuple(_tensor(entry) for entry in self._session.get_outputs())
@@ -174,7 +172,7 @@ class OnnxModel:
 
     def holds_any(self, words: Iterable[str]) -> bool:
         """Return whether the file holds one of some words, such as a part of a weight's name."""
-        _, content = _read(self._source)
+        _, content = read_model(self._source)
         return any(word.encode() in content for word in words)
 
     def run(self, feeds: Mapping[str, NDArray[Any]], *, timed: bool = True) -> list[NDArray[Any]]:
@@ -202,17 +200,6 @@ class OnnxModel:
             NETWORK_TIME.elapsed_s += perf_counter() - began
             NETWORK_TIME.processor_s += thread_time() - processor_began
         return results
-
-    def _check_sha256(self, content: bytes, wanted: str) -> None:
-        digits = str(wanted).strip().lower()
-        if len(digits) != 64 or set(digits) - set("0123456789abcdef"):
-            raise PerceptionError(f"sha256 must be 64 hexadecimal digits, got {wanted!r}")
-        found = hashlib.sha256(content).hexdigest()
-        if found != digits:
-            raise PerceptionError(
-                f"{self.name} is not the file it should be: its sha256 is {found}, "
-                f"wanted {digits} ({len(content)} bytes)"
-            )
 
     def _load(self, content: bytes, *, sealed: bool) -> Any:
         names = self.settings.provider_names
@@ -282,21 +269,45 @@ def output_shapes(model: OnnxModel, outputs: Sequence[NDArray[Any]]) -> str:
     )
 
 
-def _read(path_or_bytes: Any) -> tuple[Path | None, bytes]:
+def read_model(path_or_bytes: Any, sha256: str | None = None) -> tuple[Path | None, bytes]:
+    """Return path and content of a model, given by its path or its content.
+
+    Args:
+        path_or_bytes: of the model; with bytes the path is None.
+        sha256: expected SHA-256 of the content, 64 hexadecimal digits; None takes any.
+
+    Raises:
+        PerceptionError: for a file that cannot be read, and for another SHA-256.
+    """
     if isinstance(path_or_bytes, (bytes, bytearray, memoryview)):
-        return None, bytes(path_or_bytes)
-    try:
-        path = Path(path_or_bytes)
-    except TypeError:
+        path, content = None, bytes(path_or_bytes)
+    else:
+        try:
+            path = Path(path_or_bytes)
+            content = path.read_bytes()
+        except TypeError:
+            raise PerceptionError(
+                "a model must be a path to a file or its bytes, got "
+                f"{type(path_or_bytes).__name__}: {path_or_bytes!r:.80}"
+            ) from None
+        except (OSError, ValueError) as cause:  # ValueError: a path with a null character
+            reason = getattr(cause, "strerror", None) or cause
+            raise PerceptionError(f"cannot read the model {path}: {reason}") from cause
+    if sha256 is not None:
+        _check_sha256(path or "model given as bytes", content, sha256)
+    return path, content
+
+
+def _check_sha256(name: Any, content: bytes, wanted: str) -> None:
+    digits = str(wanted).strip().lower()
+    if len(digits) != 64 or set(digits) - set("0123456789abcdef"):
+        raise PerceptionError(f"sha256 must be 64 hexadecimal digits, got {wanted!r}")
+    found = hashlib.sha256(content).hexdigest()
+    if found != digits:
         raise PerceptionError(
-            "a model must be a path to an ONNX file or its bytes, got "
-            f"{type(path_or_bytes).__name__}: {path_or_bytes!r:.80}"
-        ) from None
-    try:
-        return path, path.read_bytes()
-    except (OSError, ValueError) as cause:  # ValueError: a path with a null character
-        reason = getattr(cause, "strerror", None) or cause
-        raise PerceptionError(f"cannot read the model {path}: {reason}") from cause
+            f"{name} is not the file it should be: its sha256 is {found}, "
+            f"wanted {digits} ({len(content)} bytes)"
+        )
 
 
 def _tensor(entry: Any) -> OnnxTensor:

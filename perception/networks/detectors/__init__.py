@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 from ._detector import OnnxPersonDetector
+from ._efficientdet import EfficientDetPersonDetector
 from ._letterbox import Letterbox, LetterboxGeometry
 
-__all__ = ["Letterbox", "LetterboxGeometry", "OnnxPersonDetector"]
+__all__ = [
+    "EfficientDetPersonDetector",
+    "Letterbox",
+    "LetterboxGeometry",
+    "OnnxPersonDetector",
+]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from typing import Any, Final
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from ..._stages import DEFAULT_SCORE_THRESHOLD, PersonDetection
 from ...arrays import ImageRgb, finite_number
@@ -16,7 +13,6 @@ from ...errors import PerceptionError
 from .._images import input_batch, input_dtype, input_size, rgb_image, run_on_images
 from .._model import ModelSource, OnnxModel, as_onnx_model
 from .._settings import OnnxSettings
-from ._decoders import Floats
 from ._layouts import (
     DetectorLayout,
     TrialRun,
@@ -25,16 +21,11 @@ from ._layouts import (
     metadata_size,
     recognise,
 )
-from ._letterbox import Letterbox, LetterboxGeometry
+from ._letterbox import Letterbox
+from ._overlaps import detections_of
 
 # RTMDet's exports leave the input size free; its person detector was trained at this size.
 _RTMDET_HW_PX: Final = (320, 320)
-# Most boxes that enter the removal of overlaps; no scene has so many people.
-_MAX_CANDIDATES: Final = 1000
-_MIN_SIDE_PX: Final = 1.0
-# Of two boxes that overlap more than this, only the one with the higher score stays. One person may
-# hide half of another, and both are reported.
-_SAME_PERSON_IOU: Final = 0.5
 
 
 class OnnxPersonDetector:
@@ -117,43 +108,7 @@ class OnnxPersonDetector:
             # Non-finite numbers are dropped below; they need no warning here.
             with np.errstate(all="ignore"):
                 boxes, scores = self._layout.decoder(outputs, self._score_threshold)
-                sizes = boxes[:, 2:] - boxes[:, :2]
-                # One sum shows that all numbers are finite, but for those too large to add.
-                finite = math.isfinite(float(boxes.sum()) + float(scores.sum()))
-        if not len(boxes):
-            return ()
-        if not (finite and sizes.min() > 0.0):
-            good = np.isfinite(boxes).all(axis=1) & np.isfinite(scores) & (sizes > 0.0).all(axis=1)
-            boxes, scores = boxes[good], scores[good]
-        return self._detections(boxes, scores, geometry)
-
-    def _detections(
-        self, boxes: Floats, scores: Floats, geometry: LetterboxGeometry
-    ) -> tuple[PersonDetection, ...]:
-        kept = self._without_overlaps(boxes, scores)
-        if not len(kept):
-            return ()
-        clipped = geometry.to_image(boxes[kept])
-        sides = (clipped[:, 2:] - clipped[:, :2]).min(axis=1)
-        return tuple(
-            PersonDetection(box, min(score, 1.0))
-            for box, score, side in zip(clipped, scores[kept].tolist(), sides.tolist(), strict=True)
-            if side >= _MIN_SIDE_PX
-        )
-
-    def _without_overlaps(self, boxes: Floats, scores: Floats) -> NDArray[np.intp]:
-        """Return the rows that remain after non-maximum suppression, highest score first."""
-        if len(boxes) < 2:
-            return np.arange(len(boxes))
-        corners_and_sizes = np.concatenate([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]], axis=1)
-        kept = cv2.dnn.NMSBoxes(
-            corners_and_sizes.tolist(),
-            scores.tolist(),
-            0.0,  # boxes below the score threshold are already dropped
-            _SAME_PERSON_IOU,
-            top_k=_MAX_CANDIDATES,
-        )
-        return np.asarray(kept, dtype=np.intp).reshape(-1)
+        return detections_of(boxes, scores, geometry)
 
     def _recognise(self, person_class: int | None, family: str | None) -> DetectorLayout:
         height, width = self.input_size_hw_px

@@ -6,16 +6,14 @@ the reading of its outputs, and the lifting of keypoints to a skeleton in metres
 
 from __future__ import annotations
 
+from ._blazepose import BlazePoseEstimator
 from ._crops import PersonCrops
 from ._estimator import OnnxPoseEstimator
 from ._lift import lift_keypoints, metres_per_pixel
-from ._mediapipe import MediaPipePoseEstimator
-from ._mediapipe_eyes import MediaPipeEyeEstimator
 from ._simcc import simcc_peaks
 
 __all__ = [
-    "MediaPipeEyeEstimator",
-    "MediaPipePoseEstimator",
+    "BlazePoseEstimator",
     "OnnxPoseEstimator",
     "PersonCrops",
     "lift_keypoints",

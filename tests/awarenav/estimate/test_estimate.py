@@ -276,7 +276,10 @@ def test_a_fixed_camera_has_its_height_and_pitch(pitch_deg):
         (["{set}", "--camera-pitch-deg", "5"], "needs --camera-height-m"),
         (["{set}", "--camera-height-m", "0"], "must be above 0"),
         (["{set}", "--camera", "absent.yaml"], "absent.yaml"),
-        (["{set}", "--detector", "absent.onnx"], "--detector must be 'shipped', an ONNX file"),
+        (
+            ["{set}", "--detector", "absent.onnx"],
+            "--detector must be 'shipped', a file of a network",
+        ),
         (["{set}", "--topic", "/image"], "--topic is for ROS recordings"),
         (["{set}", "--detector", "{set}/cut.onnx"], "cut.onnx"),
     ],

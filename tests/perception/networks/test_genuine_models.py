@@ -53,7 +53,7 @@ def test_an_independent_decoder_finds_the_same_people(
     if not photographs:
         pytest.skip("needs photographs in the folder of genuine images")
     reference = GenuineDetector(name)
-    monkeypatch.setattr("perception.networks.detectors._detector._SAME_PERSON_IOU", 0.65)
+    monkeypatch.setattr("perception.networks.detectors._overlaps._SAME_PERSON_IOU", 0.65)
     detector = OnnxPersonDetector(path, settings=OnnxSettings(intra_op_threads=1))
     compared = 0
     for photograph in photographs:

@@ -1,0 +1,126 @@
+"""A pose estimator that runs BlazePose (MediaPipe Pose) from a TFLite file.
+
+Contract of ``pose_landmarks_detector.tflite``: input (1, 256, 256, 3) float32 RGB in [0, 1], a
+square about one person; outputs (1, 195), of which 39 points are x, y, z in pixels of the input and
+the logits of visibility and presence; (1, 1), the probability of a person; (1, 117), the same
+points in metres from the mid-hip. The first 33 points are the body's. Masks and heat maps are not
+read.
+
+Source: Bazarevsky et al., "BlazePose: On-device Real-time Body Pose tracking", 2020; MediaPipe,
+``mediapipe/modules/pose_landmark/tensors_to_pose_landmarks_and_segmentation.pbtxt``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from scipy.special import expit
+
+from ..._stages import PersonDetection, PersonKeypoints
+from ...arrays import ImageRgb
+from ...errors import PerceptionError
+from .._images import rgb_image
+from .._settings import OnnxSettings
+from .._tflite import TfliteModel
+from ._crops import PersonCrops
+
+# BlazePose's point of each COCO keypoint.
+_POINTS: Final = (0, 2, 5, 7, 8, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28)
+_COUNT: Final = 39
+_SIDE_PX: Final = 256
+# Extents of the outputs that are read, in the order: points, person, metres.
+_OUTPUTS: Final = (5 * _COUNT, 1, 3 * _COUNT)
+# The square about a person, in sides of their box: the best of 1.0 to 1.8 on labelled photographs.
+_PADDING: Final = 1.4
+#: Smallest probability of a person in a box; MediaPipe's own limit.
+_PERSON: Final = 0.5
+
+
+class BlazePoseEstimator:
+    """Keypoints of detected people by BlazePose; the contract is in the module's text.
+
+    Each person is processed alone and each frame by itself. All scores are 0 for a person whom the
+    network does not find in the box.
+
+    The scores of a head's keypoints stay near 1 on backs of heads, so ``face_evidence`` is False:
+    :class:`~perception.networks.FaceMeshPoseEstimator` adds it.
+
+    Args:
+        path: the TFLite file, its bytes, or a loaded model.
+        settings: threads, for a model that is not loaded yet.
+
+    Raises:
+        PerceptionError: for a file that cannot be loaded, and for another layout.
+    """
+
+    def __init__(self, path: Any, *, settings: OnnxSettings | None = None) -> None:
+        self.model = path if isinstance(path, TfliteModel) else TfliteModel(path, settings=settings)
+        image = self.model.inputs[0]
+        ends = {tensor.shape: tensor.name for tensor in self.model.outputs}
+        self._names = [ends.get((1, extent)) for extent in _OUTPUTS]
+        if (
+            image.shape != (1, _SIDE_PX, _SIDE_PX, 3)
+            or image.dtype != "float32"
+            or None in self._names
+        ):
+            raise PerceptionError(
+                f"{self.model.name} is not a BlazePose network: found {self.model.layout}; known: "
+                f"(1, 256, 256, 3) float32 -> {', '.join(f'(1, {extent})' for extent in _OUTPUTS)}"
+            )
+
+    def __repr__(self) -> str:
+        return f"BlazePoseEstimator({self.model.name}: {self.model.engine})"
+
+    def estimate(
+        self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
+    ) -> tuple[PersonKeypoints, ...]:
+        """Return one set of COCO keypoints per detection, in the same order.
+
+        ``keypoints_root_m`` are in metres from the mid-hip, in the axes of a camera that looks
+        straight at the person.
+
+        Args:
+            image_rgb: (H, W, 3) uint8 of any size.
+            detections: people; box coordinates count from the image's corner.
+
+        Raises:
+            PerceptionError: for an image of another type or shape, and when the network fails.
+        """
+        image = rgb_image(image_rgb)
+        boxes = np.array([each.box_xyxy_px for each in detections]).reshape(-1, 4)
+        crops = PersonCrops(boxes, _SIDE_PX, _SIDE_PX, _PADDING)
+        shown = crops.inside(image)
+        return tuple(
+            self._person(image, crops, row) if shown[row] else _unseen(crops, row)
+            for row in range(len(boxes))
+        )
+
+    def _person(self, image: ImageRgb, crops: PersonCrops, row: int) -> PersonKeypoints:
+        crop = np.empty((_SIDE_PX, _SIDE_PX, 3), np.uint8)
+        crops.cut(image, row, crop)
+        outputs = self.model.run(crop[None].astype(np.float32) / np.float32(255.0))
+        points, person, metres = (outputs[str(name)].ravel() for name in self._names)
+        points = points.reshape(_COUNT, 5)[list(_POINTS)].astype(np.float64)
+        root_m = metres.reshape(_COUNT, 3)[list(_POINTS)].astype(np.float64)
+        # The network counts from the crop's corner, keypoints from the middle of the first pixel.
+        pixels = crops.to_image(points[None, :, :2] - 0.5, np.array([row]))[0]
+        if not (person[0] >= _PERSON and np.isfinite(points).all() and np.isfinite(root_m).all()):
+            return _unseen(crops, row)
+        scores = expit(points[:, 3:].min(axis=1))
+        extent = np.array([image.shape[1], image.shape[0]])
+        scores[((pixels < -0.5) | (pixels > extent - 0.5)).any(axis=1)] = 0.0
+        return PersonKeypoints(pixels, root_m, scores, "coco", face_evidence=False)
+
+
+def _unseen(crops: PersonCrops, row: int) -> PersonKeypoints:
+    """Return keypoints in the middle of a crop, none of which is seen."""
+    count = len(_POINTS)
+    middle = crops.to_image(np.full((1, 1, 2), 0.5 * _SIDE_PX), np.array([row]))[0, 0]
+    return PersonKeypoints(
+        np.tile(middle, (count, 1)),
+        np.zeros((count, 3)),
+        np.zeros(count),
+        "coco",
+        face_evidence=False,
+    )
