@@ -21,6 +21,7 @@ AwarenessReason = Literal[
     "head of another person",
     "no head pose",
     "face too small",
+    "no face found",
     "face cut by the border",
     "no keypoint of the head",
     "head direction unknown",
@@ -51,8 +52,10 @@ _LARGEST_SHARE: Final = 0.7
 # Probability of a face without evidence for or against it.
 _UNKNOWN: Final = 0.5
 # The same if a network that looks for faces found none: on labelled photographs it misses a quarter
-# of the faces that show nose and eyes, and finds none on the backs of heads (0.25 : 1).
+# of the faces that show nose and eyes, and finds none on the backs of heads (0.25 : 1). Of faces
+# with fewer pixels of width it misses more, so that nothing follows.
 _NO_FACE_FOUND: Final = 0.2
+_FACE_TO_FIND_PX: Final = 20.0
 _MIN_SCORE_SCALE: Final = 0.05
 # Generous bound on the shift of a point near the image's border by lens distortion.
 _MAX_DISTORTION_PX: Final = 200.0
@@ -89,11 +92,12 @@ def judge_face(
 
     * Two of nose and eyes are seen, according to ``head.face_seen``, or else to the scores of the
       keypoints (probability 0 at half of ``min_score``, 1 at one and a half). If these scores are
-      no evidence of a face (``face_evidence`` False), the probability is 0.2. Of a skeleton
-      without depth, one of nose and eyes alone counts half: sunglasses, a hand or a cup may cover
-      the others of a face that looks here. A nose or an eye outside the image counts as seen with a
-      probability of at least 0.5: it is cut off, not turned away. If two of them are outside, a
-      lower ``head.face_seen`` also counts as 0.5.
+      no evidence of a face (``face_evidence`` False), the probability is 0.2; below 20 pixels of
+      width there is no evidence then. Of a skeleton without depth, one of nose and eyes alone
+      counts half: sunglasses, a hand or a cup may cover the others of a face that looks here. A
+      nose or an eye outside the image counts as seen with a probability of at least 0.5: it is cut
+      off, not turned away. If two of them are outside, a lower ``head.face_seen`` also counts as
+      0.5.
     * Nose, eyes and ears lie where a head in this pose has them. A root mean square error of more
       than 3.5 standard deviations of the noise together with 5 % of the face's width (the head's
       own shape), or of more than 15 % of the width, lowers the probability.
@@ -118,8 +122,8 @@ def judge_face(
     """
     depth = max(float(head.position_camera_m[2]), 0.05)
     width_px = HEAD_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
-    if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
-        return "face too small"
+    if reason := _too_small(person, head, width_px):
+        return reason
     if head.face_seen is None and _is_cut(camera, person, width_px, min_score):
         return "face cut by the border"
     if _is_too_large(person, width_px, min_score):
@@ -149,6 +153,15 @@ def judge_face(
         return "head direction unknown"
     extra = _WEAK_FACE_STD_RAD * (_WEAK_FACE_PX / width_px) ** _SIZE_POWER
     return FaceEvidence(seen, width_px, extra, known)
+
+
+def _too_small(person: PersonKeypoints, head: HeadPose, width_px: float) -> AwarenessReason | None:
+    """Return why a face of this width (px) is too small to be judged; None if it is not."""
+    if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
+        return "face too small"
+    if head.face_seen is None and not person.face_evidence and width_px < _FACE_TO_FIND_PX:
+        return "no face found"
+    return None
 
 
 def _is_too_large(person: PersonKeypoints, width_px: float, min_score: float) -> bool:

@@ -35,6 +35,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(skip)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _no_fetched_networks(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Let no test depend on the networks that its user has fetched."""
+    os.environ["AWARENAV_MODELS"] = str(tmp_path_factory.mktemp("models"))
+
+
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
     """Return a browser that all tests of a session share; without one they are skipped."""

@@ -152,7 +152,8 @@ def _files(
 
 def _networks(options: Any) -> tuple[Networks, tuple[str, ...]]:
     """Return the networks, and the roles of those that have seen renders only."""
-    choice = NetworkChoice.of_options(options)
+    # Without a camera they see nothing.
+    choice = NetworkChoice.of_options(options, rendered=options.no_camera, log=_log)
     networks = choose_networks(**choice.model_dump(), **running_options(options))
     if options.no_camera:
         return networks, ()

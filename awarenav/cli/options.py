@@ -178,19 +178,20 @@ def as_json(what: str = "the table") -> Decorator:
 
 
 _NETWORKS: Final = "Networks"
+_BY_PICTURES: Final = "of the set 'real' once fetched; for renders 'shipped'"
 _NETWORK_OPTIONS: Final = (
     option(
         "--networks",
         group=_NETWORKS,
         type=FilePath(),
         metavar="FILE",
-        help="Detector, pose and head from a file, as `awarenav models fetch robot` writes it.",
+        help="Detector, pose and head from a file, as `awarenav models fetch` writes it.",
     ),
     option(
         "--detector",
         group=_NETWORKS,
         excludes="--networks",
-        default="shipped",
+        show_default=_BY_PICTURES,
         metavar="NAME|FILE",
         help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
         "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet). yolox:FILE, "
@@ -215,7 +216,7 @@ _NETWORK_OPTIONS: Final = (
         "--pose",
         group=_NETWORKS,
         excludes="--networks",
-        default="shipped",
+        show_default=_BY_PICTURES,
         metavar="NAME|FILE",
         help="Pose network: 'shipped' (made for the simulator), a network that `awarenav models` "
         "lists, or a file: ONNX (RTMPose, RTMW, RTMW3D, MoveNet), TFLite (BlazePose).",
@@ -224,7 +225,7 @@ _NETWORK_OPTIONS: Final = (
         "--head",
         group=_NETWORKS,
         excludes="--networks",
-        default="auto",
+        show_default="as the set says, else auto",
         metavar="NAME|FILE",
         help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
         "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
@@ -234,7 +235,7 @@ _NETWORK_OPTIONS: Final = (
         "--face",
         group=_NETWORKS,
         excludes="--networks",
-        default="none",
+        show_default="of the set 'real' once fetched, else 'none'",
         metavar="NAME|FILE",
         help="Network of faces for any pose network: 'face-mesh' (`awarenav models fetch real`), a "
         "file face_landmarker.task, or 'none'.",
@@ -243,7 +244,7 @@ _NETWORK_OPTIONS: Final = (
         "--eyes",
         group=_NETWORKS,
         excludes="--networks",
-        default="auto",
+        show_default="as the set says, else auto",
         metavar="auto|none",
         help="Eyes of people nearer than about 2.5 m: 'auto' (with --face, by its irises), or "
         "'none' (the gaze is the head's direction).",

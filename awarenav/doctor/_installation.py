@@ -33,6 +33,7 @@ _EXTRAS: Final = (
     ("plot", "matplotlib", "plots"),
     ("smooth", "filterpy", "smoothed tracks"),
     ("litert", "ai_edge_litert", "TFLite networks at full speed"),
+    ("movenet", "onnx", "fetching MoveNet"),
 )
 
 
@@ -103,7 +104,7 @@ def _fetched() -> list[Finding]:
         Finding.warning(
             "fetched networks",
             "none, so that there is no network for photographs",
-            "awarenav models fetch robot",
+            "awarenav models fetch real",
         )
     ]
 

@@ -29,6 +29,7 @@ from ..estimate import (
     choose_networks,
     is_recording,
     open_source,
+    running_options,
 )
 from ..files import json_text
 from ._findings import Finding, Severity, by_importance, findings_text
@@ -52,7 +53,7 @@ _UNKNOWN: Final[AwarenessReason] = "head direction unknown"
 _UNKNOWN_SHARE: Final = 0.2
 # A principal point farther from the middle, as a share of the width, is unusual.
 _OFF_CENTRE: Final = 0.1
-_REMEDY_NETWORKS: Final = "awarenav models fetch robot, then --networks robot_networks.yaml"
+_REMEDY_NETWORKS: Final = "awarenav models fetch real"
 
 
 @dataclass(slots=True)
@@ -109,14 +110,14 @@ def _source_findings(options: Any) -> list[Finding]:
 
 def _image_findings(options: Any) -> list[Finding]:
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
-        choice = NetworkChoice.of_options(options)
-        networks = choose_networks(**choice.model_dump())
+        choice = NetworkChoice.of_options(options, rendered=source.rendered)
+        networks = choose_networks(**choice.model_dump(), **running_options(options))
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)
         estimator = PeopleEstimator(networks, cameras, unfit=unfit)
         seen = _examine(source, estimator, options.frames)
         findings = [
-            _domain_finding(unfit, networks.training_domains, rendered=source.rendered),
+            _domain_finding(unfit, networks.training_domains, choice, rendered=source.rendered),
             *(Finding.error("images", note) for note in source.notes),
         ]
         if seen.problems:
@@ -129,7 +130,7 @@ def _image_findings(options: Any) -> list[Finding]:
             _calibration_finding(seen.best.camera if cameras.calibrated else None, options, source),
             *_rate_findings(source, seen),
             *picture_findings(seen.figures),
-            _resolution_finding(seen.best.camera),
+            _resolution_finding(seen.best.camera, choice),
             *_people_findings(seen),
         ]
         if str(options.out) != "none":
@@ -179,18 +180,28 @@ def _chosen(source: ImageSource, most: int) -> Iterator[SourceFrame]:
 
 
 def _domain_finding(
-    unfit: tuple[str, ...], domains: Mapping[str, str | None], *, rendered: bool
+    unfit: tuple[str, ...],
+    domains: Mapping[str, str | None],
+    choice: NetworkChoice,
+    *,
+    rendered: bool,
 ) -> Finding:
     if unfit:
         text = simulator_networks_warning(unfit)
         return Finding.error("networks", text, _REMEDY_NETWORKS)
-    told = ", ".join(f"{role} {domain or 'not known'}" for role, domain in domains.items())
+    known = {
+        role: f" ({model.name}, {model.publisher})" for role, model in choice.catalogued().items()
+    }
+    told = ", ".join(
+        f"{role} {domain or 'not known'}{known.get(role, '')}" for role, domain in domains.items()
+    )
     kind = "renders" if rendered else "pictures that no renderer of this package made"
     if None in domains.values():
         return Finding.warning(
             "networks",
             f"trained on: {told}; the images are {kind}",
-            "a network says it under 'training_domain' in its metadata",
+            "a network that `awarenav models list` names is known by its checksum; another says it "
+            "under 'training_domain' in its metadata",
         )
     return Finding.fine("networks", f"trained on: {told}; the images are {kind}")
 
@@ -253,14 +264,15 @@ def _rate_finding(rate_hz: float, words: str) -> Finding:
         return Finding.warning(
             "frame rate",
             f"{text}; the method's paper has {_WANTED_HZ:g}",
-            "smaller networks (rtmdet-nano, rtmpose-s), or a GPU (--provider of estimate)",
+            "--detect-every-s 0.15, smaller networks, or a GPU (--provider)",
         )
     return Finding.fine("frame rate", text)
 
 
-def _resolution_finding(camera: Camera) -> Finding:
+def _resolution_finding(camera: Camera, choice: NetworkChoice) -> Finding:
     range_m = camera.fx_px * _FACE_M / _FACE_PX
-    text = f"faces have {_FACE_PX:g} pixels up to {range_m:.1f} m, and less beyond"
+    beyond = "α is less certain" if choice.face == "none" else "only keypoints give an α"
+    text = f"faces have {_FACE_PX:g} pixels up to {range_m:.1f} m; beyond, {beyond}"
     if range_m < _FACE_RANGE_M:
         remedy = "a larger picture, or a narrower lens: awareness is uncertain beyond"
         return Finding.warning("resolution", text, remedy)

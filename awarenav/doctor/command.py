@@ -41,6 +41,7 @@ _CAMERA: Final = "Camera"
 @option("--frames", type=POSITIVE, default=20, metavar="N", help="Number of images to look at.")
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
 @options.networks
+@options.running
 @option(
     "--camera",
     group=_CAMERA,

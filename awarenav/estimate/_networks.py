@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -55,8 +56,8 @@ SHIPPED: Final = "shipped"
 _NONE: Final = "none"
 _WITHOUT_NETWORK: Final = "pnp"
 _EYES: Final = ("auto", _NONE)
-# What can be said of a detector of one's own.
-_OWN: Final = ("person_class", "input_size")
+# Set of networks that photographs get where no option says otherwise.
+_DEFAULT_SET: Final = "real"
 # What the messages of the networks' classes advise, and what the command has for it.
 _WORDS: Final = {
     "--detector": {
@@ -98,22 +99,61 @@ class NetworkChoice(StrictConfig):
     input_size: str | None = None
 
     @classmethod
-    def of_options(cls, options: Any) -> NetworkChoice:
+    def of_options(
+        cls, options: Any, *, rendered: bool, log: Callable[[str], None] | None = None
+    ) -> NetworkChoice:
         """Return the choice of a command's options: that of the file, else of the other ones.
 
-        What an option says of a detector of one's own completes the file.
+        An option that is not given leaves the value of the file. Without a file it leaves that of
+        the set ``real``, if that has been fetched and the pictures are no renders; else the shipped
+        network.
 
         Args:
-            options: with ``networks``, a path or None, and an attribute for each name here.
+            options: with ``networks``, a path or None, and an attribute for each name here; None
+                for an option that is not given.
+            rendered: the pictures are renders of this package.
+            log: gets one message if the set ``real`` is used.
 
         Raises:
             AwarenavError: for a file that cannot be read.
         """
-        given = {name: getattr(options, name) for name in cls.model_fields}
-        if options.networks is None:
+        values = {name: getattr(options, name, None) for name in cls.model_fields}
+        given = {name: value for name, value in values.items() if value is not None}
+        if options.networks is not None:
+            return cls.from_yaml(options.networks).model_copy(update=given)
+        # Whoever allows networks of renders has asked for them.
+        shipped = rendered or getattr(options, "allow_simulator_networks", False)
+        fetched = None if shipped else cls._fetched()
+        if fetched is None:
             return cls(**given)
-        own = {name: given[name] for name in _OWN if given[name] is not None}
-        return cls.from_yaml(options.networks).model_copy(update=own)
+        chosen = fetched.model_copy(update=given)
+        if log is not None:
+            used = chosen.model_dump(exclude_none=True).items()
+            named = ", ".join(f"{role} {name}" for role, name in used if name not in _EYES)
+            log(f"networks of the fetched set {_DEFAULT_SET}: {named}")
+        return chosen
+
+    @classmethod
+    def _fetched(cls) -> NetworkChoice | None:
+        """Return the default set for photographs; None unless it has been fetched completely."""
+        store = ModelStore()
+        known = {each.name for each in store.catalogue.models}
+        for each in store.catalogue.sets:
+            if each.name == _DEFAULT_SET:
+                named = each.model_dump(include=set(cls.model_fields), exclude_none=True)
+                chosen = cls(**named)
+                wanted = known.intersection(map(str, named.values()))
+                return chosen if all(map(store.is_fetched, wanted)) else None
+        return None
+
+    def catalogued(self) -> dict[str, RealModel]:
+        """Return what the catalogue says of the networks, by their roles.
+
+        A file is known by its SHA-256. A network that is not in the catalogue is left out.
+        """
+        named = self.model_dump(exclude_none=True)
+        found = {role: _catalogued(str(name)) for role, name in named.items()}
+        return {role: model for role, model in found.items() if model is not None}
 
 
 def running_options(options: Any) -> dict[str, Any]:
@@ -216,8 +256,8 @@ def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tupl
     roles = () if rendered else simulator_networks(networks.training_domains)
     if roles and not allowed:
         raise AwarenavError(
-            f"{simulator_networks_warning(roles)}: `awarenav models fetch robot` brings others "
-            "for --networks robot_networks.yaml (or add --allow-simulator-networks)"
+            f"{simulator_networks_warning(roles)}: `awarenav models fetch {_DEFAULT_SET}` brings "
+            "others, which are used from then on (or add --allow-simulator-networks)"
         )
     return roles
 
@@ -318,7 +358,7 @@ def _model(
 def _file(option: str, name: str, names: tuple[str, ...]) -> tuple[Path, RealModel | None]:
     """Return the file of a network, and its entry if the catalogue knows it."""
     if Path(name).is_file():
-        return Path(name), None
+        return Path(name), _catalogued(name)
     store = ModelStore()
     if name in {each.name for each in store.catalogue.models}:
         return store.path(name), store.catalogue[name]
@@ -326,3 +366,13 @@ def _file(option: str, name: str, names: tuple[str, ...]) -> tuple[Path, RealMod
         f"{option} must be {', '.join(map(repr, names))}, a file of a network, or a network that "
         f"'awarenav models list' names; there is no file {name!r}"
     )
+
+
+def _catalogued(name: str) -> RealModel | None:
+    """Return the catalogue's entry of a network: of its name, else of the file's SHA-256."""
+    catalogue = ModelStore().catalogue
+    prefix, colon, rest = name.partition(":")
+    path = Path(rest if colon and prefix in _FAMILIES else name)
+    if path.is_file():
+        return catalogue.known(hashlib.sha256(path.read_bytes()).hexdigest())
+    return next((each for each in catalogue.models if each.name == str(path)), None)

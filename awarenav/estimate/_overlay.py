@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,7 @@ from ..drawing import (
 from ..errors import AwarenavError, MissingExtraError
 from ..files import atomic_path
 from ._estimator import FrameEstimate
+from ._labels import Box, Labelled, Place, Size, leader, meet, place_labels
 from ._pictures import IMAGE_SUFFIXES
 
 if TYPE_CHECKING:
@@ -63,20 +65,27 @@ _FACE: Final = (
 )
 # Keypoints with a lower score are not drawn.
 _SEEN_SCORE: Final = 0.3
-_CONE_LENGTH_M: Final = 0.24
+# Lines and letters are made for a picture of this size, and grow with larger ones.
+_UNIT_PX2: Final = 640.0 * 480.0
+# Lengths of the cone and of the arrow along its axis.
+_CONE_LENGTH_M: Final = 0.14
+_ARROW_LENGTH_M: Final = 0.34
 _RIM_ANGLES: Final = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
 
-# Left, top, right, bottom in pixels.
-_Box = tuple[int, int, int, int]
+_HEAD: Final = range(kp.NOSE, kp.RIGHT_EAR + 1)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Person:
-    """A person to draw, and what is known of them."""
+    """A person to draw, and what is known of them.
+
+    ``arrow_px`` (2, 2) is the gaze, from the head on; None until it is drawn.
+    """
 
     observation: PersonObservation
     keypoints: PersonKeypoints | None
     track: PersonTrack | None
+    arrow_px: FloatArray | None = None
 
 
 def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
@@ -95,7 +104,8 @@ def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
     """
     assert estimate.frame.image_rgb is not None
     image: ImageRgb = estimate.frame.image_rgb.copy()
-    unit = max(image.shape[0] / 480.0, 0.5)
+    picture = image.shape[1], image.shape[0]
+    unit = max(math.sqrt(picture[0] * picture[1] / _UNIT_PX2), 0.5)
     tracks = {track.id: track for track in estimate.tracks or ()}
     people = [
         _Person(observation, keypoints, None if track_id is None else tracks.get(track_id))
@@ -111,11 +121,16 @@ def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
         if person.keypoints is not None:
             _draw_skeleton(image, person.keypoints, unit)
         _draw_box(image, person.observation, unit)
-    font = Font(round(18 * unit))
-    labels: list[_Box] = []
-    for person in reversed(people):
-        labels.append(_draw_label(image, person, font, labels, estimate.camera))
-    _draw_caption(image, estimate, font)
+    font, near_first = Font(round(18 * unit)), people[::-1]
+    labelled = [_labelled(person, estimate.camera, font, picture) for person in near_first]
+    caption = _draw_caption(image, estimate, font, [each.head for each in labelled])
+    places = place_labels(labelled, picture, [caption])
+    for person, place, own in zip(near_first, places, labelled, strict=True):
+        if place is not None:
+            ends = leader(place.box, own.head)
+            if math.dist(*ends) > font.height_px:
+                draw_line(image, ends, awareness_colour(person.observation.awareness), 1)
+            _draw_label(image, person, place, font)
     return image
 
 
@@ -133,13 +148,17 @@ def _draw_gaze(
     rim = camera.project(np.vstack([apex, apex + length * _cone_rim(gaze, cone.half_angle_rad)]))
     if drawable(rim):
         # The cone of a gaze away from the camera lies behind the body: it is drawn fainter.
-        fill_hull(image, rim, colour, 0.26 if gaze[2] < 0.0 else 0.13)
+        fill_hull(image, rim, colour, 0.16 if gaze[2] < 0.0 else 0.08)
         draw_line(image, np.vstack([rim[1:], rim[1:2]]), colour, 1)
-    ray = camera.project(np.stack([apex, apex + 1.4 * length * gaze]))
+    arrow = min(_ARROW_LENGTH_M, 0.7 * float(apex[2]))
+    ray = camera.project(np.stack([apex, apex + arrow * gaze]))
     if drawable(ray):
-        draw_line(image, ray, DARK, round(4 * unit))
-        draw_line(image, ray, colour, max(round(2 * unit), 1))
+        for line in (ray, _barbs(ray, unit)):
+            draw_line(image, line, DARK, round(4 * unit))
+        for line in (ray, _barbs(ray, unit)):
+            draw_line(image, line, colour, max(round(2 * unit), 1))
         draw_disc(image, ray[0], 3.0 * unit, colour)
+        person.arrow_px = ray
 
 
 def _cone_rim(gaze: FloatArray, half_angle_rad: float) -> FloatArray:
@@ -150,12 +169,21 @@ def _cone_rim(gaze: FloatArray, half_angle_rad: float) -> FloatArray:
     return np.asarray(gaze + math.tan(half_angle_rad) * ring)
 
 
+def _barbs(ray_px: FloatArray, unit: float) -> FloatArray:
+    """Return the head (3, 2) of an arrow; an arrow that points at the camera has a small one."""
+    along = ray_px[1] - ray_px[0]
+    length = max(float(np.hypot(*along)), 1e-6)
+    back = -along / length * min(7.0 * unit, 0.5 * length)
+    side = 0.6 * np.array([-back[1], back[0]])
+    return np.stack([ray_px[1] + back + side, ray_px[1], ray_px[1] + back - side])
+
+
 def _head_position(camera: Camera, person: _Person) -> FloatArray | None:
     """Return the cone's apex (3,): the head's keypoints, else the top of the box, at body depth."""
     keypoints, box = person.keypoints, person.observation.box_xyxy_px
     pixel = None
     if keypoints is not None:
-        head = list(range(kp.NOSE, kp.RIGHT_EAR + 1))
+        head = list(_HEAD)
         weight = np.where(keypoints.scores[head] >= _SEEN_SCORE, keypoints.scores[head], 0.0)
         if weight.sum() > 0.0:
             pixel = weight @ keypoints.keypoints_px[head] / weight.sum()
@@ -208,52 +236,97 @@ def _draw_box(image: ImageRgb, observation: PersonObservation, unit: float) -> N
         draw_line(image, corner, colour, max(round(2 * unit), 1))
 
 
-def _draw_label(
-    image: ImageRgb,
-    person: _Person,
-    font: Font,
-    labels: list[_Box],
-    camera: Camera,
-) -> _Box:
-    """Draw distance, α and a bar over a person's head, beside earlier labels; return the label."""
+def _texts(person: _Person) -> tuple[tuple[str, ...], ...]:
+    """Return the rows of a person's label, the smallest label first."""
     observation, track = person.observation, person.track
     alpha, spread = observation.awareness, observation.awareness_std
+    name = "" if track is None else f"#{track.id} "
     distance = f"{np.linalg.norm(observation.position_camera_m):.1f} m"
-    first = distance if track is None else f"#{track.id} · {distance}"
-    second = "no evidence" if alpha is None else f"α {alpha:.2f} ± {spread:.2f}"
-    gap = max(font.height_px // 4, 3)
-    bar_height = max(font.height_px // 3, 4)
-    width = max(font.width_px(first), font.width_px(second), 4 * font.height_px) + 2 * gap
-    height = 2 * font.height_px + bar_height + 3 * gap
-    anchor = observation.box_xyxy_px
-    if anchor is None:
-        u, v = camera.project(observation.position_camera_m[None])[0].tolist()
-        anchor = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
-    left = round(float(np.clip(0.5 * (anchor[0] + anchor[2] - width), 0, image.shape[1] - width)))
-    top = round(float(np.clip(anchor[1] - height - gap, 0, image.shape[0] - height)))
-    for other in sorted(labels):
-        if (
-            left < other[2]
-            and other[0] < left + width
-            and top < other[3]
-            and other[1] < top + height
-        ):
-            top = other[3] + 2 if other[3] + 2 + height <= image.shape[0] else other[1] - height - 2
-    label = (left, top, left + width, top + height)
-    darken_box(image, label)
-    colour = awareness_colour(alpha)
-    draw_line(image, [(left, top), (left, top + height - 1)], colour, max(gap // 2, 2))
-    row = top + gap // 2
-    font.write(image, first, (left + gap, row), WHITE)
-    font.write(image, second, (left + gap, row + font.height_px), WHITE)
-    bar_top = row + 2 * font.height_px + gap // 2
-    bar = (left + gap, bar_top, left + width - gap, bar_top + bar_height)
-    _draw_bar(image, bar, observation, track)
-    return label
+    distance = distance if track is None else f"#{track.id} · {distance}"
+    if alpha is None:
+        why = observation.awareness_reason or "no evidence"
+        return (f"{name}no α",), (f"{name}{why}",), (distance, f"no α: {why}")
+    value = f"α {alpha:.2f}"
+    return (f"{name}{value}",), (distance, f"{value} ± {spread:.2f}")
+
+
+def _labelled(person: _Person, camera: Camera, font: Font, picture: Size) -> Labelled:
+    """Return where a person and their head are, and how large their label is."""
+    box = person.observation.box_xyxy_px
+    if box is None:
+        u, v = camera.project(person.observation.position_camera_m[None])[0].tolist()
+        box = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
+    return Labelled(
+        _inside(box, picture),
+        _inside(_head_px(box, person.keypoints), picture),
+        _label_sizes(person, font),
+        None if person.arrow_px is None else _inside(_around(person.arrow_px), picture),
+    )
+
+
+def _head_px(box: FloatArray, keypoints: PersonKeypoints | None) -> FloatArray:
+    """Return the box (4,) around a head: around its keypoints, else the top fifth of the person."""
+    height = box[3] - box[1]
+    if keypoints is not None:
+        points = keypoints.keypoints_px[list(_HEAD)][keypoints.scores[list(_HEAD)] >= _SEEN_SCORE]
+        if len(points):
+            around = _around(points)
+            # From ear to ear a head is two thirds of its height; a profile shows less.
+            wide = float((around[2:] - around[:2]).max())
+            margin = max(0.75 * wide, 0.06 * height)
+            return np.asarray(around + np.array([-margin, -margin, margin, margin]))
+    return np.array([box[0], box[1], box[2], box[1] + 0.2 * height])
+
+
+def _around(points: FloatArray) -> FloatArray:
+    return np.concatenate([points.min(axis=0), points.max(axis=0)])
+
+
+def _inside(box: FloatArray, picture: Size) -> Box:
+    """Return the part of a box (4,) in the picture, in whole pixels."""
+    limits = (picture[0], picture[1])
+    left, top = (int(np.clip(math.floor(box[k]), 0, limits[k])) for k in (0, 1))
+    right, bottom = (int(np.clip(math.ceil(box[2 + k]), 0, limits[k])) for k in (0, 1))
+    return left, top, right, bottom
+
+
+def _label_sizes(person: _Person, font: Font) -> tuple[Size, ...]:
+    """Return the sizes of a person's labels, the smallest first."""
+    gap, sizes = _label_gap(font), []
+    for rows in _texts(person):
+        width = max(font.width_px(row) for row in rows) + 2 * gap
+        height = len(rows) * font.height_px + gap
+        sizes.append((width, height + _bar_height(person, rows, font)))
+    return tuple(sizes)
+
+
+def _label_gap(font: Font) -> int:
+    return max(font.height_px // 4, 3)
+
+
+def _bar_height(person: _Person, rows: Sequence[str], font: Font) -> int:
+    """Return the height of the bar with its margin: a whole label with an α has one."""
+    has_bar = len(rows) > 1 and person.observation.awareness is not None
+    return 2 * _label_gap(font) if has_bar else 0
+
+
+def _draw_label(image: ImageRgb, person: _Person, place: Place, font: Font) -> None:
+    """Draw α, why there is none, or all: the distance and a bar as well."""
+    left, top, right, bottom = place.box
+    gap, rows = _label_gap(font), _texts(person)[place.size]
+    darken_box(image, place.box)
+    colour = awareness_colour(person.observation.awareness)
+    _fill_box(image, (left, top, left + max(gap // 2, 2), bottom), colour)
+    for number, row in enumerate(rows):
+        corner = left + gap, top + gap // 2 + number * font.height_px
+        font.write(image, row, corner, WHITE)
+    if _bar_height(person, rows, font):
+        bar = (left + gap, bottom - 2 * gap, right - gap, bottom - gap)
+        _draw_bar(image, bar, person.observation, person.track)
 
 
 def _draw_bar(
-    image: ImageRgb, bar: _Box, observation: PersonObservation, track: PersonTrack | None
+    image: ImageRgb, bar: Box, observation: PersonObservation, track: PersonTrack | None
 ) -> None:
     """Draw α, its standard deviation and the lower bound on a scale from 0 to 1."""
     left, top, right, bottom = bar
@@ -277,22 +350,30 @@ def _draw_bar(
         _fill_box(image, (mark, top - 2, mark + 2, bottom + 2), WHITE)
 
 
-def _fill_box(image: ImageRgb, box: _Box, colour: Colour) -> None:
+def _fill_box(image: ImageRgb, box: Box, colour: Colour) -> None:
     left, top, right, bottom = box
     image[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] = colour
 
 
-def _draw_caption(image: ImageRgb, estimate: FrameEstimate, font: Font) -> None:
-    """Write stamp, number of people and unfit networks into the lower left corner."""
+def _draw_caption(
+    image: ImageRgb, estimate: FrameEstimate, font: Font, heads: Sequence[Box]
+) -> Box:
+    """Write stamp, number of people and unfit networks into a corner without heads; return it."""
     count = len(estimate.observations)
     people = "nobody" if not count else "1 person" if count == 1 else f"{count} people"
     text = f"{estimate.frame.stamp_s:.2f} s · {people}"
     if estimate.unfit:
         text += " · made for renders, do not trust"
     gap = font.height_px // 3
-    top = image.shape[0] - font.height_px - gap
-    darken_box(image, (0, top - gap // 2, font.width_px(text) + 3 * gap, image.shape[0]), 0.55)
-    font.write(image, text, (gap, top), WHITE)
+    width, height = font.width_px(text) + 3 * gap, font.height_px + gap
+    right, bottom = image.shape[1] - width, image.shape[0] - height
+    corners = [(0, bottom), (0, 0), (right, 0), (right, bottom)]
+    boxes = [(left, top, left + width, top + height) for left, top in corners]
+    free = (box for box in boxes if not any(meet(box, head) for head in heads))
+    box = next(free, boxes[0])
+    darken_box(image, box, 0.55)
+    font.write(image, text, (box[0] + gap, box[1] + gap // 2), WHITE)
+    return box
 
 
 class OverlayWriter(AbstractContextManager["OverlayWriter"]):

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from tqdm import tqdm
 
-from perception import AttentionCone
+from perception import AttentionCone, PersonObservation
 from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError, counted
@@ -112,22 +112,29 @@ class _Summary:
     Attributes:
         frames: number of frames that were estimated.
         people: number of observations in them.
-        without_evidence: number of these observations without an α.
+        without_evidence: number of these observations without an α, by the reason.
         no_view: number of frames that show nothing, by the reason.
         problems: of frames that could not be read or estimated.
+        last: the latest estimate.
     """
 
     frames: int = 0
     people: int = 0
-    without_evidence: int = 0
+    without_evidence: Counter[str] = field(default_factory=Counter)
     no_view: Counter[str] = field(default_factory=Counter)
     problems: list[str] = field(default_factory=list)
+    last: FrameEstimate | None = None
 
     def add(self, estimate: FrameEstimate) -> None:
         """Count an estimated frame."""
         self.frames += 1
         self.people += len(estimate.observations)
-        self.without_evidence += sum(each.awareness is None for each in estimate.observations)
+        self.without_evidence.update(
+            each.awareness_reason or "no reason given"
+            for each in estimate.observations
+            if each.awareness is None
+        )
+        self.last = estimate
         if estimate.no_view is not None:
             self.no_view[estimate.no_view] += 1
 
@@ -205,7 +212,7 @@ def _estimator(
         _log("the images are rectified: P of the calibration counts, without distortion")
     for note in source.notes:
         _log(note)
-    choice = NetworkChoice.of_options(options)
+    choice = NetworkChoice.of_options(options, rendered=source.rendered, log=_log)
     if networks is None:
         networks = choose_networks(
             **choice.model_dump(), min_score=options.min_score, **running_options(options)
@@ -284,13 +291,31 @@ def _report(options: Any, summary: _Summary, duration_s: float) -> None:
     drawn = "" if options.overlay == "none" else f", drawn into {options.overlay}"
     print(
         f"Written to {options.out}{drawn}: {counted(summary.frames, 'frame')} ({rate_hz:.1f} per "
-        f"second), {counted(summary.people, 'observation')} of people, {summary.without_evidence} "
-        "of them without evidence of awareness"
+        f"second), {counted(summary.people, 'observation')} of people, "
+        f"{_without_evidence(summary.without_evidence)}"
     )
+    if summary.last is not None and summary.frames == 1:
+        for person in summary.last.observations:
+            print(f"  {_in_words(person)}")
     for reason, count in summary.no_view.items():
         _log(f"no view in {count} of {counted(summary.frames, 'frame')}: {reason}")
     if summary.problems:
         _log(f"{counted(len(summary.problems), 'frame')} could not be read or estimated")
+
+
+def _without_evidence(reasons: Counter[str]) -> str:
+    named = ", ".join(f"{reason}: {count}" for reason, count in reasons.most_common())
+    text = f"{reasons.total()} of them without evidence of awareness"
+    return f"{text} ({named})" if named else text
+
+
+def _in_words(person: PersonObservation) -> str:
+    """Return where a person is, and α or why there is none."""
+    x_m, _, z_m = person.position_camera_m.tolist()
+    where = f"{z_m:.1f} m ahead, {abs(x_m):.1f} m to the {'left' if x_m < 0.0 else 'right'}"
+    if person.awareness is None:
+        return f"{where}: no α, which is not aware ({person.awareness_reason or 'no evidence'})"
+    return f"{where}: α {person.awareness:.2f} ± {person.awareness_std:.2f}"
 
 
 def _log(text: str) -> None:

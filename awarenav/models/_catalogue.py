@@ -120,6 +120,10 @@ class Catalogue(StrictConfig):
         """Read the catalogue of this package."""
         return cls.from_yaml(_FILE)
 
+    def known(self, sha256: str) -> RealModel | None:
+        """Return the network whose file has this SHA-256; None if there is none."""
+        return next((model for model in self.models if model.sha256 == sha256), None)
+
     def __getitem__(self, name: str) -> RealModel:
         """Return the network called ``name``.
 

@@ -136,10 +136,14 @@ def test_a_tilt_about_the_gaze_is_no_uncertainty_of_the_direction(yaw_deg, axis)
 
 
 def test_where_no_face_was_found_one_is_unlikely_but_possible():
-    mediapipe = with_scores(1, 1, 1, 1, 1, face_evidence=False)
-    assert judge_face(CAMERA, mediapipe, head_at(), 0.3).seen == 0.2
-    alpha, std = awareness_with_evidence(head_at(), mediapipe)
+    unfound = with_scores(1, 1, 1, 1, 1, face_evidence=False)
+    assert judge_face(CAMERA, unfound, head_at(), 0.3).seen == 0.2
+    alpha, std = awareness_with_evidence(head_at(), unfound)
     assert alpha - 1.28 * std < 0.1
+    # A small one may have been missed.
+    far = head_at(distance_m=5.0)
+    assert judge_face(CAMERA, unfound, far, 0.3) == "no face found"
+    assert judge_face(CAMERA, ALL, far, 0.3).seen == 1.0
 
 
 @given(st.floats(0.0, 60.0), st.floats(0.0, 60.0))

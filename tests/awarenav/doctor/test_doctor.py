@@ -54,7 +54,7 @@ def test_an_installation_without_a_camera(capsys, tmp_path, monkeypatch):
     found = findings(capsys)
     assert severities(found, "packages") <= {"fine", "warning"}
     assert severities(found, "shipped networks") == {"fine"}
-    assert found["fetched networks"][0].remedy == "awarenav models fetch robot"
+    assert found["fetched networks"][0].remedy == "awarenav models fetch real"
     assert "networks" not in found
 
 
@@ -155,6 +155,19 @@ def test_photographs_need_other_networks(capsys, tmp_path):
     assert picture.exists()
     found = findings(capsys, PHOTOGRAPHS, "--out", "none", "--frames", 2, "--detector", detector)
     assert "the pose and head networks" in found["networks"][0].text
+
+
+@pytest.mark.skipif(not (SHARED / "models").is_dir(), reason="no networks beside the checkout")
+def test_a_catalogued_network_is_known_whatever_its_file_is_called(capsys, renders):
+    detector = f"rtmdet:{SHARED / 'models' / 'rtmdet_nano_person_320_mmpose.onnx'}"
+    options = ["--out", "none", "--frames", 1, "--threads", 1]
+    found = findings(capsys, renders, *options, "--detector", detector)
+    assert severities(found, "networks") == {"fine"}
+    assert "detector photographs (rtmdet-nano, OpenMMLab)" in found["networks"][0].text
+    unknown = SHARED / "models" / "yolov8n_int8_640_coco.onnx"
+    found = findings(capsys, renders, *options, "--detector", unknown)
+    assert severities(found, "networks") == {"warning"}
+    assert "detector not known, pose renders" in found["networks"][0].text
 
 
 # --- figures ------------------------------------------------------------------------------------

@@ -83,6 +83,26 @@ def test_a_folder_becomes_one_line_per_frame_in_the_format_of_truth(tmp_path, ca
     assert figures["detection"]["ap50"] == 1.0
 
 
+def test_one_picture_is_told_person_by_person(tmp_path, capsys):
+    picture = folder(tmp_path / "set", 1) / "000000.png"
+    out = tmp_path / "out.jsonl"
+    assert estimate(NumberReader(), picture, "--out", out) == 0
+    (person,) = read_records(out)[0]["people"]
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].endswith("1 observation of people, 0 of them without evidence of awareness")
+    x_m, _, z_m = person["position_camera_m"]
+    assert said[1:] == [
+        f"  {z_m:.1f} m ahead, {-x_m:.1f} m to the left: α {person['awareness']:.2f} ± "
+        f"{person['awareness_std']:.2f}"
+    ]
+    # Of a face four pixels wide there is no pose.
+    far = NumberReader(Camera.from_fov(WIDTH, HEIGHT, math.radians(170.0)))
+    assert estimate(far, picture, "--out", out, "--overwrite", "--fov-deg", 170) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].endswith("1 of them without evidence of awareness (no head pose: 1)")
+    assert said[1].endswith("no α, which is not aware (no head pose)")
+
+
 def test_a_video_is_estimated_and_drawn(tmp_path):
     out, drawn = tmp_path / "out.jsonl", tmp_path / "drawn.mp4"
     arguments = [film(tmp_path / "a.mp4", 12), "--out", out, "--overlay", drawn, "--fov-deg", 60]

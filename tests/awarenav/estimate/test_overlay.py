@@ -18,7 +18,8 @@ from awarenav import drawing
 from awarenav.drawing import Font, awareness_colour
 from awarenav.errors import AwarenavError
 from awarenav.estimate import FrameEstimate, OverlayWriter, SourceFrame
-from awarenav.estimate._overlay import _draw_label, _Person, draw_overlay, fit_image
+from awarenav.estimate._labels import Box, Labelled, leader, meet, place_labels
+from awarenav.estimate._overlay import draw_overlay, fit_image
 from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
 
 CONE = AttentionCone()
@@ -92,16 +93,93 @@ def test_red_means_unaware_and_green_aware():
     assert np.all(np.diff(shades[:, 0] - shades[:, 1]) <= 1)
 
 
-def test_labels_of_people_who_stand_together_do_not_cover_each_other():
-    people = [observed(0.1 * k, 3.0 + 0.1 * k) for k in range(3)]
-    labels: list[tuple[int, int, int, int]] = []
-    font = Font(18)
-    canvas = GREY.copy()
-    for seen in people:
-        labels.append(_draw_label(canvas, _Person(seen, None, None), font, labels, CAMERA))
-    for one, other in itertools.combinations(labels, 2):
-        apart = one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
-        assert apart, (one, other)
+def test_labels_hide_no_head_and_say_why_there_is_no_evidence():
+    """Three people in a row, each under the label that the one behind had above the head."""
+    image, camera = numbered(10, (640, 480)), Camera.from_fov(640, 480, 1.0)
+    boxes = [np.array([250.0 + 30 * k, 60.0 + 60 * k, 350.0 + 30 * k, 470.0]) for k in range(3)]
+    people = [observed(0.0, 5.0 - k, alpha=None, gaze=None, box=box) for k, box in enumerate(boxes)]
+    people = [replace(each, awareness_reason="face too small") for each in people]
+    drawn = draw_overlay(estimate(*people, image=image, camera=camera), CONE)
+    for left, top, right, bottom in boxes:
+        # Within the corners of the box; those of the others cross it.
+        inner = np.s_[
+            int(top) + 6 : int(top + 0.2 * (bottom - top)), int(left) + 6 : int(right) - 6
+        ]
+        hidden = (drawn[inner] != image[inner]).any(axis=2)
+        assert hidden.mean() < 0.1
+    silent = [replace(each, awareness_reason=None) for each in people]
+    told = draw_overlay(estimate(*silent, image=image, camera=camera), CONE)
+    assert not np.array_equal(drawn, told)
+
+
+def boxes_in(picture: tuple[int, int]) -> st.SearchStrategy[Box]:
+    width, height = picture
+    return st.tuples(
+        st.integers(0, width), st.integers(0, height), st.integers(0, width), st.integers(0, height)
+    ).map(lambda b: (min(b[0], b[2]), min(b[1], b[3]), max(b[0], b[2]), max(b[1], b[3])))
+
+
+PICTURE = 640, 480
+labelled = st.builds(
+    lambda box, share, sizes, pointer: Labelled(
+        box,
+        (box[0], box[1], box[2], box[1] + int(share * (box[3] - box[1]))),
+        sizes,
+        pointer,
+    ),
+    boxes_in(PICTURE),
+    st.floats(0.05, 1.0),
+    st.tuples(
+        st.tuples(st.integers(1, 80), st.integers(1, 25)),
+        st.tuples(st.integers(1, 800), st.integers(1, 500)),
+    ),
+    st.none() | boxes_in(PICTURE),
+)
+
+
+@given(people=st.lists(labelled, max_size=8), taken=st.lists(boxes_in(PICTURE), max_size=1))
+def test_labels_lie_in_the_picture_and_meet_no_head_and_no_label(people, taken):
+    places = place_labels(people, PICTURE, taken)
+    found = [(k, place) for k, place in enumerate(places) if place is not None]
+    for k, place in found:
+        left, top, right, bottom = place.box
+        assert 0 <= left < right <= PICTURE[0]
+        assert 0 <= top < bottom <= PICTURE[1]
+        assert (right - left, bottom - top) == people[k].sizes[place.size]
+        for other in (*(each.head for each in people), *taken):
+            assert not meet(place.box, other)
+    for (_, one), (_, other) in itertools.combinations(found, 2):
+        assert not meet(one.box, other.box)
+
+
+@given(
+    left=st.integers(0, 540),
+    top=st.integers(0, 440),
+    width=st.integers(5, 99),
+    share=st.floats(0, 1),
+)
+def test_somebody_alone_has_a_whole_label_near_the_head(left, top, width, share):
+    bottom = top + round(share * (480 - top))
+    head = left, top, left + width, top + (bottom - top) // 5
+    person = Labelled((left, top, left + width, bottom), head, ((40, 20), (120, 55)))
+    (place,) = place_labels([person], PICTURE)
+    assert place is not None
+    assert place.size == 1
+    assert math.dist(*leader(place.box, head)) <= 120
+
+
+def test_a_full_row_of_people_has_whole_labels_and_a_crowd_has_small_ones():
+    def row_of_people(step_px: int, count: int) -> list[Labelled]:
+        sizes = ((40, 20), (110, 55))
+        return [
+            Labelled((k, 60, k + 60, 200), (k + 10, 60, k + 50, 90), sizes)
+            for k in range(0, step_px * count, step_px)
+        ]
+
+    whole = place_labels(row_of_people(120, 5), (640, 200))
+    assert [place and place.size for place in whole] == [1] * 5
+    packed = place_labels(row_of_people(30, 20), (640, 200))
+    assert {None if place is None else place.size for place in packed} == {0, 1}
 
 
 finite = st.floats(-4.0, 4.0)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -16,6 +18,7 @@ from paths import ROOT
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
 from awarenav.estimate import NetworkChoice, admit_networks, choose_networks
+from awarenav.models._catalogue import Catalogue, NetworkSet
 from perception.networks import OnnxModel
 from perception.shipped import DETECTOR, POSE, shipped_model_path, shipped_models
 
@@ -84,7 +87,7 @@ def test_one_network_of_three_is_enough_to_be_refused(tmp_path, pose, head, role
         admit_networks(networks, rendered=False, allowed=False)
     assert all(role in str(refusal.value) for role in roles)
     assert "detector" not in str(refusal.value)
-    assert "awarenav models fetch robot" in str(refusal.value)
+    assert "awarenav models fetch real" in str(refusal.value)
 
 
 def test_a_photograph_is_refused_in_one_line_and_nothing_is_written(photograph, capsys):
@@ -143,3 +146,79 @@ def test_a_file_names_the_networks(photograph, capsys):
     file.write_text("poze: shipped\n")
     assert main(given) == 2
     assert "did you mean 'pose'" in capsys.readouterr().err
+
+
+def catalogue_of(detector: Path, pose: Path) -> Catalogue:
+    """A catalogue with a set 'real' of a detector and a pose network."""
+    some = next(each for each in Catalogue.shipped().models if each.file.endswith(".onnx"))
+    models = tuple(
+        some.model_copy(
+            update={
+                "name": file.stem,
+                "role": role,
+                "sha256": hashlib.sha256(file.read_bytes()).hexdigest(),
+                "publisher": "Example",
+            }
+        )
+        for role, file in (("detector", detector), ("pose", pose))
+    )
+    names = {"detector": detector.stem, "pose": pose.stem, "head": "pnp"}
+    return Catalogue(models=models, sets=(NetworkSet(name="real", purpose="tests", **names),))
+
+
+@pytest.fixture
+def real_set(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of the fetched set 'real', in a catalogue of its own."""
+    folder = tmp_path / "fetched"
+    folder.mkdir()
+    files = told(folder / "people.onnx", None), folder / "points.onnx"
+    pose = onnx.load(str(shipped_model_path(POSE)))
+    pose.doc_string = "not the shipped one to the byte"
+    del pose.metadata_props[:]
+    onnx.save(pose, str(files[1]))
+    catalogue = catalogue_of(*files)
+    monkeypatch.setattr(Catalogue, "shipped", classmethod(lambda cls: catalogue))
+    monkeypatch.setenv("AWARENAV_MODELS", str(folder))
+    return folder
+
+
+def test_a_catalogued_file_is_known_by_its_content(real_set, tmp_path):
+    renamed = Path(shutil.copy(real_set / "people.onnx", tmp_path / "mine.onnx"))
+    choice = NetworkChoice(detector=f"ultralytics:{renamed}", pose="points", head="pnp")
+    assert {role: each.name for role, each in choice.catalogued().items()} == {
+        "detector": "people",
+        "pose": "points",
+    }
+    domains = choose_networks(**choice.model_dump()).training_domains
+    assert domains == {"detector": "photographs", "pose": "photographs"}
+    renamed.write_bytes(told(tmp_path / "other.onnx", "dreams").read_bytes())
+    assert set(choice.catalogued()) == {"pose"}
+    assert choose_networks(**choice.model_dump()).training_domains["detector"] is None
+
+
+def test_photographs_get_the_fetched_set_and_one_line_says_so(real_set, photograph, capsys):
+    given = ["estimate", str(photograph), "--out", str(photograph.with_name("out.jsonl"))]
+    assert main(given) == 0
+    said = [line for line in capsys.readouterr().err.splitlines() if "set real" in line]
+    assert said == [
+        "awarenav estimate: networks of the fetched set real: detector people, pose points, head "
+        "pnp"
+    ]
+    (line,) = map(json.loads, photograph.with_name("out.jsonl").read_text().splitlines())
+    assert "simulator_networks" not in line
+    # An option counts before the set, and whoever allows networks of renders gets them.
+    assert main([*given, "--overwrite", "--pose", "shipped"]) == 2
+    assert "the pose network has seen renders only" in capsys.readouterr().err
+    assert main([*given, "--overwrite", "--allow-simulator-networks"]) == 0
+    assert "the detector, pose and head networks have seen renders only" in capsys.readouterr().err
+    # Half a set is none.
+    (real_set / "points.onnx").unlink()
+    assert main([*given, "--overwrite"]) == 2
+    assert "awarenav models fetch real" in capsys.readouterr().err
+
+
+def test_renders_keep_the_shipped_networks(real_set):
+    options = SimpleNamespace(networks=None)
+    assert NetworkChoice.of_options(options, rendered=True) == NetworkChoice()
+    chosen = NetworkChoice.of_options(options, rendered=False)
+    assert (chosen.detector, chosen.pose, chosen.head) == ("people", "points", "pnp")
