@@ -271,7 +271,7 @@ def _rate_finding(rate_hz: float, words: str) -> Finding:
 
 def _resolution_finding(camera: Camera, choice: NetworkChoice) -> Finding:
     range_m = camera.fx_px * _FACE_M / _FACE_PX
-    beyond = "α is less certain" if choice.face == "none" else "only keypoints give an α"
+    beyond = "α is less certain" if choice.face == "none" else "a face that is not found gives no α"
     text = f"faces have {_FACE_PX:g} pixels up to {range_m:.1f} m; beyond, {beyond}"
     if range_m < _FACE_RANGE_M:
         remedy = "a larger picture, or a narrower lens: awareness is uncertain beyond"
