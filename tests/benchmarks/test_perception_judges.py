@@ -20,8 +20,6 @@ from benchmarks.perception._photographs import (
     Label,
     read_labels,
 )
-from benchmarks.perception._photographs import (
-)
 from benchmarks.perception._photographs import measure as measure_photographs
 from benchmarks.perception._pictures import CONDITIONS, degraded_picture, picture_sets, pictures
 from benchmarks.perception._sureness import axis_nees, matched
