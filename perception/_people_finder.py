@@ -22,15 +22,14 @@ from ._stages import (
     check_count,
 )
 from .arrays import FloatArray, ImageRgb, finite_number
-from .confirmation import (
+from .confirmation import KeypointConfirmation, keypoint_score
+from .ownership import (
     FoundPerson,
-    KeypointConfirmation,
     area,
     common_area,
     disowned_keypoints,
     extent,
     iou,
-    keypoint_score,
     without_disowned,
 )
 

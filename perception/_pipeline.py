@@ -28,12 +28,13 @@ from .anthropometry import UNUSUAL_SIZE_PROBABILITY
 from .arrays import FloatArray, ImageRgb, check_image, finite_array, finite_number
 from .awareness import AttentionCone, AwarenessEstimate, estimate_awareness
 from .body import DEFAULT_MIN_SCORE
-from .confirmation import FoundPerson, KeypointConfirmation
+from .confirmation import KeypointConfirmation
 from .depth_image import checked_depth
 from .errors import PerceptionError
 from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import OnnxSettings
+from .ownership import FoundPerson, own_heads
 from .shipped import shipped_detector, shipped_head_pose_estimator, shipped_pose_estimator
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
@@ -225,6 +226,8 @@ class AwarenessPipeline:
             people = tuple(one.keypoints for one in found)
             heads = tuple(self._head_pose_estimator.estimate(image_rgb, self.camera, people))
             check_count("head_pose_estimator", len(heads), len(people))
+            found, heads = own_heads(self.camera, found, heads, self._min_score)
+            people = tuple(one.keypoints for one in found)
             eyes = self._eyes(image_rgb, heads)
             places = place_people(
                 self.camera,

@@ -24,9 +24,9 @@ from perception import (
     PoseEstimator,
 )
 from perception.arrays import FloatArray, ImageRgb
-from perception.confirmation import DISOWNED, without_disowned
 from perception.errors import DepthImageError
 from perception.no_view import NoView, why_no_view
+from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 

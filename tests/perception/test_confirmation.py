@@ -15,7 +15,8 @@ from perception import (
     PersonKeypoints,
     PnpHeadPoseEstimator,
 )
-from perception.confirmation import FoundPerson, KeypointConfirmation
+from perception.confirmation import KeypointConfirmation
+from perception.ownership import FoundPerson
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 FRAME = np.zeros((480, 640, 3), np.uint8)

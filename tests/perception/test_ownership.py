@@ -13,11 +13,18 @@ from synthetic_people import Given, person_at
 from perception import (
     AwarenessPipeline,
     Camera,
+    HeadPose,
     PersonDetection,
     PersonKeypoints,
 )
-from perception.confirmation import DISOWNED, disowned_keypoints, without_disowned
 from perception.layouts import HEAD
+from perception.ownership import (
+    DISOWNED,
+    FoundPerson,
+    disowned_keypoints,
+    own_heads,
+    without_disowned,
+)
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 WIDE = Camera.from_fov(1920, 1200, math.radians(120.0))
@@ -175,7 +182,127 @@ def test_people_without_keypoints_lose_nothing():
     assert disowned_keypoints(CAMERA, (), (), 0.3) == []
 
 
+# --- heads that no neck carries -----------------------------------------------------------------
+
+
+def with_head(x_m=0.0, depth_m=4.0, *, camera=CAMERA, noise_px=1.0, seed=0, **pose):
+    """A person as found, and the true pose of the head."""
+    person = person_at((x_m, 0.2, depth_m), **pose)
+    found = person.keypoints(camera, noise_px, np.random.default_rng(seed))
+    pixels = found.keypoints_px
+    box = PersonDetection(np.r_[pixels.min(axis=0), pixels.max(axis=0)], 0.9)
+    covariance = np.diag([0.01] * 3 + [0.0025] * 3)
+    head = HeadPose(person.points_camera_m[0], person.rotation_camera_head, covariance, 0.5)
+    return FoundPerson(box, found, None), head
+
+
+def reason_of(one, head, camera=CAMERA):
+    """Return why the head is not the person's; it has no pose and no score then."""
+    (left,), (kept,) = own_heads(camera, (one,), (head,), 0.3)
+    if left.disowned is None:
+        assert left is one
+        assert kept is head
+    else:
+        assert kept is None
+        assert left.keypoints.scores[HEAD].max() == 0.0
+        assert np.array_equal(left.keypoints.scores[5:], one.keypoints.scores[5:])
+    return left.disowned
+
+
+def moved_head(one, across_m, up_m, depth_m):
+    pixels = one.keypoints.keypoints_px.copy()
+    pixels[HEAD] += np.array([across_m, -up_m]) * CAMERA.fx_px / depth_m
+    return one._replace(keypoints=changed(one.keypoints, pixels))
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    st.floats(-1.5, 1.5),
+    st.floats(1.5, 5.0),
+    st.floats(-3.2, 3.2),
+    st.floats(-65.0, 65.0),
+    st.floats(-40.0, 30.0),
+    st.floats(1.2, 2.0),
+    st.integers(0, 100),
+)
+def test_a_head_that_the_neck_can_turn_stays(
+    aside, depth_m, yaw, turn_deg, nod_deg, stature_m, seed
+):
+    pose = {
+        "body_yaw_rad": yaw,
+        "head_yaw_rad": math.radians(turn_deg),
+        "head_pitch_rad": math.radians(nod_deg),
+        "stature_m": stature_m,
+    }
+    one, head = with_head(aside * depth_m, depth_m, camera=WIDE, seed=seed, **pose)
+    assert reason_of(one, head, WIDE) is None
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.floats(-1.5, 1.5),
+    st.floats(1.5, 8.0),
+    st.floats(150.0, 210.0),
+    st.floats(-15.0, 15.0),
+    st.integers(0, 100),
+)
+def test_a_face_over_a_back_is_anothers(aside, depth_m, yaw_deg, off_deg, seed):
+    yaw = math.radians(yaw_deg)
+    # Yaw 0 faces the camera's plane, not the camera.
+    pose = {"body_yaw_rad": yaw - math.atan(aside), "head_yaw_rad": math.radians(off_deg) - yaw}
+    one, head = with_head(aside * depth_m, depth_m, camera=WIDE, seed=seed, **pose)
+    assert reason_of(one, head, WIDE) == SHARED_HEAD
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(0.4, 0.55), st.floats(-1.0, 4.1), st.floats(2.0, 6.0))
+def test_a_face_away_from_the_neck_is_anothers(away_m, direction_rad, depth_m):
+    one, head = with_head(depth_m=depth_m)
+    # The head's own place is about 0.2 m above the neck.
+    across, up = away_m * math.cos(direction_rad), away_m * math.sin(direction_rad) - 0.2
+    assert reason_of(moved_head(one, across, up, depth_m), head) == SHARED_HEAD
+
+
+def test_a_head_that_looks_away_is_left():
+    """It is unaware, whoever it belongs to: that is worth more than no evidence."""
+    one, head = with_head(body_yaw_rad=math.pi)
+    assert reason_of(moved_head(one, 0.3, 0.1, 4.0), head) is None
+    one, head = with_head(head_yaw_rad=math.pi)
+    assert reason_of(one, head) is None
+
+
+def test_without_shoulders_nothing_tells_whose_head_it_is():
+    one, head = with_head(body_yaw_rad=math.pi, head_yaw_rad=math.pi)
+    assert reason_of(one, head) == SHARED_HEAD
+    for shoulder in (5, 6):
+        scores = one.keypoints.scores.copy()
+        scores[shoulder] = 0.0
+        hidden = one._replace(keypoints=changed(one.keypoints, scores=scores))
+        assert reason_of(hidden, head) is None
+
+
+def test_people_without_head_or_skeleton_stay_as_they_are():
+    one, head = with_head(body_yaw_rad=math.pi, head_yaw_rad=math.pi)
+    assert reason_of(one, None) is None
+    stolen = one._replace(disowned=SKELETON)
+    assert own_heads(CAMERA, (stolen,), (head,), 0.3) == ((stolen,), (head,))
+    assert own_heads(CAMERA, (), (), 0.3) == ((), ())
+
+
 # --- in the pipeline ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("yaw", "aware"), [(0.0, True), (math.pi, False)], ids=["front", "back"])
+def test_a_face_on_the_wall_behind_a_back_gives_no_awareness(yaw, aware):
+    one, head = with_head(body_yaw_rad=yaw, head_yaw_rad=-yaw)
+    known = Given([one.keypoints], [one.detection], [head])
+    (seen_as,) = AwarenessPipeline(CAMERA, known, known, known).process(BLANK, 0.0)
+    if aware:
+        assert seen_as.awareness > 0.8
+        assert seen_as.awareness_reason is None
+    else:
+        assert (seen_as.awareness, seen_as.gaze_camera) == (None, None)
+        assert seen_as.awareness_reason == SHARED_HEAD
 
 
 def processed(*pairs):
