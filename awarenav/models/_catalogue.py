@@ -15,6 +15,8 @@ from ..errors import AwarenavError, not_one_of
 
 Role = Literal["detector", "pose", "face", "head"]
 
+#: Set of networks that photographs get once it is fetched, where no option says otherwise.
+DEFAULT_SET: Final = "real"
 _FILE: Final = Path(__file__).parent / "catalogue.yaml"
 # Archives and networks. A bundle of MediaPipe, .task, is both: a ZIP archive of networks.
 _ARCHIVES: Final = (".zip", ".whl", ".task", ".tgz")

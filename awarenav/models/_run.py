@@ -14,7 +14,7 @@ from perception.shipped import shipped_models, verify_shipped_model
 
 from ..errors import AwarenavError, counted
 from ..files import json_text, write_text
-from ._catalogue import NetworkSet, RealModel, Source
+from ._catalogue import DEFAULT_SET, NetworkSet, RealModel, Source
 from ._store import ModelStore, default_folder
 
 _WIDTH: Final = 100
@@ -135,7 +135,9 @@ def fetch_command(names: Sequence[str], folder: Path | None, origin: Path | None
     for each in sets:
         write_text(Path(each.file), _set_text(store, each))
         print(f"{each.name}: written to {each.file}")
-        print(f"next: awarenav estimate PHOTO.jpg --networks {each.file}")
+        # The default set is found without its file, unless it is in another folder.
+        found = each.name == DEFAULT_SET and store.folder == default_folder()
+        print("next: awarenav estimate PHOTO.jpg" + ("" if found else f" --networks {each.file}"))
         if each.hint is not None:
             print(f"note: {each.hint}")
     return 0
