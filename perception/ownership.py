@@ -209,7 +209,7 @@ def _is_anothers(camera: Camera, person: PersonKeypoints, head: HeadPose, min_sc
     """Return whether a head looks towards the camera that these shoulders cannot carry."""
     seen = person.scores[kp.BODY] >= min_score
     seen[kp.SHOULDERS] = person.scores[kp.SHOULDERS] >= _SHOULDERS_SHARE * min_score
-    away = head.gaze_camera @ head.position_camera_m
+    away = float(head.gaze_camera @ head.position_camera_m)
     if not seen[kp.SHOULDERS].all() or away >= 0.0:
         return False
     rays = _unit_rays(camera, person.keypoints_px[None, kp.BODY])

@@ -256,6 +256,16 @@ class Conditions:
         metavar="NAME|FILE",
         shell_complete=completion_of("sim_tests", "scenario/shipped/cameras"),
     )
+    networks: str = _axis(
+        "Name of the file of other networks, empty for the shipped ones.",
+        empty=True,
+        changes_scenario=True,
+        help="Networks of your own for --perception pixels: a YAML file as for --networks of "
+        "awarenav estimate.",
+        default="",
+        show_default="the shipped ones",
+        metavar="FILE",
+    )
     robot: str = _axis(
         "Name of another robot, empty for the scenario's own.",
         empty=True,
@@ -336,6 +346,19 @@ def changed_scenario(scenario: _ScenarioT, values: Mapping[str, Any]) -> _Scenar
         if values.get(name) not in (None, ""):
             scenario = getattr(scenario, f"with_{name}")(values[name])
     return scenario
+
+
+def refuse_unused_networks(values: Mapping[str, Any], kind: str) -> None:
+    """Raise SimError if there are networks among the values of axes, and no pictures for them.
+
+    Args:
+        values: by the name of the axis.
+        kind: of :class:`Perception`.
+    """
+    if values.get("networks") and kind != "pixels":
+        raise SimError(
+            f"networks see pictures: they need perception 'pixels', got {kind or _SCANNER!r}"
+        )
 
 
 def table_name(value: Any) -> str:

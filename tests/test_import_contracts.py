@@ -39,7 +39,7 @@ PLANTED = {
         "from ..runs import run_jobs",
     ),
     "awarenav: tools > command line > files": (
-        "awarenav/models/_download.py",
+        "awarenav/models/_sources.py",
         "from ..tracks import command",
     ),
     "no module imports another package's private module": (

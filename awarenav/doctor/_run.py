@@ -190,9 +190,9 @@ def _domain_finding(
         text = simulator_networks_warning(unfit)
         return Finding.error("networks", text, _REMEDY_NETWORKS)
     known = {
-        role: f" ({model.name}, {model.publisher})" for role, model in choice.catalogued().items()
+        role: f", {model.name} by {model.publisher}" for role, model in choice.catalogued().items()
     }
-    told = ", ".join(
+    told = "; ".join(
         f"{role} {domain or 'not known'}{known.get(role, '')}" for role, domain in domains.items()
     )
     kind = "renders" if rendered else "pictures that no renderer of this package made"
@@ -247,9 +247,9 @@ def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
         if (steps_s <= 0.0).any():
             text = "stamps stand still or go back"
             found.append(Finding.error("frame rate", text, "look at the driver's clock"))
-    warm = seen.times_s[_WARM_UP:] or seen.times_s
-    rate = _rate_finding(1.0 / float(np.median(warm)), "perception manages")
-    return [*found, rate]
+    if warm := seen.times_s[_WARM_UP:]:
+        found.append(_rate_finding(1.0 / float(np.median(warm)), "perception manages"))
+    return found
 
 
 def _rate_finding(rate_hz: float, words: str) -> Finding:
@@ -271,7 +271,7 @@ def _rate_finding(rate_hz: float, words: str) -> Finding:
 
 def _resolution_finding(camera: Camera, choice: NetworkChoice) -> Finding:
     range_m = camera.fx_px * _FACE_M / _FACE_PX
-    beyond = "α is less certain" if choice.face == "none" else "only keypoints give an α"
+    beyond = "α is less certain" if choice.face == "none" else "a face that is not found gives no α"
     text = f"faces have {_FACE_PX:g} pixels up to {range_m:.1f} m; beyond, {beyond}"
     if range_m < _FACE_RANGE_M:
         remedy = "a larger picture, or a narrower lens: awareness is uncertain beyond"

@@ -14,7 +14,7 @@ _CAMERA: Final = "Camera"
     "doctor",
     examples=[
         "awarenav doctor",
-        "awarenav doctor 0 --networks robot_networks.yaml --camera camera.yaml",
+        "awarenav doctor 0 --camera camera.yaml",
         "awarenav doctor photographs/",
         "awarenav doctor drive/ --topic /camera/image_raw",
     ],

@@ -25,6 +25,7 @@ from perception import (
 )
 from perception.arrays import FloatArray, ImageRgb
 from perception.errors import DepthImageError
+from perception.networks.detectors import for_wide_view
 from perception.no_view import NoView, why_no_view
 from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
@@ -49,9 +50,10 @@ _MEASURED_STD_RAD: Final = math.radians(2.0)
 class Networks:
     """The detector and estimators of a pipeline.
 
-    ``detector`` may be a function that makes the detector for a camera. ``head_pose_estimator``
-    None is the pipeline's default. ``training_domains`` says what each has seen in training, by its
-    role; a role that is missing or None is not known.
+    ``detector`` may be a function that makes the detector for a camera. Any other one looks twice
+    at an image of more than 90° across (:func:`~perception.networks.detectors.for_wide_view`).
+    ``head_pose_estimator`` None is the pipeline's default. ``training_domains`` says what each has
+    seen in training, by its role; a role that is missing or None is not known.
     """
 
     detector: PersonDetector | Callable[[Camera], PersonDetector]
@@ -66,7 +68,9 @@ class Networks:
         detector = self.detector
         return AwarenessPipeline(
             camera,
-            detector if isinstance(detector, PersonDetector) else detector(camera),
+            for_wide_view(detector, camera)
+            if isinstance(detector, PersonDetector)
+            else detector(camera),
             pose_estimator,
             self.head_pose_estimator,
             **self.settings,

@@ -1,127 +1,204 @@
-"""Places for the labels of people in a picture, where they hide no head and no other label."""
+"""Labels of people in a picture: distance, α or why there is none."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-# Left, top, right, bottom in pixels.
-Box = tuple[int, int, int, int]
-#: Width and height in pixels.
-Size = tuple[int, int]
+import numpy as np
 
-# Between a label and what it belongs to.
-_GAP_PX: Final = 2
+from perception import Camera, PersonKeypoints, PersonObservation
+from perception import layouts as kp
+from perception.arrays import FloatArray, ImageRgb
+from tracking import PersonTrack
+
+from ..drawing import WHITE, Colour, Font, awareness_colour, darken_box, draw_line
+from ._places import Box, Labelled, Place, Size, leader, meet, place_labels
+
+#: Keypoints with a lower score are not seen.
+SEEN_SCORE: Final = 0.3
+#: Keypoints of a head.
+HEAD: Final = range(kp.NOSE, kp.RIGHT_EAR + 1)
 
 
-@dataclass(frozen=True, slots=True)
-class Labelled:
-    """A person who gets a label.
+@dataclass(slots=True)
+class Person:
+    """A person to draw, and what is known of them.
 
-    Attributes:
-        box: around the person.
-        head: around the head, which no label hides.
-        sizes: of the label, the smallest first.
-        pointer: around what points from the head, which a label leaves alone where it can.
+    ``arrow_px`` (2, 2) is the gaze, from the head on; None until it is drawn.
     """
 
-    box: Box
-    head: Box
-    sizes: tuple[Size, ...]
-    pointer: Box | None = None
+    observation: PersonObservation
+    keypoints: PersonKeypoints | None
+    track: PersonTrack | None
+    arrow_px: FloatArray | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
-    """A place of a label.
+def draw_labels(
+    image: ImageRgb, near_first: Sequence[Person], camera: Camera, font: Font, caption: str
+) -> None:
+    """Draw a label at each person and a caption in a corner; they hide no head and no other label.
 
-    Attributes:
-        box: of the label, inside the picture.
-        size: index in ``sizes`` of the person.
-    """
-
-    box: Box
-    size: int
-
-
-def place_labels(
-    people: Sequence[Labelled], picture: Size, taken: Sequence[Box] = ()
-) -> list[Place | None]:
-    """Return the place of each label; None where there is no room even for the smallest.
-
-    No label meets a head, another label or what is taken. Each is near its own head, and leaves
-    bodies and pointers alone where it can. Everybody gets the smallest size first; then labels
-    grow, in the order of the people.
+    A label far from its head has a line to it. Somebody for whom there is no room has none.
 
     Args:
-        people: the most important first.
-        picture: its size.
-        taken: places that stay free.
+        image: (H, W, 3) uint8 RGB, which is changed.
+        near_first: the people, the nearest first.
+        camera: of the image.
+        font: of the labels.
+        caption: of the picture.
     """
-    places: list[Place | None] = [None] * len(people)
-    heads = [each.head for each in people]
-    unwanted = [each.box for each in people]
-    unwanted += [each.pointer for each in people if each.pointer is not None]
-    for size in range(max((len(each.sizes) for each in people), default=0)):
-        for index, person in enumerate(people):
-            if size >= len(person.sizes):
-                continue
-            others = [place.box for k, place in enumerate(places) if place and k != index]
-            forbidden = [*heads, *others, *taken]
-            free = [
-                box
-                for box in _candidates(person, person.sizes[size], picture)
-                if not any(meet(box, other) for other in forbidden)
-            ]
-            if free:
-                best = min(free, key=lambda box: _strain(box, person.head, unwanted))
-                places[index] = Place(best, size)
-    return places
+    picture = image.shape[1], image.shape[0]
+    labelled = [_labelled(person, camera, font, picture) for person in near_first]
+    taken = _draw_caption(image, caption, font, [each.head for each in labelled])
+    places = place_labels(labelled, picture, [taken])
+    for person, place, own in zip(near_first, places, labelled, strict=True):
+        if place is not None:
+            ends = leader(place.box, own.head)
+            if math.dist(*ends) > font.height_px:
+                draw_line(image, ends, awareness_colour(person.observation.awareness), 1)
+            _draw_label(image, person, place, font)
 
 
-def meet(one: Box, other: Box) -> bool:
-    """Return whether two boxes have a pixel in common."""
-    return one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
+def _texts(person: Person) -> tuple[tuple[str, ...], ...]:
+    """Return the rows of a person's label, the smallest label first."""
+    observation, track = person.observation, person.track
+    alpha, spread = observation.awareness, observation.awareness_std
+    name = "" if track is None else f"#{track.id} "
+    distance = f"{np.linalg.norm(observation.position_camera_m):.1f} m"
+    distance = distance if track is None else f"#{track.id} · {distance}"
+    if alpha is None:
+        why = observation.awareness_reason or "no evidence"
+        return (f"{name}no α",), (f"{name}{why}",), (distance, f"no α: {why}")
+    value = f"α {alpha:.2f}"
+    return (f"{name}{value}",), (distance, f"{value} ± {spread:.2f}")
 
 
-def leader(label: Box, head: Box) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the ends of the shortest line from a label to a head."""
-    (x_label, x_head), (y_label, y_head) = (
-        _nearest((label[k], label[2 + k]), (head[k], head[2 + k])) for k in (0, 1)
+def _labelled(person: Person, camera: Camera, font: Font, picture: Size) -> Labelled:
+    """Return where a person and their head are, and how large their label is."""
+    box = person.observation.box_xyxy_px
+    if box is None:
+        u, v = camera.project(person.observation.position_camera_m[None])[0].tolist()
+        box = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
+    return Labelled(
+        _inside(box, picture),
+        _inside(_head_px(box, person), picture),
+        _label_sizes(person, font),
+        None if person.arrow_px is None else _inside(_around(person.arrow_px), picture),
     )
-    return (x_label, y_label), (x_head, y_head)
 
 
-def _nearest(one: tuple[int, int], other: tuple[int, int]) -> tuple[int, int]:
-    """Return the nearest numbers of two intervals; of what they share, the middle."""
-    if one[1] < other[0]:
-        return one[1], other[0]
-    if other[1] < one[0]:
-        return one[0], other[1]
-    middle = (max(one[0], other[0]) + min(one[1], other[1])) // 2
-    return middle, middle
+def _head_px(box: FloatArray, person: Person) -> FloatArray:
+    """Return the box (4,) around a head: around its keypoints, else the top fifth of the person.
+
+    Keypoints that gave no α may lie elsewhere: then it is around both.
+    """
+    height = box[3] - box[1]
+    top = np.array([box[0], box[1], box[2], box[1] + 0.2 * height])
+    keypoints = person.keypoints
+    if keypoints is None:
+        return top
+    points = keypoints.keypoints_px[list(HEAD)][keypoints.scores[list(HEAD)] >= SEEN_SCORE]
+    if not len(points):
+        return top
+    around = _around(points)
+    # From ear to ear a head is two thirds of its height; a profile shows less.
+    wide = float((around[2:] - around[:2]).max())
+    margin = max(0.75 * wide, 0.06 * height)
+    around += np.array([-margin, -margin, margin, margin])
+    if person.observation.awareness is None:
+        return _around(np.stack([around[:2], around[2:], top[:2], top[2:]]))
+    return around
 
 
-def _strain(label: Box, head: Box, unwanted: Sequence[Box]) -> float:
-    """Return how far a label is from its head, and farther for what it hides."""
-    away = math.dist(*leader(label, head))
-    return away + (label[3] - label[1]) * sum(meet(label, other) for other in unwanted)
+def _around(points: FloatArray) -> FloatArray:
+    return np.concatenate([points.min(axis=0), points.max(axis=0)])
 
 
-def _candidates(person: Labelled, size: Size, picture: Size) -> Iterator[Box]:
-    """Yield places inside the picture: above, beside, below, and on the body."""
-    (left, top, right, bottom), (width, height) = person.box, size
-    if width > picture[0] or height > picture[1]:
-        return
-    chest = person.head[3] + _GAP_PX
-    across = ((left + right - width) // 2, left, right - width)
-    beside = (top, chest, (top + bottom - height) // 2, bottom - height)
-    corners = [(x, top - height - _GAP_PX) for x in across]
-    corners += [(x, y) for y in beside for x in (right + _GAP_PX, left - width - _GAP_PX)]
-    corners += [(x, bottom + _GAP_PX) for x in across]
-    corners += [(x, y) for y in (bottom - height - _GAP_PX, chest) for x in across]
-    for x, y in corners:
-        inside = min(max(x, 0), picture[0] - width), min(max(y, 0), picture[1] - height)
-        yield (*inside, inside[0] + width, inside[1] + height)
+def _inside(box: FloatArray, picture: Size) -> Box:
+    """Return the part of a box (4,) in the picture, in whole pixels."""
+    clipped = np.clip(np.nan_to_num(box), 0.0, (*picture, *picture))
+    left, top = np.floor(clipped[:2]).astype(int).tolist()
+    right, bottom = np.ceil(clipped[2:]).astype(int).tolist()
+    return left, top, right, bottom
+
+
+def _label_sizes(person: Person, font: Font) -> tuple[Size, ...]:
+    """Return the sizes of a person's labels, the smallest first."""
+    gap, sizes = _label_gap(font), []
+    for rows in _texts(person):
+        width = max(font.width_px(row) for row in rows) + 2 * gap
+        height = len(rows) * font.height_px + gap
+        sizes.append((width, height + _bar_height(person, rows, font)))
+    return tuple(sizes)
+
+
+def _label_gap(font: Font) -> int:
+    return max(font.height_px // 4, 3)
+
+
+def _bar_height(person: Person, rows: Sequence[str], font: Font) -> int:
+    """Return the height of the bar with its margin: a whole label with an α has one."""
+    has_bar = len(rows) > 1 and person.observation.awareness is not None
+    return 2 * _label_gap(font) if has_bar else 0
+
+
+def _draw_label(image: ImageRgb, person: Person, place: Place, font: Font) -> None:
+    """Draw α, why there is none, or all: the distance and a bar as well."""
+    left, top, right, bottom = place.box
+    gap, rows = _label_gap(font), _texts(person)[place.size]
+    darken_box(image, place.box)
+    colour = awareness_colour(person.observation.awareness)
+    _fill_box(image, (left, top, left + max(gap // 2, 2), bottom), colour)
+    for number, row in enumerate(rows):
+        corner = left + gap, top + gap // 2 + number * font.height_px
+        font.write(image, row, corner, WHITE)
+    if _bar_height(person, rows, font):
+        bar = (left + gap, bottom - 2 * gap, right - gap, bottom - gap)
+        _draw_bar(image, bar, person.observation, person.track)
+
+
+def _draw_bar(
+    image: ImageRgb, bar: Box, observation: PersonObservation, track: PersonTrack | None
+) -> None:
+    """Draw α, its standard deviation and the lower bound on a scale from 0 to 1."""
+    left, top, right, bottom = bar
+    span, height = right - left, bottom - top
+    _fill_box(image, bar, (74, 78, 88))
+    alpha, spread = observation.awareness, observation.awareness_std
+    if alpha is not None and spread is not None:
+        colour = awareness_colour(alpha)
+        low, high = max(alpha - spread, 0.0), min(alpha + spread, 1.0)
+        faint = tuple((np.array(colour) * 0.55 + 30.0).astype(int).tolist())
+        _fill_box(image, (left, top, left + round(alpha * span), bottom), colour)
+        band = (
+            left + round(low * span),
+            top + height // 3,
+            left + max(round(high * span), round(low * span) + 1),
+            bottom - height // 3,
+        )
+        _fill_box(image, band, (faint[0], faint[1], faint[2]))
+    if track is not None:
+        mark = left + round(track.awareness_lower * (span - 2))
+        _fill_box(image, (mark, top - 2, mark + 2, bottom + 2), WHITE)
+
+
+def _fill_box(image: ImageRgb, box: Box, colour: Colour) -> None:
+    left, top, right, bottom = box
+    image[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] = colour
+
+
+def _draw_caption(image: ImageRgb, text: str, font: Font, heads: Sequence[Box]) -> Box:
+    """Write a line into a corner of the picture without heads; return its box."""
+    gap = font.height_px // 3
+    width, height = font.width_px(text) + 3 * gap, font.height_px + gap
+    right, bottom = image.shape[1] - width, image.shape[0] - height
+    corners = [(0, bottom), (0, 0), (right, 0), (right, bottom)]
+    boxes = [(left, top, left + width, top + height) for left, top in corners]
+    free = (box for box in boxes if not any(meet(box, head) for head in heads))
+    box = next(free, boxes[0])
+    darken_box(image, box, 0.55)
+    font.write(image, text, (box[0] + gap, box[1] + gap // 2), WHITE)
+    return box

@@ -48,7 +48,7 @@ from perception.shipped import (
 from tracking.config import StrictConfig
 
 from ..errors import AwarenavError
-from ..models import ModelStore, RealModel
+from ..models import DEFAULT_SET, ModelStore, RealModel
 from ._estimator import Networks
 
 #: The name of the networks that come with the package.
@@ -56,8 +56,6 @@ SHIPPED: Final = "shipped"
 _NONE: Final = "none"
 _WITHOUT_NETWORK: Final = "pnp"
 _EYES: Final = ("auto", _NONE)
-# Set of networks that photographs get where no option says otherwise.
-_DEFAULT_SET: Final = "real"
 # What the messages of the networks' classes advise, and what the command has for it.
 _WORDS: Final = {
     "--detector": {
@@ -130,7 +128,7 @@ class NetworkChoice(StrictConfig):
         if log is not None:
             used = chosen.model_dump(exclude_none=True).items()
             named = ", ".join(f"{role} {name}" for role, name in used if name not in _EYES)
-            log(f"networks of the fetched set {_DEFAULT_SET}: {named}")
+            log(f"networks of the fetched set {DEFAULT_SET}: {named}")
         return chosen
 
     @classmethod
@@ -139,7 +137,7 @@ class NetworkChoice(StrictConfig):
         store = ModelStore()
         known = {each.name for each in store.catalogue.models}
         for each in store.catalogue.sets:
-            if each.name == _DEFAULT_SET:
+            if each.name == DEFAULT_SET:
                 named = each.model_dump(include=set(cls.model_fields), exclude_none=True)
                 chosen = cls(**named)
                 wanted = known.intersection(map(str, named.values()))
@@ -256,7 +254,7 @@ def admit_networks(networks: Networks, *, rendered: bool, allowed: bool) -> tupl
     roles = () if rendered else simulator_networks(networks.training_domains)
     if roles and not allowed:
         raise AwarenavError(
-            f"{simulator_networks_warning(roles)}: `awarenav models fetch {_DEFAULT_SET}` brings "
+            f"{simulator_networks_warning(roles)}: `awarenav models fetch {DEFAULT_SET}` brings "
             "others, which are used from then on (or add --allow-simulator-networks)"
         )
     return roles

@@ -14,6 +14,8 @@ from ._sources import ImageFiles, ImageSource, open_video
 _BAG_SUFFIXES: Final = (".bag", ".db3", ".mcap")
 #: A camera's number, as a source.
 CAMERA_NUMBER: Final = re.compile("[0-9]{1,9}")
+# Pictures of telephones that OpenCV does not decode.
+_HEIF: Final = (".heic", ".heif")
 _STREAM: Final = re.compile(r"^[a-z][a-z0-9+.-]*://")
 
 
@@ -47,6 +49,8 @@ def open_source(text: str, *, topic: str | None = None) -> ImageSource:
         return BagSource(path, topic)
     if topic is not None:
         raise AwarenavError(f"--topic is for ROS recordings; {text} is not one")
+    if path.suffix.lower() in _HEIF:
+        raise AwarenavError(f"{text} is an HEIF picture, which cannot be read: save it as JPEG")
     if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
         return ImageFiles(path)
     return open_video(text, live=False)

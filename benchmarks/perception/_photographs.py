@@ -1,9 +1,13 @@
-"""Detection and awareness on labelled photographs.
+"""People, keypoints and awareness on labelled photographs.
 
-The folder holds photographs and ``agreed_boxes.json``: for each file its size and the boxes of the
-people in it (``people_xyxy_px``). It prints recall and false positives a picture at the pipeline's
-default score, and lists everybody to whom the networks give α ≥ 0.5. Whether such a person looks at
-the camera is for the reader to judge: the boxes do not say it.
+The folder holds photographs and ``coco_labels.json``: for each file its size (width, height) and
+the people in it, each with ``box_xyxy_px`` and COCO's 17 ``keypoints_px`` (u, v and visibility 0, 1
+or 2). People who are smaller than a fifth of the picture's height count neither as missed nor as
+false. Whether a face looks here follows from its labels: the nose lies between two visible eyes. It
+looks away if neither nose nor eyes are labelled as visible, or one eye alone beside one ear. The
+rest may be either.
+
+Source of the similarity of keypoints (OKS): cocodataset.org, "Keypoint Evaluation".
 """
 
 from __future__ import annotations
@@ -11,6 +15,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import time
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,62 +25,212 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.errors import AwarenavError
-from awarenav.judge import judge_frames
-from awarenav.records import PersonRecord, read_person
-from perception import Camera
+from awarenav.estimate import NetworkChoice, choose_networks
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    PersonDetection,
+    PersonKeypoints,
+    PoseEstimator,
+)
+from perception import layouts as kp
 
-from ._degradations import estimated
 from ._pictures import add_networks, pipeline_of
+from ._sureness import matched
 
-#: Bounds of the figures.
-MIN_RECALL: Final = 0.75
-MAX_FALSE_PER_PICTURE: Final = 0.3
 AWARE: Final = 0.5
-LABELS: Final = "agreed_boxes.json"
+LABELS: Final = "coco_labels.json"
+# COCO's constants of the keypoints, and the share of a box that a body covers.
+_SIGMAS: Final = 1e-3 * np.array(
+    [26, 25, 25, 35, 35, 79, 79, 72, 72, 62, 62, 107, 107, 87, 87, 89, 89]
+)
+_BODY_SHARE: Final = 0.53
+_SMALLEST_SHARE: Final = 0.2
+_MIN_IOU: Final = 0.5
+# The nose of a face that looks here, from one eye to the other.
+_BETWEEN: Final = (0.25, 0.75)
+
+
+@dataclass(frozen=True)
+class Label:
+    """A person of a photograph: box (4,), and keypoints (17, 3) with their visibility."""
+
+    box_xyxy_px: NDArray[np.float64]
+    keypoints_px: NDArray[np.float64]
+
+    @property
+    def facing(self) -> bool | None:
+        """True for a face that looks about here, False for one that does not, else None."""
+        head = self.keypoints_px[kp.HEAD]
+        seen = head[:, 2] == 2
+        if seen[:3].all():
+            nose, left, right = head[:3, :2]
+            across = left - right
+            share = float((nose - right) @ across) / max(float(across @ across), 1e-9)
+            return True if _BETWEEN[0] <= share <= _BETWEEN[1] else None
+        one_side = bool(seen[1:3].sum() == 1 and seen[3:].sum() == 1)
+        return False if one_side or (not seen[:3].any() and seen[3:].any()) else None
+
+    def similarity(self, person: PersonKeypoints) -> float | None:
+        """Return the OKS of estimated keypoints; None without a labelled one."""
+        labelled = self.keypoints_px[:, 2] > 0
+        if not labelled.any():
+            return None
+        width, height = (self.box_xyxy_px[2:] - self.box_xyxy_px[:2]).tolist()
+        away = ((person.keypoints_px[kp.BODY] - self.keypoints_px[:, :2]) ** 2).sum(axis=1)
+        errors = away / (2.0 * (2.0 * _SIGMAS) ** 2 * _BODY_SHARE * width * height)
+        return float(np.exp(-errors)[labelled].mean())
+
 
 #: The people of every photograph, by the name of its file.
-People = dict[str, list[PersonRecord]]
+Labels = dict[str, list[Label]]
 
 
-def read_labels(folder: Path) -> People:
-    """Return the people in every labelled photograph of a folder, of whom the boxes are known.
+@dataclass
+class Figures:
+    """Counts over photographs."""
+
+    pictures: int = 0
+    people: int = 0
+    found: int = 0
+    false: int = 0
+    similarities: list[float] = field(default_factory=list)
+    #: α of faces that look here, and of people who look away; None without evidence.
+    facing: list[float | None] = field(default_factory=list)
+    away: list[float | None] = field(default_factory=list)
+    processor_ms: list[float] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        facing = [each for each in self.facing if each is not None]
+        away = [each for each in self.away if each is not None]
+        return "\n".join(
+            (
+                f"{self.people} people in {self.pictures} photographs: recall "
+                f"{_share(self.found, self.people)}, false boxes a picture "
+                f"{_share(self.false, self.pictures)}",
+                f"keypoints of {len(self.similarities)} skeletons: OKS "
+                f"{_share(math.fsum(self.similarities), len(self.similarities))}",
+                f"faces that look here: {sum(each >= AWARE for each in facing)} aware of "
+                f"{len(facing)} with an α, of {len(self.facing)} found",
+                f"people who look away: {sum(each >= AWARE for each in away)} aware of "
+                f"{len(away)} with an α, of {len(self.away)} found",
+                f"processor time a picture: {np.median(self.processor_ms):.0f} ms (median)",
+            )
+        )
+
+
+def read_labels(folder: Path) -> Labels:
+    """Return the people in every labelled photograph of a folder.
 
     Raises:
-        AwarenavError: for a folder without labels, and for labels that are not boxes.
+        AwarenavError: for a folder without labels, and for labels of another form.
     """
     path = folder / LABELS
     if not path.is_file():
         raise AwarenavError(f"{folder} must hold photographs and {LABELS}, which is missing")
     labels: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return {
-        name: [read_person({"box_xyxy_px": box}, name) for box in label["people_xyxy_px"]]
+        name: [_label(each, name) for each in label["people"]]
         for name, label in sorted(labels.items())
     }
 
 
-def find_people(
-    folder: Path,
-    names: list[str],
-    networks: Path | None = None,
-    fov_rad: float = math.radians(60.0),
-) -> People:
-    """Run the pipeline on the photographs of a folder.
+def _label(person: dict[str, Any], name: str) -> Label:
+    box = np.asarray(person.get("box_xyxy_px"), dtype=np.float64)
+    keypoints = np.asarray(person.get("keypoints_px"), dtype=np.float64)
+    if box.shape != (4,) or keypoints.shape != (17, 3):
+        raise AwarenavError(
+            f"{name}: a person must have box_xyxy_px (4,) and keypoints_px (17, 3), got "
+            f"{box.shape} and {keypoints.shape}"
+        )
+    return Label(box, keypoints)
+
+
+def measure(
+    folder: Path, labels: Labels, networks: Path | None = None, fov_rad: float = math.radians(60.0)
+) -> Figures:
+    """Run the pipeline on the photographs of a folder and compare it with the labels.
 
     Args:
         folder: the photographs.
-        names: of their files.
-        networks: folder of networks with a manifest; None takes the shipped ones.
+        labels: of :func:`read_labels`.
+        networks: a file for ``--networks`` of ``awarenav estimate``, or a folder of networks with a
+            manifest; None takes the shipped ones.
         fov_rad: horizontal field of view that is assumed of the longer side.
     """
-    found = {}
-    for name in names:
+    figures = Figures()
+    chosen = None
+    if networks is None or not networks.is_dir():
+        choice = NetworkChoice() if networks is None else NetworkChoice.from_yaml(networks)
+        chosen = choose_networks(**choice.model_dump(), threads=1)
+    for name, people in labels.items():
         rgb = read_rgb(folder / name)
         height, width = rgb.shape[:2]
         # The field of view belongs to the longer side, also of an upright photograph.
         focal = 0.5 * max(height, width) / math.tan(0.5 * fov_rad)
         camera = Camera(width, height, focal, focal, 0.5 * width, 0.5 * height)
-        found[name] = [estimated(each) for each in pipeline_of(camera, networks).process(rgb, 0.0)]
-    return found
+        recorder = None if chosen is None else _Recorder(chosen.pose_estimator)
+        if chosen is None or recorder is None:
+            pipeline = pipeline_of(camera, networks)
+        else:
+            pipeline = chosen.pipeline(camera, recorder)
+        _count(figures, pipeline, recorder, rgb, people)
+    return figures
+
+
+def _count(
+    figures: Figures,
+    pipeline: AwarenessPipeline,
+    recorder: _Recorder | None,
+    rgb: NDArray[np.uint8],
+    people: list[Label],
+) -> None:
+    """Add one photograph to the figures."""
+    began = time.process_time()
+    observations = pipeline.process(rgb, 0.0)
+    figures.processor_ms.append(1e3 * (time.process_time() - began))
+    boxes = np.array([each.box_xyxy_px for each in observations]).reshape(-1, 4)
+    truth = np.array([each.box_xyxy_px for each in people]).reshape(-1, 4)
+    partner = dict(matched(truth, boxes, _MIN_IOU))
+    smallest_px = _SMALLEST_SHARE * rgb.shape[0]
+    figures.pictures += 1
+    figures.false += sum(
+        row not in partner.values() and box[3] - box[1] >= smallest_px
+        for row, box in enumerate(boxes)
+    )
+    for row, label in enumerate(people):
+        if label.box_xyxy_px[3] - label.box_xyxy_px[1] < smallest_px:
+            continue
+        figures.people += 1
+        if row not in partner:
+            continue
+        figures.found += 1
+        seen = observations[partner[row]]
+        if label.facing is not None:
+            (figures.facing if label.facing else figures.away).append(seen.awareness)
+        person = None if recorder is None else recorder.people[boxes[partner[row]].tobytes()]
+        similarity = None if person is None else label.similarity(person)
+        if person is not None and similarity is not None and person.scores.any():
+            figures.similarities.append(similarity)
+
+
+class _Recorder:
+    """A pose estimator that keeps its results by the person's box."""
+
+    def __init__(self, pose_estimator: PoseEstimator) -> None:
+        self._pose_estimator = pose_estimator
+        self.people: dict[bytes, PersonKeypoints] = {}
+
+    def estimate(
+        self, image_rgb: Any, detections: tuple[PersonDetection, ...]
+    ) -> tuple[PersonKeypoints, ...]:
+        """Return the results of the pose estimator."""
+        people = self._pose_estimator.estimate(image_rgb, detections)
+        self.people |= {
+            each.box_xyxy_px.tobytes(): person
+            for each, person in zip(detections, people, strict=True)
+        }
+        return people
 
 
 def read_rgb(path: Path) -> NDArray[np.uint8]:
@@ -86,40 +242,17 @@ def read_rgb(path: Path) -> NDArray[np.uint8]:
     return np.ascontiguousarray(np.asarray(bgr, dtype=np.uint8)[..., ::-1])
 
 
-def figures(truth: People, found: People) -> str:
-    """Return recall and false positives of all people, however small, in a line."""
-    metrics = judge_frames(truth, found, min_height_px=0.0)
-    overall, false = metrics["overall"], metrics["detection"]["false_positives_per_frame"]
-    recall = "–" if overall["recall"] is None else f"{overall['recall']:.2f}"
-    return (
-        f"{overall['people']} people in {len(truth)} photographs: "
-        f"recall {recall} (wanted {MIN_RECALL:g}), "
-        f"false positives a picture {false:.2f} (at most {MAX_FALSE_PER_PICTURE:g})"
-    )
-
-
-def aware_lines(found: People) -> list[str]:
-    """Return a line for everybody with α ≥ 0.5, people and things alike."""
-    return [
-        f"{name}: α = {each.awareness:.2f} ± {each.awareness_std or 0.0:.2f}, score "
-        f"{each.score:.2f}, at {', '.join(f'{edge:.0f}' for edge in each.box_xyxy_px.tolist())}"
-        for name, people in found.items()
-        for each in people
-        if each.awareness is not None and each.awareness >= AWARE and each.box_xyxy_px is not None
-    ]
+def _share(part: float, whole: int) -> str:
+    return f"{part / whole:.2f}" if whole else "–"
 
 
 def run(parser: argparse.ArgumentParser, chosen: argparse.Namespace) -> None:
-    """Print the figures and the people with α ≥ 0.5."""
+    """Print the figures."""
     try:
-        truth = read_labels(chosen.folder)
-        found = find_people(chosen.folder, list(truth), chosen.networks, math.radians(chosen.fov))
+        labels = read_labels(chosen.folder)
+        print(measure(chosen.folder, labels, chosen.networks, math.radians(chosen.fov)))
     except AwarenavError as cause:
         parser.error(str(cause))
-    print(figures(truth, found))
-    lines = aware_lines(found)
-    print(f"α ≥ {AWARE:g}: {len(lines) or 'nobody'}")
-    print("\n".join(lines))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

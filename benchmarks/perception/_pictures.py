@@ -269,7 +269,11 @@ def add_pictures(parser: argparse.ArgumentParser) -> None:
 def add_networks(parser: argparse.ArgumentParser) -> None:
     """Add the option that chooses networks."""
     parser.add_argument(
-        "--networks", type=Path, metavar="DIR", help="folder of networks with their manifest"
+        "--networks",
+        type=Path,
+        metavar="DIR",
+        help="folder of networks with their manifest; of photographs also a file as for "
+        "`awarenav estimate --networks`",
     )
 
 

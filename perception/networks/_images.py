@@ -57,6 +57,12 @@ def _conversion_hint(image: NDArray[Any]) -> str:
 _DTYPES: Final = ("float32", "float16", "uint8")
 
 
+def has_channels_last(model: OnnxModel) -> bool:
+    """Return whether the one input of a network is (N, height, width, 3), as in TensorFlow."""
+    shape = model.inputs[0].shape if len(model.inputs) == 1 else ()
+    return len(shape) == 4 and shape[3] == 3 and shape[1] != 3
+
+
 def input_batch(model: OnnxModel) -> int | None:
     """Return the extent of the batch axis of a network with one image input; None if it is free.
 
@@ -76,16 +82,20 @@ def input_batch(model: OnnxModel) -> int | None:
     return shape[0]
 
 
-def input_dtype(model: OnnxModel) -> str:
-    """Return the number type of the input: ``"float32"``, ``"float16"`` or ``"uint8"``.
+def input_dtype(model: OnnxModel, known: tuple[str, ...] = _DTYPES) -> str:
+    """Return the number type of the input, such as ``"float32"``.
+
+    Args:
+        model: a network with one input.
+        known: types that the network may have.
 
     Raises:
         PerceptionError: for another type.
     """
     tensor = model.inputs[0]
-    if tensor.dtype not in _DTYPES:
+    if tensor.dtype not in known:
         raise PerceptionError(
-            f"{model.name}: input {tensor} is not one of the known types {', '.join(_DTYPES)}"
+            f"{model.name}: input {tensor} is not one of the known types {', '.join(known)}"
         )
     return tensor.dtype
 
@@ -96,7 +106,7 @@ def input_size(
     """Return the height and width to run ``model`` at.
 
     Args:
-        model: a network with an input (N, 3, height, width).
+        model: a network with an input (N, 3, height, width) or (N, height, width, 3).
         requested_hw_px: the caller's choice, or None; it must agree with extents that are fixed.
         default_hw_px: for extents that the network leaves free and the caller does not give.
 
@@ -104,7 +114,8 @@ def input_size(
         PerceptionError: for a choice that is not two whole numbers ≥ 1 or does not agree with the
             network, and for a free extent without choice or default.
     """
-    fixed = model.inputs[0].shape[2:]
+    shape = model.inputs[0].shape
+    fixed = shape[1:3] if has_channels_last(model) else shape[2:]
     requested = None if requested_hw_px is None else _checked_size(requested_hw_px)
     size = []
     for axis, extent in enumerate(fixed):
@@ -141,7 +152,7 @@ def _checked_size(requested_hw_px: Any) -> tuple[int, int]:
 
 
 def run_on_images(model: OnnxModel, blob: NDArray[Any]) -> list[NDArray[Any]]:
-    """Run a network on a batch of images (N, 3, height, width)."""
+    """Run a network with one input on a batch of images, in the shape that it takes."""
     return model.run({model.inputs[0].name: blob})
 
 

@@ -23,6 +23,7 @@ from ..conditions import (
     Conditions,
     Perception,
     changed_scenario,
+    refuse_unused_networks,
     table_name,
 )
 from ..scenario import Scenario, ScenarioTemplate
@@ -47,7 +48,7 @@ class Setup:
         planner: a planner; or its name, as for :func:`make_planner`.
         fault: a fault of sensors, detections or odometry; None for none.
         noise: noise of the keypoint camera; None for the default.
-        pipeline: pipeline for ``"pixels"``; None for the shipped networks.
+        pipeline: pipeline for ``"pixels"``; None for the scenario's networks.
         renderer: renderer of the images.
     """
 
@@ -81,6 +82,8 @@ class Setup:
             SimError: an unknown or unusable argument.
             NavError: an unknown preset or unusable policy file.
         """
+        sight = Perception.named(perception)
+        refuse_unused_networks(axes, sight.kind)
         drawn = changed(scenario, axes)
         if isinstance(drawn, ScenarioTemplate):
             drawn = drawn.for_seed(seed)
@@ -95,7 +98,7 @@ class Setup:
                 planner_label(driver, drawn)
                 if isinstance(driver, str)
                 else type(check_planner(driver)).__name__,
-                Perception.named(perception).name,
+                sight.name,
                 fault=own_fault.name if own_fault else "",
                 **axis_names(axes),
             ),

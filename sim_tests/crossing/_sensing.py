@@ -73,7 +73,7 @@ class Sensing:
         seed: of the episode.
         cone: attention cone; None for the default.
         noise: noise of the keypoint camera; None for the default.
-        pipeline: pipeline for pixels; None for the shipped networks.
+        pipeline: pipeline for pixels; None for the scenario's networks.
         fault: a fault of the sensors; None for none.
 
     Raises:

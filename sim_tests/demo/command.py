@@ -22,7 +22,7 @@ from ..conditions import Experiment, conditions_options
 @options.out_folder("demo")
 @option("--no-video", is_flag=True, help="Write no films (faster).")
 @conditions_options(
-    without=("scenario", "policy", "planner", "sensors", "camera", "fault"),
+    without=("scenario", "policy", "planner", "sensors", "camera", "networks", "fault"),
     perception={"type": OneOf(["keypoints", "pixels"]), "note": " 'pixels' takes many minutes."},
 )
 @options.as_json("the tables")

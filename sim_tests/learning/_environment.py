@@ -21,7 +21,7 @@ from perception.installation import install_command
 from tracking.config import complaints
 
 from ..actors.robot import NOVA_CARTER, RobotModel
-from ..conditions import Perception
+from ..conditions import Perception, refuse_unused_networks
 from ..crossing import (
     STANDING_SPEED_MPS,
     Crossing,
@@ -158,7 +158,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             raise SimError(f"render_mode must be 'rgb_array' or None, got {render_mode!r}")
         if render_view not in _VIEWS:
             raise SimError(not_one_of("render_view", render_view, _VIEWS))
-        Perception.named(perception)
+        refuse_unused_networks(self._axes, Perception.named(perception).kind)
         self._given: dict[str, Any] = {
             "policy": named_policy(policy)[1],
             "perception": perception,

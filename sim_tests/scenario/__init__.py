@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from ._distributions import Choice, Distribution, Integers, read_distribution
     from ._files import SCENARIO_SETS, shipped_scenarios
     from ._for_robot import scenario_for_robot
+    from ._networks import load_networks
     from ._scenario import CameraSpec, RobotTask, Scenario
     from ._template import ScenarioTemplate, shipped_templates
 
@@ -22,6 +23,7 @@ __all__ = [
     "RobotTask",
     "Scenario",
     "ScenarioTemplate",
+    "load_networks",
     "read_distribution",
     "scenario_for_robot",
     "shipped_scenarios",

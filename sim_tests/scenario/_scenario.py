@@ -195,6 +195,9 @@ class Scenario(SimConfig):
             :class:`~sim_tests.actors.robot.RobotModel`; None for the Nova Carter. See
             :func:`~sim_tests.scenario.scenario_for_robot`, which fits room and time as well.
         camera: the robot's camera; a robot model has its place.
+        networks: networks for the pictures of the camera, instead of the shipped ones: the keys of
+            a file for ``--networks``, and ``sha256`` of each file among them; see
+            :meth:`ScenarioTemplate.with_networks`.
         scanners: the robot's laser scanners; they are used where a crossing asks for them.
         people: people who look, react and walk by themselves; names are unique.
         population: habits of the people: ``"classic"``, or ``"recorded"`` as fitted to recorded
@@ -220,6 +223,7 @@ class Scenario(SimConfig):
     robot: RobotTask
     robot_model: Annotated[RobotModel | None, BeforeValidator(_robot_model)] = None
     camera: CameraSpec = CameraSpec()
+    networks: dict[str, Any] = Field(default_factory=dict)
     scanners: tuple[ScannerSpec, ...] = DIAGONAL_SCANNERS
     people: tuple[PersonSpec, ...] = ()
     population: PopulationName = DEFAULT_POPULATION

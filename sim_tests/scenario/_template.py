@@ -27,6 +27,7 @@ from ._files import (
     shipped_text,
 )
 from ._for_robot import scenario_for_robot
+from ._networks import networks_data
 from ._scenario import Scenario
 
 # The key of a robot to which the scenario is fitted.
@@ -198,6 +199,23 @@ class ScenarioTemplate:
             return self
         return ScenarioTemplate(
             {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
+        )
+
+    def with_networks(self, path: str | Path) -> ScenarioTemplate:
+        """Return the same scenario with other networks for the pictures of its camera.
+
+        Args:
+            path: a YAML file as for ``--networks`` of ``awarenav estimate``; empty for the
+                scenario's own.
+
+        Raises:
+            SimError: for a file that cannot be read, and networks that cannot be loaded.
+        """
+        if not path:
+            return self
+        networks = networks_data(path)
+        return ScenarioTemplate(
+            {**self._data, "networks": networks}, f"{self._source} with networks {path}"
         )
 
     def with_population(self, text: str) -> ScenarioTemplate:

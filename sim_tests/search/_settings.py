@@ -16,7 +16,13 @@ from tqdm import tqdm
 from awarenav.files import write_text
 from perception.documents import parse_json, read_json
 
-from ..conditions import REFERENCE_PLANNER, Experiment, Perception, option_words
+from ..conditions import (
+    REFERENCE_PLANNER,
+    Experiment,
+    Perception,
+    option_words,
+    refuse_unused_networks,
+)
 from ..crossing import named_policy
 from ..scenario import ScenarioTemplate
 from ..study.measures import EpisodeRecord, nondeterminism_notes
@@ -71,6 +77,7 @@ def common_settings(experiment: Experiment) -> dict[str, Any]:
         NavError: an unusable policy.
     """
     name, own_policy = named_policy(experiment.one("policy"))
+    refuse_unused_networks(experiment.changes, experiment["perception"])
     templates = named_templates(experiment["scenario"], **experiment.changes)
     return {
         "policy_name": name,

@@ -69,8 +69,9 @@ def crossings_command(
         PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
     jobs = experiment_jobs(experiment)
-    if experiment["perception"] == "pixels" and set(experiment["sensors"]) != {"scanner"}:
-        # Refuses missing networks before anything runs.
+    sees = experiment["perception"] == "pixels" and set(experiment["sensors"]) != {"scanner"}
+    if sees and not experiment["networks"]:
+        # Refuses missing networks before anything runs; the plan loads others.
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
     if sample is not None:
         jobs = sample_jobs(jobs, sample, experiment["seed"])

@@ -128,6 +128,19 @@ def test_rows_that_are_missing_or_not_whole_are_measured(tmp_path):
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.csv")} == whole
 
 
+def test_networks_of_a_row_see_pixels_and_belong_to_it(tmp_path):
+    networks = tmp_path / "real.yaml"
+    networks.write_text("head: pnp")
+    plain = Row(name="mine", policy="balanced", sensors="camera+scanner")
+    row = plain.model_copy(update={"networks": str(networks)})
+    (job,) = row.jobs([ScenarioTemplate.shipped("blind_corner")], [0])
+    assert (job.perception, job.networks) == ("pixels+scanner", "real")
+    assert row.senses == "camera+scanner with real"
+    digests = [plain.digest, row.digest]
+    networks.write_text("head: fused")
+    assert len({*digests, row.digest}) == 3
+
+
 @pytest.mark.parametrize(
     ("changed", "message"),
     [

@@ -1,4 +1,4 @@
-"""A pose estimator that runs any SimCC network: keypoints in the image and in metres."""
+"""A pose estimator that runs SimCC networks and MoveNet: keypoints in the image and in metres."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from .._images import (
     IMAGENET_MEAN_RGB,
     IMAGENET_STD_RGB,
     PixelFormat,
+    has_channels_last,
     input_batch,
     input_dtype,
     input_size,
@@ -25,27 +26,28 @@ from .._images import (
 from .._model import ModelSource, as_onnx_model
 from .._settings import OnnxSettings
 from ._crops import BOX_PADDING, PersonCrops
+from ._layouts import PoseLayout, metadata_number
 from ._lift import lift_keypoints
-from ._simcc import (
-    PoseLayout,
-    metadata_number,
-    recognise,
-    simcc_confidence,
-    simcc_depth_m,
-    simcc_peaks,
-)
+from ._movenet import MOVENET_DTYPES, RawPixels, recognise_movenet
+from ._simcc import recognise_simcc
 
 # Larger batches need more memory and are not faster per person.
 _MAX_BATCH: Final = 16
 
 
 class OnnxPoseEstimator:
-    """A top-down pose network from an ONNX file: RTMPose, RTMW, RTMW3D or the shipped one.
+    """A top-down pose network from an ONNX file: RTMPose, RTMW, RTMW3D, MoveNet or the shipped one.
 
-    Keypoint positions are refined between the bins; the score of a keypoint is the lower
-    of its heights along x and y. A network with a third axis gives depths;
+    Keypoint positions of SimCC networks are refined between the bins; the score of a keypoint is
+    the lower of its heights along x and y. A network with a third axis gives depths;
     :func:`~perception.networks.poses.lift_keypoints` describes how the skeleton becomes metric.
-    Without a third axis the skeleton is flat: every z is 0, and ``lifted`` is False.
+    Without a third axis, and from MoveNet, the skeleton is flat: every z is 0, and ``lifted`` is
+    False.
+
+    MoveNet, for one person: input (1, S, S, 3) int32, uint8 or float32, RGB from 0 to 255; output
+    (1, 1, 17, 3), y, x and score of COCO's keypoints, y and x from 0 to 1 across the input
+    (MoveNet.SinglePose model card, Google, 2021). It sees a square about each box, and takes the
+    person who is nearest to its middle.
 
     The people of an image form one batch if the network's batch axis is free, else batches of the
     network's size. Several threads may share an estimator; their calls run one after another.
@@ -72,11 +74,16 @@ class OnnxPoseEstimator:
         # Data sets place keypoints differently on the body, so limbs differ in length.
         self._limb_scale = metadata_number(self.model, "limb_scale", 1.0)
         self._scale_std = metadata_number(self.model, "scale_relative_std", 0.0)
-        batch = input_batch(self.model)
+        self._channels_last = has_channels_last(self.model)
+        self._pixels: PixelFormat | RawPixels
+        if self._channels_last:
+            batch = self.model.inputs[0].shape[0]
+            self._pixels = RawPixels(input_dtype(self.model, MOVENET_DTYPES))
+        else:
+            batch = input_batch(self.model)
+            dtype = input_dtype(self.model)
+            self._pixels = PixelFormat(IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, dtype=dtype)
         self.input_size_hw_px = input_size(self.model, input_size_hw_px, None)
-        self._pixels = PixelFormat(
-            IMAGENET_MEAN_RGB, IMAGENET_STD_RGB, dtype=input_dtype(self.model)
-        )
         self._batch, self._always_full, self._layout = self._recognise(batch)
         self._crop = np.empty((*self.input_size_hw_px, 3), np.uint8)
         self._blob = self._pixels.empty_blob(1, *self.input_size_hw_px)
@@ -145,7 +152,7 @@ class OnnxPoseEstimator:
     def _run(
         self, image: ImageRgb, crops: PersonCrops, rows: NDArray[np.intp]
     ) -> list[NDArray[Any]]:
-        """Return the network's outputs x, y and, if it has one, z for the crops ``rows``."""
+        """Return the network's outputs for the crops ``rows``."""
         batches = []
         for start in range(0, len(rows), self._batch):
             batch = rows[start : start + self._batch]
@@ -156,7 +163,7 @@ class OnnxPoseEstimator:
                 crops.cut(image, int(row), self._crop)
                 self._pixels.write(self._crop, self._blob[place])
             outputs = run_on_images(self.model, self._pixels.as_input(self._blob[:count]))
-            batches.append([outputs[axis][: len(batch)] for axis in self._layout.axes])
+            batches.append([output[: len(batch)] for output in outputs])
         if len(batches) == 1:
             return batches[0]
         return [np.concatenate(parts) for parts in zip(*batches, strict=True)]
@@ -169,17 +176,13 @@ class OnnxPoseEstimator:
         rows: NDArray[np.intp],
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return pixels (n, K, 2), skeletons (n, K, 3) and scores (n, K) of the crops ``rows``."""
-        places, heights = simcc_peaks(outputs)
-        in_crop = places[:2].transpose(1, 2, 0) / self._layout.split_ratio
+        in_crop, depths, scores = self._layout.decode(outputs)
         pixels = crops.to_image(in_crop, rows)
         # Keypoints outside the image were guessed. The slack of one crop pixel allows for rounding.
         extent = np.array([image.shape[1], image.shape[0]])
         slack = 0.5 + crops.step_px[rows, None]
         shown = (pixels > -slack) & (pixels < extent - 1.0 + slack)
-        scores = simcc_confidence(heights, np.asarray(shown.all(axis=2)))
-        depths = None
-        if self.has_depth:
-            depths = simcc_depth_m(places[2], outputs[2].shape[2], self._layout.z_range_m)
+        scores = scores * shown.all(axis=2)
         return pixels, lift_keypoints(pixels, depths, scores, self._limb_scale), scores
 
     def _recognise(self, batch: int | None) -> tuple[int, bool, PoseLayout]:
@@ -205,5 +208,6 @@ class OnnxPoseEstimator:
                 f"{self.model.name} does not return one result per image: {self.model.layout}"
             )
         count, outputs = next(iter(works.items()))
-        layout = recognise(self.model, outputs, height, width)
+        recognise = recognise_movenet if self._channels_last else recognise_simcc
+        layout: PoseLayout = recognise(self.model, outputs, height, width)
         return (_MAX_BATCH, False, layout) if len(works) == 2 else (count, True, layout)

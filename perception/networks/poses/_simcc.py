@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import FloatArray, finite_number
-from ...errors import PerceptionError
-from .._model import OnnxModel, output_shapes
+from ...arrays import FloatArray
+from .._model import OnnxModel
+from ._layouts import metadata_number, unknown_layout
 
 #: Half the depth that RTMW3D's z axis spans about the mid-hip, in metres: ``z_range`` of its codec.
 Z_RANGE_M: Final = 2.1744869
@@ -84,7 +84,7 @@ def simcc_depth_m(places: FloatArray, bins: int, range_m: float = Z_RANGE_M) -> 
     return np.asarray((2.0 / bins * range_m) * places - range_m)
 
 
-def simcc_confidence(heights: FloatArray, possible: NDArray[np.bool_]) -> FloatArray:
+def simcc_confidence(heights: FloatArray) -> FloatArray:
     """Return the confidence (N, K) of keypoints in [0, 1]: the lower of the heights along x and y.
 
     The height along z does not count, as in OpenMMLab's ``get_simcc_maximum`` for two axes and for
@@ -92,23 +92,18 @@ def simcc_confidence(heights: FloatArray, possible: NDArray[np.bool_]) -> FloatA
 
     Args:
         heights: (2 or 3, N, K) heights of the peaks along x, y and z.
-        possible: (N, K) False for keypoints that the image cannot show; their confidence is 0.
     """
-    possible = possible & (heights[2:] != 0.0).all(axis=0)
+    possible = (heights[2:] != 0.0).all(axis=0)
     return np.asarray(possible * np.minimum(np.maximum(heights[:2].min(axis=0), 0.0), 1.0))
 
 
-_KNOWN: Final = (
-    "RTMPose and RTMW: simcc_x (N, K, s * width), simcc_y (N, K, s * height); "
-    "RTMW3D: simcc_z (N, K, depth bins) beside them; K = 17 (COCO) or 133 (COCO-WholeBody)"
-)
 _KEYPOINTS: Final = {17: "coco", 133: "coco_wholebody"}
 _AXES: Final = ("simcc_x", "simcc_y", "simcc_z")
 
 
 @dataclass(frozen=True, slots=True)
-class PoseLayout:
-    """Layout of a pose network's outputs.
+class SimccLayout:
+    """Layout of a SimCC network's outputs.
 
     Attributes:
         keypoints: name of the keypoint layout: ``"coco"`` or ``"coco_wholebody"``.
@@ -127,11 +122,23 @@ class PoseLayout:
         """True if the network gives the depths of the keypoints."""
         return len(self.axes) == 3
 
+    def decode(
+        self, outputs: Sequence[NDArray[Any]]
+    ) -> tuple[FloatArray, FloatArray | None, FloatArray]:
+        """Return pixels (n, K, 2) of the crop, depths (n, K) or None, and scores (n, K)."""
+        axes = [outputs[axis] for axis in self.axes]
+        places, heights = simcc_peaks(axes)
+        depths = None
+        if self.has_depth:
+            depths = simcc_depth_m(places[2], axes[2].shape[2], self.z_range_m)
+        pixels = places[:2].transpose(1, 2, 0) / self.split_ratio
+        return pixels, depths, simcc_confidence(heights)
 
-def recognise(
+
+def recognise_simcc(
     model: OnnxModel, outputs: Sequence[NDArray[Any]], height_px: int, width_px: int
-) -> PoseLayout:
-    """Recognise the layout of a pose network from the outputs of a trial run.
+) -> SimccLayout:
+    """Recognise the layout of a SimCC network from the outputs of a trial run.
 
     Outputs called simcc_x, simcc_y and simcc_z are found by their names; outputs with other names
     are taken in this order.
@@ -139,13 +146,7 @@ def recognise(
     Raises:
         PerceptionError: for an unknown layout; the message says what was found and what is known.
     """
-
-    def refusal(reason: str) -> PerceptionError:
-        return PerceptionError(
-            f"{model.name} is not a pose network of a known layout: {reason}. Found input "
-            f"(N, 3, {height_px}, {width_px}) -> {output_shapes(model, outputs)}. Known: {_KNOWN}"
-        )
-
+    refusal = partial(unknown_layout, model, f"(N, 3, {height_px}, {width_px})", outputs)
     if len(outputs) not in (2, 3) or any(output.ndim != 3 for output in outputs):
         raise refusal("it does not have two or three outputs (N, K, bins)")
     names = [tensor.name for tensor in model.outputs]
@@ -164,16 +165,4 @@ def recognise(
     if min(output.shape[2] for output in outputs) < 3:
         raise refusal("an axis has fewer than three bins")
     z_range_m = metadata_number(model, "z_range_m", Z_RANGE_M)
-    return PoseLayout(_KEYPOINTS[count.pop()], axes, split, z_range_m)
-
-
-def metadata_number(model: OnnxModel, key: str, default: float) -> float:
-    """Return a number > 0 from the metadata, which awarenav's exports have, or the default."""
-    if key not in model.metadata:
-        return default
-    return finite_number(
-        f"metadata {key} of {model.name}",
-        model.metadata[key],
-        minimum=0.0,
-        exclusive_minimum=True,
-    )
+    return SimccLayout(_KEYPOINTS[count.pop()], axes, split, z_range_m)

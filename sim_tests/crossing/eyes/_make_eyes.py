@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
-from typing import Final, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
 
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.anthropometry import UNUSUAL_SIZE_PROBABILITY
 from perception.arrays import ImageRgb
+from perception.documents import yaml_text
 from perception.networks import OnnxSettings
 from perception.surround import FlatView
 
 from ...conditions import ORACLE, PerceptionKind
-from ...scenario import CameraSpec, Scenario
+from ...scenario import CameraSpec, Scenario, load_networks
 from ...world.camera import CoarseSceneryRenderer
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
@@ -50,7 +52,7 @@ def make_eyes(
         rng: random generator of the noise.
         cone: attention cone.
         noise: noise of the keypoint camera.
-        pipeline: pipeline for pixels; None for the shipped networks.
+        pipeline: pipeline for pixels; None for the scenario's networks.
         pictures: faults of the pictures; None for none.
 
     Raises:
@@ -83,27 +85,35 @@ def unusual_size_probability(scenario: Scenario) -> float:
     return UNUSUAL_SIZE_PROBABILITY
 
 
-# Scenarios with the same camera and the same people share one, because networks load slowly.
-@lru_cache(maxsize=4)
-def _pipeline(camera: CameraSpec, unusual: float, cone: AttentionCone) -> AwarenessPipeline:
-    """Return the pipeline with the shipped networks for rendered images.
-
-    Args:
-        camera: that of the scenario.
-        unusual: probability of an unusual size that the robot may assume.
-        cone: attention cone.
+def _pipeline(scenario: Scenario, cone: AttentionCone) -> AwarenessPipeline:
+    """Return a pipeline that has seen no image, with the scenario's networks or the shipped ones.
 
     Raises:
         PerceptionError: the shipped networks cannot be loaded.
+        SimError: likewise for those of the scenario.
     """
-    return AwarenessPipeline(
-        camera.camera(camera.picture_scale),
-        cone=cone,
+    unusual = unusual_size_probability(scenario)
+    networks = yaml_text(scenario.networks) if scenario.networks else ""
+    return _shared_pipeline(scenario.camera, unusual, cone, networks).for_another_view()
+
+
+# Scenarios with the same camera and the same people share one, because networks load slowly.
+@lru_cache(maxsize=4)
+def _shared_pipeline(
+    spec: CameraSpec, unusual: float, cone: AttentionCone, networks: str
+) -> AwarenessPipeline:
+    camera = spec.camera(spec.picture_scale)
+    settings: dict[str, Any] = {
+        "cone": cone,
         # Workers in a crossing turn their heads; their eyes follow.
-        eye_in_head_std_rad=0.0,
-        unusual_size_probability=unusual,
-        onnx_settings=_ONE_CORE,
-    )
+        "eye_in_head_std_rad": 0.0,
+        "unusual_size_probability": unusual,
+    }
+    if not networks:
+        return AwarenessPipeline(camera, onnx_settings=_ONE_CORE, **settings)
+    own = load_networks(networks)
+    own = replace(own, settings={**own.settings, **settings})
+    return own.pipeline(camera, own.pose_estimator)
 
 
 def _pixel_eyes(
@@ -114,12 +124,18 @@ def _pixel_eyes(
     pipeline: AwarenessPipeline | None,
     pictures: Change[ImageRgb] | None,
 ) -> list[Eyes]:
-    """Return the eyes of every view; they share networks and renderer."""
+    """Return the eyes of every view; they share networks and renderer, but no image."""
     spec, camera = stage.scenario.camera, views[0].camera
     renderer = CoarseSceneryRenderer(stage.warehouse, spec.scenery_divisor)
-    if pipeline is None:
-        pipeline = _pipeline(spec, unusual_size_probability(stage.scenario), cone)
     return [
-        PixelEyes(stage, camera, spec.sensor, view_rng, pipeline, renderer, pictures)
+        PixelEyes(
+            stage,
+            camera,
+            spec.sensor,
+            view_rng,
+            _pipeline(stage.scenario, cone) if pipeline is None else pipeline,
+            renderer,
+            pictures,
+        )
         for view_rng in ([rng] if len(views) == 1 else rng.spawn(len(views)))
     ]

@@ -29,6 +29,7 @@ from ...conditions import (
     Perception,
     changed_scenario,
     option_words,
+    refuse_unused_networks,
     table_name,
 )
 from ...crossing import named_policy
@@ -75,13 +76,15 @@ def plan_jobs(
             and ``[…]`` in a name stand for all shipped names that fit, as in a shell; in names that
             are joined by ``+`` for every combination.
         axes: the other conditions, which change every scenario: ``camera`` and ``robot`` (a shipped
-            name or a YAML file) and ``population``; empty keeps each scenario's own.
+            name or a YAML file), ``networks`` (a YAML file) and ``population``; empty keeps each
+            scenario's own.
 
     Raises:
         SimError: an unknown or unusable argument, or two episodes with the same conditions.
         NavError: an unknown preset or unusable policy file.
     """
     perceptions = [Perception.of(perception, each).name for each in sensors]
+    refuse_unused_networks(axes, perception)
     templates = _expanded(scenarios, axes)
     policy_texts = [text for each in policies for text in _named_policy(each, perceptions)]
     fault_texts = [_named_fault(each) for given in faults for each in _matching_faults(given)]

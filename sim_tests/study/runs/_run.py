@@ -21,6 +21,7 @@ from tqdm import tqdm
 from awarenav.errors import counted
 from awarenav.files import write_text
 from perception.arrays import finite_number
+from perception.documents import parse_yaml
 
 from ...world.bullet import require_pybullet
 from ...world.errors import SimError
@@ -360,10 +361,21 @@ def _refuse_other_job(folder: Path, number: int, was: Job, job: Job) -> None:
     """Raise SimError, naming the first field in which an episode of the folder differs."""
     before, now = asdict(was), asdict(job)
     name = next(each for each in JOB_FIELDS if before[each] != now[each])
-    values = ""
-    if "\n" not in f"{before[name]}{now[name]}":
-        values = f" ({before[name]!r}, now {now[name]!r})"
+    values = f" ({before[name]!r}, now {now[name]!r})"
+    if "\n" in f"{before[name]}{now[name]}":
+        values = f" ({_difference(before[name], now[name])})"
     raise SimError(
         f"the run in {folder} has other episodes than these: episode {number} has another "
         f"{name}{values}; {_OTHER_WAY}"
     )
+
+
+def _difference(before: str, now: str) -> str:
+    """Return the dotted key of the first difference between two texts of YAML."""
+    old, new = (parse_yaml(text, "it", SimError) for text in (before, now))
+    path: list[str] = []
+    while isinstance(old, dict) and isinstance(new, dict):
+        key = next(key for key in {**old, **new} if old.get(key) != new.get(key))
+        path.append(str(key))
+        old, new = old.get(key), new.get(key)
+    return ".".join(path)

@@ -55,7 +55,10 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
     [
         (["estimat"], "awarenav: No such command 'estimat'. Did you mean 'estimate'?"),
         (["models", "lst"], "awarenav models: No such command 'lst'. Did you mean 'list'?"),
-        (["crossings", "--workrs", "x"], "No such option '--workrs'. Did you mean '--workers'?"),
+        (
+            ["crossings", "--overwrit", "x"],
+            "No such option '--overwrit'. Did you mean '--overwrite'?",
+        ),
         (["--versio"], "No such option '--versio'. Did you mean '--version'?"),
         (["demo", "--perception", "pixel"], "got 'pixel'; did you mean 'pixels'?"),
         (["completion", "bsh"], "got 'bsh'; did you mean 'bash'?"),

@@ -164,6 +164,7 @@ def test_a_camera_that_is_unplugged_is_a_problem_after_its_last_frame(tmp_path):
     [
         ("absent.mp4", r"no such file.*did you mean .*absent\.mov"),
         ("absent.mov", "cannot open video"),
+        ("photo.HEIC", "HEIF picture, which cannot be read: save it as JPEG"),
         ("empty", "has no image"),
         ("99", "cannot open camera"),
         ("²", "no such file or folder: .*²"),
@@ -173,6 +174,7 @@ def test_a_camera_that_is_unplugged_is_a_problem_after_its_last_frame(tmp_path):
 )
 def test_sources_that_cannot_be_opened_are_refused(tmp_path, name, message):
     (tmp_path / "absent.mov").write_bytes(b"no video")
+    (tmp_path / "photo.HEIC").write_bytes(b"a picture of a telephone")
     (tmp_path / "empty").mkdir()
     with pytest.raises(AwarenavError, match=message):
         open_source(name if name.isdigit() else str(tmp_path / name))

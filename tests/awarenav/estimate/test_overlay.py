@@ -18,8 +18,8 @@ from awarenav import drawing
 from awarenav.drawing import Font, awareness_colour
 from awarenav.errors import AwarenavError
 from awarenav.estimate import FrameEstimate, OverlayWriter, SourceFrame
-from awarenav.estimate._labels import Box, Labelled, leader, meet, place_labels
 from awarenav.estimate._overlay import draw_overlay, fit_image
+from awarenav.estimate._places import Box, Labelled, leader, meet, place_labels
 from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
 
 CONE = AttentionCone()
@@ -203,9 +203,7 @@ def test_any_estimate_can_be_drawn(x_m, z_m, yaw, pitch, alpha, std, box, size):
     image = numbered(3, size)
     camera = Camera.from_fov(*size, 1.0)
     person = standing_at(x_m, z_m + 1.0)
-    keypoints = PersonKeypoints(
-        np.nan_to_num(person.keypoints_px), person.keypoints_root_m, person.scores, "coco"
-    )
+    keypoints = PersonKeypoints(person.keypoints_px, person.keypoints_root_m, person.scores, "coco")
     drawn = draw_overlay(estimate(seen, keypoints=(keypoints,), image=image, camera=camera), CONE)
     assert drawn.shape == image.shape
 

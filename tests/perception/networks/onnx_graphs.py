@@ -21,6 +21,7 @@ _TYPES = {
     "float32": TensorProto.FLOAT,
     "float16": TensorProto.FLOAT16,
     "uint8": TensorProto.UINT8,
+    "int32": TensorProto.INT32,
 }
 # Names of weights in the heads of OpenMMLab's detectors.
 RTMDET_HEAD = "bbox_head.rtm_cls.0.weight"
@@ -252,6 +253,25 @@ def red_point_pose(
         value, bins = outputs[axis]
         name = f"simcc_{axis}" if named else f"out_{place}"
         graph.output(value, name, (batch, 17, bins))
+    return graph.bytes()
+
+
+def red_point_movenet(
+    size: int, scores: Sequence[float], *, dtype: str = "int32", batch: int | str = 1
+) -> bytes:
+    """Return a MoveNet whose 17 keypoints lie at the reddest column and row of the image."""
+    graph = Graph("input", (batch, size, size, 3), dtype=dtype)
+    red = graph.node("Slice", graph.pixels, *(graph.constant([v], np.int64) for v in (0, 1, 3)))
+    places = []
+    for across in (2, 1):  # y, then x
+        peak = graph.node("ReduceMax", red, axes=[across, 3], keepdims=0)  # (1, size)
+        place = graph.node("ArgMax", peak, axis=1, keepdims=1)
+        place = graph.node("Cast", place, to=TensorProto.FLOAT)
+        middle = graph.node("Add", place, graph.constant([0.5]))
+        share = graph.node("Div", middle, graph.constant([float(size)]))  # (1, 1)
+        places.append(graph.node("Expand", share, graph.constant([1, 1, 17, 1], np.int64)))
+    column = graph.constant(np.reshape(scores, (1, 1, 17, 1)))
+    graph.output(graph.node("Concat", *places, column, axis=3), "output_0", (1, 1, 17, 3))
     return graph.bytes()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from onnx_graphs import fixed, red_point_pose, simcc
+from onnx_graphs import Graph, fixed, red_point_movenet, red_point_pose, simcc
 from scipy.spatial.transform import Rotation
 
 from perception import Camera, PerceptionError, PersonDetection, PersonKeypoints, PoseEstimator
@@ -226,6 +226,64 @@ def test_any_box_on_any_image_gives_one_person(
     assert (seen >= -slack).all()
     assert (seen <= np.array([width, height]) - 1.0 + slack).all()
     assert bool(len(seen)) <= bool(crop.inside(image)[0])
+
+
+# --- MoveNet --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", ["int32", "uint8", "float32"])
+@pytest.mark.parametrize("batch", [1, "batch"])
+def test_movenet_finds_a_red_dot_of_each_person_at_its_pixel(dtype: str, batch: int | str) -> None:
+    """Its output is y, x; the picture that it sees is a square, black beyond the image's border."""
+    scores = np.linspace(0.0, 1.0, 17)
+    estimator = OnnxPoseEstimator(red_point_movenet(192, scores, dtype=dtype, batch=batch))
+    assert isinstance(estimator, PoseEstimator)
+    assert (estimator.layout, estimator.has_depth) == ("coco", False)
+    assert estimator.input_size_hw_px == (192, 192)
+    image = np.maximum(red_dot(100.0, 300.0), red_dot(500.0, 200.0))
+    boxes = ([0.0, 60.0, 160.0, 440.0], [430.0, 60.0, 590.0, 440.0])
+    people = estimator.estimate(image, tuple(PersonDetection(np.array(b), 0.9) for b in boxes))
+    for person, wanted in zip(people, ((100.0, 300.0), (500.0, 200.0)), strict=True):
+        # A pixel of the crop is 2.5 of the image.
+        np.testing.assert_allclose(person.keypoints_px, [wanted] * 17, atol=1.5)
+        np.testing.assert_allclose(np.diff(person.scores) > 0.0, [True] * 16)
+        assert not person.lifted
+
+
+def test_movenets_keypoints_that_are_not_finite_have_scores_of_0() -> None:
+    scores = np.full(17, 0.8)
+    scores[3], scores[4] = math.nan, 1.5
+    (person,) = OnnxPoseEstimator(red_point_movenet(64, scores)).estimate(
+        red_dot(300.0, 200.0), (MIDDLE,)
+    )
+    assert (person.scores[3], person.scores[4]) == (0.0, 1.0)
+
+
+def test_movenets_keypoints_outside_the_image_have_scores_of_0() -> None:
+    """In a picture without red, the network's keypoints lie in the corner of its crop."""
+    corner = PersonDetection(np.array([0.0, 0.0, 100.0, 100.0]), 0.9)
+    (person,) = OnnxPoseEstimator(red_point_movenet(64, np.full(17, 0.8))).estimate(
+        IMAGE, (corner,)
+    )
+    assert (person.keypoints_px < -5.0).all()
+    assert (person.scores == 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("shape", "output", "reason"),
+    [
+        ((1, 256, 256, 3), (1, 6, 56), "only MoveNet for one person is known"),
+        ((1, 256, 192, 3), (1, 1, 17, 3), "only MoveNet for one person is known"),
+    ],
+)
+def test_other_networks_with_the_channels_last_are_refused(
+    shape: tuple[int, ...], output: tuple[int, ...], reason: str
+) -> None:
+    graph = Graph("input", shape, dtype="int32")
+    graph.output(graph.node("Add", graph.constant(np.zeros(output)), graph.zero()), "out", output)
+    with pytest.raises(PerceptionError, match=reason) as refused:
+        OnnxPoseEstimator(graph.bytes())
+    assert "MoveNet: (1, size, size, 3)" in str(refused.value)
 
 
 @pytest.mark.parametrize(
