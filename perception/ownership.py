@@ -116,11 +116,13 @@ _NECK_M: Final = 0.55
 # From the middle of the shoulders to that of nose, eyes and ears, away from the hips.
 _HEAD_ABOVE_M: Final = 0.22
 _UP_CAMERA: Final = np.array([0.0, -1.0, 0.0])
-# Of a head that looks towards the camera: no neck turns farther from the shoulders, which are so
-# wide, and no nose, eyes and ears lie farther from the middle of the shoulders.
-_MOST_NECK_TURN_RAD: Final = math.radians(100.0)
-_SHOULDERS_M: Final = 0.36
+# Of a head that looks towards the camera: no neck turns farther from shoulders and hips, which are
+# so wide, and no nose, eyes and ears lie farther from the middle of the shoulders.
+_MOST_NECK_TURN_RAD: Final = math.radians(95.0)
+_SHOULDERS_M, _HIPS_M = 0.36, 0.16
 _FACE_FROM_NECK_M: Final = 0.28
+# Shoulders with this share of the score of seen points still tell whose head it is.
+_SHOULDERS_SHARE: Final = 0.5
 
 
 def disowned_keypoints(
@@ -181,9 +183,10 @@ def own_heads(
     """Return people and heads without the heads that look here and are not the person's own.
 
     A pose network puts nose and eyes on the best face that it sees: of a neighbour, or on a
-    photograph. Such a head often is too far from the shoulders, or looks at the camera over
-    shoulders whose back is turned: the left one at the image's left. Nobody turns the neck by more
-    than 100°. A head that looks away is left as it is: whoever it belongs to, it is unaware.
+    photograph. Such a head often lies farther than 0.28 m from the middle of the shoulders, or
+    looks at the camera over a trunk that turns its back: left shoulder and hip at the image's left.
+    Nobody turns the head by more than 95° from the trunk. A head that looks away is left as it is:
+    whoever it belongs to, it is unaware. Without both shoulders nothing tells.
 
     Args:
         camera: camera of the image.
@@ -202,11 +205,10 @@ def own_heads(
     return tuple(people), tuple(own)
 
 
-def _is_anothers(
-    camera: Camera, person: PersonKeypoints, head: HeadPose, min_score: float
-) -> bool:
+def _is_anothers(camera: Camera, person: PersonKeypoints, head: HeadPose, min_score: float) -> bool:
     """Return whether a head looks towards the camera that these shoulders cannot carry."""
     seen = person.scores[kp.BODY] >= min_score
+    seen[kp.SHOULDERS] = person.scores[kp.SHOULDERS] >= _SHOULDERS_SHARE * min_score
     away = float(head.gaze_camera @ head.position_camera_m)
     if not seen[kp.SHOULDERS].all() or away >= 0.0:
         return False
@@ -219,11 +221,13 @@ def _is_anothers(
         off = rays[kp.HEAD][shown].mean(axis=0) - neck
         if float(np.linalg.norm(off)) > _FACE_FROM_NECK_M * scale:
             return True
-    up = neck - rays[kp.HIPS].mean(axis=0) if seen[kp.HIPS].all() else _UP_CAMERA
+    up, left, wide_m = _UP_CAMERA, rays[kp.LEFT_SHOULDER] - rays[kp.RIGHT_SHOULDER], _SHOULDERS_M
+    if seen[kp.HIPS].all():
+        up = neck - rays[kp.HIPS].mean(axis=0)
+        left, wide_m = left + rays[kp.LEFT_HIP] - rays[kp.RIGHT_HIP], wide_m + _HIPS_M
     right = np.cross(neck, up)
-    left_to_right = rays[kp.LEFT_SHOULDER] - rays[kp.RIGHT_SHOULDER]
-    facing = float(left_to_right @ right) / max(float(np.linalg.norm(right)) * scale, 1e-9)
-    torso_rad = math.acos(min(max(facing / _SHOULDERS_M, -1.0), 1.0))
+    across = float(left @ right) / max(float(np.linalg.norm(right)) * scale, 1e-9)
+    torso_rad = math.acos(min(max(across / wide_m, -1.0), 1.0))
     head_rad = math.acos(min(-away / float(np.linalg.norm(head.position_camera_m)), 1.0))
     return torso_rad - head_rad > _MOST_NECK_TURN_RAD
 

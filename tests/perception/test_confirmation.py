@@ -55,6 +55,12 @@ def test_the_odds_are_multiplied(score, seen):
     assert found == pytest.approx(wanted / (1.0 + wanted), rel=1e-6, abs=1e-9)
 
 
+@given(st.floats(0.01, 0.99), st.floats(0.01, 0.99))
+def test_the_neutral_point_of_another_pose_network_leaves_a_score_as_it_is(score, neutral):
+    rule = KeypointConfirmation(score_threshold=0.0, neutral=neutral)
+    assert rule.score(detection(score), keypoints(neutral)) == pytest.approx(score, abs=1e-9)
+
+
 def test_four_hidden_keypoints_do_not_count():
     half = keypoints(*[0.0] * 4, *[0.8] * 13)
     assert RULE.score(detection(0.3), half) == RULE.score(detection(0.3), keypoints(0.8))

@@ -175,6 +175,7 @@ STAGES: list[Refused] = [
     (lambda: pipeline(min_score=1.5), "min_score"),
     (lambda: pipeline(detect_every_s=0.21), "detect_every_s"),
     (lambda: KeypointConfirmation(1.5), "score_threshold"),
+    (lambda: KeypointConfirmation(neutral=-0.1), "neutral must lie in"),
     (lambda: FusedHeadPoseEstimator(Still()), "two or more"),
     (lambda: FusedHeadPoseEstimator(Still(), 5), "estimate"),
     (
