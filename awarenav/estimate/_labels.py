@@ -84,33 +84,28 @@ def _labelled(person: Person, camera: Camera, font: Font, picture: Size) -> Labe
         box = np.array([u, v, u, v]) if math.isfinite(u) else np.zeros(4)
     return Labelled(
         _inside(box, picture),
-        _inside(_head_px(box, person), picture),
+        _inside(_head_px(box, person.keypoints), picture),
         _label_sizes(person, font),
         None if person.arrow_px is None else _inside(_around(person.arrow_px), picture),
     )
 
 
-def _head_px(box: FloatArray, person: Person) -> FloatArray:
-    """Return the box (4,) around a head: around its keypoints, else the top fifth of the person.
+def _head_px(box: FloatArray, keypoints: PersonKeypoints | None) -> FloatArray:
+    """Return the box (4,) around a person's top fifth and the keypoints of the head.
 
-    Keypoints that gave no α may lie elsewhere: then it is around both.
+    Somebody bent has the head elsewhere than at the top, and keypoints may be a neighbour's.
     """
     height = box[3] - box[1]
-    top = np.array([box[0], box[1], box[2], box[1] + 0.2 * height])
-    keypoints = person.keypoints
+    top = np.array([box[:2], (box[2], box[1] + 0.2 * height)])
     if keypoints is None:
-        return top
+        return _around(top)
     points = keypoints.keypoints_px[list(HEAD)][keypoints.scores[list(HEAD)] >= SEEN_SCORE]
     if not len(points):
-        return top
-    around = _around(points)
+        return _around(top)
+    low, high = points.min(axis=0), points.max(axis=0)
     # From ear to ear a head is two thirds of its height; a profile shows less.
-    wide = float((around[2:] - around[:2]).max())
-    margin = max(0.75 * wide, 0.06 * height)
-    around += np.array([-margin, -margin, margin, margin])
-    if person.observation.awareness is None:
-        return _around(np.stack([around[:2], around[2:], top[:2], top[2:]]))
-    return around
+    margin = max(0.75 * float((high - low).max()), 0.06 * height)
+    return _around(np.vstack([top, low - margin, high + margin]))
 
 
 def _around(points: FloatArray) -> FloatArray:
