@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import expit
 
 from ..._stages import PersonDetection, PersonKeypoints
-from ...arrays import ImageRgb
+from ...arrays import FloatArray, ImageRgb
 from ...errors import PerceptionError
 from .._images import rgb_image
 from .._settings import OnnxSettings
@@ -33,8 +33,15 @@ _SIDE_PX: Final = 256
 _OUTPUTS: Final = (5 * _COUNT, 1, 3 * _COUNT)
 # The square about a person, in sides of their box: the best of 1.0 to 1.8 on labelled photographs.
 _PADDING: Final = 1.4
-#: Smallest probability of a person in a box; MediaPipe's own limit.
+# Smallest probability of a person in a box; MediaPipe's own limit.
 _PERSON: Final = 0.5
+# A box that the image cuts at its top or bottom shows a part of a person. The network would fit a
+# whole body into it, so its height becomes so many widths; from there two further points lead to
+# the whole person: the mid-hip and one on a circle about the body. A second run begins from them.
+_WHOLE_HEIGHT: Final = 3.0
+_BORDER_PX: Final = 3.0
+_HIP, _CIRCLE = 33, 34
+_CIRCLE_PADDING: Final = 1.25
 
 
 class BlazePoseEstimator:
@@ -88,37 +95,61 @@ class BlazePoseEstimator:
             PerceptionError: for an image of another type or shape, and when the network fails.
         """
         image = rgb_image(image_rgb)
-        boxes = np.array([each.box_xyxy_px for each in detections]).reshape(-1, 4)
-        crops = PersonCrops(boxes, _SIDE_PX, _SIDE_PX, _PADDING)
-        shown = crops.inside(image)
-        return tuple(
-            self._person(image, crops, row) if shown[row] else _unseen(crops, row)
-            for row in range(len(boxes))
-        )
+        return tuple(self._person(image, each.box_xyxy_px) for each in detections)
 
-    def _person(self, image: ImageRgb, crops: PersonCrops, row: int) -> PersonKeypoints:
-        crop = np.empty((_SIDE_PX, _SIDE_PX, 3), np.uint8)
-        crops.cut(image, row, crop)
-        outputs = self.model.run(crop[None].astype(np.float32) / np.float32(255.0))
-        points, person, metres = (outputs[str(name)].ravel() for name in self._names)
-        points = points.reshape(_COUNT, 5)[list(_POINTS)].astype(np.float64)
-        root_m = metres.reshape(_COUNT, 3)[list(_POINTS)].astype(np.float64)
-        # The network counts from the crop's corner, keypoints from the middle of the first pixel.
-        pixels = crops.to_image(points[None, :, :2] - 0.5, np.array([row]))[0]
-        if not (person[0] >= _PERSON and np.isfinite(points).all() and np.isfinite(root_m).all()):
-            return _unseen(crops, row)
+    def _person(self, image: ImageRgb, box: FloatArray) -> PersonKeypoints:
+        whole, cut = _whole_box(box, image.shape[0])
+        found = self._run(image, whole, _PADDING)
+        if cut and found is not None:
+            points, *_ = found
+            radius = float(np.linalg.norm(points[_CIRCLE, :2] - points[_HIP, :2]))
+            around = np.concatenate([points[_HIP, :2] - radius, points[_HIP, :2] + radius])
+            found = self._run(image, around + 0.5, _CIRCLE_PADDING)
+        if found is None:
+            return _unseen(box)
+        points, root_m = (each[list(_POINTS)] for each in found)
+        pixels = points[:, :2]
         scores = expit(points[:, 3:].min(axis=1))
         extent = np.array([image.shape[1], image.shape[0]])
         scores[((pixels < -0.5) | (pixels > extent - 0.5)).any(axis=1)] = 0.0
         return PersonKeypoints(pixels, root_m, scores, "coco", face_evidence=False)
 
+    def _run(
+        self, image: ImageRgb, box: FloatArray, padding: float
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """Return points (39, 5), u and v in the image, and metres (39, 3); None if nobody is."""
+        crops = PersonCrops(box, _SIDE_PX, _SIDE_PX, padding)
+        if not crops.inside(image)[0]:
+            return None
+        crop = np.empty((_SIDE_PX, _SIDE_PX, 3), np.uint8)
+        crops.cut(image, 0, crop)
+        outputs = self.model.run(crop[None].astype(np.float32) / np.float32(255.0))
+        numbers, person, metres = (outputs[str(name)].ravel() for name in self._names)
+        points = numbers.reshape(_COUNT, 5).astype(np.float64)
+        root_m = metres.reshape(_COUNT, 3).astype(np.float64)
+        if not (person[0] >= _PERSON and np.isfinite(points).all() and np.isfinite(root_m).all()):
+            return None
+        # The network counts from the crop's corner, keypoints from the middle of the first pixel.
+        points[:, :2] = crops.to_image(points[None, :, :2] - 0.5, np.array([0]))[0]
+        return points, root_m
 
-def _unseen(crops: PersonCrops, row: int) -> PersonKeypoints:
-    """Return keypoints in the middle of a crop, none of which is seen."""
+
+def _whole_box(box: FloatArray, height_px: int) -> tuple[FloatArray, bool]:
+    """Return the box of a whole person, and whether the image cuts the given one."""
+    left, top, right, bottom = box.tolist()
+    height = max(_WHOLE_HEIGHT * (right - left), bottom - top)
+    if bottom >= height_px - _BORDER_PX:
+        return np.array([left, top, right, top + height]), True
+    if top <= _BORDER_PX:
+        return np.array([left, bottom - height, right, bottom]), True
+    return box, False
+
+
+def _unseen(box: FloatArray) -> PersonKeypoints:
+    """Return keypoints in the middle of a box, none of which is seen."""
     count = len(_POINTS)
-    middle = crops.to_image(np.full((1, 1, 2), 0.5 * _SIDE_PX), np.array([row]))[0, 0]
     return PersonKeypoints(
-        np.tile(middle, (count, 1)),
+        np.tile(0.5 * (box[:2] + box[2:]) - 0.5, (count, 1)),
         np.zeros((count, 3)),
         np.zeros(count),
         "coco",
