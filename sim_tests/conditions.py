@@ -221,7 +221,8 @@ class Conditions:
     planner: str = _axis(
         "Name of the planner.",
         help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
-        "class of yours, which gets the robot's profile, and static_boxes_odom_m if it takes that.",
+        "class of your own, which gets the robot's profile, and static_boxes_odom_m if it "
+        "accepts it.",
         default=REFERENCE_PLANNER,
         metavar="MODULE:CLASS",
         callback=_without_reference,
@@ -271,7 +272,7 @@ class Conditions:
         empty=True,
         changes_scenario=True,
         help="Another robot: 'forklift' (it steers), 'omni' (it moves sideways), 'delivery' "
-        "(small), or a YAML file. Room and time of the scenarios are fitted to it.",
+        "(small), or a YAML file. The scenarios are fitted to it in space and time.",
         default="",
         show_default="nova_carter",
         metavar="NAME|FILE",

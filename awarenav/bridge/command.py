@@ -15,10 +15,9 @@ _LOG: Final = "Recordings"
 @command(
     "bridge",
     examples=[
-        "awarenav bridge --robot robot.yaml --networks robot_networks.yaml --scan scan",
+        "awarenav bridge --robot robot.yaml --scan scan_front --scan scan_rear",
         "awarenav bridge --robot robot.yaml --detector yolox-tiny --pose rtmpose-m",
-        "awarenav bridge --robot robot.yaml --networks robot_networks.yaml "
-        "--prediction prediction.yaml",
+        "awarenav bridge --robot robot.yaml --scan scan --prediction prediction.yaml",
         "awarenav bridge --robot robot.yaml --no-camera --scan scan_front --scan scan_rear",
         "awarenav bridge --robot robot.yaml --no-camera --scan scan --bag drive --record seen.mcap",
     ],
@@ -100,13 +99,13 @@ _LOG: Final = "Recordings"
     "--no-camera",
     group=_READ,
     is_flag=True,
-    help="Scanners alone: everybody counts as unaware.",
+    help="Use only scanners: everybody counts as unaware.",
 )
 @option(
     "--map",
     group=_READ,
     metavar="TOPIC|FILE.yaml",
-    help="nav_msgs/OccupancyGrid, or a map file of map_server. What the map holds is not taken "
+    help="nav_msgs/OccupancyGrid, or a map file of map_server. What is in the map is not taken "
     "for legs. Needs --scan.",
 )
 @option(
@@ -129,7 +128,7 @@ _LOG: Final = "Recordings"
     group=_READ,
     default="tf",
     metavar="TOPIC",
-    help="tf2_msgs/TFMessage, as robot1/tf; the static ones are in robot1/tf_static.",
+    help="tf2_msgs/TFMessage, such as robot1/tf; static transforms are then in robot1/tf_static.",
 )
 @option("--odom-frame", group=_READ, default="odom", metavar="FRAME", help="Fixed frame in tf.")
 @option("--base-frame", group=_READ, default="base_link", metavar="FRAME", help="Robot's frame.")
@@ -146,7 +145,7 @@ _LOG: Final = "Recordings"
     group=_WRITE,
     many=True,
     metavar="KEY=TOPIC...",
-    help="Publish under another name, as speed_limit=robot1/speed_limit.",
+    help="Publish under another name, such as speed_limit=robot1/speed_limit.",
 )
 @option(
     "--only",
@@ -204,7 +203,7 @@ _LOG: Final = "Recordings"
     "'viz').",
 )
 def bridge(**values: Any) -> int:
-    """Find and track people in a ROS 2 camera; publish obstacles and a speed limit for Nav2.
+    """Find and track people with a ROS 2 camera; publish obstacles and a speed limit for Nav2.
 
     Reads images, calibration, scans and odometry. Publishes what Nav2, its collision monitor, TEB
     and RViz read. Needs no ROS. While an input is missing or late, the bridge publishes a stop and

@@ -56,7 +56,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "bridge": _Entry(
             "awarenav.bridge.command:bridge",
-            "Read a ROS 2 camera; publish obstacles and a speed limit for Nav2.",
+            "Read ROS 2 sensors; publish obstacles and a speed limit for Nav2.",
         ),
         "models": _Entry(
             "awarenav.models.command:models",

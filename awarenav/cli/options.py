@@ -178,14 +178,14 @@ def as_json(what: str = "the table") -> Decorator:
 
 
 _NETWORKS: Final = "Networks"
-_BY_PICTURES: Final = "of the set 'real' once fetched; for renders 'shipped'"
+_BY_PICTURES: Final = "from the set 'real' once fetched; 'shipped' for renders"
 _NETWORK_OPTIONS: Final = (
     option(
         "--networks",
         group=_NETWORKS,
         type=FilePath(),
         metavar="FILE",
-        help="Detector, pose and head from a file, as `awarenav models fetch` writes it.",
+        help="Detector, pose and head from a file such as `awarenav models fetch` writes.",
     ),
     option(
         "--detector",
@@ -195,7 +195,7 @@ _NETWORK_OPTIONS: Final = (
         metavar="NAME|FILE",
         help="Person detector: 'shipped' (made for the simulator), a network that `awarenav "
         "models` lists, or an ONNX file (YOLOv8, YOLO11, YOLOX, RTMDet). yolox:FILE, "
-        "rtmdet:FILE and ultralytics:FILE say what a file is that does not tell it.",
+        "rtmdet:FILE and ultralytics:FILE name the family of a file that does not reveal it.",
     ),
     option(
         "--person-class",
@@ -203,14 +203,14 @@ _NETWORK_OPTIONS: Final = (
         type=Whole(0),
         show_default="the class that the network calls 'person', else 0",
         metavar="N",
-        help="Number of the class of a --detector that counts as people, from 0.",
+        help="Number of the --detector's class that counts as people, from 0.",
     ),
     option(
         "--input-size",
         group=_NETWORKS,
         show_default="the network's own",
         metavar="WxH",
-        help="Width and height, in pixels, of the input of a --detector that leaves them free.",
+        help="Width and height, in pixels, of the input of a --detector that leaves them open.",
     ),
     option(
         "--pose",
@@ -235,9 +235,9 @@ _NETWORK_OPTIONS: Final = (
         "--face",
         group=_NETWORKS,
         excludes="--networks",
-        show_default="of the set 'real' once fetched, else 'none'",
+        show_default="from the set 'real' once fetched, else 'none'",
         metavar="NAME|FILE",
-        help="Network of faces for any pose network: 'face-mesh' (`awarenav models fetch real`), a "
+        help="Face network for any pose network: 'face-mesh' (`awarenav models fetch real`), a "
         "file face_landmarker.task, or 'none'.",
     ),
     option(
@@ -246,7 +246,7 @@ _NETWORK_OPTIONS: Final = (
         excludes="--networks",
         show_default="as the set says, else auto",
         metavar="auto|none",
-        help="Eyes of people nearer than about 2.5 m: 'auto' (with --face, by its irises), or "
+        help="Eyes of people within about 2.5 m: 'auto' (with --face, from its irises), or "
         "'none' (the gaze is the head's direction).",
     ),
 )
@@ -281,7 +281,7 @@ _RUNNING_OPTIONS: Final = (
         default="",
         show_default="none",
         metavar="'KEY=VALUE ...'",
-        help="Options of that provider, separated by spaces, as 'trt_fp16_enable=True "
+        help="Options of that provider, separated by spaces, such as 'trt_fp16_enable=True "
         "trt_engine_cache_enable=True trt_engine_cache_path=DIR'.",
     ),
     option(
@@ -290,8 +290,8 @@ _RUNNING_OPTIONS: Final = (
         type=Number(0.0, 0.2),
         default=0.0,
         metavar="S",
-        help="Longest time between two looks of the detector; boxes follow the keypoints in "
-        "between. 0 looks at every image.",
+        help="Longest time between two runs of the detector; boxes follow the keypoints in "
+        "between. 0 runs it on every image.",
     ),
 )
 
@@ -309,6 +309,6 @@ def allow_simulator_networks() -> Decorator:
         "--allow-simulator-networks",
         group=_NETWORKS,
         is_flag=True,
-        help="Let networks that have seen renders only, such as the shipped ones, see other "
-        "images. All results say so.",
+        help="Allow networks that have only seen renders, such as the shipped ones, on other "
+        "images. All results then say so.",
     )

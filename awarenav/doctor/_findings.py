@@ -76,7 +76,7 @@ def findings_text(findings: Iterable[Finding]) -> str:
     """Return the findings as lines, each with its remedy below."""
     lines = []
     for each in findings:
-        word = each.severity if each.severity == "fine" else each.severity.upper()
+        word = "OK" if each.severity == "fine" else each.severity.upper()
         head = f"{word:9s}{each.subject:18s}"
         lines.append(_filled(each.text, head))
         if each.remedy:

@@ -103,15 +103,18 @@ def _fetched() -> list[Finding]:
     return [
         Finding.warning(
             "fetched networks",
-            "none, so that there is no network for photographs",
+            "none: there is no network for photographs",
             "awarenav models fetch real",
         )
     ]
 
 
 def _extras() -> Finding:
+    here = [extra for extra, module, _ in _EXTRAS if find_spec(module)]
+    missing = [f"{extra} ({use})" for extra, module, use in _EXTRAS if not find_spec(module)]
     words = [
-        f"{extra} {'is there' if find_spec(module) else f'is not installed ({use})'}"
-        for extra, module, use in _EXTRAS
+        f"{state}: {', '.join(names)}"
+        for state, names in (("installed", here), ("not installed", missing))
+        if names
     ]
     return Finding.fine("extras", "; ".join(words))

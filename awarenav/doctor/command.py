@@ -36,7 +36,7 @@ _CAMERA: Final = "Camera"
     type=FilePath(),
     default="doctor.png",
     metavar="FILE.png|none",
-    help="A test picture: the image with the most people, and what is estimated of them.",
+    help="A test picture: the image with the most people, and what is estimated about them.",
 )
 @option("--frames", type=POSITIVE, default=20, metavar="N", help="Number of images to look at.")
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")

@@ -48,9 +48,10 @@ _CAMERA: Final = "Camera"
     "--depth",
     type=FilePath(),
     metavar="PATH",
-    help="Depth images that are aligned with the pictures: 16-bit PNG in millimetres, .npy or TIFF "
-    "in floating-point metres. A file for one image; a folder with the same stems for a folder; "
-    "for a video a folder with names by frame number from 0, or with as many files as frames.",
+    help="Depth images that are aligned with the pictures: 16-bit PNG in millimetres, .npy or "
+    "TIFF in floating-point metres. A file for one image; a folder with the same stems for a "
+    "folder; for a video, a folder of files named by frame number from 0, or with as many "
+    "files as frames.",
 )
 @options.networks
 @options.allow_simulator_networks()

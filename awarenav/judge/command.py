@@ -12,7 +12,7 @@ from ..cli import FilePath, argument, command, option, options
     examples=["awarenav judge render/truth.jsonl estimates.jsonl --out report.md"],
     exit_status={
         0: "Success.",
-        1: "With --gate: a figure is outside what is asked.",
+        1: "With --gate: a figure fails its requirement.",
         2: "Bad input.",
     },
 )
@@ -37,7 +37,7 @@ def judge(**values: Any) -> int:
     Prints Markdown tables: detection (COCO's average precision at IoU 0.5), gaze, position and
     awareness, and whether the stated uncertainties hold; for everybody, by facing and by range.
     Every figure has its 95 % interval. A requirement is met (yes), not met (no), or there are too
-    few people to tell: the interval holds what is asked and other values too.
+    few people to tell: the interval contains the bound.
     """
     from ._report import judge_command  # noqa: PLC0415 - help needs no arrays
 

@@ -41,12 +41,12 @@ def policy() -> None:
     help="A robot file, as `awarenav bridge` reads it.",
 )
 def show(policies: tuple[str, ...], out: Path | None, robot: Path | None, *, as_json: bool) -> int:
-    """Show a policy's effect for one person who stands, ahead of the robot or beside its way.
+    """Show a policy's effect for one person standing ahead of the robot or beside its path.
 
     Prints and draws the obstacle radius and U, the speed that the person may change to, over
     awareness, and the speed limit over awareness and distance. The robot drives straight on. The
-    person beside the way stands 1.2 m from its middle. Distances run along the way, from the
-    robot's front to the body. Frames have shown the person for a while, at an exactly known place.
+    person beside the path stands 1.2 m from its centre line. Distances are along the path, from
+    the robot's front to the body. Frames have shown the person for a while, at a known position.
     """
     from ._show import show_command  # noqa: PLC0415 - help needs no policies
 
@@ -62,7 +62,7 @@ def show(policies: tuple[str, ...], out: Path | None, robot: Path | None, *, as_
     ],
     exit_status={
         0: "Every setting was translated, or could be dropped safely.",
-        1: "Lines that begin with 'check' need a decision; the new file is written all the same.",
+        1: "Lines that begin with 'check' need a decision; the new file is written anyway.",
         2: "Bad input; nothing was written.",
     },
 )
@@ -71,9 +71,9 @@ def show(policies: tuple[str, ...], out: Path | None, robot: Path | None, *, as_
 def upgrade(**values: Any) -> int:
     """Say what becomes of each setting of a policy file of 0.2, and write the new file.
 
-    A line begins with kept, renamed, replaced, dropped, added or check. What the old file left out
-    and has another default now is written with its old value. 'check' means that the new file may
-    be less careful than the old one in this point, and says what to do.
+    A line begins with kept, renamed, replaced, dropped, added or check. A setting that the old
+    file left out, and whose default has changed, is written with its old value. 'check' means that
+    the new file may be less careful than the old one on this point, and says what to do.
     """
     from ._upgrade import upgrade_command  # noqa: PLC0415 - help needs no policies
 

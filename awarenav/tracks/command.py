@@ -42,7 +42,7 @@ from ..cli import POSITIVE, Command, FilePath, Number, argument, command, option
     "--smooth",
     is_flag=True,
     excludes="--ids",
-    help="Also draw each path smoothed with what came later, as the reference.",
+    help="Also draw each path smoothed with later data, as a reference.",
 )
 @option(
     "--ids",
@@ -77,7 +77,7 @@ def tracks(**values: Any) -> int:
 
 @command(
     "calibrate",
-    short_help="Fit the uncertainty of predicted people to recordings of yours.",
+    short_help="Fit the uncertainty of predicted people to your own recordings.",
     examples=[
         "awarenav tracks calibrate estimates.jsonl",
         "awarenav tracks calibrate monday.csv tuesday.csv --longest 1.5 --out site.yaml",
@@ -103,11 +103,11 @@ def tracks(**values: Any) -> int:
     help="Longest horizon of the prediction.",
 )
 def calibrate(**values: Any) -> int:
-    """Track the people in FILE, and set how uncertain their predicted places are.
+    """Track the people in FILE, and set how uncertain their predicted positions are.
 
-    Each horizon gets a factor with which the region of two standard deviations holds 86.5 % of the
-    people. To check it, each half of them is judged by the factors of the other half. The smoothed
-    tracks count as the truth. Read the file with `PredictionModel.from_yaml`.
+    Each horizon gets a factor with which the region of two standard deviations contains 86.5 % of
+    the people. To check it, each half of them is judged by the factors of the other half. The
+    smoothed tracks count as the truth. Read the file with `PredictionModel.from_yaml`.
     """
     from ._calibrate import calibrate_command  # noqa: PLC0415
 

@@ -143,8 +143,8 @@ def replay(**values: Any) -> int:
         2: "Bad input; nothing was run.",
         130: "Interrupted.",
     },
-    epilog="The page is served on this computer alone and makes no request to any other. It keeps "
-    "all states after the end, so the crossing can then be scrubbed.",
+    epilog="The page is served only on this computer and makes no requests to any other. It "
+    "keeps all states after the end, so the crossing can then be scrubbed.",
 )
 @argument(
     "scenario",
@@ -158,7 +158,7 @@ def replay(**values: Any) -> int:
     type=Number(0.1, 20.0),
     default=1.0,
     metavar="X",
-    help="Simulated seconds per second. A computer that is slower than this sets its own pace.",
+    help="Simulated seconds per second. A slower computer runs at its own pace.",
 )
 @option(
     "--port",
@@ -290,7 +290,7 @@ def frontier(**values: Any) -> int:
         "awarenav measures crossings --workers 2 --out social.csv",
         "awarenav measures track_scene1_col1.csv",
     ],
-    exit_status={0: "Success.", 1: "An episode broke off with an error.", 2: "Bad input."},
+    exit_status={0: "Success.", 1: "An episode failed with an error.", 2: "Bad input."},
     epilog="docs/social_measures.md defines every measure and names its source. The episodes of a "
     "run are run again, which takes as long as the run. Needs the extra 'bench'.",
 )

@@ -12,7 +12,7 @@ from ...conditions import COMPLETE_SCENARIOS
 
 @group("scenario")
 def scenario() -> None:
-    """List, explain, draw and check scenarios: shipped ones, or YAML files of yours."""
+    """List, explain, draw and check scenarios: shipped ones, or your own YAML files."""
 
 
 @command(
@@ -57,7 +57,7 @@ def show(scenario: str, *, yaml: bool, seed: int | None, out: Path | None) -> in
 
     Also prints how often robot and people would meet if nobody reacted. The drawing shows the hall,
     paths with dots every 2 s, and gaze. Values that vary are at their medians; thin lines are the
-    paths of other episodes. Robot and people stand where they are 1.5 s before they come nearest.
+    paths of other episodes. Robot and people are drawn 1.5 s before their closest approach.
     """
     from ...scenario.catalogue import show_command  # noqa: PLC0415 - help needs no scenarios
 
@@ -75,8 +75,8 @@ def show(scenario: str, *, yaml: bool, seed: int | None, out: Path | None) -> in
     examples=["awarenav scenario validate mine.yaml"],
     exit_status={
         0: "All can be run.",
-        1: "The people of one contradict its attention.",
-        2: "One cannot be run.",
+        1: "The people of a scenario contradict its attention.",
+        2: "A scenario cannot be run.",
     },
 )
 @argument(
@@ -109,7 +109,7 @@ def validate(files: tuple[str, ...], *, episodes: int) -> int:
 
 @command(
     "from-recording",
-    short_help="Make a scenario of recorded people.",
+    short_help="Make a scenario from recorded people.",
     examples=[
         "awarenav scenario from-recording people.csv --out hall.yaml",
         "awarenav scenario from-recording people.csv --robot-id agv --react --out hall.yaml",
@@ -120,14 +120,18 @@ def validate(files: tuple[str, ...], *, episodes: int) -> int:
     "table",
     metavar="FILE.csv",
     type=FilePath(),
-    help="Positions of people, with the columns t_s, id, x_m, y_m and perhaps heading_rad.",
+    help="Positions of people, with the columns t_s, id, x_m, y_m and optionally heading_rad.",
 )
 @option(
     "--react",
     is_flag=True,
     help="People leave their paths where the robot forces them off, and return.",
 )
-@option("--robot-id", metavar="ID", help="The id of a robot's rows: no person, and the task.")
+@option(
+    "--robot-id",
+    metavar="ID",
+    help="The id of the robot's rows: they are not a person, and give the task.",
+)
 @option("--start", nargs=2, type=NUMBER, metavar="X Y", help="Start of the robot, in metres.")
 @option("--goal", nargs=2, type=NUMBER, metavar="X Y", help="Goal of the robot, in metres.")
 @option(
@@ -150,7 +154,7 @@ def from_recording(
     until_s: float | None,
     out: Path,
 ) -> int:
-    """Make a scenario of recorded people: the robot drives in closed loop among them.
+    """Make a scenario from recorded people: the robot drives in closed loop among them.
 
     The recorded people do not react to the robot, or with --react leave their paths where it
     forces them off. Positions stay as recorded. Without --robot-id, --start and --goal the robot
