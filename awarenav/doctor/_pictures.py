@@ -80,7 +80,7 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
             Finding.error(
                 "images",
                 f"they show nothing: {levels:.0f} grey levels between dark and bright",
-                "take the cap off the lens, look at the exposure and the cable",
+                "take the cap off the lens; check the exposure and the cable",
             )
         ]
     found = []
@@ -88,7 +88,7 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
         found.append(
             Finding.error(
                 "images",
-                f"all {len(figures)} are the same, to the bit: the camera is frozen",
+                f"all {len(figures)} are identical, bit for bit: the camera is frozen",
                 "restart the driver; a live camera has noise",
             )
         )
@@ -97,7 +97,7 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
             Finding.warning(
                 "images",
                 f"{repeats} of {len(figures)} repeat the one before",
-                "look at the driver's frame rate and the load of the computer",
+                "check the driver's frame rate and the load on the computer",
             )
         )
     found.append(_exposure(burnt, black))
@@ -106,7 +106,7 @@ def picture_findings(figures: Sequence[PictureFigures]) -> list[Finding]:
             Finding.warning(
                 "sharpness",
                 f"the sharpest edges are {edge_px:.1f} pixels wide: out of focus, or in motion",
-                "focus, clean the lens, or expose for a shorter time",
+                "focus, clean the lens, or use a shorter exposure",
             )
         )
     else:
@@ -119,7 +119,7 @@ def _exposure(burnt: float, black: float) -> Finding:
         return Finding.warning(
             "exposure",
             f"{100.0 * burnt:.0f} % of the pixels are burnt out",
-            "expose for a shorter time; faces before a window need it most",
+            "use a shorter exposure; faces in front of a window need it most",
         )
     if black > _BLACK_SHARE:
         return Finding.warning(

@@ -33,7 +33,7 @@ _BASE: Final = "base_link"
 _OFTEN: Final = 0.5
 _SELDOM: Final = 0.05
 _REMEDY_BLIND: Final = (
-    "look at its window and its driver; what the robot's own body hides belongs outside "
+    "check its window and its driver; directions hidden by the robot's own body belong outside "
     "field_of_view_deg of robot.yaml"
 )
 
@@ -111,7 +111,7 @@ def recording_findings(path: Path) -> tuple[list[Finding], bool]:
     for topic, odometry in sorted(recording.odometry.items()):
         found += _odometry_findings(topic, odometry, recording)
     if not recording.whole:
-        text = f"scanners and odometry were looked at for the first {_LONGEST_S:g} s"
+        text = f"scanners and odometry were checked for the first {_LONGEST_S:g} s"
         found.append(Finding.fine("recording", text))
     if not recording.has_images:
         found.append(Finding.warning("images", "the recording has none"))
@@ -147,9 +147,9 @@ def _scanner_findings(
             blind[sight.blind_text] += 1
     found = [Finding.warning("scanners", text) for text in said]
     for reasons, words, remedy in (
-        (refused, "refused: {}", "look at its driver"),
+        (refused, "refused: {}", "check its driver"),
         (blind, "the scanner is {} (0° is ahead, " + where + ")", _REMEDY_BLIND),
-        (frozen, "{}: it is frozen", "look at its driver; a simulated scanner needs noise"),
+        (frozen, "{}: it is frozen", "check its driver; a simulated scanner needs noise"),
     ):
         share = reasons.total() / len(scans)
         if share > _SELDOM:

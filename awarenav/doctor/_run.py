@@ -200,8 +200,8 @@ def _domain_finding(
         return Finding.warning(
             "networks",
             f"trained on: {told}; the images are {kind}",
-            "a network that `awarenav models list` names is known by its checksum; another says it "
-            "under 'training_domain' in its metadata",
+            "a network in `awarenav models list` is known by its checksum; any other can state its "
+            "'training_domain' in its metadata",
         )
     return Finding.fine("networks", f"trained on: {told}; the images are {kind}")
 
@@ -212,7 +212,7 @@ def _calibration_finding(camera: Camera | None, options: Any, source: ImageSourc
         return Finding.error(
             "calibration",
             "there is none; a horizontal field of view of 60 degrees is assumed, and distances are "
-            "wrong by as much as that is",
+            "as wrong as that assumption",
             "--camera camera.yaml (ROS camera_calibration makes it), or at least --fov-deg",
         )
     if camera is None:
@@ -225,14 +225,14 @@ def _calibration_finding(camera: Camera | None, options: Any, source: ImageSourc
     off = abs(camera.cx_px - 0.5 * camera.width_px) / camera.width_px
     text = f"{camera.width_px} × {camera.height_px} pixels, {across:.0f} degrees across"
     if source.rectified:
-        text += "; by the topic's name the images are rectified: P counts, without distortion"
+        text += "; by the topic's name, the images are rectified: P applies, without distortion"
     elif is_recording(Path(str(options.source))):
-        text += "; by the topic's name the images are raw: K and the distortion count, and P is not"
+        text += "; by the topic's name, the images are raw: K and distortion apply, and P is not"
         text += " used"
     if off > _OFF_CENTRE:
         return Finding.warning(
             "calibration",
-            f"{text}; its principal point lies {100.0 * off:.0f} % of the width off the middle",
+            f"{text}; its principal point lies {100.0 * off:.0f} % of the width off centre",
             "was the picture cropped after the calibration?",
         )
     return Finding.fine("calibration", text)
@@ -245,8 +245,8 @@ def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
     if (source.live or source.rate_hz is not None) and len(steps_s) and np.median(steps_s) > 0.0:
         found.append(_rate_finding(1.0 / float(np.median(steps_s)), "the images come at"))
         if (steps_s <= 0.0).any():
-            text = "stamps stand still or go back"
-            found.append(Finding.error("frame rate", text, "look at the driver's clock"))
+            text = "stamps do not advance, or go back"
+            found.append(Finding.error("frame rate", text, "check the driver's clock"))
     if warm := seen.times_s[_WARM_UP:]:
         found.append(_rate_finding(1.0 / float(np.median(warm)), "perception manages"))
     return found
@@ -286,7 +286,7 @@ def _people_findings(seen: _Examined) -> list[Finding]:
             Finding.warning(
                 "people",
                 f"nobody in {counted(images, 'image')}",
-                "stand before the camera, 2 to 5 m away, and run it again",
+                "stand in front of the camera, 2 to 5 m away, and run it again",
             )
         ]
     with_people = sum(number > 0 for number in seen.people)
@@ -303,8 +303,8 @@ def _people_findings(seen: _Examined) -> list[Finding]:
         found.append(
             Finding.warning(
                 "people",
-                f"{unknown} of {total} heads show no direction: motion blurs them, or noise",
-                "expose for a shorter time, with more light",
+                f"{unknown} of {total} heads show no direction, because of motion blur or noise",
+                "use a shorter exposure and more light",
             )
         )
     return found

@@ -209,7 +209,7 @@ def _estimator(
         depth = DepthFiles(options.depth, source, options.frames)
     cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, _log)
     if source.rectified and cameras.calibrated:
-        _log("the images are rectified: P of the calibration counts, without distortion")
+        _log("the images are rectified: P of the calibration applies, without distortion")
     for note in source.notes:
         _log(note)
     choice = NetworkChoice.of_options(options, rendered=source.rendered, log=_log)

@@ -163,7 +163,7 @@ def _check_set_file(store: ModelStore, chosen: NetworkSet) -> None:
     """Refuse to replace a file that somebody has changed."""
     path = Path(chosen.file)
     if path.exists() and path.read_text(encoding="utf-8") != _set_text(store, chosen):
-        raise AwarenavError(f"{path} is there with other contents; move it away")
+        raise AwarenavError(f"{path} exists with other contents; move it away")
 
 
 def _shipped_state(name: str) -> str:

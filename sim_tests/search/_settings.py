@@ -123,7 +123,7 @@ def write_or_check_settings(
         _compare(path, parse_json(text, path.name, SimError), may_grow)
     elif path.exists() and not overwrite:
         raise SimError(
-            f"{folder} already holds a {search}; give --resume to go on with it, --overwrite "
+            f"{folder} already holds a {search}; give --resume to continue it, --overwrite "
             "to replace it, or another --out"
         )
     elif resume:

@@ -124,7 +124,7 @@ def episode_chart(arms: Sequence[Arm]) -> tuple[str, str]:
     left_out = f" The {len(points) - len(shown)} largest margins are left out." * (
         len(shown) < len(points)
     )
-    caption = f"Every episode at its least margin; a margin below 0 is too near.{left_out}"
+    caption = f"Every episode at its least margin; a margin below 0 is too close.{left_out}"
     return _svg("episodes", draw), caption
 
 

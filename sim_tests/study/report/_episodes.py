@@ -111,7 +111,7 @@ def failures_section(run: Run) -> Section | None:
     if not lines:
         return None
     columns = dict.fromkeys(("Error", "Scenarios", "Planners", "Times", "See the first again"), "")
-    lead = "These episodes count as no success, and are in no other figure."
+    lead = "These episodes count as not reaching the goal, and are in no other figure."
     return Section("failed", "Failed", lead, tables=(Table(columns, lines, 3),))
 
 

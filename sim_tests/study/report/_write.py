@@ -130,7 +130,7 @@ def arms_section(results: Results) -> Section:
         },
         [_arm_row(arm) for arm in results.arms],
         caption="Means and shares with 95 % intervals. Step-out impacts: per 1 000 crossings, an "
-        "index and no rate of accidents.",
+        "index, not an accident rate.",
     )
     parts = ("", "attentive", UNCONFIRMED, "mixed", "unaware")
     differences: list[Row] = [

@@ -123,7 +123,7 @@ def test_people_who_are_blurred_by_motion_need_a_shorter_exposure(capsys, render
     assert severities(found, "people") == {"fine", "warning"}
     (told,) = (each for each in found["people"] if each.severity == "warning")
     assert "heads show no direction" in told.text
-    assert "shorter time" in told.remedy
+    assert "shorter exposure" in told.remedy
     (counts,) = (each for each in found["people"] if each.severity == "fine")
     assert "head direction unknown: " in counts.text
 

@@ -169,7 +169,7 @@ def test_a_twist_in_the_odom_frame(capsys, tmp_path, drive) -> None:
 
 @pytest.mark.parametrize(
     ("topic", "said"),
-    [("/cam/image_rect", "P counts"), ("/cam/image_raw", "P is not used")],
+    [("/cam/image_rect", "P applies"), ("/cam/image_raw", "P is not used")],
 )
 def test_which_matrix_counts_is_said(capsys, tmp_path, drive, topic, said) -> None:
     drive.image_topic = topic
