@@ -163,6 +163,8 @@ def test_the_gallery_has_every_scenario_and_every_example() -> None:
         assert re.search(rf"```yaml\n(#.*\n)*name: {name}\n", text), name
     for path in (ROOT / "examples").glob("*.py"):
         assert f"(../examples/{path.name})" in text
+    assert "--sensors camera+scanner" in text
+    assert "--perception keypoints+scanner" not in text  # --perception has no sensors
     third_party = {path.stem for path in (ROOT / "examples" / "planners").glob("[!_]*.py")}
     assert third_party == PLANNERS.keys()
     assert {path.stem for path in FOLDER.glob("*.png")} == set(example_names())
