@@ -98,7 +98,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "export": _Entry(
             "sim_tests.study.command:export",
-            "Write episodes in the formats of other projects; check such files.",
+            "Write episodes in the formats of other projects.",
         ),
         "report": _Entry(
             "sim_tests.study.report.command:report",
