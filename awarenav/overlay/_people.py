@@ -92,7 +92,7 @@ def draw_people(
         if person.keypoints is not None:
             _draw_skeleton(image, person.keypoints, unit)
         _draw_box(image, person.observation, unit)
-    font = Font(round(18 * unit) if text_px is None else text_px)
+    font = Font(round(18 * unit) if text_px is None else text_px, weight=450)
     draw_labels(image, far_first[::-1], camera, font, caption)
     return image
 
