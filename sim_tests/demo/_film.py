@@ -145,10 +145,9 @@ def film_pictures(rows: Sequence[ComparisonRow]) -> Iterator[ImageRgb]:
 
 
 def decisive_picture(row: ComparisonRow) -> CameraPicture:
-    """Return the picture of the camera in the middle of those that show most people as a whole."""
+    """Return the last picture of the camera that shows most people as a whole."""
     most = max(len(each.whole) for each in row.pictures)
-    showing = [each for each in row.pictures if len(each.whole) == most]
-    return showing[len(showing) // 2]
+    return next(each for each in row.pictures[::-1] if len(each.whole) == most)
 
 
 def _picture(
