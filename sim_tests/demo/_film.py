@@ -97,10 +97,15 @@ def unaware_person(result: CrossingResult) -> int:
 
 
 def passage(result: CrossingResult, person: int) -> Passage:
-    """Return the moment at which the moving robot is nearest to a person."""
-    for contact in result.contacts:
-        if contact.worker == person and contact.by == "robot":
-            return Passage(contact.t_s, 0.0, contact.robot_speed_mps)
+    """Return the moment at which the moving robot is nearest to a person: the fastest touch."""
+    touches = [
+        contact
+        for contact in result.contacts
+        if contact.worker == person and contact.robot_speed_mps > STANDING_SPEED_MPS
+    ]
+    if touches:
+        fastest = max(touches, key=lambda contact: contact.robot_speed_mps)
+        return Passage(fastest.t_s, 0.0, fastest.robot_speed_mps)
     moving = [
         frame
         for frame in result.frames
