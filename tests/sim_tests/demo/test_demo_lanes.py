@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from paths import ROOT
 
 from awarenav.cli import main
 from sim_tests.demo import _lanes
@@ -96,3 +97,10 @@ def test_the_command_prints_both_tables_and_which_file_to_open(tmp_path, capsys)
     assert len(tables["reported"]) == REPORTED * len(LANES)
     assert printed.err.splitlines()[-1] == f"Open {out / 'lanes.jsonl'}"
     assert max(map(len, printed.err.splitlines()[:-1])) <= 80
+
+
+def test_the_page_has_the_reported_table_and_names_the_shown_seed() -> None:
+    _, rows = read_report()
+    page = (ROOT / "docs" / "simulation.md").read_text("utf-8")
+    assert lanes_table(rows) in page
+    assert f"seed {shown_seed(rows)}." in page
