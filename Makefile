@@ -20,7 +20,7 @@ help: ## list the targets
 setup: ## make or repair .venv (PYTHON=… chooses the interpreter, 3.10 or 3.11)
 	@sh tools/setup_venv.sh
 
-demo: setup ## run the paper's encounter and the demonstration crossings; results in demo/
+demo: setup ## film four robots in an aisle in which somebody steps out; results in demo/
 	$(AWARENAV) demo --out demo
 
 # Cheap checks first, so that a mistake shows in seconds.

@@ -15,10 +15,10 @@ from perception.arrays import FloatArray
 from ..figures import Axes, Figure, QuadMesh, new_figure
 from ._effect import BESIDE_M, effect_of
 
-_DPI: Final = 160
-# Text of 10 points is 11 px high where a page shows the figure 780 px wide.
-_WIDTH_IN: Final = 9.8
-_ROW_IN: Final = 2.9
+_DPI: Final = 170
+# Text of 10 points is 11 px high where a page shows the figure 700 px wide.
+_WIDTH_IN: Final = 8.8
+_ROW_IN: Final = 2.7
 _LINE_COLOUR: Final = "#1f5f8b"
 _LIMIT_COLOUR: Final = "#6b7079"
 _AWARENESS: Final = np.linspace(0.0, 1.0, 26)
@@ -63,7 +63,7 @@ def _draw_line(axes: Axes, values: FloatArray, label: str, highest: float) -> No
     axes.plot(_AWARENESS, values, color=_LINE_COLOUR, lw=2.0)
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(0.0, 1.12 * highest if highest > 0.0 else 1.0)
-    axes.set_xlabel("awareness, at least")
+    axes.set_xlabel("awareness ≥")
     axes.set_ylabel(label)
     axes.grid(alpha=0.25)
 
@@ -91,7 +91,7 @@ def _draw_limit(axes: Axes, limit_mps: FloatArray, robot: RobotProfile) -> QuadM
         places = [(_AWARENESS[_LABELLED], _DISTANCE_M[int((unaware >= x).argmax())]) for x in met]
         fmt = dict(zip(lines.levels, texts, strict=True))
         if met:
-            axes.clabel(lines, met, fmt=fmt, fontsize=9, manual=places)
-    axes.set_xlabel("awareness, at least")
+            axes.clabel(lines, met, fmt=fmt, fontsize=10, manual=places)
+    axes.set_xlabel("awareness ≥")
     axes.set_ylabel("distance ahead (m)")
     return limit_map

@@ -9,6 +9,7 @@ from benchmarks._harness import count, make_parser
 
 from ._measure import measure
 from ._page import leaderboard_page
+from ._results import headline
 from ._rows import PAGE, RESULTS, Board
 
 
@@ -27,9 +28,15 @@ def main() -> int:
     )
     parser.add_argument("--again", action="store_true", help="measure the rows from the beginning")
     parser.add_argument("--page", action="store_true", help="measure nothing, write the page")
+    parser.add_argument(
+        "--results", action="store_true", help="measure nothing, print the results of README"
+    )
     options = parser.parse_args()
     try:
         board = Board.read()
+        if options.results:
+            print(headline(board))
+            return 0
         rows = [board.named(name) for name in options.row] if options.row else list(board.rows)
         if not options.page:
             measure(board, rows, workers=options.workers, again=options.again)

@@ -1,112 +1,158 @@
-"""The demonstration: the paper's encounter, then a crossing with and without awareness."""
+"""The demonstration: four robots in an aisle, or the paper's encounter."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from awarenav.files import json_text
+from tqdm import tqdm
+
+from awarenav.errors import counted
+from awarenav.files import json_text, write_text
 from perception import AwarenessPipeline, Camera
 
 from ..crossing import CrossingResult
-from ..study.measures import measure, write_records
 from ..world.bullet import require_pybullet
-from ._comparison import (
-    ComparisonRow,
-    compare_policies,
-    compared_scenarios,
-    comparison_table,
-    delay_won_back,
-    plot_comparison,
-)
+from ..world.errors import SimError
+from ._camera_film import CameraRecorder
+from ._comparison import ComparisonRow
 from ._encounter import case_values, encounter_table, run_encounter
 from ._film import write_crossing_film
+from ._lanes import (
+    LANES,
+    REPORTED,
+    LaneRow,
+    lanes_table,
+    legend,
+    read_report,
+    report_text,
+    run_lane,
+    run_nobody,
+    shown_seed,
+)
 
 #: Files of the film: for pages, and for players.
 FILMS: Final = ("crossing.webp", "crossing.mp4")
+_ROWS: Final = "lanes.jsonl"
+# Labels of the film.
+_FILMED: Final = {
+    "today-costmap": "today's AMR",
+    "blind": "awareness-blind",
+    "awarenav": "aware",
+}
 
 
-def run_demo(
-    out: Path,
-    *,
-    seed: int,
-    video: bool,
-    perception: str,
-    axes: Mapping[str, str],
-    as_json: bool,
-) -> None:
-    """Run the demonstration and write its files.
+def run_demo(out: Path, *, seed: int | None, video: bool, as_json: bool) -> None:
+    """Run the four robots with one seed, film them, and print them beside the reported seeds.
 
     Args:
-        out: folder for ``encounter.png``, ``encounter.mp4``, ``encounter.csv``, ``crossings.png``,
-            ``episodes.csv``, ``crossing.webp`` and ``crossing.mp4``; made when missing.
-        seed: seed of everything random.
-        video: whether to render the films.
-        perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
-        axes: robot and population of the crossings, as for :func:`compare_policies`.
+        out: folder for ``lanes.jsonl``, ``crossing.webp`` and ``crossing.mp4``; made when missing.
+        seed: of the crossing; None for the median one of the reported seeds.
+        video: whether to film.
         as_json: print the tables as JSON.
-
-    Raises:
-        SimError: an unknown robot or population; nothing is written then.
     """
     require_pybullet()
-    compared_scenarios(axes)  # refuses unknown names before anything runs
-    if perception == "pixels":
-        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing
+    about, reported = read_report()
+    median = shown_seed(reported)
+    seed = median if seed is None else seed
+    camera = CameraRecorder() if video else None
+    runs = [
+        run_lane(lane, seed, camera if lane is LANES[-1] else None)
+        for lane in tqdm(LANES, desc="robots", unit="robot", disable=None, file=sys.stderr)
+    ]
+    rows = [run.row for run in runs]
+    _write_rows(out, rows)
     # With JSON on standard output, text goes to standard error.
     text_stream = sys.stderr if as_json else sys.stdout
-    out.mkdir(parents=True, exist_ok=True)
-    print("The encounter of the paper: 25 s", file=text_stream)
-    encounter = run_encounter(out, seed=seed, video=video, perception=perception)
-    print(encounter_table(encounter), file=text_stream)
-    print("\nThe same crossing, with and without awareness", file=text_stream)
-    rows = compare_policies(seed, perception, filmed=video, **axes)
-    write_records(out / "episodes.csv", [measure(row.result) for row in rows])
-    plot_comparison(out / "crossings.png", rows)
-    print(comparison_table(rows), file=text_stream)
-    share = delay_won_back(rows)
-    if share is not None:
-        print(
-            f"\nAn attentive worker gives back {share:.0%} of the time that the blind robot loses.",
-            file=text_stream,
-        )
+    note = f", the median one of {REPORTED} by awarenav's time lost" if seed == median else ""
+    print(
+        "An aisle: one worker watches the robot, another with a phone steps out.\n\n"
+        f"Seed {seed}{note}:\n\n{lanes_table(rows)}\n\n"
+        f"Seeds 0 to {REPORTED - 1}, measured {about['date']} with version {about['version']}:\n\n"
+        f"{lanes_table(reported)}\n\n{legend(REPORTED)}",
+        file=text_stream,
+    )
     if as_json:
-        print(json_text(_tables_as_data(encounter, rows, share)), end="")
-    if video:
-        write_crossing_film([out / name for name in FILMS], rows)
-    names = ["encounter.png", *(["encounter.mp4"] if video else []), "encounter.csv"]
-    names += ["crossings.png", "episodes.csv", *(FILMS if video else [])]
-    print(f"\nWritten to {out}: {', '.join(names)}", file=text_stream)
+        tables = {"seed": seed, "shown": [*map(asdict, rows)], "reported": [*map(asdict, reported)]}
+        print(json_text(tables), end="")
+    if camera is None:
+        print(f"\nOpen {out / _ROWS}", file=text_stream)
+        return
+    free = run_nobody(seed)
+    films = [ComparisonRow("nobody there", free, runs[0].scenario)]
+    for run in runs:
+        if run.lane.name in _FILMED:
+            pictures = camera.pictures if run.lane is LANES[-1] else ()
+            label = _FILMED[run.lane.name]
+            films.append(ComparisonRow(label, run.result, run.scenario, pictures))
+    write_crossing_film([out / name for name in FILMS], films)
+    print(f"\nOpen {out / FILMS[1]}", file=text_stream)
 
 
-def _tables_as_data(
-    encounter: CrossingResult, rows: Sequence[ComparisonRow], share: float | None
-) -> dict[str, Any]:
-    """Return both tables as plain data."""
-    return {
-        "encounter": [
-            {
-                "t_s": case.t_s,
-                "meaning": case.meaning,
-                "perception": perception,
-                "awareness": alpha,
-                "d_fwd_m": forward,
-                "d_lat_m": lateral,
-            }
-            for case, perception, (alpha, forward, lateral) in case_values(encounter)
-        ],
-        "crossings": [
-            {
-                "crossing": row.label,
-                "time_to_goal_s": row.result.time_to_goal_s,
-                "min_separation_m": row.result.min_separation_m,
-                "max_speed_within_2m_mps": row.result.max_speed_within_2m_mps,
-                "violation_time_s": row.result.violation_time_s,
-                "contacts": len(row.result.contacts),
-            }
-            for row in rows
-        ],
-        "delay_won_back": share,
-    }
+def run_seeds(out: Path, *, seeds: int, as_json: bool) -> None:
+    """Run the four robots with the seeds 0, 1, … and print their table.
+
+    Args:
+        out: folder for ``lanes.jsonl``; made when missing.
+        seeds: number of seeds.
+        as_json: print the table as JSON.
+    """
+    require_pybullet()
+    pairs = [(seed, lane) for seed in range(seeds) for lane in LANES]
+    bar = tqdm(pairs, desc="crossings", unit="crossing", disable=None, file=sys.stderr)
+    rows = [run_lane(lane, seed).row for seed, lane in bar]
+    _write_rows(out, rows)
+    print(
+        f"{counted(seeds, 'seed')}; the median one by awarenav's time lost is {shown_seed(rows)}"
+        f"\n\n{lanes_table(rows)}\n\n{legend(seeds)}\n\nOpen {out / _ROWS}",
+        file=sys.stderr if as_json else sys.stdout,
+    )
+    if as_json:
+        print(json_text([asdict(row) for row in rows]), end="")
+
+
+def _write_rows(out: Path, rows: list[LaneRow]) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / _ROWS, report_text(rows), SimError)
+
+
+def run_paper(out: Path, *, seed: int, video: bool, perception: str, as_json: bool) -> None:
+    """Run the paper's encounter and write its files.
+
+    Args:
+        out: folder for ``encounter.png``, ``encounter.mp4`` and ``encounter.csv``; made when
+            missing.
+        seed: seed of everything random.
+        video: whether to film.
+        perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
+        as_json: print the table as JSON.
+    """
+    require_pybullet()
+    if perception == "pixels":
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing
+    out.mkdir(parents=True, exist_ok=True)
+    encounter = run_encounter(out, seed=seed, video=video, perception=perception)
+    print(
+        f"The encounter of the paper: 25 s\n{encounter_table(encounter)}\n\n"
+        f"Open {out / ('encounter.mp4' if video else 'encounter.png')}",
+        file=sys.stderr if as_json else sys.stdout,
+    )
+    if as_json:
+        print(json_text(_cases_as_data(encounter)), end="")
+
+
+def _cases_as_data(encounter: CrossingResult) -> list[dict[str, Any]]:
+    """Return the cases of the encounter as plain data."""
+    return [
+        {
+            "t_s": case.t_s,
+            "meaning": case.meaning,
+            "perception": perception,
+            "awareness": alpha,
+            "d_fwd_m": forward,
+            "d_lat_m": lateral,
+        }
+        for case, perception, (alpha, forward, lateral) in case_values(encounter)
+    ]

@@ -2,36 +2,34 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from tqdm import tqdm
 
-from awarenav.drawing import awareness_colour
+from awarenav.drawing import DARK, WHITE, Font, awareness_colour
 from awarenav.figures import Axes, new_figure
 from awarenav.files import csv_number, write_csv
 from awarenav.video import VideoWriter
 from nav_adapter import AwarenessPolicy
-from perception import AttentionCone, Camera, PersonObservation
+from perception import Camera, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 
-from ..crossing import CrossingFrame, CrossingResult, Stage, TopView, draw_camera_view, run_crossing
-from ..crossing.eyes import PIXEL_RATE_HZ
+from ..crossing import CrossingFrame, CrossingResult, Stage, run_crossing
 from ..scenario import Scenario
 from ..world.camera import CameraRenderer
 from ..world.errors import SimError
+from ._camera_film import CAMERA_PERIOD_S, OverlayCamera
 
 _TRUTH_COLOUR: Final = "#1f4e79"
 _PERCEPTION_COLOUR: Final = "#d9822b"
 _BOUND_COLOUR: Final = "#7fb77e"
-
-#: Longest time between two images of the slowest camera of an encounter, with a margin.
-CAMERA_PERIOD_S: Final = 1.1 / PIXEL_RATE_HZ
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,11 +63,9 @@ class CaseImages:
 
 #: α, d_fwd (m) and d_lat (m, left positive); None where nothing is known.
 EncounterValues = tuple[float | None, float | None, float | None]
-_TITLES: Final = (
-    "awareness score α",
-    "forward distance d_fwd (m)",
-    "lateral offset d_lat (m), left positive",
-)
+_TITLES: Final = ("awareness α", "ahead, d_fwd (m)", "to the left, d_lat (m)")
+# At a width of 390 px these letters have a size of 12 px.
+_TEXT_PT: Final = 17
 
 
 def true_values(frame: CrossingFrame) -> EncounterValues:
@@ -94,67 +90,59 @@ def plot_encounter(path: Path, result: CrossingResult, images: Sequence[CaseImag
         result: the encounter.
         images: images of each case.
     """
-    figure = new_figure(16.0, 6.9)
-    grid = figure.add_gridspec(2, 6, height_ratios=[1.0, 1.9])
-    for column, case_images in enumerate(images):
-        for side, (image, name) in enumerate(
-            ((case_images.robot_view, "robot's camera"), (case_images.eye_view, "worker's eyes"))
-        ):
-            axes = figure.add_subplot(grid[0, 2 * column + side])
-            title = f"({column + 1}) {case_images.case.t_s:.2f} s: {case_images.case.meaning}"
-            _show_image(axes, image, title if side == 0 else "", name)
-            _colour_frame(axes, case_images.frame.truth[0].awareness)
+    figure = new_figure(7.8, 14.2)
+    pictures, curves = figure.subfigures(2, 1, height_ratios=[1.0, 1.5])
+    views = pictures.subplots(2, len(images), squeeze=False)
+    for number, each in enumerate(images):
+        alpha = each.frame.truth[0].awareness
+        title = f"({number + 1}) {each.case.t_s:.2f} s\n{each.case.meaning}"
+        _show_image(views[0, number], each.robot_view, alpha, title)
+        _show_image(views[1, number], each.eye_view, alpha)
+    for row, name in zip(views, ("robot sees", "worker sees"), strict=True):
+        row[0].set_ylabel(name, fontsize=_TEXT_PT)
     time = np.array([frame.t_s for frame in result.frames])
     true = np.array([true_values(frame) for frame in result.frames], dtype=float)
     seen = [observed_values(frame.observation_of(0)) for frame in result.frames]
     observed = np.array(seen, dtype=float)
     paper = [(case.awareness, case.d_fwd_m, case.d_lat_m) for case in CASES]
-    for index, title in enumerate(_TITLES):
-        axes = figure.add_subplot(grid[1, 2 * index : 2 * index + 2])
-        label = f"from {result.perception}"
+    panels = curves.subplots(len(_TITLES), 1, sharex=True)
+    for index, (axes, title) in enumerate(zip(panels, _TITLES, strict=True)):
         with_gaps = _with_gaps(time, observed[:, index])
-        axes.plot(*with_gaps, color=_PERCEPTION_COLOUR, lw=0.7, label=label)
+        axes.plot(*with_gaps, color=_PERCEPTION_COLOUR, lw=1.0, label=f"from {result.perception}")
         if index == 0:
             _plot_bound(axes, result, time)
-        axes.plot(time, true[:, index], color=_TRUTH_COLOUR, lw=1.4, label="truth")
-        _mark_cases(axes, [values[index] for values in paper])
-        axes.set_title(title, fontsize=10, loc="left")
-        axes.set_xlabel("time (s)")
+        axes.plot(time, true[:, index], color=_TRUTH_COLOUR, lw=2.0, label="truth")
+        _mark_cases(axes, [values[index] for values in paper], named=index == 0)
+        axes.set_title(title, fontsize=_TEXT_PT, loc="left", pad=28 if index == 0 else 6)
+        axes.tick_params(labelsize=_TEXT_PT)
         axes.grid(alpha=0.25)
-        axes.legend(fontsize=8, loc="best")
-    figure.savefig(path, dpi=110)
+    panels[-1].set_xlabel("time (s)", fontsize=_TEXT_PT)
+    lines, names = panels[0].get_legend_handles_labels()
+    curves.legend(lines, names, fontsize=_TEXT_PT, loc="outside lower center", ncols=2)
+    figure.savefig(path, dpi=100)
 
 
-def _show_image(axes: Axes, image: ImageRgb, title: str, name: str) -> None:
+def _show_image(axes: Axes, image: ImageRgb, alpha: float, title: str = "") -> None:
     axes.imshow(image)
     axes.set_xticks([])
     axes.set_yticks([])
-    axes.set_title(title, loc="left", fontsize=10)
-    axes.set_xlabel(name, fontsize=9)
-
-
-def _colour_frame(axes: Axes, awareness: float) -> None:
-    red, green, blue = awareness_colour(awareness)
+    axes.set_title(title, loc="left", fontsize=_TEXT_PT)
+    red, green, blue = awareness_colour(alpha)
     for spine in axes.spines.values():
         spine.set_color((red / 255.0, green / 255.0, blue / 255.0))
-        spine.set_linewidth(2.0)
+        spine.set_linewidth(4.0)
 
 
-def _mark_cases(axes: Axes, paper: Sequence[float]) -> None:
-    """Mark the times of the cases, and the paper's value at each."""
+def _mark_cases(axes: Axes, paper: Sequence[float], *, named: bool) -> None:
+    """Mark the times of the cases, and the paper's value at each; their numbers stand above."""
     times = [case.t_s for case in CASES]
-    axes.plot(times, paper, "o", mfc="none", mec="black", ms=8, label="paper")
+    axes.plot(times, paper, "o", mfc="none", mec="black", mew=2.0, ms=12, label="paper")
     for number, case in enumerate(CASES, start=1):
-        axes.axvline(case.t_s, color="0.8", lw=0.8, zorder=0)
-        axes.annotate(
-            f"({number})",
-            (case.t_s, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(2, -11),
-            textcoords="offset points",
-            fontsize=8,
-            color="0.35",
-        )
+        axes.axvline(case.t_s, color="0.7", lw=1.0, zorder=0)
+        if named:
+            place = (case.t_s, 1.01)
+            across = axes.get_xaxis_transform()
+            axes.text(*place, f"({number})", transform=across, fontsize=_TEXT_PT, ha="center")
 
 
 def _plot_bound(axes: Axes, result: CrossingResult, time: FloatArray) -> None:
@@ -175,10 +163,17 @@ def _with_gaps(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatA
     return np.insert(times, breaks, times[breaks]), np.insert(finite_values, breaks, np.nan)
 
 
-_VIDEO_HZ: Final = 15
-_VIEW_SCALE: Final = 1.0 / 3.0
-_MAP_WINDOW_M: Final = (-0.9, -2.05, 5.5, 1.95)
-_EYE_CAMERA_FOV_RAD: Final = np.radians(75.0)
+_VIDEO_HZ: Final = 10
+# Width and height of each half of the video, and height of the line of text above.
+_HALF_PX: Final = (480, 360)
+_HEAD_PX: Final = 40
+_HEADS: Final = ("What the robot sees", "What the worker sees")
+# Pictures of the cases have twice the size at which they are shown.
+_CASE_PX: Final = (480, 480)
+_CASE_TEXT_PX: Final = 64
+_TEXT_PX: Final = 24
+_ROBOT_VIEW_RAD: Final = math.radians(80.0)
+_EYE_VIEW_RAD: Final = math.radians(75.0)
 # The eye camera sits at the front of the eyes, so that the worker's own face is not in its view.
 _EYE_FORWARD_M: Final = 0.08
 
@@ -217,15 +212,14 @@ class _Recorder(AbstractContextManager["_Recorder"]):
     """Renders the video and the images of the three cases while the encounter runs."""
 
     def __init__(self, scenario: Scenario, path: Path | None) -> None:
-        self._camera = scenario.camera.camera(_VIEW_SCALE)
-        self._cone = AttentionCone()
+        self._of_video = OverlayCamera(Camera.from_fov(*_HALF_PX, _ROBOT_VIEW_RAD), _TEXT_PX)
+        case_camera = Camera.from_fov(*_CASE_PX, _ROBOT_VIEW_RAD)
+        self._of_cases = OverlayCamera(case_camera, _CASE_TEXT_PX)
         self._every = round(scenario.control_hz / _VIDEO_HZ)
         self._ticks = 0
-        self._last_observed: CrossingFrame | None = None
         total = round(scenario.duration_s * scenario.control_hz)
         self._bar = tqdm(total=total, desc="encounter", unit="frame", disable=None, file=sys.stderr)
-        self._map: TopView | None = None
-        size = (2 * self._camera.width_px, self._camera.height_px)
+        size = (2 * _HALF_PX[0], _HALF_PX[1] + _HEAD_PX)
         self._video = None if path is None else VideoWriter(path, _VIDEO_HZ, size)
         self._pending_cases = list(CASES)
         self.images: list[CaseImages] = []
@@ -236,45 +230,34 @@ class _Recorder(AbstractContextManager["_Recorder"]):
             self._video.close()
 
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
-        if frame.observations:
-            self._last_observed = frame
-        if self._map is None:
-            size = (self._camera.width_px, self._camera.height_px)
-            self._map = TopView(stage, size, _MAP_WINDOW_M)
-        self._map.watch(frame)
+        for overlay in (self._of_video, self._of_cases):
+            overlay.watch(frame)
         half_tick = 0.5 / stage.scenario.control_hz
         case = next((c for c in self._pending_cases if abs(c.t_s - frame.t_s) <= half_tick), None)
-        filming = self._video is not None and self._ticks % self._every == 0
-        if filming or case is not None:
-            renderer = CameraRenderer(stage.warehouse)
-            image = renderer.rgb(self._camera, frame.T_odom_camera)
-            drawn = draw_camera_view(
-                image, self._camera, self._with_last_observations(frame), stage, self._cone
-            )
-            if case is not None:
-                self._pending_cases.remove(case)
-                self.images.append(CaseImages(case, frame, drawn, _eye_view(stage, self._camera)))
-            if filming and self._video is not None:
-                above = self._map.draw(frame, stage, self._cone)
-                self._video.add(np.hstack([drawn, above]))
+        if case is not None:
+            self._pending_cases.remove(case)
+            seen = self._of_cases.draw(frame, stage).rgb
+            self.images.append(CaseImages(case, frame, seen, _eye_view(stage, _CASE_PX)))
+        if self._video is not None and self._ticks % self._every == 0:
+            seen = self._of_video.draw(frame, stage).rgb
+            self._video.add(_side_by_side(seen, _eye_view(stage, _HALF_PX)))
         self._ticks += 1
         self._bar.update()
 
-    def _with_last_observations(self, frame: CrossingFrame) -> CrossingFrame:
-        """Return the frame with the observations of the last image, unless they are too old."""
-        last = self._last_observed
-        if last is None or frame.t_s - last.t_s > CAMERA_PERIOD_S:
-            return frame
-        return replace(
-            frame, observations=last.observations, observed_workers=last.observed_workers
-        )
+
+def _side_by_side(*halves: ImageRgb) -> ImageRgb:
+    """Return images of one size side by side, with a line of text above each."""
+    head: ImageRgb = np.full((_HEAD_PX, sum(each.shape[1] for each in halves), 3), DARK, np.uint8)
+    for number, text in enumerate(_HEADS):
+        Font(28, weight=600).write(head, text, (number * _HALF_PX[0] + 10, 6), WHITE)
+    return np.vstack([head, np.hstack(halves)])
 
 
-def _eye_view(stage: Stage, like: Camera) -> ImageRgb:
+def _eye_view(stage: Stage, size_px: tuple[int, int]) -> ImageRgb:
     """Return the view of the first worker: an image of a camera at the eyes along the gaze."""
     pose = np.array(stage.workers[0].T_odom_eyes)
     pose[:3, 3] += _EYE_FORWARD_M * pose[:3, 2]
-    camera = Camera.from_fov(like.width_px, like.height_px, float(_EYE_CAMERA_FOV_RAD))
+    camera = Camera.from_fov(*size_px, _EYE_VIEW_RAD)
     return CameraRenderer(stage.warehouse).rgb(camera, pose)
 
 

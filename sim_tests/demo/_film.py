@@ -1,150 +1,232 @@
-"""The film of one crossing with three robots, side by side: faces, numbers, and the hall."""
+"""The film of an aisle: what the robot's camera sees, and three robots in the aisle from above."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from awarenav.drawing import Colour, Font, awareness_colour, draw_disc, draw_line, fill_hull
+from awarenav.drawing import (
+    DARK,
+    WHITE,
+    Colour,
+    Font,
+    awareness_colour,
+    draw_disc,
+    draw_line,
+    fill_hull,
+)
 from awarenav.video import VideoWriter
 from perception import AttentionCone
 from perception.arrays import FloatArray, ImageRgb
 
-from ..crossing import CrossingFrame, CrossingResult, RequestMemory
-from ._comparison import (
-    FILM_HZ,
-    PORTRAIT_PX,
-    WITHOUT_AWARENESS,
-    ComparisonRow,
-    largest_radius_m,
-    lowest_bound,
-    time_behind_s,
-    time_lost_s,
-)
+from ..crossing import STANDING_SPEED_MPS, CrossingFrame, CrossingResult, RequestMemory
+from ._camera_film import CAMERA_PX, PICTURE_S, CameraPicture
+from ._comparison import WITHOUT_AWARENESS, ComparisonRow, time_lost_s
 
-#: Time for which the last picture, with the results, is shown.
-HOLD_S: Final = 4.0
+#: Pictures per second: the film runs at twice the real speed.
+FILM_HZ: Final = 10
+#: Time for which the first picture, with the results, is shown.
+HOLD_S: Final = 3.0
 
-_GAP_PX: Final = 12
-_LEGEND_PX: Final = 34
-_LEGEND: Final = (
-    "circle: obstacle · cone: where the worker looks · outline: robot with nobody there"
-    " · α: lower bound"
-)
+FILM_PX: Final = (780, 576)
+# Height of a line of text. At a width of 390 px its letters have a size of 12 px.
+_LINE_PX: Final = 33
 
-#: Width and height of a panel, pixels.
-PANEL_PX: Final = (320, 826)
+_EDGE_PX: Final = 8
+_LANE_LEFT_PX: Final = _EDGE_PX + CAMERA_PX[0] + 12
+_LANE_PX: Final = (FILM_PX[0] - _EDGE_PX - _LANE_LEFT_PX, 188)
+_MAP_PX: Final = (_LANE_PX[0], _LANE_PX[1] - 2 * _LINE_PX - 8)
 
-_MAP_TOP_PX: Final = 282
-_MAP_PX: Final = (320, 468)
-#: Pixels per metre of the map; the way of the robot points up.
-MAP_PX_PER_M: Final = 32.5
-_MAP_CENTRE_M: Final = np.array([6.35, 0.0])
+_QUIET: Final[Colour] = (172, 176, 186)
+_FLOOR: Final[Colour] = (52, 56, 66)
+_RACK: Final[Colour] = (96, 102, 116)
+_ROBOT: Final[Colour] = (126, 200, 255)
+_BAD: Final[Colour] = (255, 122, 108)
 
-_BACKGROUND: Final[Colour] = (255, 255, 255)
-_FLOOR: Final[Colour] = (238, 239, 241)
-_RACK: Final[Colour] = (176, 182, 190)
-_INK: Final[Colour] = (28, 30, 36)
-_QUIET: Final[Colour] = (96, 100, 110)
-_GHOST: Final[Colour] = (130, 134, 142)
-_BAD: Final[Colour] = (190, 30, 30)
+_TITLE: Final = Font(_LINE_PX, weight=650)
+_TEXT: Final = Font(_LINE_PX, weight=450)
 
-_LARGE: Final = Font(33, weight=600)
-_TEXT: Final = Font(27, weight=600)
-_SMALL: Final = Font(24, weight=500)
-
-_BODY_RADIUS_M: Final = 0.24
-_HEAD_RADIUS_M: Final = 0.13
+_BODY_RADIUS_M: Final = 0.26
+_CONE_LENGTH_M: Final = 1.3
 # Radii of the rings around a person who is asked to look.
 _WAVES_M: Final = (0.45, 0.65)
-_CONE_LENGTH_M: Final = 1.6
-# The line that shows where the robot faces.
-_NOSE_M: Final = np.array([[0.0, 0.0], [0.62, 0.0]])
-_PLATE: Final[Colour] = (214, 217, 222)
+# A circle farther than this from a person is not theirs.
+_SAME_PERSON_M: Final = 0.8
+# A slower robot counts as stopping.
+_STOPPING_MPS: Final = 0.05
+_MARGIN_M: Final = 0.7
+_LEGEND: Final = (
+    ("dot", awareness_colour(1.0), "has noticed the robot"),
+    ("dot", awareness_colour(0.0), "has not"),
+    ("ring", awareness_colour(0.0), "kept free by the planner"),
+)
 
-#: Rows of the comparison that the film shows: title, note and colour of the panel.
-PANELS: Final[dict[str, tuple[str, str, Colour]]] = {
-    "today's AMR": ("Scanners only", "today's AMR", (31, 78, 121)),
-    "aware, attentive worker": ("Aware robot", "worker watches it", (46, 125, 79)),
-    "aware, distracted worker": ("Aware robot", "worker looks away", (190, 105, 25)),
+#: Rows of the comparison that the film shows, and the title of each lane.
+LANES: Final[dict[str, str]] = {
+    "today's AMR": "Today’s AMR",
+    "awareness-blind": "Slow for everybody",
+    "aware": "awarenav",
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """The moment at which a moving robot comes nearest to a person.
+
+    Attributes:
+        t_s: time.
+        distance_m: between their surfaces; 0 for a touch.
+        speed_mps: of the robot.
+    """
+
+    t_s: float
+    distance_m: float
+    speed_mps: float
+
+
+def unaware_person(result: CrossingResult) -> int:
+    """Return the number of the person who is least aware of the robot, by the true gaze."""
+    alpha = np.array([[view.awareness for view in frame.truth] for frame in result.frames])
+    return int(alpha.mean(axis=0).argmin())
+
+
+def passage(result: CrossingResult, person: int) -> Passage:
+    """Return the moment at which the moving robot is nearest to a person: the fastest touch."""
+    touches = [
+        contact
+        for contact in result.contacts
+        if contact.worker == person and contact.robot_speed_mps > STANDING_SPEED_MPS
+    ]
+    if touches:
+        fastest = max(touches, key=lambda contact: contact.robot_speed_mps)
+        return Passage(fastest.t_s, 0.0, fastest.robot_speed_mps)
+    moving = [
+        frame
+        for frame in result.frames
+        if abs(frame.robot_state.travel_mps) > STANDING_SPEED_MPS and frame.separations_m
+    ]
+    nearest = min(moving, key=lambda frame: frame.separations_m[person])
+    return Passage(nearest.t_s, nearest.separations_m[person], nearest.robot_state.travel_mps)
+
+
 def write_crossing_film(paths: Sequence[Path], rows: Sequence[ComparisonRow]) -> None:
-    """Write the film of crossings side by side, in real time; each panel stands still at its end.
+    """Write the film; its first picture shows the results.
 
     Args:
         paths: files to write, each ``.webp`` (animated image) or ``.mp4``.
         rows: the comparison. The first row is the crossing with nobody there, against which time
-            is lost; the film shows today's robot and the aware one with both workers.
+            is lost; the film shows those of :data:`LANES`.
 
     Raises:
         AwarenavError: for another kind of file.
     """
-    free = rows[0].result
-    shown = [row for row in rows if row.label in PANELS]
     with ExitStack() as stack:
-        writers = [
-            stack.enter_context(VideoWriter(path, FILM_HZ, film_size_px(len(shown))))
-            for path in paths
-        ]
-        for picture in film_pictures(shown, free):
-            for writer in writers:
-                writer.add(picture)
-        for writer in writers:
-            for _ in range(round(HOLD_S * FILM_HZ) - 1):
-                writer.add(picture)
+        writers = [stack.enter_context(VideoWriter(path, FILM_HZ, FILM_PX)) for path in paths]
+        for number, picture in enumerate(film_pictures(rows)):
+            for _ in range(round(HOLD_S * FILM_HZ) if number == 0 else 1):
+                for writer in writers:
+                    writer.add(picture)
 
 
-def film_size_px(panels: int) -> tuple[int, int]:
-    """Return width and height of a film, both even."""
-    width = panels * (PANEL_PX[0] + _GAP_PX) + _GAP_PX
-    height = PANEL_PX[1] + _GAP_PX + _LEGEND_PX
-    return width + width % 2, height + height % 2
+def film_pictures(rows: Sequence[ComparisonRow]) -> Iterator[ImageRgb]:
+    """Yield the pictures of the film: the results, then all robots from the start to the goal."""
+    free = rows[0].result
+    shown = [row for row in rows if row.label in LANES]
+    person = unaware_person(shown[0].result)
+    seeing = next(row for row in shown[::-1] if row.pictures)
+    yield _picture(shown, free, person, None, decisive_picture(seeing).rgb)
+    # Who never arrives would make the film long.
+    arrived = [row for row in shown if row.result.time_to_goal_s is not None]
+    end_s = max(row.result.frames[-1].t_s for row in arrived or shown)
+    for number in range(math.ceil(end_s / PICTURE_S - 1e-6) + 1):
+        camera = seeing.pictures[min(number, len(seeing.pictures) - 1)].rgb
+        yield _picture(shown, free, person, number * PICTURE_S, camera)
 
 
-def film_pictures(rows: Sequence[ComparisonRow], free: CrossingResult) -> Iterator[ImageRgb]:
-    """Yield the pictures of the film, from the start to the end of the longest crossing."""
-    width, height = film_size_px(len(rows))
-    end_s = max(row.result.frames[-1].t_s for row in rows)
-    for number in range(math.ceil(end_s * FILM_HZ - 1e-6) + 1):
-        image = np.full((height, width, 3), 255, np.uint8)
-        for column, row in enumerate(rows):
-            left = _GAP_PX + column * (PANEL_PX[0] + _GAP_PX)
-            panel = draw_panel(row, free, number)
-            image[_GAP_PX : _GAP_PX + PANEL_PX[1], left : left + PANEL_PX[0]] = panel
-        _SMALL.write(image, _LEGEND, (_GAP_PX + 8, height - _LEGEND_PX), (96, 100, 110))
-        yield image
+def decisive_picture(row: ComparisonRow) -> CameraPicture:
+    """Return the last picture of the camera that shows most people as a whole."""
+    most = max(len(each.whole) for each in row.pictures)
+    return next(each for each in row.pictures[::-1] if len(each.whole) == most)
 
 
-def draw_panel(row: ComparisonRow, free: CrossingResult, picture: int) -> ImageRgb:
-    """Draw one crossing at one time; after its end the panel stands still.
+def _picture(
+    rows: Sequence[ComparisonRow],
+    free: CrossingResult,
+    person: int,
+    t_s: float | None,
+    camera: ImageRgb,
+) -> ImageRgb:
+    """Draw a picture of the film at a time; None for the results."""
+    image: ImageRgb = np.full((FILM_PX[1], FILM_PX[0], 3), DARK, np.uint8)
+    _TITLE.write(image, "What awarenav sees", (_EDGE_PX, 4), WHITE)
+    top = _LINE_PX + 10
+    image[top : top + CAMERA_PX[1], _EDGE_PX : _EDGE_PX + CAMERA_PX[0]] = camera
+    _write_legend(image, top + CAMERA_PX[1] + 10)
+    for number, row in enumerate(rows):
+        corner = _LANE_LEFT_PX, 4 + number * (_LANE_PX[1] + 2)
+        lane = image[corner[1] : corner[1] + _LANE_PX[1], corner[0] : corner[0] + _LANE_PX[0]]
+        lane[:] = draw_lane(row, free, person, t_s)
+    return image
+
+
+def _write_legend(image: ImageRgb, top: int) -> None:
+    for number, (sign, colour, text) in enumerate(_LEGEND):
+        middle = np.array([_EDGE_PX + 14.0, top + number * (_LINE_PX + 2) + 0.5 * _LINE_PX])
+        if sign == "dot":
+            draw_disc(image, middle, 11.0, colour)
+        else:
+            draw_line(image, middle + 11.0 * _circle(), colour, 3)
+        corner = _EDGE_PX + 38, top + number * (_LINE_PX + 2)
+        _TEXT.write(image, text, corner, WHITE)
+
+
+def draw_lane(row: ComparisonRow, free: CrossingResult, person: int, t_s: float | None) -> ImageRgb:
+    """Draw one robot in the aisle at one time, with its title and two figures.
 
     Args:
-        row: the crossing, one of :data:`PANELS`.
+        row: the crossing, one of :data:`LANES`.
         free: the same crossing with nobody there.
-        picture: number of the picture in the film.
+        person: number of the person whose passage is shown.
+        t_s: the time; None for the results and the moment nearest to the person.
 
     Returns:
-        An (H, W, 3) RGB image of :data:`PANEL_PX`.
+        An (H, W, 3) RGB image.
     """
-    title, note, colour = PANELS[row.label]
-    index = frame_index(row.result, picture / FILM_HZ)
-    image = np.full((PANEL_PX[1], PANEL_PX[0], 3), _BACKGROUND, np.uint8)
-    image[:6] = colour
-    _LARGE.write(image, title, (8, 12), _INK)
-    _SMALL.write(image, note, (8, 46), _QUIET)
-    _draw_portrait(image, row.portraits, picture)
-    _write_numbers(image, row.result.frames[index], row.result.policy in WITHOUT_AWARENESS)
-    bottom = _MAP_TOP_PX + _MAP_PX[1]
-    image[_MAP_TOP_PX:bottom] = draw_map(row, free, picture / FILM_HZ)
-    _write_clock(image, row.result, free, index, bottom + 4)
+    result = row.result
+    image: ImageRgb = np.full((_LANE_PX[1], _LANE_PX[0], 3), DARK, np.uint8)
+    near = passage(result, person)
+    end = t_s is None or t_s >= result.frames[-1].t_s - 1e-9
+    _TITLE.write(image, LANES[row.label], (0, 0), WHITE)
+    lost = time_lost_s(result, free)
+    if not end:
+        _write_right(image, _TEXT, f"{t_s:.1f} s", 0, _QUIET)
+    elif lost is None:
+        _write_right(image, _TITLE, "never arrives", 0, _BAD)
+    else:
+        _write_right(image, _TITLE, f"{lost:.1f} s lost", 0, WHITE)
+    image[_LINE_PX : _LINE_PX + _MAP_PX[1]] = draw_map(row, t_s)
+    bottom = _LINE_PX + _MAP_PX[1]
+    if t_s is not None and t_s < near.t_s:
+        frame = result.frames[frame_index(result, t_s)]
+        _TEXT.write(image, f"{frame.robot_state.travel_mps:.1f} m/s", (0, bottom), _QUIET)
+    elif near.distance_m <= 0.0:
+        _TITLE.write(image, f"hits at {near.speed_mps:.1f} m/s", (0, bottom), _BAD)
+    else:
+        stops = near.speed_mps < _STOPPING_MPS
+        speed = ", stopping" if stops else f" at {near.speed_mps:.1f} m/s"
+        text = f"nearest {near.distance_m:.2f} m{speed}"
+        _TEXT.write(image, text, (0, bottom), WHITE)
     return image
+
+
+def _write_right(image: ImageRgb, font: Font, text: str, top: int, colour: Colour) -> None:
+    font.write(image, text, (image.shape[1] - font.width_px(text), top), colour)
 
 
 def frame_index(result: CrossingResult, t_s: float) -> int:
@@ -154,125 +236,108 @@ def frame_index(result: CrossingResult, t_s: float) -> int:
     return max(int(np.searchsorted(times, t_s + 1e-9, side="right")) - 1, 0)
 
 
-def _draw_portrait(image: ImageRgb, portraits: tuple[ImageRgb | None, ...], picture: int) -> None:
-    left, top = 8, 80
-    width, height = PORTRAIT_PX
-    place = image[top : top + height, left : left + width]
-    portrait = portraits[min(picture, len(portraits) - 1)] if portraits else None
-    if portrait is not None:
-        place[:] = portrait
-        return
-    place[:] = _PLATE
-    for row, text in enumerate(("out of", "view") if portraits else ("no", "camera")):
-        x = left + (width - _TEXT.width_px(text)) // 2
-        _TEXT.write(image, text, (x, top + 46 + 29 * row), _QUIET)
+def draw_map(row: ComparisonRow, t_s: float | None) -> ImageRgb:
+    """Draw the aisle from above, the robot's way pointing right.
 
+    Shows racks, people with their attention cones in the colour of their awareness, each obstacle
+    as its circle in the colour of the bound that the robot uses (grey: it uses none), the robot
+    with the way it has come, and requests to look.
 
-def _write_numbers(image: ImageRgb, frame: CrossingFrame, unused: bool) -> None:
-    left, top = 158, 80
-    alpha, radius_m = lowest_bound(frame), largest_radius_m(frame)
-    if unused or alpha is None:
-        _LARGE.write(image, "α unused" if unused else "α –", (left, top), _QUIET)
-    else:
-        draw_disc(image, np.array([left + 9.0, top + 19.0]), 9.0, awareness_colour(alpha))
-        _LARGE.write(image, f"α ≥ {alpha:.2f}", (left + 26, top), _INK)
-    radius = "–" if radius_m is None else f"{radius_m:.2f} m"
-    _TEXT.write(image, f"radius {radius}", (left, top + 38), _INK)
-    _LARGE.write(image, f"{frame.robot_state.travel_mps:.2f} m/s", (left, top + 72), _INK)
-    limit = frame.constraints
-    _TEXT.write(image, f"limit {limit.speed_limit_mps:.2f} m/s", (left, top + 110), _INK)
-    rule = limit.limited_by.rpartition(": ")[2]  # without the person's number
-    _SMALL.write(image, f"limited by {rule}", (8, 240), _QUIET)
+    Args:
+        row: the crossing.
+        t_s: the time; None draws each person at the moment at which the robot is nearest to them.
 
-
-def _write_clock(
-    image: ImageRgb, result: CrossingResult, free: CrossingResult, index: int, top: int
-) -> None:
-    frame, colour, below = result.frames[index], _INK, ""
-    if index < len(result.frames) - 1:
-        clock, lost_s = f"{frame.t_s:.1f} s", time_behind_s(frame, free)
-    else:
-        clock, lost_s = "not at the goal", time_lost_s(result, free)
-        if result.time_to_goal_s is not None:
-            clock = f"goal {result.time_to_goal_s:.2f} s"
-            below = f"passed at up to {result.max_speed_within_2m_mps:.2f} m/s"
-        if result.contact:
-            below = "touched the worker"
-        if result.contact or result.time_to_goal_s is None:
-            colour = _BAD
-        image[top - 2 : top + 40] = _PLATE
-    lost = "" if lost_s is None else f"{lost_s:.1f} s lost"
-    _LARGE.write(image, clock, (8, top), colour)
-    _LARGE.write(image, lost, (PANEL_PX[0] - 8 - _LARGE.width_px(lost), top), colour)
-    _TEXT.write(image, below, (8, top + 40), colour)
-
-
-def draw_map(row: ComparisonRow, free: CrossingResult, t_s: float) -> ImageRgb:
-    """Draw the hall from above, the robot's way pointing up.
-
-    Shows racks, the worker with head and attention cone, each obstacle as its circle, the robot,
-    requests to look and their answers, and as an outline the robot that meets nobody.
+    Returns:
+        An (H, W, 3) RGB image.
     """
-    result, robot = row.result, PANELS[row.label][2]
-    index = frame_index(result, t_s)
-    frame = result.frames[index]
-    image = np.full((_MAP_PX[1], _MAP_PX[0], 3), _FLOOR, np.uint8)
+    result, place = row.result, MapScale.of(row)
+    image: ImageRgb = np.full((_MAP_PX[1], _MAP_PX[0], 3), _FLOOR, np.uint8)
     for x0, y0, x1, y1 in row.scenario.layout.obstacle_boxes_odom:
-        fill_hull(image, map_px(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), _RACK, 1.0)
-    blind = result.policy in WITHOUT_AWARENESS
-    for obstacle in frame.constraints.obstacles:
-        colour = awareness_colour(None if blind else obstacle.awareness_lower)
-        ring = obstacle.center_odom_m + obstacle.radius_m * _circle()
-        fill_hull(image, map_px(ring), colour, 0.30)
-        draw_line(image, map_px(ring), colour, 2)
-    path = np.array([each.robot_state.position_odom_m for each in result.frames[: index + 1]])
-    draw_line(image, map_px(path), robot, 1)
-    for number in range(len(frame.truth)):
-        walked = [each.truth[number].position_odom_m for each in result.frames[: index + 1]]
-        draw_line(image, map_px(np.array(walked)), _GHOST, 1)
-        _draw_person(image, frame, number)
-    ghost = free.frames[frame_index(free, t_s)]
-    draw_line(image, map_px(_footprint(ghost, free)), _GHOST, 2)
-    fill_hull(image, map_px(_footprint(frame, result)), robot, 1.0)
-    draw_line(image, map_px(_placed(frame, _NOSE_M)), robot, 3)
-    _draw_requests(image, result, index, robot)
+        fill_hull(image, place.px(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), _RACK, 1.0)
+    people = range(len(result.frames[0].truth))
+    times_s = [passage(result, each).t_s if t_s is None else t_s for each in people]
+    if t_s is not None:
+        times_s.append(t_s)  # where the robot is with nobody there
+    indices = [frame_index(result, each) for each in times_s]
+    for number, index in zip(people, indices, strict=False):
+        _draw_circle(image, result, number, index, place)
+    path = np.array([each.robot_state.position_odom_m for each in result.frames])
+    draw_line(image, place.px(path[: None if t_s is None else indices[-1] + 1]), _ROBOT, 2)
+    for number, index in zip(people, indices, strict=False):
+        _draw_person(image, result.frames[index], number, place)
+    for index in set(indices):
+        outline = place.px(_placed(result.frames[index], result.robot.footprint_m))
+        fill_hull(image, outline, _ROBOT, 1.0)
+    if t_s is not None:
+        _draw_requests(image, result, indices[-1], place)
     return image
 
 
-def _draw_requests(image: ImageRgb, result: CrossingResult, index: int, asks: Colour) -> None:
+def _draw_circle(
+    image: ImageRgb, result: CrossingResult, person: int, index: int, place: MapScale
+) -> None:
+    """Draw the circle of a person, if the robot has one."""
+    frame = result.frames[index]
+    where = frame.truth[person].position_odom_m
+    for obstacle in frame.constraints.obstacles:
+        if float(np.hypot(*(obstacle.center_odom_m - where))) > _SAME_PERSON_M:
+            continue
+        ignored = result.policy in WITHOUT_AWARENESS
+        colour = awareness_colour(None if ignored else obstacle.awareness_lower)
+        ring = place.px(obstacle.center_odom_m + obstacle.radius_m * _circle())
+        fill_hull(image, ring, colour, 0.25)
+        draw_line(image, ring, colour, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class MapScale:
+    """Where places of the hall are on a map: x in odom right, y up.
+
+    Attributes:
+        px_per_m: scale.
+        centre_odom_m: (2,) place in the middle of the map.
+    """
+
+    px_per_m: float
+    centre_odom_m: FloatArray
+
+    @classmethod
+    def of(cls, row: ComparisonRow) -> MapScale:
+        """Return the scale at which the robot's way fills the width of the map."""
+        task = row.scenario.robot
+        length_m = abs(task.goal_x_m - task.start_x_m) + 2.0 * _MARGIN_M
+        middle = 0.5 * np.array([task.start_x_m + task.goal_x_m, task.start_y_m + task.goal_y_m])
+        return cls(_MAP_PX[0] / length_m, middle)
+
+    def px(self, points_odom_m: FloatArray) -> FloatArray:
+        """Return the pixels (N, 2) of points (N, 2)."""
+        shifted = (np.asarray(points_odom_m) - self.centre_odom_m) * self.px_per_m
+        return np.asarray(shifted * (1.0, -1.0) + 0.5 * np.array(_MAP_PX))
+
+
+def _draw_requests(image: ImageRgb, result: CrossingResult, index: int, place: MapScale) -> None:
     memory = RequestMemory()
     for each in result.frames[: index + 1]:
         memory.take(each)
-    for row, request in enumerate(memory.shown(result.frames[index])):
-        colour = awareness_colour(1.0) if request.answered else asks
-        _SMALL.write(image, request.text, (8, 6 + 28 * row), _INK)
+    for request in memory.shown(result.frames[index]):
+        colour = awareness_colour(1.0) if request.answered else WHITE
         if request.place_odom_m is not None:
             for radius_m in _WAVES_M:
-                ring = request.place_odom_m + radius_m * _circle()
-                draw_line(image, map_px(ring), colour, 2)
+                draw_line(image, place.px(request.place_odom_m + radius_m * _circle()), colour, 2)
 
 
-def map_px(points_odom_m: FloatArray) -> FloatArray:
-    """Return where points (N, 2) of the hall are on the map: x in odom up, y to the left."""
-    shifted = (np.asarray(points_odom_m) - _MAP_CENTRE_M) * MAP_PX_PER_M
-    return np.stack([0.5 * _MAP_PX[0] - shifted[:, 1], 0.5 * _MAP_PX[1] - shifted[:, 0]], axis=1)
-
-
-def _draw_person(image: ImageRgb, frame: CrossingFrame, number: int) -> None:
+def _draw_person(image: ImageRgb, frame: CrossingFrame, number: int, place: MapScale) -> None:
     view = frame.truth[number]
     gaze = (frame.T_odom_camera[:3, :3] @ view.gaze_camera)[:2]
     heading = math.atan2(gaze[1], gaze[0])
     half = AttentionCone().half_angle_rad
     angles = np.linspace(-half, half, 15) + heading
     arc = view.position_odom_m + _CONE_LENGTH_M * np.stack([np.cos(angles), np.sin(angles)], 1)
-    sector = map_px(np.vstack([view.position_odom_m, arc]))
-    fill_hull(image, sector, _INK, 0.22)
-    draw_line(image, np.vstack([sector, sector[:1]]), _INK, 1)
-    centre = map_px(view.position_odom_m[None])
-    draw_disc(image, centre, _BODY_RADIUS_M * MAP_PX_PER_M, _QUIET)
-    draw_disc(image, centre, _HEAD_RADIUS_M * MAP_PX_PER_M, _INK)
-    nose = view.position_odom_m + 0.32 * np.array([math.cos(heading), math.sin(heading)])
-    draw_line(image, map_px(np.stack([view.position_odom_m, nose])), _INK, 3)
+    colour = awareness_colour(view.awareness)
+    fill_hull(image, place.px(np.vstack([view.position_odom_m, arc])), colour, 0.45)
+    centre = place.px(view.position_odom_m[None])
+    draw_disc(image, centre, _BODY_RADIUS_M * place.px_per_m + 1.5, DARK)
+    draw_disc(image, centre, _BODY_RADIUS_M * place.px_per_m, colour)
 
 
 def _circle() -> FloatArray:
@@ -285,9 +350,3 @@ def _placed(frame: CrossingFrame, points_m: FloatArray) -> FloatArray:
     cos, sin = (f(frame.robot_state.heading_odom_rad) for f in (math.cos, math.sin))
     turned = points_m @ np.array([[cos, -sin], [sin, cos]]).T
     return np.asarray(turned + frame.robot_state.position_odom_m)
-
-
-def _footprint(frame: CrossingFrame, result: CrossingResult) -> FloatArray:
-    """Return the closed outline (N, 2) of the robot in odom."""
-    corners = _placed(frame, result.robot.footprint_m)
-    return np.vstack([corners, corners[:1]])

@@ -3,50 +3,63 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-from awarenav.cli import OneOf, command, option, options
-
-from ..conditions import Experiment, conditions_options
+from awarenav.cli import POSITIVE, OneOf, command, option, options
 
 
 @command(
     "demo",
     examples=[
         "awarenav demo --out demo",
-        "awarenav demo --robot omni --population recorded --no-video --out omni",
+        "awarenav demo --seeds 10 --out ten",
+        "awarenav demo --paper --no-video --out paper",
     ],
     exit_status={0: "Success.", 2: "Bad input, or the extra 'sim' is missing."},
-    epilog="Needs the extra 'sim'. The encounter keeps the paper's robot and worker.",
+    epilog="Needs the extra 'sim'.",
 )
 @options.out_folder("demo")
-@option("--no-video", is_flag=True, help="Write no films (faster).")
-@conditions_options(
-    without=("scenario", "policy", "planner", "sensors", "camera", "networks", "fault"),
-    perception={"type": OneOf(["keypoints", "pixels"]), "note": " 'pixels' takes many minutes."},
+@option("--no-video", is_flag=True, help="Write no film (faster).")
+@option(
+    "--seeds",
+    type=POSITIVE,
+    metavar="N",
+    help="Run the seeds 0 to N-1 without a film, and print their table; 10 of them take minutes.",
+    excludes="--paper",
 )
-@options.as_json("the tables")
+@option("--paper", is_flag=True, help="Run the paper's 25 s encounter instead.")
+@option(
+    "--perception",
+    type=OneOf(["keypoints", "pixels"]),
+    default="keypoints",
+    help="With --paper: noisy keypoints, or networks that see rendered images (many minutes).",
+)
+@options.seed(default=None)
+@options.as_json()
 def demo(
     out: Path,
     *,
     no_video: bool,
+    seeds: int | None,
+    paper: bool,
+    perception: str,
+    seed: int | None,
     as_json: bool,
-    **values: Any,
 ) -> int:
-    """Run the paper's 25 s encounter, and one crossing with and without awareness.
+    """Film four robots in an aisle in which somebody with a phone steps out.
 
-    Prints the results. Writes encounter.png, encounter.mp4 and encounter.csv; crossings.png and
-    episodes.csv; and a film of the crossing with three robots: crossing.webp and crossing.mp4.
+    Today's AMR with a planner that knows how people walk, today's AMR with a costmap planner, a
+    robot that is slow for everybody, and awarenav. Prints their figures beside those of ten seeds.
+    Writes lanes.jsonl, crossing.webp and crossing.mp4; with --paper encounter.png, encounter.mp4
+    and encounter.csv.
     """
-    from ._demo import run_demo  # noqa: PLC0415 - help needs no simulator
+    from . import _demo  # noqa: PLC0415 - help needs no simulator
 
-    experiment = Experiment.taken_from(values)
-    run_demo(
-        out,
-        seed=experiment["seed"],
-        video=not no_video,
-        perception=experiment["perception"],
-        axes=experiment.changes,
-        as_json=as_json,
-    )
+    if paper:
+        _demo.run_paper(
+            out, seed=seed or 0, video=not no_video, perception=perception, as_json=as_json
+        )
+    elif seeds is not None:
+        _demo.run_seeds(out, seeds=seeds, as_json=as_json)
+    else:
+        _demo.run_demo(out, seed=seed, video=not no_video, as_json=as_json)
     return 0

@@ -18,6 +18,7 @@ from benchmarks.leaderboard import (
     read_results,
 )
 from benchmarks.leaderboard._page import Standing
+from benchmarks.leaderboard._results import headline, over_scenarios, times
 from sim_tests import SimError
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import EpisodeRecord
@@ -68,6 +69,36 @@ def _standing(name, *, contacts=0, violation_s=0.0, lost_s=5.0, missing=0) -> St
         for seed in range(10 - missing)
     )
     return Standing(row, records, 10)
+
+
+def _times(factor=1.0, lost_s=2.0) -> Standing:
+    records = tuple(
+        EpisodeRecord(
+            *(scenario, seed, "balanced", "SamplingPlanner", "keypoints"),
+            time_to_goal_s=factor * (10.0 + number + 0.1 * seed),
+            time_lost_s=lost_s + number,
+        )
+        for number, scenario in enumerate("abcd")
+        for seed in range(3)
+    )
+    return Standing(Row(name="a", policy="balanced", sensors="camera"), records, 12)
+
+
+def test_the_results_compare_the_same_episodes_of_two_rows():
+    same = times(_times(), _times())
+    assert (same.value, same.low, same.high) == pytest.approx((1.0, 1.0, 1.0))
+    slower = times(_times(), _times(1.5))
+    assert (slower.value, slower.low, slower.high) == pytest.approx((1.5, 1.5, 1.5))
+    saved = over_scenarios(_times(lost_s=2.0).ran, _times(lost_s=3.5).ran, lambda a, b: b - a)
+    assert (saved.value, saved.low, saved.high) == pytest.approx((1.5, 1.5, 1.5))
+    assert saved.n == 4
+
+
+def test_the_results_of_the_committed_rows_are_told():
+    text = headline(_BOARD)
+    assert f"{len(_BOARD.templates)} scenarios" in text
+    assert "contacts with the moving robot in 0 of" in text.splitlines()[-1]
+    assert "nan" not in text
 
 
 def test_contacts_come_before_violation_and_violation_before_time():

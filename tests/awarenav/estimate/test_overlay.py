@@ -19,7 +19,7 @@ from awarenav.drawing import Font, awareness_colour
 from awarenav.errors import AwarenavError
 from awarenav.estimate import FrameEstimate, OverlayWriter, SourceFrame
 from awarenav.estimate._overlay import draw_overlay, fit_image
-from awarenav.estimate._places import Box, Labelled, leader, meet, place_labels
+from awarenav.overlay._places import Box, Labelled, leader, meet, place_labels
 from perception import AttentionCone, Camera, PersonKeypoints, PersonObservation
 
 CONE = AttentionCone()

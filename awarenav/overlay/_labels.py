@@ -24,20 +24,20 @@ HEAD: Final = range(kp.NOSE, kp.RIGHT_EAR + 1)
 
 
 @dataclass(slots=True)
-class Person:
+class OverlaidPerson:
     """A person to draw, and what is known of them.
 
     ``arrow_px`` (2, 2) is the gaze, from the head on; None until it is drawn.
     """
 
     observation: PersonObservation
-    keypoints: PersonKeypoints | None
-    track: PersonTrack | None
+    keypoints: PersonKeypoints | None = None
+    track: PersonTrack | None = None
     arrow_px: FloatArray | None = None
 
 
 def draw_labels(
-    image: ImageRgb, near_first: Sequence[Person], camera: Camera, font: Font, caption: str
+    image: ImageRgb, near_first: Sequence[OverlaidPerson], camera: Camera, font: Font, caption: str
 ) -> None:
     """Draw a label at each person and a caption in a corner; they hide no head and no other label.
 
@@ -48,12 +48,14 @@ def draw_labels(
         near_first: the people, the nearest first.
         camera: of the image.
         font: of the labels.
-        caption: of the picture.
+        caption: of the picture; empty for none.
     """
     picture = image.shape[1], image.shape[0]
     labelled = [_labelled(person, camera, font, picture) for person in near_first]
-    taken = _draw_caption(image, caption, font, [each.head for each in labelled])
-    places = place_labels(labelled, picture, [taken])
+    taken = []
+    if caption:
+        taken.append(_draw_caption(image, caption, font, [each.head for each in labelled]))
+    places = place_labels(labelled, picture, taken)
     for person, place, own in zip(near_first, places, labelled, strict=True):
         if place is not None:
             ends = leader(place.box, own.head)
@@ -62,7 +64,7 @@ def draw_labels(
             _draw_label(image, person, place, font)
 
 
-def _texts(person: Person) -> tuple[tuple[str, ...], ...]:
+def _texts(person: OverlaidPerson) -> tuple[tuple[str, ...], ...]:
     """Return the rows of a person's label, the smallest label first."""
     observation, track = person.observation, person.track
     alpha, spread = observation.awareness, observation.awareness_std
@@ -76,7 +78,7 @@ def _texts(person: Person) -> tuple[tuple[str, ...], ...]:
     return (f"{name}{value}",), (distance, f"{value} ± {spread:.2f}")
 
 
-def _labelled(person: Person, camera: Camera, font: Font, picture: Size) -> Labelled:
+def _labelled(person: OverlaidPerson, camera: Camera, font: Font, picture: Size) -> Labelled:
     """Return where a person and their head are, and how large their label is."""
     box = person.observation.box_xyxy_px
     if box is None:
@@ -120,7 +122,7 @@ def _inside(box: FloatArray, picture: Size) -> Box:
     return left, top, right, bottom
 
 
-def _label_sizes(person: Person, font: Font) -> tuple[Size, ...]:
+def _label_sizes(person: OverlaidPerson, font: Font) -> tuple[Size, ...]:
     """Return the sizes of a person's labels, the smallest first."""
     gap, sizes = _label_gap(font), []
     for rows in _texts(person):
@@ -134,13 +136,13 @@ def _label_gap(font: Font) -> int:
     return max(font.height_px // 4, 3)
 
 
-def _bar_height(person: Person, rows: Sequence[str], font: Font) -> int:
+def _bar_height(person: OverlaidPerson, rows: Sequence[str], font: Font) -> int:
     """Return the height of the bar with its margin: a whole label with an α has one."""
     has_bar = len(rows) > 1 and person.observation.awareness is not None
     return 2 * _label_gap(font) if has_bar else 0
 
 
-def _draw_label(image: ImageRgb, person: Person, place: Place, font: Font) -> None:
+def _draw_label(image: ImageRgb, person: OverlaidPerson, place: Place, font: Font) -> None:
     """Draw α, why there is none, or all: the distance and a bar as well."""
     left, top, right, bottom = place.box
     gap, rows = _label_gap(font), _texts(person)[place.size]

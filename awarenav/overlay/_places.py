@@ -61,24 +61,39 @@ def place_labels(
         taken: places that stay free.
     """
     places: list[Place | None] = [None] * len(people)
-    heads = [each.head for each in people]
-    unwanted = [each.box for each in people]
-    unwanted += [each.pointer for each in people if each.pointer is not None]
     for size in range(max((len(each.sizes) for each in people), default=0)):
         for index, person in enumerate(people):
-            if size >= len(person.sizes):
-                continue
-            others = [place.box for k, place in enumerate(places) if place and k != index]
-            forbidden = [*heads, *others, *taken]
-            free = [
-                box
-                for box in _candidates(person, person.sizes[size], picture)
-                if not any(meet(box, other) for other in forbidden)
-            ]
-            if free:
-                best = min(free, key=lambda box: _strain(box, person.head, unwanted))
-                places[index] = Place(best, size)
-    return places
+            if size < len(person.sizes):
+                places[index] = _best(people, index, size, places, picture, taken) or places[index]
+    # Small labels of others were in the way while the first ones grew.
+    again: list[Place | None] = [None] * len(people)
+    for index, place in enumerate(places):
+        if place is not None:
+            again[index] = _best(people, index, place.size, again, picture, taken)
+    return again if again.count(None) == places.count(None) else places
+
+
+def _best(
+    people: Sequence[Labelled],
+    index: int,
+    size: int,
+    places: Sequence[Place | None],
+    picture: Size,
+    taken: Sequence[Box],
+) -> Place | None:
+    """Return the best free place of one person's label in a size; None if there is no room."""
+    others = [place.box for k, place in enumerate(places) if place and k != index]
+    forbidden = [*(each.head for each in people), *others, *taken]
+    unwanted = [each.box for each in people]
+    unwanted += [each.pointer for each in people if each.pointer is not None]
+    free = [
+        box
+        for box in _candidates(people[index], people[index].sizes[size], picture)
+        if not any(meet(box, other) for other in forbidden)
+    ]
+    if not free:
+        return None
+    return Place(min(free, key=lambda box: _strain(box, people[index].head, unwanted)), size)
 
 
 def meet(one: Box, other: Box) -> bool:

@@ -1,0 +1,106 @@
+"""The four robots of ``awarenav demo``: the reported rows, the shown seed, table and command."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+from paths import ROOT
+
+from awarenav.cli import main
+from sim_tests.demo import _lanes
+from sim_tests.demo._lanes import (
+    LANES,
+    REPORTED,
+    LaneRow,
+    lanes_table,
+    legend,
+    read_report,
+    report_text,
+    run_lane,
+    shown_seed,
+)
+from sim_tests.scenario import ScenarioTemplate
+
+ROW = LaneRow(0, "awarenav", 12.0, 2.0, None, 0.80, 0.10, 0.90, 1.40, 0.0)
+
+
+def of_seeds(lost_s: list[float]) -> list[LaneRow]:
+    other = replace(ROW, lane="blind", time_lost_s=0.0)
+    return [
+        replace(row, seed=seed, time_lost_s=value)
+        for seed, value in enumerate(lost_s)
+        for row in (ROW, replace(other, time_lost_s=-value))
+    ]
+
+
+def test_the_report_holds_every_robot_with_every_seed_of_this_version_of_the_scenario() -> None:
+    about, rows = read_report()
+    assert about["scenario"] == ScenarioTemplate.shipped(_lanes.SCENARIO).id
+    assert [(row.seed, row.lane) for row in rows] == [
+        (seed, lane.name) for seed in range(REPORTED) for lane in LANES
+    ]
+    assert report_text(rows).splitlines()[1:] == _lanes._REPORT.read_text("utf-8").splitlines()[1:]
+
+
+@pytest.mark.parametrize(
+    ("lost_s", "seed"),
+    [([5.0], 0), ([9.0, 1.0, 5.0], 2), ([9.0, 5.0, 1.0, 6.0], 1), ([3.0, 3.0, 3.0, 3.0], 1)],
+)
+def test_the_median_seed_by_the_time_that_awarenav_loses_is_shown(lost_s, seed) -> None:
+    assert shown_seed(of_seeds(lost_s)) == seed
+
+
+def test_a_near_miss_is_close_fast_and_no_touch() -> None:
+    near = replace(ROW, nearest_m=0.44, nearest_mps=0.26)
+    assert near.near_miss
+    assert not replace(near, nearest_m=0.46).near_miss
+    assert not replace(near, nearest_mps=0.24).near_miss
+    assert not replace(near, touch_mps=0.5).near_miss
+
+
+def test_the_table_fits_80_columns_and_shows_medians_and_counts() -> None:
+    today = replace(ROW, lane="today", nearest_m=0.1, nearest_mps=1.5)
+    late = replace(ROW, seed=1, time_to_goal_s=None, time_lost_s=40.0, watcher_mps=None)
+    rows = [today, replace(today, seed=1, nearest_m=0.0, touch_mps=1.234), ROW, late]
+    table = lanes_table(rows)
+    assert max(map(len, (table + "\n" + legend(2)).splitlines())) <= 80
+    *_, of_today, of_awarenav = table.splitlines()
+    assert of_today.removeprefix("today's AMR, predicts").split() == [
+        *("12.0", "2.0", "1,", "1.23", "1", "0.05", "1.50", "0.90", "1.40")
+    ]
+    # One that never arrives or never comes near has no number.
+    assert of_awarenav.removeprefix("awarenav").split() == [
+        *("–", "21.0", "–", "0", "0.80", "0.10", "0.90", "–")
+    ]
+    assert lanes_table([late]).splitlines()[-1].split()[1:4] == ["–", "40.0", "–"]
+
+
+@pytest.mark.slow
+def test_a_reported_row_can_be_measured_again() -> None:
+    seed = shown_seed(read_report()[1])
+    (reported,) = (row for row in read_report()[1] if (row.seed, row.lane) == (seed, "awarenav"))
+    run = run_lane(LANES[-1], seed)
+    assert run.row == reported
+    assert run.scenario.people[run.stepping_out].activity == "phone"
+
+
+@pytest.mark.slow
+def test_the_command_prints_both_tables_and_which_file_to_open(tmp_path, capsys) -> None:
+    out = tmp_path / "demo"
+    assert main(["demo", "--no-video", "--json", "--out", str(out)]) == 0
+    printed = capsys.readouterr()
+    tables = json.loads(printed.out)
+    assert [row["lane"] for row in tables["shown"]] == [lane.name for lane in LANES]
+    assert {row["seed"] for row in tables["shown"]} == {tables["seed"]}
+    assert len(tables["reported"]) == REPORTED * len(LANES)
+    assert printed.err.splitlines()[-1] == f"Open {out / 'lanes.jsonl'}"
+    assert max(map(len, printed.err.splitlines()[:-1])) <= 80
+
+
+def test_the_page_has_the_reported_table_and_names_the_shown_seed() -> None:
+    _, rows = read_report()
+    page = (ROOT / "docs" / "simulation.md").read_text("utf-8")
+    assert lanes_table(rows) in page
+    assert f"seed {shown_seed(rows)}." in page
