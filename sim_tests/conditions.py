@@ -26,6 +26,8 @@ SensorSet = Literal["camera", "camera+scanner", "scanner"]
 ORACLE: Final = "oracle"
 #: The command line's name of the reference planner, which is empty elsewhere.
 REFERENCE_PLANNER: Final = "reference"
+#: The same planner's name in tables of episodes.
+REFERENCE_IN_TABLES: Final = "SamplingPlanner"
 #: The name that stands for "without a fault".
 NO_FAULT: Final = "none"
 #: The name of the habits that people have.
@@ -318,9 +320,9 @@ class Conditions:
     @property
     def text(self) -> str:
         """The conditions in words; those that are empty are left out."""
-        named = {"seed": "seed ", "policy": "policy ", "planner": "", "scenario": ""}
+        named = {"scenario": ""}
         words = [
-            f"{named.get(name, f'{name} ')}{value}"
+            f"{named.get(name, f'{name} ')}{planner_name(value) if name == 'planner' else value}"
             for name in AXES
             if (value := getattr(self, name)) != ""
         ]
@@ -366,6 +368,11 @@ def refuse_unused_networks(values: Mapping[str, Any], kind: str) -> None:
         raise SimError(
             f"networks see pictures: they need perception 'pixels', got {kind or _SCANNER!r}"
         )
+
+
+def planner_name(in_table: str) -> str:
+    """Return the name of a planner on the command line, from that in tables of episodes."""
+    return REFERENCE_PLANNER if in_table == REFERENCE_IN_TABLES else in_table
 
 
 def table_name(value: Any) -> str:

@@ -89,7 +89,7 @@ def _table(policy: AwarenessPolicy, robot: RobotProfile) -> dict[str, Any]:
 def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list[str]:
     """Return the table of radius, U and speed limits as lines of text."""
     table = _table(policy, robot)
-    distances = "  ".join(f"{distance:3g} m" for distance in _DISTANCES_M)
+    distances = " ".join(f"{distance:3g} m" for distance in _DISTANCES_M)
     width = len(distances)
     lines = [
         name,
@@ -99,6 +99,7 @@ def table_lines(name: str, policy: AwarenessPolicy, robot: RobotProfile) -> list
     for row, alpha in enumerate(_AWARENESS):
         cells = [f"{alpha:9.1f}", f"{table['radius_m'][row]:4.2f} m"]
         cells.append(f"{table['human_speed_mps'][row]:4.2f} m/s")
-        limits = table["limit_ahead_mps"][row] + table["limit_beside_mps"][row]
-        lines.append("  ".join(cells + [f"{limit:5.2f}" for limit in limits]))
+        limits = (table["limit_ahead_mps"][row], table["limit_beside_mps"][row])
+        cells += [" ".join(f"{limit:5.2f}" for limit in each) for each in limits]
+        lines.append("  ".join(cells))
     return [*lines, ""]

@@ -39,8 +39,9 @@ class CrossingFrame:
             second.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle, as the robot
             places them.
-        plan_s: elapsed time of the planner's ``plan``, seconds by the clock of the computer. It is
-            the only field that differs when the same episode is run again.
+        plan_s: processor time of this process in the planner's ``plan``, seconds: the load of the
+            computer changes it little. Waiting for another process does not count. It is the only
+            field that differs when the same episode is run again.
         lateral_command_mps: commanded speed to the left, of a robot that can move sideways.
     """
 

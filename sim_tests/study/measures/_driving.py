@@ -141,7 +141,7 @@ class Conduct:
         limit_excess_mps: see :func:`limit_excess_mps`.
         fastest_point_excess_mps: see :func:`fastest_point_excess_mps`.
         plan_calls: number of calls of ``plan``.
-        plan_median_s: median elapsed time of a call, by the computer's clock.
+        plan_median_s: median processor time of a call.
         plan_p99_s: 99th percentile of it.
         cycle_s: time between two calls in the simulation, which a call should not exceed.
     """

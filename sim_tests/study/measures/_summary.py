@@ -11,7 +11,7 @@ import numpy as np
 
 from perception.short_repr import short_repr
 
-from ...conditions import AXES
+from ...conditions import AXES, planner_name
 from ._awareness import ATTENTIVE_FROM
 from ._metrics import METRICS
 from ._record import EpisodeRecord
@@ -72,7 +72,7 @@ def labels(variants: Iterable[Variant]) -> dict[Variant, str]:
     def label(variant: Variant) -> str:
         same = [each for each in found if each.policy == variant.policy]
         differing = [
-            getattr(variant, field) or _NO_FAULT
+            planner_name(getattr(variant, field)) or _NO_FAULT
             for field in ("planner", "perception", "fault", "source")
             if len({getattr(each, field) for each in same}) > 1
         ]

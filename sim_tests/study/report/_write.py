@@ -11,6 +11,7 @@ from awarenav.errors import counted
 from perception.anthropometry import BODY_RADIUS_M
 from perception.documents import parse_yaml
 
+from ...conditions import REFERENCE_IN_TABLES, planner_name
 from ...world.errors import SimError
 from ..measures import (
     METRICS,
@@ -43,7 +44,6 @@ _REQUESTS: Final = ("requests", *RATIOS, "asked_twice")
 _REPORT: Final = "report.html"
 #: Paths or distances that differ by less count as the same.
 SAME_PATH_M: Final = 0.01
-_REFERENCE: Final = "SamplingPlanner"
 
 
 def write_report(
@@ -368,7 +368,7 @@ def planners_section(results: Results, run: Run) -> Section | None:
             "Episodes over": f"with an excess of more than {OVERSHOOT_MPS:g} m/s",
             "Yaw rule, m/s": "the same for |v| + |ω| R and fastest_point_limit_mps",
             "Episodes over it": f"with an excess of more than {OVERSHOOT_MPS:g} m/s",
-            "plan(), ms": "median over episodes of the median of a call's elapsed time",
+            "plan(), ms": "median over episodes of the median of a call's processor time",
             "99th percentile, ms": "median over episodes; red if longer than the control cycle",
             "× reference": "median time of a call, divided by the reference planner's",
             "Repeats itself": "gives the same commands with the same seed",
@@ -383,7 +383,7 @@ def planners_section(results: Results, run: Run) -> Section | None:
 
 def _reference_of(arm: Arm, results: Results) -> Sequence[Episode]:
     """Return the episodes of the reference planner with the policy and perception of an arm."""
-    same = (arm.variant.policy, _REFERENCE, arm.variant.perception)
+    same = (arm.variant.policy, REFERENCE_IN_TABLES, arm.variant.perception)
     for each in results.arms:
         if (each.variant.policy, each.variant.planner, each.variant.perception) == same:
             return each.episodes
@@ -453,7 +453,7 @@ def _radii_table(results: Results, run: Run) -> Table:
         says = "uses them" if changed else "ignores them" if near else "nobody came near"
         lines.append(
             [
-                arm.variant.planner,
+                planner_name(arm.variant.planner),
                 share_cell(proportion_interval(changed, len(pairs))),
                 number_cell(near, 0),
                 interval_cell(

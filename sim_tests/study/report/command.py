@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from awarenav.cli import (
     group,
     option,
     options,
-    table_text,
+    styled,
 )
 
 from ...conditions import Experiment, conditions_options, option_words
@@ -69,7 +70,10 @@ def list_planners(*, as_json: bool) -> int:
     if as_json:
         print(json_text([{"name": name, "about": about} for name, about in known.items()]), end="")
         return 0
-    print(table_text(("planner", "about"), known.items(), left=2))
+    for name, about in known.items():
+        print(
+            f"{styled(name, bold=True)}\n    {textwrap.fill(about, 76, subsequent_indent='    ')}"
+        )
     print("\nA planner of yours: module:NAME, a class, a function that returns one, or an object.")
     return 0
 

@@ -18,7 +18,7 @@ from awarenav.errors import counted
 from awarenav.video import VideoWriter
 from perception import AttentionCone
 
-from ...conditions import Perception
+from ...conditions import Perception, planner_name
 from ...crossing import (
     CrossingFrame,
     CrossingResult,
@@ -263,7 +263,7 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
         number
         for number, key in enumerate(keys)
         if [key.scenario, str(key.seed), key.policy] == parts[:3]
-        and all(part in astuple(key)[3:] for part in parts[3:])
+        and all(part in (*astuple(key)[3:], planner_name(key.planner)) for part in parts[3:])
     ]
     if len(found) == 1:
         return found[0]

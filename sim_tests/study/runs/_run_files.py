@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from perception.documents import parse_json, parse_yaml, read_json, read_lines
 
-from ...conditions import Conditions
+from ...conditions import REFERENCE_IN_TABLES, Conditions
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, read_records
 
@@ -146,7 +146,8 @@ def _of_earlier_line(values: Mapping[str, Any]) -> dict[str, Any]:
         "scenario": scenario["name"],
         "seed": values["seed"],
         "policy": values["policy_name"],
-        "planner": planner.rpartition(":")[2] or ("StraightOn" if straight else "SamplingPlanner"),
+        "planner": planner.rpartition(":")[2]
+        or ("StraightOn" if straight else REFERENCE_IN_TABLES),
         "perception": values["perception"],
         "fault": values["fault_name"],
         "scenario_text": values["scenario"],
@@ -239,4 +240,4 @@ def answering_note(about: Any) -> str:
         share, source = found[1], f"population {population}"
     else:
         share, source = f"{DEFAULT_ANSWERS:g}", "the default, unless a scenario has its own"
-    return f"Simulated people answer a request that they hear with probability {share} ({source})."
+    return f"Simulated people answer a request that they hear with probability {share}\n({source})."

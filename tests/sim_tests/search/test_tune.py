@@ -29,7 +29,6 @@ from sim_tests.search.tune._evaluation import (
     stages,
 )
 from sim_tests.search.tune._policy_space import PolicySpace, read_ranges, shipped_ranges
-from sim_tests.search.tune._results import change_text, is_undecided, verdict_text
 from sim_tests.search.tune._tune import (
     TuneSettings,
     Tuning,
@@ -37,6 +36,7 @@ from sim_tests.search.tune._tune import (
     kept_records,
     ranked_trials,
 )
+from sim_tests.search.tune._verdict import change_text, is_undecided, verdict_text
 from sim_tests.study.measures import EpisodeRecord, Interval, write_records
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")

@@ -65,7 +65,7 @@ def test_the_api_and_a_job_have_the_same_conditions():
     setup = Setup.of("late_glance", **given, seed=4, fault="misses_30")
     assert setup.conditions == job.conditions
     assert job.conditions.text == (
-        "late_glance_omni, seed 4, policy blind, SamplingPlanner, perception truth, "
+        "late_glance_omni, seed 4, policy blind, planner reference, perception truth, "
         "camera surround, robot omni, population recorded, fault misses_30"
     )
     drawn = ScenarioTemplate.from_text(job.scenario_text).for_seed(4)

@@ -77,15 +77,15 @@ def test_every_planner_runs_with_blind_and_the_reference_planner_runs_too(folder
 
 def test_obeying_and_using_radii_are_told_from_reading_nothing(tables, page):
     conduct, radii = tables
-    reference, straight_on = (conduct[f"balanced, {n}"] for n in ("SamplingPlanner", "straight_on"))
+    reference, straight_on = (conduct[f"balanced, {n}"] for n in ("reference", "straight_on"))
     assert reference["Speed limit, m/s"] <= 0.03
     assert reference["Episodes over"] == 0.0
     assert reference["× reference"] == pytest.approx(1.0)
     assert straight_on["Speed limit, m/s"] > 0.3
     assert straight_on["Episodes over"] == 1.0
     assert straight_on["× reference"] < 0.5
-    assert radii["SamplingPlanner"]["Radii"] == "uses them"
-    assert radii["SamplingPlanner"]["More distance, m"] > 0.1
+    assert radii["reference"]["Radii"] == "uses them"
+    assert radii["reference"]["More distance, m"] > 0.1
     assert radii["straight_on"]["Radii"] == "ignores them"
     assert radii["straight_on"]["Somebody near"] == 1.0
     assert radii["Raises"]["Radii"] == "–"
@@ -189,6 +189,6 @@ def test_a_planner_that_hangs_costs_its_own_episodes_alone(tmp_path, capfd):
     assert main(["planners", "compare", *words, "--out", str(tmp_path / "out")]) == 1
     printed = capfd.readouterr()
     arms = {each["variant"]: each for each in json.loads(printed.out)["arms"]}
-    assert arms["balanced, SamplingPlanner"]["success"]["value"] == 1.0
+    assert arms["balanced, reference"]["success"]["value"] == 1.0
     assert arms["balanced, Hangs"]["errors"] == 1
     assert "3 of 6 episodes failed" in printed.err
