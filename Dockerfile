@@ -5,7 +5,7 @@
 #
 # The bridge speaks DDS with ROS on the host:
 #   docker run --rm --network host --volume "$PWD:/work" awarenav \
-#       bridge --robot robot.yaml --networks robot_networks.yaml
+#       bridge --robot robot.yaml --networks real_networks.yaml
 
 # Development: make, git and Python. `make setup` installs the lock into the checkout's .venv.
 FROM python:3.11-slim-bookworm AS dev

@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from perception.errors import AwarenavError
     from tracking import PersonTrack, PersonTracker, TrackerConfig, TrackingError
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 __all__ = [
     "AttentionCone",

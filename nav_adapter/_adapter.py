@@ -81,6 +81,15 @@ class NavAdapter:
     all people, starts anew and logs a warning (logger ``nav_adapter``). If the clock returns after
     a single update far ahead, the adapter goes on from before that update.
 
+    Examples:
+        >>> from nav_adapter import AwarenessPolicy, NavAdapter, RobotProfile, RobotState
+        >>> box_m = [[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]]
+        >>> robot = RobotProfile(box_m, 1.5, 1.0, 1.0, reaction_time_s=0.3)
+        >>> adapter = NavAdapter(AwarenessPolicy.preset("balanced"), robot)
+        >>> now = RobotState(0.0, [0.0, 0.0], 0.0, speed_mps=0.5, yaw_rate_radps=0.0)
+        >>> adapter.update((), now, 0.0).limited_by  # in place of (): a tracker's tracks
+        'robot maximum'
+
     Args:
         policy: radii, human speeds, margins and time behaviour.
         robot: footprint, braking and reaction time.

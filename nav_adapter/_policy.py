@@ -130,7 +130,7 @@ class AwarenessPolicy(NavConfig):
             if entry.name.endswith(".yaml")
         }
         if name not in files:
-            raise NavError(not_one_of("preset", name, sorted(files)))
+            raise NavError(not_one_of("policy", name, sorted(files)))
         policy = cls.model_validate(
             parse_yaml(files[name].read_text(encoding="utf-8"), name, NavError)
         )

@@ -64,6 +64,14 @@ class _Look(NamedTuple):
 class AwarenessPipeline:
     """Detection, keypoints, head pose and awareness of every person in a frame.
 
+    Examples:
+        >>> import numpy as np
+        >>> from perception import AwarenessPipeline, Camera
+        >>> pipeline = AwarenessPipeline(Camera.from_fov(640, 480, np.radians(90.0)))
+        >>> image_rgb = np.full((480, 640, 3), 120, np.uint8)  # here your camera's image
+        >>> pipeline.process(image_rgb, stamp_s=0.0)  # one observation for each person
+        ()
+
     Args:
         camera: the robot's camera.
         detector: finds people; default the shipped network.

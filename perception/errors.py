@@ -34,8 +34,23 @@ def did_you_mean(given: object, names: Iterable[str], *, cutoff: float = 0.6) ->
     return f"; did you mean {near[0]!r}?" if near else ""
 
 
-def not_one_of(what: str, given: object, valid: Iterable[str]) -> str:
-    """Return the message that a name is not valid, with the valid names and the nearest one."""
+def not_one_of(
+    what: str, given: object, valid: Iterable[str], *, or_else: str = "", listed_by: str = ""
+) -> str:
+    """Return the message that a name is not valid: the nearest valid one first, then all of them.
+
+    Args:
+        what: kind of the name, such as ``"scenario"``.
+        given: what was given instead.
+        valid: valid names.
+        or_else: what else is valid, such as ``"a YAML file"``.
+        listed_by: command that lists the names, where they are too many for a message.
+    """
     names = list(valid)
     hint = did_you_mean(given, names)
-    return f"{what} must be one of {', '.join(map(repr, names))}, got {given!r}{hint}"
+    if listed_by:
+        return f"{what} {given!r} is unknown{hint or ';'} `{listed_by}` lists all {len(names)}"
+    listed = f"must be one of {', '.join(map(repr, names))}{or_else and f', or {or_else}'}"
+    if hint:
+        return f"{what} {given!r} is unknown{hint} It {listed}"
+    return f"{what} {listed}, got {given!r}"

@@ -33,6 +33,12 @@ PopulationName = Literal["classic", "recorded"]
 #: All of them.
 POPULATIONS: Final[tuple[PopulationName, ...]] = get_args(PopulationName)
 
+#: Settings of ``--sensors`` for the commands that show what the library wins: the robot has all of
+#: its sensors, but for the truth, to which scanners add nothing.
+USUAL_SENSORS: Final = {
+    "default": None,
+    "show_default": "camera+scanner; camera with --perception truth",
+}
 #: Completion of scenarios on the command line.
 COMPLETE_SCENARIOS: Final = completion_of(
     "sim_tests",
@@ -419,6 +425,8 @@ class Experiment:
         """Return the experiment among the options of a command, and take them out of these."""
         episodes = values.pop("episodes", 1)
         found = {name: values.pop(name) for name in OPTIONS if name in values}
+        if not found.get("sensors", True):  # not given, in a command with USUAL_SENSORS
+            found["sensors"] = "camera" if found.get("perception") in _TRUTHS else "camera+scanner"
         return cls({}, episodes).replaced(**found)
 
     def replaced(self, **values: Any) -> Experiment:

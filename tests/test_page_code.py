@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ import pytest
 from page_code import Block, Reader, blocks_of, compare_output
 from paths import ROOT
 
-from nav_adapter import RobotState
+from nav_adapter import NavAdapter, RobotState
+from perception import AwarenessPipeline
+from tracking import PersonTracker
 
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
@@ -70,6 +73,14 @@ def test_the_five_lines_of_the_readme_give_obstacles_and_a_limit() -> None:
         assert (limit_mps, reason) == (limit, why)
     lines = block.text.partition("def on_image")[2].splitlines()[1:]
     assert len([line for line in lines if line.strip()]) == 5
+
+
+@pytest.mark.parametrize("main_class", [NavAdapter, PersonTracker, AwarenessPipeline])
+def test_the_example_of_a_main_class_prints_what_it_shows(main_class: type) -> None:
+    (example,) = doctest.DocTestFinder(recurse=False).find(main_class, globs={})
+    result = doctest.DocTestRunner().run(example)
+    assert result.attempted >= 5
+    assert result.failed == 0
 
 
 @pytest.mark.full

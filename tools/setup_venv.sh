@@ -150,6 +150,25 @@ logged() {
     fi
 }
 
+# Installs this checkout, editable, after the number of packages.
+install_checkout() {
+    if have_uv; then
+        logged "$1" uv pip install --quiet --python "$VENV/bin/python" --no-deps \
+            --no-build-isolation -e .
+    else
+        logged "$1" "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input \
+            --progress-bar off --no-deps --quiet --no-build-isolation -e .
+    fi
+}
+
+# Succeeds where a later `pip install .` has put a copy of the checkout in place of the link to it.
+is_copy() {
+    for record in "$VENV"/lib/python3.*/site-packages/awarenav-*.dist-info/direct_url.json; do
+        [ ! -e "$record" ] || grep -q '"editable": *true' "$record" || return 0
+    done
+    return 1
+}
+
 # The lock names every package, so nothing is resolved here: --no-deps keeps it that way. pip would
 # compile every module, which takes as long as all the rest; Python compiles those that it imports.
 install() {
@@ -163,14 +182,11 @@ install() {
     say "installing $count pinned packages with $how"
     if have_uv; then
         logged "$count" uv pip install --python "$VENV/bin/python" --no-deps -r "$LOCK"
-        logged "$count" uv pip install --quiet --python "$VENV/bin/python" --no-deps \
-            --no-build-isolation -e .
     else
-        set -- "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input \
-            --progress-bar off --no-deps
-        logged "$count" "$@" --no-compile -r "$LOCK"
-        logged "$count" "$@" --quiet --no-build-isolation -e .
+        logged "$count" "$VENV/bin/python" -m pip install --disable-pip-version-check --no-input \
+            --progress-bar off --no-deps --no-compile -r "$LOCK"
     fi
+    install_checkout "$count"
     printf '%s\n%s\n' "$PWD" "$(wanted)" >"$STAMP"
     rm -f "$INCOMPLETE"
     say "done after $(($(date +%s) - started)) s"
@@ -193,4 +209,9 @@ if [ -n "$why" ] || ! [ -x "$VENV/bin/python" ]; then
 fi
 if [ ! -e "$STAMP" ] || [ "$(sed -n 2p "$STAMP")" != "$(wanted)" ]; then
     install
+elif is_copy; then
+    say "$VENV has a copy of this checkout, as after 'pip install .': linking the checkout again"
+    : >"$LOG"
+    rm -f "$FAILED"
+    install_checkout 1
 fi

@@ -55,6 +55,17 @@ class PersonTracker:
     the tracks as they were; :attr:`refused_late_frames` and :attr:`refused_early_frames` count
     those refused for their stamp.
 
+    Examples:
+        >>> import numpy as np
+        >>> from perception import PersonObservation
+        >>> from tracking import PersonTracker
+        >>> covariance_m2 = np.eye(3) / 100
+        >>> seen = PersonObservation(0.0, [0, 0, 4], covariance_m2, [0, 0, -1], 0.9, 0.1, 1.0)
+        >>> T_odom_camera = [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.4], [0, 0, 0, 1]]
+        >>> (track,) = PersonTracker().update([seen], 0.0, T_odom_camera)
+        >>> track.status, track.position_odom_m.tolist(), track.awareness_lower
+        ('tentative', [4.0, 0.0], 0.0)
+
     Args:
         config: settings; None for the defaults.
         view: where the camera can see people; None if unknown.

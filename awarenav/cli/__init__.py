@@ -9,6 +9,7 @@ from __future__ import annotations
 from . import options
 from ._app import app, main
 from ._command import Command, CommandGroup, Option, argument, command, group, option
+from ._terminal import styled, table_text
 from ._types import (
     NUMBER,
     POSITIVE,
@@ -43,4 +44,6 @@ __all__ = [
     "main",
     "option",
     "options",
+    "styled",
+    "table_text",
 ]

@@ -6,6 +6,7 @@ import codecs
 import io
 import json
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -24,6 +25,7 @@ from ._command import (
     command,
     write_exit_status,
 )
+from ._terminal import styled
 from ._types import OneOf
 
 _PROGRAM: Final = "awarenav"
@@ -98,7 +100,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
         ),
         "export": _Entry(
             "sim_tests.study.command:export",
-            "Write episodes in the formats of other projects; check such files.",
+            "Write episodes in the formats of other projects.",
         ),
         "report": _Entry(
             "sim_tests.study.report.command:report",
@@ -274,8 +276,12 @@ def _run(words: list[str]) -> int:
         _print_usage_error(error)
         return BAD_INPUT
     except CommandFailure as failure:
-        newline = "\n" if failure.status == INTERRUPTED else ""  # after the terminal's ^C
-        print(f"{newline}{failure.command_path}: {failure.message}", file=sys.stderr)
+        if failure.status == INTERRUPTED:
+            print(file=sys.stderr)  # after the terminal's ^C
+        _print_error(failure.command_path, failure.message)
+        if failure.can_resume:
+            same = [word for word in words if word not in ("--resume", "--overwrite")]
+            print(f"Go on with:\n  {shlex.join([_PROGRAM, *same, '--resume'])}", file=sys.stderr)
         return failure.status
     except KeyboardInterrupt:
         print(f"\n{_PROGRAM}: interrupted", file=sys.stderr)
@@ -289,4 +295,8 @@ def _print_usage_error(error: click.UsageError) -> None:
     if context is not None:
         print(context.get_usage(), file=sys.stderr)
         print(f"Try '{path} --help' for help.\n", file=sys.stderr)
-    print(f"{path}: {error.format_message()}", file=sys.stderr)
+    _print_error(path, error.format_message())
+
+
+def _print_error(path: str, message: str) -> None:
+    print(f"{styled(f'{path}:', sys.stderr, fg='red', bold=True)} {message}", file=sys.stderr)

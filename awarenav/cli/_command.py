@@ -45,6 +45,8 @@ class CommandFailure(click.ClickException):
         super().__init__(message)
         self.command_path = context.command_path
         self.status = status
+        #: Whether the same command with ``--resume`` goes on.
+        self.can_resume = False
 
 
 class Option(click.Option):
@@ -155,7 +157,11 @@ class Command(click.Command):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            raise CommandFailure(ctx, "interrupted; partial results kept", INTERRUPTED) from None
+            can_resume = any(each.name == "resume" for each in self.params)
+            said = "interrupted; partial results kept" if can_resume else "interrupted"
+            failure = CommandFailure(ctx, said, INTERRUPTED)
+            failure.can_resume = can_resume
+            raise failure from None
         except AwarenavError as error:
             raise CommandFailure(ctx, str(error), BAD_INPUT) from error
         except ModuleNotFoundError as error:

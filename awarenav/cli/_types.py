@@ -32,7 +32,7 @@ class OneOf(click.Choice[str]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the word, or fail and name the nearest valid one."""
         if value not in self.choices:
-            self.fail(not_one_of("it", str(value), self.choices), param, ctx)
+            self.fail(not_one_of("the word", str(value), self.choices), param, ctx)
         return str(value)
 
 

@@ -73,15 +73,25 @@ def seed(note: str = "", *, default: int | None = 0) -> Decorator:
 def out_folder(
     default: str | None, help: str = "Folder of the results.", *, show_default: str | None = None
 ) -> Decorator:
-    """Add ``--out``: a folder."""
+    """Add ``--out``: a folder, which the command makes; it says so of missing ones above it."""
     return option(
         "--out",
         type=FolderPath(),
         default=default,
+        callback=_named_parents,
         show_default=show_default,
         metavar="DIR",
         help=help,
     )
+
+
+def _named_parents(
+    context: click.Context, parameter: click.Parameter, out: Path | None
+) -> Path | None:
+    """Return the folder; say which folders above it are missing, in case of a slip."""
+    if out is not None and not context.resilient_parsing and not out.parent.exists():
+        print(f"{context.command_path}: makes the new folder {out.parent}, too", file=sys.stderr)
+    return out
 
 
 def out_file(

@@ -1,19 +1,22 @@
-"""The work of ``awarenav judge``: what is asked of the metrics, and both as Markdown tables."""
+"""The work of ``awarenav judge``: what is asked of the metrics, and both as tables."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from ..cli import table_text
 from ..errors import counted
 from ..files import check_output, json_text, write_text
 from ._intervals import UNBOUNDED, Ends
 from ._judge import judge_files
 
 Verdict = Literal["yes", "no", "too few to tell"]
+# Makes lines of a header and rows.
+_Layout = Callable[[tuple[str, ...], Sequence[tuple[str, ...]]], list[str]]
 
 # The project's requirements for its own networks on rendered people: title, group of metrics, key,
 # smallest and largest value that is asked, and unit. {gaze} is the head, or the gaze where the
@@ -93,10 +96,10 @@ def judge_command(
     if out is not None:
         check_output(out, (".json", ".md"), (truth, estimates))
     metrics = judge_files(truth, estimates, common=common)
-    report = markdown_report(metrics)
-    print(json_text(metrics) if as_json else report, end="")
+    print(json_text(metrics) if as_json else report_text(metrics, _terminal_table), end="")
     if out is not None:
-        write_text(out, report if out.suffix.lower() == ".md" else json_text(metrics))
+        markdown = out.suffix.lower() == ".md"
+        write_text(out, report_text(metrics, _table) if markdown else json_text(metrics))
     return 1 if gate and not all(each.met for each in requirements(metrics)) else 0
 
 
@@ -181,8 +184,8 @@ def interval_text(ends: Ends, unit: str) -> str:
     return f"[{low}, {high}]"
 
 
-def markdown_report(metrics: dict[str, Any]) -> str:
-    """Return the report as Markdown."""
+def report_text(metrics: dict[str, Any], table: _Layout) -> str:
+    """Return the report, with tables in Markdown or for the terminal."""
     settings, frames, overall = metrics["settings"], metrics["frames"], metrics["overall"]
     height, hidden, outside = (
         settings[name] for name in ("min_height_px", "max_occlusion", "max_truncation")
@@ -211,7 +214,7 @@ def markdown_report(metrics: dict[str, Any]) -> str:
         )
         for each in asked
     ]
-    lines += ["", *_table(("figure", "value", "95 % interval", "asked", "met"), rows)]
+    lines += ["", *table(("figure", "value", "95 % interval", "asked", "met"), rows)]
     if any(each.verdict == "too few to tell" for each in asked):
         lines += [
             "",
@@ -222,11 +225,11 @@ def markdown_report(metrics: dict[str, Any]) -> str:
         ends = metrics["intervals"][group].get(key)
         interval = "–" if ends is None else interval_text(ends, unit)
         beside.append((title, value_text(metrics[group][key], unit), interval))
-    lines += ["", *_table(("beside that", "value", "95 % interval"), beside)]
-    return "\n".join([*lines, "", *_group_table(metrics)]) + "\n"
+    lines += ["", *table(("beside that", "value", "95 % interval"), beside)]
+    return "\n".join([*lines, "", *_group_table(metrics, table)]) + "\n"
 
 
-def _group_table(metrics: dict[str, Any]) -> list[str]:
+def _group_table(metrics: dict[str, Any], table: _Layout) -> list[str]:
     """Return the table with a column for each group of people."""
     ends = metrics["intervals"]
     groups = [("all", metrics["overall"], ends["overall"])]
@@ -243,7 +246,7 @@ def _group_table(metrics: dict[str, Any]) -> list[str]:
         for title, key, unit in _GROUP_ROWS
         if any(values[key] is not None for _, values, _ in groups)
     ]
-    return _table(("", *(name for name, _, _ in groups)), rows)
+    return table(("", *(name for name, _, _ in groups)), rows)
 
 
 def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
@@ -257,3 +260,9 @@ def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str
         return "| " + " | ".join(padded) + " |"
 
     return [line(header), line(tuple("-" * width for width in widths)), *map(line, rows)]
+
+
+def _terminal_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return a table that fits the terminal."""
+    plain = [tuple(cell.replace("**", "") for cell in row) for row in rows]
+    return [table_text(header, plain)]

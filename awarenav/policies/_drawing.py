@@ -15,9 +15,10 @@ from perception.arrays import FloatArray
 from ..figures import Axes, Figure, QuadMesh, new_figure
 from ._effect import BESIDE_M, effect_of
 
-_DPI: Final = 130
-_WIDTH_IN: Final = 14.0
-_ROW_IN: Final = 3.4
+_DPI: Final = 160
+# Text of 10 points is 11 px high where a page shows the figure 780 px wide.
+_WIDTH_IN: Final = 9.8
+_ROW_IN: Final = 2.9
 _LINE_COLOUR: Final = "#1f5f8b"
 _LIMIT_COLOUR: Final = "#6b7079"
 _AWARENESS: Final = np.linspace(0.0, 1.0, 26)
@@ -40,18 +41,21 @@ def policy_figure(policies: Sequence[tuple[str, AwarenessPolicy]], robot: RobotP
     max_speed_mps = max(float(effect.human_speed_mps.max()) for effect in effects)
     for axes, (name, policy), effect in zip(rows, policies, effects, strict=True):
         floor_m = policy.margins.floor_m
-        _draw_line(axes[0], effect.radius_m, "obstacle radius (m)", max_radius_m)
-        for height_m, text in ((floor_m, f"floor {floor_m:.2f} m"), (BODY_RADIUS_M, "body")):
+        _draw_line(axes[0], effect.radius_m, "radius (m)", max_radius_m)
+        for height_m, text, up in ((floor_m, "floor", True), (BODY_RADIUS_M, "body", False)):
             axes[0].axhline(height_m, color=_LIMIT_COLOUR, ls="--", lw=1.0)
-            axes[0].text(0.02, height_m, text, color=_LIMIT_COLOUR, va="bottom", fontsize=8)
-        _draw_line(axes[1], effect.human_speed_mps, "U, human speed (m/s)", max_speed_mps)
+            where = {"xytext": (3, 3 if up else -3), "textcoords": "offset points"}
+            va = "bottom" if up else "top"
+            note = f"{text} {height_m:.2f} m"
+            axes[0].annotate(note, (0.0, height_m), color=_LIMIT_COLOUR, va=va, **where)
+        _draw_line(axes[1], effect.human_speed_mps, "U (m/s)", max_speed_mps)
         _draw_limit(axes[2], effect.ahead_mps, robot)
         limit_map = _draw_limit(axes[3], effect.beside_mps, robot)
         bar = figure.colorbar(limit_map, ax=axes[3], label="speed limit (m/s)")
         bar.ax.set_ylim(0.0, robot.max_speed_mps)
         axes[0].set_title(Path(name).name, loc="left", fontweight="bold")
-        axes[2].set_title("limit, person straight ahead", loc="left", fontsize=10)
-        axes[3].set_title(f"limit, person {BESIDE_M:g} m beside", loc="left", fontsize=10)
+        axes[2].set_title("limit, straight ahead", loc="left", fontsize=10)
+        axes[3].set_title(f"limit, {BESIDE_M:g} m beside", loc="left", fontsize=10)
     return figure
 
 
@@ -59,7 +63,7 @@ def _draw_line(axes: Axes, values: FloatArray, label: str, highest: float) -> No
     axes.plot(_AWARENESS, values, color=_LINE_COLOUR, lw=2.0)
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(0.0, 1.12 * highest if highest > 0.0 else 1.0)
-    axes.set_xlabel("awareness, lower bound")
+    axes.set_xlabel("awareness, at least")
     axes.set_ylabel(label)
     axes.grid(alpha=0.25)
 
@@ -83,11 +87,11 @@ def _draw_limit(axes: Axes, limit_mps: FloatArray, robot: RobotProfile) -> QuadM
     met = [step for step in steps.tolist() if unaware[0] < step <= float(unaware.max())]
     if float(limit.max()) > float(limit.min()):
         lines = axes.contour(_AWARENESS, _DISTANCE_M, limit, steps, colors="white", linewidths=1.0)
-        texts = ["stop", *(f"{step:.2f}" for step in steps[1:-1].tolist()), "maximum"]
+        texts = ["stop", *(f"{step:.2f}" for step in steps[1:-1].tolist()), "max"]
         places = [(_AWARENESS[_LABELLED], _DISTANCE_M[int((unaware >= x).argmax())]) for x in met]
         fmt = dict(zip(lines.levels, texts, strict=True))
         if met:
-            axes.clabel(lines, met, fmt=fmt, fontsize=8, manual=places)
-    axes.set_xlabel("awareness, lower bound")
-    axes.set_ylabel("distance from front to body (m)")
+            axes.clabel(lines, met, fmt=fmt, fontsize=9, manual=places)
+    axes.set_xlabel("awareness, at least")
+    axes.set_ylabel("distance ahead (m)")
     return limit_map

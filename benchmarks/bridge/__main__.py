@@ -80,7 +80,7 @@ def _metrics(options: argparse.Namespace) -> list[MeasuredValue]:
 
 def _render(folder: Path, people: int) -> None:
     size = ["--frames", "1", "--scenes", "1", "--people", str(people), "--range", "2", "4"]
-    status = awarenav(["render", *size, "--seed", "3", "--processes", "1", "--out", str(folder)])
+    status = awarenav(["render", *size, "--seed", "3", "--workers", "1", "--out", str(folder)])
     if status != 0:
         raise AwarenavError(f"awarenav render ended with status {status}")
 

@@ -8,11 +8,11 @@ Source of the format: TensorFlow's ``schema.fbs``, version 3.
 
 from __future__ import annotations
 
-import hashlib
 import os
+import struct
 import tempfile
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from time import perf_counter, thread_time
 from typing import Any, Final, TypeAlias
@@ -67,8 +67,9 @@ class TfliteModel:
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
     ) -> None:
-        settings = OnnxSettings() if settings is None else settings
-        self.path, content = read_model(path_or_bytes, sha256)
+        self._settings = settings = OnnxSettings() if settings is None else settings
+        self.path, self._content = read_model(path_or_bytes, sha256)
+        content = self._content
         if settings.provider_names != ("cpu",):
             raise PerceptionError(
                 f"{self.name} is a TFLite network, which runs on the provider 'cpu' only, "
@@ -82,7 +83,6 @@ class TfliteModel:
                 f"{self.name} is not a TFLite network that can be loaded "
                 f"({len(content)} bytes): {_last_line(cause)}"
             ) from cause
-        self.sha256 = hashlib.sha256(content).hexdigest()
         self._lock = threading.Lock()
 
     def __repr__(self) -> str:
@@ -97,6 +97,15 @@ class TfliteModel:
     def layout(self) -> str:
         """Inputs and outputs with shapes and types, for messages."""
         return " -> ".join(", ".join(map(str, ends)) for ends in (self.inputs, self.outputs))
+
+    def with_outputs(self, names: Collection[str]) -> TfliteModel:
+        """Return the network with these outputs only; what they do not need is not computed.
+
+        A network of bodies spends two fifths of its time on masks, for example.
+        """
+        reduced = TfliteModel(_reduced(self._content, names), settings=self._settings)
+        reduced.path = self.path
+        return reduced
 
     def run(self, batch: NDArray[Any]) -> Mapping[str, NDArray[Any]]:
         """Run the network on its only input (1, height, width, 3); return outputs by name.
@@ -120,7 +129,7 @@ class TfliteModel:
         return results
 
 
-def is_tflite(content: bytes) -> bool:
+def is_tflite(content: bytes | bytearray) -> bool:
     """Return whether these are the first bytes of a TFLite file."""
     return content[4:8] == _IDENTIFIER
 
@@ -196,17 +205,45 @@ def _ends(content: bytes) -> tuple[tuple[OnnxTensor, ...], tuple[OnnxTensor, ...
     Raises:
         ValueError, struct.error: for something else than a TFLite file.
     """
+    graph = _graph(content)
+    tensors = _tables(graph, 0)
+    return (
+        tuple(_tensor(tensors[row]) for row in _integers(graph, 1)),
+        tuple(_tensor(tensors[row]) for row in _integers(graph, 2)),
+    )
+
+
+def _graph(content: bytes | bytearray) -> Table:
     if not is_tflite(content):
         raise ValueError("it does not begin as a TFLite file")
     root = Table(content, int.from_bytes(content[:4], "little"))
     graphs = _tables(root, 2)
     if len(graphs) != 1:
         raise ValueError(f"one graph is wanted, found {len(graphs)}")
-    tensors = _tables(graphs[0], 0)
-    return (
-        tuple(_tensor(tensors[row]) for row in _integers(graphs[0], 1)),
-        tuple(_tensor(tensors[row]) for row in _integers(graphs[0], 2)),
-    )
+    return graphs[0]
+
+
+def _reduced(content: bytes, names: Collection[str]) -> bytes:
+    """Return a file with the named outputs and the operators that they need.
+
+    The lists of outputs and operators become shorter in their place; all else stays.
+    """
+    changed = bytearray(content)
+    graph = _graph(changed)
+    tensors, operators = _tables(graph, 0), _tables(graph, 3)
+    kept = [row for row in _integers(graph, 2) if _tensor(tensors[row]).name in names]
+    needed, used = set(kept), []
+    for operator in reversed(operators):
+        if needed.intersection(_integers(operator, 2)):
+            needed.update(_integers(operator, 1))
+            used.append(operator.Pos)
+    start = graph.Vector(graph.Offset(_slot(2)))
+    struct.pack_into(f"<I{len(kept)}i", changed, start - 4, len(kept), *kept)
+    start = graph.Vector(graph.Offset(_slot(3)))
+    # Places of tables count from the entry itself.
+    places = [place - (start + 4 * row) for row, place in enumerate(reversed(used))]
+    struct.pack_into(f"<I{len(places)}I", changed, start - 4, len(places), *places)
+    return bytes(changed)
 
 
 def _tensor(table: Table) -> OnnxTensor:

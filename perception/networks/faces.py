@@ -73,7 +73,7 @@ _MESH_SIDES: Final = 1.5
 # The square for the detector, in units of the body size from _body_size_px, and how far from its
 # middle a face may lie, in the same unit.
 _HEAD_SIDES: Final = 2.0
-_FARTHEST: Final = 0.6
+_FARTHEST: Final = 0.4
 _MIN_SIDE_PX: Final = 8.0
 # Mesh points whose mean is nose, left eye, right eye, left ear and right ear (its tragion).
 _HEAD_POINTS: Final = ((1, 1), (263, 362), (33, 133), (454, 454), (234, 234))

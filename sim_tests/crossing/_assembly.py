@@ -26,7 +26,7 @@ from ..conditions import (
     refuse_unused_networks,
     table_name,
 )
-from ..scenario import Scenario, ScenarioTemplate
+from ..scenario import SCENARIO_SETS, Scenario, ScenarioTemplate, shipped_scenarios
 from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner
@@ -192,7 +192,9 @@ def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPo
     shipped = {path.name for path in resources.files("nav_adapter.policies").iterdir()}
     if f"{policy}.yaml" not in shipped:
         names = {name.removesuffix(".yaml") for name in shipped if name.endswith(".yaml")}
-        raise NavError(not_one_of("preset", policy, sorted(names | set(own))))
+        if policy in {name for each in SCENARIO_SETS for name in shipped_scenarios(each)}:
+            raise NavError(f"{policy!r} is a scenario, not a policy; give it with --scenario")
+        raise NavError(not_one_of("policy", policy, sorted(names | set(own))))
     return policy, AwarenessPolicy.preset(policy)
 
 

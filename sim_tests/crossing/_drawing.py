@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.drawing import awareness_colour, draw_disc, draw_line
-from nav_adapter import Alert
+from nav_adapter import Alert, PersonObstacle
 from nav_adapter.alerts import Answer
 from perception import AttentionCone, Camera, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
@@ -39,6 +39,8 @@ _FAR_PX: Final = 1.0e4
 _SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
 #: Time for which a request or an answer is shown.
 SHOWN_S: Final = 2.0
+# A person looks at the robot from this estimate of α on.
+_LOOKS_FROM: Final = 0.5
 
 
 def draw_camera_view(
@@ -50,6 +52,7 @@ def draw_camera_view(
     *,
     box_scale: float = 1.0,
     captions: bool = True,
+    memory: RequestMemory | None = None,
 ) -> ImageRgb:
     """Draw boxes, gaze cones, α, radius and speed limit into an image of the robot's camera.
 
@@ -62,6 +65,7 @@ def draw_camera_view(
         box_scale: size of the images that boxes were observed in, over that of the scenario's
             camera.
         captions: also write the speed limit and its reason.
+        memory: of the frames so far: tells the captions how long ago somebody has looked.
 
     Returns:
         A new image.
@@ -103,7 +107,7 @@ def draw_camera_view(
             if (apart < 0.5 * np.array([camera.width_px, camera.height_px])).all():
                 _draw_box(image, box, observation)
     if captions:
-        _write(image, _captions(frame), (8, 18), _TEXT_SIZE)
+        _write(image, _captions(frame, memory or RequestMemory()), (8, 18), _TEXT_SIZE)
     return image
 
 
@@ -137,7 +141,7 @@ class ShownRequest:
 
 
 class RequestMemory:
-    """The requests and answers of the last 2 s, one per person: the latest.
+    """The requests and answers of the last 2 s, one per person, and everybody's latest look.
 
     Each is in one control cycle only, so :meth:`take` must get every cycle, drawn or not. A cycle
     that it gets again changes nothing.
@@ -145,14 +149,25 @@ class RequestMemory:
 
     def __init__(self) -> None:
         self._latest: dict[int, tuple[float, Alert | Answer]] = {}
+        self._looked_s: dict[int, float] = {}
 
     def take(self, frame: CrossingFrame) -> None:
-        """Remember the requests and answers of a control cycle."""
+        """Remember the requests, answers and looks of a control cycle."""
+        self._looked_s |= {
+            each.id: frame.t_s for each in frame.tracks if each.awareness >= _LOOKS_FROM
+        }
         limit = frame.constraints
         asked = [each for each in limit.alerts if each.kind == "attention"]
         events: tuple[Alert | Answer, ...] = (*asked, *limit.answers)
         for each in events:
             self._latest[each.track_id] = (frame.t_s, each)
+
+    def noticed_s(self, obstacle: PersonObstacle, frame: CrossingFrame) -> float | None:
+        """Return how long ago a person looked at the robot, if that counts and not α itself."""
+        own = next((each for each in frame.tracks if each.id == obstacle.track_id), None)
+        if own is None or not own.noticed or obstacle.awareness_lower <= own.awareness_lower:
+            return None
+        return frame.t_s - self._looked_s.get(own.id, frame.t_s)
 
     def shown(self, frame: CrossingFrame) -> tuple[ShownRequest, ...]:
         """Return what is shown at the time of a control cycle, the oldest first."""
@@ -206,11 +221,12 @@ class TopView:
             )
         self._robot_path: list[FloatArray] = []
         self._worker_paths: list[list[FloatArray]] = [[] for _ in stage.workers]
-        self._requests = RequestMemory()
+        #: Requests, answers and looks of the frames so far.
+        self.memory = RequestMemory()
 
     def watch(self, frame: CrossingFrame) -> None:
-        """Remember the requests and answers of a frame, for the next ones that are drawn."""
-        self._requests.take(frame)
+        """Remember requests, answers and looks of a frame, for the next ones that are drawn."""
+        self.memory.take(frame)
 
     def _pixels(self, points_odom_m: FloatArray) -> FloatArray:
         return np.asarray(points_odom_m * (self._scale, -self._scale) + self._offset)
@@ -249,7 +265,7 @@ class TopView:
         cv2.fillConvexPoly(image, _fixed_point(outline), _ROBOT_COLOUR, cv2.LINE_AA, _SHIFT)
         nose = np.stack([state.position_odom_m, state.position_odom_m + 0.7 * rotation[:, 0]])
         draw_line(image, self._pixels(nose), _ROBOT_COLOUR, 2)
-        for each in self._requests.shown(frame):
+        for each in self.memory.shown(frame):
             self._draw_request(image, each, state.position_odom_m)
         self._draw_scale(image)
         return image
@@ -279,17 +295,24 @@ class TopView:
         _write(image, ["1 m"], (16, image.shape[0] - 18), 0.4)
 
 
-def _captions(frame: CrossingFrame) -> list[str]:
+def _captions(frame: CrossingFrame, memory: RequestMemory) -> list[str]:
     limit = frame.constraints
     lines = [
         f"{frame.t_s:5.2f} s   robot {frame.robot_state.travel_mps:.2f} m/s",
         f"limit {limit.speed_limit_mps:.2f} m/s: {limit.limited_by}",
     ]
     return lines + [
-        f"person {obstacle.track_id}: alpha at least {obstacle.awareness_lower:.2f}, "
+        f"person {obstacle.track_id}: {_known(obstacle, memory.noticed_s(obstacle, frame))}, "
         f"radius {obstacle.radius_m:.2f} m"
         for obstacle in limit.obstacles
     ]
+
+
+def _known(obstacle: PersonObstacle, noticed_s: float | None) -> str:
+    """Return what the robot takes a person to know of it."""
+    if noticed_s is None:
+        return f"alpha at least {obstacle.awareness_lower:.2f}"
+    return f"noticed {noticed_s:.1f} s ago, counts as {obstacle.awareness_lower:.2f}"
 
 
 def _cone_rim(apex: FloatArray, gaze: FloatArray, half_angle_rad: float) -> FloatArray:

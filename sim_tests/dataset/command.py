@@ -44,11 +44,11 @@ from awarenav.errors import counted
     help="Distance of people from the camera, m.",
 )
 @option(
-    "--workers",
+    "--bodies",
     many=True,
     show_default="all",
     metavar="NAME|FILE...",
-    help="People who appear: shipped workers, or .npz files.",
+    help="Bodies of the people: shipped ones, or .npz files.",
 )
 @option("--layouts", many=True, show_default="all", metavar="NAME...", help="Layouts of the halls.")
 @option(
@@ -64,13 +64,7 @@ from awarenav.errors import counted
     metavar="N",
     help="Samples per pixel in width and in height; 2 smooths edges.",
 )
-@option(
-    "--processes",
-    type=POSITIVE,
-    show_default="one per processor core",
-    metavar="N",
-    help="Worker processes.",
-)
+@options.workers()
 @options.out_folder("render")
 @options.resume()
 @options.overwrite()
@@ -80,10 +74,10 @@ def render(
     size: str,
     fov: float,
     range_m: tuple[float, float],
-    workers: tuple[str, ...],
+    bodies: tuple[str, ...],
     layouts: tuple[str, ...],
     *,
-    processes: int | None,
+    workers: int | None,
     resume: bool,
     overwrite: bool,
     **settings: Any,
@@ -103,11 +97,11 @@ def render(
         horizontal_fov_deg=fov,
         min_range_m=range_m[0],
         max_range_m=range_m[1],
-        workers=list(workers) or None,
+        workers=list(bodies) or None,
         layouts=list(layouts) or None,
         **settings,
     )
-    truth = render_images(config, out, processes=processes, resume=resume, overwrite=overwrite)
+    truth = render_images(config, out, processes=workers, resume=resume, overwrite=overwrite)
     print(
         f"Written to {out}: {counted(config.frames, 'image')}, camera.yaml, {truth.name}, "
         "contact_sheet.png"

@@ -55,7 +55,9 @@ def shipped_text(name: str) -> tuple[str, str]:
     plain = str(name).partition("@")[0]
     folders = {name: folder for folder in _SETS.values() for name in _names_in(folder)}
     if plain not in folders:
-        raise SimError(not_one_of("scenario", plain, tuple(folders)))
+        if (resources.files("nav_adapter.policies") / f"{plain}.yaml").is_file():
+            raise SimError(f"{plain!r} is a policy, not a scenario; give it with --policy")
+        raise SimError(not_one_of("scenario", plain, folders, listed_by="awarenav scenario list"))
     return plain, (folders[plain] / f"{plain}.yaml").read_text("utf-8")
 
 
@@ -88,7 +90,7 @@ def camera_data(name: str) -> dict[str, Any]:
         return _completed(documents.read_yaml(Path(name), SimError), name)
     names = shipped_cameras()
     if name not in names:
-        raise SimError(f"{not_one_of('camera', name, names)}, or a YAML file")
+        raise SimError(not_one_of("camera", name, names, or_else="a YAML file"))
     return parse_yaml((_CAMERAS / f"{name}.yaml").read_text("utf-8"), name)
 
 
@@ -104,7 +106,7 @@ def read_file(path: Path, keys: Iterable[str]) -> dict[str, Any]:
     data = _completed(documents.read_yaml(path, SimError), str(path))
     kind = other_kind(data, keys)
     if kind:
-        raise SimError(f"{path}: this is {kind}, no scenario")
+        raise SimError(f"{path}: this is {kind}, not a scenario")
     replay = data.get("replay_csv")
     if isinstance(replay, str):
         data["replay_csv"] = str((path.parent / replay).resolve())

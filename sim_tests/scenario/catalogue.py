@@ -241,7 +241,7 @@ def list_command(*, as_json: bool = False) -> int:
             people = len(scenario.people)
             print(f"{template.id:{width}}  {template.attention:9}  {people:6}", end="")
             print(f"  {len(template.parameters()):6}")
-            print(textwrap.indent(textwrap.fill(template.description, 88), "    "))
+            print(textwrap.indent(textwrap.fill(template.description, 76), "    "))
     return 0
 
 

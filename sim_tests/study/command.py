@@ -20,7 +20,7 @@ from awarenav.cli import (
     options,
 )
 
-from ..conditions import COMPLETE_SCENARIOS, Experiment, conditions_options
+from ..conditions import COMPLETE_SCENARIOS, USUAL_SENSORS, Experiment, conditions_options
 
 #: Names of the formats of exported episodes; those of ``_files.FORMATS``.
 FORMAT_NAMES = ("socnav3", "navwareset")
@@ -29,11 +29,12 @@ FORMAT_NAMES = ("socnav3", "navwareset")
 @command(
     "crossings",
     examples=[
+        "awarenav crossings --out results    # all 23 scenarios, about 4 minutes of processor time",
         "awarenav crossings --scenario blind_corner --policy blind balanced",
         "awarenav crossings --policy mine.yaml blind --episodes 20 --out run",
         "awarenav crossings --planner my_planners:Dwa reference --fault none ghosts",
         "awarenav crossings --robot forklift --scenario blind_corner head_on_in_aisle",
-        "awarenav crossings --fault 'scanner_*' --sensors camera+scanner --sample 50",
+        "awarenav crossings --fault 'scanner_*' --sample 50",
     ],
     exit_status={
         0: "Success.",
@@ -46,7 +47,8 @@ FORMAT_NAMES = ("socnav3", "navwareset")
 )
 @conditions_options(
     many=("scenario", "policy", "planner", "sensors", "fault"),
-    policy={"default": ["blind", "balanced"]},
+    policy={"default": ["scanner", "blind", "balanced"]},
+    sensors=USUAL_SENSORS,
     seed={"note": " It is that of the first episode; the next ones count up."},
 )
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
@@ -134,7 +136,7 @@ def replay(**values: Any) -> int:
     "watch",
     examples=[
         "awarenav watch crossing_attentive",
-        "awarenav watch blind_corner --seed 3 --policy blind --sensors camera+scanner",
+        "awarenav watch blind_corner --seed 3 --policy blind",
         "awarenav watch late_glance --population recorded --robot delivery",
         "awarenav watch late_glance --port 8765 --wait 300 --out late_glance.html",
     ],
@@ -152,7 +154,7 @@ def replay(**values: Any) -> int:
     shell_complete=COMPLETE_SCENARIOS,
     help="A shipped scenario, or a YAML file.",
 )
-@conditions_options(without=("scenario",))
+@conditions_options(without=("scenario",), sensors=USUAL_SENSORS)
 @option(
     "--speed",
     type=Number(0.1, 20.0),

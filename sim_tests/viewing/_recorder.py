@@ -23,6 +23,7 @@ from ..crossing import (
     STANDING_SPEED_MPS,
     CrossingFrame,
     CrossingResult,
+    RequestMemory,
     Stage,
     draw_camera_view,
 )
@@ -74,6 +75,7 @@ class CrossingRecorder:
         self._scan_s = 0.0
         self._alerts: tuple[Alert, ...] = ()
         self._answers: tuple[Answer, ...] = ()
+        self._memory = RequestMemory()
         self.begin: dict[str, Any] = {}
         self.states: list[dict[str, Any]] = []
 
@@ -88,6 +90,7 @@ class CrossingRecorder:
         elif frame.t_s - self._scan_s > _SCAN_AGE_S:
             self._scan = np.zeros((0, 2))
         number, self._cycles = self._cycles, self._cycles + 1
+        self._memory.take(frame)
         # An alert is in one control cycle only, which may be one between two states.
         limit = frame.constraints
         self._alerts += limit.alerts
@@ -96,7 +99,7 @@ class CrossingRecorder:
             return
         limit = replace(limit, alerts=self._alerts, answers=self._answers)
         self._alerts, self._answers = (), ()
-        state = state_of(replace(frame, constraints=limit), stage, self._scan)
+        state = state_of(replace(frame, constraints=limit), stage, self._scan, self._memory)
         picture = None if self._pictures is None else self._pictures.take(frame, stage)
         if picture is not None:
             state["picture"] = picture
@@ -205,7 +208,10 @@ def cycles_per_state(control_hz: float) -> int:
 
 
 def state_of(
-    frame: CrossingFrame, stage: Stage, scan_points_odom_m: FloatArray | None = None
+    frame: CrossingFrame,
+    stage: Stage,
+    scan_points_odom_m: FloatArray | None = None,
+    memory: RequestMemory | None = None,
 ) -> dict[str, Any]:
     """Return one control cycle as a JSON value.
 
@@ -213,16 +219,17 @@ def state_of(
         frame: the control cycle.
         stage: gives the places of the people's eyes.
         scan_points_odom_m: (N, 2) points of the newest scans; None for those of the frame.
+        memory: of the frames so far.
 
     Returns:
         ``robot_odom`` is x (m), y (m) and heading (rad); each of ``people``, the truth, has
         ``odom`` (x, y and direction of gaze), the true α, distance and margin; each of ``tracks``
         has ``odom`` (x, y, vx, vy), α with its standard deviation and lower bound; each of
-        ``obstacles`` has its radius. ``alerts`` are the
-        tracks that are warned of a collision. Each of ``requests`` to look at the robot has the
-        track, the means, the time that a look would win and the reason; each of ``answers`` has
-        the track and the time since the request. All three are in one state only. A number that
-        is not finite is None.
+        ``obstacles`` has its radius, and ``noticed_s``, how long ago the person has looked, where
+        that counts instead of α. ``alerts`` are the tracks that are warned of a collision. Each
+        of ``requests`` to look at the robot has the track, the means, the time that a look would
+        win and the reason; each of ``answers`` has the track and the time since the request. All
+        three are in one state only. A number that is not finite is None.
     """
     state, limit = frame.robot_state, frame.constraints
     points = frame.scan_points_odom_m if scan_points_odom_m is None else scan_points_odom_m
@@ -263,7 +270,10 @@ def state_of(
             }
             for track in frame.tracks
         ],
-        "obstacles": [_obstacle(each) for each in limit.obstacles],
+        "obstacles": [
+            _obstacle(each, None if memory is None else memory.noticed_s(each, frame))
+            for each in limit.obstacles
+        ],
         "scan_odom_cm": _scan(points, window),
     }
 
@@ -300,12 +310,13 @@ def _people(frame: CrossingFrame) -> list[dict[str, Any]]:
     return people
 
 
-def _obstacle(obstacle: PersonObstacle) -> dict[str, Any]:
+def _obstacle(obstacle: PersonObstacle, noticed_s: float | None) -> dict[str, Any]:
     return {
         "id": obstacle.track_id,
         "odom": _rounded(obstacle.center_odom_m),
         "radius_m": _rounded_number(obstacle.radius_m),
         "awareness_lower": _rounded_number(obstacle.awareness_lower),
+        "noticed_s": None if noticed_s is None else _rounded_number(noticed_s),
     }
 
 

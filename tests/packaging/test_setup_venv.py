@@ -95,6 +95,15 @@ def test_a_set_up_says_what_it_takes_and_how_far_it_is_in_few_lines(checkout: Pa
     assert "Successfully installed" in (checkout / ".venv/setup.log").read_text()
     again = set_up(checkout)
     assert (again.returncode, again.stdout) == (0, "")
+    (packages,) = (checkout / ".venv/lib").glob("python3.*/site-packages")
+    record = packages / "awarenav-1.0.dist-info/direct_url.json"
+    record.parent.mkdir()
+    for text, said in (('{"dir_info": {"editable": true}}', ""), ('{"dir_info": {}}', "a copy")):
+        record.write_text(text)
+        repaired = set_up(checkout)
+        assert repaired.returncode == 0, repaired.stdout
+        assert said in repaired.stdout if said else not repaired.stdout
+    shutil.rmtree(record.parent)
 
 
 @pytest.mark.full

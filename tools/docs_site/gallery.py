@@ -27,8 +27,9 @@ person: red for an unaware person, green for an aware one. A sector is the perso
 the colour of the true α. The line below each film gives the robot's speed and limit, and the lower
 bound of α and the radius of the nearest person.
 
-`awarenav crossings --scenario NAME --policy balanced --perception keypoints+scanner` runs a
-scenario; `awarenav scenario show NAME` prints its file. With reduced motion set in your browser,
+`awarenav crossings --scenario NAME --policy balanced --sensors camera+scanner` runs a scenario;
+`awarenav watch NAME --sensors camera+scanner` shows it in the browser while it runs;
+`awarenav scenario show NAME` prints its file. With reduced motion set in your browser,
 you see plans instead of films."""
 _SETS: Final = {
     "all": "## Scenarios",

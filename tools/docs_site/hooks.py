@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import posixpath
 import re
@@ -13,6 +14,7 @@ from typing import Any, Final
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from PIL import Image
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 # MkDocs loads this file by its path; the pages come from the checkout, not from an installation.
@@ -21,6 +23,8 @@ sys.path.insert(0, str(ROOT))
 from awarenav import __version__  # noqa: E402
 from tools.docs_site import gallery, notebook, reference  # noqa: E402
 
+#: The film of the home page, without motion.
+_STILL: Final = "images/crossing_still.png"
 #: Pages whose films and code get the full width.
 _WIDE: Final = ("index.md", "gallery.md")
 _LINK: Final = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
@@ -50,7 +54,16 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     add(f"{stem}.md", content=text)
     for name, png in pictures.items():
         add(name, content=png)
+    add(_STILL, content=first_picture(ROOT / "docs" / "images" / "crossing.webp"))
     return files
+
+
+def first_picture(film: Path) -> bytes:
+    """Return the first picture of a film as PNG, for readers who do not want motion."""
+    png = io.BytesIO()
+    with Image.open(film) as pictures:
+        pictures.convert("RGB").save(png, "PNG")
+    return png.getvalue()
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, **_: Any) -> str:

@@ -39,9 +39,28 @@ PACKAGES: Final = (
     "nav_adapter.ros2",
     "sim_tests",
 )
+#: Names that a user meets first, and that begin the page of their package.
+FIRST: Final = (
+    "NavAdapter",
+    "PersonTracker",
+    "AwarenessPipeline",
+    "AwarenessPolicy",
+    "RobotProfile",
+    "RobotState",
+    "NavConstraints",
+    "PersonObstacle",
+    "TrackerConfig",
+    "PersonTrack",
+    "Camera",
+    "PersonObservation",
+    "run_crossing",
+)
 _INDEX: Final = """# Reference
 
-Everything here is made from the code of this version.
+Everything here is made from the code of this version. From an image to a speed limit you need three
+classes: [AwarenessPipeline](perception.md#perception.AwarenessPipeline),
+[PersonTracker](tracking.md#tracking.PersonTracker) and
+[NavAdapter](nav_adapter.md#nav_adapter.NavAdapter).
 
 - **Python**: [perception](perception.md) (with [laser](perception.laser.md),
   [surround](perception.surround.md), [networks](perception.networks.md)),
@@ -72,6 +91,7 @@ _PACKAGE: Final = """# {package}
 
 ::: {package}
     options:
+      group_by_category: false
       members: [{names}]
 """
 _FRONT_DOOR: Final = """# awarenav
@@ -245,8 +265,13 @@ def pages(metrics: str) -> dict[str, str]:
 
 def package_page(package: str) -> str:
     """Return the page of a package, with every name of its ``__all__``."""
-    names = import_module(package).__all__
+    names = first_names_first(import_module(package).__all__)
     return _PACKAGE.format(package=package, names=", ".join(names))
+
+
+def first_names_first(names: Iterable[str]) -> list[str]:
+    """Return names with those of ``FIRST`` before the others, which keep their order."""
+    return sorted(names, key=lambda name: FIRST.index(name) if name in FIRST else len(FIRST))
 
 
 def front_door_page() -> str:
@@ -256,7 +281,7 @@ def front_door_page() -> str:
         name: package for package in reversed(PACKAGES) for name in import_module(package).__all__
     }
     rows = []
-    for name in front.__all__:
+    for name in first_names_first(front.__all__):
         home = homes.get(name)
         where = f"[{home}]({home}.md#{home}.{name})" if home else "the base of every error"
         rows.append(f"| `awarenav.{name}` | {where} |")

@@ -1,4 +1,4 @@
-"""References of docstrings (``:class:`~perception.Camera```) as links of the site.
+"""References of docstrings (``:class:`~perception.Camera```) as links; types without metadata.
 
 MkDocs loads this file by its path, as an extension of griffe, which reads the source code.
 """
@@ -42,12 +42,22 @@ def _shown(role: re.Match[str]) -> str:
     return role.group(2).rpartition(".")[2] if role.group(1) else role.group(2)
 
 
+def without_metadata(annotation: griffe.Expr | str | None) -> griffe.Expr | str | None:
+    """Return ``X`` for ``Annotated[X, ...]``, whose rest is for the model's own reading."""
+    if isinstance(annotation, griffe.ExprSubscript) and str(annotation.left) == "Annotated":
+        inner = annotation.slice
+        return inner.elements[0] if isinstance(inner, griffe.ExprTuple) else inner
+    return annotation
+
+
 class LinkedRoles(griffe.Extension):
-    """Rewrites the references in every docstring that is read."""
+    """Rewrites the references in every docstring that is read, and the types of attributes."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Rewrite the docstring of an object within a package."""
+        """Rewrite the docstring of an object within a package, and its type."""
         _rewrite(obj)
+        if isinstance(obj, griffe.Attribute):
+            obj.annotation = without_metadata(obj.annotation)
 
     def on_package(self, *, pkg: griffe.Module, **_: Any) -> None:
         """Rewrite the docstring of a package, which is no object within another."""

@@ -15,8 +15,8 @@ from ...arrays import FloatArray, ImageRgb
 _WIDE: Final = 0.5
 # Side of the middle, as a share of the image's width.
 _SHARE: Final = 0.5
-# As for the boxes of one look.
-_SAME_IOU: Final = 0.5
+# In the whole image a small person may be several boxes, of which this share lies in the fine one.
+_SAME_SHARE: Final = 0.5
 _EDGE_PX: Final = 2.0
 
 
@@ -58,11 +58,11 @@ class WideViewDetector:
         left, top, right, bottom = self._middle.tolist()
         part = np.ascontiguousarray(image_rgb[top:bottom, left:right])
         shift = np.array([left, top, left, top], dtype=float)
-        finer = [
+        fine = [
             PersonDetection(each.box_xyxy_px + shift, each.score)
             for each in self._detector.detect(part)
         ]
-        kept = [each for each in finer if not self._is_cut(each.box_xyxy_px)]
+        kept = [each for each in fine if not self._is_cut(each.box_xyxy_px)]
         kept += [
             each
             for each in self._detector.detect(image_rgb)
@@ -78,9 +78,8 @@ class WideViewDetector:
         return bool(low.any() or high.any())
 
 
-def _same(first: FloatArray, second: FloatArray) -> bool:
-    """Return whether two boxes show one person. Of two people one may hide half of the other."""
-    low, high = np.maximum(first[:2], second[:2]), np.minimum(first[2:], second[2:])
+def _same(coarse: FloatArray, fine: FloatArray) -> bool:
+    """Return whether a box of the whole image shows the person of one of the middle, or a part."""
+    low, high = np.maximum(coarse[:2], fine[:2]), np.minimum(coarse[2:], fine[2:])
     shared = float(np.prod(np.clip(high - low, 0.0, None)))
-    both = sum(float(np.prod(box[2:] - box[:2])) for box in (first, second))
-    return shared > _SAME_IOU * (both - shared)
+    return shared > _SAME_SHARE * float(np.prod(coarse[2:] - coarse[:2]))

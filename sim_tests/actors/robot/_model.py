@@ -132,7 +132,7 @@ class RobotModel(SimConfig):
         """
         names = shipped_robots()
         if name not in names:
-            raise SimError(f"{not_one_of('robot', name, names)}, or a YAML file")
+            raise SimError(not_one_of("robot", name, names, or_else="a YAML file"))
         if name == NOVA_CARTER_NAME:
             return _nova_carter()
         with resources.as_file(_FOLDER / f"{name}.yaml") as path:

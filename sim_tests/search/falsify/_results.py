@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.cli import table_text
 from awarenav.errors import counted
 from awarenav.files import write_csv
 
@@ -179,20 +180,21 @@ def write_summary(
 
 def table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> list[str]:
     """Return the worst cases and the totals as lines of text."""
-    lines = [
-        f"{'file':16s}{'scenario':24s}{'margin':>9s}{'separation':>12s}{'robot':>10s}"
-        f"  {'contact by':12s}{'awareness':16s}{'reaction':12s}"
+    header = ("file", "scenario", "margin", "separation", "robot", "contact by", "awareness")
+    rows = [
+        [
+            case.path.name + ("" if case.replays else " (DOES NOT REPLAY)"),
+            case.episode.scenario,
+            f"{_two_decimals(case.record.min_margin_unaware_m)} m",
+            f"{_two_decimals(case.record.min_separation_m)} m",
+            f"{_two_decimals(case.record.speed_at_min_separation_mps)} m/s",
+            case.record.contact_by or "-",
+            case.record.awareness or "-",
+            case.record.reaction or "-",
+        ]
+        for case in cases
     ]
-    for case in cases:
-        record = case.record
-        lines.append(
-            f"{case.path.name:16s}{case.episode.scenario:24s}"
-            f"{_two_decimals(record.min_margin_unaware_m):>7s} m"
-            f"{_two_decimals(record.min_separation_m):>10s} m"
-            f"{_two_decimals(record.speed_at_min_separation_mps):>6s} m/s"
-            f"  {record.contact_by or '-':12s}{record.awareness or '-':16s}"
-            f"{record.reaction or '-':12s}" + ("" if case.replays else "  DOES NOT REPLAY")
-        )
+    lines = [table_text((*header, "reaction"), rows, left=2), ""]
     contacts, episodes = falsification.contacts, len(falsification.episodes)
     aware = len(falsification.aware_speeds_mps)
     lines.append(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from awarenav.cli import styled, table_text
 from awarenav.errors import counted
 from awarenav.figures import new_figure, save_figure, scale_by_roots
 from awarenav.files import csv_number, write_csv, write_text
@@ -163,22 +164,20 @@ def table_lines(tuning: Tuning) -> list[str]:
     """
     rows = (*tuning.anchors, *tuning.chosen)
     names = [", ".join(each.names) for each in rows]
-    width = max(18, *map(len, names)) + 1
-    asks = f"{'requests':>10s}" if tuning.asks else ""
-    heads = f"{'time lost (s)':>21s}{'step-out':>21s}{'contacts':>10s}{asks}"
-    lines = [
-        " " * (width + 5)
-        + f"{'tuning seeds':^{len(heads)}s}  {'held-out seeds':^{len(heads)}s}".rstrip(),
-        f"{'policy':{width}s}{'trial':>5s}" + (2 * f"{heads}  ").rstrip(),
-    ]
-    for name, each in zip(names, rows, strict=True):
-        trial = "" if each.trial is None else str(each.trial)
-        cells = f"{name:{width}s}{trial:>5s}"
-        for evaluation in (each.tuning, each.held_out):
-            time_s, risk = (evaluation.interval(name) for name in FIGURES)
-            cells += f"{time_s.text(2):>21s}{risk.text(2):>21s}{evaluation.moving_contacts:10d}"
-            cells += f"{evaluation.requests:10.2f}  " if asks else "  "
-        lines.append(cells.rstrip())
+    header = ["policy", "trial", "time lost (s)", "step-out", "contacts"]
+    header += ["requests"] if tuning.asks else []
+    lines = []
+    for title, evaluations in (
+        ("tuning seeds", [each.tuning for each in rows]),
+        ("held-out seeds", [each.held_out for each in rows]),
+    ):
+        cells = []
+        for name, each, evaluation in zip(names, rows, evaluations, strict=True):
+            trial = "" if each.trial is None else str(each.trial)
+            figures = (evaluation.interval(figure).text(2) for figure in FIGURES)
+            asked = [f"{evaluation.requests:.2f}"] if tuning.asks else []
+            cells.append([name, trial, *figures, str(evaluation.moving_contacts), *asked])
+        lines += [styled(title, bold=True), table_text(header, cells), ""]
     lines.append(
         f"At most {tuning.risk:.2f} step-out impacts with unaware people per 1 000 crossings on "
         f"tuning seeds, {tuning.held_out_risk:.2f} on held-out seeds."
@@ -212,11 +211,33 @@ def verdict_text(tuning: Tuning) -> str:
         )
     nearest = nearest_candidate(tuning)
     if nearest is None:
-        return f"keep {base.name}. No trial within the bounds differs from it and the presets."
+        return (
+            f"keep {base.name}. No trial within the bounds differs from it and the presets."
+            + _better_preset(tuning)
+        )
     reason = _reason(tuning, nearest)
     return (
         f"keep {base.name}. The nearest is {nearest.name} ({_also(nearest)}): {reason}. "
         + _comparison(tuning, nearest)
+        + _better_preset(tuning)
+    )
+
+
+def _better_preset(tuning: Tuning) -> str:
+    """Return a sentence on the preset with the least time lost, if the base policy loses more."""
+    faster = [
+        each
+        for each in tuning.anchors[1:]
+        if not each.held_out.moving_contacts
+        and tuning.allows(each)
+        and tuning.minus_base(each).value < 0.0
+    ]
+    if not faster:
+        return ""
+    best = min(faster, key=lambda each: tuning.minus_base(each).value)
+    return (
+        f" Of the policies beside it, {best.name} {change_text(tuning.minus_base(best))} than "
+        f"{tuning.base.name}: consider it instead."
     )
 
 

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
         summarise,
         summarise_sources,
     )
-    from ._summary_text import nondeterminism_notes, short_text, summary_text, table_text
+    from ._summary_text import nondeterminism_notes, short_text, summary_text
     from ._trace import Trace
 
 __all__ = [
@@ -112,7 +112,6 @@ __all__ = [
     "summarise",
     "summarise_sources",
     "summary_text",
-    "table_text",
     "violates_more",
     "write_records",
     "zero_of_n_upper",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar
 
+from awarenav.cli import styled, table_text
 from awarenav.errors import counted
 
 from ._awareness import ATTENTION_WITHIN_M, ATTENTIVE_FROM
@@ -54,22 +55,6 @@ def summary_text(summary: Summary, notes: Iterable[str] = ()) -> str:
     return "\n\n".join(blocks)
 
 
-def table_text(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
-    """Return aligned columns: the first ``left`` of them left-aligned, the others right-aligned."""
-    lines = [list(header), *(list(row) for row in rows)]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(header))]
-
-    def line_text(cells: list[str]) -> str:
-        aligned = [
-            cell.ljust(width) if column < left else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(cells, widths, strict=True))
-        ]
-        return "  ".join(aligned).rstrip()
-
-    rule = "  ".join("-" * width for width in widths)
-    return "\n".join([line_text(lines[0]), rule, *(line_text(line) for line in lines[1:])])
-
-
 def short_text(summary: Summary) -> str:
     """Return the table of policies that the end of a run prints."""
     columns: dict[str, Callable[[SummaryRow], str]] = {
@@ -78,15 +63,20 @@ def short_text(summary: Summary) -> str:
         "success": lambda row: percent(row.success.value),
         "contacts": _moving_contacts,
         "time lost s": _mean("time_lost_s", bounds=False),
-        "least m": _worst("min_separation_m"),
+        "nearest m": _worst("min_separation_m"),
         "step-out": _mean("step_out_unaware", bounds=False),
         "failed": lambda row: str(row.errors),
     }
-    return _table(summary.policies, columns)
+    legend = (
+        "success: at the goal in time. contacts: episodes in which the moving robot and a person\n"
+        "touched. time lost: to the same task without people. nearest: smallest gap to a person.\n"
+        "step-out: impacts with unaware people who step out, per 1 000 crossings."
+    )
+    return f"{_table(summary.policies, columns)}\n\n{legend}"
 
 
 def _titled(title: str, table: str) -> str:
-    return f"{title}\n\n{table}"
+    return f"{styled(title, bold=True)}\n\n{table}"
 
 
 def _policy_table(rows: Sequence[SummaryRow]) -> str:
@@ -111,7 +101,7 @@ def _safety_table(rows: Sequence[SummaryRow]) -> str:
             "contact, moving": lambda row: row.moving_contact.share_text(),
             "by robot": lambda row: row.robot_contact.share_text(),
             "by person": lambda row: row.person_contact.share_text(),
-            "least m": _worst("min_separation_m"),
+            "nearest m": _worst("min_separation_m"),
             "margin m": _worst("min_margin_m"),
             "violated s": _worst("violation_time_s"),
             "TTC s": _worst("min_time_to_collision_s"),
@@ -178,7 +168,7 @@ def _part_table(rows: Sequence[SummaryRow]) -> str:
             "contacts": _moving_contacts,
             "step-out": _mean("step_out_unaware", bounds=False),
             "time lost s": _mean("time_lost_s"),
-            "least m": _worst("min_separation_m"),
+            "nearest m": _worst("min_separation_m"),
             "margin m": _worst("min_margin_m"),
             "violated s": _mean("violation_time_s", bounds=False),
             "α error": _mean("awareness_error", bounds=False),
@@ -235,7 +225,7 @@ def _notes(summary: Summary) -> list[str]:
     """Return the legend, and one line for each policy with episodes that are left out."""
     notes = [
         "won back: share of the time that the other loses. violation: longer violation of the\n"
-        "margin S − S_p, relative to that of the other, and to the time that it takes. least,\n"
+        "margin S − S_p, relative to that of the other, and to the time that it takes. nearest,\n"
         "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
         "person and the moving robot touched, by any cause. step-out: step-out impacts\n"
         "with unaware people. (…): the exact interval. [?]: too few for an interval.\n"

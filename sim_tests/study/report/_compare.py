@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
+from awarenav.cli import table_text
 from awarenav.errors import AwarenavError
 from awarenav.files import json_text
 from nav_adapter import AwarenessPolicy
@@ -21,7 +22,6 @@ from ...world.errors import SimError
 from ..measures import (
     BASELINE,
     EpisodeRecord,
-    table_text,
 )
 from ..runs import Job, plan_jobs, policy_of, run_jobs, template_of
 from ._results import WIDE_KEY, Results, Run

@@ -61,16 +61,24 @@ class _WorstInstant:
         spec = stage.scenario.camera
         camera = spec.camera(_WIDTH_PX / spec.width_px)
         picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
-        self.camera = draw_camera_view(
-            picture, camera, frame, stage, cone, box_scale=self._box_scale
-        )
         worker = int(np.argmin(frame.margins_m))
         middle = 0.5 * (frame.robot_state.position_odom_m + frame.truth[worker].position_odom_m)
         size_px = (camera.width_px, camera.height_px)
         view = TopView(stage, size_px, _window(middle, size_px))
+        for earlier in self._frames:
+            view.watch(earlier)
         for earlier in self._frames[:-1:_PATH_STEP]:
             view.draw(earlier, stage, cone)  # extends the paths
         self.plan = view.draw(frame, stage, cone)
+        self.camera = draw_camera_view(
+            picture,
+            camera,
+            frame,
+            stage,
+            cone,
+            box_scale=self._box_scale,
+            memory=view.memory,
+        )
         self.t_s = frame.t_s
 
 

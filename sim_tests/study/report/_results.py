@@ -231,13 +231,12 @@ class Results:
                 said.append("Without the policy blind on the same seeds, no time is won back.")
             return " ".join(filter(None, said))
         note = self._left_out(arm, whole)
+        said.append(_won_back("people", whole))
         attentive = self.against(arm, "attentive")
-        if attentive is not None:
+        if attentive is not None and attentive.won_back.n < whole.won_back.n:
             said.append(_won_back("attentive people", attentive))
-        elif note:
-            said.append("Nobody was measured to be attentive, so time won back is not stated.")
-        else:
-            said.append(_won_back("people", whole))
+        elif attentive is None and note:
+            said.append("Nobody was measured to be attentive.")
         unaware = self.against(arm, "unaware")
         said.append(_violates(unaware or whole, "people" if unaware is None else "unaware people"))
         return " ".join(filter(None, [*said, note]))

@@ -8,7 +8,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from awarenav.cli import FolderPath, Number, Seeds, argument, command, group, option, options
+from awarenav.cli import (
+    FolderPath,
+    Number,
+    Seeds,
+    argument,
+    command,
+    group,
+    option,
+    options,
+    table_text,
+)
 
 from ...conditions import Experiment, conditions_options, option_words
 
@@ -53,7 +63,6 @@ def list_planners(*, as_json: bool) -> int:
     """List the planners that have a name; any other is given as module:NAME."""
     from awarenav.files import json_text  # noqa: PLC0415 - help needs no planners
 
-    from ..measures import table_text  # noqa: PLC0415
     from ._compare import known_planners  # noqa: PLC0415
 
     known = known_planners()

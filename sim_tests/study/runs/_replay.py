@@ -124,7 +124,13 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         camera = spec.camera(_HEIGHT_PX / spec.height_px)
         camera_image = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
         camera_view = draw_camera_view(
-            camera_image, camera, frame, stage, self._cone, box_scale=self._box_scale
+            camera_image,
+            camera,
+            frame,
+            stage,
+            self._cone,
+            box_scale=self._box_scale,
+            memory=None if self._view is None else self._view.memory,
         )
         image = np.hstack([camera_view, above])
         image = image[:, : image.shape[1] // 2 * 2]  # the codec needs an even width
@@ -149,7 +155,7 @@ def replay_command(
     Raises:
         SimError: the folder holds no run, or the run does not have the episode.
     """
-    jobs, files = read_jobs(folder), RunFiles(folder)
+    jobs, files, rows = read_jobs(folder), RunFiles(folder), read_rows(folder)
     every = episode == _EVERY
     numbers = range(len(jobs)) if every else [find_episode(jobs, episode)]
     out = files.replays if out is None else out
@@ -158,22 +164,27 @@ def replay_command(
     for number in numbers:
         job, path = jobs[number], out / files.page(number).name
         print(f"Episode {number}: {job.conditions.text}")
-        result, record, written = _drawn(job, path, video=not no_video, view=view)
+        before = next((row for row in rows if row.conditions == job.conditions), None)
+        length_s = None if before is None else before.duration_s
+        result, record, written = _drawn(job, path, length_s, video=not no_video, view=view)
         for each in written:
             print(f"Written: {each}")
         print(outcome_text(result))
-        status = max(status, _compare_row(folder, job, record))
+        status = max(status, _compare_row(folder, before, record))
         if view and not every:
             show_page(path.resolve().as_uri())
     return status
 
 
 def _drawn(
-    job: Job, path: Path, *, video: bool, view: bool
+    job: Job, path: Path, length_s: float | None, *, video: bool, view: bool
 ) -> tuple[CrossingResult, EpisodeRecord, Sequence[Path]]:
-    """Run one episode again; return its result, its row and the files written."""
+    """Run one episode again; return its result, its row and the files written.
+
+    Its progress counts to the length that it had before, or to its time limit.
+    """
     scenario = template_of(job.scenario_text).for_seed(job.seed)
-    total = round(scenario.duration_s * scenario.control_hz)
+    total = round((length_s or scenario.duration_s) * scenario.control_hz)
     with tqdm(total=total, desc="replay", unit="frame", file=sys.stderr) as bar:
         if view:
             recorder = recorder_of(job)
@@ -264,13 +275,12 @@ def find_episode(jobs: Sequence[Job], episode: str) -> int:
     raise SimError(f"{episode!r} is {len(found)} episodes of the run, give one's number: {listed}")
 
 
-def _compare_row(folder: Path, job: Job, record: EpisodeRecord) -> int:
+def _compare_row(folder: Path, before: EpisodeRecord | None, record: EpisodeRecord) -> int:
     """Print the difference to the row of the run; return 0 for the same row, else 1."""
-    before = [each for each in read_rows(folder) if each.conditions == job.conditions]
-    if not before:
+    if before is None:
         print(f"{folder} has no row of this episode yet")
         return 0
-    pairs = zip(RECORD_COLUMNS, record_row(before[0]), record_row(record), strict=True)
+    pairs = zip(RECORD_COLUMNS, record_row(before), record_row(record), strict=True)
     changed = [(name, was, now) for name, was, now in pairs if was != now]
     if not changed:
         print(f"The same row as in {folder}.")

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from tqdm import tqdm
 
+from awarenav.cli import table_text
 from awarenav.errors import counted
 from awarenav.files import json_text, write_text
 
 from ...world.errors import SimError
-from ..measures import EpisodeRecord, Variant, labels, table_text
+from ..measures import EpisodeRecord, Variant, labels
 from ..runs import (
     Job,
     RunFiles,

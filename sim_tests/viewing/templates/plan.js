@@ -259,7 +259,9 @@ function trackMark(pen, track, state, x, y, scale, bottom) {
   pen.textAlign = "center";
   const bound = kept ? kept.awareness_lower : track.awareness_lower;
   const name = state.tracks.length > 3 ? "" : "track ";
-  const text = `${name}${track.id}: α ≥ ${bound.toFixed(2)}`;
+  const before = kept && kept.noticed_s !== null && kept.noticed_s !== undefined;
+  const known = before ? `noticed ${kept.noticed_s.toFixed(1)} s ago` : `α ≥ ${bound.toFixed(2)}`;
+  const text = `${name}${track.id}: ${known}`;
   writeOver(pen, text, u, Math.max(v - away - 6, 14), PALETTE.ink, PALETTE.floor);
 }
 

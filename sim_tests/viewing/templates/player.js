@@ -49,6 +49,8 @@
   }
 
   const fixed = (value, digits = 2) => (value === null ? "–" : value.toFixed(digits));
+  const counted = (kept) => fixed(kept.awareness_lower) +
+    (typeof kept.noticed_s === "number" ? ` (noticed ${kept.noticed_s.toFixed(1)} s ago)` : "");
 
   function figures(state) {
     find("speed").textContent = fixed(state.speed_mps);
@@ -76,7 +78,7 @@
       name.append(mark, `${track.id}${track.status === "confirmed" ? "" : ", " + track.status}`);
       row.append(name);
       for (const text of [`${fixed(track.awareness)} ± ${fixed(track.awareness_std)}`,
-        fixed(track.awareness_lower), kept ? fixed(kept.awareness_lower) : "–", kept ? `${fixed(kept.radius_m)} m` : "–"]) {
+        fixed(track.awareness_lower), kept ? counted(kept) : "–", kept ? `${fixed(kept.radius_m)} m` : "–"]) {
         const cell = document.createElement("td");
         cell.textContent = text;
         row.append(cell);

@@ -77,5 +77,5 @@ def odometry(stamp_s: float) -> Odometry:
 
 def rendered(folder: Path) -> RenderedImage:
     size = ["--frames", "2", "--people", "1", "--scenes", "1", "--range", "2", "4", "--seed", "3"]
-    assert main(["render", *size, "--processes", "1", "--out", str(folder)]) == 0
+    assert main(["render", *size, "--workers", "1", "--out", str(folder)]) == 0
     return RenderedImage(folder)

@@ -233,7 +233,7 @@ def test_the_loop_waits_while_messages_come_that_it_does_not_need(domain: int) -
     [
         (["--robot", "nowhere.yaml"], "cannot read nowhere.yaml"),
         ([], "ROS_DOMAIN_ID must be a number from 0 to 232, got 'zero'"),
-        (["--policy", "bold"], "preset must be one of"),
+        (["--policy", "bold"], "did you mean 'blind'? It must be one of"),
         (["--rate", "0"], "--rate"),
         (["--detector", "nowhere"], "--detector must be"),
         (["--seconds", "-1"], "--seconds"),

@@ -53,7 +53,7 @@ def test_a_simulator_that_is_not_installed_is_one_line_and_2(failing, capsys):
 def test_an_interruption_is_130(failing, capsys):
     assert failing(KeyboardInterrupt()) == 130
     said = capsys.readouterr().err
-    assert said == "\nawarenav policy show: interrupted; partial results kept\n"
+    assert said == "\nawarenav policy show: interrupted\n"
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_a_file_name_that_is_not_utf_8_is_only_a_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "file", "kind"),
     [
-        (["scenario", "validate"], POLICY, ": this is a policy, no scenario"),
+        (["scenario", "validate"], POLICY, ": this is a policy, not a scenario"),
         (["policy", "show"], SCENARIO, ": this is a scenario; unknown key 'name' in Aw"),
         (["policy", "show"], ROBOT, ": this is the file of a robot; unknown key 'footprint_m'"),
         (["tracks", "x.csv", "--config"], POLICY, ": this is a policy; TrackerConfig: unknown key"),

@@ -319,11 +319,11 @@ def test_the_gate_fails_for_estimates_that_are_not_good_enough(tmp_path, capsys)
     # 1 % of 200 misses the 0.5 % that are asked, but so few may be chance.
     capsys.readouterr()
     assert main(["judge", *files(tmp_path, truth, good), "--gate"]) == 1
-    assert "**no**" not in capsys.readouterr().out
+    assert "  no\n" not in capsys.readouterr().out
     for k in range(1, 60, 3):
         good[k]["people"][0]["awareness"] = 0.7
     assert main(["judge", *files(tmp_path, truth, good), "--gate"]) == 1
-    assert "**no**" in capsys.readouterr().out
+    assert "  no\n" in capsys.readouterr().out
 
 
 BAD = {**person(0), "awareness": 1.5}

@@ -137,6 +137,18 @@ def test_both_engines_give_the_same_numbers(files, monkeypatch):
             assert first[name] == pytest.approx(result, abs=2e-3)
 
 
+def test_fewer_outputs_cost_less_and_change_no_number(files):
+    whole = TfliteModel(files[1])
+    wanted = [each.name for each in whole.outputs if len(each.shape) == 2]
+    reduced = whole.with_outputs(wanted)
+    assert [each.name for each in reduced.outputs] == wanted
+    batch = np.random.default_rng(2).random(whole.inputs[0].shape, dtype=np.float32)
+    first, second = whole.run(batch), reduced.run(batch)
+    assert set(second) == set(wanted)
+    for name in wanted:
+        assert (first[name] == second[name]).all()
+
+
 def test_a_network_in_the_place_of_another_is_refused_with_what_it_is(files):
     detector, pose, face = files
     with pytest.raises(PerceptionError, match=r"not a BlazePose network: found .*320"):

@@ -83,6 +83,23 @@ def test_somebody_before_another_hides_nobody():
     assert boxes(before, behind) == sorted([list(before), list(behind)])
 
 
+def test_somebody_behind_hides_nobody_whom_the_middle_cuts():
+    behind, near = (950.0, 520.0, 1010.0, 700.0), (800.0, 100.0, 1200.0, 1200.0)
+    assert boxes(near, behind) == sorted([list(near), list(behind)])
+
+
+def test_a_part_of_somebody_in_the_whole_image_is_nobody_else():
+    person, part = (900.0, 500.0, 1000.0, 760.0), (910.0, 505.0, 960.0, 600.0)
+
+    class Parts(Detector):
+        def detect(self, image_rgb: np.ndarray) -> tuple[PersonDetection, ...]:
+            whole = image_rgb.shape[1] == WIDE.width_px
+            return (PersonDetection(part, 0.4),) if whole else super().detect(image_rgb)
+
+    found = for_wide_view(Parts(person), WIDE).detect(image())
+    assert [each.box_xyxy_px.tolist() for each in found] == [list(person)]
+
+
 def test_a_middle_that_reaches_the_images_edges_cuts_nobody_there():
     low = Camera.from_fov(1920, 480, math.radians(120.0))
     person = (900.0, 200.0, 980.0, 480.0)  # the image ends below

@@ -119,7 +119,7 @@ def test_the_command_renders_and_replaces_a_set_on_request_only(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "set"
-    command = ["render", "--frames", "2", "--size", "96x72", "--processes", "1", "--out", str(out)]
+    command = ["render", "--frames", "2", "--size", "96x72", "--workers", "1", "--out", str(out)]
     assert main(command) == 0
     assert "2 images" in capsys.readouterr().out
     first = contents(out)

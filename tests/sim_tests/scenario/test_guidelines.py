@@ -25,7 +25,7 @@ def test_the_sets_share_no_scenario_and_all_stays_as_it_was_measured() -> None:
     assert [each.name for each in named_templates(["guidelines"])] == list(NAMES)
     assert len(named_templates(["all", "guidelines", NAMES[0]])) == 23 + len(NAMES)
     sets = "'all', 'guidelines', 'step_out'"
-    with pytest.raises(SimError, match=f"must be one of {sets}, got 'guideline'"):
+    with pytest.raises(SimError, match=f"did you mean 'guidelines'. It must be one of {sets}"):
         shipped_scenarios("guideline")
     for name in NAMES:
         assert ScenarioTemplate.shipped(f"{name}@1").name == Scenario.shipped(name).name == name

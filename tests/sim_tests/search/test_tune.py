@@ -349,6 +349,15 @@ def test_the_verdict_names_a_winner_with_its_intervals_and_says_that_it_was_not_
     assert "no scenario was held out" in alone
 
 
+def test_the_verdict_names_a_preset_that_loses_less_than_the_base_policy():
+    tuning = tuning_of(candidate("second", 7, time_s=6.0))
+    faster = candidate("assertive", None, time_s=4.0)
+    text = verdict_text(dataclasses.replace(tuning, anchors=(*tuning.anchors, faster)))
+    assert text.startswith("keep balanced. ")
+    assert "assertive loses 0.84 s less" in text
+    assert "beside it" not in verdict_text(tuning)
+
+
 @pytest.mark.parametrize(
     ("values", "reason", "undecided"),
     [

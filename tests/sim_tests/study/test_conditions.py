@@ -46,6 +46,18 @@ def test_every_command_has_the_options_of_the_axes(name):
     assert set(OPTIONS) - names == {each for each in WITHOUT[name] if each != "scenario"}
 
 
+@pytest.mark.parametrize("name", ["crossings", "watch"])
+@pytest.mark.parametrize(
+    ("perception", "sensors"), [("keypoints", "camera+scanner"), ("truth", "camera")]
+)
+def test_a_robot_has_all_of_its_sensors_unless_scanners_add_nothing(name, perception, sensors):
+    words = ["late_glance"] if name == "watch" else []
+    context = app.get_command(None, name).make_context(name, [*words, "--perception", perception])
+    experiment = Experiment.taken_from(context.params)
+    assert experiment["sensors"] == (sensors,)
+    assert experiment.replaced(sensors="scanner")["sensors"] == ("scanner",)
+
+
 def test_the_api_and_a_job_have_the_same_conditions():
     given = {"policy": "blind", "robot": "omni", "camera": "surround", "population": "recorded"}
     values = {**given, "scenario": "late_glance", "perception": "truth", "seed": 4}

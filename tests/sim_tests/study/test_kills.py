@@ -31,7 +31,7 @@ COMMANDS = {
         ["episodes.csv", "summary.json", "worst_*.yaml", "policy.yaml", "falsify.png"],
     ),
     "render": (
-        ["--frames", "12", "--scenes", "3", "--size", "160x120", "--processes", "1"],
+        ["--frames", "12", "--scenes", "3", "--size", "160x120", "--workers", "1"],
         ["*.png", "truth.jsonl", "camera.yaml", "render.yaml"],
     ),
     "estimate": (["--threads", "1"], ["estimates.jsonl"]),
@@ -44,7 +44,7 @@ def kill(name, kills, tmp_path, *more):
     words = [name, *options, *more]
     if name == "estimate":
         pictures = tmp_path / "pictures"
-        made = ["render", "--frames", "8", "--size", "320x240", "--processes", "1"]
+        made = ["render", "--frames", "8", "--size", "320x240", "--workers", "1"]
         assert main([*made, "--out", str(pictures)]) == 0
         words.append(str(pictures))
     elif name != "render":

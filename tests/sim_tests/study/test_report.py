@@ -81,8 +81,9 @@ def test_figures_are_those_of_the_statistics(page: PageReader, run: MadeUpRun) -
     for each in (*summary.comparisons, *summary.scenario_comparisons):
         assert f"{100.0 * each.won_back.value:.0f}" in page.text
     against = {(each.variant, each.part): each for each in summary.comparisons}
-    back = against["balanced", "attentive"].won_back
-    assert f"It wins back {back.text(0, 100.0)}\u202f% of the time that blind loses" in page.text
+    for part, who in (("", "people"), ("attentive", "attentive people")):
+        back = against["balanced", part].won_back.text(0, 100.0)
+        assert f"It wins back {back}\u202f% of the time that blind loses to {who}" in page.text
     # Contacts under faults count too.
     balanced = [record for record in run.records if record.policy == "balanced"]
     assert f"The moving robot touched nobody in {len(balanced)} episodes" in page.text

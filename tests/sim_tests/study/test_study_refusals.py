@@ -28,7 +28,7 @@ def run(tmp_path_factory):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("crossings --robot tank", "'delivery', 'forklift', 'nova_carter', 'omni', got 'tank'"),
+        ("crossings --robot tank", "'delivery', 'forklift', 'nova_carter', 'omni', or a YAML file"),
         ("report EMPTY", "holds no episodes.csv"),
         ("replay RUN 4", "the run has 4 episodes, numbered 0 to 3, got 4"),
         ("replay RUN short", "SCENARIO:SEED:POLICY"),
@@ -59,10 +59,10 @@ def run(tmp_path_factory):
             "planners compare straight_on --scenario paper_encounter",
             "drives straight on without a planner",
         ),
-        ("watch nowhere", "scenario must be one of"),
+        ("watch nowhere", "`awarenav scenario list` lists all"),
         ("watch all", "watch shows one crossing"),
         ("watch late_glance --fault scanner_*", "watch shows one crossing"),
-        ("watch late_glance --policy brave", "preset must be one of"),
+        ("watch late_glance --policy brave", "policy must be one of"),
         ("watch late_glance --out no_such_folder/page.html", "there is no folder"),
     ],
 )

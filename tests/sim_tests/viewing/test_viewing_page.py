@@ -116,6 +116,24 @@ def test_nothing_is_wider_than_the_window(chromium, page_file, width, dark):
     assert (level < 60) is dark
 
 
+@pytest.mark.parametrize("height", [720, 800])
+def test_people_and_the_time_line_are_seen_above_the_controls(
+    chromium, page_file, recorder, height
+):
+    still(chromium, page_file, height=height)
+    at = next(at for at, state in enumerate(recorder.states) if state["tracks"])
+    chromium.evaluate(f"crossing.seek({at}), true")
+    chromium.drawn()
+
+    def edge(selector: str, side: str) -> float:
+        box = f"document.querySelector('{selector}').getBoundingClientRect()"
+        return chromium.evaluate(f"{box}.{side}")
+
+    assert edge("#tracks tr", "bottom") <= edge("#side", "bottom")
+    assert edge("#motion", "bottom") <= edge("footer", "top")
+    assert edge("footer", "bottom") <= height
+
+
 STYLE = (resources.files("sim_tests.viewing") / "templates" / "watch.css").read_text("utf-8")
 LIGHT, DARK = re.findall(r":root\{(.*?)\}", STYLE, re.DOTALL)
 #: Colours of text, which need 4.5 : 1, over each colour on which they stand.
