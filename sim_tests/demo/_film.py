@@ -143,17 +143,18 @@ def film_pictures(rows: Sequence[ComparisonRow]) -> Iterator[ImageRgb]:
     person = unaware_person(shown[0].result)
     seeing = next(row for row in shown[::-1] if row.pictures)
     yield _picture(shown, free, person, None, decisive_picture(seeing).rgb)
-    end_s = max(row.result.frames[-1].t_s for row in shown)
+    # Who never arrives would make the film long.
+    arrived = [row for row in shown if row.result.time_to_goal_s is not None]
+    end_s = max(row.result.frames[-1].t_s for row in arrived or shown)
     for number in range(math.ceil(end_s / PICTURE_S - 1e-6) + 1):
         camera = seeing.pictures[min(number, len(seeing.pictures) - 1)].rgb
         yield _picture(shown, free, person, number * PICTURE_S, camera)
 
 
 def decisive_picture(row: ComparisonRow) -> CameraPicture:
-    """Return the picture of the camera in the middle of those that show most people as a whole."""
+    """Return the last picture of the camera that shows most people as a whole."""
     most = max(len(each.whole) for each in row.pictures)
-    showing = [each for each in row.pictures if len(each.whole) == most]
-    return showing[len(showing) // 2]
+    return next(each for each in row.pictures[::-1] if len(each.whole) == most)
 
 
 def _picture(
@@ -202,13 +203,13 @@ def draw_lane(row: ComparisonRow, free: CrossingResult, person: int, t_s: float 
     result = row.result
     image: ImageRgb = np.full((_LANE_PX[1], _LANE_PX[0], 3), DARK, np.uint8)
     near = passage(result, person)
-    end = t_s is None or t_s >= result.frames[-1].t_s
+    end = t_s is None or t_s >= result.frames[-1].t_s - 1e-9
     _TITLE.write(image, LANES[row.label], (0, 0), WHITE)
     lost = time_lost_s(result, free)
     if not end:
         _write_right(image, _TEXT, f"{t_s:.1f} s", 0, _QUIET)
     elif lost is None:
-        _write_right(image, _TITLE, "not there", 0, _BAD)
+        _write_right(image, _TITLE, "never arrives", 0, _BAD)
     else:
         _write_right(image, _TITLE, f"{lost:.1f} s lost", 0, WHITE)
     image[_LINE_PX : _LINE_PX + _MAP_PX[1]] = draw_map(row, t_s)

@@ -129,9 +129,10 @@ def test_the_first_picture_has_both_people_with_their_colours(aware):
     assert pictures[0].rgb.shape == (CAMERA_PX[1], CAMERA_PX[0], 3)
     shown = decisive_picture(aware)
     assert shown.whole == {0, 1}
-    for alpha in (0.0, 0.95):  # the bars of the labels
-        near = np.abs(shown.rgb.astype(int) - awareness_colour(alpha)).sum(axis=2) < 40
-        assert near.sum() > 100
+    red, green, _ = np.moveaxis(shown.rgb[60:340].astype(int), 2, 0)
+    # The bars and corners of the labels; the hall has no such green.
+    assert ((green > 150) & (red < 110)).sum() > 100
+    assert (np.abs(shown.rgb.astype(int) - awareness_colour(0.0)).sum(axis=2) < 40).sum() > 100
 
 
 @pytest.mark.slow
