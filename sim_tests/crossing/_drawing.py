@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from awarenav.drawing import awareness_colour, draw_disc, draw_line
+from awarenav.drawing import Font, awareness_colour, draw_disc, draw_line
 from nav_adapter import Alert, PersonObstacle
 from nav_adapter.alerts import Answer
 from perception import AttentionCone, Camera, PersonObservation
@@ -21,14 +21,13 @@ from ._result import CrossingFrame
 from ._stage import Stage
 from .eyes import NOBODY
 
-_FONT: Final = cv2.FONT_HERSHEY_SIMPLEX
+_FONT: Final = Font(16, weight=450)
 _TEXT_COLOUR: Final = (40, 40, 46)
 _BACKGROUND_COLOUR: Final = (246, 245, 242)
 _RACK_COLOUR: Final = (176, 182, 190)
 _ROBOT_COLOUR: Final = (38, 84, 140)
 _PATH_COLOUR: Final = (120, 120, 126)
 _SCAN_COLOUR: Final = (150, 40, 120)
-_TEXT_SIZE: Final = 0.42
 _CONE_LENGTH_M: Final = 0.4
 # Radius of the disc that marks a person on the map.
 _PERSON_RADIUS_M: Final = 0.22
@@ -107,7 +106,7 @@ def draw_camera_view(
             if (apart < 0.5 * np.array([camera.width_px, camera.height_px])).all():
                 _draw_box(image, box, observation)
     if captions:
-        _write(image, _captions(frame, memory or RequestMemory()), (8, 18), _TEXT_SIZE)
+        _write(image, _captions(frame, memory or RequestMemory()), (8, 18))
     return image
 
 
@@ -119,8 +118,8 @@ def _draw_box(image: ImageRgb, box_xyxy_px: FloatArray, observation: PersonObser
     alpha, spread = observation.awareness, observation.awareness_std
     text = "no face seen"
     if alpha is not None and spread is not None:
-        text = f"alpha {alpha:.2f} +- {spread:.2f}"
-    _write(image, [text], (left + 4, max(top - 4, 18)), _TEXT_SIZE)
+        text = f"α {alpha:.2f} ± {spread:.2f}"
+    _write(image, [text], (left + 4, max(top - 4, 18)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -283,16 +282,16 @@ class TopView:
         for radius_m in _WAVES_M:
             ring = np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius_m * self._scale
             draw_line(image, place + ring, colour, 2)
-        width, height = cv2.getTextSize(request.text, _FONT, _TEXT_SIZE, 1)[0]
+        width, height = _FONT.width_px(request.text), _FONT.height_px
         above = place - np.array([0.5 * width, _WAVES_M[1] * self._scale + height])
         most = np.maximum((4.0, 18.0), (image.shape[1] - width - 8.0, image.shape[0] - 8.0))
         left, top = np.clip(above, (4.0, 18.0), most).round().astype(int).tolist()
-        _write(image, [request.text], (left, top), _TEXT_SIZE)
+        _write(image, [request.text], (left, top))
 
     def _draw_scale(self, image: ImageRgb) -> None:
         y_px = image.shape[0] - 14.0
         draw_line(image, np.array([[14.0, y_px], [14.0 + self._scale, y_px]]), _TEXT_COLOUR, 2)
-        _write(image, ["1 m"], (16, image.shape[0] - 18), 0.4)
+        _write(image, ["1 m"], (16, image.shape[0] - 18))
 
 
 def _captions(frame: CrossingFrame, memory: RequestMemory) -> list[str]:
@@ -311,7 +310,7 @@ def _captions(frame: CrossingFrame, memory: RequestMemory) -> list[str]:
 def _known(obstacle: PersonObstacle, noticed_s: float | None) -> str:
     """Return what the robot takes a person to know of it."""
     if noticed_s is None:
-        return f"alpha at least {obstacle.awareness_lower:.2f}"
+        return f"α ≥ {obstacle.awareness_lower:.2f}"
     return f"noticed {noticed_s:.1f} s ago, counts as {obstacle.awareness_lower:.2f}"
 
 
@@ -346,17 +345,15 @@ def _fill(image: ImageRgb, points_px: FloatArray, colour: Any, opacity: float) -
     cv2.addWeighted(layer, opacity, image, 1.0 - opacity, 0.0, dst=image)
 
 
-def _write(image: ImageRgb, lines: list[str], corner: tuple[int, int], size: float) -> None:
+def _write(image: ImageRgb, lines: list[str], corner: tuple[int, int]) -> None:
     """Write lines of text on a plate; ``corner`` is the lower left one of the first line."""
-    height = round(34 * size)
-    widths = [cv2.getTextSize(text, _FONT, size, 1)[0][0] for text in lines]
+    height = _FONT.height_px
     left, top = corner[0], corner[1] - height
     plate = image[max(top, 0) : top + height * len(lines) + 4, max(left - 4, 0) :]
-    plate = plate[:, : max(widths) + 8]
+    plate = plate[:, : max(_FONT.width_px(text) for text in lines) + 8]
     np.copyto(plate, (0.25 * plate + 0.75 * np.array(_BACKGROUND_COLOUR)).astype(np.uint8))
     for row, text in enumerate(lines):
-        base = (left, top + height * (row + 1) - round(9 * size))
-        cv2.putText(image, text, base, _FONT, size, _TEXT_COLOUR, 1, cv2.LINE_AA)
+        _FONT.write(image, text, (left, top + height * row + 1), _TEXT_COLOUR)
 
 
 def _fixed_point(points_px: Any) -> NDArray[np.int32]:

@@ -83,11 +83,13 @@ class Passage:
         t_s: time.
         distance_m: between their surfaces; 0 for a touch.
         speed_mps: of the robot.
+        hit: the robot touched the person by its own motion.
     """
 
     t_s: float
     distance_m: float
     speed_mps: float
+    hit: bool = False
 
 
 def unaware_person(result: CrossingResult) -> int:
@@ -105,7 +107,7 @@ def passage(result: CrossingResult, person: int) -> Passage:
     ]
     if touches:
         fastest = max(touches, key=lambda contact: contact.robot_speed_mps)
-        return Passage(fastest.t_s, 0.0, fastest.robot_speed_mps)
+        return Passage(fastest.t_s, 0.0, fastest.robot_speed_mps, fastest.by == "robot")
     moving = [
         frame
         for frame in result.frames
@@ -216,7 +218,8 @@ def draw_lane(row: ComparisonRow, free: CrossingResult, person: int, t_s: float 
         frame = result.frames[frame_index(result, t_s)]
         _TEXT.write(image, f"{frame.robot_state.travel_mps:.1f} m/s", (0, bottom), _QUIET)
     elif near.distance_m <= 0.0:
-        _TITLE.write(image, f"hits at {near.speed_mps:.1f} m/s", (0, bottom), _BAD)
+        verb = "hits" if near.hit else "touched"
+        _TITLE.write(image, f"{verb} at {near.speed_mps:.1f} m/s", (0, bottom), _BAD)
     else:
         stops = near.speed_mps < _STOPPING_MPS
         speed = ", stopping" if stops else f" at {near.speed_mps:.1f} m/s"

@@ -78,6 +78,7 @@ class LaneRow:
         time_lost_s: time over that of the same robot with nobody there; all of it without arrival.
         touch_mps: highest speed of the robot at a contact with anybody while it moved; None for no
             such contact.
+        hit: the robot caused such a contact by its own motion.
         nearest_m: smallest distance to the one who steps out, while the robot moved.
         nearest_mps: speed of the robot at that time.
         phone_mps: highest speed within 2 m of the one who steps out; None if never so near.
@@ -90,6 +91,7 @@ class LaneRow:
     time_to_goal_s: float | None
     time_lost_s: float
     touch_mps: float | None
+    hit: bool
     nearest_m: float
     nearest_mps: float
     phone_mps: float | None
@@ -138,13 +140,16 @@ def run_lane(lane: Lane, seed: int, observer: Observer | None = None) -> LaneRun
         record.time_to_goal_s,
         record.time_lost_s,
         record.moving_contact_mps,
+        record.robot_touched,
         near.distance_m,
         near.speed_mps,
         _fastest_beside_mps(result, phone),
         _fastest_beside_mps(result, watcher),
         record.step_out_unaware,
     )
-    rounded: list[Any] = [None if each is None else round(each, _DECIMALS) for each in figures]
+    rounded: list[Any] = [
+        round(each, _DECIMALS) if isinstance(each, float) else each for each in figures
+    ]
     row = LaneRow(seed, lane.name, *rounded)
     return LaneRun(lane, scenario, result, row)
 
@@ -181,10 +186,10 @@ def shown_seed(rows: Sequence[LaneRow]) -> int:
 def lanes_table(rows: Sequence[LaneRow]) -> str:
     """Return the figures as text of at most 80 columns; of several seeds medians and counts."""
     lines = [
-        f"{'':21}{'goal':>6}{'lost':>7}{'touched':>9}{'near':>6}{'nearest':>8}{'at':>7}"
-        f"{'fastest near':>16}",
-        f"{'robot':21}{'s':>6}{'s':>7}{'m/s':>9}{'miss':>6}{'m':>8}{'m/s':>7}{'phone':>7}"
-        f"{'watcher':>9}",
+        f"{'':21}{'goal':>5}{'lost':>6}{'touched':>12}{'near':>6}{'nearest':>8}{'at':>7}"
+        f"{'fastest near':>15}",
+        f"{'robot':21}{'s':>5}{'s':>6}{'(hit), m/s':>12}{'miss':>6}{'m':>8}{'m/s':>7}{'phone':>7}"
+        f"{'watcher':>8}",
         "-" * 80,
     ]
     for lane in LANES:
@@ -197,32 +202,33 @@ def lanes_table(rows: Sequence[LaneRow]) -> str:
 def _cells(rows: Sequence[LaneRow]) -> str:
     """Return the figures of one robot, after its name."""
     touches = [row.touch_mps for row in rows if row.touch_mps is not None]
-    misses = sum(row.near_miss for row in rows)
+    misses, hits = (sum(getattr(row, name) for row in rows) for name in ("near_miss", "hit"))
     touched, missed = f"{max(touches):.2f}" if touches else NOTHING, str(misses)
     if len(rows) == 1:
-        missed = "yes" if misses else "no"
+        touched, missed = "hit, " * hits + touched, "yes" if misses else "no"
     elif touches:
-        touched = f"{len(touches)}, {touched}"
+        touched = f"{len(touches)} ({hits}), {touched}"
 
     def middle(name: str, decimals: int = 2) -> str:
         values = [getattr(row, name) for row in rows]
         return number_text(median(math.inf if v is None else v for v in values), decimals)
 
     return (
-        f"{middle('time_to_goal_s', 1):>6}{middle('time_lost_s', 1):>7}{touched:>9}{missed:>6}"
+        f"{middle('time_to_goal_s', 1):>5}{middle('time_lost_s', 1):>6}{touched:>12}{missed:>6}"
         f"{middle('nearest_m'):>8}{middle('nearest_mps'):>7}{middle('phone_mps'):>7}"
-        f"{middle('watcher_mps'):>9}"
+        f"{middle('watcher_mps'):>8}"
     )
 
 
 def legend(seeds: int) -> str:
     """Return what the columns of a table of some seeds mean."""
-    several = "Medians; touches (with the fastest) and near misses are counts. " * (seeds > 1)
+    several = "Medians, and counts of touches (hits), with the fastest, and near misses. "
     return textwrap.fill(
-        f"{several}Lost: over the time with nobody there. Touched: somebody, while the robot "
-        f"moved. Near miss: within {_NEAR_MISS_M:g} m of the worker with the phone, who steps "
-        f"out, at over {_NEAR_MISS_MPS:g} m/s. Nearest: to that worker, while the robot moved. "
-        f"Fastest: with that worker, and the one who watches, within {_BESIDE_M:g} m.",
+        f"{several * (seeds > 1)}Lost: over the time with nobody there. Touched: somebody, while "
+        "the robot moved; hit: by its own motion, not by walking into its side. Near miss: within "
+        f"{_NEAR_MISS_M:g} m of the worker with the phone, who steps out, at over "
+        f"{_NEAR_MISS_MPS:g} m/s. Nearest: to that worker, while the robot moved. Fastest: with "
+        f"that worker, and the one who watches, within {_BESIDE_M:g} m.",
         80,
     )
 

@@ -23,7 +23,7 @@ from sim_tests.demo._lanes import (
 )
 from sim_tests.scenario import ScenarioTemplate
 
-ROW = LaneRow(0, "awarenav", 12.0, 2.0, None, 0.80, 0.10, 0.90, 1.40, 0.0)
+ROW = LaneRow(0, "awarenav", 12.0, 2.0, None, False, 0.80, 0.10, 0.90, 1.40, 0.0)
 
 
 def of_seeds(lost_s: list[float]) -> list[LaneRow]:
@@ -63,12 +63,13 @@ def test_a_near_miss_is_close_fast_and_no_touch() -> None:
 def test_the_table_fits_80_columns_and_shows_medians_and_counts() -> None:
     today = replace(ROW, lane="today", nearest_m=0.1, nearest_mps=1.5)
     late = replace(ROW, seed=1, time_to_goal_s=None, time_lost_s=40.0, watcher_mps=None)
-    rows = [today, replace(today, seed=1, nearest_m=0.0, touch_mps=1.234), ROW, late]
+    hit = replace(today, seed=1, nearest_m=0.0, touch_mps=1.234, hit=True)
+    rows = [today, hit, ROW, late]
     table = lanes_table(rows)
     assert max(map(len, (table + "\n" + legend(2)).splitlines())) <= 80
     *_, of_today, of_awarenav = table.splitlines()
     assert of_today.removeprefix("today's AMR, predicts").split() == [
-        *("12.0", "2.0", "1,", "1.23", "1", "0.05", "1.50", "0.90", "1.40")
+        *("12.0", "2.0", "1", "(1),", "1.23", "1", "0.05", "1.50", "0.90", "1.40")
     ]
     # One that never arrives or never comes near has no number.
     assert of_awarenav.removeprefix("awarenav").split() == [
