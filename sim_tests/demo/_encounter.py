@@ -91,7 +91,8 @@ def plot_encounter(path: Path, result: CrossingResult, images: Sequence[CaseImag
         images: images of each case.
     """
     figure = new_figure(7.8, 14.2)
-    pictures, curves = figure.subfigures(2, 1, height_ratios=[1.0, 1.5])
+    halves = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.0, 1.5])
+    pictures, curves = halves.ravel()
     views = pictures.subplots(2, len(images), squeeze=False)
     for number, each in enumerate(images):
         alpha = each.frame.truth[0].awareness
