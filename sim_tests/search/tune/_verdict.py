@@ -42,7 +42,8 @@ def _better_preset(tuning: Tuning) -> str:
     faster = [
         each
         for each in tuning.anchors[1:]
-        if not each.held_out.moving_contacts
+        if "scanner" not in each.names  # today's AMR is no policy to choose
+        and not each.held_out.moving_contacts
         and tuning.allows(each)
         and tuning.minus_base(each).value < 0.0
     ]
@@ -50,8 +51,8 @@ def _better_preset(tuning: Tuning) -> str:
         return ""
     best = min(faster, key=lambda each: tuning.minus_base(each).value)
     return (
-        f" Of the policies beside it, {best.name} {change_text(tuning.minus_base(best))} than "
-        f"{tuning.base.name}: consider it instead."
+        f" Of the presets, {best.name} {change_text(tuning.minus_base(best))} than "
+        f"{tuning.base.name}: compare with it, too."
     )
 
 

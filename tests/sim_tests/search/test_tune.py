@@ -355,7 +355,7 @@ def test_the_verdict_names_a_preset_that_loses_less_than_the_base_policy():
     text = verdict_text(dataclasses.replace(tuning, anchors=(*tuning.anchors, faster)))
     assert text.startswith("keep balanced. ")
     assert "assertive loses 0.84 s less" in text
-    assert "beside it" not in verdict_text(tuning)
+    assert "Of the presets" not in verdict_text(tuning)
 
 
 @pytest.mark.parametrize(
