@@ -79,7 +79,7 @@ def test_presets_are_loaded_by_name() -> None:
     for alpha in (0.0, 0.3, 0.7, 1.0):
         assert blind.inflation.radius_m(alpha) == AwarenessPolicy().inflation.radius_m(0.0)
         assert blind.speed.human_speed_mps(alpha) == AwarenessPolicy().speed.human_speed_mps(0.0)
-    with pytest.raises(NavError, match="got 'blinded'; did you mean 'blind'") as refusal:
+    with pytest.raises(NavError, match="'blinded' is unknown; did you mean 'blind'") as refusal:
         AwarenessPolicy.preset("blinded")
     for name in PRESETS:
         assert repr(name) in str(refusal.value)

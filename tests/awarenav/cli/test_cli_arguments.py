@@ -112,4 +112,5 @@ def test_every_seed_is_zero_unless_it_is_given():
         if "--seed" in options_of(each)
     }
     assert defaults.pop(("scenario", "show")) is None  # the whole scenario, not one episode of it
+    assert defaults.pop(("demo",)) is None  # the median one of the reported seeds
     assert set(defaults.values()) == {0}

@@ -184,7 +184,7 @@ def test_a_robot_that_ignores_people_causes_a_contact_and_is_named_as_its_cause(
         (
             {"policy": "scaner"},
             NavError,
-            r"'blind'.*got 'scaner'; did you mean 'scanner'",
+            "policy 'scaner' is unknown; did you mean 'scanner'.*'blind'",
         ),
         ({"perception": "radar"}, SimError, "'truth', 'keypoints', 'pixels'"),
     ],
