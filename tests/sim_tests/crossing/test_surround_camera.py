@@ -144,7 +144,7 @@ def test_the_camera_of_a_scenario_can_be_replaced(tmp_path: Path) -> None:
     assert template.median().camera.width_px == 640
     assert ScenarioTemplate.from_text(template.to_text()) == template
     with pytest.raises(
-        SimError, match="'surround2' is unknown; did you mean 'surround'.*'forward', 'surround'"
+        SimError, match=r"'surround2' is unknown; did you mean 'surround'.*'forward', 'surround'"
     ):
         template.with_camera("surround2")
     own.write_text("{width: 640}")
