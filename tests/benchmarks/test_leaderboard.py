@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 
 import pytest
+from paths import ROOT
 
 from benchmarks.leaderboard import (
     PAGE,
@@ -94,8 +95,13 @@ def test_the_results_compare_the_same_episodes_of_two_rows():
     assert saved.n == 4
 
 
-def test_the_results_of_the_committed_rows_are_told():
+def test_the_results_of_the_committed_rows_are_told_and_are_those_of_readme():
     text = headline(_BOARD)
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for interval in re.findall(r"[\d.]+ \[.*?\]", text):
+        assert interval in readme
+    *_, today, _, _, aware = (line.split(";")[0].split()[-1] for line in text.splitlines())
+    assert f"{aware} impacts per 1 000 crossings instead of {today}" in readme
     assert f"{len(_BOARD.templates)} scenarios" in text
     assert "contacts with the moving robot in 0 of" in text.splitlines()[-1]
     assert "nan" not in text
