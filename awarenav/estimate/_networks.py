@@ -302,10 +302,15 @@ def _detector(
     model, entry = _model("--detector", file if family else name, (SHIPPED,), settings)
     if min_score is None and entry is not None:
         min_score = entry.score_threshold
-    domain = model.training_domain if entry is None else entry.training_domain
+    domain = _domain(model, entry)
     if isinstance(model, TfliteModel):
         return EfficientDetPersonDetector(model, **_threshold(min_score)), domain
     return OnnxPersonDetector(model, family=family, **_threshold(min_score), **own), domain
+
+
+def _domain(model: OnnxModel | TfliteModel, entry: RealModel | None) -> TrainingDomain | None:
+    """Return what a network was trained on, by the catalogue or else by its file."""
+    return model.training_domain if entry is None else entry.training_domain
 
 
 def _threshold(min_score: float | None) -> dict[str, Any]:
@@ -317,7 +322,7 @@ def _pose(name: str, settings: OnnxSettings) -> tuple[PoseEstimator, TrainingDom
     if name == SHIPPED:
         return shipped_pose_estimator(settings), shipped_model(POSE).training_domain
     model, entry = _model("--pose", name, (SHIPPED,), settings)
-    domain = model.training_domain if entry is None else entry.training_domain
+    domain = _domain(model, entry)
     if isinstance(model, TfliteModel):
         return BlazePoseEstimator(model), domain
     return OnnxPoseEstimator(model), domain
@@ -333,7 +338,7 @@ def _head(name: str, settings: OnnxSettings) -> tuple[HeadPoseEstimator, Trainin
             return shipped, domain
         return FusedHeadPoseEstimator(shipped, PnpHeadPoseEstimator()), domain
     model, entry = _model("--head", name, _HEADS, settings)
-    own_domain = model.training_domain if entry is None else entry.training_domain
+    own_domain = _domain(model, entry)
     if isinstance(model, TfliteModel):
         raise AwarenavError(f"--head takes an ONNX file, got the TFLite file {name}")
     return OnnxHeadPoseEstimator(model), own_domain

@@ -83,7 +83,31 @@ class OnnxTensor:
         return f"{self.name} ({extents}) {self.dtype}"
 
 
-class OnnxModel:
+class NetworkFile:
+    """What messages say of a network, whatever its format.
+
+    Attributes:
+        path: of the file; None if the content was given.
+        inputs, outputs: in the order of the graph.
+    """
+
+    path: Path | None
+    inputs: tuple[OnnxTensor, ...]
+    outputs: tuple[OnnxTensor, ...]
+
+    @property
+    def name(self) -> str:
+        """Name for messages: the path, or a note that the model was given as bytes."""
+        return "model given as bytes" if self.path is None else str(self.path)
+
+    @property
+    def layout(self) -> str:
+        """Inputs and outputs with shapes and types, for messages."""
+        sides = (", ".join(map(str, tensors)) for tensors in (self.inputs, self.outputs))
+        return " -> ".join(sides)
+
+
+class OnnxModel(NetworkFile):
     """A network loaded from an ONNX file.
 
     Args:
@@ -147,17 +171,6 @@ class OnnxModel:
 
     def __repr__(self) -> str:
         return f"OnnxModel({self.name}: {self.layout})"
-
-    @property
-    def name(self) -> str:
-        """Name for messages: the path, or a note that the model was given as bytes."""
-        return "model given as bytes" if self.path is None else str(self.path)
-
-    @property
-    def layout(self) -> str:
-        """Inputs and outputs with shapes and types, for messages."""
-        sides = (", ".join(map(str, tensors)) for tensors in (self.inputs, self.outputs))
-        return " -> ".join(sides)
 
     @property
     def providers(self) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .._manifest import TrainingDomain
 from ..errors import PerceptionError
-from ._model import NETWORK_TIME, OnnxTensor, read_model
+from ._model import NETWORK_TIME, NetworkFile, OnnxTensor, read_model
 from ._settings import OnnxSettings
 
 #: Runs a network on one batch, from the input to the outputs by name.
@@ -36,7 +36,7 @@ _IDENTIFIER: Final = b"TFL3"
 _DTYPES: Final = {0: "float32", 1: "float16", 2: "int32", 3: "uint8", 4: "int64", 9: "int8"}
 
 
-class TfliteModel:
+class TfliteModel(NetworkFile):
     """A network loaded from a TFLite file.
 
     Several threads may share a model; their runs follow one another.
@@ -87,16 +87,6 @@ class TfliteModel:
 
     def __repr__(self) -> str:
         return f"TfliteModel({self.name}: {self.layout}, {self.engine})"
-
-    @property
-    def name(self) -> str:
-        """Name for messages: the path, or a note that the model was given as bytes."""
-        return "model given as bytes" if self.path is None else str(self.path)
-
-    @property
-    def layout(self) -> str:
-        """Inputs and outputs with shapes and types, for messages."""
-        return " -> ".join(", ".join(map(str, ends)) for ends in (self.inputs, self.outputs))
 
     def with_outputs(self, names: Collection[str]) -> TfliteModel:
         """Return the network with these outputs only; what they do not need is not computed.

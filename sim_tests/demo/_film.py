@@ -294,7 +294,7 @@ def _draw_circle(
 
 @dataclass(frozen=True, slots=True)
 class MapScale:
-    """Where places of the hall are on a map: x in odom right, y up.
+    """Map of the hall: from odom to pixels, with x to the right and y up.
 
     Attributes:
         px_per_m: scale.

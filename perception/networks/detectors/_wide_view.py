@@ -9,6 +9,7 @@ import numpy as np
 from ..._camera import Camera
 from ..._stages import PersonDetection, PersonDetector
 from ...arrays import FloatArray, ImageRgb
+from ...ownership import area, common_area
 
 # In an input of 320 pixels somebody at 5 m is 97 pixels tall at 60° across, 56 at 90° and 32 at
 # 120°. A detector finds few people of less than 30.
@@ -80,6 +81,4 @@ class WideViewDetector:
 
 def _same(coarse: FloatArray, fine: FloatArray) -> bool:
     """Return whether a box of the whole image shows the person of one of the middle, or a part."""
-    low, high = np.maximum(coarse[:2], fine[:2]), np.minimum(coarse[2:], fine[2:])
-    shared = float(np.prod(np.clip(high - low, 0.0, None)))
-    return shared > _SAME_SHARE * float(np.prod(coarse[2:] - coarse[:2]))
+    return common_area(coarse, fine) > _SAME_SHARE * area(coarse)

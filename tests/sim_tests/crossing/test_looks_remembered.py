@@ -1,4 +1,4 @@
-"""How long ago a person has looked, where that counts and not α itself."""
+"""The time since a person's last look, for those of whom it counts and not α itself."""
 
 from __future__ import annotations
 
