@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -17,11 +17,14 @@ from ._checks import age_of_s, checked_tracks, goes_back, refuse_absurd, require
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._governor import GovernedSpeed, SpeedGovernor
+from ._known import SpeedBasis
 from ._obstacles import obstacles_of
 from ._people import People, Person
 from ._policy import AwarenessPolicy
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
-from ._speed_basis import SpeedBasis
+from .course import stands_still
+from .rigid import Motion
+from .rules import Sectors, seen_sectors
 
 _LOG = logging.getLogger("nav_adapter")
 # A stamp that is later than the last one by more than this may be wrong.
@@ -36,7 +39,7 @@ class _Memory:
         people: by id.
         addressed: the latest warnings and requests.
         constraints: the latest, or None before the first update.
-        given: the latest tracks, state of the robot, and stamp of perception.
+        given: the latest tracks, state of the robot, stamp of perception, and what was seen when.
         ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
         lost: people who were dropped and still limit the speed, by id.
     """
@@ -44,7 +47,7 @@ class _Memory:
     people: Mapping[int, Person] = field(default_factory=dict)
     addressed: AddressHistory = field(default_factory=AddressHistory)
     constraints: NavConstraints | None = None
-    given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
+    given: tuple[tuple[PersonTrack, ...], RobotState, float, Sectors] | None = None
     ceiling_mps: float | None = None
     lost: Mapping[int, Person] = field(default_factory=dict)
 
@@ -114,7 +117,7 @@ class NavAdapter:
         self._robot = robot
         self._prediction = prediction
         self._people = People(policy, robot)
-        self._governor = SpeedGovernor(policy, robot, self._people)
+        self._governor = SpeedGovernor(policy, robot)
         self._addressing = Addressing(policy, robot, self._people, self._governor, prediction)
         self._memory = _Memory()
         self._gate: Gate[_Memory] = Gate(_MAX_PAUSE_S)
@@ -144,6 +147,7 @@ class NavAdapter:
         stamp_s: float,
         *,
         perception_stamp_s: float | None = None,
+        seen_stamp_s: Callable[[float, float], float | None] | None = None,
     ) -> NavConstraints:
         """Return the constraints at ``stamp_s``.
 
@@ -156,6 +160,10 @@ class NavAdapter:
                 without people. If it is None, the newest track's stamp is used, and empty
                 ``tracks`` mean that no person is there. So a dead camera stops a robot without
                 tracks only if this stamp is given.
+            seen_stamp_s: gives, for a bearing from the base and half the width of a sector (rad),
+                the stamp from which all of it has been seen, or None if not all of it has been,
+                such as ``SeenDirections.stamp_s``. The robot then creeps where no sensor has
+                looked lately. None: it is not known what the sensors see, and all counts as seen.
 
         Returns:
             Obstacles in the order of track ids, the speed limit with the rule that set it, and
@@ -171,7 +179,10 @@ class NavAdapter:
         current = checked_tracks(tracks)
         require_type("robot_state", robot_state, RobotState)
         entry = self._entry(now, robot_state)
-        memory = self._following(entry.memory, current, robot_state, now, perception_stamp_s)
+        seen_s = seen_sectors(seen_stamp_s)
+        memory = self._following(
+            entry.memory, current, robot_state, now, perception_stamp_s, seen_s
+        )
         # Nothing can fail from here on. An error above leaves the adapter unchanged.
         if entry.anew:
             last_s = self._memory.stamp_s
@@ -200,8 +211,8 @@ class NavAdapter:
             return NavConstraints(now, (), 0.0, "stale data: none yet", True, robot=self._robot)
         if now < before.stamp_s:
             raise NavError(goes_back(now, before.stamp_s))
-        tracks, robot_state, perceived_s = before.given
-        memory = self._following(before, tracks, robot_state, now, perceived_s)
+        tracks, robot_state, perceived_s, seen_s = before.given
+        memory = self._following(before, tracks, robot_state, now, perceived_s, seen_s)
         assert memory.constraints is not None
         if now - before.stamp_s <= self._policy.timing.stale_after_s:
             # A stamp farther ahead may be wrong, and must not make all later ones late.
@@ -259,6 +270,7 @@ class NavAdapter:
         robot_state: RobotState,
         now: float,
         perception_stamp_s: float | None,
+        seen_s: Sectors,
     ) -> _Memory:
         """Return the memory after an update, with its constraints. Changes nothing."""
         for index, track in enumerate(current):
@@ -281,7 +293,7 @@ class NavAdapter:
         people = self._people.updated(people, current, now, stale, answered)
         refuse_absurd(people)
         lost = self._people.lost(before.lost, before.people, before.stamp_s, people, now)
-        limit, lost = self._governor.limit(people, lost, robot_state, now, robot_age_s)
+        limit, lost = self._governor.limit(people, lost, robot_state, now, robot_age_s, seen_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
                 reason = f"stale data: {name} is {age_s:.2f} s old"
@@ -308,12 +320,14 @@ class NavAdapter:
             braking_suffices=limit.braking_suffices,
             fastest_point_limit_mps=limit.fastest_point_mps,
             robot=self._robot,
+            other_way_limit_mps=limit.other_way_mps,
             speed_basis=SpeedBasis(
-                *(self._policy, self._people, people, lost, current),
-                *(robot_age_s, perception_age_s, ceiling_mps, self._prediction),
+                *(now, self._policy, people, lost, current, robot_age_s, perception_age_s),
+                *(ceiling_mps, self._prediction, seen_s),
+                *(robot_state.speed_mps, stands_still(Motion.of(robot_state))),
             ),
         )
-        given = current, robot_state, perceived_s
+        given = current, robot_state, perceived_s, seen_s
         return _Memory(people, addressed.history, constraints, given, ceiling_mps, lost)
 
     def _limit_recovery(

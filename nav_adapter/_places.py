@@ -8,6 +8,8 @@ from typing import Final
 from perception.matrices import larger_eigenvalue
 from tracking import PersonTrack
 
+from .reach import Spread
+
 # Standard deviations by which two positions of one person may differ. 4 are exceeded once in
 # 3000 frames, which costs a moment of speed.
 _EXPLAINED_SIGMAS: Final = 4.0
@@ -18,22 +20,14 @@ _SAME_PLACE_M: Final = 0.05
 def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
     """Return the standard deviation of the position after ``ahead_s`` ≥ 0 at constant velocity.
 
-    It is that of the most uncertain direction: the root of the larger eigenvalue of the position's
-    part of F P Fᵀ.
+    It is that of the most uncertain direction.
     """
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = (
-        track.covariance_odom.tolist()
-    )
-    xx += ahead_s * (2.0 * xu + ahead_s * uu)
-    yy += ahead_s * (2.0 * yv + ahead_s * vv)
-    xy += ahead_s * (xv + yu + ahead_s * uv)
-    return math.sqrt(max(larger_eigenvalue(xx, xy, yy), 0.0))
+    return Spread.of(track.covariance_odom.tolist()).after(ahead_s).sigma_m
 
 
 def velocity_variance_m2ps2(track: PersonTrack) -> float:
     """Return the variance of the velocity along its most uncertain direction."""
-    _, _, (_, _, uu, uv), (_, _, _, vv) = track.covariance_odom.tolist()
-    variance_m2ps2: float = larger_eigenvalue(uu, uv, vv)
+    variance_m2ps2: float = larger_eigenvalue(*Spread.of(track.covariance_odom.tolist()).velocity)
     return variance_m2ps2
 
 

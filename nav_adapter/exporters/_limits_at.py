@@ -1,18 +1,20 @@
-"""The limits of all people and rules at many poses at once, and who sets them."""
+"""The limits of all people and rules at many poses at once."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from .._people_ahead import PersonAhead, people_ahead
+from .._known import SpeedBasis
 from .._robot import LATERAL_NOISE_MPS, RobotProfile
-from .._speed_basis import SpeedBasis
-from ._courses import Value, chosen_of, courses_of, stands_at
+from ..course import travel_bearing_rad
+from ..rules import Unseen
+from ._courses import Value, courses_at
 from ._reach_field import Field, Reaches
 
 
@@ -26,8 +28,8 @@ def limits_at(
     aware_for_s: float,
     reach_m: float = 0.0,
     fine: bool = False,
-) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
-    """Return the limits (K, T) at poses (K, T, …), and who sets them: indices of texts.
+) -> FloatArray:
+    """Return the limits (K, T) at poses (K, T, …).
 
     Args:
         constraints: of ``NavAdapter.update``, or some that stop the robot.
@@ -47,85 +49,72 @@ def limits_at(
         raise NavError(f"constraints must be NavConstraints, got {type(constraints).__name__}")
     basis, robot = constraints.speed_basis, constraints.robot
     shape = positions_m.shape[:2]
-    by = np.zeros(shape, dtype=np.intp)
     if basis is None or robot is None:
         if constraints.speed_limit_mps > 0.0:
             raise NavError(
                 "constraints must come from NavAdapter.update, got some without speed_basis"
             )
-        return np.zeros(shape), by, [constraints.limited_by]
-    if basis.stopped:
-        return np.zeros(shape), by, ["stale data"]
-    texts = [
-        "recovery after stale data",
-        "robot: moves sideways, but its profile says otherwise",
-        "robot maximum",
-    ]
-    limits, by = np.full(shape, robot.max_speed_mps), by + 2
-    if basis.ceiling_mps is not None:
-        rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
-        ceilings = np.broadcast_to(basis.ceiling_mps + rise_mps2 * times_s, shape)
-        by[ceilings < limits] = 0
-        limits = np.minimum(limits, ceilings)
-    if velocities_mps is not None and robot.moves_sideways is False:
-        sideways = np.broadcast_to(np.abs(velocities_mps[1]) > LATERAL_NOISE_MPS, shape)
-        limits[sideways], by[sideways] = 0.0, 1
-    people = tuple(people_ahead(constraints, times_s, aware_for_s))
-    if not people or not limits.size:
-        return limits, by, texts
-    lowest, who = limits.reshape(-1), np.full(limits.size, -1)
-    told = positions_m, headings_rad, velocities_mps, yaw_rates_radps
-    _lower(lowest, who, people, robot, basis, told, reach_m, fine)
-    by = np.where(who.reshape(shape) < 0, by, who.reshape(shape) + len(texts))
-    for person in people:
-        rules = ("reach", "in the path") if person.least_mps is None else ("lost", "lost")
-        texts += [f"track {person.track_id}: {rule}" for rule in rules]
-    return lowest.reshape(shape), by, texts
-
-
-def _lower(
-    lowest: FloatArray,
-    who: NDArray[np.intp],
-    people: tuple[PersonAhead, ...],
-    robot: RobotProfile,
-    basis: SpeedBasis,
-    told: tuple[FloatArray, FloatArray | None, tuple[FloatArray, Value] | None, Value],
-    reach_m: float,
-    fine: bool,
-) -> None:
-    """Lower limits (K·T,) in place to those that people set, and write down by whom.
-
-    What is told of the robot are the arguments of :func:`limits_at`, in their order.
-    """
-    positions_m, headings_rad, velocities_mps, yaw_rates_radps = told
-    count = positions_m.shape[1]
+        return np.zeros(shape)
 
     def flat(value: Value) -> Value:
+        """Return values (K, T, …) as (K·T, …)."""
         is_array = isinstance(value, np.ndarray) and value.ndim
         return value.reshape(-1, *value.shape[2:]) if is_array else value
 
-    places, headings, rates = map(flat, (positions_m, headings_rad, yaw_rates_radps))
     velocities = velocities_mps and tuple(map(flat, velocities_mps))
-    times = np.tile(np.arange(count), positions_m.shape[0])
-    reaches = Reaches.of(people, count, basis, robot)
-    walkers = [index for index, person in enumerate(people) if person.walks_faster]
-    # As in the adapter: whoever walks on is not met by a robot that goes straight on.
-    on = tuple(people[index].walking_on() for index in walkers)
-    walking = Reaches.of(on, count, basis, robot) if on else None
-    standing = np.zeros(lowest.size, dtype=bool)
-    if velocities and headings_rad is not None and robot.moves_sideways is not False:
-        standing |= stands_at(*velocities)
-    for anywhere in (False, True):
-        poses = np.flatnonzero(standing == anywhere)
-        if not len(poses):
-            continue
-        here, heading, rate = (chosen_of(each, poses) for each in (places, headings, rates))
-        velocity = velocities and tuple(chosen_of(each, poses) for each in velocities)
-        courses = courses_of(robot, basis, here, heading, velocity, rate, anywhere)
-        given = times[poses], basis, robot, reach_m, fine
-        some = lowest[poses]
-        first = Field(reaches, courses, *given).lower(some)
-        if walking is not None:
-            second = Field(walking, courses.straight_on(), *given, walking_on=True).lower(some)
-            first = np.where(second < 0, first, 2 * np.array(walkers)[second // 2])
-        who[poses], lowest[poses] = first, some
+    limits = np.tile(_without_people_mps(constraints, basis, robot, times_s), shape[0])
+    if velocities is not None:
+        _lower_by_direction(limits, velocities, basis, robot)
+    known = list(basis.known_ahead(times_s, aware_for_s))
+    if not known or not limits.size:
+        return limits.reshape(shape)
+    told = flat(positions_m), flat(headings_rad), velocities, flat(yaw_rates_radps)
+    turn_rad = math.radians(basis.policy.reach.turn_deg)
+    own = courses_at(robot, *told, 0.0, basis.robot_age_s)
+    turned = None
+    if basis.policy.applies("reach"):
+        turned = courses_at(robot, *told, turn_rad, basis.robot_age_s)
+    field = (
+        own.grown(basis.policy.margins.clearance_m) if basis.policy.applies("in the path") else None
+    )
+    given = np.tile(np.arange(shape[1]), shape[0]), basis, robot, reach_m, fine
+    Field(Reaches.of(known, basis, robot), turned, field, *given).lower(limits)
+    walkers = [ahead for ahead in known if any(each.reach.walks_faster for each in ahead)]
+    if walkers and basis.policy.applies("walking on"):
+        on = [
+            [each._replace(reach=each.reach.walking_on(), first_sight_mps=0.0) for each in ahead]
+            for ahead in walkers
+        ]
+        Field(Reaches.of(on, basis, robot), own, None, *given).lower(limits)
+    return limits.reshape(shape)
+
+
+def _without_people_mps(
+    constraints: NavConstraints, basis: SpeedBasis, robot: RobotProfile, times_s: FloatArray
+) -> FloatArray:
+    """Return the limits (T,) by the robot's maximum, old data and the recovery after them."""
+    if basis.stopped:
+        return np.zeros(len(times_s))
+    limits = np.full(len(times_s), robot.max_speed_mps)
+    if basis.ceiling_mps is not None:
+        rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
+        limits = np.minimum(limits, basis.ceiling_mps + rise_mps2 * times_s)
+    return limits
+
+
+def _lower_by_direction(
+    limits: FloatArray,
+    velocities_mps: tuple[Value, ...],
+    basis: SpeedBasis,
+    robot: RobotProfile,
+) -> None:
+    """Lower limits (N,) in place where the drive, or what sensors see, forbids the direction."""
+    forward, left = velocities_mps
+    if robot.moves_sideways is False:
+        limits[np.broadcast_to(np.abs(left) > LATERAL_NOISE_MPS, limits.shape)] = 0.0
+    if basis.seen_s:
+        unseen = Unseen(basis.policy.timing.stale_after_s)
+        bearings = np.broadcast_to(travel_bearing_rad(forward, left, np), limits.shape)
+        directions, which = np.unique(bearings, return_inverse=True)
+        caps = [unseen.cap(basis.seen_s, each, basis.stamp_s) for each in directions.tolist()]
+        np.minimum(limits, np.array(caps)[which], out=limits)

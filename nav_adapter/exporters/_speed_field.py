@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from perception.arrays import FloatArray, finite_array, finite_number
+from perception.arrays import finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
@@ -64,34 +63,30 @@ def speed_limit_at(
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
             constraints that do not come from ``update`` unless they stop the robot.
     """
-    limits, _, _ = _limits(
-        *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
-        *(speeds_mps, yaw_rates_radps, aware_for_s, fine),
+    positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
+    shape = positions.shape[:2]
+    dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
+    first = finite_number("first_s", first_s, NavError, minimum=0.0)
+    if not aware_for_s >= 0.0:
+        raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
+
+    def of_shape(name: str, values: Any, *more: int) -> Any:
+        return None if values is None else finite_array(name, values, (*shape, *more), NavError)
+
+    headings = of_shape("headings_odom_rad", headings_odom_rad)
+    rates = of_shape("yaw_rates_radps", yaw_rates_radps)
+    velocities = None  # forward and to the left
+    if np.ndim(speeds_mps) == 3:
+        both = of_shape("speeds_mps", speeds_mps, 2)
+        velocities = both[:, :, 0], both[:, :, 1]
+    elif speeds_mps is not None:
+        velocities = of_shape("speeds_mps", speeds_mps), np.float64(0.0)
+    return limits_at(
+        *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
+        first + dt * np.arange(shape[1], dtype=np.float64),
+        aware_for_s,
+        fine=fine,
     )
-    return limits
-
-
-def limited_by_at(
-    constraints: NavConstraints,
-    positions_odom_m: Any,
-    headings_odom_rad: Any = None,
-    *,
-    dt_s: float,
-    first_s: float = 0.0,
-    speeds_mps: Any = None,
-    yaw_rates_radps: Any = None,
-    aware_for_s: float = math.inf,
-) -> NDArray[np.object_]:
-    """Return (K, T), the person and the rule that set each limit of :func:`speed_limit_at`.
-
-    The texts are those of :attr:`~nav_adapter.NavConstraints.limited_by`, such as ``"track 3:
-    reach"``. The arguments and errors are those of :func:`speed_limit_at`.
-    """
-    _, by, texts = _limits(
-        *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
-        *(speeds_mps, yaw_rates_radps, aware_for_s),
-    )
-    return np.array(texts, dtype=object)[by]
 
 
 def time_cost(
@@ -145,41 +140,3 @@ def time_cost(
     seconds = np.full(lengths.shape, math.inf)
     np.divide(lengths, slower, out=seconds, where=slower > 0.0)
     return np.where(lengths > 0.0, seconds, 0.0).sum(axis=1)
-
-
-def _limits(
-    constraints: NavConstraints,
-    positions_odom_m: Any,
-    headings_odom_rad: Any,
-    dt_s: float,
-    first_s: float,
-    speeds_mps: Any,
-    yaw_rates_radps: Any,
-    aware_for_s: float,
-    fine: bool = False,
-) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
-    """Return the limits and their reasons after a check of all arguments."""
-    positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
-    shape = positions.shape[:2]
-    dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
-    first = finite_number("first_s", first_s, NavError, minimum=0.0)
-    if not aware_for_s >= 0.0:
-        raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
-
-    def of_shape(name: str, values: Any, *more: int) -> Any:
-        return None if values is None else finite_array(name, values, (*shape, *more), NavError)
-
-    headings = of_shape("headings_odom_rad", headings_odom_rad)
-    rates = of_shape("yaw_rates_radps", yaw_rates_radps)
-    velocities = None  # forward and to the left
-    if np.ndim(speeds_mps) == 3:
-        both = of_shape("speeds_mps", speeds_mps, 2)
-        velocities = both[:, :, 0], both[:, :, 1]
-    elif speeds_mps is not None:
-        velocities = of_shape("speeds_mps", speeds_mps), np.float64(0.0)
-    return limits_at(
-        *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
-        first + dt * np.arange(shape[1], dtype=np.float64),
-        aware_for_s,
-        fine=fine,
-    )

@@ -120,7 +120,7 @@ class SpeedMap:
         positions = positions.reshape(-1, 1, 2)
         limits = np.full(side * side, robot.max_speed_mps)
         for time_s in times:
-            at_time, _, _ = limits_at(
+            at_time = limits_at(
                 *(constraints, positions, None, None, 0.0, np.array([time_s]), aware_for_s),
                 reach_m=math.sqrt(0.5) * cell,
             )

@@ -112,7 +112,6 @@ def reach(
     name: str, alpha: float, x_m: float = 0.0, y_m: float = 0.0, *, walks: float = 0.0
 ) -> Reach:
     policy = AwarenessPolicy.preset(name)
-    assert policy.reach is not None
     return Reach(
         *(x_m, y_m, walks, 0.0, policy.speed.human_speed_mps(alpha)),
         policy.reach.time_constant_s,
