@@ -68,7 +68,7 @@ class NavAdapter:
 
     The speed limit is the lowest of all people: the highest speed at which the robot stands before
     it meets their reach (:mod:`nav_adapter.limit`), with the speed that the policy assumes for
-    their awareness, and never more than a protective field in the robot's straight path allows.
+    their awareness, and never more than a protective field along the robot's own curve allows.
 
     When a person is dropped whom no sensor has shown to be gone, the limit that they set rises
     slowly (``lost_rise_mps2``).
