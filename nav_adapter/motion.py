@@ -13,6 +13,7 @@ use, and assumption 4 of ``docs/safety.md`` says what they are for.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -24,7 +25,6 @@ from ._constraints import NavConstraints
 from ._errors import NavError
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
 from .course import STANDING_MPS, travel_bearing_rad
-from .exporters import speed_limit_at
 from .rigid import Motion
 from .rules import Courses, Unseen, lowest, rules_of
 
@@ -40,8 +40,6 @@ __all__ = [
 # Behind the robot, within this angle's sine, noise would decide to which side it turns: a turn
 # that has begun goes on.
 _BEHIND_SINE = 0.3
-# The field ends at the robot's maximum, less its rounding error.
-_FIELD_ENDS_MPS = 1e-3
 
 
 def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> FloatArray:
@@ -111,15 +109,15 @@ def clip_twists_ahead(
 
     A limit is that of a measurement, and a command takes effect after it. Meanwhile robot and
     people come nearer to each other and the limit falls. A planner that uses its limit to the last
-    centimetre per second is then too fast for a cycle. So this function also asks
-    :func:`~nav_adapter.exporters.speed_limit_at` for the limits at the ends of the next cycles:
-    where each twist leads, and where the robot's present motion leads. People move as predicted.
+    centimetre per second is then too fast for a cycle. So this function also asks the rules for the
+    limits at the ends of the next cycles: where each twist leads, and where the robot's present
+    motion leads. People move as predicted.
     The lowest of these limits counts, less the slack.
 
     A robot that cannot brake to a twist's speed within a cycle has less left for turning. Only then
     the curve becomes flatter. Otherwise this is :func:`clip_twists`, and it is never faster.
 
-    For the last line of a planner. One twist takes about as long as one call of the field.
+    For the last line of a planner: one twist takes about as long as an update.
 
     Args:
         constraints: of ``NavAdapter.update`` in the present cycle.
@@ -141,107 +139,60 @@ def clip_twists_ahead(
     now = _clipped(constraints, twists, 0.0, math.inf)
     if cycles == 0 or now.size == 0:
         return _clipped(constraints, twists, slack, math.inf)
+    if now.ndim > 1:
+        rows = now.reshape(-1, now.shape[-1])
+        found = [
+            clip_twists_ahead(constraints, robot_state, row, dt_s, cycles=cycles, slack_mps=slack)
+            for row in rows
+        ]
+        return np.array(found).reshape(now.shape)
     robot, fastest_mps = constraints.robot, constraints.fastest_point_limit_mps
     assert robot is not None
     assert fastest_mps is not None
-    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
+    radius_m, (*velocity, turn) = robot.circumscribed_radius_m, now.tolist()
     still_mps = robot_state.travel_mps - robot.max_deceleration_mps2 * period_s
-    if now.ndim == 1:
-        *velocity, turn = now.tolist()
-        needed_mps = max(math.hypot(*velocity), still_mps) + slack
-        needed_mps += robot.circumscribed_radius_m * abs(turn)
-        ahead: Any = _lowest_ahead_mps(constraints, robot_state, now.tolist(), times_s, needed_mps)
-    else:
-        ahead = _lowest_field_mps(constraints, robot_state, now, times_s)
-    fastest = np.minimum(ahead, fastest_mps)
-    slower = _clipped(constraints, now, slack, float(fastest) if now.ndim == 1 else fastest)
-    left = np.maximum(fastest - slack - still_mps, 0.0) / robot.circumscribed_radius_m
-    turning = np.minimum(np.maximum(slower[..., -1], -left), left)
-    too_fast = np.sqrt((slower[..., :-1] ** 2).sum(axis=-1)) < still_mps
-    slower[..., -1] = np.where(too_fast, turning, slower[..., -1])
+    needed_mps = max(math.hypot(*velocity), still_mps) + slack + radius_m * abs(turn)
+    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
+    present = Motion.of(robot_state)
+    left_mps = velocity[1] if len(velocity) == 2 else 0.0
+    asked = present._replace(forward_mps=velocity[0], left_mps=left_mps, yaw_rate_radps=turn)
+    ahead_mps = _lowest_ahead_mps(constraints, {asked, present}, times_s, needed_mps)
+    fastest_mps = min(ahead_mps, fastest_mps)
+    slower = _clipped(constraints, now, slack, fastest_mps)
+    if math.hypot(*slower[:-1].tolist()) < still_mps:
+        left_radps = max(fastest_mps - slack - still_mps, 0.0) / radius_m
+        slower[-1] = min(max(slower[-1], -left_radps), left_radps)
     return slower
 
 
-def _lowest_field_mps(
-    constraints: NavConstraints, robot_state: RobotState, twists: FloatArray, times_s: FloatArray
-) -> FloatArray:
-    """Return the lowest limits (...) at times ahead, on each twist and on the present motion.
-
-    They are infinite where nobody limits the robot.
-    """
-    speeds = np.zeros((twists.size // twists.shape[-1] + 1, 3))
-    speeds[:-1, 0], speeds[:-1, 2] = twists[..., 0].ravel(), twists[..., -1].ravel()
-    if twists.shape[-1] == 3:
-        speeds[:-1, 1] = twists[..., 1].ravel()
-    speeds[-1] = robot_state.speed_mps, robot_state.lateral_mps, robot_state.yaw_rate_radps
-    positions, headings = _driven(robot_state, speeds, times_s)
-    every_time = np.broadcast_to(speeds[:, None], (*headings.shape, 3))
-    limits = speed_limit_at(
-        constraints,
-        positions,
-        headings,
-        dt_s=float(times_s[0]),
-        first_s=float(times_s[0]),
-        speeds_mps=every_time[..., :2],
-        yaw_rates_radps=every_time[..., 2],
-        fine=True,
-    )
-    least = limits.min(axis=1)
-    least = np.minimum(least[:-1], least[-1]).reshape(twists.shape[:-1])
-    assert constraints.robot is not None
-    people = least < constraints.robot.max_speed_mps - _FIELD_ENDS_MPS
-    return np.where(people, least, math.inf)
-
-
 def _lowest_ahead_mps(
-    constraints: NavConstraints,
-    robot_state: RobotState,
-    twist: list[float],
-    times_s: FloatArray,
-    needed_mps: float,
+    constraints: NavConstraints, motions: Iterable[Motion], times_s: FloatArray, needed_mps: float
 ) -> float:
-    """Return the same for one twist, by the rules on plain floats, which takes a tenth of the time.
-
-    A limit of ``needed_mps`` or more may be any other such one.
-    """
+    """Return the lowest limit at times ahead on any of the motions; infinite from a speed on."""
     basis, robot = constraints.speed_basis, constraints.robot
     assert robot is not None
+    if basis is None and constraints.speed_limit_mps > 0.0:
+        raise NavError("constraints must come from NavAdapter.update, got some without speed_basis")
     if basis is None or basis.stopped:
-        if basis is None and constraints.speed_limit_mps > 0.0:
-            raise NavError(
-                "constraints must come from NavAdapter.update, got some without speed_basis"
-            )
         return 0.0
-    least_mps = min(needed_mps, robot.max_speed_mps - _FIELD_ENDS_MPS)
+    least_mps = needed_mps
     if basis.ceiling_mps is not None:
         rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
         least_mps = min(least_mps, basis.ceiling_mps + rise_mps2 * float(times_s[0]))
-    present = Motion.of(robot_state)
-    commanded = present._replace(
-        forward_mps=twist[0],
-        left_mps=twist[1] if len(twist) == 3 else 0.0,
-        yaw_rate_radps=twist[-1],
-    )
     unseen = Unseen(basis.policy.timing.stale_after_s)
-    motions = (commanded,) if commanded == present else (commanded, present)
     for motion in motions:
         if robot.moves_sideways is False and abs(motion.left_mps) > LATERAL_NOISE_MPS:
             return 0.0
-        bearing_rad = travel_bearing_rad(motion.forward_mps, motion.left_mps)
-        least_mps = min(least_mps, unseen.cap(basis.seen_s, bearing_rad, basis.stamp_s))
-    people = list(basis.known_ahead(times_s))
-    rules = rules_of(basis.policy)
-    for index, time_s in enumerate(times_s.tolist()):
+        if basis.policy.applies(unseen.name):
+            bearing_rad = travel_bearing_rad(motion.forward_mps, motion.left_mps)
+            least_mps = min(least_mps, unseen.cap(basis.seen_s, bearing_rad, basis.stamp_s))
+    people, rules = list(basis.known_ahead(times_s)), rules_of(basis.policy)
+    for index, time_s in enumerate(times_s.tolist() if people else ()):
         for motion in motions:
             courses = Courses.of(basis.policy, robot, motion.at(time_s), basis.robot_age_s)
             for ahead in people:
-                own_mps, _ = lowest(ahead[index], courses, rules, least_mps)
-                least_mps = min(least_mps, own_mps)
-    return (
-        least_mps
-        if least_mps < min(needed_mps, robot.max_speed_mps - _FIELD_ENDS_MPS)
-        else math.inf
-    )
+                least_mps = min(least_mps, lowest(ahead[index], courses, rules, least_mps)[0])
+    return least_mps if least_mps < needed_mps else math.inf
 
 
 def _clipped(
@@ -427,20 +378,6 @@ def differential_drive(
     if curve_m > 0.0:  # the yaw rate of a robot that steers falls with its speed
         yaw_rate = min(max(yaw_rate, -abs(speed) / curve_m), abs(speed) / curve_m)
     return speed, yaw_rate
-
-
-def _driven(
-    robot_state: RobotState, velocities: FloatArray, times_s: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return positions (K, T, 2) and headings (K, T) of K constant base velocities x, y, ω."""
-    turned = velocities[:, 2:] * times_s
-    # The chord of an arc: it points along the mean heading, and is shorter than the arc.
-    towards = robot_state.heading_odom_rad + 0.5 * turned
-    chords_s = times_s * np.sinc(0.5 * turned / np.pi)
-    forward, left = velocities[:, 0, None] * chords_s, velocities[:, 1, None] * chords_s
-    c, s = np.cos(towards), np.sin(towards)
-    moved = np.stack([c * forward - s * left, s * forward + c * left], axis=-1)
-    return robot_state.position_odom_m + moved, robot_state.heading_odom_rad + turned
 
 
 def _share(value: FloatArray, most: float | FloatArray) -> FloatArray:

@@ -50,8 +50,13 @@ def courses_at(
     single = (np.asarray(value, dtype=np.float32) for value in course[2:10])
     cos, sin, fan_cos, fan_sin, front, rear, half, radius = single
     return course._replace(
-        **{"cos": cos, "sin": sin, "fan_cos": fan_cos, "fan_sin": fan_sin},
-        **{"front_m": front + _NEAR_M, "rear_m": rear - _NEAR_M, "half_m": half + _NEAR_M},
+        cos=cos,
+        sin=sin,
+        fan_cos=fan_cos,
+        fan_sin=fan_sin,
+        front_m=front + _NEAR_M,
+        rear_m=rear - _NEAR_M,
+        half_m=half + _NEAR_M,
         radius_m=radius + _NEAR_M,
     )
 

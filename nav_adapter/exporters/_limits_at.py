@@ -27,7 +27,6 @@ def limits_at(
     times_s: FloatArray,
     aware_for_s: float,
     reach_m: float = 0.0,
-    fine: bool = False,
 ) -> FloatArray:
     """Return the limits (K, T) at poses (K, T, …).
 
@@ -40,7 +39,6 @@ def limits_at(
         times_s: (T,) after the stamp.
         aware_for_s: how long awareness counts.
         reach_m: the limits hold within this distance of the poses; they have no heading then.
-        fine: all steps of time are as short as the shortest of ``update``.
 
     Raises:
         NavError: for constraints that do not come from ``update`` unless they stop the robot.
@@ -77,7 +75,7 @@ def limits_at(
     field = (
         own.grown(basis.policy.margins.clearance_m) if basis.policy.applies("in the path") else None
     )
-    given = np.tile(np.arange(shape[1]), shape[0]), basis, robot, reach_m, fine
+    given = np.tile(np.arange(shape[1]), shape[0]), basis, robot, reach_m
     Field(Reaches.of(known, basis, robot), turned, field, *given).lower(limits)
     walkers = [ahead for ahead in known if any(each.reach.walks_faster for each in ahead)]
     if walkers and basis.policy.applies("walking on"):
@@ -112,8 +110,8 @@ def _lower_by_direction(
     forward, left = velocities_mps
     if robot.moves_sideways is False:
         limits[np.broadcast_to(np.abs(left) > LATERAL_NOISE_MPS, limits.shape)] = 0.0
-    if basis.seen_s:
-        unseen = Unseen(basis.policy.timing.stale_after_s)
+    unseen = Unseen(basis.policy.timing.stale_after_s)
+    if basis.seen_s and basis.policy.applies(unseen.name):
         bearings = np.broadcast_to(travel_bearing_rad(forward, left, np), limits.shape)
         directions, which = np.unique(bearings, return_inverse=True)
         caps = [unseen.cap(basis.seen_s, each, basis.stamp_s) for each in directions.tolist()]

@@ -159,7 +159,6 @@ class Field:
         basis: of the constraints.
         robot: of the constraints.
         reach_m: the limits hold within this distance of the poses.
-        fine: all steps of time are as short as the shortest of ``limit_mps``, for a few poses.
     """
 
     def __init__(
@@ -171,13 +170,12 @@ class Field:
         basis: SpeedBasis,
         robot: RobotProfile,
         reach_m: float,
-        fine: bool = False,
     ) -> None:
         self._reaches, self._times = reaches, times
         self._course, self._field = course, field
         self._margin_m = np.float32(basis.policy.margins.floor_m)
         self._a = np.float32(robot.max_deceleration_mps2)
-        self._fine, self._reach_m = fine, np.float32(reach_m)
+        self._reach_m = np.float32(reach_m)
         # No farther from the base is any part of robot or field, wherever they point.
         size = 0.0
         for each in (course, field):
@@ -231,9 +229,8 @@ class Field:
         """Lower the limits by pairs (poses, rows); each pose is in each of them once."""
         poses, rows = (np.concatenate(each) for each in zip(*pairs, strict=True))
         before, own = limits[poses].astype(np.float32), np.empty(len(poses), dtype=np.float32)
-        together = _TOGETHER if not self._fine else 1 + _TOGETHER // len(self._reaches.ahead_s)
-        for start in range(0, len(poses), together):
-            some = slice(start, start + together)
+        for start in range(0, len(poses), _TOGETHER):
+            some = slice(start, start + _TOGETHER)
             own[some] = self._limits(poses[some], rows[some], before[some])
         lowest = np.maximum(own * (1.0 - _ROUNDING), self._reaches.least_mps[rows])
         end = 0
@@ -260,8 +257,7 @@ class Field:
         np.minimum(before, own, out=before)
         pairs = self._pairs(self._course, pose, row)
         near = self._near(pairs, before)
-        reach_mps = self._finely_mps if self._fine else self._reach_mps
-        own[near] = np.minimum(own[near], reach_mps(pairs.at(near), before[near]))
+        own[near] = np.minimum(own[near], self._reach_mps(pairs.at(near), before[near]))
         return own
 
     def _pairs(self, course: Course, pose: Any, row: Any) -> Pairs:
@@ -319,15 +315,6 @@ class Field:
             if behind is not None:
                 gap = np.where(behind >= 0.0, np.float32(0.0), gap)
         return stopping_mps(gap, self._reacts_s(pairs.row), self._a)
-
-    def _finely_mps(self, pairs: Pairs, before: Any) -> Any:
-        """Return what :meth:`_reach_mps` does, with all the shortest steps of time at once."""
-        parts = np.arange(len(self._reaches.ahead_s) - 1)
-        each = np.repeat(np.arange(len(before)), len(parts))
-        part = np.tile(parts, len(before))
-        own = self._lowest_mps(pairs.at(each), part, part + 1)
-        limits = own.reshape(len(before), len(parts)).min(axis=1)
-        return np.where(limits < before, limits, NOWHERE_M)
 
     def _reach_mps(self, pairs: Pairs, before: Any, first: Any = None, again: int = 2) -> Any:
         """Return the limits (n,) by the reach; they are ∞ where they are not below ``before``.

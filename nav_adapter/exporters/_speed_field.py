@@ -24,7 +24,6 @@ def speed_limit_at(
     speeds_mps: Any = None,
     yaw_rates_radps: Any = None,
     aware_for_s: float = math.inf,
-    fine: bool = False,
 ) -> Any:
     """Return (K, T), the speed limit in m/s at K × T poses, people moving as predicted.
 
@@ -57,7 +56,6 @@ def speed_limit_at(
         yaw_rates_radps: (K, T), or None.
         aware_for_s: ≥ 0, how long after the stamp awareness counts. People are unaware from then
             on, as they may have looked away.
-        fine: steps of time as short as those of ``update``, for a higher limit at a few poses.
 
     Raises:
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
@@ -85,7 +83,6 @@ def speed_limit_at(
         *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
         first + dt * np.arange(shape[1], dtype=np.float64),
         aware_for_s,
-        fine=fine,
     )
 
 

@@ -52,7 +52,7 @@ def drawn_people(
     return found
 
 
-def field_mps(constraints: NavConstraints, state: RobotState, *, fine: bool = False) -> float:
+def field_mps(constraints: NavConstraints, state: RobotState) -> float:
     """Return the field's limit of a robot in this state, now."""
     limits = speed_limit_at(
         constraints,
@@ -61,7 +61,6 @@ def field_mps(constraints: NavConstraints, state: RobotState, *, fine: bool = Fa
         dt_s=0.1,
         speeds_mps=[[[state.speed_mps, state.lateral_mps]]],
         yaw_rates_radps=[[state.yaw_rate_radps]],
-        fine=fine,
     )
     return float(limits[0, 0])
 
@@ -75,12 +74,12 @@ def test_field_and_update_agree_for_robots_that_turn(count: int) -> None:
         walking = 1.5 * (index % 2)
         people = drawn_people(rng, 1 + index % 3, state.position_odom_m, walking)
         now = settled_update(people, policy=POLICY, robot=robot, state=state)
-        fine, field = (field_mps(now, state, fine=each) for each in (True, False))
-        assert max(fine, field) <= now.speed_limit_mps + 1e-6, index
-        if not walking:
-            apart.append(now.speed_limit_mps - fine)
-    assert max(apart) <= 0.02
-    assert np.mean(apart) <= 2e-3
+        apart.append(now.speed_limit_mps - field_mps(now, state))
+        assert apart[-1] >= -1e-6, index
+    # For people who stand and are seen: equal, but where somebody just comes to the robot's way.
+    standing = np.array(apart[::2])
+    assert np.mean(standing <= 0.01) >= 0.9
+    assert standing.max() <= 0.2
 
 
 def meets_on_an_arc(

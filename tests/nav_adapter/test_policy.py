@@ -91,7 +91,7 @@ def test_a_file_that_sets_a_part_leaves_the_rest_at_its_defaults() -> None:
     assert policy.speed.human_speed_mps(1.0) == 0.5
     assert policy.reach == AwarenessPolicy().reach
     assert not AwarenessPolicy.model_validate({"without": ["reach"]}).applies("reach")
-    with pytest.raises(NavError, match="in the path"):
+    with pytest.raises(ValueError, match="in the path"):
         AwarenessPolicy.model_validate({"without": ["in the path"]})
 
 
