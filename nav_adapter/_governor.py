@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from ._known import known_now
-from ._people import Person
+from ._people import Person, human_speed_mps
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
 from .course import Course, stands_still, travel_bearing_rad
@@ -61,6 +61,7 @@ class SpeedGovernor:
 
     def __init__(self, policy: AwarenessPolicy, robot: RobotProfile) -> None:
         self._policy, self._robot = policy, robot
+        self._unaware_mps = human_speed_mps(policy, 0.0)
         self._rules, self._lost = rules_of(policy), Lost(policy.timing.lost_rise_mps2)
         self._unseen = Unseen(policy.timing.stale_after_s)
 
@@ -91,7 +92,7 @@ class SpeedGovernor:
         speed_mps = motion.travel_mps
         for each, person in people.items():
             assert courses is not None
-            known = known_now(self._policy, each, person, now)
+            known = known_now(self._policy, self._unaware_mps, each, person, now)
             # A limit that is not the lowest counts only where it is below the speed.
             own_mps, rule = lowest(known, courses, self._rules, max(lowest_mps, speed_mps))
             if own_mps < lowest_mps:
@@ -103,7 +104,7 @@ class SpeedGovernor:
                 suffices = all(rule.suffices(known, courses, speed_mps) for rule in self._rules)
         for each, person in lost.items():
             assert courses is not None
-            known = known_now(self._policy, each, person, now)
+            known = known_now(self._policy, self._unaware_mps, each, person, now)
             own_mps, _ = lowest(known, courses, self._rules)
             first_mps = own_mps if person.lost_limit_mps is None else person.lost_limit_mps
             least_mps = self._lost.least_mps(first_mps, person.lost_for_s(now))
@@ -155,5 +156,5 @@ class SpeedGovernor:
         at_most_mps: float = math.inf,
     ) -> tuple[float, str]:
         """Return the limit that one person sets, infinite for none, and the rule."""
-        known = known_now(self._policy, person.track.id, person, now)
+        known = known_now(self._policy, self._unaware_mps, person.track.id, person, now)
         return lowest(known, courses, self._rules, at_most_mps)

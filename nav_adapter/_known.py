@@ -25,10 +25,14 @@ _OLDEST_S: Final = 10.0
 _SAME_AGE_S: Final = 1e-9
 
 
-def known_now(policy: AwarenessPolicy, key: int, person: Person, now: float) -> Known:
-    """Return what is known of a person at ``now``, the stamp of the update or later."""
+def known_now(
+    policy: AwarenessPolicy, unaware_mps: float, key: int, person: Person, now: float
+) -> Known:
+    """Return what is known of a person at ``now``, the stamp of the update or later.
+
+    The policy's U of unaware people is given, as it is the same for all.
+    """
     track, velocity, margins = person.track, person.velocity_odom_mps, policy.margins
-    unaware_mps = human_speed_mps(policy, 0.0)
     speed_mps = unaware_mps
     if person.awareness_lower > 0.0:
         speed_mps = human_speed_mps(policy, person.awareness_lower)
@@ -134,7 +138,8 @@ class SpeedBasis:
     ) -> list[Known]:
         track, policy, now = person.track, self.policy, self.stamp_s
         timing, margins = policy.timing, policy.margins
-        present = known_now(policy, key, person, now)
+        unaware_mps = human_speed_mps(policy, 0.0)
+        present = known_now(policy, unaware_mps, key, person, now)
         reach, (vx, vy) = present.reach, person.velocity_odom_mps
         seen_s, age_s = _seen_s(person), max(now - track.stamp_s, 0.0)
         fresh_s = timing.fresh_within_s - _SAME_AGE_S
@@ -155,7 +160,7 @@ class SpeedBasis:
         predicted_m: list[float] = [0.0] * len(times)
         if self.prediction is not None:
             predicted_m = predicted_sigmas_m(track, age_s + times_s, self.prediction).tolist()
-        unaware_mps = max(human_speed_mps(policy, 0.0), math.hypot(vx, vy))
+        unaware_mps = max(unaware_mps, math.hypot(vx, vy))
         rows = []
         for known, time_s, sigma_m in zip(ahead, times, predicted_m, strict=True):
             reach = known.reach

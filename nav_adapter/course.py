@@ -83,6 +83,11 @@ class Course(NamedTuple):
             radius_m=self.radius_m + math.sqrt(2.0) * clearance_m,
         )
 
+    def turned(self, turn_rad: float, xp: Any = Floats) -> Course:
+        """Return the courses turned by up to this off these, either way."""
+        fan_rad = xp.minimum(xp.arctan2(self.fan_sin, self.fan_cos) + turn_rad, math.pi)
+        return self._replace(fan_cos=xp.cos(fan_rad), fan_sin=xp.sin(fan_rad))
+
 
 def course_of(
     robot: RobotProfile, motion: Motion, turn_rad: float, age_s: float = 0.0, xp: Any = Floats

@@ -184,6 +184,8 @@ def in_the_path_mps(
     """
     dx, dy = place_m[0] - field.x_m, place_m[1] - field.y_m
     x, y = field.cos * dx + field.sin * dy, abs(field.cos * dy - field.sin * dx)
+    if x > 0.0 and field.fan_cos * y - field.fan_sin * x > field.half_m + margin_m:
+        return field.maximum_mps  # beside it
     near, past, past_behind = contact_m(field, 0.0, x, y, dx * dx + dy * dy, margin_m)
     if past_behind >= 0.0:
         return 0.0

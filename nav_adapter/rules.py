@@ -65,17 +65,18 @@ class Courses(NamedTuple):
         cls, policy: AwarenessPolicy, robot: RobotProfile, motion: Motion, age_s: float
     ) -> Courses:
         """Return the courses of a robot whose motion is ``age_s`` old."""
-        own = course_of(robot, motion, 0.0, age_s)
-        turned = course_of(robot, motion, math.radians(policy.reach.turn_deg), age_s)
-        return cls(own, own.grown(policy.margins.clearance_m), turned)
+        return cls._around(policy, course_of(robot, motion, 0.0, age_s))
 
     @classmethod
     def of_starts(
         cls, policy: AwarenessPolicy, robot: RobotProfile, motion: Motion, age_s: float
     ) -> Courses:
         """Return the courses on which a robot that stands may start otherwise than forwards."""
-        turned = starts_of(robot, motion, math.radians(policy.reach.turn_deg), age_s)
-        own = turned if turned.circle_m else starts_of(robot, motion, 0.0, age_s)
+        return cls._around(policy, starts_of(robot, motion, 0.0, age_s))
+
+    @classmethod
+    def _around(cls, policy: AwarenessPolicy, own: Course) -> Courses:
+        turned = own.turned(math.radians(policy.reach.turn_deg))
         return cls(own, own.grown(policy.margins.clearance_m), turned)
 
     def braking(self) -> Courses:
@@ -250,9 +251,11 @@ def lowest(
     """
     lowest_mps, name = courses.own.maximum_mps, ""
     for rule in rules:
-        own_mps = rule.cap(person, courses, min(at_most_mps, lowest_mps))
+        own_mps = rule.cap(person, courses, at_most_mps)
         if own_mps < lowest_mps:
             lowest_mps, name = own_mps, rule.name
+            if own_mps < at_most_mps:
+                at_most_mps = own_mps
     if person.least_mps > lowest_mps:
         lowest_mps, name = person.least_mps, Lost.name
     return (math.inf if lowest_mps >= courses.own.maximum_mps else lowest_mps), name

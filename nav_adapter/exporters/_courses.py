@@ -29,7 +29,6 @@ def courses_at(
     headings_rad: Value,
     velocities_mps: tuple[Value, Value] | None,
     yaw_rates_radps: Value,
-    turn_rad: float,
     age_s: float,
 ) -> Course:
     """Return the courses at poses (N, 2), as :func:`~nav_adapter.course.course_of` has them.
@@ -41,7 +40,7 @@ def courses_at(
     heading = 0.0 if headings_rad is None else headings_rad
     x, y = positions_m.T
     motion = Motion(x, y, heading, forward, left, yaw_rates_radps)
-    course = course_of(robot, motion, turn_rad, age_s, np)
+    course = course_of(robot, motion, 0.0, age_s, np)
     if headings_rad is None:
         driven_m = driven_since_m(robot, np.hypot(forward, left), age_s, np)
         course = course._replace(

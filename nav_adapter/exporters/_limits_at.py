@@ -67,11 +67,10 @@ def limits_at(
     if not known or not limits.size:
         return limits.reshape(shape)
     told = flat(positions_m), flat(headings_rad), velocities, flat(yaw_rates_radps)
-    turn_rad = math.radians(basis.policy.reach.turn_deg)
-    own = courses_at(robot, *told, 0.0, basis.robot_age_s)
+    own = courses_at(robot, *told, basis.robot_age_s)
     turned = None
     if basis.policy.applies("reach"):
-        turned = courses_at(robot, *told, turn_rad, basis.robot_age_s)
+        turned = own.turned(np.float32(math.radians(basis.policy.reach.turn_deg)), np)
     field = (
         own.grown(basis.policy.margins.clearance_m) if basis.policy.applies("in the path") else None
     )
