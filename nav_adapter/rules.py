@@ -254,8 +254,7 @@ def lowest(
         own_mps = rule.cap(person, courses, at_most_mps)
         if own_mps < lowest_mps:
             lowest_mps, name = own_mps, rule.name
-            if own_mps < at_most_mps:
-                at_most_mps = own_mps
+            at_most_mps = min(at_most_mps, own_mps)
     if person.least_mps > lowest_mps:
         lowest_mps, name = person.least_mps, Lost.name
     return (math.inf if lowest_mps >= courses.own.maximum_mps else lowest_mps), name

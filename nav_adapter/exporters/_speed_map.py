@@ -15,8 +15,8 @@ from perception.short_repr import short_repr
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._limits_at import limits_at
 from ._person_costs import checked_grid
+from ._speed_field import limits_at
 
 _LARGEST_CELLS: Final = 4_000_000
 
