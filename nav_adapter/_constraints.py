@@ -231,6 +231,10 @@ class NavConstraints:
                 "them; these have robot=None"
             )
         limits = [left_mps / self.robot.circumscribed_radius_m]
+        if self.speed_basis is not None and self.speed_basis.stands:
+            other_mps = max(self.other_way_limit_mps - speed, 0.0)
+            straight = max(speed_mps, 0.0) / self.robot.half_width_m
+            limits.append(max(other_mps / self.robot.circumscribed_radius_m, straight))
         if self.robot.max_yaw_rate_radps is not None:
             limits.append(self.robot.max_yaw_rate_radps)
         if self.robot.min_turning_radius_m is not None:

@@ -47,7 +47,8 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
 
     For a solver that chooses v (m/s) and ω (rad/s). The region is convex and contains (0, 0):
     |v| at most the speed limit, |v| + |ω| R at most the limit of the fastest point, and |ω| at most
-    ``max_yaw_rate_radps`` of the robot's profile. Limits that are not there have no rows.
+    ``max_yaw_rate_radps`` of the robot's profile. For a robot that stands, |ω| R − v is at most
+    ``other_way_limit_mps``. Limits that are not there have no rows.
 
     The twists of a robot that steers (``min_turning_radius_m``) are two cones, one for each
     direction of travel, and not convex together. The region then holds one of them.
@@ -67,6 +68,11 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
         rows += [[v, w * radius_m, -fastest_mps] for v, w in signs]
     if math.isfinite(highest_radps):
         rows += [[0.0, 1.0, -highest_radps], [0.0, -1.0, -highest_radps]]
+    basis, other_mps = constraints.speed_basis, constraints.other_way_limit_mps
+    if basis is not None and other_mps < fastest_mps:
+        way = math.copysign(1.0, basis.forward_mps) if not basis.stands else 1.0
+        turns = (radius_m, -radius_m) if basis.stands else (0.0,)
+        rows += [[way, turn, -other_mps] for turn in turns]
     if (curve_m := _tightest_curve_m(constraints)) > 0.0:
         direction = -1.0 if backward else 1.0
         rows += [[direction, curve_m, 0.0], [direction, -curve_m, 0.0]]

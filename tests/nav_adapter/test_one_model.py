@@ -14,7 +14,7 @@ from nav_scenes import ROBOT, finite, moved_person, moved_robot, person, robot_a
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
 from nav_adapter.exporters import speed_limit_at
-from nav_adapter.motion import clip_twists, clip_twists_ahead
+from nav_adapter.motion import clip_twists, clip_twists_ahead, twist_envelope
 from nav_adapter.rigid import Motion
 from nav_adapter.rules import CREEPING_MPS
 from perception.arrays import FloatArray
@@ -210,3 +210,26 @@ def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(
     for policy, told in ((POLICY, None), (left_out, lambda *_: None)):
         free = NavAdapter(policy, ROBOT).update((), state, 0.0, seen_stamp_s=told)
         assert free.speed_limit_mps == 1.5
+
+
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 10**6),
+    speed=st.sampled_from([0.0, 0.5, -0.5]),
+    v=finite(-1.5, 1.5),
+    w=finite(-2.0, 2.0),
+)
+def test_twists_of_the_envelope_are_not_clipped(
+    seed: int, speed: float, v: float, w: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    state = robot_at(speed_mps=speed)
+    people = drawn_people(rng, 2, state.position_odom_m, 1.0)
+    now = settled_update(people, policy=POLICY, robot=DIFFERENTIAL, state=state)
+    rows = twist_envelope(now)
+    if (rows[:, :2] @ [v, w] >= rows[:, 2]).all():
+        assert clip_twists(now, [v, w]) == pytest.approx([v, w], abs=1e-9)
+    v, _ = clip_twists(now, [v, 0.0]).tolist()
+    w = now.yaw_rate_limit_radps(v)
+    if math.isfinite(w):
+        assert clip_twists(now, [v, w]) == pytest.approx([v, w], abs=1e-6)
