@@ -308,6 +308,7 @@ class NavAdapter:
             )
         braked_mps = _latest_travel_mps(before, robot_state)
         braked_mps -= self._robot.max_deceleration_mps2 * pause_s
+        stands = stands_still(Motion.of(robot_state))
         constraints = NavConstraints(
             stamp_s=now,
             obstacles=obstacles_of(people, now),
@@ -324,7 +325,7 @@ class NavAdapter:
             speed_basis=SpeedBasis(
                 *(now, self._policy, people, lost, current, robot_age_s, perception_age_s),
                 *(ceiling_mps, self._prediction, seen_s),
-                *(robot_state.speed_mps, stands_still(Motion.of(robot_state))),
+                None if stands else (robot_state.speed_mps, robot_state.lateral_mps),
             ),
         )
         given = current, robot_state, perceived_s, seen_s

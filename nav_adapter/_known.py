@@ -82,8 +82,7 @@ class SpeedBasis:
         ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
         prediction: of the adapter; None if places ahead are as certain as the present one.
         seen_s: stamps from which the sectors about the base are seen; empty if that is not known.
-        forward_mps: speed of the robot.
-        stands: whether it stands.
+        velocity_base_mps: of the robot, forward and left; None if it stands.
     """
 
     stamp_s: float
@@ -96,8 +95,12 @@ class SpeedBasis:
     ceiling_mps: float | None
     prediction: PredictionModel | None = None
     seen_s: Sectors = ()
-    forward_mps: float = 0.0
-    stands: bool = True
+    velocity_base_mps: tuple[float, float] | None = None
+
+    @property
+    def stands(self) -> bool:
+        """True if the robot stands."""
+        return self.velocity_base_mps is None
 
     @property
     def stopped(self) -> bool:

@@ -24,7 +24,7 @@ from perception.arrays import FloatArray, finite_array, finite_number
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
-from .course import STANDING_MPS, travel_bearing_rad
+from .course import travel_bearing_rad
 from .rigid import Motion
 from .rules import Courses, Unseen, lowest, rules_of
 
@@ -70,9 +70,10 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
         rows += [[0.0, 1.0, -highest_radps], [0.0, -1.0, -highest_radps]]
     basis, other_mps = constraints.speed_basis, constraints.other_way_limit_mps
     if basis is not None and other_mps < fastest_mps:
-        way = math.copysign(1.0, basis.forward_mps) if not basis.stands else 1.0
-        turns = (radius_m, -radius_m) if basis.stands else (0.0,)
-        rows += [[way, turn, -other_mps] for turn in turns]
+        if basis.velocity_base_mps is None:
+            rows += [[1.0, turn * radius_m, -other_mps] for turn in (1.0, -1.0)]
+        elif (forward_mps := basis.velocity_base_mps[0]) != 0.0:
+            rows.append([math.copysign(1.0, forward_mps), 0.0, -other_mps])
     if (curve_m := _tightest_curve_m(constraints)) > 0.0:
         direction = -1.0 if backward else 1.0
         rows += [[direction, curve_m, 0.0], [direction, -curve_m, 0.0]]
@@ -254,9 +255,10 @@ def _leads_another_way(constraints: NavConstraints, forward: Any, *left_and_turn
     basis, robot = constraints.speed_basis, constraints.robot
     if basis is None or robot is None:
         return np.zeros(np.shape(forward), dtype=bool)  # nothing is known
-    if not basis.stands:
-        way_mps = basis.forward_mps if abs(basis.forward_mps) >= STANDING_MPS else 0.0
-        return forward * way_mps < 0.0
+    if basis.velocity_base_mps is not None:
+        moves_forward, moves_left = basis.velocity_base_mps
+        left = left_and_turn[0] if len(left_and_turn) == 2 else 0.0
+        return forward * moves_forward + left * moves_left < 0.0
     another = forward < abs(left_and_turn[-1]) * robot.half_width_m
     if len(left_and_turn) == 2:
         another = another | (abs(left_and_turn[0]) > LATERAL_NOISE_MPS)
