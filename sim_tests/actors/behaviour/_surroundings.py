@@ -52,6 +52,7 @@ class RobotBody:
         half_length_m: half the rectangle's length along the heading.
         half_width_m: half its width.
         camera_m: (x, y, z) of the camera.
+        yaw_rate_radps: counter-clockwise positive.
     """
 
     x_m: float
@@ -62,6 +63,7 @@ class RobotBody:
     half_length_m: float
     half_width_m: float
     camera_m: tuple[float, float, float]
+    yaw_rate_radps: float = 0.0
 
     def nearest_point_m(self, x_m: float, y_m: float) -> tuple[float, float]:
         """Return the point of the rectangle nearest to (x, y)."""
