@@ -145,7 +145,7 @@ class ReactionModel:
             self.reaction = REACTIONS[min(int(drawn), len(REACTIONS) - 1)]
             self.first_reaction = self.first_reaction or self.reaction
             self._began_s, self._robot_waited_s = t_s, 0.0
-            self._gave_up, self._course_rad, last_place = False, None, None
+            self._gave_up, self._course_rad = False, None
         line = self._line_beside(place, last_place, desired, robot)
         return self._carry_out(t_s, dt_s, place, desired, robot, line, standing)
 
@@ -167,10 +167,12 @@ class ReactionModel:
         line = _Line.beside(course, place)
         off_rad = course.heading_rad - (self._course_rad or 0.0)
         if self._course_rad is None or math.cos(off_rad) < _SAME_LINE_COSINE:
-            self._course_rad = course.heading_rad
-            self._over = self._passed = False
             across = line.across(desired)
-            self._head_on = abs(across) < _HEAD_ON_SINE
+            # Nobody who has stopped walks on towards a robot because it turns towards them.
+            may_be = self._course_rad is None or self._head_on
+            self._head_on = may_be and abs(across) < _HEAD_ON_SINE
+            self._course_rad = course.heading_rad
+            self._over = False
             onward = desired.speed_mps * across
             self._side = math.copysign(1.0, onward if abs(onward) > 0.1 else line.left_m)
         elif last_place is not None and line.left_m * _Line.beside(course, last_place).left_m < 0.0:
@@ -178,8 +180,7 @@ class ReactionModel:
         if abs(line.left_m) > _ON_LINE_M:
             self._side = math.copysign(1.0, line.left_m)
         behind = line.ahead_m < -robot.half_length_m - _PASSED_M
-        if behind or (self._over and abs(line.left_m) > _ASIDE_M):
-            self._passed = True
+        self._passed = behind or (self._over and abs(line.left_m) > _ASIDE_M)
         return line
 
     def _carry_out(
@@ -312,8 +313,13 @@ class _Line(NamedTuple):
         from_centre = math.hypot(curve * ahead, 1.0 - curve * left)
         turned_rad = math.atan2(curve * ahead, 1.0 - curve * left)
         cos, sin = math.cos(turned_rad), math.sin(turned_rad)
+        # A robot that goes on in a circle comes to what is behind it as well.
+        ahead_rad = math.copysign(1.0, curve) * turned_rad
+        comes_within_rad = abs(course.yaw_rate_radps) * _CONFLICT_HORIZON_S
+        if ahead_rad < 0.0 and ahead_rad + math.tau < comes_within_rad:
+            ahead_rad += math.tau
         return cls(
-            turned_rad / curve,
+            ahead_rad / abs(curve),
             (2.0 * left - curve * (ahead * ahead + left * left)) / (1.0 + from_centre),
             ux * cos - uy * sin,
             uy * cos + ux * sin,
