@@ -257,7 +257,11 @@ class Startle:
 
     def is_on(self, t_s: float) -> bool:
         """Return whether the startle has begun and not ended."""
-        return self._from_s <= t_s < self._from_s + _STARTLE_S - 1e-9
+        return self._from_s <= t_s and not self.is_over(t_s)
+
+    def is_over(self, t_s: float) -> bool:
+        """Return whether the startle has ended; until then, no other one begins."""
+        return t_s >= self._from_s + _STARTLE_S - 1e-9
 
     def velocity(
         self, t_s: float, place: tuple[float, float], robot: RobotBody

@@ -189,12 +189,12 @@ class PersonOutcome:
         reaction: first reaction to the robot: ``"walk_on"``, ``"wait"``, ``"hurry"``,
             ``"pass_behind"`` or ``"claim"``; empty without an encounter.
         time_s: from the start to the end of the route; None if the end was not reached.
-        free_time_s: the same without robot and other people, pauses included; None without a route
-            or without an end of it.
+        free_time_s: the same for the same people with the same seed, the robot absent; None where
+            that walk has no route or did not end by now.
         length_m: length of the path walked.
-        free_length_m: the same without robot and other people; None as ``free_time_s``.
-        late_s: of somebody on the way: how much longer than alone they took to come so far, or
-            more. None before the start, at the end of the route, and without ``free_time_s``.
+        free_length_m: the same without the robot; None as ``free_time_s``.
+        late_s: of somebody on the way: how much longer than without the robot they took to come so
+            far, or more. None before the start, at the end of the route, and without one.
     """
 
     name: str
