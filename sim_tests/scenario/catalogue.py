@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import textwrap
 from collections.abc import Sequence
@@ -183,6 +184,7 @@ def scenario_problems(scenario: Scenario) -> tuple[str, ...]:
     grown = boxes + BODY_RADIUS_M * np.array([-1.0, -1.0, 1.0, 1.0])
     for person in scenario.people:
         corners = [(point.x_m, point.y_m) for point in person.route]
+        found += _problems_of_stops(person, sum(map(math.dist, corners, corners[1:])))
         for number, corner in enumerate(corners):
             what = f"people: {person.name}: route point {number}"
             found += _place_problems(what, corner, boxes, inner, BODY_RADIUS_M)
@@ -195,6 +197,27 @@ def scenario_problems(scenario: Scenario) -> tuple[str, ...]:
     if scenario.replay_csv is not None and not Path(scenario.replay_csv).is_file():
         found.append(f"replay_csv: there is no file {scenario.replay_csv}")
     return tuple(dict.fromkeys(found))
+
+
+def _problems_of_stops(person: PersonSpec, length_m: float) -> list[str]:
+    """Return the turn and the pauses that a person never comes to, which would do nothing."""
+    found = []
+    turn_m, way_m = person.turns_back_at_m, length_m
+    where = f"route of {length_m:.4g} m"
+    if turn_m is not None and turn_m >= length_m:
+        found.append(
+            f"people: {person.name}: turns_back_at_m {turn_m:g} is not before the end of the "
+            f"{where}: make it smaller, or leave it out"
+        )
+    elif turn_m is not None:
+        way_m, where = 2.0 * turn_m, f"way of {2.0 * turn_m:.4g} m there and back"
+    found += [
+        f"people: {person.name}: the pause at_m {pause.at_m:g} is not before the end of the "
+        f"{where}: make at_m smaller, or leave the pause out"
+        for pause in person.pauses
+        if pause.at_m >= way_m
+    ]
+    return found
 
 
 def _place_problems(
