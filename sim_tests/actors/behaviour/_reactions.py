@@ -160,10 +160,7 @@ class ReactionModel:
 
         What was said about a line, such as that the robot has passed, holds for that line alone.
         """
-        course = robot.course
-        if self._course_rad is not None and course.forward_mps == 0.0:
-            # It waits on the line that it came along.
-            course = course._replace(heading_rad=self._course_rad)
+        course = self._course_of(robot)
         line = _Line.beside(course, place)
         off_rad = course.heading_rad - (self._course_rad or 0.0)
         if self._course_rad is None or math.cos(off_rad) < _SAME_LINE_COSINE:
@@ -182,6 +179,13 @@ class ReactionModel:
         behind = line.ahead_m < -robot.half_length_m - _PASSED_M
         self._passed = behind or (self._over and abs(line.left_m) > _ASIDE_M)
         return line
+
+    def _course_of(self, robot: RobotBody) -> Motion:
+        """Return the robot's course; one that stands waits on the line that it came along."""
+        course = robot.course
+        if self._course_rad is None or course.forward_mps > 0.0:
+            return course
+        return course._replace(heading_rad=self._course_rad)
 
     def _carry_out(
         self,
@@ -210,7 +214,8 @@ class ReactionModel:
         if self.reaction == "wait":
             return self._wait(desired, line)
         if self.reaction == "pass_behind":
-            return _pass_behind(place, desired, robot, self._course_rad)
+            back_m = robot.half_length_m + _BEHIND_M
+            return _pass_behind(place, desired, self._course_of(robot), back_m)
         factor = _HURRY_FACTOR if self.reaction == "hurry" else _CLAIM_FACTOR
         fastest = max(_MAX_HURRY_MPS, desired.speed_mps)
         return DesiredVelocity(desired.ux, desired.uy, min(factor * desired.speed_mps, fastest))
@@ -368,19 +373,15 @@ def _on_conflicting_course(
 def _pass_behind(
     place: tuple[float, float],
     desired: DesiredVelocity,
-    robot: RobotBody,
-    course_rad: float | None,
+    course: Motion,
+    back_m: float,
 ) -> DesiredVelocity:
     """Return the velocity to the point behind the robot's tail at the time of arrival there."""
-    course = robot.course
-    if course.forward_mps == 0.0 and course_rad is not None:
-        course = course._replace(heading_rad=course_rad)
-    back = robot.half_length_m + _BEHIND_M
     speed = max(desired.speed_mps, 1e-3)
-    aim = course.point(-back, 0.0)
+    aim = course.point(-back_m, 0.0)
     for _ in range(4):
         arrival_s = min(math.dist(place, aim) / speed, _CONFLICT_HORIZON_S)
-        aim = course.at(arrival_s).point(-back, 0.0)
+        aim = course.at(arrival_s).point(-back_m, 0.0)
     dx, dy = aim[0] - place[0], aim[1] - place[1]
     distance = math.hypot(dx, dy)
     if distance < 1e-3:

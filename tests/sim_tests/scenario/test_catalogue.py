@@ -128,7 +128,7 @@ def test_impossible_positions_are_reported():
     assert scenario_problems(changed("crossing_from_left", **back)) == ()
     back["pauses"] = ({"at_m": 8.1, "for_s": 1.0},)
     (beyond,) = scenario_problems(changed("crossing_from_left", **back))
-    assert "8.1 is not before the end of the way of 8 m there and back" in beyond
+    assert "8.1 is not before the end of the way of 8 m" in beyond
     replay = inside.model_copy(update={"people": (), "replay_csv": "nowhere.csv"})
     assert scenario_problems(replay) == ("replay_csv: there is no file nowhere.csv",)
 
