@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 from ._surroundings import ALONE, MovingBody, Surroundings
-
-if TYPE_CHECKING:
-    from ._person import Person
 
 # Somebody as far along a route as this is level with another.
 _LEVEL_M: Final = 0.1
@@ -17,7 +14,26 @@ _LEVEL_M: Final = 0.1
 _LONGEST_S: Final = 120.0
 
 
-class FreeWalks:
+class Walker(Protocol):
+    """A person as far as a free walk goes: see :class:`Person`."""
+
+    @property
+    def arrived(self) -> bool: ...
+    @property
+    def along_m(self) -> float: ...
+    @property
+    def started_s(self) -> float | None: ...
+    @property
+    def moving_body(self) -> MovingBody | None: ...
+    def twin(self) -> Any: ...
+    def set_off(self, t_s: float) -> None: ...
+    def advance(self, t_s: float, around: Surroundings) -> None: ...
+
+
+WalkerT = TypeVar("WalkerT", bound=Walker)
+
+
+class FreeWalks(Generic[WalkerT]):
     """The free walks of some people among each other, computed as far as they are asked for.
 
     Args:
@@ -26,14 +42,14 @@ class FreeWalks:
         tick_s: time between two decisions of a person.
     """
 
-    def __init__(self, people: Sequence[Person], tick_s: float) -> None:
+    def __init__(self, people: Sequence[WalkerT], tick_s: float) -> None:
         self._people, self._tick_s = people, tick_s
-        self._twins: list[Person] = []
+        self._twins: list[WalkerT] = []
         self._bodies: list[MovingBody | None] = []
         self._ticks = 0
         self._along_m: list[list[float]] = [[] for _ in people]  # at each tick since the start
 
-    def of(self, person: Person, now_s: float) -> tuple[Person, float]:
+    def of(self, person: WalkerT, now_s: float) -> tuple[WalkerT, float]:
         """Return somebody as they would be at the end of their walk, and how late they are.
 
         The walk ends now for a person who is still on the way, and at its end for one who has
