@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, TypeAlias, TypeVar
+
+import numpy as np
+
+from perception.arrays import FloatArray
 
 from ._config import TrackerConfig
 from ._frame import Frame, Measurement, Spread
@@ -15,6 +20,40 @@ _STANDING_CHI2: Final = 4.605
 _STANDING_HOLD_S: Final = 0.5
 # For steps below this share of the time constant, the closed form loses digits; use its series.
 _SHORT_SHARE: Final = 1e-3
+
+_Value = TypeVar("_Value", float, FloatArray)
+#: The upper triangle of a covariance of x, y, vx, vy, row by row.
+Upper: TypeAlias = tuple[
+    _Value, _Value, _Value, _Value, _Value, _Value, _Value, _Value, _Value, _Value
+]
+
+# Where each element of the covariance is in its upper triangle.
+_PLACES: Final = np.array([[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]])
+
+
+def drifted(upper: Upper[_Value], dt_s: _Value) -> Upper[_Value]:
+    """Return F P Fᵀ: a covariance after ``dt_s`` at constant velocity; numbers, or arrays of them.
+
+    It has no process noise. Tracker, prediction and navigation all move a track on with it.
+    """
+    xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = upper
+    return (
+        xx + dt_s * (2.0 * xu + dt_s * uu),
+        xy + dt_s * (yu + xv + dt_s * uv),
+        xu + dt_s * uu,
+        xv + dt_s * uv,
+        yy + dt_s * (2.0 * yv + dt_s * vv),
+        yu + dt_s * uv,
+        yv + dt_s * vv,
+        uu,
+        uv,
+        vv,
+    )
+
+
+def matrices(uppers: Sequence[Upper[float]]) -> FloatArray:
+    """Return the covariances (N, 4, 4) of N upper triangles, N ≥ 1."""
+    return np.array(uppers)[:, _PLACES]
 
 
 class Track:
@@ -101,6 +140,14 @@ class Track:
         return Spread(self.p00, self.p01, self.p11)
 
     @property
+    def upper(self) -> Upper[float]:
+        """Upper triangle of the covariance."""
+        return (
+            *(self.p00, self.p01, self.p02, self.p03, self.p11),
+            *(self.p12, self.p13, self.p22, self.p23, self.p33),
+        )
+
+    @property
     def speed_mps(self) -> float:
         """Speed over the floor."""
         return math.hypot(self.vx, self.vy)
@@ -130,18 +177,7 @@ class Track:
 
     def _predict_free(self, dt: float, q: float) -> None:
         """Move on at constant velocity under white acceleration of density q."""
-        place_noise, cross_noise = q * dt * dt * dt / 3.0, q * dt * dt / 2.0
-        self.x += dt * self.vx
-        self.y += dt * self.vy
-        self.p00 += dt * (2.0 * self.p02 + dt * self.p22) + place_noise
-        self.p01 += dt * (self.p12 + self.p03 + dt * self.p23)
-        self.p11 += dt * (2.0 * self.p13 + dt * self.p33) + place_noise
-        self.p02 += dt * self.p22 + cross_noise
-        self.p03 += dt * self.p23
-        self.p12 += dt * self.p23
-        self.p13 += dt * self.p33 + cross_noise
-        self.p22 += q * dt
-        self.p33 += q * dt
+        self._move(dt, 1.0, q * dt * dt * dt / 3.0, q * dt * dt / 2.0, q * dt)
 
     def _predict_damped(self, dt: float, tau: float, q: float) -> None:
         """Move on while the velocity decays with τ: an Ornstein–Uhlenbeck process.
@@ -151,26 +187,29 @@ class Track:
         """
         share = dt / tau
         decayed, decayed2 = -math.expm1(-share), -math.expm1(-2.0 * share)
-        carried, kept = tau * decayed, 1.0 - decayed  # x += carried · vx, vx *= kept
+        carried = tau * decayed
         if share < _SHORT_SHARE:
             place_noise = q * dt * dt * dt * (1.0 / 3.0 - 0.25 * share)
         else:
             place_noise = q * tau * tau * (dt - 2.0 * tau * decayed + 0.5 * tau * decayed2)
         cross_noise, velocity_noise = q * 0.5 * carried * carried, q * 0.5 * tau * decayed2
-        self.x += carried * self.vx
-        self.y += carried * self.vy
+        self._move(carried, 1.0 - decayed, place_noise, cross_noise, velocity_noise)
+
+    def _move(
+        self, carried_s: float, kept: float, place_m2: float, cross_m2ps: float, speed_m2ps2: float
+    ) -> None:
+        """Add ``carried_s`` velocities to the place and keep a share of them; then add noise."""
+        self.x += carried_s * self.vx
+        self.y += carried_s * self.vy
         self.vx *= kept
         self.vy *= kept
-        self.p00 += carried * (2.0 * self.p02 + carried * self.p22) + place_noise
-        self.p01 += carried * (self.p12 + self.p03 + carried * self.p23)
-        self.p11 += carried * (2.0 * self.p13 + carried * self.p33) + place_noise
-        self.p02 = kept * (self.p02 + carried * self.p22) + cross_noise
-        self.p03 = kept * (self.p03 + carried * self.p23)
-        self.p12 = kept * (self.p12 + carried * self.p23)
-        self.p13 = kept * (self.p13 + carried * self.p33) + cross_noise
-        self.p22 = kept * kept * self.p22 + velocity_noise
-        self.p23 *= kept * kept
-        self.p33 = kept * kept * self.p33 + velocity_noise
+        xx, self.p01, xu, xv, yy, yu, yv, uu, uv, vv = drifted(self.upper, carried_s)
+        kept2 = kept * kept
+        self.p00, self.p11 = xx + place_m2, yy + place_m2
+        self.p02, self.p03 = kept * xu + cross_m2ps, kept * xv
+        self.p12, self.p13 = kept * yu, kept * yv + cross_m2ps
+        self.p22, self.p33 = kept2 * uu + speed_m2ps2, kept2 * vv + speed_m2ps2
+        self.p23 = kept2 * uv
 
     def widen(self, b: tuple[float, float, float, float], factor: float) -> None:
         """Add factor · b bᵀ to the covariance."""

@@ -11,7 +11,7 @@ from perception.arrays import FloatArray, covariance_matrix, finite_array, finit
 
 from ._errors import TrackingError
 from ._noticed import noticed
-from ._person import Track
+from ._person import Track, Upper, matrices
 from ._presence import is_over, shown_empty
 from ._sensors import Sensors
 from ._size import lever
@@ -126,7 +126,7 @@ def snapshots(state: State, stamp_s: float, sensors: Sensors) -> tuple[PersonTra
         return ()
     # The snapshots share these arrays.
     states = np.array([(track.x, track.y, track.vx, track.vy) for track in people])
-    covariances = np.array([_covariance(track, state) for track in people]).reshape(-1, 4, 4)
+    covariances = matrices([_covariance(track, state) for track in people])
     states.setflags(write=False)
     covariances.setflags(write=False)
     return tuple(
@@ -173,16 +173,13 @@ def _snapshot(
     return made
 
 
-def _covariance(track: Track, state: State) -> tuple[float, ...]:
-    """Return the covariance, row by row, with the lasting error of the range."""
+def _covariance(track: Track, state: State) -> Upper[float]:
+    """Return the upper triangle of the covariance, with the lasting error of the range."""
     if track.lasting_std and state.origin_m is not None:
         track = track.copied()
         b = lever(track, state.origin_m, state.origin_velocity_mps)
         track.widen(b, track.lasting_std * track.lasting_std)
-    p01, p02, p03 = track.p01, track.p02, track.p03
-    p12, p13, p23 = track.p12, track.p13, track.p23
-    first, second = (track.p00, p01, p02, p03), (p01, track.p11, p12, p13)
-    return (*first, *second, p02, p12, track.p22, p23, p03, p13, p23, track.p33)
+    return track.upper
 
 
 def _status(track: Track, state: State, now_s: float) -> TrackStatus:

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -29,6 +29,9 @@ from pydantic import Field, model_validator
 from perception.arrays import FloatArray, finite_array
 
 from ._errors import TrackingError
+from ._person import Upper as Upper
+from ._person import drifted
+from ._person import matrices as matrices
 from ._snapshot import PersonTrack
 from .config import StrictConfig
 
@@ -203,6 +206,19 @@ def predict_ahead(
     return predict_states(states.reshape(-1, 4), covariances.reshape(-1, 4, 4), horizons_s, model)
 
 
+def covariance_ahead(track: PersonTrack, ahead_s: float) -> Upper[float]:
+    """Return the upper triangle of a track's covariance, ``ahead_s`` ≥ 0 after its stamp.
+
+    It is that of constant velocity, without noise: xx, xy, xu, xv, yy, yu, yv, uu, uv, vv of the
+    place x, y and the velocity u, v. Plain numbers, fast for one track; :func:`matrices` makes
+    arrays (N, 4, 4) of them.
+    """
+    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = (
+        track.covariance_odom.tolist()
+    )
+    return drifted((xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), ahead_s)
+
+
 def predict_states(
     states: FloatArray, covariances: FloatArray, horizons_s: Any, model: PredictionModel = FITTED
 ) -> PredictedPlaces:
@@ -230,12 +246,10 @@ def predict_states(
     outer = (ahead[:, :, None] * ahead[:, None, :])[:, None]
     motion = (along - across)[..., None, None] * outer + across[..., None, None] * np.eye(2)
     # The part of the track itself.
-    t = times[:, None, None]
-    place, cross, drift = (
-        part[:, None]
-        for part in (covariances[:, :2, :2], covariances[:, :2, 2:], covariances[:, 2:, 2:])
-    )
-    known = place + t * (cross + np.swapaxes(cross, -1, -2)) + t * t * drift
+    rows, columns = np.triu_indices(4)
+    upper = cast(Upper[FloatArray], tuple(covariances[:, rows, columns].T[..., None]))
+    xx, xy, _, _, yy, *_ = drifted(upper, times)
+    known = np.stack((xx, xy, xy, yy), axis=-1).reshape(*xx.shape, 2, 2)
     lags = np.minimum(model.lag_per_s2 * _memories_s2(covariances), _MOST_LAG)
     lags = 1.0 + np.outer(lags, -np.expm1(-times / _LAG_SHOWS_S))
     scale = lags[..., None, None] * factors2[:, None, None]
