@@ -11,12 +11,13 @@ from perception.arrays import FloatArray, covariance_matrix, finite_array, finit
 
 from ._errors import TrackingError
 from ._noticed import noticed
-from ._person import Track, Upper, matrices
+from ._person import Track
 from ._presence import is_over, shown_empty
 from ._sensors import Sensors
 from ._size import lever
 from ._state import State, face_period_s
 from .awareness_filter import drift_unseen, estimate
+from .covariances import Upper, matrices
 
 TrackStatus = Literal["tentative", "confirmed", "coasting"]
 # A sensor is silent when no frame has come for this many of its usual intervals.

@@ -29,11 +29,9 @@ from pydantic import Field, model_validator
 from perception.arrays import FloatArray, finite_array
 
 from ._errors import TrackingError
-from ._person import Upper as Upper
-from ._person import drifted
-from ._person import matrices as matrices
 from ._snapshot import PersonTrack
 from .config import StrictConfig
+from .covariances import Upper, drifted
 
 #: Regions are ellipses of this many standard deviations.
 REGION_SIGMAS: Final = 2.0
@@ -204,19 +202,6 @@ def predict_ahead(
     states = np.array([[*track.position_odom_m, *track.velocity_odom_mps] for track in people])
     covariances = np.array([track.covariance_odom for track in people])
     return predict_states(states.reshape(-1, 4), covariances.reshape(-1, 4, 4), horizons_s, model)
-
-
-def covariance_ahead(track: PersonTrack, ahead_s: float) -> Upper[float]:
-    """Return the upper triangle of a track's covariance, ``ahead_s`` ≥ 0 after its stamp.
-
-    It is that of constant velocity, without noise: xx, xy, xu, xv, yy, yu, yv, uu, uv, vv of the
-    place x, y and the velocity u, v. Plain numbers, fast for one track; :func:`matrices` makes
-    arrays (N, 4, 4) of them.
-    """
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = (
-        track.covariance_odom.tolist()
-    )
-    return drifted((xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), ahead_s)
 
 
 def predict_states(
