@@ -7,6 +7,7 @@ from typing import Any, Final, Literal, cast, get_args
 
 import numpy as np
 
+from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray, covariance_matrix, finite_array, finite_number, set_fields
 
 from ._errors import TrackingError
@@ -17,11 +18,10 @@ from ._sensors import Sensors
 from ._size import lever
 from ._state import State, face_period_s
 from .awareness_filter import drift_unseen, estimate
+from .clock import GAP_PERIODS
 from .covariances import Upper, matrices
 
 TrackStatus = Literal["tentative", "confirmed", "coasting"]
-# A sensor is silent when no frame has come for this many of its usual intervals.
-_SILENT_PERIODS: Final = 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +122,7 @@ def snapshots(state: State, stamp_s: float, sensors: Sensors) -> tuple[PersonTra
     if stamp_s > now_s:
         people = [track.copied() for track in people]
         for track in people:
-            track.predict(now_s, stamp_s, sensors.config)
+            track.predict(now_s, stamp_s, sensors.config.acceleration_density_m2ps3)
     if not people:
         return ()
     # The snapshots share these arrays.
@@ -163,8 +163,8 @@ def _snapshot(
         numbers[:2],
         numbers[2:],
         covariance,
-        *estimate(belief, sensors.config.awareness),
-        sensors.config.stature_m,
+        *estimate(belief),
+        MEAN_STATURE_M,
         stamp_s - track.last_seen_s,
         shown_empty(track, state, sensors.config),
         noticed(track, stamp_s, state, sensors),
@@ -190,7 +190,7 @@ def _status(track: Track, state: State, now_s: float) -> TrackStatus:
     if track.last_seen_s == now_s:
         return "confirmed"
     shown = any(
-        seen_s == clock.stamp_s and now_s - seen_s <= _SILENT_PERIODS * clock.known_period_s
+        seen_s == clock.stamp_s and now_s - seen_s <= GAP_PERIODS * clock.known_period_s
         for clock, seen_s in zip(state.clocks, track.seen_s, strict=True)
     )
     return "confirmed" if shown else "coasting"

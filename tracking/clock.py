@@ -15,6 +15,9 @@ _LEAST_INTERVAL_S: Final = 1e-3
 _PERIOD_GAIN: Final = 0.2
 # Stamps may come slightly out of order.
 _DISORDER_S: Final = 0.5
+#: Nothing from a sensor for so many of its usual intervals is a gap, or a silence: two frames in a
+#: row are missing.
+GAP_PERIODS: Final = 2.5
 # Steps between stamps differ by this factor at most.
 _ALIKE: Final = 2.0
 # Two stamps may agree by chance.

@@ -180,7 +180,7 @@ PATH = person(1.0)
 CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: PersonTracker().predict(math.nan), "stamp_s must be finite"),
     (lambda: watched().predict(0.1), r"predict at stamp_s = 0.1 s: the last frame was at 0.45\d*"),
-    (lambda: PersonTracker({"weak_score": 0.2}), "config must be a TrackerConfig, got dict"),
+    (lambda: PersonTracker({"max_coast_s": 2.0}), "config must be a TrackerConfig, got dict"),
     (lambda: both().update([], 0.0, laser_at(), sensor="lidar"), "'camera', 'laser', got 'lidar'"),
     (lambda: PersonTracker(sensors={"camera": SensorConfig()}), "names of their own, got 'cam"),
     (
@@ -193,15 +193,14 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: SensorConfig(sees_face=True), "did you mean 'sees_faces'"),
     (lambda: TrackerConfig(max_cost_s=2.0), "did you mean 'max_coast_s'"),
     (lambda: TrackerConfig(acceleration_density_m2ps3=0.0), "acceleration_density_m2ps3: "),
-    (lambda: TrackerConfig(position_noise_floor_m=0.0), "position_noise_floor_m: "),
     (lambda: TrackerConfig(gate_probability=1.0), "gate_probability: "),
     (lambda: TrackerConfig(max_missed_s=0), r"^TrackerConfig: max_missed_s: [^\n]*, got 0$"),
     (lambda: TrackerConfig(max_coast_s=math.inf), "max_coast_s: "),
-    (lambda: TrackerConfig(initial_velocity_std_mps=math.nan), "initial_velocity_std_mps: "),
+    (lambda: TrackerConfig(miss_cost=math.nan), "miss_cost: "),
     (lambda: TrackerConfig(gate_distance_m=1e300), "gate_distance_m: "),
-    (lambda: TrackerConfig(stature_m=1e300), "stature_m: "),
-    (lambda: AwarenessFilterConfig(prior_awareness=0.0), "prior_awareness"),
-    (lambda: AwarenessFilterConfig(prior_awareness=0.9), "prior_awareness"),
+    # A setting of 0.3 that nobody turned.
+    (lambda: TrackerConfig(max_standing_coast_s=8.0), "'max_standing_coast_s'.*'max_coast_s'"),
+    (lambda: AwarenessFilterConfig(prior_awareness=0.1), "unknown key 'prior_awareness'"),
     (lambda: AwarenessFilterConfig(lower_bound_confidence=1.0), "lower_bound_confidence"),
     # A hidden face must not keep awareness longer than being unseen.
     (
@@ -272,14 +271,14 @@ def test_without_filterpy_the_message_names_the_extra(monkeypatch: pytest.Monkey
 
 def test_an_unusable_file_is_refused_in_one_line_that_names_every_wrong_key(tmp_path: Path) -> None:
     path = tmp_path / "tracker.yaml"
-    path.write_text("max_missed_s: 0\ngate_probability: x\nawareness: {prior_awarenes: 0.1}\n")
+    path.write_text("max_missed_s: 0\ngate_probability: x\nawareness: {memory: 0.1}\n")
     with pytest.raises(TrackingError) as caught:
         TrackerConfig.from_yaml(path)
     assert str(caught.value).splitlines() == [
         f"{path}: TrackerConfig: gate_probability: Input should be a valid number, unable to parse "
         "string as a number, got 'x'; max_missed_s: Input should be greater than or equal to "
-        "0.0001, got 0; awareness: unknown key 'prior_awarenes' in AwarenessFilterConfig; did you "
-        "mean 'prior_awareness'?"
+        "0.0001, got 0; awareness: unknown key 'memory' in AwarenessFilterConfig; did you mean "
+        "'memory_s'?"
     ]
     path.write_text("gate_distance_m: 1.0e+300\n", encoding="utf-8")
     with pytest.raises(TrackingError, match=r"tracker\.yaml: (?s:.)*gate_distance_m"):
@@ -287,10 +286,10 @@ def test_an_unusable_file_is_refused_in_one_line_that_names_every_wrong_key(tmp_
 
 
 def test_a_view_is_not_lost_when_a_sensor_is_written(tmp_path: Path) -> None:
-    sensor = SensorConfig(view=ScannerView(), detection_probability=0.8)
+    sensor = SensorConfig(view=ScannerView(), sees_faces=True)
     path = tmp_path / "sensor.yaml"
     with pytest.raises(TrackingError, match="view of SensorConfig cannot be written as YAML"):
         sensor.to_yaml(path)
     assert not path.exists()
     sensor.model_copy(update={"view": None}).to_yaml(path)
-    assert SensorConfig.from_yaml(path) == SensorConfig(detection_probability=0.8)
+    assert SensorConfig.from_yaml(path) == SensorConfig(sees_faces=True)
