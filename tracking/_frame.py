@@ -18,6 +18,12 @@ from .awareness_filter import Evidence, evidence, trusted_std
 _MAX_POSITION_M: Final = 1e7
 _MAX_VARIANCE_M2: Final = 1e6
 _LEAST_RANGE_M: Final = 1e-3
+# No sensor of a robot sees further, and no range is less certain. Within them determinants keep
+# their digits.
+_MAX_RANGE_M: Final = 1e4
+_MAX_LASTING_STD: Final = 1.0
+# A size that differs from an adult's by more than a factor of 100 is none.
+_MAX_SIZE_LOG: Final = math.log(100.0)
 # Nearer than a nanometre, places have no direction from each other.
 _NO_OFFSET_M2: Final = 1e-18
 # Largest difference between the stamps of an observation and of its frame.
@@ -150,6 +156,17 @@ def _measurement(
 ) -> Measurement:
     """Return an observation, given the two rows of T_odom_camera that lead to the floor plane."""
     a, b, c = one.position_camera_m.tolist()
+    range_m, lasting = math.hypot(a, b, c), one.range_lasting_relative_std
+    if range_m > _MAX_RANGE_M:
+        raise TrackingError(
+            f"{name}.position_camera_m must lie within {_MAX_RANGE_M:g} m of the sensor, got "
+            f"{[a, b, c]} m"
+        )
+    if lasting > _MAX_LASTING_STD:
+        raise TrackingError(
+            f"{name}.range_lasting_relative_std must be at most {_MAX_LASTING_STD:g}, got "
+            f"{lasting:g}"
+        )
     spread = one.position_covariance_m2.tolist()
     ax, bx, cx, origin_x = to_x
     ay, by, cy, origin_y = to_y
@@ -171,7 +188,6 @@ def _measurement(
         ax * n_x + bx * n_y + cx * n_z,
         ay * n_x + by * n_y + cy * n_z,
     )
-    lasting = one.range_lasting_relative_std
     if lasting:
         noise = noise.plus(outer(east, north, -lasting * lasting))
     if pose is not None:
@@ -196,9 +212,9 @@ def _measurement(
         lasting,
     )
     if one.size_range_m is not None and one.size_range_relative_std is not None:
-        placed_m = max(math.sqrt(a * a + b * b + c * c), _LEAST_RANGE_M)
-        measured.size_log = math.log(one.size_range_m / placed_m)
-        measured.size_variance = one.size_range_relative_std**2
+        size_log = math.log(one.size_range_m) - math.log(max(range_m, _LEAST_RANGE_M))
+        if abs(size_log) <= _MAX_SIZE_LOG:
+            measured.size_log, measured.size_variance = size_log, one.size_range_relative_std**2
     return measured
 
 
