@@ -20,7 +20,7 @@ _MAX_VARIANCE_M2: Final = 1e6
 _LEAST_RANGE_M: Final = 1e-3
 # No sensor of a robot sees further, and no range is less certain. Within them determinants keep
 # their digits.
-_MAX_RANGE_M: Final = 1e4
+_MAX_RANGE_M: Final = 1e5
 _MAX_LASTING_STD: Final = 1.0
 # A size that differs from an adult's by more than a factor of 100 is none.
 _MAX_SIZE_LOG: Final = math.log(100.0)

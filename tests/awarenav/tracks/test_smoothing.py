@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 import numpy as np
-from tracking_scenes import CAMERA, FloatArray, observe, white_acceleration
 
+from awarenav.tracks._smoothing import smooth
+from perception import PersonObservation
+from perception.arrays import FloatArray
 from tracking import PersonTracker, TrackerConfig
-from tracking.smoothing import smooth
 
 CONFIG = TrackerConfig()
 STD_M = 0.1
+# Of a sensor whose frame is odom.
+SENSOR = np.eye(4)
+
+
+def observe(place_m: FloatArray, stamp_s: float) -> PersonObservation:
+    spread_m2 = STD_M**2 * np.eye(3)
+    return PersonObservation(stamp_s, [*place_m, 0.0], spread_m2, None, None, None, 0.9)
+
+
+def white_acceleration(dt_s: float, density_m2ps3: float) -> tuple[FloatArray, FloatArray]:
+    """Return F and Q of constant velocity under white acceleration."""
+    F = np.eye(4) + dt_s * np.eye(4, k=2)
+    place, cross = dt_s**3 / 3.0, dt_s**2 / 2.0
+    return F, density_m2ps3 * np.kron([[place, cross], [cross, dt_s]], np.eye(2))
 
 
 def tracked(
@@ -20,7 +35,7 @@ def tracked(
     states, covariances = [], []
     for stamp_s, place in zip(stamps_s.tolist(), measured_m, strict=True):
         seen = [] if np.isnan(place[0]) else [observe(place, stamp_s)]
-        (track,) = tracker.update(seen, stamp_s, CAMERA)
+        (track,) = tracker.update(seen, stamp_s, SENSOR)
         states.append(np.concatenate([track.position_odom_m, track.velocity_odom_mps]))
         covariances.append(track.covariance_odom)
     return stamps_s, np.array(states), np.array(covariances)
