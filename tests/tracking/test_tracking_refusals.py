@@ -101,7 +101,7 @@ FRAMES: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"T_odom_camera": altered(0, 3, 1e8)},
-        r"observations\[0\] must lie within 1e\+07 m of the or",
+        r"observations\[0\] must lie within 1e\+07 m of",
     ),
     (
         {"observations": far((1.7e308, 1.7e308)), "T_odom_camera": camera_at(yaw_rad=0.8)},
