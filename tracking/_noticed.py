@@ -55,11 +55,12 @@ def remembers(sensors: Sensors) -> bool:
 
 def held(track: Track, stamp_s: float, clocks: tuple[FrameClock, ...], sensors: Sensors) -> bool:
     """Return whether a sensor without faces has seen a person without a gap."""
-    return any(
-        clock.period_s < math.inf and stamp_s - seen_s <= GAP_PERIODS * clock.period_s
-        for index, (clock, seen_s) in enumerate(zip(clocks, track.seen_s, strict=True))
-        if index not in sensors.faces
-    )
+    for sensor, clock, seen_s in zip(sensors.all, clocks, track.seen_s, strict=True):
+        if sensor.settings.sees_faces or clock.period_s == math.inf:
+            continue
+        if stamp_s - seen_s <= GAP_PERIODS * clock.period_s:
+            return True
+    return False
 
 
 def noticed(track: Track, stamp_s: float, state: State, sensors: Sensors) -> float:

@@ -134,13 +134,10 @@ class Track:
             damped_s = max(to_s - max(self.last_seen_s + _STANDING_HOLD_S, from_s), 0.0)
         free_s = to_s - from_s - damped_s
         if free_s > 0.0:
-            self._predict_free(free_s, q)
+            place_noise, cross_noise = q * free_s**3 / 3.0, q * free_s * free_s / 2.0
+            self._move(free_s, 1.0, place_noise, cross_noise, q * free_s)
         if damped_s > 0.0:
             self._predict_damped(damped_s, q)
-
-    def _predict_free(self, dt: float, q: float) -> None:
-        """Move on at constant velocity."""
-        self._move(dt, 1.0, q * dt * dt * dt / 3.0, q * dt * dt / 2.0, q * dt)
 
     def _predict_damped(self, dt: float, q: float) -> None:
         """Move on while the velocity decays with τ: an Ornstein–Uhlenbeck process.

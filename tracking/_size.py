@@ -195,23 +195,26 @@ class Ray:
         extra_m2: added to the covariance of the place, along the ray.
     """
 
-    __slots__ = ("_east", "_north", "_origin_m", "_track", "extra_m2", "measures")
+    __slots__ = ("_east", "_north", "_origin_m", "_range_m", "_track", "extra_m2", "measures")
 
     def __init__(self, track: Track, origin_m: Place, measures: bool) -> None:
         self._track, self._origin_m, self.measures = track, origin_m, measures
         self._east, self._north = track.x - origin_m[0], track.y - origin_m[1]
+        self._range_m = math.hypot(self._east, self._north)
         share = _ERROR_SHARE / (1.0 + _ERROR_SHARE) if measures else _ERROR_SHARE
         self.extra_m2 = outer(self._east, self._north, share * share)
 
     def allows(self, measured: Measurement) -> bool:
         """Return whether a measurement may be the same person, whose range disagrees."""
-        spread, x, y = self._track.spread_m2.plus(measured.noise_m2), self._east, self._north
-        range_m = math.hypot(x, y)
+        x, y, range_m = self._east, self._north, self._range_m
         along_m = (measured.x - self._origin_m[0]) * x + (measured.y - self._origin_m[1]) * y
-        true_m, assumed_m = range_m, along_m / max(range_m, 1e-9)
+        if range_m == 0.0:
+            return False
+        true_m, assumed_m = range_m, along_m / range_m
         if self.measures:
             true_m, assumed_m = assumed_m, range_m
-        noise_m = _SIGMAS * math.sqrt(max(spread.along(x, y), 0.0))
+        variance_m2 = self._track.spread_m2.along(x, y) + measured.noise_m2.along(x, y)
+        noise_m = _SIGMAS * math.sqrt(max(variance_m2, 0.0))
         least_m = true_m - max(_SLACK_M, _MOST_NEARER_SHARE * true_m)
         return true_m > 0.0 and least_m - noise_m <= assumed_m <= _MOST_RATIO * true_m + noise_m
 

@@ -114,7 +114,10 @@ class State(NamedTuple):
 
 def seen_within(track: Track, which: Iterable[int], stamp_s: float, within_s: float) -> bool:
     """Return whether one of these sensors has seen a person within this time."""
-    return any(stamp_s - track.seen_s[index] <= within_s for index in which)
+    for index in which:  # noqa: SIM110 - half the time of a generator, for every track
+        if stamp_s - track.seen_s[index] <= within_s:
+            return True
+    return False
 
 
 def absence_s(period_s: float) -> float:
