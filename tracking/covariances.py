@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, TypeAlias, TypeVar
+from typing import Final, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
 from perception.arrays import FloatArray
-
-if TYPE_CHECKING:
-    from ._snapshot import PersonTrack
 
 _Value = TypeVar("_Value", float, FloatArray)
 #: The upper triangle of a covariance of x, y, vx, vy, row by row.
@@ -20,6 +17,15 @@ Upper: TypeAlias = tuple[
 
 # Where each element of the covariance is in its upper triangle.
 _PLACES: Final = np.array([[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]])
+
+
+class Tracked(Protocol):
+    """Something with the covariance of a :class:`~tracking.PersonTrack`."""
+
+    @property
+    def covariance_odom(self) -> FloatArray:
+        """(4, 4), order x, y, vx, vy."""
+        ...
 
 
 def drifted(upper: Upper[_Value], dt_s: _Value) -> Upper[_Value]:
@@ -47,7 +53,7 @@ def matrices(uppers: Sequence[Upper[float]]) -> FloatArray:
     return np.array(uppers)[:, _PLACES]
 
 
-def covariance_ahead(track: PersonTrack, ahead_s: float) -> Upper[float]:
+def covariance_ahead(track: Tracked, ahead_s: float) -> Upper[float]:
     """Return the upper triangle of a track's covariance, ``ahead_s`` ≥ 0 after its stamp.
 
     It is that of constant velocity, without noise: xx, xy, xu, xv, yy, yu, yv, uu, uv, vv of the
