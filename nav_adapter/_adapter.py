@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from perception.arrays import finite_number
@@ -12,7 +12,7 @@ from tracking import PersonTrack
 from tracking.clock import Entry, Gate
 from tracking.prediction import PredictionModel
 
-from ._asking import Addressed, Addressing, AddressHistory
+from ._asking import Addressed, AddressHistory, Addressing
 from ._checks import age_of_s, checked_tracks, goes_back, require_type
 from ._constraints import NavConstraints
 from ._errors import NavError
@@ -42,7 +42,7 @@ class _Memory:
     """
 
     people: tuple[Person, ...] = ()
-    addressed: AddressHistory = AddressHistory()
+    addressed: AddressHistory = field(default_factory=AddressHistory)
     constraints: NavConstraints | None = None
     given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
     ceiling_mps: float | None = None
@@ -260,11 +260,12 @@ class NavAdapter:
         current: tuple[PersonTrack, ...], now: float, perception_stamp_s: float | None
     ) -> float:
         """Return the stamp of the latest frame of perception, after checking the input's ages."""
-        for index, track in enumerate(current):
-            age_of_s(f"tracks[{index}].stamp_s", track.stamp_s, now)
+        stamps = [track.stamp_s for track in current] or [now]
+        for stamp_s in (min(stamps), max(stamps)):
+            age_of_s(f"tracks[{stamps.index(stamp_s)}].stamp_s", stamp_s, now)
         if perception_stamp_s is not None:
             return finite_number("perception_stamp_s", perception_stamp_s, NavError)
-        return min(now, max((track.stamp_s for track in current), default=now))
+        return min(now, max(stamps))
 
     def _following(
         self,
@@ -309,7 +310,7 @@ class NavAdapter:
         braked_mps -= self._robot.max_deceleration_mps2 * pause_s
         constraints = NavConstraints(
             stamp_s=now,
-            obstacles=obstacles_of(people, now),
+            obstacles=obstacles_of(people.values(), now),
             speed_limit_mps=limit.limit_mps,
             limited_by=limit.limited_by,
             stale=stale,

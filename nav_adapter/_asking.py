@@ -106,7 +106,8 @@ class Addressing:
         robot_age_s: float,
     ) -> Addressed:
         """Return the warnings of an update, then the request, and the answers."""
-        people, alerts = dict(people), list[Alert]()
+        people, sound, moved_s = dict(people), history.sound, history.moved_s
+        alerts: list[Alert] = []
         if self._policy.alerts is not None:
             alerts, sound = alerts_due(
                 self._policy.alerts,
@@ -115,27 +116,26 @@ class Addressing:
                 robot_state,
                 now,
                 self._policy.margins.uncertainty_sigmas,
-                history.sound,
+                sound,
                 self._prediction,
             )
-            history = history._replace(sound=sound)
         rules = self._policy.attention
         if rules is None:
-            return Addressed(tuple(alerts), (), history, people)
+            return Addressed(tuple(alerts), (), AddressHistory(sound), people)
         answers = tuple(_answers(people, rules, now))
         if robot_state.travel_mps > STANDING_MPS:
-            history = history._replace(moved_s=now)
+            moved_s = now
         recent_s = tuple(each for each in history.requests_s if now - each < _MINUTE_S)
         person = None if limit.track_id is None else people.get(limit.track_id)
         means = None
         if (
             person is not None
             and len(recent_s) < rules.per_minute
-            and now - history.moved_s <= _PARKED_AFTER_S
+            and now - moved_s <= _PARKED_AFTER_S
             and not any(alert.track_id == person.id for alert in alerts)
             and self._may_be_asked(person, rules, robot_state, now)
         ):
-            means = _means(rules, person, history.sound, now)
+            means = _means(rules, person, sound, now)
         if person is not None and means is not None:
             group = _group(person, people.values())
             wins_s = self._wins_s(person, group, people, robot_state, now, robot_age_s)
@@ -147,7 +147,8 @@ class Addressing:
                     if not before.answered:
                         asked = Asked(before.times + 1, now)
                         people[each.id] = each._replace(asked=asked)
-        return Addressed(tuple(alerts), answers, history._replace(requests_s=recent_s), people)
+        history = AddressHistory(sound, recent_s, moved_s)
+        return Addressed(tuple(alerts), answers, history, people)
 
     def _may_be_asked(
         self, person: Person, rules: AttentionRules, robot_state: RobotState, now: float
@@ -158,7 +159,10 @@ class Addressing:
             person.awareness_lower < _LOOKED
             and person.known_s >= _KNOWN_S
             and track.status != "tentative"
-            and (asked is None or not (asked.answered or now - asked.stamp_s < _pause_s(rules, asked)))
+            and (
+                asked is None
+                or not (asked.answered or now - asked.stamp_s < _pause_s(rules, asked))
+            )
             # Nobody would see the answer of somebody out of sight, or whose face no camera can see:
             # what is known of their α is then hardly more than of anybody's.
             and now - person.seen_stamp_s <= self._policy.timing.fresh_within_s

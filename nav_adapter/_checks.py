@@ -66,4 +66,3 @@ def require_type(name: str, value: object, kind: type | UnionType) -> None:
 def goes_back(now: float, last_s: float) -> str:
     """Return the message about a stamp that goes back."""
     return f"stamp_s must not go backward, got {now:.6f} s after {last_s:.6f} s"
-

@@ -12,7 +12,7 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._places import position_sigma_m, refuse_absurd
+from ._places import checked_sigma_m, position_sigma_m
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile
 from .alerts import AlertKind
@@ -121,13 +121,11 @@ class Person(NamedTuple):
         walked_s = max(track.stamp_s - self.seen_stamp_s, 0.0) if self.is_lost else elapsed_s
         x, y = track.position_odom_m.tolist()
         (old_x, old_y), (vx, vy) = self.track_position_odom_m, self.velocity_odom_mps
-        apart_m = min(
-            math.hypot(x - old_x, y - old_y),
-            math.hypot(x - old_x - elapsed_s * vx, y - old_y - elapsed_s * vy),
-        )
         way_m = walking_mps * walked_s + _SAME_PLACE_M
+        apart_m = math.hypot(x - old_x, y - old_y)
         if apart_m <= way_m:
             return True
+        apart_m = min(apart_m, math.hypot(x - old_x - elapsed_s * vx, y - old_y - elapsed_s * vy))
         sigma_m = math.hypot(position_sigma_m(self.track, elapsed_s), position_sigma_m(track, 0.0))
         return apart_m <= way_m + _EXPLAINED_SIGMAS * sigma_m
 
@@ -170,6 +168,7 @@ class People:
             for each in self._passing_speeds
         ]
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
+        self._unaware_m = self._policy_radius_m(0.0)
 
     def follow(
         self,
@@ -248,9 +247,7 @@ class People:
                 heirs[track_id] = person
         return heirs
 
-    def _without_track(
-        self, person: Person, now: float, before_s: float | None
-    ) -> Person | None:
+    def _without_track(self, person: Person, now: float, before_s: float | None) -> Person | None:
         """Return a person without a track in the input: missing at first, then lost, then None.
 
         They are unaware and walk on. The tracker of this project reports a coasting person before
@@ -324,8 +321,9 @@ class People:
             lower = self._trusted_lower(track, None, now, stale)
             return _remembering(self._at(track, None, lower, now), before)
         lower = self._trusted_lower(track, before, now, stale)
-        advance_s = _advance_s(track, before)
-        shown_s = 0.0 if stale else min(advance_s, self._timing.fresh_within_s)
+        advance_s = track.stamp_s - track.time_since_seen_s - before.seen_stamp_s
+        counts = advance_s > _SAME_STAMP_S and not stale
+        shown_s = min(advance_s, self._timing.fresh_within_s) if counts else 0.0
         return self._at(track, before, lower, now, shown_s)
 
     def _trusted_lower(
@@ -337,19 +335,17 @@ class People:
         is no new evidence, whatever the track says. A look at a robot that has just asked for it is
         no chance look: the belief counts until it ends.
         """
-        fresh_s, status = self._timing.fresh_within_s, track.status
-        if stale or status == "tentative":
-            return 0.0
-        if now - (track.stamp_s - track.time_since_seen_s) > fresh_s:
+        seen_stamp_s, status = track.stamp_s - track.time_since_seen_s, track.status
+        if stale or status == "tentative" or now - seen_stamp_s > self._timing.fresh_within_s:
             return 0.0
         lower, counts_as = track.awareness_lower, self._policy.noticed_counts_as
         if counts_as is not None and track.noticed > 0.0 and status == "confirmed":
             asked = None if before is None else before.asked
             answered = asked is not None and asked.answered
-            if answered and now - asked.stamp_s <= self._answer_s or track.noticed >= _NOTICED:
+            if track.noticed >= _NOTICED or (answered and now - asked.stamp_s <= self._answer_s):
                 lower = max(lower, counts_as)
-        if before is not None and _advance_s(track, before) == 0.0:
-            lower = min(lower, before.awareness_lower)
+        if before is not None and seen_stamp_s - before.seen_stamp_s <= _SAME_STAMP_S:
+            return min(lower, before.awareness_lower)
         return lower
 
     def _at(
@@ -368,29 +364,41 @@ class People:
         (x, y), (vx, vy) = track.position_odom_m.tolist(), track.velocity_odom_mps.tolist()
         place = x + ahead_s * vx, y + ahead_s * vy
         # Growth ends where the robot stops for lack of data: more would only block its restart.
-        sigma_m = position_sigma_m(track, min(max(ahead_s, 0.0), self._timing.stop_after_s))
-        refuse_absurd(track, place, (vx, vy), sigma_m)
-        seen_stamp_s, confirmed = track.stamp_s - track.time_since_seen_s, track.status != "tentative"
+        grown_s = min(max(ahead_s, 0.0), self._timing.stop_after_s)
+        sigma_m = checked_sigma_m(track, place, (vx, vy), grown_s)
+        seen_stamp_s = track.stamp_s - track.time_since_seen_s
+        confirmed = track.status != "tentative"
         radius_m = self._target_m(0.0 if before is None else lower, sigma_m)
-        if before is None:
-            return Person(
-                *(track.id, track, (x, y), place, (vx, vy), seen_stamp_s),
-                *(lower, radius_m, sigma_m, 0.0, confirmed),
-            )
-        # A late frame is no evidence of awareness, but it does show the position. Without it, the
-        # uncertainty of the first sighting would never shrink with a slow camera.
-        shrinks = track.status == "confirmed" and before.known_s >= 0.0
-        shrunk_m = self._timing.shrink_rate_mps * shown_s if shrinks else 0.0
+        known_s, kept = 0.0, (None, None, None, ())
+        if before is not None:
+            # A late frame is no evidence of awareness, but it does show the position. Without it,
+            # the uncertainty of the first sighting would never shrink with a slow camera.
+            shrinks = track.status == "confirmed" and before.known_s >= 0.0
+            shrunk_m = self._timing.shrink_rate_mps * shown_s if shrinks else 0.0
+            radius_m = max(radius_m, before.radius_m - shrunk_m)
+            seen_stamp_s = max(seen_stamp_s, before.seen_stamp_s)
+            known_s = before.known_s + shown_s
+            confirmed = confirmed or before.was_confirmed
+            kept = before[-4:]
         return Person(
-            *(before.id, track, (x, y), place, (vx, vy), max(seen_stamp_s, before.seen_stamp_s)),
-            *(lower, max(radius_m, before.radius_m - shrunk_m), sigma_m),
-            *(before.known_s + shown_s, confirmed or before.was_confirmed),
-            *(before.lost_since_s, before.lost_limit_mps, before.asked, before.warned_s),
+            track.id if before is None else before.id,
+            track,
+            (x, y),
+            place,
+            (vx, vy),
+            seen_stamp_s,
+            lower,
+            radius_m,
+            sigma_m,
+            known_s,
+            confirmed,
+            *kept,
         )
 
     def _target_m(self, lower: float, sigma_m: float) -> float:
         """Return the radius that this awareness allows."""
-        return self._policy_radius_m(lower) + self._margins.uncertainty_sigmas * sigma_m
+        radius_m = self._policy_radius_m(lower) if lower else self._unaware_m
+        return radius_m + self._margins.uncertainty_sigmas * sigma_m
 
     def _policy_radius_m(self, awareness_lower: float) -> float:
         """Return the policy's radius, or the smallest with which the limit beside it is usable."""
@@ -415,12 +423,6 @@ class People:
             return speed_mps
         name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
         return finite_number(name, speed_mps, NavError, minimum=0.0)
-
-
-def _advance_s(track: PersonTrack, before: Person) -> float:
-    """Return by how much a track's latest sighting is newer than the one known, or 0."""
-    advance_s = track.stamp_s - track.time_since_seen_s - before.seen_stamp_s
-    return advance_s if advance_s > _SAME_STAMP_S else 0.0
 
 
 def _remembering(person: Person, before: Person | None) -> Person:

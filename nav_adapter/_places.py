@@ -14,12 +14,6 @@ from ._errors import NavError
 # 1e15 m a circle's corners fall together.
 _MOST_M: Final = 1e12
 _MOST_MPS: Final = 1e4
-_MOST: Final = (
-    ("position_odom_m", _MOST_M, "m"),
-    ("velocity_odom_mps", _MOST_MPS, "m/s"),
-    ("the standard deviation of covariance_odom", _MOST_M, "m"),
-    ("the velocity's variance in covariance_odom", _MOST_MPS**2, "m²/s²"),
-)
 
 
 def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
@@ -28,13 +22,7 @@ def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
     It is that of the most uncertain direction: the root of the larger eigenvalue of the position's
     part of F P Fᵀ.
     """
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = (
-        track.covariance_odom.tolist()
-    )
-    xx += ahead_s * (2.0 * xu + ahead_s * uu)
-    yy += ahead_s * (2.0 * yv + ahead_s * vv)
-    xy += ahead_s * (xv + yu + ahead_s * uv)
-    return math.sqrt(max(larger_eigenvalue(xx, xy, yy), 0.0))
+    return _sigma_m(track.covariance_odom.tolist(), ahead_s)
 
 
 def velocity_variance_m2ps2(track: PersonTrack) -> float:
@@ -44,33 +32,43 @@ def velocity_variance_m2ps2(track: PersonTrack) -> float:
     return variance_m2ps2
 
 
-def refuse_absurd(
+def checked_sigma_m(
     track: PersonTrack,
     place_m: tuple[float, float],
     velocity_mps: tuple[float, float],
-    sigma_m: float,
-) -> None:
-    """Refuse a person whose finite numbers are too large for any person.
+    ahead_s: float,
+) -> float:
+    """Return :func:`position_sigma_m` of a person whose numbers are not too large for any person.
 
     Args:
         track: of the person.
         place_m: predicted place, in odom.
         velocity_mps: of the track.
-        sigma_m: standard deviation of the place.
+        ahead_s: as there.
 
     Raises:
-        NavError: for such a number, or NaN, which an overflow may leave.
+        NavError: for such a number.
     """
-    numbers = (
-        max(abs(place_m[0]), abs(place_m[1])),
-        max(abs(velocity_mps[0]), abs(velocity_mps[1])),
-        sigma_m,
-        velocity_variance_m2ps2(track),
-    )
-    if sum(numbers) <= _MOST_MPS:
-        return
-    for value, (name, most, unit) in zip(numbers, _MOST, strict=True):
+    rows = track.covariance_odom.tolist()
+    place, speed = max(map(abs, place_m)), max(map(abs, velocity_mps))
+    sigma_m, variance = _sigma_m(rows, ahead_s), max(rows[2][2], rows[3][3])
+    for name, value, most, unit in (
+        ("position_odom_m", place, _MOST_M, "m"),
+        ("velocity_odom_mps", speed, _MOST_MPS, "m/s"),
+        ("the standard deviation of covariance_odom", sigma_m, _MOST_M, "m"),
+        ("the velocity's variance in covariance_odom", variance, _MOST_MPS**2, "m²/s²"),
+    ):
+        # A NaN, which an overflow may leave, fails the comparison too.
         if not value <= most:
             raise NavError(
                 f"track {track.id}: {name} must be at most {most:g} {unit}, got {value:g}"
             )
+    return sigma_m
+
+
+def _sigma_m(covariance: list[list[float]], ahead_s: float) -> float:
+    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = covariance
+    xx += ahead_s * (2.0 * xu + ahead_s * uu)
+    yy += ahead_s * (2.0 * yv + ahead_s * vv)
+    xy += ahead_s * (xv + yu + ahead_s * uv)
+    return math.sqrt(max(larger_eigenvalue(xx, xy, yy), 0.0))

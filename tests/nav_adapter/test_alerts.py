@@ -105,7 +105,7 @@ def test_the_most_urgent_person_gets_the_horn_first() -> None:
 def test_alerts_are_limited_in_rate(people: tuple[PersonTrack, ...], rates: list[float]) -> None:
     adapter, now = NavAdapter(AwarenessPolicy(), ROBOT), 0.0
     given_s: dict[tuple[int, str], float] = {}
-    sounded_s = -100.0
+    loudness, sounded_s = {"light": 0, "voice": 1, "horn": 2}, {0: -100.0, 1: -100.0, 2: -100.0}
     for dt in rates:
         now += dt
         result: NavConstraints = adapter.update(
@@ -118,9 +118,10 @@ def test_alerts_are_limited_in_rate(people: tuple[PersonTrack, ...], rates: list
             key = (alert.track_id, alert.kind)
             assert now - given_s.get(key, -100.0) >= REPEAT_AFTER_S
             given_s[key] = now
-            if alert.kind != "light":
-                assert now - sounded_s >= QUIET_S
-                sounded_s = now
+            loud = loudness[alert.kind]
+            if loud:
+                assert all(now - sounded_s[each] >= QUIET_S for each in range(loud, 3))
+                sounded_s[loud] = now
 
 
 def test_a_refused_update_uses_up_no_alert() -> None:
