@@ -143,7 +143,7 @@ class NavConstraints:
             speeds must not be empty. It starts from the measured speed, so a drive with its own
             ramp should get ``speed_limit_mps``: following a late measurement brakes too softly.
         alerts: people to warn now, and then the person to ask for attention, if any. An alert is
-            given once, not in every update.
+            given once, not in every update, and none by the watchdog.
         braking_suffices: False if a robot that brakes from now on at full deceleration may still be
             met before it stands, by the model of people. A limit is then not enough: warn, evade or
             stop harder.

@@ -130,6 +130,11 @@ class Person(NamedTuple):
         return apart_m <= way_m + _EXPLAINED_SIGMAS * sigma_m
 
 
+_NOTHING_KEPT: Final[
+    tuple[float | None, float | None, Asked | None, tuple[tuple[AlertKind, float], ...]]
+] = (None, None, None, ())
+
+
 class People:
     """Rules by which people are followed, trusted and sized. The caller keeps the people.
 
@@ -182,10 +187,10 @@ class People:
     ) -> list[Person]:
         """Return everybody as of ``now``, in the order of their ids: present, missing and lost.
 
-        A track goes on with the person of its id, wherever they can be there. A track of another
-        id that is new, or whose own person cannot be there, goes on with a person who has lost
-        theirs, if it is where they can be: they are at first sight again, but not forgotten. Each
-        track stands for one person; clutter explains nobody's absence.
+        A track goes on with the person of its id, if they can be there. A track that is new, or
+        whose own person cannot be there, goes on with somebody who has lost their id, if they can
+        be there: at first sight again, but not forgotten. Each track stands for one person, and
+        clutter for nobody.
 
         Args:
             people: of the update before.
@@ -341,8 +346,8 @@ class People:
         lower, counts_as = track.awareness_lower, self._policy.noticed_counts_as
         if counts_as is not None and track.noticed > 0.0 and status == "confirmed":
             asked = None if before is None else before.asked
-            answered = asked is not None and asked.answered
-            if track.noticed >= _NOTICED or (answered and now - asked.stamp_s <= self._answer_s):
+            answered = asked and asked.answered and now - asked.stamp_s <= self._answer_s
+            if answered or track.noticed >= _NOTICED:
                 lower = max(lower, counts_as)
         if before is not None and seen_stamp_s - before.seen_stamp_s <= _SAME_STAMP_S:
             return min(lower, before.awareness_lower)
@@ -369,7 +374,7 @@ class People:
         seen_stamp_s = track.stamp_s - track.time_since_seen_s
         confirmed = track.status != "tentative"
         radius_m = self._target_m(0.0 if before is None else lower, sigma_m)
-        known_s, kept = 0.0, (None, None, None, ())
+        known_s, kept = 0.0, _NOTHING_KEPT
         if before is not None:
             # A late frame is no evidence of awareness, but it does show the position. Without it,
             # the uncertainty of the first sighting would never shrink with a slow camera.
@@ -379,7 +384,7 @@ class People:
             seen_stamp_s = max(seen_stamp_s, before.seen_stamp_s)
             known_s = before.known_s + shown_s
             confirmed = confirmed or before.was_confirmed
-            kept = before[-4:]
+            kept = before.lost_since_s, before.lost_limit_mps, before.asked, before.warned_s
         return Person(
             track.id if before is None else before.id,
             track,
