@@ -30,13 +30,13 @@ def obstacles_of(people: Collection[Person], now: float) -> tuple[PersonObstacle
     centers.setflags(write=False)
     return tuple(
         trusted_obstacle(
+            partial(_polygon, person.radius_m, center),
             person.id,
             center,
             person.track.velocity_odom_mps,
             person.radius_m,
             person.track.height_m,
             person.awareness_lower,
-            partial(_polygon, person.radius_m, center),
             covariance,
         )
         for person, center, covariance in zip(
