@@ -26,10 +26,8 @@ from .policies import AttentionRules
 
 # The lower bound of α from which a person has looked.
 _LOOKED: Final = 0.5
-# A look sooner after a request is by chance. The eyes need 0.2 s to set out for a new target, and
-# the head 0.02 to 0.04 s more: Saslow, Latency for saccadic eye movement, J. Opt. Soc. Am. 57
-# (1967); Uemura et al., The reaction time of eye-head coordination in man, Neurosci. Lett. 32
-# (1982).
+# A look sooner after a request is by chance. The eyes need about 0.2 s to set out for a new target
+# (Saslow, Latency for saccadic eye movement, J. Opt. Soc. Am. 57, 1967), and the head follows.
 _REACTION_S: Final = 0.3 - 1e-9
 # Before frames have shown somebody for so long, their speed is hardly known, nor what a look wins.
 _KNOWN_S: Final = 1.0 - 1e-9
