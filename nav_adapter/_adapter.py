@@ -222,7 +222,11 @@ class NavAdapter:
             return Entry(memory, now)
         pause_s = now - latest.stamp_s
         if 0.0 <= pause_s <= self._policy.timing.stale_after_s:
-            if self._has_caught_up(now):
+            refused_s = self._gate.refused_for_s(now, self._policy.timing.stale_after_s)
+            if refused_s > 0.5 * self._policy.timing.fresh_within_s:
+                # A clock that was set back a little has just caught up. The tracker cannot tell the
+                # frames since then from late ones: their people may still have the awareness that
+                # they had before.
                 memory = replace(memory, silent=True)
             return Entry(memory, now)
         if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
@@ -242,18 +246,6 @@ class NavAdapter:
             f"stamp_s jumps ahead, got {now:.6f} s after {latest.stamp_s:.6f} s, with a "
             f"robot_state of {robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
         )
-
-    def _has_caught_up(self, now: float) -> bool:
-        """Return whether a clock that was set back a little has just caught up.
-
-        The tracker cannot tell the frames since then from late ones. Their people may still have
-        the awareness that they had before.
-        """
-        jumped, timing = self._gate.jumped.get(""), self._policy.timing
-        if jumped is None or jumped.stamps < 2:
-            return False
-        follows = 0.0 <= now - jumped.last_s <= timing.stale_after_s
-        return follows and now - jumped.first_s > 0.5 * timing.fresh_within_s
 
     @staticmethod
     def _perceived_s(

@@ -11,7 +11,10 @@ import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
-from tracking.awareness_filter import estimate, prior
+from tracking.awareness_filter import PRIOR, estimate
+from tracking.people import AVERTED_AWARENESS as _AVERTED
+from tracking.people import LOOKING_AWARENESS as _LOOKED
+from tracking.people import WALKING_MPS
 from tracking.prediction import PredictionModel
 
 from ._alerting import Sound, alerts_due, closest_approach
@@ -24,8 +27,6 @@ from .alerts import Alert, AlertMeans, Answer
 from .limit import STANDING_MPS
 from .policies import AttentionRules
 
-# The lower bound of α from which a person has looked.
-_LOOKED: Final = 0.5
 # A look sooner after a request is by chance. The eyes need about 0.2 s to set out for a new target
 # (Saslow, Latency for saccadic eye movement, J. Opt. Soc. Am. 57, 1967), and the head follows.
 _REACTION_S: Final = 0.3 - 1e-9
@@ -35,17 +36,12 @@ _KNOWN_S: Final = 1.0 - 1e-9
 _ANSWER_S: Final = 1.0
 # People so near to the one who is asked are asked too.
 _GROUP_M: Final = 1.5
-# Beside somebody who walks the same way this fast, a look is forgotten before the robot has passed.
-_WALKS_AHEAD_MPS: Final = 0.4
 # Neither way is expected to take longer than this.
 _LONGEST_S: Final = 10.0
 # A robot that has stood for so long is not on its way, and asks nobody.
 _PARKED_AFTER_S: Final = 10.0
 # Budget, and how long people count as asked.
 _MINUTE_S: Final = 60.0
-# A light is not noticed by somebody who looks this far past the robot: with the default cone, by
-# 57° and more.
-_AVERTED: Final = 0.1
 
 
 class AddressHistory(NamedTuple):
@@ -91,7 +87,7 @@ class Addressing:
         self._looked_lower = 1.0 if counts_as is None else counts_as
         if counts_as is not None:
             self._lasts_s += policy.filter.noticed_memory_s
-        nothing_known = estimate(prior(policy.filter), policy.filter)
+        nothing_known = estimate(PRIOR)
         self._unseen_std = 0.5 * float(nothing_known.awareness_std)
 
     def step(
@@ -189,7 +185,8 @@ class Addressing:
         straight, courses = self._governor.courses(later, robot_age_s)
         vx, vy = person.velocity_odom_mps
         along_mps = straight.cos * vx + straight.sin * vy
-        if along_mps + math.sqrt(velocity_variance_m2ps2(person.track)) >= _WALKS_AHEAD_MPS:
+        # Beside somebody who walks the same way, a look is forgotten before the robot has passed.
+        if along_mps + math.sqrt(velocity_variance_m2ps2(person.track)) >= WALKING_MPS:
             return 0.0
 
         def lowest_mps(some: Iterable[Person], lowest_mps: float) -> float:
