@@ -156,5 +156,5 @@ class SpeedGovernor:
         at_most_mps: float = math.inf,
     ) -> tuple[float, str]:
         """Return the limit that one person sets, infinite for none, and the rule."""
-        known = known_now(self._policy, self._unaware_mps, person.track.id, person, now)
+        known = known_now(self._policy, self._unaware_mps, person.id, person, now)
         return lowest(known, courses, self._rules, at_most_mps)

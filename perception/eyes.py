@@ -18,7 +18,7 @@ from ._camera import Camera
 from ._stages import HeadPose
 from .arrays import FloatArray, ImageRgb, covariance_matrix, finite_array, set_fields
 from .errors import PerceptionError
-from .matrices import mahalanobis2
+from .matrices import CHI2_999, mahalanobis2
 
 #: Distance of the iris ahead of the eye's centre of rotation. The centre lies 13.5 mm behind the
 #: front of the cornea (Fry and Hill 1962), the iris 3.6 mm.
@@ -31,9 +31,6 @@ AHEAD_M: Final = np.array([-0.0004, 0.0015])
 AHEAD_STD_M: Final = np.array([0.0007, 0.0015])
 # Eyes do not turn farther in the head than this.
 _MAX_TURN_RAD: Final = math.radians(50.0)
-# A measurement that lies farther off than all but 1 in 1000 (χ² of two degrees of freedom) shows
-# something else than irises.
-_LIMIT_CHI2: Final = 13.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,8 +170,8 @@ def fuse_with_prior(eyes: EyeGaze, eye_in_head_std_rad: tuple[float, float]) -> 
     """
     prior = np.diag(np.square(eye_in_head_std_rad))
     both = prior + eyes.covariance_rad2
-    if mahalanobis2(eyes.angles_rad, both) > _LIMIT_CHI2:
-        return None
+    if mahalanobis2(eyes.angles_rad, both) > CHI2_999:
+        return None  # what lies so far off is something else than irises
     gain = prior @ np.linalg.inv(both)
     keep = np.eye(2) - gain
     covariance = keep @ prior @ keep.T + gain @ eyes.covariance_rad2 @ gain.T

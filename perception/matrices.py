@@ -9,6 +9,9 @@ import numpy as np
 
 from .arrays import FloatArray
 
+#: χ² with two degrees of freedom that is exceeded by chance in 0.1 % of cases.
+CHI2_999: Final = 13.8
+
 
 def _inverse_2x2(matrices: FloatArray) -> FloatArray:
     """Return the inverses of symmetric matrices (…, 2, 2)."""

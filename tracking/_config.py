@@ -25,13 +25,6 @@ class AwarenessFilterConfig(StrictConfig):
     is seen without a face must not count as aware for longer than one who is not seen.
     """
 
-    prior_awareness: float = Field(default=0.05, gt=0.0, le=0.5)
-    """α of a person of whom nothing is known: the mean of the prior is its logit."""
-
-    prior_std_logit: float = Field(default=2.0, gt=0.0, le=5.0)
-    """Standard deviation of the prior in logit(α); uncertainty never grows beyond it. It is wide
-    enough for one turn of the head, about six units of logit(α)."""
-
     evidence_time_constant_s: float = Field(default=1.0, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior between two frames that show a face, and in the
     first moment (``missed_frame_s``) in which no frame shows the person."""
@@ -40,39 +33,13 @@ class AwarenessFilterConfig(StrictConfig):
     """Time constant of the drift to the prior while no frame shows the person."""
 
     missed_frame_s: float = Field(default=0.1, ge=0.0, le=1.0)
-    """For this long after the last frame with a face, or for one usual frame interval up to
-    ``max_evidence_gap_s`` if that is longer, a frame without the person may just have missed them:
-    the belief drifts with ``evidence_time_constant_s``. 0 switches this off: a missed frame then
-    counts as unseen at once."""
+    """For this long after the last frame with a face, or for one usual frame interval up to 0.25 s
+    if that is longer, a frame without the person may just have missed them: the belief drifts with
+    ``evidence_time_constant_s``. 0 switches this off: a missed frame then counts as unseen at
+    once."""
 
     no_face_time_constant_s: float = Field(default=0.2, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior while the person is seen without a usable face."""
-
-    max_evidence_gap_s: float = Field(default=0.25, ge=_LEAST_S, le=_MOST_S)
-    """Two frames with a face further apart than this are no evidence for the time between them."""
-
-    evidence_correlation_s: float = Field(default=0.1, ge=0.0, le=_MOST_S)
-    """Errors of α this close in time count as one error. This caps the information per second: the
-    variance of a frame dt after the last one is multiplied by ``evidence_correlation_s / dt`` where
-    that is above one, so a faster camera, or one that repeats frames, adds no certainty."""
-
-    clip_awareness: float = Field(default=0.02, ge=1e-9, lt=0.5)
-    """ε: α is clipped to [ε, 1 − ε] before the logit."""
-
-    min_evidence_std_logit: float = Field(default=0.3, ge=1e-4, le=100.0)
-    """Smallest standard deviation of a measurement in logit(α)."""
-
-    typical_evidence_std: float = Field(default=0.1, ge=1e-3, le=0.5)
-    """Standard deviation of α that a measurement usually has; see ``reported_std_weight``."""
-
-    reported_std_weight: float = Field(default=0.6, ge=0.0, le=1.0)
-    """Weight w of a reported σ against the typical one: the filter uses σ^w · σ_typical^(1 − w).
-    Half is right if σ differs between measurements by as large a factor as it is wrong. 1 trusts
-    the reported σ; 0 ignores it."""
-
-    max_evidence_std: float = Field(default=0.29, gt=0.0, le=0.5)
-    """An α with a larger reported σ is no evidence. 1/√12 ≈ 0.29 is the standard deviation
-    of the uniform distribution on [0, 1], which carries no information."""
 
     memory_s: float = Field(default=0.0, ge=0.0, le=10.0)
     """Memory of a look at the robot: the time constants of unseen and of no face are at least this.
@@ -85,11 +52,6 @@ class AwarenessFilterConfig(StrictConfig):
 
     lower_bound_confidence: float = Field(default=0.9, ge=0.5, lt=1.0)
     """One-sided confidence of ``awareness_lower``."""
-
-    @cached_property
-    def prior_logit(self) -> float:
-        """Mean of the prior in logit(α)."""
-        return math.log(self.prior_awareness / (1.0 - self.prior_awareness))
 
     @cached_property
     def bound_sigmas(self) -> float:
@@ -142,74 +104,29 @@ class TrackerConfig(TrackingConfig):
     acceleration_density_m2ps3: float = Field(default=0.05, ge=1e-9, le=1e4)
     """Spectral density q of the white acceleration in the motion model of a person."""
 
-    initial_velocity_std_mps: float = Field(default=1.0, ge=1e-4, le=3.0)
-    """Standard deviation of a new track's velocity, per axis: how fast people may walk."""
-
-    position_noise_floor_m: float = Field(default=0.05, ge=1e-4, le=_MOST_M)
-    """Smallest standard deviation of a measured position in any direction of the floor plane."""
-
     gate_probability: float = Field(default=0.9999, gt=0.0, lt=1.0)
     """Share of a person's true measurements that pass the Mahalanobis gate."""
 
     gate_distance_m: float = Field(default=1.0, ge=1e-4, le=_MOST_M)
     """Largest distance of a measurement from the predicted position of its track. With a slow
-    camera it is 3 ``initial_velocity_std_mps`` times the interval of frames, if that is more."""
-
-    detection_probability: float = Field(default=0.9, ge=0.01, le=0.999)
-    """P_D, the share of frames that report a person in sight."""
-
-    detection_correlation_s: float = Field(default=0.12, ge=0.0, le=_MOST_S)
-    """Frames closer than this share their errors, clutter included, and count in proportion."""
+    camera it is 3 m/s times the interval of frames, if that is more."""
 
     confirm_logit: float = Field(default=2.3, ge=-1e3, le=1e3)
     """A track is confirmed once the log-likelihood ratio of its detections to clutter exceeds this
     minus ln(time between frames / 1 s)."""
-
-    weak_score: float = Field(default=0.25, ge=0.0, le=1.0)
-    """A detection with a score below this may continue a confirmed track that no other detection
-    continues. It never starts a track and is no evidence of awareness. The shipped detector reports
-    no scores below 0.25 unless its ``score_threshold`` is lowered."""
 
     miss_cost: float = Field(default=10.0, ge=-1e3, le=1e3)
     """Cost of leaving a track and a measurement unmatched, in units of d² + ln det S (S in m²):
     2 ln(P_D / (2π β (1 − P_D))), here for a detection probability P_D of 0.9 and a density β of
     0.01 false or first detections per m² and frame."""
 
-    ambiguity_margin: float = Field(default=4.0, ge=0.0, le=1e3)
-    """A match is ambiguous if a rival match costs (d² + ln det S) at most this much more. 4 is a
-    likelihood ratio of e²."""
-
-    ambiguity_distance_m: float = Field(default=0.8, ge=0.0, le=_MOST_M)
-    """Rivals further away than this do not make a match ambiguous."""
-
-    ambiguous_noise_factor: float = Field(default=2.0, ge=1.0, le=1e4)
-    """Factor on the variance of a measured position whose match is ambiguous. When two people pass
-    each other, a wrong match would otherwise reverse both velocities."""
-
     max_missed_s: float = Field(default=1.2, ge=_LEAST_S, le=_MOST_S)
     """A confirmed track is deleted after this time in which frames should have shown the person and
     did not, …"""
 
     max_coast_s: float = Field(default=3.0, ge=0.0, le=60.0)
-    """… after this time in which none could, …"""
-
-    max_standing_coast_s: float = Field(default=5.0, ge=0.0, le=120.0)
-    """… or after this time if the person stood still, which needs a view. The three add up: half of
-    one and half of another end a track as well."""
-
-    standing_speed_mps: float = Field(default=0.3, ge=0.0, le=100.0)
-    """A person no faster than this, with a velocity consistent with 0, counts as standing."""
-
-    standing_time_constant_s: float = Field(default=1.0, ge=_LEAST_S, le=_MOST_S)
-    """Time constant with which the velocity of an unseen standing person decays."""
-
-    body_radius_m: float = Field(default=0.25, ge=1e-3, le=10.0)
-    """Radius of a person as an occluder: a body hides the people behind it."""
-
-    size_error_share: float = Field(default=0.35, ge=0.0, le=1.0)
-    """Standard deviation of the range that a camera infers from the size of a person, as a share
-    of the range that another sensor measures. Children and people who sit are put up to 1.7 times
-    too far away. 0 takes the camera's ranges as they are."""
+    """… after this time in which none could, or 5 s if that is more and the person stood still,
+    which needs a view. The times add up: half of one and half of another end a track as well."""
 
     max_lag_s: float = Field(default=0.5, ge=0.0, le=10.0)
     """A frame up to this much older than the latest is processed as if it had come in order. An
@@ -222,14 +139,13 @@ class TrackerConfig(TrackingConfig):
     """Refused frames that follow one another for this time, and are more than two, show that the
     clock has been set. The tracker then starts anew."""
 
-    stamp_tolerance_s: float = Field(default=1e-3, ge=0.0, le=_MOST_S)
-    """Largest difference between the stamps of an observation and of its frame."""
-
-    stature_m: float = Field(default=1.75, gt=0.0, le=10.0)
-    """Stature assumed for every person."""
-
     awareness: AwarenessFilterConfig = Field(default_factory=AwarenessFilterConfig)
     """Settings of the awareness filter."""
+
+    @cached_property
+    def gate_chi2(self) -> float:
+        """Largest squared Mahalanobis distance of a match: χ² with two degrees of freedom."""
+        return -2.0 * math.log1p(-self.gate_probability)
 
     @classmethod
     def for_policy(cls, policy: TrackedPolicy) -> TrackerConfig:

@@ -10,7 +10,6 @@ from typing import Any, Final, NamedTuple
 from perception import PersonObservation
 from perception.arrays import FloatArray
 
-from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._views import View
 from .awareness_filter import Evidence, evidence, trusted_std
@@ -19,6 +18,22 @@ from .awareness_filter import Evidence, evidence, trusted_std
 _MAX_POSITION_M: Final = 1e7
 _MAX_VARIANCE_M2: Final = 1e6
 _LEAST_RANGE_M: Final = 1e-3
+# No sensor of a robot sees further, and no range is less certain. Within them determinants keep
+# their digits.
+_MAX_RANGE_M: Final = 1e5
+_MAX_LASTING_STD: Final = 1.0
+# A size that differs from an adult's by more than a factor of 100 is none.
+_MAX_SIZE_LOG: Final = math.log(100.0)
+# Nearer than a nanometre, places have no direction from each other.
+_NO_OFFSET_M2: Final = 1e-18
+# Largest difference between the stamps of an observation and of its frame.
+_STAMP_TOLERANCE_S: Final = 1e-3
+# Smallest standard deviation of a measured position in any direction of the floor plane.
+_NOISE_FLOOR_M: Final = 0.05
+# A detection with a lower score may continue a confirmed track that no other continues. It never
+# starts one, and is no evidence of awareness. The shipped detector reports none unless its
+# ``score_threshold`` is lowered.
+_WEAK_SCORE: Final = 0.25
 
 
 @dataclass(slots=True)
@@ -44,8 +59,11 @@ class Spread:
         return Spread(factor * self.xx, factor * self.xy, factor * self.yy)
 
     def along(self, x: float, y: float) -> float:
-        """Return the variance along a direction, for a unit vector (x, y)."""
-        return self.xx * x * x + 2.0 * self.xy * x * y + self.yy * y * y
+        """Return the variance in the direction of an offset (x, y); in the mean of all without."""
+        length2 = x * x + y * y
+        if length2 < _NO_OFFSET_M2:
+            return 0.5 * (self.xx + self.yy)
+        return (self.xx * x * x + 2.0 * self.xy * x * y + self.yy * y * y) / length2
 
     def distance2_and_log_det(self, x: float, y: float) -> tuple[float, float]:
         """Return the squared Mahalanobis distance of an offset (x, y), and ln det."""
@@ -68,7 +86,7 @@ class Measurement:
         y: in odom, on the floor plane.
         noise_m2: covariance of x and y, positive definite.
         evidence: of awareness; None for no evidence.
-        weak: whether the score is below ``weak_score``.
+        weak: whether the score is below 0.25.
         lasting_std: part of the range's relative standard deviation that lasts; it is not in
             ``noise_m2`` (``_size``).
         size_log: ln of the range by an adult's size over the range; None where unknown.
@@ -108,7 +126,6 @@ def measurements_of(
     stamp_s: float,
     T_odom_camera: FloatArray,
     pose_covariance_odom: FloatArray | None,
-    config: TrackerConfig,
 ) -> list[Measurement]:
     """Return the observations of the frame at ``stamp_s`` as measurements.
 
@@ -121,11 +138,11 @@ def measurements_of(
         TrackingError: naming an observation that is not a ``PersonObservation``, has another stamp
             than the frame, or lies out of bounds.
     """
-    checked = _checked_observations(observations, stamp_s, config.stamp_tolerance_s)
+    checked = _checked_observations(observations, stamp_s)
     to_x, to_y = T_odom_camera[:2].tolist()
     pose = None if pose_covariance_odom is None else pose_covariance_odom.tolist()
     return [
-        _measurement(f"observations[{index}]", one, to_x, to_y, pose, config)
+        _measurement(f"observations[{index}]", one, to_x, to_y, pose)
         for index, one in enumerate(checked)
     ]
 
@@ -136,10 +153,20 @@ def _measurement(
     to_x: list[float],
     to_y: list[float],
     pose: list[list[float]] | None,
-    config: TrackerConfig,
 ) -> Measurement:
     """Return an observation, given the two rows of T_odom_camera that lead to the floor plane."""
     a, b, c = one.position_camera_m.tolist()
+    range_m, lasting = math.hypot(a, b, c), one.range_lasting_relative_std
+    if range_m > _MAX_RANGE_M:
+        raise TrackingError(
+            f"{name}.position_camera_m must lie within {_MAX_RANGE_M:g} m of the sensor, got "
+            f"{[a, b, c]} m"
+        )
+    if lasting > _MAX_LASTING_STD:
+        raise TrackingError(
+            f"{name}.range_lasting_relative_std must be at most {_MAX_LASTING_STD:g}, got "
+            f"{lasting:g}"
+        )
     spread = one.position_covariance_m2.tolist()
     ax, bx, cx, origin_x = to_x
     ay, by, cy, origin_y = to_y
@@ -161,7 +188,6 @@ def _measurement(
         ax * n_x + bx * n_y + cx * n_z,
         ay * n_x + by * n_y + cy * n_z,
     )
-    lasting = one.range_lasting_relative_std
     if lasting:
         noise = noise.plus(outer(east, north, -lasting * lasting))
     if pose is not None:
@@ -177,25 +203,22 @@ def _measurement(
             f"{name}.position_covariance_m2 must sum to at most {_MAX_VARIANCE_M2:g} m² on the "
             f"floor plane, the pose's share included, got {noise.xx + noise.yy:g} m²"
         )
-    filtered = config.awareness
     measured = Measurement(
         x,
         y,
-        with_noise_floor(noise, config.position_noise_floor_m),
-        evidence(one.awareness, trusted_std(one.awareness_std, filtered), filtered),
-        one.score < config.weak_score,
+        with_noise_floor(noise),
+        evidence(one.awareness, trusted_std(one.awareness_std)),
+        one.score < _WEAK_SCORE,
         lasting,
     )
     if one.size_range_m is not None and one.size_range_relative_std is not None:
-        placed_m = max(math.sqrt(a * a + b * b + c * c), _LEAST_RANGE_M)
-        measured.size_log = math.log(one.size_range_m / placed_m)
-        measured.size_variance = one.size_range_relative_std**2
+        size_log = math.log(one.size_range_m) - math.log(max(range_m, _LEAST_RANGE_M))
+        if abs(size_log) <= _MAX_SIZE_LOG:
+            measured.size_log, measured.size_variance = size_log, one.size_range_relative_std**2
     return measured
 
 
-def _checked_observations(
-    observations: Any, stamp_s: float, tolerance_s: float
-) -> tuple[PersonObservation, ...]:
+def _checked_observations(observations: Any, stamp_s: float) -> tuple[PersonObservation, ...]:
     """Return the observations after checking their types and stamps."""
     try:
         checked = tuple(observations)
@@ -209,10 +232,10 @@ def _checked_observations(
             raise TrackingError(
                 f"observations[{index}] must be a PersonObservation, got {type(one).__name__}"
             )
-        if abs(one.stamp_s - stamp_s) > tolerance_s:
+        if abs(one.stamp_s - stamp_s) > _STAMP_TOLERANCE_S:
             raise TrackingError(
                 f"observations[{index}].stamp_s = {one.stamp_s!r} s must be that of its frame, "
-                f"{stamp_s!r} s, within {tolerance_s:g} s"
+                f"{stamp_s!r} s, within {_STAMP_TOLERANCE_S:g} s"
             )
     return checked
 
@@ -227,15 +250,15 @@ def _pose_noise(east_m: float, north_m: float, pose: list[list[float]]) -> Sprea
     )
 
 
-def with_noise_floor(spread_m2: Spread, floor_m: float) -> Spread:
-    """Return a covariance with no standard deviation below ``floor_m`` in any direction.
+def with_noise_floor(spread_m2: Spread) -> Spread:
+    """Return a covariance with no standard deviation below 0.05 m in any direction.
 
     Eigenvalues below the floor are raised to it and the eigenvectors are kept, in closed form: the
     result of a rotated covariance is the rotated result.
     """
     xx, xy, yy = spread_m2.xx, spread_m2.xy, spread_m2.yy
     centre, radius = 0.5 * (xx + yy), math.hypot(0.5 * (xx - yy), xy)
-    low, high, floor = centre - radius, centre + radius, floor_m * floor_m
+    low, high, floor = centre - radius, centre + radius, _NOISE_FLOOR_M * _NOISE_FLOOR_M
     if low >= floor:
         return spread_m2
     # A covariance below the floor in every direction becomes isotropic.

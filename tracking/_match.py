@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
-from ._by_ray import PRICE, Ray, rays
 from ._frame import Measurement
-from ._person import Track
-from ._sensors import Gates
-from ._size import Taken, knows_size
+from ._person import WALKER_STD_MPS, Track
+from ._size import PRICE, Ray, Taken, knows_size, rays
 from ._state import Step
 from .awareness_filter import Evidence
 
 # How far a person may walk between two frames, in standard deviations of a new track's velocity.
 _REACH_SIGMAS: Final = 3.0
+#: A match is ambiguous if a rival match costs (d² + ln det S) at most this much more, a likelihood
+#: ratio of e², …
+AMBIGUITY_MARGIN: Final = 4.0
+#: … and is no further away than this.
+AMBIGUITY_M: Final = 0.8
 # Two people are not as near to each other.
 _DOUBLE_M: Final = 0.25
 
@@ -80,6 +83,20 @@ class Match:
         self.rivals: list[tuple[int, int]] = []
 
 
+class Gates(NamedTuple):
+    """Limits within which a match is possible.
+
+    Attributes:
+        distance_m: largest distance.
+        chi2: largest squared Mahalanobis distance.
+        miss_cost: cost of leaving a track and a measurement unmatched.
+    """
+
+    distance_m: float
+    chi2: float
+    miss_cost: float
+
+
 _Edges = dict[int, dict[int, Sight]]
 
 
@@ -102,15 +119,14 @@ def matched(tracks: list[Track], step: Step) -> Match:
         return match
     strong = [column for column, one in enumerate(measured) if not one.weak]
     if tracks:
-        gates, period_s = step.sensor.gates, step.clock.known_period_s
-        reach_m = _REACH_SIGMAS * step.config.initial_velocity_std_mps * period_s
-        if reach_m > gates.distance_m:
-            gates = gates._replace(distance_m=reach_m)
+        config, origin = step.config, step.state.origin_m
+        reach_m = _REACH_SIGMAS * WALKER_STD_MPS * step.clock.known_period_s
+        gates = Gates(max(config.gate_distance_m, reach_m), config.gate_chi2, config.miss_cost)
         along = rays(tracks, step)
 
         def offer(rows: Sequence[int], columns: list[int]) -> None:
-            edges = _edges(tracks, rows, measured, columns, along, step.state.origin_m, gates)
-            _associate(match, edges, tracks, measured, gates)
+            edges = _edges(tracks, rows, measured, columns, along, origin, gates)
+            _associate(match, edges, tracks, measured, gates.miss_cost)
 
         offer(range(len(tracks)), strong)
         if len(strong) < len(measured):
@@ -196,12 +212,12 @@ def _sight(
     spread = taken.spread_m2(track)
     if near:
         distance2, log_det = spread.distance2_and_log_det(dx, dy)
-        if distance2 <= gates.mahalanobis2:
+        if distance2 <= gates.chi2:
             return Sight(taken, distance2 + log_det, ray)
     if ray is None or not ray.allows(given):
         return None
     distance2, log_det = spread.plus(ray.extra_m2).distance2_and_log_det(dx, dy)
-    if distance2 > gates.mahalanobis2:
+    if distance2 > gates.chi2:
         return None
     return Sight(taken, distance2 + log_det + PRICE, ray, by_ray=True)
 
@@ -211,7 +227,7 @@ def _associate(
     edges: _Edges,
     tracks: list[Track],
     measured: list[Measurement],
-    gates: Gates,
+    miss_cost: float,
 ) -> None:
     """Write the best set of matches into ``match``, and which of them are ambiguous."""
     owner: dict[int, int] = {}
@@ -220,17 +236,17 @@ def _associate(
             row: {
                 column: sight.cost
                 for column, sight in found.items()
-                if sight.cost < gates.miss_cost and column not in owner
+                if sight.cost < miss_cost and column not in owner
             }
             for row, found in edges.items()
             if tracks[row].confirmed is confirmed
         }
         if costs:
-            owner.update(assigned(costs, gates.miss_cost))
+            owner.update(assigned(costs, miss_cost))
     partner = {row: column for column, row in owner.items()}
     for row, column in partner.items():
         match.sights[row] = edges[row][column]
-    reach2 = gates.ambiguity_distance_m**2
+    reach2 = AMBIGUITY_M**2
     for row, found in edges.items():
         for column, sight in found.items():
             holder = owner.get(column)
@@ -241,7 +257,7 @@ def _associate(
                 own.evidence = _lower(own.evidence, sight.given.evidence)
                 continue
             # The track could have matched this measurement, …
-            if own is not None and sight.cost <= own.cost + gates.ambiguity_margin:
+            if own is not None and sight.cost <= own.cost + AMBIGUITY_MARGIN:
                 a, b = measured[column], own.given
                 if (a.x - b.x) ** 2 + (a.y - b.y) ** 2 <= reach2:
                     match.rivals.append((row, -1 if holder is None else holder))
@@ -250,7 +266,7 @@ def _associate(
             other = None if holder is None else match.sights[holder]
             if other is None or holder is None:
                 continue
-            if sight.cost <= other.cost + gates.ambiguity_margin:
+            if sight.cost <= other.cost + AMBIGUITY_MARGIN:
                 c, d = tracks[row], tracks[holder]
                 if (c.x - d.x) ** 2 + (c.y - d.y) ** 2 <= reach2:
                     match.rivals.append((holder, row))

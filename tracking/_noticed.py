@@ -26,9 +26,10 @@ from typing import Final
 from ._match import Match, Sight
 from ._person import Track
 from ._sensors import Sensors
-from ._state import State, Step, face_period_s
-from .awareness_filter import grace_s
-from .clock import FrameClock
+from ._state import State, Step, absence_s, face_period_s
+from .awareness_filter import EVIDENCE_GAP_S, grace_s, logit
+from .clock import GAP_PERIODS, FrameClock
+from .people import AVERTED_AWARENESS, WALKING_MPS
 
 # Half a second of certain looks gives a belief of a half.
 _LOOKING_S: Final = 0.5 / math.log(2.0)
@@ -36,23 +37,11 @@ _LOOKING_S: Final = 0.5 / math.log(2.0)
 _FORGETTING_S: Final = 3.0
 # A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
 _LOOK: Final = 0.5
-# A face looks away if α is at most this, and below a half by one standard deviation: with the
-# default cone it points more than 57° off the robot. A person who passes the robot and looks ahead
-# still has it in the corner of the eye.
-_AVERTED_AWARENESS: Final = 0.1
+# α of a face that looks away is low, and below a half by one standard deviation.
 _AVERTED_SIGMAS: Final = -1.0
-_AVERTED_LOGIT: Final = math.log(_AVERTED_AWARENESS / (1.0 - _AVERTED_AWARENESS))
+_AVERTED_LOGIT: Final = logit(AVERTED_AWARENESS)
 # One frame may be wrong about a face, and two are not both by chance.
 _AVERTED_S: Final = 0.09
-# Somebody walks at this speed or faster: three standard deviations of a velocity from scans.
-_WALKING_MPS: Final = 0.4
-# Cameras that are silent for longer than this see no face that looks away.
-_BLIND_S: Final = 0.5
-# Two scans in a row without the person, or as long a silence, are a gap.
-_GAP_PERIODS: Final = 2.5
-# How much faster towards the robot than before: 2.5 σ of a velocity from scans. Speed and
-# separation takes the measured speed towards the robot in any case.
-_FASTER_MPS: Final = 0.4
 # A person who stood has begun to move at this speed, if it is not 0 by 99.7 % (χ², two degrees).
 _STARTED_MPS: Final = 0.25
 _STARTED_CHI2: Final = 11.6
@@ -66,11 +55,12 @@ def remembers(sensors: Sensors) -> bool:
 
 def held(track: Track, stamp_s: float, clocks: tuple[FrameClock, ...], sensors: Sensors) -> bool:
     """Return whether a sensor without faces has seen a person without a gap."""
-    return any(
-        clock.period_s < math.inf and stamp_s - seen_s <= _GAP_PERIODS * clock.period_s
-        for index, (clock, seen_s) in enumerate(zip(clocks, track.seen_s, strict=True))
-        if index not in sensors.faces
-    )
+    for sensor, clock, seen_s in zip(sensors.all, clocks, track.seen_s, strict=True):
+        if sensor.settings.sees_faces or clock.period_s == math.inf:
+            continue
+        if stamp_s - seen_s <= GAP_PERIODS * clock.period_s:
+            return True
+    return False
 
 
 def noticed(track: Track, stamp_s: float, state: State, sensors: Sensors) -> float:
@@ -105,7 +95,7 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     """Take a frame into the looks of one person, who looks at the robot by ``look`` in [0, 1]."""
     stamp, faces, looking = step.frame.stamp_s, step.earlier.faces, look > 0.0
     config, sees_faces = step.config.awareness, step.sensor.settings.sees_faces
-    dt_s = min(step.dt_s, config.max_evidence_gap_s) if sees_faces else 0.0
+    dt_s = min(step.dt_s, EVIDENCE_GAP_S) if sees_faces else 0.0
     period_s = face_period_s(track, faces, step.state.clocks, step.sensors)
     since_s = stamp - track.look_s
     if looking:
@@ -133,8 +123,8 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     if not (doubtful or averted or sight.ambiguous):
         # A look after a pause stands for one frame, not for the pause. Of two cameras, it stands
         # for the time since the last look of either.
-        follows = since_s <= config.max_evidence_gap_s
-        stands_for_s = min(sight.stands_for_s, config.max_evidence_gap_s)
+        follows = since_s <= EVIDENCE_GAP_S
+        stands_for_s = min(sight.stands_for_s, EVIDENCE_GAP_S)
         track.looked_s += look * min(stands_for_s, since_s if follows else period_s)
     track.look_s = stamp
     track.look_velocity_mps = (track.vx, track.vy)
@@ -145,7 +135,7 @@ def _cameras_are_silent(stamp_s: float, faces: FrameClock) -> bool:
     """Return whether no camera has sent a frame for so long that nobody would see a face."""
     if faces.stamp_s is None:
         return True
-    return stamp_s - faces.stamp_s > max(_BLIND_S, _GAP_PERIODS * faces.known_period_s)
+    return stamp_s - faces.stamp_s > absence_s(faces.known_period_s)
 
 
 def _shared_with_rivals(tracks: list[Track], match: Match) -> dict[int, tuple[float, float]]:
@@ -191,7 +181,7 @@ def _looks_away(track: Track, sight: Sight | None, step: Step) -> bool:
     if mean > _AVERTED_LOGIT or mean > _AVERTED_SIGMAS * math.sqrt(variance):
         return False
     x, y = _towards(track, step)
-    return x * track.vx + y * track.vy >= 0.0 or track.speed_mps < _WALKING_MPS
+    return x * track.vx + y * track.vy >= 0.0 or track.speed_mps < WALKING_MPS
 
 
 def _is_interrupted(
@@ -203,7 +193,7 @@ def _is_interrupted(
     """
     config = step.config.awareness
     known_s = period_s if period_s < math.inf else 0.0
-    longest_s = max(config.max_evidence_gap_s, _GAP_PERIODS * known_s)
+    longest_s = max(EVIDENCE_GAP_S, GAP_PERIODS * known_s)
     recent_s = longest_s if looking else grace_s(period_s, config)
     if track.look_s >= step.frame.stamp_s - recent_s:
         return False
@@ -228,7 +218,8 @@ def _sets_off(track: Track, step: Step) -> bool:
     # On the same course the speed towards the robot changes while both move.
     expected_mps = max(x * before_x + y * before_y, 0.0)
     expected_mps *= min(track.look_speed_mps / max(math.hypot(before_x, before_y), 1e-9), 1.0)
-    if x * track.vx + y * track.vy > expected_mps + _FASTER_MPS:
+    # Speed and separation takes the measured speed towards the robot in any case.
+    if x * track.vx + y * track.vy > expected_mps + WALKING_MPS:
         return True
     started = track.look_standing and track.speed_mps > _STARTED_MPS
     return started and track.velocity_chi2() > _STARTED_CHI2

@@ -5,14 +5,20 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ._config import TrackerConfig
 from ._frame import Frame, Measurement, Spread
-from .awareness_filter import AwarenessBelief, prior
+from .awareness_filter import PRIOR, AwarenessBelief
+from .covariances import Upper, drifted
 
 # χ² with two degrees of freedom: 90 % of the estimated velocities of a standing person pass.
 _STANDING_CHI2: Final = 4.605
+# A person no faster than this, with a velocity consistent with 0, counts as standing.
+_STANDING_MPS: Final = 0.3
 # A standing person is predicted with constant velocity for this long after the last sighting.
 _STANDING_HOLD_S: Final = 0.5
+# Time constant with which the velocity of an unseen standing person then decays.
+_STANDING_DECAY_S: Final = 1.0
+#: Standard deviation of a new track's velocity, per axis: how fast people may walk.
+WALKER_STD_MPS: Final = 1.0
 # For steps below this share of the time constant, the closed form loses digits; use its series.
 _SHORT_SHARE: Final = 1e-3
 
@@ -57,12 +63,10 @@ class Track:
         size_variance: of it; ∞ where nothing is known of the person's size.
     """
 
-    def __init__(
-        self, number: int, measured: Measurement, frame: Frame, sensors: int, config: TrackerConfig
-    ) -> None:
+    def __init__(self, number: int, measured: Measurement, frame: Frame, sensors: int) -> None:
         self.id = number
         self.x, self.y, self.vx, self.vy = measured.x, measured.y, 0.0, 0.0
-        noise, velocity_variance = measured.noise_m2, config.initial_velocity_std_mps**2
+        noise, velocity_variance = measured.noise_m2, WALKER_STD_MPS**2
         self.p00, self.p01, self.p02, self.p03 = noise.xx, noise.xy, 0.0, 0.0
         self.p11, self.p12, self.p13 = noise.yy, 0.0, 0.0
         self.p22, self.p23, self.p33 = velocity_variance, 0.0, velocity_variance
@@ -74,7 +78,7 @@ class Track:
         self.presence[frame.sensor] = 0.0
         self.lost = 0.0
         self.passed_s = [-math.inf] * sensors
-        self.belief: AwarenessBelief = prior(config.awareness)
+        self.belief: AwarenessBelief = PRIOR
         self.face_s = -math.inf
         self.looked_s = 0.0
         self.look_s = -math.inf
@@ -101,6 +105,14 @@ class Track:
         return Spread(self.p00, self.p01, self.p11)
 
     @property
+    def upper(self) -> Upper[float]:
+        """Upper triangle of the covariance."""
+        return (
+            *(self.p00, self.p01, self.p02, self.p03, self.p11),
+            *(self.p12, self.p13, self.p22, self.p23, self.p33),
+        )
+
+    @property
     def speed_mps(self) -> float:
         """Speed over the floor."""
         return math.hypot(self.vx, self.vy)
@@ -109,8 +121,8 @@ class Track:
         """Return how far the velocity is from 0: χ² with two degrees of freedom."""
         return Spread(self.p22, self.p23, self.p33).distance2_and_log_det(self.vx, self.vy)[0]
 
-    def predict(self, from_s: float, to_s: float, config: TrackerConfig) -> None:
-        """Move on from one stamp to a later one.
+    def predict(self, from_s: float, to_s: float, q: float) -> None:
+        """Move on from one stamp to a later one, under white acceleration of density q.
 
         With constant velocity, an unseen standing person would drift off with the remaining
         estimated velocity, and its uncertainty, which grows with the cube of time, would cover the
@@ -122,55 +134,43 @@ class Track:
             damped_s = max(to_s - max(self.last_seen_s + _STANDING_HOLD_S, from_s), 0.0)
         free_s = to_s - from_s - damped_s
         if free_s > 0.0:
-            self._predict_free(free_s, config.acceleration_density_m2ps3)
+            place_noise, cross_noise = q * free_s**3 / 3.0, q * free_s * free_s / 2.0
+            self._move(free_s, 1.0, place_noise, cross_noise, q * free_s)
         if damped_s > 0.0:
-            self._predict_damped(
-                damped_s, config.standing_time_constant_s, config.acceleration_density_m2ps3
-            )
+            self._predict_damped(damped_s, q)
 
-    def _predict_free(self, dt: float, q: float) -> None:
-        """Move on at constant velocity under white acceleration of density q."""
-        place_noise, cross_noise = q * dt * dt * dt / 3.0, q * dt * dt / 2.0
-        self.x += dt * self.vx
-        self.y += dt * self.vy
-        self.p00 += dt * (2.0 * self.p02 + dt * self.p22) + place_noise
-        self.p01 += dt * (self.p12 + self.p03 + dt * self.p23)
-        self.p11 += dt * (2.0 * self.p13 + dt * self.p33) + place_noise
-        self.p02 += dt * self.p22 + cross_noise
-        self.p03 += dt * self.p23
-        self.p12 += dt * self.p23
-        self.p13 += dt * self.p33 + cross_noise
-        self.p22 += q * dt
-        self.p33 += q * dt
-
-    def _predict_damped(self, dt: float, tau: float, q: float) -> None:
+    def _predict_damped(self, dt: float, q: float) -> None:
         """Move on while the velocity decays with τ: an Ornstein–Uhlenbeck process.
 
         Its variance never exceeds q τ / 2, and the variance of the position grows in proportion to
         time, not to its cube.
         """
+        tau = _STANDING_DECAY_S
         share = dt / tau
         decayed, decayed2 = -math.expm1(-share), -math.expm1(-2.0 * share)
-        carried, kept = tau * decayed, 1.0 - decayed  # x += carried · vx, vx *= kept
+        carried = tau * decayed
         if share < _SHORT_SHARE:
             place_noise = q * dt * dt * dt * (1.0 / 3.0 - 0.25 * share)
         else:
             place_noise = q * tau * tau * (dt - 2.0 * tau * decayed + 0.5 * tau * decayed2)
         cross_noise, velocity_noise = q * 0.5 * carried * carried, q * 0.5 * tau * decayed2
-        self.x += carried * self.vx
-        self.y += carried * self.vy
+        self._move(carried, 1.0 - decayed, place_noise, cross_noise, velocity_noise)
+
+    def _move(
+        self, carried_s: float, kept: float, place_m2: float, cross_m2ps: float, speed_m2ps2: float
+    ) -> None:
+        """Add ``carried_s`` velocities to the place and keep a share of them; then add noise."""
+        self.x += carried_s * self.vx
+        self.y += carried_s * self.vy
         self.vx *= kept
         self.vy *= kept
-        self.p00 += carried * (2.0 * self.p02 + carried * self.p22) + place_noise
-        self.p01 += carried * (self.p12 + self.p03 + carried * self.p23)
-        self.p11 += carried * (2.0 * self.p13 + carried * self.p33) + place_noise
-        self.p02 = kept * (self.p02 + carried * self.p22) + cross_noise
-        self.p03 = kept * (self.p03 + carried * self.p23)
-        self.p12 = kept * (self.p12 + carried * self.p23)
-        self.p13 = kept * (self.p13 + carried * self.p33) + cross_noise
-        self.p22 = kept * kept * self.p22 + velocity_noise
-        self.p23 *= kept * kept
-        self.p33 = kept * kept * self.p33 + velocity_noise
+        xx, self.p01, xu, xv, yy, yu, yv, uu, uv, vv = drifted(self.upper, carried_s)
+        kept2 = kept * kept
+        self.p00, self.p11 = xx + place_m2, yy + place_m2
+        self.p02, self.p03 = kept * xu + cross_m2ps, kept * xv
+        self.p12, self.p13 = kept * yu, kept * yv + cross_m2ps
+        self.p22, self.p33 = kept2 * uu + speed_m2ps2, kept2 * vv + speed_m2ps2
+        self.p23 = kept2 * uv
 
     def widen(self, b: tuple[float, float, float, float], factor: float) -> None:
         """Add factor · b bᵀ to the covariance."""
@@ -214,9 +214,9 @@ class Track:
         self.p23 -= k20 * p03 + k21 * p13
         self.p33 -= k30 * p03 + k31 * p13
 
-    def stands(self, limit_mps: float) -> bool:
+    def stands(self) -> bool:
         """Return whether the velocity is small, well known and consistent with 0."""
-        limit2 = limit_mps * limit_mps
+        limit2 = _STANDING_MPS * _STANDING_MPS
         if self.vx * self.vx + self.vy * self.vy > limit2 or self.p22 + self.p33 > 2.0 * limit2:
             return False
         return self.velocity_chi2() <= _STANDING_CHI2

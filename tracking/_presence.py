@@ -24,18 +24,26 @@ from typing import Final
 
 import numpy as np
 
+from perception.anthropometry import BODY_RADIUS_M, MEAN_STATURE_M
 from perception.matrices import larger_eigenvalue
 
 from ._config import TrackerConfig
 from ._errors import TrackingError
 from ._person import Track
 from ._sensors import Sensor, Sensors
-from ._state import CHEST_M, State, Step
-from ._views import RangedView
+from ._state import State, Step
+from ._views import CHEST_M, RangedView
 from .clock import FrameClock
 
 # Log-odds that somebody is there whom a frame has just shown.
 _SURE: Final = 8.0 * math.log(10.0)
+# P_D, the share of frames that report a person in sight, and the evidence of one that does not.
+_DETECTION_PROBABILITY: Final = 0.9
+_LOG_MISSED: Final = math.log1p(-_DETECTION_PROBABILITY)
+# Frames closer than this share their errors, clutter included, and count in proportion.
+_CORRELATION_S: Final = 0.12
+# Somebody who stood still is kept for this long while nobody could see them.
+_STANDING_COAST_S: Final = 5.0
 # A tentative track outlives as many missed frames in a row as happen to 1 % of people.
 _GIVEN_UP: Final = 1.25 * math.log(0.01)
 # One frame counts for at most this share of max_missed_s, however long the pause before it.
@@ -68,7 +76,7 @@ def hit_evidence(distance2: float, log_det: float, beside: bool, step: Step) -> 
         beside: whether it may be the double of another person's.
         step: the frame.
     """
-    gain = 0.5 * (step.sensor.gates.miss_cost - distance2 - log_det) + step.sensor.log_missed
+    gain = 0.5 * (step.config.miss_cost - distance2 - log_det) + _LOG_MISSED
     return min(gain, _BESIDE_HIT) if beside else gain
 
 
@@ -88,7 +96,7 @@ def record_hit(track: Track, gain: float, stands_for_s: float, step: Step) -> No
     index, stamp, period_s = step.sensor.index, step.frame.stamp_s, step.clock.period_s
     second = step.is_second and track.seen_s[index] < stamp
     track.seen_s[index] = track.last_seen_s = stamp
-    track.standing = track.stands(step.config.standing_speed_mps)
+    track.standing = track.stands()
     if track.confirmed:
         track.presence[index] = _SURE
         return
@@ -99,7 +107,7 @@ def record_hit(track: Track, gain: float, stands_for_s: float, step: Step) -> No
     if second:
         # The first of two frames with this stamp did not show the person, but the second does.
         before += track.lost
-    counted = _weight(stands_for_s, step.config) * gain
+    counted = _weight(stands_for_s) * gain
     track.presence[index] = before + min(max(counted, 0.0), _MOST_OF_ONE_FRAME)
     if period_s < math.inf:
         needed = step.config.confirm_logit - math.log(period_s)
@@ -139,32 +147,28 @@ def _loss(track: Track, visible: float, dt_s: float, tracks: Sequence[Track], st
     hidden_s = (1.0 - visible) * dt_s
     lost = hidden_s * _fading_per_s(track, sensor, config)
     # How much less likely the frame is with the person there, as a share of a person in full view.
-    probability = sensor.settings.detection_probability
-    share = math.log1p(-probability * visible) / sensor.log_missed
+    share = math.log1p(-_DETECTION_PROBABILITY * visible) / _LOG_MISSED
     if track.confirmed:
         counted_s = min(dt_s, _MAX_SHARE_OF_ONE_FRAME * config.max_missed_s)
         return lost + share * counted_s * _SURE / config.max_missed_s
-    miss = _BESIDE_MISS if is_beside(track, tracks, step) else sensor.log_missed
-    return lost - share * _weight(dt_s, config) * miss
+    miss = _BESIDE_MISS if is_beside(track, tracks, step) else _LOG_MISSED
+    return lost - share * _weight(dt_s) * miss
 
 
-def _weight(dt_s: float, config: TrackerConfig) -> float:
+def _weight(dt_s: float) -> float:
     """Return the weight of a frame ``dt_s`` after the one before, for tracks not confirmed yet.
 
-    Frames closer than ``detection_correlation_s`` share their errors, clutter included. So a frame
-    counts in proportion to the time that it stands for, and a faster camera adds no certainty. A
-    second frame with one stamp adds nothing.
+    A frame counts in proportion to the time that it stands for, so a faster camera adds no
+    certainty. A second frame with one stamp adds nothing.
     """
-    if dt_s >= config.detection_correlation_s:
-        return 1.0 if dt_s > 0.0 else 0.0
-    return dt_s / config.detection_correlation_s
+    return min(dt_s / _CORRELATION_S, 1.0)
 
 
 def _fading_per_s(track: Track, sensor: Sensor, config: TrackerConfig) -> float:
     """Return what each second takes in which a sensor cannot see a person."""
     kept_s = config.max_coast_s
     if track.standing and sensor.view is not None:
-        kept_s = max(config.max_standing_coast_s, kept_s)
+        kept_s = max(_STANDING_COAST_S, kept_s)
     return _SURE / max(kept_s, 1e-9)
 
 
@@ -213,7 +217,7 @@ def is_over(track: Track, stamp_s: float, clocks: Sequence[FrameClock], sensors:
         gone = 0.0
         if not track.confirmed:
             period_s = clock.known_period_s
-            gone = _GIVEN_UP * (_weight(period_s, config) if period_s > 0.0 else 1.0)
+            gone = _GIVEN_UP * (_weight(period_s) if period_s > 0.0 else 1.0)
         if _left(track, sensor, clock, stamp_s, config) >= gone - _ROUNDING:
             return False
     return True
@@ -237,7 +241,7 @@ def _visibility(unseen: list[Track], shown: list[Track], step: Step) -> list[flo
                 f"all, got shape {found.shape}: {found!r:.80}"
             )
         in_view = found.tolist()
-    front = Occluders(shown, step.place_m, step.config.body_radius_m, step.config.stature_m)
+    front = Occluders(shown, step.place_m)
     return [
         visible and visible * front.unhidden(track)
         for track, visible in zip(unseen, in_view, strict=True)
@@ -248,10 +252,10 @@ def _record_empty_places(unseen: list[Track], step: Step) -> None:
     """Note whose places the frame has shown empty: as large as a body and two σ of the position."""
     if not unseen or not isinstance(step.view, RangedView):
         return
-    body_m = step.config.body_radius_m
     places = np.array([(track.x, track.y) for track in unseen])
     radii = [
-        body_m + _PLACE_SIGMAS * math.sqrt(larger_eigenvalue(track.p00, track.p01, track.p11))
+        BODY_RADIUS_M
+        + _PLACE_SIGMAS * math.sqrt(larger_eigenvalue(track.p00, track.p01, track.p11))
         for track in unseen
     ]
     passed = step.view.passed(places, np.array(radii), step.frame.T_odom_camera).tolist()
@@ -290,18 +294,10 @@ class Occluders:
     Args:
         people: who stand in front.
         camera_m: x, y and height of the camera, in odom.
-        radius_m: > 0, of every body.
-        stature_m: of every body.
     """
 
-    def __init__(
-        self,
-        people: Iterable[Track],
-        camera_m: tuple[float, float, float],
-        radius_m: float,
-        stature_m: float,
-    ) -> None:
-        self._camera_m, self._radius_m, self._stature_m = camera_m, radius_m, stature_m
+    def __init__(self, people: Iterable[Track], camera_m: tuple[float, float, float]) -> None:
+        self._camera_m = camera_m
         # In the order of their bearings, so that only neighbours are compared.
         self._people = sorted(self._interval(track.x, track.y) for track in people)
         self._bearings = [bearing for bearing, _, _ in self._people]
@@ -310,8 +306,8 @@ class Occluders:
     def _interval(self, x: float, y: float) -> tuple[float, float, float]:
         """Return bearing, distance and angular half-width of a body."""
         east, north = x - self._camera_m[0], y - self._camera_m[1]
-        distance, radius_m = math.hypot(east, north), self._radius_m
-        half = math.asin(radius_m / max(distance, radius_m))
+        distance = math.hypot(east, north)
+        half = math.asin(BODY_RADIUS_M / max(distance, BODY_RADIUS_M))
         return math.atan2(north, east), distance, half
 
     def unhidden(self, track: Track) -> float:
@@ -327,10 +323,10 @@ class Occluders:
             first = bisect_left(self._bearings, bearing + turn - reach)
             last = bisect_right(self._bearings, bearing + turn + reach)
             for front, front_distance, front_half in self._people[first:last]:
-                if front_distance + self._radius_m > distance:
+                if front_distance + BODY_RADIUS_M > distance:
                     continue
                 seen_at_m = height_m + (CHEST_M - height_m) * front_distance / distance
-                if seen_at_m > self._stature_m:
+                if seen_at_m > MEAN_STATURE_M:
                     continue
                 apart = abs(bearing + turn - front)
                 overlap = min(half, apart + front_half) - max(-half, apart - front_half)

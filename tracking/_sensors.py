@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from pydantic import Field, field_validator
@@ -40,12 +39,6 @@ class SensorConfig(TrackingConfig):
     """True if ranges are measured. If not, they follow from the size that people are assumed to
     have, and yield to a measured range of the same person."""
 
-    detection_probability: float = Field(default=0.9, ge=0.01, le=0.999)
-    """P_D, the share of frames that report a person in sight."""
-
-    miss_cost: float = Field(default=10.0, ge=-1e3, le=1e3)
-    """As in :class:`~tracking.TrackerConfig`; lower for a sensor with more clutter."""
-
     alignment_std_rad: float = Field(default=0.015, ge=0.0, le=0.5)
     """Standard deviation of the angle by which the calibrations of this sensor and of the camera
     disagree. It moves people sideways in proportion to their range, and is added to the noise of
@@ -62,24 +55,6 @@ class SensorConfig(TrackingConfig):
         return view
 
 
-class Gates(NamedTuple):
-    """Limits within which a match is possible, and within which it is ambiguous.
-
-    Attributes:
-        mahalanobis2: largest squared Mahalanobis distance (χ² with two degrees of freedom).
-        distance_m: largest distance.
-        miss_cost: cost of leaving a track and a measurement unmatched.
-        ambiguity_margin: a rival that costs at most this much more makes a match ambiguous, …
-        ambiguity_distance_m: … if it is no further away than this.
-    """
-
-    mahalanobis2: float
-    distance_m: float
-    miss_cost: float
-    ambiguity_margin: float
-    ambiguity_distance_m: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
     """A sensor as the steps of the tracker use it.
@@ -88,16 +63,12 @@ class Sensor:
         name: as in ``update(sensor=…)``.
         index: its place in the lists of a track.
         settings: as given.
-        gates: of its measurements.
-        log_missed: ln(1 − P_D), the evidence of a frame that should have shown a person.
         pose_covariance: (3, 3) of the sensor's x, y and yaw on the robot; None if it is exact.
     """
 
     name: str
     index: int
     settings: SensorConfig
-    gates: Gates
-    log_missed: float
     pose_covariance: FloatArray | None
 
     @property
@@ -177,15 +148,11 @@ def sensors_of(
             view=view,
             sees_faces=True,
             measures_range=False,
-            detection_probability=config.detection_probability,
-            miss_cost=config.miss_cost,
             alignment_std_rad=max((one.alignment_std_rad for one in others.values()), default=0.0),
         ),
         **others,
     }
-    found = [
-        _sensor(name, index, one, config) for index, (name, one) in enumerate(settings.items())
-    ]
+    found = [_sensor(name, index, one) for index, (name, one) in enumerate(settings.items())]
     return Sensors(
         all=tuple(found),
         config=config,
@@ -195,20 +162,6 @@ def sensors_of(
     )
 
 
-def _sensor(name: str, index: int, settings: SensorConfig, config: TrackerConfig) -> Sensor:
+def _sensor(name: str, index: int, settings: SensorConfig) -> Sensor:
     std = settings.alignment_std_rad
-    return Sensor(
-        name,
-        index,
-        settings,
-        Gates(
-            # χ² with two degrees of freedom.
-            mahalanobis2=-2.0 * math.log1p(-config.gate_probability),
-            distance_m=config.gate_distance_m,
-            miss_cost=settings.miss_cost,
-            ambiguity_margin=config.ambiguity_margin,
-            ambiguity_distance_m=config.ambiguity_distance_m,
-        ),
-        math.log1p(-settings.detection_probability),
-        np.diag([0.0, 0.0, std * std]) if std > 0.0 else None,
-    )
+    return Sensor(name, index, settings, np.diag([0.0, 0.0, std * std]) if std > 0.0 else None)

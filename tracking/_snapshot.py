@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Final, Literal, cast, get_args
 
 import numpy as np
 
+from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray, covariance_matrix, finite_array, finite_number, set_fields
 
 from ._errors import TrackingError
@@ -17,10 +19,10 @@ from ._sensors import Sensors
 from ._size import lever
 from ._state import State, face_period_s
 from .awareness_filter import drift_unseen, estimate
+from .clock import GAP_PERIODS
+from .covariances import Upper, matrices
 
 TrackStatus = Literal["tentative", "confirmed", "coasting"]
-# A sensor is silent when no frame has come for this many of its usual intervals.
-_SILENT_PERIODS: Final = 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +48,8 @@ class PersonTrack:
             person was out of sight and may still be there.
         noticed: lower bound, in [0, 1], of the probability that this person has noticed the robot
             by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
+        time_since_face_s: ≥ 0, time since the latest picture whose view of the face α rests on;
+            infinite if there is none, and None from a tracker that does not say.
     """
 
     id: int
@@ -61,6 +65,7 @@ class PersonTrack:
     time_since_seen_s: float
     place_empty: bool = False
     noticed: float = 0.0
+    time_since_face_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.status not in get_args(TrackStatus):
@@ -98,6 +103,8 @@ class PersonTrack:
             place_empty=bool(self.place_empty),
             noticed=number("noticed", 0.0, 1.0),
         )
+        if self.time_since_face_s not in (None, math.inf):
+            set_fields(self, time_since_face_s=number("time_since_face_s", 0.0))
 
 
 _SETTERS: Final = tuple(
@@ -121,12 +128,12 @@ def snapshots(state: State, stamp_s: float, sensors: Sensors) -> tuple[PersonTra
     if stamp_s > now_s:
         people = [track.copied() for track in people]
         for track in people:
-            track.predict(now_s, stamp_s, sensors.config)
+            track.predict(now_s, stamp_s, sensors.config.acceleration_density_m2ps3)
     if not people:
         return ()
     # The snapshots share these arrays.
     states = np.array([(track.x, track.y, track.vx, track.vy) for track in people])
-    covariances = np.array([_covariance(track, state) for track in people]).reshape(-1, 4, 4)
+    covariances = matrices([_covariance(track, state) for track in people])
     states.setflags(write=False)
     covariances.setflags(write=False)
     return tuple(
@@ -162,27 +169,25 @@ def _snapshot(
         numbers[:2],
         numbers[2:],
         covariance,
-        *estimate(belief, sensors.config.awareness),
-        sensors.config.stature_m,
+        *estimate(belief),
+        MEAN_STATURE_M,
         stamp_s - track.last_seen_s,
         shown_empty(track, state, sensors.config),
         noticed(track, stamp_s, state, sensors),
+        stamp_s - track.face_s,
     )
     for assign, value in zip(_SETTERS, values, strict=True):
         assign(made, value)
     return made
 
 
-def _covariance(track: Track, state: State) -> tuple[float, ...]:
-    """Return the covariance, row by row, with the lasting error of the range."""
+def _covariance(track: Track, state: State) -> Upper[float]:
+    """Return the upper triangle of the covariance, with the lasting error of the range."""
     if track.lasting_std and state.origin_m is not None:
         track = track.copied()
         b = lever(track, state.origin_m, state.origin_velocity_mps)
         track.widen(b, track.lasting_std * track.lasting_std)
-    p01, p02, p03 = track.p01, track.p02, track.p03
-    p12, p13, p23 = track.p12, track.p13, track.p23
-    first, second = (track.p00, p01, p02, p03), (p01, track.p11, p12, p13)
-    return (*first, *second, p02, p12, track.p22, p23, p03, p13, p23, track.p33)
+    return track.upper
 
 
 def _status(track: Track, state: State, now_s: float) -> TrackStatus:
@@ -192,7 +197,7 @@ def _status(track: Track, state: State, now_s: float) -> TrackStatus:
     if track.last_seen_s == now_s:
         return "confirmed"
     shown = any(
-        seen_s == clock.stamp_s and now_s - seen_s <= _SILENT_PERIODS * clock.known_period_s
+        seen_s == clock.stamp_s and now_s - seen_s <= GAP_PERIODS * clock.known_period_s
         for clock, seen_s in zip(state.clocks, track.seen_s, strict=True)
     )
     return "confirmed" if shown else "coasting"

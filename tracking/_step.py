@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ._by_ray import RANGED_S, put_too_far
+from perception.matrices import CHI2_999
+
 from ._frame import Frame
 from ._match import Match, Sight, matched
 from ._noticed import held, remember_looks, remembers
 from ._person import Track
 from ._presence import hit_evidence, is_beside, is_over, record_hit, record_misses
 from ._sensors import Sensors
-from ._size import Taken, forget_size, learn_size
+from ._size import RANGED_S, Taken, forget_size, learn_size, put_too_far
 from ._state import State, Step, evidence_interval_s, face_period_s, seen_within
-from .awareness_filter import drift, drift_unseen, forget, measure
+from .awareness_filter import EVIDENCE_GAP_S, drift, drift_unseen, forget, measure
 
-# χ² with two degrees of freedom of a measurement beyond which it may be somebody else: 99.9 %.
-_JUMP_CHI2: Final = 13.8
+# Factor on the variance of a place whose match is ambiguous. When two people pass each other, a
+# wrong match would otherwise reverse both velocities.
+_AMBIGUOUS_NOISE: Final = 2.0
 
 
 def advance(state: State, frame: Frame, sensors: Sensors) -> State:
@@ -62,7 +64,7 @@ def _predicted(step: Step) -> list[Track]:
         # A track that the last frame has left alive gets a chance, however long the interval.
         if not is_over(track, stamp, clocks, sensors):
             moved = track.copied()
-            moved.predict(previous, stamp, step.config)
+            moved.predict(previous, stamp, step.config.acceleration_density_m2ps3)
             tracks.append(moved)
     return tracks
 
@@ -80,7 +82,7 @@ def _correct(track: Track, sight: Sight, step: Step) -> tuple[float, float]:
     if track.looked_s > 0.0:
         sight.held = held(track, step.frame.stamp_s, step.state.clocks, step.sensors)
         jump2 = expected.plus(taken.noise_m2).distance2_and_log_det(dx, dy)[0]
-        sight.jumped = jump2 > _JUMP_CHI2 and not sight.by_ray
+        sight.jumped = jump2 > CHI2_999 and not sight.by_ray
     found = (0.0, 0.0)
     if not track.confirmed:
         spread = track.spread_m2.plus(taken.noise_m2)
@@ -90,7 +92,7 @@ def _correct(track: Track, sight: Sight, step: Step) -> tuple[float, float]:
     # An ambiguous measurement has less weight and leaves more uncertainty.
     noise = taken.noise_m2
     if sight.ambiguous:
-        noise = noise.times(step.config.ambiguous_noise_factor)
+        noise = noise.times(_AMBIGUOUS_NOISE)
     if ray is not None:
         noise = ray.without_assumed_range(noise)
         # A place that jumps along the ray may be another person's.
@@ -105,7 +107,7 @@ def _give_birth(tracks: list[Track], match: Match, step: Step) -> int:
     """Append new tracks of the measurements that fit none, and return the next free id."""
     next_id = step.earlier.next_id
     for measured in match.new:
-        tracks.append(Track(next_id, measured, step.frame, len(step.sensors.all), step.config))
+        tracks.append(Track(next_id, measured, step.frame, len(step.sensors.all)))
         match.sights.append(Sight(Taken(tracks[-1], measured, None), 0.0))
         next_id += 1
     return next_id
@@ -162,7 +164,7 @@ def _drift(track: Track, previous_s: float, seen: bool, face: bool, step: Step) 
     """Let a belief drift to the frame, from the one before that could have shown a face."""
     config, stamp = step.config.awareness, step.frame.stamp_s
     dt_s = stamp - previous_s
-    if face and stamp - track.face_s <= config.max_evidence_gap_s:
+    if face and stamp - track.face_s <= EVIDENCE_GAP_S:
         # Two faces count for the time between them, missed frames included, unless it is long.
         track.belief = drift(track.belief, dt_s, config.evidence_time_constant_s, config)
     elif seen and not face:

@@ -177,7 +177,7 @@ class PersonTracker:
         Raises:
             TrackingError: for an unknown sensor, for a stamp that is not finite, lies too far back
                 or ahead, or differs from that of an observation by more than
-                ``stamp_tolerance_s``, for a ``T_odom_camera`` that is not a rigid transform, for a
+                a millisecond, for a ``T_odom_camera`` that is not a rigid transform, for a
                 ``pose_covariance_odom`` that is not a covariance, for a view without its method,
                 and for anything in ``observations`` that is not a
                 :class:`~perception.PersonObservation` or lies out of bounds.
@@ -191,7 +191,7 @@ class PersonTracker:
             pose = covariance_matrix("pose_covariance_odom", pose_covariance_odom, 3, TrackingError)
         if source.pose_covariance is not None:
             pose = source.pose_covariance if pose is None else pose + source.pose_covariance
-        measurements = measurements_of(observations, stamp, T, pose, self._config)
+        measurements = measurements_of(observations, stamp, T, pose)
         entry = self._admission.frame_entry(self._history, stamp, source)
         if entry.anew:
             history = self._empty_history(entry.memory.latest.next_id)

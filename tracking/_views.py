@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception import Camera
+from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import (
     FloatArray,
     finite_array,
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 
 BoolArray = NDArray[np.bool_]
 
-# Half the width of a person.
-_BODY_M: Final = 0.25
+#: Height of the point that represents a body.
+CHEST_M: Final = 1.2
 # A gap between the rays that have passed a place hides nobody if it is no wider than a child's leg.
 _GAP_M: Final = 0.08
 
@@ -91,7 +92,7 @@ class CameraView:
     max_range_m: float = 8.0
     min_range_m: float = 0.5
     side_margin: float = 0.05
-    chest_height_m: float = 1.2
+    chest_height_m: float = CHEST_M
     _limits: tuple[float, float, float, float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -230,10 +231,10 @@ class ScannerView:
         if self.points is None:
             return in_view
         along, across, free, _ = _towards(positions, self.points)
-        at_body = (along > 0.0) & (np.abs(across) <= _BODY_M)
-        reached = (at_body & (free >= along - _BODY_M)).sum(axis=1)
+        at_body = (along > 0.0) & (np.abs(across) <= BODY_RADIUS_M)
+        reached = (at_body & (free >= along - BODY_RADIUS_M)).sum(axis=1)
         # Rays that saw nothing are not among those at the body: as many as it takes must be there.
-        whole_rad = 2.0 * np.arcsin(_BODY_M / np.maximum(ranges, _BODY_M))
+        whole_rad = 2.0 * np.arcsin(BODY_RADIUS_M / np.maximum(ranges, BODY_RADIUS_M))
         wanted = np.floor(whole_rad / abs(self.points.angle_increment_rad))
         wanted = np.maximum(np.maximum(wanted, at_body.sum(axis=1)), 1.0)
         return np.asarray(in_view * reached / wanted)

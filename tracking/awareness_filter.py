@@ -22,6 +22,26 @@ _GAUSS_HERMITE: Final = tuple(
 )
 # Below it, exp overflows; the awareness is 0 there.
 _LOWEST_LOGIT: Final = -700.0
+#: Two frames with a face further apart than this are no evidence for the time between them: 5 Hz,
+#: the slowest rate at which awareness builds up, with some room.
+EVIDENCE_GAP_S: Final = 0.25
+# α of a person of whom nothing is known, and its standard deviation in logit(α): wide enough for
+# one turn of the head, about six units.
+_PRIOR_AWARENESS: Final = 0.05
+_PRIOR_STD: Final = 2.0
+# Errors of α this close in time count as one. So a faster camera, or one that repeats frames, adds
+# no certainty: the information per second has a limit.
+_CORRELATION_S: Final = 0.1
+# ε: α is clipped to [ε, 1 − ε] before the logit.
+_CLIP: Final = 0.02
+# Smallest standard deviation of a measurement in logit(α).
+_LEAST_STD: Final = 0.3
+# The standard deviation of α that a measurement usually has, and the weight of the reported one
+# against it. Half is right if σ differs between measurements by as large a factor as it is wrong.
+_TYPICAL_STD: Final = 0.1
+_REPORTED_WEIGHT: Final = 0.6
+# 1/√12: the standard deviation of the uniform distribution on [0, 1], which says nothing.
+_MOST_STD: Final = 0.29
 
 
 class AwarenessBelief(NamedTuple):
@@ -74,9 +94,8 @@ def sigmoid(value: float) -> float:
     return 1.0 / (1.0 + math.exp(-value)) if value > _LOWEST_LOGIT else 0.0
 
 
-def prior(config: AwarenessFilterConfig) -> AwarenessBelief:
-    """Return the belief for a person of whom nothing is known; its lower bound is α = 0."""
-    return AwarenessBelief(config.prior_logit, config.prior_std_logit**2)
+#: The belief for a person of whom nothing is known; its lower bound is α = 0.
+PRIOR: Final = AwarenessBelief(logit(_PRIOR_AWARENESS), _PRIOR_STD**2)
 
 
 def drift(
@@ -90,11 +109,7 @@ def drift(
     """
     if dt_s <= 0.0:
         return belief
-    prior_mean, prior_variance, z = (
-        config.prior_logit,
-        config.prior_std_logit**2,
-        config.bound_sigmas,
-    )
+    (prior_mean, prior_variance, _), z = PRIOR, config.bound_sigmas
     offset, excess = belief.mean - prior_mean, belief.variance - prior_variance
     phi = math.exp(-dt_s / time_constant_s)
     phi2 = phi * phi
@@ -113,37 +128,34 @@ def drift(
     return AwarenessBelief(mean, variance, lowest)
 
 
-def evidence(
-    awareness: float | None, awareness_std: float | None, config: AwarenessFilterConfig
-) -> Evidence | None:
+def evidence(awareness: float | None, awareness_std: float | None) -> Evidence | None:
     """Return a measured α as mean and variance of logit(α).
 
     This is the Gaussian in logit(α) with the same one-σ points as α: α ± σ, clipped to [ε, 1 − ε].
     In mid-range its σ agrees with the logit's derivative, σ / (α (1 − α)). Near 0 and 1 the
     derivative has no bound and would give a confident "unaware" (α = 0, σ = 0.05) almost no weight.
 
-    None, no evidence, without α or if σ exceeds ``max_evidence_std``.
+    None, no evidence, without α or if σ exceeds 0.29, as if α were uniform on [0, 1].
     """
-    if awareness is None or awareness_std is None or awareness_std > config.max_evidence_std:
+    if awareness is None or awareness_std is None or awareness_std > _MOST_STD:
         return None
-    low, high = config.clip_awareness, 1.0 - config.clip_awareness
+    low, high = _CLIP, 1.0 - _CLIP
     below = logit(min(max(awareness - awareness_std, low), high))
     above = logit(min(max(awareness + awareness_std, low), high))
-    std = max(0.5 * (above - below), config.min_evidence_std_logit)
+    std = max(0.5 * (above - below), _LEAST_STD)
     return Evidence(0.5 * (above + below), std * std)
 
 
-def trusted_std(awareness_std: float | None, config: AwarenessFilterConfig) -> float | None:
+def trusted_std(awareness_std: float | None) -> float | None:
     """Return the σ of α to use for a reported one: σ^w · σ_typical^(1 − w), for a reported σ ≥ 0.
 
     The reported σ is itself an estimate. If the logarithms of the true σ and of its error are
     normal, this is the most likely true σ, and w the first variance's share of their sum. None
-    stays None, and a σ above ``max_evidence_std`` becomes None: it says that there is no evidence.
+    stays None, and a σ above 0.29 becomes None: it says that there is no evidence.
     """
-    if awareness_std is None or awareness_std > config.max_evidence_std:
+    if awareness_std is None or awareness_std > _MOST_STD:
         return None
-    weight = config.reported_std_weight
-    return float(awareness_std**weight * config.typical_evidence_std ** (1.0 - weight))
+    return float(awareness_std**_REPORTED_WEIGHT * _TYPICAL_STD ** (1.0 - _REPORTED_WEIGHT))
 
 
 def grace_s(period_s: float, config: AwarenessFilterConfig) -> float:
@@ -154,7 +166,7 @@ def grace_s(period_s: float, config: AwarenessFilterConfig) -> float:
     if config.missed_frame_s <= 0.0:
         return 0.0
     known_s = period_s if math.isfinite(period_s) else 0.0
-    return max(config.missed_frame_s, min(known_s, config.max_evidence_gap_s))
+    return max(config.missed_frame_s, min(known_s, EVIDENCE_GAP_S))
 
 
 def drift_unseen(
@@ -194,11 +206,11 @@ def measure(
     Args:
         belief: at the time of the measurement.
         measured: from :func:`evidence`.
-        interval_s: > 0, time that this measurement stands for. Below ``evidence_correlation_s`` the
+        interval_s: > 0, time that this measurement stands for. Below 0.1 s the
             variance is increased in proportion, so that the information per second has a limit.
         config: settings.
     """
-    effective = measured.variance * max(1.0, config.evidence_correlation_s / interval_s)
+    effective = measured.variance * max(1.0, _CORRELATION_S / interval_s)
     gain = belief.variance / (belief.variance + effective)
     corrected = belief.mean + gain * (measured.mean - belief.mean)
     remaining = belief.variance * (1.0 - gain)
@@ -208,12 +220,11 @@ def measure(
 
 def forget(belief: AwarenessBelief, config: AwarenessFilterConfig) -> AwarenessBelief:
     """Return the prior, with the lower of the belief's bound and the prior's bound."""
-    fresh = prior(config)
-    prior_bound = fresh.mean - config.bound_sigmas * config.prior_std_logit
-    return AwarenessBelief(fresh.mean, fresh.variance, min(belief.bound, prior_bound))
+    prior_bound = PRIOR.mean - config.bound_sigmas * _PRIOR_STD
+    return PRIOR._replace(bound=min(belief.bound, prior_bound))
 
 
-def estimate(belief: AwarenessBelief, config: AwarenessFilterConfig) -> FilteredAwareness:
+def estimate(belief: AwarenessBelief) -> FilteredAwareness:
     """Return a belief in units of α.
 
     The awareness is sigmoid(mean), the median of the logit-normal distribution. The standard
@@ -230,8 +241,7 @@ def estimate(belief: AwarenessBelief, config: AwarenessFilterConfig) -> Filtered
         value = math.tanh(half + spread * node) - middle
         mean += weight * value
         second += weight * value * value
-    clip = config.clip_awareness
-    lower = max((sigmoid(belief.bound) - clip) / (1.0 - clip), 0.0)
+    lower = max((sigmoid(belief.bound) - _CLIP) / (1.0 - _CLIP), 0.0)
     return FilteredAwareness(
         sigmoid(belief.mean), 0.5 * math.sqrt(max(second - mean * mean, 0.0)), lower
     )

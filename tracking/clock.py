@@ -15,6 +15,9 @@ _LEAST_INTERVAL_S: Final = 1e-3
 _PERIOD_GAIN: Final = 0.2
 # Stamps may come slightly out of order.
 _DISORDER_S: Final = 0.5
+#: Nothing from a sensor for so many of its usual intervals is a gap, or a silence: two frames in a
+#: row are missing.
+GAP_PERIODS: Final = 2.5
 # Steps between stamps differ by this factor at most.
 _ALIKE: Final = 2.0
 # Two stamps may agree by chance.
@@ -135,7 +138,6 @@ class Gate(Generic[Memory]):
         late: number of stamps refused as late, by source.
         ahead: number of stamps refused as ahead, or undone, by source.
         restarts: how often the clock has been set.
-        jumped: refused stamps that follow one another while none is in time, by source.
         leap: entry of the latest stamp, if it was a leap.
     """
 
@@ -148,25 +150,36 @@ class Gate(Generic[Memory]):
 
     def forget(self) -> None:
         """Forget all clocks; the counts stay."""
-        self.jumped: dict[str, JumpedClock] = {}
+        # Refused stamps that follow one another while none is in time, by source.
+        self._jumped: dict[str, JumpedClock] = {}
         self.leap: Entry[Memory] | None = None
 
     def new_clock(
         self, memory: Memory, stamp_s: float, *, ahead: bool, source: str = ""
     ) -> Entry[Memory] | None:
         """Return the entry of a wrong stamp as a new clock; None if it is refused, and counted."""
-        jumped = JumpedClock.following(self.jumped.get(source), stamp_s, self._max_pause_s)
+        jumped = JumpedClock.following(self._jumped.get(source), stamp_s, self._max_pause_s)
         if jumped.has_lasted(self._new_clock_after_s):
             return Entry(memory, stamp_s, source, anew=True)
-        self.jumped[source] = jumped
+        self._jumped[source] = jumped
         (self.ahead if ahead else self.late)[source] += 1
         return None
+
+    def refused_for_s(self, stamp_s: float, within_s: float, source: str = "") -> float:
+        """Return since when stamps have been refused that ``stamp_s`` goes on from; 0 for none.
+
+        They are two or more, and the last of them is at most ``within_s`` before.
+        """
+        jumped = self._jumped.get(source)
+        if jumped is None or jumped.stamps < 2 or not 0.0 <= stamp_s - jumped.last_s <= within_s:
+            return 0.0
+        return stamp_s - jumped.first_s
 
     def taken(self, entry: Entry[Memory]) -> None:
         """Remember an entry that has been used. It ends the refused stamps of all sources."""
         if entry.anew:
             self.forget()
             self.restarts += 1
-        self.jumped, self.leap = {}, entry if entry.leaps else None
+        self._jumped, self.leap = {}, entry if entry.leaps else None
         if entry.undone is not None:
             self.ahead[entry.undone.source] += 1

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -31,6 +31,7 @@ from perception.arrays import FloatArray, finite_array
 from ._errors import TrackingError
 from ._snapshot import PersonTrack
 from .config import StrictConfig
+from .covariances import Upper, drifted
 
 #: Regions are ellipses of this many standard deviations.
 REGION_SIGMAS: Final = 2.0
@@ -230,12 +231,10 @@ def predict_states(
     outer = (ahead[:, :, None] * ahead[:, None, :])[:, None]
     motion = (along - across)[..., None, None] * outer + across[..., None, None] * np.eye(2)
     # The part of the track itself.
-    t = times[:, None, None]
-    place, cross, drift = (
-        part[:, None]
-        for part in (covariances[:, :2, :2], covariances[:, :2, 2:], covariances[:, 2:, 2:])
-    )
-    known = place + t * (cross + np.swapaxes(cross, -1, -2)) + t * t * drift
+    rows, columns = np.triu_indices(4)
+    upper = cast(Upper[FloatArray], tuple(covariances[:, rows, columns].T[..., None]))
+    xx, xy, _, _, yy, *_ = drifted(upper, times)
+    known = np.stack((xx, xy, xy, yy), axis=-1).reshape(*xx.shape, 2, 2)
     lags = np.minimum(model.lag_per_s2 * _memories_s2(covariances), _MOST_LAG)
     lags = 1.0 + np.outer(lags, -np.expm1(-times / _LAG_SHOWS_S))
     scale = lags[..., None, None] * factors2[:, None, None]

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from tracking import TrackerConfig
-from tracking.calibration import HORIZONS_S, Calibration, FollowedPerson, calibrate
 from tracking.prediction import REGION_SHARE
-from tracking.units import refuse_other_units
 
 from ..errors import AwarenavError
 from ..files import check_output, json_text, write_text
+from ._calibration import HORIZONS_S, Calibration, FollowedPerson, calibrate
 from ._run import log, read_file
 from ._tracking import arrays_of, smoothed_path, track_recording
+from ._units import refuse_other_units
 
 
 def calibrate_command(

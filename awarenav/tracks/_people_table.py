@@ -11,9 +11,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from tracking.units import refuse_other_units
-
 from ..errors import AwarenavError
+from ._units import refuse_other_units
 
 _REQUIRED: Final = ("t_s", "id", "x_m", "y_m")
 # A whole number as pandas writes it in a column with gaps.

@@ -13,11 +13,11 @@ import numpy as np
 
 from perception import Camera
 from perception.arrays import FloatArray
-from tracking.smoothing import SmoothedPath
 
 from ..errors import counted
 from ..figures import Axes, Ellipse, Figure, GridSpec, Line2D, Patch, Wedge, new_figure
 from ._history import TrackedRecording, TrackHistory
+from ._smoothing import SmoothedPath
 from ._truth import MAX_TRUTH_GAP_S, TruePerson, Truth, TruthMatch, person_ids_text
 
 _TEXT: Final = "#28282e"

@@ -14,12 +14,12 @@ import numpy as np
 
 from perception import Camera
 from tracking import TrackerConfig
-from tracking.smoothing import SmoothedPath
 
 from ..errors import AwarenavError, counted
 from ..files import check_output, check_plot, csv_number, json_text, write_text
 from ._history import TrackedRecording, TrackHistory, TrackSample
 from ._recording import Recording, is_positions, read_positions, read_recording
+from ._smoothing import SmoothedPath
 from ._tracking import distances_m, smoothed_path, track_recording, tracks_in_file
 from ._truth import Truth, match_truth, person_ids_text, true_people
 

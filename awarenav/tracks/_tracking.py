@@ -21,12 +21,12 @@ from tracking import (
     TrackingError,
     TrackStatus,
 )
-from tracking.smoothing import SmoothedPath, smooth
 
 from ..errors import AwarenavError, counted
 from ..estimate import ids_of_tracks
 from ._history import HistoryBuilder, TrackedRecording, TrackHistory, TrackSample
 from ._recording import ASSUMED_POSITION_STD_M, RecordedFrame, Recording
+from ._smoothing import SmoothedPath, smooth
 
 # A recording may have pauses of any length, and nobody sets its clock.
 _OF_RECORDINGS: Final = {"max_pause_s": 1e12, "new_clock_after_s": 1e5}

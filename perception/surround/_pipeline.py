@@ -16,12 +16,11 @@ from .._observation import PersonObservation
 from .._pipeline import AwarenessPipeline
 from ..arrays import ImageRgb, check_image
 from ..errors import PerceptionError
-from ..matrices import mahalanobis2
+from ..matrices import CHI2_999, mahalanobis2
 from ._lenses import FlatView, PanoramaLens, WideLens
 
-# Two observations are of the same person up to this χ² in the plane across the camera's y axis (two
-# degrees of freedom, exceeded by chance in 0.1 % of cases), and up to this distance.
-_SAME_CHI2: Final = 13.8
+# Two observations are of the same person up to 99.9 % in the plane across the camera's y axis, and
+# up to this distance.
 _SAME_WITHIN_M: Final = 1.0
 # Standard deviation to add, because the border of a view cuts bodies off.
 _CUT_OFF_STD_M: Final = 0.1
@@ -103,7 +102,7 @@ def _distance_if_same_m(first: PersonObservation, second: PersonObservation) -> 
     both = first.position_covariance_m2 + second.position_covariance_m2
     spread = both[np.ix_([0, 2], [0, 2])] + _CUT_OFF_STD_M**2 * np.eye(2)
     chi2 = float(mahalanobis2(difference, spread))
-    return distance_m if chi2 <= _SAME_CHI2 else None
+    return distance_m if chi2 <= CHI2_999 else None
 
 
 def _off_axis_rad(observation: PersonObservation) -> float:

@@ -15,7 +15,7 @@ from awarenav.tracks import person_id, read_people_table
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray, finite_array, finite_number
 from perception.documents import yaml_text
-from tracking.units import FASTEST_MPS
+from tracking.people import FASTEST_MPS
 
 from ..actors.robot import NOVA_CARTER
 from ..world.errors import SimError

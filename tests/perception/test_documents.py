@@ -92,9 +92,9 @@ def test_numbers_with_an_exponent_are_numbers(tmp_path: Path) -> None:
     text = "[5e-2, 1E5, -1e1, +.5e3, 5.e1, 1.0e-3, '5e-2', 5e, e5, 1e2x]"
     read = parse_yaml(text, "text")
     assert read == [0.05, 1e5, -10.0, 500.0, 50.0, 1e-3, "5e-2", "5e", "e5", "1e2x"]
-    (tmp_path / "tracker.yaml").write_text("awareness: {clip_awareness: 1e-2}\n")
+    (tmp_path / "tracker.yaml").write_text("awareness: {memory_s: 1e-2}\n")
     config = TrackerConfig.from_yaml(tmp_path / "tracker.yaml")
-    assert config.awareness.clip_awareness == 0.01
+    assert config.awareness.memory_s == 0.01
 
 
 @settings(max_examples=25, deadline=None)

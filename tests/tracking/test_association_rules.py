@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from perception.arrays import FloatArray
 from tracking import TrackerConfig
 from tracking._frame import Frame, Measurement, Spread
-from tracking._match import assigned, is_same_body, matched
+from tracking._match import AMBIGUITY_M, AMBIGUITY_MARGIN, assigned, is_same_body, matched
 from tracking._person import Track
 from tracking._sensors import sensors_of
 from tracking._state import Field, State, Step
@@ -23,8 +23,6 @@ CONFIG = TrackerConfig(
     gate_probability=0.99,
     gate_distance_m=0.9,
     miss_cost=4.0,
-    ambiguity_margin=3.0,
-    ambiguity_distance_m=0.7,
 )
 SENSORS = sensors_of(CONFIG, None, None)
 GATE2 = -2.0 * math.log(0.01)
@@ -43,7 +41,7 @@ def scene(seed: int) -> tuple[list[Track], Step]:
     rng = np.random.default_rng(seed)
     n, m = rng.integers(1, 5, 2)
     frame = Frame(1.0, np.eye(4), [measurement(rng, weak=rng.random() < 0.25) for _ in range(m)])
-    tracks = [Track(row + 1, measurement(rng, weak=False), frame, 1, CONFIG) for row in range(n)]
+    tracks = [Track(row + 1, measurement(rng, weak=False), frame, 1) for row in range(n)]
     for track in tracks:
         track.confirmed = bool(rng.random() < 0.6)
     state = State(tuple(tracks), (FrameClock(),), (Field(),))
@@ -94,36 +92,39 @@ def rivals_of(
             one, own = measured[j], measured[matches[i]]
             if owner < 0 and is_same_body(one, own):
                 continue
-            close = math.hypot(one.x - own.x, one.y - own.y) <= CONFIG.ambiguity_distance_m
-            if close and costs[i, j] <= costs[i, matches[i]] + CONFIG.ambiguity_margin:
+            close = math.hypot(one.x - own.x, one.y - own.y) <= AMBIGUITY_M
+            if close and costs[i, j] <= costs[i, matches[i]] + AMBIGUITY_MARGIN:
                 found.add((i, owner))
         if owner >= 0:
             first, second = tracks[i], tracks[owner]
-            close = (
-                math.hypot(first.x - second.x, first.y - second.y) <= CONFIG.ambiguity_distance_m
-            )
-            if close and costs[i, j] <= costs[owner, j] + CONFIG.ambiguity_margin:
+            close = math.hypot(first.x - second.x, first.y - second.y) <= AMBIGUITY_M
+            if close and costs[i, j] <= costs[owner, j] + AMBIGUITY_MARGIN:
                 found.add((owner, i))
     return found
 
 
 @pytest.mark.parametrize("count", [1, 2])
-@pytest.mark.parametrize(("margin", "distance_m"), [(0.25, 0.5), (0.24, 0.5), (0.25, 0.49)])
-def test_a_rival_at_the_very_edge_counts(count: int, margin: float, distance_m: float) -> None:
-    """With a spread of 1 m² the costs are squared distances, here 0 and 0.25."""
-    config = CONFIG.model_copy(
-        update={"ambiguity_margin": margin, "ambiguity_distance_m": distance_m}
-    )
-    sensors, half = sensors_of(config, None, None), Spread(0.5, 0.0, 0.5)
-    places = [Measurement(x, 0.0, half) for x in (0.0, 0.5)]
+@pytest.mark.parametrize(
+    ("apart_m", "more_cost"),
+    [
+        (AMBIGUITY_M - 1e-9, AMBIGUITY_MARGIN - 1e-6),
+        (AMBIGUITY_M - 1e-9, AMBIGUITY_MARGIN + 1e-6),
+        (AMBIGUITY_M + 1e-9, AMBIGUITY_MARGIN - 1e-6),
+    ],
+)
+def test_a_rival_up_to_the_very_edge_counts(count: int, apart_m: float, more_cost: float) -> None:
+    """The costs of the two differ by the squared distance over the spread."""
+    variance_m2 = 0.5 * apart_m**2 / more_cost
+    half = Spread(variance_m2, 0.0, variance_m2)
+    places = [Measurement(x, 0.0, half) for x in (0.0, apart_m)]
     # The second of the tracks, or of the measurements, is the rival.
     frame = Frame(1.0, np.eye(4), places[: 3 - count])
-    tracks = [Track(row + 1, places[row], frame, 1, config) for row in range(count)]
+    tracks = [Track(row + 1, places[row], frame, 1) for row in range(count)]
     state = State(tuple(tracks), (FrameClock(),), (Field(),))
-    found = matched(tracks, Step.of(frame, state, sensors))
+    found = matched(tracks, Step.of(frame, state, SENSORS))
     (sight,) = [each for each in found.sights if each is not None]
     assert sight.given is places[0]
-    assert sight.ambiguous == ((margin, distance_m) == (0.25, 0.5))
+    assert sight.ambiguous == (apart_m < AMBIGUITY_M and more_cost < AMBIGUITY_MARGIN)
 
 
 @pytest.mark.parametrize("first", range(0, 240, 40))

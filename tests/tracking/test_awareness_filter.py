@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 from tracking import AwarenessFilterConfig
 from tracking.awareness_filter import (
+    PRIOR,
     AwarenessBelief,
     Evidence,
     drift,
@@ -23,7 +24,6 @@ from tracking.awareness_filter import (
     grace_s,
     logit,
     measure,
-    prior,
     sigmoid,
     trusted_std,
 )
@@ -31,9 +31,12 @@ from tracking.awareness_filter import (
 CONFIG = AwarenessFilterConfig()
 Z = float(norm.ppf(CONFIG.lower_bound_confidence))
 TAU_S = CONFIG.unseen_time_constant_s
-PRIOR_VARIANCE = CONFIG.prior_std_logit**2
+# docs/tracking.md: the prior, the clipped ends, the least and the largest deviations.
+PRIOR_AWARENESS, PRIOR_VARIANCE = 0.05, 2.0**2
+CLIP, LEAST_STD, MOST_STD = 0.02, 0.3, 0.29
+CORRELATION_S = 0.1
 alphas = st.floats(0.0, 1.0)
-stds = st.floats(0.0, CONFIG.max_evidence_std)
+stds = st.floats(0.0, MOST_STD)
 intervals = st.floats(1e-3, 10.0)
 # Any mean, any variance that a filter started at the prior can have, a bound below the mean.
 beliefs = st.builds(
@@ -60,7 +63,7 @@ def test_drift_is_exact_in_time(belief: AwarenessBelief, dt_s: float, share: flo
 def test_the_bound_never_rises_without_evidence(belief: AwarenessBelief, dt_s: float) -> None:
     after = drift(belief, dt_s, TAU_S, CONFIG)
     assert after.bound <= belief.bound
-    assert estimate(after, CONFIG).awareness_lower <= estimate(belief, CONFIG).awareness_lower
+    assert estimate(after).awareness_lower <= estimate(belief).awareness_lower
     assert forget(after, CONFIG).bound <= after.bound
 
 
@@ -69,7 +72,7 @@ def test_the_bound_falls_to_the_lowest_value_during_the_step(
     belief: AwarenessBelief, dt_s: float
 ) -> None:
     phi = np.exp(-np.linspace(0.0, dt_s, 4001) / TAU_S)
-    m0 = logit(CONFIG.prior_awareness)
+    m0 = logit(PRIOR_AWARENESS)
     path = (
         m0
         + phi * (belief.mean - m0)
@@ -93,7 +96,7 @@ def test_a_hidden_face_lowers_the_bound_at_least_as_fast_as_being_unseen(
 @given(belief=beliefs)
 def test_without_evidence_the_belief_ends_at_the_prior(belief: AwarenessBelief) -> None:
     after = drift(belief, 100.0 * TAU_S, TAU_S, CONFIG)
-    assert sigmoid(after.mean) == pytest.approx(CONFIG.prior_awareness)
+    assert sigmoid(after.mean) == pytest.approx(PRIOR_AWARENESS)
     assert after.variance == pytest.approx(PRIOR_VARIANCE)
 
 
@@ -101,10 +104,10 @@ def test_without_evidence_the_belief_ends_at_the_prior(belief: AwarenessBelief) 
 def test_a_measurement_is_a_scalar_bayes_update(
     belief: AwarenessBelief, alpha: float, std: float, dt_s: float
 ) -> None:
-    measured = evidence(alpha, std, CONFIG)
+    measured = evidence(alpha, std)
     assert measured is not None
     mean, variance = measured
-    variance = variance * max(1.0, CONFIG.evidence_correlation_s / dt_s)
+    variance = variance * max(1.0, CORRELATION_S / dt_s)
     information = 1.0 / belief.variance + 1.0 / variance
     after = measure(belief, measured, dt_s, CONFIG)
     assert after.variance == pytest.approx(1.0 / information)
@@ -116,13 +119,13 @@ def test_a_measurement_is_a_scalar_bayes_update(
 
 @given(alpha=alphas, std=stds)
 def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, std: float) -> None:
-    measured = evidence(alpha, std, CONFIG)
+    measured = evidence(alpha, std)
     assert measured is not None
     mean, variance = measured
     sigma = math.sqrt(variance)
-    epsilon = CONFIG.clip_awareness
-    assert sigma >= CONFIG.min_evidence_std_logit
-    if sigma > CONFIG.min_evidence_std_logit + 1e-9:
+    epsilon = CLIP
+    assert sigma >= LEAST_STD
+    if sigma > LEAST_STD + 1e-9:
         for sign in (-1.0, 1.0):
             point = min(max(alpha + sign * std, epsilon), 1.0 - epsilon)
             assert sigmoid(mean + sign * sigma) == pytest.approx(point)
@@ -131,35 +134,35 @@ def test_the_one_sigma_points_of_a_measurement_are_those_of_alpha(alpha: float, 
 @given(low=alphas, high=alphas, std=stds)
 def test_a_higher_alpha_is_higher_evidence(low: float, high: float, std: float) -> None:
     low, high = sorted((low, high))
-    first, second = evidence(low, std, CONFIG), evidence(high, std, CONFIG)
+    first, second = evidence(low, std), evidence(high, std)
     assert first is not None
     assert second is not None
     assert first.mean <= second.mean
 
 
 def test_a_confident_zero_is_confident_unawareness() -> None:
-    measured = evidence(0.0, 0.05, CONFIG)
+    measured = evidence(0.0, 0.05)
     assert measured is not None
     mean, variance = measured
     # By the derivative at ε it would have almost no weight: σ = 0.05 / (0.02 · 0.98) = 2.6.
     assert sigmoid(mean + 2.0 * math.sqrt(variance)) < 0.1
-    after = estimate(measure(prior(CONFIG), measured, 1.0, CONFIG), CONFIG)
-    assert after.awareness < CONFIG.prior_awareness
+    after = estimate(measure(PRIOR, measured, 1.0, CONFIG))
+    assert after.awareness < PRIOR_AWARENESS
     assert after.awareness_std < 0.02
 
 
 def test_an_alpha_with_a_large_standard_deviation_is_no_evidence() -> None:
-    assert evidence(1.0, CONFIG.max_evidence_std, CONFIG) is not None
-    assert evidence(1.0, 0.3, CONFIG) is None
-    assert evidence(1.0, 1e9, CONFIG) is None
-    assert evidence(None, None, CONFIG) is None
+    assert evidence(1.0, MOST_STD) is not None
+    assert evidence(1.0, 0.3) is None
+    assert evidence(1.0, 1e9) is None
+    assert evidence(None, None) is None
 
 
 @pytest.mark.parametrize("frames", [2, 40])
 def test_information_per_second_does_not_depend_on_the_frame_rate(frames: int) -> None:
-    span_s = CONFIG.evidence_correlation_s
-    once = measure(prior(CONFIG), Evidence(1.0, 0.5), span_s, CONFIG)
-    many = prior(CONFIG)
+    span_s = CORRELATION_S
+    once = measure(PRIOR, Evidence(1.0, 0.5), span_s, CONFIG)
+    many = PRIOR
     for _ in range(frames):
         many = measure(many, Evidence(1.0, 0.5), span_s / frames, CONFIG)
     assert many.mean == pytest.approx(once.mean)
@@ -173,7 +176,7 @@ def test_information_per_second_does_not_depend_on_the_frame_rate(frames: int) -
 def test_an_estimate_is_a_probability_with_a_bounded_deviation(
     mean: float, variance: float
 ) -> None:
-    result = estimate(AwarenessBelief(mean, variance, mean - Z * math.sqrt(variance)), CONFIG)
+    result = estimate(AwarenessBelief(mean, variance, mean - Z * math.sqrt(variance)))
     assert 0.0 <= result.awareness_lower <= result.awareness <= 1.0
     assert 0.0 <= result.awareness_std <= 0.5
 
@@ -191,23 +194,23 @@ def test_the_deviation_is_that_of_the_logit_normal_distribution(
         return float(quad(lambda x: sigmoid(x) ** order * density(x), low, high)[0])
 
     expected = math.sqrt(moment(2) - moment(1) ** 2)
-    assert estimate(AwarenessBelief(mean, variance), CONFIG).awareness_std == pytest.approx(
+    assert estimate(AwarenessBelief(mean, variance)).awareness_std == pytest.approx(
         expected, rel=0.01
     )
 
 
 @given(value=st.floats(-12.0, 12.0))
 def test_a_lower_bound_below_the_clip_is_zero(value: float) -> None:
-    epsilon = CONFIG.clip_awareness
-    lower = estimate(AwarenessBelief(value, 1.0, value), CONFIG).awareness_lower
+    epsilon = CLIP
+    lower = estimate(AwarenessBelief(value, 1.0, value)).awareness_lower
     assert lower == pytest.approx(max(0.0, (sigmoid(value) - epsilon) / (1.0 - epsilon)))
     assert lower <= sigmoid(value)
     assert lower == 0.0 or sigmoid(value) > epsilon
 
 
 def test_the_prior_has_a_lower_bound_of_zero() -> None:
-    assert estimate(prior(CONFIG), CONFIG).awareness_lower == 0.0
-    assert estimate(prior(CONFIG), CONFIG).awareness == pytest.approx(CONFIG.prior_awareness)
+    assert estimate(PRIOR).awareness_lower == 0.0
+    assert estimate(PRIOR).awareness == pytest.approx(PRIOR_AWARENESS)
 
 
 ages = st.floats(0.0, 1.0)
@@ -220,7 +223,7 @@ def test_the_bound_never_rises_while_unseen(
 ) -> None:
     after = drift_unseen(belief, 0.0, step_s, -age_s, period_s, CONFIG)
     assert after.bound <= belief.bound
-    assert estimate(after, CONFIG).awareness_lower <= estimate(belief, CONFIG).awareness_lower
+    assert estimate(after).awareness_lower <= estimate(belief).awareness_lower
     # The grace changes how fast, and no more than that: the belief is between the two constants'.
     slow = drift(belief, step_s, CONFIG.evidence_time_constant_s, CONFIG)
     fast = drift(belief, step_s, CONFIG.unseen_time_constant_s, CONFIG)
@@ -255,12 +258,12 @@ def test_the_grace_is_one_frame_within_limits(period_s: float, expected_s: float
 
 
 def test_a_sigma_is_moved_towards_the_typical_one_and_keeps_its_order() -> None:
-    reported = [0.0, 0.02, 0.1, 0.2, CONFIG.max_evidence_std]
-    trusted = [trusted_std(std, CONFIG) or 0.0 for std in reported]
-    assert [trusted_std(std, CONFIG) for std in (0.3, 1e9, None)] == [None] * 3
-    assert trusted[2] == pytest.approx(CONFIG.typical_evidence_std)
+    reported = [0.0, 0.02, 0.1, 0.2, MOST_STD]
+    trusted = [trusted_std(std) or 0.0 for std in reported]
+    assert [trusted_std(std) for std in (0.3, 1e9, None)] == [None] * 3
+    assert trusted[2] == pytest.approx(0.1)
     assert trusted == sorted(trusted)
     assert trusted[1] > reported[1]
     assert trusted[3] < reported[3]
-    exact = AwarenessFilterConfig(reported_std_weight=1.0)
-    assert [trusted_std(std, exact) for std in reported] == pytest.approx(reported)
+    # A reported σ that is twice another counts as 2^0.6 times it.
+    assert trusted[3] / trusted[2] == pytest.approx(2.0**0.6)

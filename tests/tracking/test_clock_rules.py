@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from tracking.clock import FrameClock, JumpedClock
+from tracking.clock import Entry, FrameClock, Gate, JumpedClock
 
 MAX_PAUSE_S = 10.0
 
@@ -68,3 +68,18 @@ def test_the_period_follows_slowly_and_a_pause_counts_as_two_frames() -> None:
     assert clock.after(3.25).period_s == pytest.approx(0.1 + gain * 0.05)
     assert clock.after(3.3).period_s == pytest.approx(0.1 + gain * 0.1)
     assert clock.after(9.0).period_s == pytest.approx(0.1 + gain * 0.1)
+
+
+def test_the_gate_says_for_how_long_stamps_have_been_refused() -> None:
+    gate: Gate[None] = Gate(2.0)
+    assert gate.refused_for_s(5.0, 1.0) == 0.0
+    gate.new_clock(None, 5.0, ahead=False)
+    assert gate.refused_for_s(5.1, 1.0) == 0.0  # one alone is no clock
+    gate.new_clock(None, 5.3, ahead=False)
+    assert gate.refused_for_s(5.4, 1.0) == pytest.approx(0.4)
+    assert gate.refused_for_s(5.4, 1.0, "another source") == 0.0
+    assert gate.refused_for_s(6.3, 1.0) == pytest.approx(1.3)
+    assert gate.refused_for_s(6.4, 1.0) == 0.0  # too late to go on from them
+    assert gate.refused_for_s(5.2, 1.0) == 0.0  # before the last of them
+    gate.taken(Entry(None, 5.4))
+    assert gate.refused_for_s(5.5, 1.0) == 0.0

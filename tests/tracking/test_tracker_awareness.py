@@ -11,7 +11,7 @@ from tracking_scenes import CAMERA, PERIOD_S, nearest, observe
 
 from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerConfig
 
-PRIOR = TrackerConfig().awareness.prior_awareness
+PRIOR = 0.05
 AWARE_ABOVE = 0.5
 # Content of a frame: an α, None for a person without a face, "unseen" for no person.
 Shown = float | str | None
@@ -152,7 +152,7 @@ def test_looks_far_apart_are_no_evidence_for_the_time_between_them() -> None:
         look = [observe((3, 0), now + gap_s, awareness=0.6, awareness_std=0.25)]
         return tracker.update(look, now + gap_s, CAMERA)[0]
 
-    gap_s = TrackerConfig().awareness.max_evidence_gap_s
+    gap_s = 0.25
     assert after_gap(gap_s - 1e-6).awareness > after_gap(gap_s + 1e-6).awareness + 0.05
 
 
@@ -302,16 +302,13 @@ def test_a_prediction_is_a_frame_that_missed_the_person() -> None:
         assert predicted.awareness == missed.awareness
 
 
-def test_a_wrong_sigma_moves_the_bound_less_than_before() -> None:
-    as_reported = TrackerConfig(awareness=AwarenessFilterConfig(reported_std_weight=1.0))
+def test_a_wrong_sigma_moves_the_bound_less_than_if_it_were_believed() -> None:
+    reported = (0.05, 0.1, 0.18)
+    # The filter uses σ^0.6 · 0.1^0.4: what it takes for it to use these.
+    believed = [(std / 0.1**0.4) ** (1.0 / 0.6) for std in reported]
     for alpha in (0.5, 0.7, 0.9):
         spread = [
-            np.ptp(
-                [
-                    exact_bounds([alpha] * 40, 0.1, std, config=config)[-1]
-                    for std in (0.05, 0.1, 0.2)
-                ]
-            )
-            for config in (TrackerConfig(), as_reported)
+            np.ptp([exact_bounds([alpha] * 40, 0.1, std)[-1] for std in stds])
+            for stds in (reported, believed)
         ]
         assert spread[0] < 0.75 * spread[1]

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracking_scenes import CAMERA, PERIOD_S, FloatArray, camera_at, observe
 
-from tracking import PersonTrack, PersonTracker, TrackerConfig
+from tracking import PersonTrack, PersonTracker
 
 NOISE_M2 = np.array([[0.01, 0.004], [0.004, 0.03]])
 
@@ -95,15 +95,15 @@ def test_rotating_and_shifting_the_world_rotates_and_shifts_the_tracks(
     assert_same(crowd(moving_camera), crowd(moving_camera, world), world)
 
 
-LOOSE = TrackerConfig(position_noise_floor_m=1e-3)
+SEEN_M2 = 0.06**2
 POSE = np.array([[0.01, 0.002, 0.001], [0.002, 0.02, -0.002], [0.001, -0.002, 0.0009]])
 
 
 def first_sight(
     place_m: tuple[float, float], T: FloatArray, pose: FloatArray | None
 ) -> PersonTrack:
-    seen = [observe(place_m, 0.0, T_odom_camera=T, covariance_odom_m2=1e-4)]
-    (track,) = PersonTracker(LOOSE).update(seen, 0.0, T, pose_covariance_odom=pose)
+    seen = [observe(place_m, 0.0, T_odom_camera=T, covariance_odom_m2=SEEN_M2)]
+    (track,) = PersonTracker().update(seen, 0.0, T, pose_covariance_odom=pose)
     return track
 
 
@@ -119,7 +119,7 @@ def test_an_uncertain_pose_adds_the_covariance_of_a_monte_carlo_run(yaw_rad: flo
     # The camera reports the same position in its own frame, whatever its true pose.
     c, s = np.cos(errors[:, 2:]), np.sin(errors[:, 2:])
     sampled = camera_m + errors[:, :2] + c * (place - camera_m) + s * turned
-    expected = np.cov(sampled.T) + 1e-4 * np.eye(2)
+    expected = np.cov(sampled.T) + SEEN_M2 * np.eye(2)
     np.testing.assert_allclose(covariance[:2, :2], expected, rtol=0.04, atol=4e-4)
 
 
@@ -127,5 +127,5 @@ def test_an_uncertain_pose_adds_the_covariance_of_a_monte_carlo_run(yaw_rad: flo
 def test_an_error_in_yaw_moves_people_sideways_in_proportion_to_range(range_m: float) -> None:
     pose = np.diag([0.0, 0.0, 0.02**2])
     covariance = first_sight((range_m, 0.0), CAMERA, pose).covariance_odom
-    assert covariance[0, 0] == pytest.approx(1e-4)
-    assert covariance[1, 1] == pytest.approx(1e-4 + (0.02 * range_m) ** 2)
+    assert covariance[0, 0] == pytest.approx(SEEN_M2)
+    assert covariance[1, 1] == pytest.approx(SEEN_M2 + (0.02 * range_m) ** 2)

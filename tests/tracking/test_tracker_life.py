@@ -179,18 +179,18 @@ def test_crossing_people_keep_their_ids(angle_rad: float, offset_m: float) -> No
 
 
 def test_an_ambiguous_match_has_less_weight() -> None:
-    """With two people within reach of each other the covariance is larger."""
+    """With two people within reach of each other the variance of the noise counts twice."""
     spreads = {}
-    for factor in (1.0, 3.0):
-        tracker = PersonTracker(TrackerConfig(ambiguous_noise_factor=factor, max_pause_s=1e3))
-        for apart_m in (0.26, 3.0):
-            for step in range(20):
-                now = step * PERIOD_S + 100.0 * apart_m
-                pair = [observe((3.0, y_m), now) for y_m in (0.0, apart_m)]
-                tracks = tracker.update(pair, now, CAMERA)
-            spreads[factor, apart_m] = np.trace(tracks[0].covariance_odom)
-    assert spreads[3.0, 0.26] > 1.5 * spreads[1.0, 0.26]
-    assert spreads[3.0, 3.0] == pytest.approx(spreads[1.0, 3.0])
+    for variance_m2, apart_m in ((0.03, 0.26), (0.03, 3.0), (0.06, 3.0)):
+        tracker = PersonTracker()
+        for step in range(20):
+            now = step * PERIOD_S
+            noise_m2 = 0.03 if step < 2 else variance_m2
+            pair = [observe((3.0, y_m), now, covariance_odom_m2=noise_m2) for y_m in (0.0, apart_m)]
+            tracks = tracker.update(pair, now, CAMERA)
+        spreads[variance_m2, apart_m] = np.trace(tracks[0].covariance_odom)
+    assert spreads[0.03, 0.26] > 1.4 * spreads[0.03, 3.0]
+    assert spreads[0.03, 0.26] == pytest.approx(spreads[0.06, 3.0], rel=0.05)
 
 
 def test_predict_returns_the_tracks_of_an_empty_frame() -> None:
@@ -327,13 +327,6 @@ def test_a_weak_detection_takes_no_track_from_a_strong_one() -> None:
     assert track.position_odom_m[0] > 5.02
 
 
-def test_the_threshold_is_a_setting() -> None:
-    tracker = PersonTracker(TrackerConfig(weak_score=0.0))
-    for frame in range(20):
-        (track,) = feed(tracker, frame, 0.01)
-    assert track.status == "confirmed"
-
-
 def test_weak_detections_neither_start_nor_confirm_a_track() -> None:
     assert [feed(PersonTracker(), frame, 0.2) for frame in range(3)] == [()] * 3
     tracker = PersonTracker()
@@ -345,7 +338,6 @@ def test_weak_detections_neither_start_nor_confirm_a_track() -> None:
 
 def test_a_faster_camera_confirms_no_more_clutter_a_second() -> None:
     """The evidence that is needed grows as the logarithm of the frame rate."""
-    assert CONFIG.detection_correlation_s <= 0.2
     needed = {}
     for period_s in (0.2, 0.4):
         config = TrackerConfig(confirm_logit=15.0)

@@ -43,9 +43,7 @@ def run(
     lag_s: float = LAG_S,
 ) -> list[PersonTrack]:
     """Return the track of one person after each pair of frames; no ``rear`` is one camera."""
-    faces = SensorConfig(
-        sees_faces=True, measures_range=False, alignment_std_rad=0.0, detection_probability=0.9
-    )
+    faces = SensorConfig(sees_faces=True, measures_range=False, alignment_std_rad=0.0)
     # A scanner, so that noticing counts; it is silent.
     sensors = {"laser": SensorConfig(alignment_std_rad=0.0)}
     if rear is not None:

@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from awarenav.tracks import read_people_table
 from perception.arrays import FloatArray
-from tracking.units import FASTEST_MPS
+from tracking.people import FASTEST_MPS
 
 from ...world.errors import SimError
 from ..body import MAX_HEAD_YAW_RAD

@@ -13,11 +13,11 @@ import pytest
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
 from awarenav.tracks import read_people_table
+from awarenav.tracks._calibration import FollowedPerson, calibrate
+from awarenav.tracks._smoothing import SmoothedPath
+from awarenav.tracks._units import refuse_other_units
 from sim_tests.scenario.recordings import read_table
 from tracking import TrackingError
-from tracking.calibration import FollowedPerson, calibrate
-from tracking.smoothing import SmoothedPath
-from tracking.units import refuse_other_units
 
 Number = Callable[[float], float]
 

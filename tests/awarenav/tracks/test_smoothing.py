@@ -2,14 +2,32 @@
 
 from __future__ import annotations
 
-import numpy as np
-from tracking_scenes import CAMERA, FloatArray, observe, white_acceleration
+import sys
 
-from tracking import PersonTracker, TrackerConfig
-from tracking.smoothing import smooth
+import numpy as np
+import pytest
+
+from awarenav.tracks._smoothing import smooth
+from perception import PersonObservation
+from perception.arrays import FloatArray
+from tracking import PersonTracker, TrackerConfig, TrackingError
 
 CONFIG = TrackerConfig()
 STD_M = 0.1
+# Of a sensor whose frame is odom.
+SENSOR = np.eye(4)
+
+
+def observe(place_m: FloatArray, stamp_s: float) -> PersonObservation:
+    spread_m2 = STD_M**2 * np.eye(3)
+    return PersonObservation(stamp_s, [*place_m, 0.0], spread_m2, None, None, None, 0.9)
+
+
+def white_acceleration(dt_s: float, density_m2ps3: float) -> tuple[FloatArray, FloatArray]:
+    """Return F and Q of constant velocity under white acceleration."""
+    F = np.eye(4) + dt_s * np.eye(4, k=2)
+    place, cross = dt_s**3 / 3.0, dt_s**2 / 2.0
+    return F, density_m2ps3 * np.kron([[place, cross], [cross, dt_s]], np.eye(2))
 
 
 def tracked(
@@ -20,7 +38,7 @@ def tracked(
     states, covariances = [], []
     for stamp_s, place in zip(stamps_s.tolist(), measured_m, strict=True):
         seen = [] if np.isnan(place[0]) else [observe(place, stamp_s)]
-        (track,) = tracker.update(seen, stamp_s, CAMERA)
+        (track,) = tracker.update(seen, stamp_s, SENSOR)
         states.append(np.concatenate([track.position_odom_m, track.velocity_odom_mps]))
         covariances.append(track.covariance_odom)
     return stamps_s, np.array(states), np.array(covariances)
@@ -45,7 +63,7 @@ def test_the_path_is_the_least_squares_of_all_measurements() -> None:
     path = smooth(stamps_s, states, covariances, CONFIG)
     count = len(stamps_s)
     information, target = np.zeros((4 * count, 4 * count)), np.zeros(4 * count)
-    prior = np.diag([STD_M**-2] * 2 + [CONFIG.initial_velocity_std_mps**-2] * 2)
+    prior = np.diag([STD_M**-2] * 2 + [1.0] * 2)
     information[:4, :4] += prior
     target[:4] += prior @ [*measured_m[0], 0.0, 0.0]
     for row in range(1, count):
@@ -87,3 +105,9 @@ def test_places_between_and_outside_the_stamps() -> None:
     assert np.isnan(path.places_m(np.array([stamps_s[0] - 0.01, stamps_s[-1] + 0.01]))).all()
     alone = smooth(stamps_s[:1], states[:1], covariances[:1])
     np.testing.assert_array_equal(alone.states, states[:1])
+
+
+def test_without_filterpy_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
+    with pytest.raises(TrackingError, match="it is the extra 'smooth': pip install"):
+        smooth([0.0], np.zeros((1, 4)), np.eye(4)[None])

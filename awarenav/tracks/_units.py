@@ -13,13 +13,11 @@ from typing import Final
 import numpy as np
 
 from perception.arrays import FloatArray
+from tracking import TrackingError
+from tracking.people import FASTEST_MPS
 
-from ._errors import TrackingError
-
-#: Nobody runs faster.
-FASTEST_MPS: Final = 12.0
-#: Whoever walks two metres or more walks some of them faster than this.
-SLOWEST_MPS: Final = 0.3
+# Whoever walks two metres or more walks some of them faster than this.
+_SLOWEST_MPS: Final = 0.3
 _USUAL_MPS: Final = 1.3
 # So many people who walk one metre are judged if nobody walks two.
 _SHORT_WALKS: Final = 10
@@ -71,11 +69,11 @@ def refuse_other_units(
             f"{FASTEST_MPS:g} m/s; times are in seconds, places in metres"
             + (f": these look like {unit}" if unit else ", and an id is one person")
         )
-    if fast < SLOWEST_MPS:
+    if fast < _SLOWEST_MPS:
         unit = next(unit for most, unit in _OF_TIMES if most * fast > _USUAL_MPS)
         raise error(
             f"{source}: people walk at {fast:.2g} m/s, and nobody does at less than "
-            f"{SLOWEST_MPS:g} m/s; times are in seconds, places in metres: the times look like "
+            f"{_SLOWEST_MPS:g} m/s; times are in seconds, places in metres: the times look like "
             f"{unit}"
         )
 

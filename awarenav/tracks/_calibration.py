@@ -22,11 +22,11 @@ from typing import Any, Final
 import numpy as np
 
 from perception.arrays import FloatArray, finite_array
+from tracking import TrackingError
+from tracking.prediction import FITTED, REGION_SHARE, REGION_SIGMAS, PredictionModel, predict_states
 
-from ._errors import TrackingError
-from .prediction import FITTED, REGION_SHARE, REGION_SIGMAS, PredictionModel, predict_states
-from .smoothing import SmoothedPath
-from .units import refuse_other_units
+from ._smoothing import SmoothedPath
+from ._units import refuse_other_units
 
 #: Horizons that a calibration uses unless it is told otherwise, seconds.
 HORIZONS_S: Final = (0.2, 0.5, 1.0, 1.5, 2.0)
@@ -46,7 +46,7 @@ class FollowedPerson:
         stamps_s: (N,) increasing.
         states: (N, 4) x, y (m), vx, vy (m/s) of the track.
         covariances: (N, 4, 4).
-        reference: the path; ``tracking.smoothing.smooth`` makes it from the track.
+        reference: the path; ``_smoothing.smooth`` makes it from the track.
     """
 
     stamps_s: FloatArray

@@ -14,9 +14,7 @@ import numpy as np
 
 from perception.arrays import FloatArray, finite_array
 from perception.installation import install_command
-
-from ._config import TrackerConfig
-from ._errors import TrackingError
+from tracking import TrackerConfig, TrackingError
 
 # The 2 × 2 patterns of one axis, for both x and y.
 _POSITION = np.kron(np.diag([1.0, 0.0]), np.eye(2))
