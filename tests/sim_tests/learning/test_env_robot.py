@@ -50,7 +50,7 @@ def test_an_episode_is_the_crossing_of_the_same_robot_among_the_same_people(
     if "robot" in settings:
         np.testing.assert_allclose(env.action_space.high, [1.4, 0.9])
         # It steers: no turn is tighter than its turning radius.
-        state = env.situation.state
+        state = env.situation.robot_state
         assert 0.0 < abs(state.yaw_rate_radps) <= state.speed_mps / 1.3 + 1e-9
     env.close()
     for own, other in zip(found, expected, strict=False):

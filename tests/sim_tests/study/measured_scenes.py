@@ -8,8 +8,9 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 
 from nav_adapter import NavConstraints, RobotState
+from nav_adapter.rigid import Motion
 from sim_tests import NOVA_CARTER, CrossingFrame, CrossingResult
-from sim_tests.crossing._separations import ContactEvent, Separations
+from sim_tests.crossing._separations import Approach, ContactEvent, Separations, moves
 from sim_tests.crossing._stage import TrueView
 from sim_tests.study.measures._trace import Trace
 from tracking import PersonTrack
@@ -102,6 +103,7 @@ def crossing(
             CrossingFrame(
                 t_s=t,
                 robot_state=state,
+                known_state=state,
                 T_odom_camera=np.eye(4),
                 truth=tuple(views),
                 observations=(),
@@ -126,24 +128,21 @@ def crossing(
     return CrossingResult(**values)
 
 
-def separations_of(t_s, state, views, separations_m):
-    """The separations of people, each in the direction of their centre."""
-    offsets = [view.position_odom_m - state.position_odom_m for view in views]
-    return Separations(
-        t_s,
-        0.05,
-        NOVA_CARTER,
-        np.array(state.velocity_odom_mps),
-        tuple(view.velocity_odom_mps for view in views),
-        tuple(separations_m),
-        tuple(offset / max(np.linalg.norm(offset), 1e-9) for offset in offsets),
-    )
+def separations_of(t_s, state, views, separations_m, robot=NOVA_CARTER):
+    """The separations of people, each nearest to the robot at its base origin."""
+    motion, approaches = Motion.of(state), []
+    for view, separation_m in zip(views, separations_m, strict=True):
+        offset = view.position_odom_m - state.position_odom_m
+        towards = offset / max(np.linalg.norm(offset), 1e-9)
+        velocities = motion.velocity_mps, tuple(view.velocity_odom_mps.tolist())
+        approaches.append(Approach(separation_m, tuple(towards.tolist()), *velocities))
+    return Separations(t_s, 0.05, robot, moves(motion, robot), tuple(approaches))
 
 
 def contact(t_s, person, by, robot_mps):
     """A contact of a robot that drives in the direction of x, into somebody or away from them."""
-    towards = np.array([1.0 if by == "robot" else -1.0, 0.0])
-    return ContactEvent(t_s, person, np.array([robot_mps, 0.0]), towards)
+    towards = (1.0 if by == "robot" else -1.0, 0.0)
+    return ContactEvent(t_s, person, Approach(0.0, towards, (robot_mps, 0.0)))
 
 
 def straight(speed_mps, start=(0.0, 0.0), heading=0.0):
@@ -172,6 +171,7 @@ def trace(times, robot, people):
         robot_odom_m=poses[:, :2],
         heading_odom_rad=poses[:, 2],
         velocity_base_mps=np.column_stack((poses[:, 3], np.zeros(len(poses)))),
+        yaw_rate_radps=np.zeros(len(poses)),
         people_odom_m=walks.reshape(len(times), len(people), 4)[..., :2],
         people_odom_mps=walks.reshape(len(times), len(people), 4)[..., 2:],
         awareness=nothing,
