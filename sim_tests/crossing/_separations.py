@@ -14,12 +14,17 @@ from nav_adapter import RobotProfile, protective_separation_m
 from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray
 
+from ..world import Nearest
+
 #: A robot at this speed or slower counts as standing (wheel motors never hold exactly zero).
 STANDING_SPEED_MPS: Final = 0.03
 #: C + Z of the separation margin, as in speed-and-separation monitoring (ISO 13855).
 CLEARANCE_M: Final = 0.10
 #: Distance to a person within which the robot's highest speed is reported.
 NEAR_M: Final = 2.0
+
+# Share of a normal that must be level to say where a body lies.
+_LEVEL: Final = 0.3
 
 Vector = tuple[float, float]
 
@@ -39,6 +44,26 @@ class Approach(NamedTuple):
     towards_person: Vector
     robot_mps: Vector
     person_mps: Vector = (0.0, 0.0)
+
+    @classmethod
+    def at(cls, nearest: Nearest, robot: Motion, person_mps: Vector, towards: Vector) -> Approach:
+        """Return the approach where two bodies are nearest.
+
+        Args:
+            nearest: the places, first on the robot and then on the person.
+            robot: motion of the robot.
+            person_mps: velocity of the person.
+            towards: direction where the places do not tell it, as with one above the other.
+        """
+        (x, y, _), (to_x, to_y, _) = nearest.first_odom_m, nearest.second_odom_m
+        separation_m, level = max(nearest.distance_m, 0.0), 1e-3
+        gap = to_x - x, to_y - y
+        if separation_m == 0.0:  # the bodies overlap
+            gap, level = (-nearest.towards_first[0], -nearest.towards_first[1]), _LEVEL
+        length = math.hypot(*gap)
+        if length > level:
+            towards = gap[0] / length, gap[1] / length
+        return cls(separation_m, towards, robot.velocity_at(x, y), person_mps)
 
     @property
     def robot_speed_mps(self) -> float:

@@ -46,8 +46,6 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
-# Share of a normal that must be level to say where a body lies.
-_LEVEL: Final = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -327,11 +325,11 @@ class Stage(AbstractContextManager["Stage"]):
         person, motion = self._motions[index], motion or self.amr.motion
         if person.away:
             return AWAY
-        centre = person.position_odom_m - self.amr.T_odom_base[:2, 3]
+        centre = person.position_odom_m - motion[:2]
         distance = math.sqrt(centre.dot(centre))
         ux, uy = (centre / max(distance, 1e-9)).tolist()
-        separation = bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
-        x, y = motion[:2]
+        vx, vy = person.velocity_odom_mps.tolist()
+        bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
         # The surfaces are nearly always closer than the first distance, and except for what a
         # person carries on the far side always closer than the second.
         first = self._last_separation_m[index] + _MOVED_M
@@ -341,17 +339,10 @@ class Stage(AbstractContextManager["Stage"]):
                 break
             nearest = self.warehouse.nearest(self.amr.body, self.workers[index].body, within)
             if nearest is not None:
-                separation = self._last_separation_m[index] = max(nearest.distance_m, 0.0)
-                (x, y, _), (to_x, to_y, _) = nearest.first_odom_m, nearest.second_odom_m
-                gap, length = (to_x - x, to_y - y), math.hypot(to_x - x, to_y - y)
-                if separation == 0.0 or length <= 1e-3:  # the bodies overlap
-                    gap = -nearest.towards_first[0], -nearest.towards_first[1]
-                    length = math.hypot(*gap)
-                if length > _LEVEL:
-                    ux, uy = gap[0] / length, gap[1] / length
-                break
-        vx, vy = person.velocity_odom_mps.tolist()
-        return Approach(separation, (ux, uy), motion.velocity_at(x, y), (vx, vy))
+                found = Approach.at(nearest, motion, (vx, vy), (ux, uy))
+                self._last_separation_m[index] = found.separation_m
+                return found
+        return Approach(bound, (ux, uy), motion.velocity_mps, (vx, vy))
 
     def _update_contact(self, index: int, *before: Motion | None) -> None:
         """Record whether a person touches the robot.

@@ -16,13 +16,14 @@ if TYPE_CHECKING:
         keypoints_in_front,
         sees,
     )
-    from ._warehouse import GRAVITY_MPS2, PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
+    from ._warehouse import GRAVITY_MPS2, PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Nearest, Warehouse
 
 __all__ = [
     "FACE_DEPTH_M",
     "FACE_KEYPOINTS",
     "GRAVITY_MPS2",
     "JOINT_DEPTH_M",
+    "Nearest",
     "PERSON_GROUP",
     "RAY_GROUP",
     "ROBOT_GROUP",

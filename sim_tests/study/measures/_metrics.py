@@ -100,7 +100,7 @@ def contact(log: Log) -> bool:
 
 @column
 def contact_by(log: Log) -> str:
-    """``"robot"`` if the robot's touching point moved into a person, else ``"person"``, or empty."""
+    """``"robot"`` if its touching point moved into a person, else ``"person"``, or empty."""
     return log.result.contact_by
 
 

@@ -30,12 +30,14 @@ def rows(policies, *, seeds=6, spread=0.0, free_s=10.0, attentive_s=0.0):
             for policy, (lost_s, impacts) in policies.items():
                 # Attentive people cost less and others more; the mean is the same.
                 shift_s = attentive_s if attention == "attentive" else -attentive_s
+                own_s = lost_s + chance - shift_s * lost_s
                 found.append(
                     EpisodeRecord(
                         *(scenario, seed, policy, "SamplingPlanner", "truth"),
                         attention=attention,
                         time_without_people_s=free_s,
-                        time_lost_s=lost_s + chance - shift_s * lost_s,
+                        time_to_goal_s=free_s + own_s,
+                        time_lost_s=own_s,
                         step_out_unaware=impacts,
                     )
                 )
