@@ -82,6 +82,17 @@ def test_awareness_wins_the_distance_to_the_line_at_equal_risk_and_at_equal_time
     assert worth_of("memory_u0.6", 1.5, 9.0).at_equal_time.value == pytest.approx(-1.0)
 
 
+def test_an_episode_that_never_arrives_costs_what_it_lasted():
+    stuck = [
+        replace(each, time_to_goal_s=None, time_lost_s=40.0, duration_s=40.0)
+        if each.policy == "blind_u1.5"
+        else each
+        for each in rows(LINE)
+    ]
+    point = next(each for each in frontier_of(stuck).points if each.name == "blind_u1.5")
+    assert point.time_over_today.value == pytest.approx(40.0 / 11.0)
+
+
 def test_the_line_is_not_prolonged():
     # Fewer impacts, or faster, than any policy of the line: compared with its end.
     assert worth_of("aware_u1.5", 3.0, 0.0).at_equal_risk_s.value == pytest.approx(1.0)
