@@ -252,8 +252,8 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
                 driver, returned, now.t_s, sideways=crossing.robot.drive == "holonomic"
             )
             crossing.command(speed, yaw_rate, lateral)
-            given = {"command": (speed, yaw_rate), "lateral_command_mps": lateral}
-            frames.append(replace(now, **given, plan_s=plan_s))
+            command = speed, yaw_rate
+            frames.append(replace(now, command=command, lateral_command_mps=lateral, plan_s=plan_s))
             if observer is not None:
                 observer(frames[-1], crossing.stage)
             if now.at_goal:

@@ -151,7 +151,7 @@ class Separations:
     robot_moves: bool
     approaches: tuple[Approach, ...]
 
-    @property
+    @cached_property
     def separations_m(self) -> tuple[float, ...]:
         """Distance between the surfaces of each person and the robot.
 

@@ -72,11 +72,14 @@ speeds = st.floats(-1.2, 1.2)
     st.tuples(st.floats(0.2, 0.8), st.floats(0.2, 0.5)),
     st.tuples(speeds, speeds, st.floats(-2.0, 2.0)),
     st.tuples(st.floats(0.0, math.tau), st.floats(0.05, 0.6)),
-    st.tuples(speeds, speeds),
+    st.tuples(st.floats(0.3, 1.2), st.floats(-0.5, 0.5)),
 )
-def test_the_cause_of_a_contact_is_that_of_a_judge(half, twist, where, velocity) -> None:
+def test_the_cause_of_a_contact_is_that_of_a_judge(half, twist, where, comes) -> None:
     reach_m = math.hypot(*half) + DISC_M + where[1]
     disc = reach_m * math.cos(where[0]), reach_m * math.sin(where[0])
+    # It comes nearer, seen from the robot's base; so it may flee from the robot or follow it.
+    course = where[0] + math.pi + comes[1]
+    velocity = twist[0] + comes[0] * math.cos(course), twist[1] + comes[0] * math.sin(course)
     said = judge(half, twist, disc, velocity)
     assume(said is not None and said[0] > 0.0 and abs(said[1] - 0.03) > 0.08)
     outline = [(x * half[0], y * half[1]) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
