@@ -128,7 +128,7 @@ class Stage(AbstractContextManager["Stage"]):
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self.contacts: list[ContactEvent] = []
-        self._touching = [False] * len(self.workers)
+        self._touching: list[ContactEvent | None] = [None] * len(self.workers)
         self._near_robot = [False] * len(self.workers)
         self._last_separation_m = [math.inf] * len(self.workers)
         corners = self.amr.profile.footprint_m
@@ -351,7 +351,7 @@ class Stage(AbstractContextManager["Stage"]):
         before the last step.
         """
         if not self._held[index] and not self.amr.touches(self.workers[index].body):
-            self._touching[index] = False
+            self._touching[index] = None
             return
         approach = max(
             (self._approach(index, each) for each in before if each is not None),
@@ -360,9 +360,11 @@ class Stage(AbstractContextManager["Stage"]):
         if self.amr.driven_mps <= STANDING_SPEED_MPS:
             # Only a person who walks into it moves a standing robot.
             approach = approach._replace(robot_mps=(0.0, 0.0))
-        if not self._touching[index]:  # a continuing touch is one contact
-            self._touching[index] = True
-            self.contacts.append(ContactEvent(self.t_s, index, approach))
+        now, began = ContactEvent(self.t_s, index, approach), self._touching[index]
+        # A continuing touch is one contact, unless a robot that stood sets off into the person.
+        if began is None or (began.robot_speed_mps <= STANDING_SPEED_MPS and now.by == "robot"):
+            self._touching[index] = now
+            self.contacts.append(now)
         x, y = approach.towards_person
         self._touches[index].append((-x, -y))
 

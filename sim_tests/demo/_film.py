@@ -109,7 +109,9 @@ def passage(result: CrossingResult, person: int) -> Passage:
         fastest = max(touches, key=lambda contact: contact.robot_speed_mps)
         return Passage(fastest.t_s, 0.0, fastest.robot_speed_mps, fastest.by == "robot")
     moving = [
-        frame for frame in result.frames if frame.separations.robot_moves and frame.separations_m
+        frame
+        for frame in result.frames
+        if abs(frame.robot_state.travel_mps) > STANDING_SPEED_MPS and frame.separations_m
     ]
     nearest = min(moving, key=lambda frame: frame.separations_m[person])
     return Passage(nearest.t_s, nearest.separations_m[person], nearest.robot_state.travel_mps)

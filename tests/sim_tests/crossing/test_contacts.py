@@ -166,6 +166,14 @@ def test_a_robot_that_turns_on_the_spot_strikes_with_its_corner() -> None:
     assert row.stops == 0
 
 
+def test_a_robot_that_sets_off_into_somebody_who_touches_it_causes_a_contact() -> None:
+    """It stands at first, so whoever touched it then walked into it."""
+    result = drive(scene((0.5, 0.0)), 0.5, 0.0)
+    first, second = result.contacts[:2]
+    assert (first.worker, first.t_s, first.by) == (0, pytest.approx(0.0, abs=0.01), "person")
+    assert (second.worker, second.by) == (0, "robot")
+
+
 @pytest.mark.parametrize("robot", [None, *KINEMATIC])
 def test_nobody_is_driven_over(robot: str | None) -> None:
     """Neither by wheels and motors, nor by a body that is moved."""
