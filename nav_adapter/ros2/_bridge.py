@@ -339,7 +339,9 @@ class AwarenessBridge:
         if self._scans is not None and CAMERA in self._watch.lost(now_s):
             # As the camera alone would have it, whatever the tracker remembers.
             tracks = tuple(replace(each, awareness_lower=0.0, noticed=0.0) for each in tracks)
-        return guarded_update(self._adapter, tracks, state, now_s, seen_s, self._warn)
+        return guarded_update(
+            *(self._adapter, tracks, state, now_s, seen_s, self._warn), self._watch.seen.stamp_s
+        )
 
     def _missing(self) -> str:
         """Return what has not come yet or cannot be trusted; empty if nothing is missing."""
@@ -391,6 +393,7 @@ def guarded_update(
     now_s: float,
     perception_stamp_s: float,
     warn: Callable[[str], bool],
+    seen_stamp_s: Callable[[float, float], float | None] | None = None,
 ) -> NavConstraints:
     """Return the adapter's constraints, or a stop with the reason if it refuses or fails.
 
@@ -401,9 +404,16 @@ def guarded_update(
         now_s: the present time.
         perception_stamp_s: time from which perception is.
         warn: called with the problem; returns whether it is a new one.
+        seen_stamp_s: as for :meth:`NavAdapter.update`.
     """
     try:
-        return adapter.update(tracks, robot_state, now_s, perception_stamp_s=perception_stamp_s)
+        return adapter.update(
+            tracks,
+            robot_state,
+            now_s,
+            perception_stamp_s=perception_stamp_s,
+            seen_stamp_s=seen_stamp_s,
+        )
     except NavError as problem:
         warn(str(problem))
         reason = f"refused: {problem}"

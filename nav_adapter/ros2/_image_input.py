@@ -22,11 +22,12 @@ from perception import (
 from perception.arrays import FloatArray
 from perception.depth_image import MOST_APART_S
 from perception.errors import DepthImageError
-from perception.no_view import FROZEN, NoView, why_no_view
+from perception.no_view import FROZEN, LastFrames, why_no_view
 from tracking import PersonTrack, TrackingError
 
 from .._errors import NavError
 from ._images import camera_of, depth_of, picture_of
+from ._poses import PoseSpread
 from ._shared import Refusals, Shared
 from .conversions import to_seconds
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
@@ -34,6 +35,7 @@ from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 # Uncertainty of the height and the tilt of a camera on a driving robot.
 _HEIGHT_STD_M = 0.05
 _TILT_STD_RAD = math.radians(2.0)
+_NEEDS_NOISE: Final = " (frozen? a simulated camera needs noise)"
 # Depth images that are kept: a quarter of a second at 30 Hz.
 _KEPT: Final = 8
 
@@ -65,6 +67,7 @@ class DepthReader:
         self._shared = shared
         self._refusals = Refusals(shared, "depth image")
         self._kept: deque[StampedDepth] = deque(maxlen=_KEPT)
+        self._last = LastFrames()
         self._used = 0
 
     @property
@@ -79,6 +82,8 @@ class DepthReader:
             depth = depth_of(message)
             with self._shared.lock:
                 self._shared.clock.check("depth_images", stamp_s, now_s, "its")
+                if self._last.repeats(depth):
+                    raise NavError(f"it is {FROZEN.replace('picture', 'depth')}{_NEEDS_NOISE}")
                 self._kept.append(StampedDepth(stamp_s, depth))
         except NavError as problem:
             self.refuse(str(problem), now_s)
@@ -166,8 +171,7 @@ class ImageInput:
         self._camera: Camera | None = None
         self._info: CameraInfo | None = None
         self._rectified = rectified
-        self._before: NDArray[np.uint8] | None = None
-        self._has_had_view = False
+        self._last = LastFrames()
         if camera is not None:
             self._start(camera)
 
@@ -198,8 +202,9 @@ class ImageInput:
                 shared.clock.check("images", stamp_s, now_s, "the image's")
                 restarts = shared.clock.restarts
                 T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
+                spread = shared.poses.spread(stamp_s, frame_id)
             frame = self._process(
-                message, stamp_s, T_odom_camera, lambda: shared.clock.restarts == restarts
+                message, stamp_s, T_odom_camera, lambda: shared.clock.restarts == restarts, spread
             )
         except (NavError, PerceptionError, TrackingError) as problem:
             shared.warn(f"image: {problem}")
@@ -229,6 +234,7 @@ class ImageInput:
         stamp_s: float,
         T_odom_camera: FloatArray,
         is_current: Callable[[], bool],
+        spread: PoseSpread,
     ) -> PerceivedFrame | None:
         """Return the frame of an image, or None if ``is_current`` says that it came too late.
 
@@ -242,10 +248,9 @@ class ImageInput:
         with self._busy:
             image = picture_of(message)
             self._fit(image.shape[1], image.shape[0])
-            no_view, self._before = why_no_view(image, self._before), image
-            if no_view and self._has_had_view:
-                raise _refusal(no_view)
-            self._has_had_view = no_view is None
+            if no_view := why_no_view(image, self._last):
+                hint = _NEEDS_NOISE if no_view == FROZEN else ""
+                raise NavError(f"the picture is no view: it is {no_view}{hint}")
             floor, problem = _floor(T_odom_camera), ""
             try:
                 given: dict[str, Any] = {}
@@ -255,11 +260,9 @@ class ImageInput:
             except DepthImageError as cause:  # before any network has run
                 depth, problem = None, str(cause)
                 observations = self._pipeline.process(image, stamp_s, floor=floor)
-            # Of a camera that has never had a view, such as a stand-in with blank pictures, people
-            # who are found count; that nobody is found means nothing.
-            if no_view and not observations:
-                raise _refusal(no_view)
-            tracks = self._shared.tracker.update(observations, stamp_s, T_odom_camera, is_current)
+            tracks = self._shared.tracker.update(
+                observations, stamp_s, T_odom_camera, is_current, spread
+            )
         if tracks is None:
             return None
         return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera, depth, problem)
@@ -287,11 +290,6 @@ class ImageInput:
         self._pipeline = self._make_pipeline(camera)
         self._shared.tracker.use_camera(camera)
         self._camera = camera
-
-
-def _refusal(no_view: NoView) -> NavError:
-    hint = " (frozen? a simulated camera needs noise)" if no_view == FROZEN else ""
-    return NavError(f"the picture is no view: it is {no_view}{hint}")
 
 
 def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:

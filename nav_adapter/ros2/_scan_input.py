@@ -25,6 +25,7 @@ from perception.laser import (
     scan_points,
     sight_of,
 )
+from perception.no_view import LastFrames
 from tracking import ScannerView, TrackingError
 
 from .._errors import NavError
@@ -43,9 +44,6 @@ _MAP_REACH_M: Final = 30.0
 _MAP_LEFT_M: Final = 10.0
 _MAP_MOVED_M: Final = 0.03
 _MAP_TURNED_RAD: Final = math.radians(0.2)
-# A robot that has moved so far sees other ranges than before.
-_MOVED_M: Final = 0.05
-_TURNED_RAD: Final = math.radians(2.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,8 +243,7 @@ class ScanInput:
         self._shared, self._inputs, self._perception = shared, inputs, perception
         self._odom_frame = odom_frame
         self._last_s = [-math.inf] * len(inputs)
-        # The first of the scans that are equal, and the robot's pose then.
-        self._repeated: list[tuple[LaserScan, FloatArray] | None] = [None] * len(inputs)
+        self._frames = [LastFrames() for _ in inputs]
         self._messages = [ScanMessages(each.name, shared.warn) for each in inputs]
         self._refusals = [Refusals(shared, f"{each.name}: scan") for each in inputs]
         self._map: MapCells | None = None
@@ -303,7 +300,7 @@ class ScanInput:
     def forget(self) -> None:
         """Forget the stamps of earlier scans, and the scans."""
         self._last_s = [-math.inf] * len(self._inputs)
-        self._repeated = [None] * len(self._inputs)
+        self._frames = [LastFrames() for _ in self._inputs]
         for each in self._refusals:
             each.forget()
 
@@ -325,7 +322,12 @@ class ScanInput:
                 T_base_scanner = mount.T_base_scanner()
             motion = self._shared.poses.motion(scan.stamp_s, scan.end_s)
             static_map = self._map_in_odom(scan.stamp_s)
-            self._require_live(number, scan, motion.T_odom_base)
+            spread = self._shared.poses.spread(middle_s)
+            if scan.repeats(self._frames[number], motion.T_odom_base):
+                raise NavError(
+                    "all ranges are those of a scan before the robot moved, so the scanner is "
+                    "frozen"
+                )
         seen = self._perception.process(number, scan, T_base_scanner, motion, static_map)
         if seen.sight.nothing:
             with self._shared.lock:
@@ -338,6 +340,7 @@ class ScanInput:
             seen.stamp_s,
             seen.T_odom_scanner,
             lambda: self._shared.clock.restarts == restarts,
+            spread,
             scanner=number,
             view=seen.view,
         )
@@ -348,22 +351,6 @@ class ScanInput:
             self._shared.watch.saw_scan(number, seen.stamp_s, seen.sight)
             self._read += 1
         return True
-
-    def _require_live(self, number: int, scan: LaserScan, T_odom_base: FloatArray) -> None:
-        """Refuse a scan that repeats those before it although the robot has moved.
-
-        While it stands, a scanner without noise, as in a simulator, repeats itself as well.
-        """
-        since = self._repeated[number]
-        if since is None or not scan.repeats(since[0]):
-            self._repeated[number] = scan, T_odom_base
-            return
-        step = np.linalg.inv(since[1]) @ T_odom_base
-        moved_m, turned_rad = math.hypot(*step[:2, 3]), abs(math.atan2(step[1, 0], step[0, 0]))
-        if moved_m > _MOVED_M or turned_rad > _TURNED_RAD:
-            raise NavError(
-                "all ranges are those of scans before the robot moved, so the scanner is frozen"
-            )
 
     def _map_in_odom(self, stamp_s: float) -> tuple[MapCells, FloatArray] | None:
         """Return the map and its pose, or None without a map, or while its pose is unknown."""
