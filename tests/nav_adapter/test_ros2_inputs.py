@@ -162,7 +162,7 @@ def test_lookups_compose_and_invert(first, second, third) -> None:
 def test_between_two_stamps_a_frame_moves_at_constant_velocity_in_itself(
     start, seen_from, mount, share: float
 ) -> None:
-    """The motion is the same from whichever frame it is seen, and of whichever point of the body."""
+    """It is the same motion from whichever frame it is seen, and of whichever point of the body."""
     step = pose_matrix((0.3, -0.2, 0.1), yaw_quaternion(share))
     lookups = []
     for before, after in ((np.eye(4), np.eye(4)), (seen_from, mount)):
