@@ -44,6 +44,8 @@ _MAP_REACH_M: Final = 30.0
 _MAP_LEFT_M: Final = 10.0
 _MAP_MOVED_M: Final = 0.03
 _MAP_TURNED_RAD: Final = math.radians(0.2)
+# Scans agree with the map again when they have done so for this time.
+_AGREES_AFTER_S: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +120,11 @@ class ScanPerception:
         )
         self._placed: tuple[MapCells, FloatArray, FloatArray] | None = None
         self._busy = threading.Lock()
+
+    @property
+    def map_contradicted(self) -> bool:
+        """Whether the latest scan contradicts the map."""
+        return self._detector.map_contradicted
 
     def process(
         self,
@@ -247,8 +254,9 @@ class ScanInput:
         self._messages = [ScanMessages(each.name, shared.warn) for each in inputs]
         self._refusals = [Refusals(shared, f"{each.name}: scan") for each in inputs]
         self._map: MapCells | None = None
-        # None until the first scan after a new map; each change is reported once.
-        self._map_used: bool | None = None
+        # What was said of it last: each change is reported once.
+        self._map_said = ""
+        self._contradicted_s = -math.inf
         self._read = self._dropped = 0
 
     @property
@@ -295,7 +303,7 @@ class ScanInput:
         """
         cells = message if isinstance(message, MapCells) else map_cells_of(message)
         with self._shared.lock:
-            self._map, self._map_used = cells, None
+            self._map, self._map_said = cells, ""
 
     def forget(self) -> None:
         """Forget the stamps of earlier scans, and the scans."""
@@ -329,6 +337,8 @@ class ScanInput:
                     "frozen"
                 )
         seen = self._perception.process(number, scan, T_base_scanner, motion, static_map)
+        if static_map is not None:
+            self._judge_map(seen.stamp_s)
         if seen.sight.nothing:
             with self._shared.lock:
                 if self._shared.clock.restarts == restarts:
@@ -359,11 +369,21 @@ class ScanInput:
         try:
             T = self._shared.poses.transforms.lookup(self._odom_frame, self._map.frame_id, stamp_s)
         except NavError as problem:
-            if self._map_used is not False:
-                self._shared.warn(f"the map is not used: {problem}")
-            self._map_used = False
+            self._say_of_map("the map is not used", f": {problem}")
             return None
-        if self._map_used is not True:
-            self._shared.warn("the map is used")
-        self._map_used = True
         return self._map, T
+
+    def _judge_map(self, stamp_s: float) -> None:
+        """Report whether the scans agree with the map; after a contradiction they must for 2 s."""
+        if self._perception.map_contradicted:
+            self._contradicted_s = stamp_s
+        if 0.0 <= stamp_s - self._contradicted_s <= _AGREES_AFTER_S:
+            more = ", so the robot is elsewhere than localisation says; it is used for no such scan"
+            self._say_of_map("the scans contradict the map", more)
+        else:
+            self._say_of_map("the map is used")
+
+    def _say_of_map(self, text: str, more: str = "") -> None:
+        if text != self._map_said:
+            self._map_said = text
+            self._shared.warn(text + more)
