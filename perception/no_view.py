@@ -55,7 +55,7 @@ class LastFrames:
             T_odom_robot: (4, 4) pose of the robot, of a sensor that may have no noise, as in a
                 simulator. A frame then repeats another only if the robot has moved in between.
         """
-        key = frame.shape, frame.dtype.str, zlib.crc32(np.ascontiguousarray(frame))
+        key = frame.shape, frame.dtype.str, zlib.crc32(np.ascontiguousarray(frame).data)
         if key not in self._first:
             self._first[key] = T_odom_robot
             if len(self._first) > _BUFFERS:

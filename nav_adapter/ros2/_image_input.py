@@ -7,7 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +16,18 @@ from perception import (
     AwarenessPipeline,
     Camera,
     FloorPlane,
-    PerceptionError,
     PersonObservation,
 )
 from perception.arrays import FloatArray
 from perception.depth_image import MOST_APART_S
 from perception.errors import DepthImageError
-from perception.no_view import FROZEN, LastFrames, why_no_view
-from tracking import PersonTrack, TrackingError
+from perception.no_view import FROZEN, why_no_view
+from tracking import PersonTrack
 
 from .._errors import NavError
 from ._images import camera_of, depth_of, picture_of
 from ._poses import PoseSpread
-from ._shared import Refusals, Shared
+from ._shared import Input, Shared
 from .conversions import to_seconds
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 
@@ -40,55 +39,26 @@ _NEEDS_NOISE: Final = " (frozen? a simulated camera needs noise)"
 _KEPT: Final = 8
 
 
-@dataclass(frozen=True, eq=False)
-class StampedDepth:
-    """A depth image.
-
-    Attributes:
-        stamp_s: its time.
-        depth: (H, W) uint16 millimetres or float32 metres.
-    """
+class StampedDepth(NamedTuple):
+    """A depth image (H, W), uint16 millimetres or float32 metres, and its time."""
 
     stamp_s: float
     depth: NDArray[Any]
 
 
-class DepthReader:
-    """Keeps the latest depth images, and gives each picture the one nearest to it in time.
+class DepthInput(Input):
+    """The latest depth images, of which each picture is given the one nearest to it in time.
 
-    A depth image that cannot be used is refused, counted and reported; the picture is then seen
-    without. Only one that perception has used counts as heard.
+    Where one cannot be used, the picture is seen without. Only one that perception has used counts
+    as heard.
 
     Args:
         shared: by the bridge's inputs.
     """
 
     def __init__(self, shared: Shared) -> None:
-        self._shared = shared
-        self._refusals = Refusals(shared, "depth image")
+        super().__init__(shared, "depth image")
         self._kept: deque[StampedDepth] = deque(maxlen=_KEPT)
-        self._last = LastFrames()
-        self._used = 0
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Numbers of depth images that were used, and refused."""
-        return {"depth_images": self._used, "depth_images_refused": self._refusals.count}
-
-    def read(self, message: Image, now_s: float) -> bool:
-        """Keep a depth image; return False if it was refused."""
-        stamp_s = to_seconds(message.header.stamp)
-        try:
-            depth = depth_of(message)
-            with self._shared.lock:
-                self._shared.clock.check("depth_images", stamp_s, now_s, "its")
-                if self._last.repeats(depth):
-                    raise NavError(f"it is {FROZEN.replace('picture', 'depth')}{_NEEDS_NOISE}")
-                self._kept.append(StampedDepth(stamp_s, depth))
-        except NavError as problem:
-            self.refuse(str(problem), now_s)
-            return False
-        return True
 
     def nearest(self, stamp_s: float) -> StampedDepth | None:
         """Return the depth image of a picture; None if none is near enough in time."""
@@ -98,19 +68,23 @@ class DepthReader:
             return None
         return found
 
-    def refuse(self, problem: str, now_s: float) -> None:
-        """Count a depth image that cannot be used, and report it if none was lately."""
-        self._refusals.add(problem, now_s)
-
-    def used(self, depth: StampedDepth) -> None:
+    def note_used(self, depth: StampedDepth) -> None:
         """Note a depth image that perception has used; called with the lock."""
-        self._used += 1
+        self.used += 1
         self._shared.watch.saw_depth(depth.stamp_s)
 
     def forget(self) -> None:
-        """Forget all depth images; called with the lock."""
+        super().forget()
         self._kept.clear()
-        self._refusals.forget()
+
+    def _use(self, message: Image, now_s: float) -> bool:
+        stamp_s, depth = to_seconds(message.header.stamp), depth_of(message)
+        with self._shared.lock:
+            self._shared.clock.check("depth_images", stamp_s, now_s, "its")
+            if self._last.repeats(depth):
+                raise NavError(f"it is the same depth image as before{_NEEDS_NOISE}")
+            self._kept.append(StampedDepth(stamp_s, depth))
+        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +110,7 @@ class PerceivedFrame:
     depth_problem: str = ""
 
 
-class ImageInput:
+class ImageInput(Input):
     """The bridge's camera: from its images to tracks, from the first calibration on.
 
     One thread at a time is in :meth:`read` or :meth:`calibrate`; others wait.
@@ -150,7 +124,6 @@ class ImageInput:
 
     Attributes:
         frame: the latest, or None before the first.
-        frames: number of images that were used.
         depth: the depth images; None if there are none.
     """
 
@@ -163,15 +136,14 @@ class ImageInput:
         rectified: bool = False,
         with_depth: bool = False,
     ) -> None:
-        self._shared, self._make_pipeline = shared, make_pipeline
+        super().__init__(shared, "image")
+        self._make_pipeline = make_pipeline
         self.frame: PerceivedFrame | None = None
-        self.frames = 0
-        self.depth = DepthReader(shared) if with_depth else None
+        self.depth = DepthInput(shared) if with_depth else None
         self._busy = threading.Lock()
         self._camera: Camera | None = None
         self._info: CameraInfo | None = None
         self._rectified = rectified
-        self._last = LastFrames()
         if camera is not None:
             self._start(camera)
 
@@ -191,42 +163,39 @@ class ImageInput:
                 self._start(camera_of(message, rectified=self._rectified))
                 self._info = message
 
-    def read(self, message: Image | CompressedImage, now_s: float) -> bool:
-        """Process one image; return True if it was used."""
-        shared = self._shared
-        stamp_s, frame_id = to_seconds(message.header.stamp), message.header.frame_id
-        try:
-            with shared.lock:
-                if self._camera is None:
-                    raise NavError("no camera_info yet: the image cannot be used")
-                shared.clock.check("images", stamp_s, now_s, "the image's")
-                restarts = shared.clock.restarts
-                T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
-                spread = shared.poses.spread(stamp_s, frame_id)
-            frame = self._process(
-                message, stamp_s, T_odom_camera, lambda: shared.clock.restarts == restarts, spread
-            )
-        except (NavError, PerceptionError, TrackingError) as problem:
-            shared.warn(f"image: {problem}")
-            return False
-        with shared.lock:
-            if frame is None or shared.clock.restarts != restarts:
-                return False
-            self.frame = frame
-            self.frames += 1
-            T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
-            shared.watch.saw_image(stamp_s, self._camera, T_base_camera)
-            if self.depth is not None and frame.depth is not None:
-                self.depth.used(frame.depth)
-        if self.depth is not None and frame.depth_problem:
-            self.depth.refuse(frame.depth_problem, now_s)
-        return True
+    def refuse(self, problem: str, now_s: float) -> None:
+        """Report an image that cannot be used: each is, for none may come that can."""
+        self._shared.warn(f"image: {problem}")
 
     def forget(self) -> None:
-        """Forget the latest frame and all depth images; called with the lock."""
+        super().forget()
         self.frame = None
         if self.depth is not None:
             self.depth.forget()
+
+    def _use(self, message: Image | CompressedImage, now_s: float) -> bool:
+        shared = self._shared
+        stamp_s, frame_id = to_seconds(message.header.stamp), message.header.frame_id
+        with shared.lock:
+            if self._camera is None:
+                raise NavError("no camera_info yet: the image cannot be used")
+            shared.clock.check("images", stamp_s, now_s, "the image's")
+            is_current = shared.still_current()
+            T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
+            spread = shared.poses.spread(stamp_s, frame_id)
+        frame = self._process(message, stamp_s, T_odom_camera, is_current, spread)
+        with shared.lock:
+            if frame is None or not is_current():
+                return False
+            self.frame = frame
+            self.used += 1
+            T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
+            shared.watch.saw_image(stamp_s, self._camera, T_base_camera)
+            if self.depth is not None and frame.depth is not None:
+                self.depth.note_used(frame.depth)
+        if self.depth is not None and frame.depth_problem:
+            self.depth.refuse(frame.depth_problem, now_s)
+        return True
 
     def _process(
         self,
