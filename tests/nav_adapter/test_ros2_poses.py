@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bridge_scenes import MOUNT
+from bridge_scenes import FRONT, INFO, MOUNT, SCANNER_MOUNT, Listener, image
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from nav_scenes import finite
+from scan_scenes import scan_message
 
 from nav_adapter import NavError
 from nav_adapter.rigid import Motion
@@ -152,3 +153,47 @@ def test_a_pose_too_long_after_the_newest_odometry_is_refused_for_images_and_sca
         poses.T_odom_camera("any", stamp_s)
     with pytest.raises(NavError, match="known until"):
         poses.motion(stamp_s - 0.1, stamp_s)
+
+
+class Fixed:
+    """Perception of one person who stands in odom, by a camera on a robot on an arc."""
+
+    def __init__(self, motion: Motion, person_odom_m: tuple[float, float]) -> None:
+        self.motion, self.person = motion, np.array([*person_odom_m, 1.0, 1.0])
+
+    def process(self, image_rgb, stamp_s, *, floor=None):
+        T_odom_camera = pose_of(self.motion.at(stamp_s - START_S)) @ MOUNT
+        place = (np.linalg.inv(T_odom_camera) @ self.person)[:3]
+        return (seen(stamp_s=stamp_s, position_camera_m=place),)
+
+
+@pytest.mark.parametrize("sensor", ["camera", "scanner"])
+@pytest.mark.parametrize("yaw_rate_radps", [-1.0, 0.0, 1.0])
+def test_people_stand_where_they_do_however_seldom_odometry_comes(sensor, yaw_rate_radps) -> None:
+    motion = Motion(0.0, 0.0, -0.5 * yaw_rate_radps, 0.3, 0.0, yaw_rate_radps)
+    person, found = (4.0, 0.5), []
+    for every in (1, 5, 9):  # ticks of 10 ms
+        nav = Listener(
+            T_base_camera=MOUNT,
+            make_pipeline=lambda camera: Fixed(motion, person),
+            with_camera=sensor == "camera",
+            scanners=[FRONT] if sensor == "scanner" else [],
+        )
+        nav.bridge.on_camera_info(INFO)
+        for tick in range(100):
+            now_s, here = START_S + 0.01 * tick, motion.at(0.01 * tick)
+            if tick % every == 0:
+                nav.bridge.on_odometry(message(now_s, here), now_s)
+            if tick % 4 == 3 and sensor == "camera":
+                assert nav.bridge.on_image(image(now_s), now_s)
+            elif tick % 4 == 3:
+                T = pose_of(here) @ SCANNER_MOUNT.T_base_scanner()
+                assert nav.bridge.on_scan(0, scan_message(now_s, [person], T), now_s)
+        (track,) = nav.bridge.tracks
+        found.append(track)
+    for track in found:
+        assert np.linalg.norm(track.position_odom_m - person) < 0.1
+        assert np.linalg.norm(track.position_odom_m - found[0].position_odom_m) < 0.02
+    # The less is known about the robot's pose, the less about the people's.
+    variances = [float(np.trace(each.covariance_odom[:2, :2])) for each in found]
+    assert variances == sorted(variances)
