@@ -29,6 +29,7 @@ from .eyes import (
     TimedEyes,
     WorkerObservations,
     make_eyes,
+    motion_of,
     pixel_timing,
     scanner_sensors,
 )
@@ -148,7 +149,7 @@ class Sensing:
         if self._scanners is not None:
             sightings = self._scanners.look(t_s, amr.T_odom_base, state, known.state)
         if self._camera is not None:
-            sightings += self._camera.look(t_s, T_odom_camera, known.T_odom_camera, truth)
+            sightings += self._camera.look(t_s, T_odom_camera, _camera_at(t_s, known), truth)
         observed: WorkerObservations = ()
         tracks: tuple[PersonTrack, ...] = ()
         for sighting in sightings:
@@ -230,6 +231,15 @@ class Odometry:
         arrived = self._queue.take(now_s)
         self._known = arrived[-1] if arrived else self._known
         return self._known
+
+
+def _camera_at(t_s: float, known: OdometryReading) -> FloatArray:
+    """Return T_odom_camera (4, 4) of a robot that keeps its motion after its newest odometry."""
+    if known.state.stamp_s == t_s:
+        return known.T_odom_camera
+    motion = motion_of(known.state)
+    moved = motion.pose_at(t_s) @ np.linalg.inv(motion.T_odom_base)
+    return np.asarray(moved @ known.T_odom_camera)
 
 
 def _camera_and_timing(stage: Stage, kind: str) -> tuple[Camera, CameraTiming]:
