@@ -7,7 +7,7 @@ the words of ``run.json`` follow from the field.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple, TypeVar, get_args
@@ -88,12 +88,11 @@ class Perception(NamedTuple):
 
     @property
     def options(self) -> str:
-        """The options of the command line, such as ``"--perception keypoints"``."""
-        if not self.has_scanners:
-            return f"--perception {self.kind}"
-        if not self.kind:
-            return "--sensors scanner"
-        return f"--perception {self.kind} --sensors camera+scanner"
+        """The options of ``awarenav crossings``, such as ``"--perception keypoints …"``."""
+        if self.kind == ORACLE:
+            return f"--policy {ORACLE}"
+        kind = f"--perception {self.kind} " if self.kind else ""
+        return f"{kind}--sensors {self.sensors}"
 
     @classmethod
     def named(cls, name: str) -> Perception:
@@ -118,7 +117,7 @@ class Perception(NamedTuple):
 
         Args:
             kind: one of :data:`PerceptionKind`.
-            sensors: one of :data:`SensorSet`; with the scanner alone, the kind does not matter.
+            sensors: one of :data:`SensorSet`; with the scanner alone, nobody is seen in images.
 
         Raises:
             SimError: for other names, and for the truth with a scanner.
@@ -129,14 +128,12 @@ class Perception(NamedTuple):
             raise SimError(not_one_of("sensors", sensors, _SENSOR_SETS))
         if sensors == "camera":
             return cls(kind)
-        if sensors == "scanner":
-            return cls("", has_scanners=True)
         if kind in _TRUTHS:
             raise SimError(
                 f"perception {kind!r} has no use for a scanner: sensors must be 'camera', got "
                 f"{sensors!r}; or perception must be 'keypoints' or 'pixels'"
             )
-        return cls(kind, has_scanners=True)
+        return cls("" if sensors == "scanner" else kind, has_scanners=True)
 
 
 class AxisOption(NamedTuple):
@@ -468,16 +465,15 @@ class Experiment:
     def settings(self, **more: Any) -> dict[str, Any]:
         """Return the values as they are given on the command line.
 
-        Without those that are None or empty, and without the camera as the only set of sensors.
+        Without those that are None or empty. Commands differ in their usual sensors: these are
+        always said.
 
         Args:
             more: further values, by the names of their options.
         """
-        found = {**self.values, "episodes": self.episodes, **more}
+        found = {**self.values, "sensors": self["sensors"], "episodes": self.episodes, **more}
         if "planner" in found:
             found["planner"] = [each or REFERENCE_PLANNER for each in found["planner"]]
-        if tuple(found.get("sensors", ())) == ("camera",):
-            del found["sensors"]
         return {
             name: list(value) if isinstance(value, tuple) else value
             for name, value in found.items()
@@ -486,9 +482,10 @@ class Experiment:
 
 
 def option_words(settings: Mapping[str, Any]) -> list[str]:
-    """Return the words of a command line that give options these values."""
-    words: list[str] = []
-    for name, value in settings.items():
-        several: Iterable[Any] = value if isinstance(value, list) else [value]
-        words += [f"--{name}", *map(str, several)]
-    return words
+    """Return the words of a command line that give options these values, each after its name."""
+    return [
+        word
+        for name, value in settings.items()
+        for each in (value if isinstance(value, list) else [value])
+        for word in (f"--{name}", f"{each}")
+    ]

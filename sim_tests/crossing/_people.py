@@ -44,6 +44,7 @@ def staged_people(
             reacts=scenario.replay_reacts,
             leaves=scenario.replay_leaves,
         )
+    Person.bring_together(everybody)
     # The ears draw from generators of their own, which come after those of the people: what
     # people do whom nobody asks depends on nothing here.
     ears = tuple(

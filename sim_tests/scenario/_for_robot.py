@@ -24,7 +24,8 @@ def scenario_for_robot(
 ) -> Scenario:
     """Return a scenario for another robot than the one that it was made for, the Nova Carter.
 
-    *Room.* The lane, the aisle along it, and everything beside it move outward by what the robot is
+    *Room.* The lane, the aisle along it, and everything beside the line from start to goal, which
+    may lie at any angle, move outward by what the robot is
     wider, and by half of what it reaches farther from its base. Places within the aisle are
     stretched; racks and people's routes beyond it are shifted. Pauses and turns stay at the same
     place of the route. The hall is longer by what the robot is longer.
@@ -89,83 +90,89 @@ def _widen(data: dict[str, Any], model: RobotModel) -> None:
     extra_m = max(half_width - usual_half_width, 0.0) + _SWING_SHARE * longer_m
     if extra_m == 0.0:
         return
-    along_x = task["start_y_m"] == task["goal_y_m"]
-    along, across = ("x_m", "y_m") if along_x else ("y_m", "x_m")
-    middle = float(task["start_y_m"] if along_x else task["start_x_m"])
+    # Unit vector across the task's line, which may lie at any angle in the hall.
+    start = np.array([task["start_x_m"], task["start_y_m"]])
+    ux, uy = np.array([task["goal_x_m"], task["goal_y_m"]]) - start
+    across = np.array([-uy, ux]) / max(math.hypot(ux, uy), 1e-9)
     inner_m = 0.5 * float(hall["aisle_width_m"])
 
-    def moved(place: float) -> float:
-        off = place - middle
-        if abs(off) <= inner_m:
-            return middle + off * (1.0 + extra_m / inner_m)
-        return place + math.copysign(extra_m, off)
+    def outward_m(off_m: float) -> float:
+        """Return how far something so far to the left of the line moves to the left."""
+        return extra_m * min(max(off_m / inner_m, -1.0), 1.0)
+
+    def off_m(x_m: float, y_m: float) -> float:
+        return float(across @ (np.array([x_m, y_m]) - start))
+
+    def moved(place: dict[str, Any]) -> dict[str, Any]:
+        dx, dy = (outward_m(off_m(place["x_m"], place["y_m"])) * across).tolist()
+        return {**place, "x_m": place["x_m"] + dx, "y_m": place["y_m"] + dy}
 
     if task["lane_half_width_m"] is not None:
         task["lane_half_width_m"] += extra_m
     hall["aisle_width_m"] += 2.0 * extra_m
-    side, end = across[0], along[0]
-    for bound in (f"{side}_min_m", f"{side}_max_m"):
-        hall[bound] = moved(hall[bound])
     ends_m = max(longer_m, extra_m)
-    hall[f"{end}_min_m"] -= ends_m
-    hall[f"{end}_max_m"] += ends_m
-    size = "width_m" if along_x else "length_m"
+    share_x, share_y = np.abs(across).tolist()
+    for axis, beside, ahead in (("x", share_x, share_y), ("y", share_y, share_x)):
+        hall[f"{axis}_min_m"] -= extra_m * beside + ends_m * ahead
+        hall[f"{axis}_max_m"] += extra_m * beside + ends_m * ahead
     racks = []
     for rack in hall["racks"]:
-        low, high = (moved(rack[across] + sign * 0.5 * rack[size]) for sign in (-1.0, 1.0))
-        racks.append({**rack, across: 0.5 * (low + high), size: high - low})
+        half_m = 0.5 * (share_x * rack["length_m"] + share_y * rack["width_m"])
+        middle_m = off_m(rack["x_m"], rack["y_m"])
+        low_m, high_m = (outward_m(middle_m + sign * half_m) for sign in (-1.0, 1.0))
+        dx, dy = (0.5 * (low_m + high_m) * across).tolist()
+        wider_m = high_m - low_m  # of a rack that reaches into the aisle
+        racks.append(
+            {
+                **rack,
+                "x_m": rack["x_m"] + dx,
+                "y_m": rack["y_m"] + dy,
+                "length_m": rack["length_m"] + share_x * wider_m,
+                "width_m": rack["width_m"] + share_y * wider_m,
+            }
+        )
     hall["racks"] = racks
-    hall["props"] = [{**prop, across: moved(prop[across])} for prop in hall["props"]]
-    data["people"] = [_moved_person(person, across, moved) for person in data["people"]]
+    hall["props"] = [moved(prop) for prop in hall["props"]]
+    data["people"] = [_moved_person(person, moved) for person in data["people"]]
 
 
 def _moved_person(
-    person: dict[str, Any], across: str, moved: Callable[[float], float]
+    person: dict[str, Any], moved: Callable[[dict[str, Any]], dict[str, Any]]
 ) -> dict[str, Any]:
     """Return a person whose route has moved, with the stops and the turn where they were on it."""
-    route = [{**key, across: moved(key[across])} for key in person["route"]]
+    route = [moved(key) for key in person["route"]]
     before, after = (
         np.array([[key["x_m"], key["y_m"]] for key in keys]) for keys in (person["route"], route)
     )
 
-    def length_m(at_m: float) -> float:
-        return _length_after(before, after, at_m, int(across == "y_m"), moved)
+    old_m, new_m = _reached_m(before), _reached_m(after)
 
-    fitted = {**person, "route": route}
-    end_m = _reached_m(before)[-1]
+    def length_m(at_m: float) -> float:
+        """Return the length of the new route at the place that was at a length of the old one."""
+        if at_m > old_m[-1]:  # beyond the end, where it means nothing
+            return float(new_m[-1] + at_m - old_m[-1])
+        piece = max(int(np.searchsorted(old_m, at_m)) - 1, 0)
+        if piece + 1 == len(after):  # a route of one point
+            return at_m
+        share = (at_m - old_m[piece]) / (old_m[piece + 1] - old_m[piece])
+        x_m, y_m = (before[piece] + share * (before[piece + 1] - before[piece])).tolist()
+        place, step = moved({"x_m": x_m, "y_m": y_m}), after[piece + 1] - after[piece]
+        on = (np.array([place["x_m"], place["y_m"]]) - after[piece]) @ step / (step @ step)
+        return float(new_m[piece] + np.clip(on, 0.0, 1.0) * (new_m[piece + 1] - new_m[piece]))
+
     turn_m = person["turns_back_at_m"]
-    turns = turn_m is not None and turn_m < end_m
-    if turn_m is not None:
-        fitted["turns_back_at_m"] = length_m(turn_m)
+    turns = turn_m is not None and turn_m < old_m[-1]
 
     def stop_m(at_m: float) -> float:
         if turns and at_m > turn_m:  # on the way back
             return 2.0 * length_m(turn_m) - length_m(2.0 * turn_m - at_m)
         return length_m(at_m)
 
+    fitted = {**person, "route": route}
+    if turn_m is not None:
+        fitted["turns_back_at_m"] = length_m(turn_m)
     fitted["pauses"] = [{**pause, "at_m": stop_m(pause["at_m"])} for pause in person["pauses"]]
     return fitted
-
-
-def _length_after(
-    before: FloatArray, after: FloatArray, at_m: float, axis: int, moved: Callable[[float], float]
-) -> float:
-    """Return the length of a moved route (N, 2) at the place that was at a length of the old one.
-
-    Beyond the ends of the old route the difference stays the same.
-    """
-    old_m, new_m = _reached_m(before), _reached_m(after)
-    if at_m >= old_m[-1] or len(before) == 1:
-        return float(new_m[-1] + at_m - old_m[-1])
-    if at_m <= 0.0:
-        return at_m
-    piece = int(np.searchsorted(old_m, at_m)) - 1
-    share = (at_m - old_m[piece]) / (old_m[piece + 1] - old_m[piece])
-    place = before[piece] + share * (before[piece + 1] - before[piece])
-    place[axis] = moved(place[axis])
-    step = after[piece + 1] - after[piece]
-    share = float(np.clip((place - after[piece]) @ step / (step @ step), 0.0, 1.0))
-    return float(new_m[piece] + share * (new_m[piece + 1] - new_m[piece]))
 
 
 def _reached_m(corners: FloatArray) -> FloatArray:

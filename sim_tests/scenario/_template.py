@@ -175,10 +175,7 @@ class ScenarioTemplate:
         if robot == "":
             return self
         model = RobotModel.of(robot)
-        return ScenarioTemplate(
-            {**self._data, _FOR_ROBOT: model.model_dump(mode="json")},
-            f"{self._source} with robot {model.name}",
-        )
+        return self._with(model.name, **{_FOR_ROBOT: model.model_dump(mode="json")})
 
     @property
     def _scenario_data(self) -> dict[str, Any]:
@@ -197,9 +194,7 @@ class ScenarioTemplate:
         """
         if not name:
             return self
-        return ScenarioTemplate(
-            {**self._data, "camera": camera_data(name)}, f"{self._source} with camera {name}"
-        )
+        return self._with(name, camera=camera_data(name))
 
     def with_networks(self, path: str | Path) -> ScenarioTemplate:
         """Return the same scenario with other networks for the pictures of its camera.
@@ -213,10 +208,7 @@ class ScenarioTemplate:
         """
         if not path:
             return self
-        networks = networks_data(path)
-        return ScenarioTemplate(
-            {**self._data, "networks": networks}, f"{self._source} with networks {path}"
-        )
+        return self._with(path, networks=networks_data(path))
 
     def with_population(self, text: str) -> ScenarioTemplate:
         """Return the same scenario among people with other habits.
@@ -233,7 +225,10 @@ class ScenarioTemplate:
         changes: dict[str, Any] = {} if name is None else {"population": name}
         if numbers:
             changes["hearing"] = {**self._data.get("hearing", {}), **numbers}
-        return ScenarioTemplate({**self._data, **changes}, self._source)
+        return self._with(text, **changes)
+
+    def _with(self, what: object, **changes: Any) -> ScenarioTemplate:
+        return ScenarioTemplate({**self._data, **changes}, f"{self._source} with {what}")
 
     def to_text(self) -> str:
         """Return YAML for :meth:`from_text`, with the shared defaults written out."""

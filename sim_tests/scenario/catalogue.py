@@ -17,7 +17,7 @@ from nav_adapter import RobotProfile
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ..actors.behaviour import PersonSpec
+from ..actors.behaviour import PersonSpec, Route
 from ..actors.robot import NOVA_CARTER
 from ..world import crosses_boxes
 from ..world.errors import SimError
@@ -53,29 +53,16 @@ def person_plan(spec: PersonSpec, t_s: FloatArray) -> tuple[FloatArray, FloatArr
 
     The person walks the route at the planned speed, with its pauses, and turns back if planned.
     """
-    corners = np.array([[point.x_m, point.y_m] for point in spec.route])
-    legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    reached = np.concatenate([[0.0], np.cumsum(legs)])
-    turn_m = spec.turns_back_at_m
-    if turn_m is None or turn_m >= reached[-1]:
-        turn_m, total_m = float(reached[-1]), float(reached[-1])
-    else:
-        total_m = 2.0 * turn_m
+    route = Route.from_spec(spec)
     # Knots of walked length over time; the length is constant in a pause.
     times, lengths = [spec.start_s], [0.0]
-    for pause in sorted(spec.pauses, key=lambda each: each.at_m):
-        if pause.at_m < total_m:
-            times.append(times[-1] + (pause.at_m - lengths[-1]) / spec.speed_mps)
-            times.append(times[-1] + pause.for_s)
-            lengths += [pause.at_m, pause.at_m]
-    times.append(times[-1] + (total_m - lengths[-1]) / spec.speed_mps)
-    lengths.append(total_m)
+    stops = [(each.at_m, each.for_s) for each in spec.pauses if each.at_m < route.length_m]
+    for at_m, for_s in (*sorted(stops), (route.length_m, 0.0)):
+        times.append(times[-1] + (at_m - lengths[-1]) / spec.speed_mps)
+        times.append(times[-1] + for_s)
+        lengths += [at_m, at_m]
     walked = np.interp(t_s, times, lengths)
-    along = np.where(walked > turn_m, 2.0 * turn_m - walked, walked)
-    if len(corners) == 1:
-        return np.repeat(corners, len(t_s), axis=0), walked
-    columns = [np.interp(along, reached, corners[:, axis]) for axis in (0, 1)]
-    return np.column_stack(columns), np.asarray(walked)
+    return np.array([route.point(along_m) for along_m in walked.tolist()]), walked
 
 
 def planned_people(scenario: Scenario) -> tuple[PersonSpec, ...]:
@@ -183,6 +170,7 @@ def scenario_problems(scenario: Scenario) -> tuple[str, ...]:
     grown = boxes + BODY_RADIUS_M * np.array([-1.0, -1.0, 1.0, 1.0])
     for person in scenario.people:
         corners = [(point.x_m, point.y_m) for point in person.route]
+        found += _problems_of_stops(person)
         for number, corner in enumerate(corners):
             what = f"people: {person.name}: route point {number}"
             found += _place_problems(what, corner, boxes, inner, BODY_RADIUS_M)
@@ -195,6 +183,20 @@ def scenario_problems(scenario: Scenario) -> tuple[str, ...]:
     if scenario.replay_csv is not None and not Path(scenario.replay_csv).is_file():
         found.append(f"replay_csv: there is no file {scenario.replay_csv}")
     return tuple(dict.fromkeys(found))
+
+
+def _problems_of_stops(person: PersonSpec) -> list[str]:
+    """Return the turn and the pauses that a person never comes to, which would do nothing."""
+    way_m, turn_m = Route.from_spec(person).length_m, person.turns_back_at_m
+    stops = [(f"the pause at_m {pause.at_m:g}", pause.at_m) for pause in person.pauses]
+    if turn_m is not None:
+        stops.insert(0, (f"turns_back_at_m {turn_m:g}", turn_m))
+    return [
+        f"people: {person.name}: {what} is not before the end of the way of {way_m:.4g} m: make "
+        "it smaller, or leave it out"
+        for what, at_m in stops
+        if at_m >= way_m
+    ]
 
 
 def _place_problems(

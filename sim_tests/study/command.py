@@ -83,8 +83,9 @@ FORMAT_NAMES = ("socnav3", "navwareset")
 def crossings(**values: Any) -> int:
     """Run every scenario with every policy, planner and fault on the same seeds, in closed loop.
 
-    Every episode that ends appends a row to episodes.csv. At the end the rows are sorted and the
-    report is written. The row of a failed episode has the reason; the other episodes still run.
+    Every episode that ends writes a file into DIR/episodes. At the end, and when the run is
+    interrupted, their table episodes.csv is written, and at the end the report. The row of a failed
+    episode has the reason; the other episodes still run.
     """
     from ._commands import crossings_command  # noqa: PLC0415 - help needs no simulator
 

@@ -11,10 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-SOURCES: Final = (
-    *("perception", "tracking", "nav_adapter"),
-    *("sim_tests/crossing", "sim_tests/study/measures"),
-)
+SOURCES: Final = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests")
 #: Code whose mistakes can hurt: limit and reach, trust in people, who is present and aware, clocks.
 SAFETY: Final = re.compile(
     r"nav_adapter/\w*(limit|reach|contact|adapter|people|trust|separation|governor)\w*\.py"

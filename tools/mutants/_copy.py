@@ -29,10 +29,7 @@ import pytest
 from tools.mutants._changes import SOURCES, Mutant, parsed, source_files
 
 ROOT: Final = Path(__file__).resolve().parents[2]
-TESTS: Final = (
-    *("tests/perception", "tests/tracking", "tests/nav_adapter", "tests/sim_tests/crossing"),
-    "tests/sim_tests/study/test_measures*.py",
-)
+TESTS: Final = tuple(f"tests/{source}" for source in SOURCES)
 _NOT_COPIED: Final = (".git", ".venv", "__pycache__", ".*_cache", ".hypothesis", "site", "build")
 # Loaded once, before the process forks for each change.
 _WARM: Final = (
@@ -235,7 +232,7 @@ def _names_set_by(statement: ast.stmt) -> list[str]:
 
 def _state(tree: Path) -> str:
     state = hashlib.sha256()
-    for folder in ("tests", "perception", "tracking", "nav_adapter", "awarenav", "sim_tests"):
+    for folder in ("tests", *SOURCES):
         for path in sorted((tree / folder).rglob("*.py")):
             state.update(path.relative_to(tree).as_posix().encode())
             state.update(path.read_bytes())
@@ -279,7 +276,10 @@ def forked(made: Copy, run: Callable[[], int], most_s: float = 1e6) -> int | Non
             os.dup2(log, 1)
             os.dup2(log, 2)
             os.chdir(folder := made.folder)
-            sys.path[:] = [str(folder), *(p for p in sys.path if Path(p or ".").resolve() != ROOT)]
+            # From no other checkout: neither this one nor that of which an installation tells.
+            others = [p for p in sys.path if not Path(p or ".", "nav_adapter").is_dir()]
+            sys.path[:] = [str(folder), *others]
+            sys.meta_path[:] = [f for f in sys.meta_path if "__editable__" not in f"{f!r}"]
             os.environ.update(PYTHONPATH=str(folder), CI="1")
             # Without compiled files, each process would compile all that it imports.
             sys.dont_write_bytecode = False

@@ -14,6 +14,7 @@ from ._habits import (
 )
 from ._hearing import Ears, Heard, Hearing, Request, RequestMeans, StartleKind
 from ._person import DECISION_PERIOD_S, Person
+from ._route import Route
 from ._spec import GazeKey, Glances, Lapse, PersonSpec, Reactions, RoutePoint
 from ._starting import LOOK_WITHIN_S, START_SHARES, start_share
 from ._surroundings import (
@@ -53,6 +54,7 @@ __all__ = [
     "Request",
     "RequestMeans",
     "RobotBody",
+    "Route",
     "RoutePoint",
     "StartleKind",
     "Surroundings",

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from functools import cached_property
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -17,15 +19,16 @@ from ._forces import (
     robot_force,
     without_part,
 )
+from ._free_walk import FreeWalks
 from ._gaze import Gaze, planned_gaze
 from ._habits import CLASSIC, Habits, Manner, draw_person
 from ._head import turn_rate, twisted
 from ._reactions import ReactionModel, Startle
-from ._route import STANDING_BELOW_MPS, DesiredVelocity, FreeWalk, Route, RouteFollower
+from ._route import STANDING_BELOW_MPS, DesiredVelocity, Route, RouteFollower
 from ._spec import PersonSpec
 from ._starting import AttentionSpan
 from ._surroundings import (
-    ALONE,
+    MovingBody,
     PersonMotion,
     PersonOutcome,
     RobotBody,
@@ -56,8 +59,6 @@ _SIDE_STEP_COSINE: Final = 0.2
 _RECOIL_S: Final = 0.7
 _RECOIL_MPS: Final = 0.4
 _TOUCHING_S: Final = 0.1
-# The free walk has no end if it takes longer than this factor times its plan.
-_MAX_FREE_TIME_FACTOR: Final = 4.0
 
 
 class Person:
@@ -102,6 +103,8 @@ class Person:
         track: Track | None = None,
         offset_s: float = 0.0,
     ) -> None:
+        self._made_of = spec, copy.deepcopy(rng), boxes_odom_m, habits, track, offset_s
+        self._free_walks = FreeWalks((self,), DECISION_PERIOD_S)
         self._habits = habits
         self._manner: Manner | None = None
         if habits.variation is not None:
@@ -111,7 +114,6 @@ class Person:
         self.spec = spec
         self._track = track
         self.on_track = track is not None
-        self._boxes_odom_m = boxes_odom_m
         self._obstacles = Obstacles(boxes_odom_m)
         route = Route.from_spec(spec)
         start_s = max(spec.start_s + offset_s, 0.0)
@@ -174,20 +176,66 @@ class Person:
         """True once the end of the route was reached."""
         return self._task.arrived_s is not None
 
+    @property
+    def along_m(self) -> float:
+        """Length of the route covered so far."""
+        return self._task.along_m
+
+    @property
+    def started_s(self) -> float | None:
+        """Time of the start on the route; None before."""
+        return self._task.started_s
+
+    @property
+    def moving_body(self) -> MovingBody | None:
+        """The person as others avoid them at the last requested time; None while away."""
+        if self._track is not None and self._track.is_away(self._now_s):
+            return None
+        return MovingBody(*self._state(self._now_s))
+
+    @staticmethod
+    def bring_together(people: Sequence[Person]) -> None:
+        """Let new people meet: their free walks are those of all of them without the robot."""
+        walks = FreeWalks(tuple(people), DECISION_PERIOD_S)
+        for person in people:
+            person._free_walks = walks
+
+    def twin(self) -> Person:
+        """Return the same person at the beginning, who draws the same random numbers."""
+        spec, rng, boxes_odom_m, habits, track, offset_s = self._made_of
+        rng = copy.deepcopy(rng)
+        return Person(spec, rng, boxes_odom_m, habits=habits, track=track, offset_s=offset_s)
+
+    def set_off(self, t_s: float) -> None:
+        """Let somebody who waits for the robot set off without it."""
+        if self.spec.sets_off_within_m is not None:
+            self._task.go(t_s)
+
     def outcome(self) -> PersonOutcome:
         """Return the outcome for the person up to now."""
-        free = self._free_walk
-        time_s, late_s = (None, None) if free is None else self._task.times_s(self._now_s, free)
-        return PersonOutcome(
+        end_s, started_s = self._task.arrived_s, self.started_s
+        outcome = PersonOutcome(
             name=self.spec.name,
             noticed_s=self._gaze.noticed_s,
             reaction=self._reactions.first_reaction,
-            time_s=time_s,
-            late_s=late_s,
-            free_time_s=None if free is None else free.time_s,
-            length_m=self._walked_m if self._walked_to_end_m is None else self._walked_to_end_m,
-            free_length_m=None if free is None else free.length_m,
+            time_s=None if end_s is None or started_s is None else end_s - started_s,
+            length_m=self._length_m,
         )
+        if self._task.route.length_m == 0.0 or started_s is None:
+            return outcome
+        free, late_s = self._free_walks.of(self, self._now_s)
+        end_s, started_s = free._task.arrived_s, free.started_s
+        return replace(
+            outcome,
+            late_s=None if self.arrived else late_s,
+            free_time_s=None if end_s is None or started_s is None else end_s - started_s,
+            free_length_m=None if end_s is None else free._length_m,
+        )
+
+    @property
+    def _length_m(self) -> float:
+        """Length walked up to now, or to the end of the route."""
+        return self._walked_m if self._walked_to_end_m is None else self._walked_to_end_m
 
     def step(self, t_s: float, around: Surroundings) -> PersonMotion:
         """Return the person's motion at ``t_s``, which never decreases."""
@@ -248,7 +296,7 @@ class Person:
         for heard in around.heard:
             if heard.looks:
                 self._gaze.hear(heard)
-            if heard.startle:
+            if heard.startle and (self._startle is None or self._startle.is_over(self._now_s)):
                 self._startle = Startle(heard.startle, heard.from_s)
         for towards_x, towards_y in around.touches:
             self._note_contact(towards_x, towards_y)
@@ -479,21 +527,3 @@ class Person:
         if errand is not None:
             goal, speed_mps = errand
             self._follower = RouteFollower(Route([(x, y), goal], []), speed_mps, t_s)
-
-    @cached_property
-    def _free_walk(self) -> FreeWalk | None:
-        """The walk without robot and people; None without a route or without an end of it."""
-        if self._task.route.length_m == 0.0:
-            return None
-        spec = self.spec.model_copy(update={"start_s": 0.0, "sets_off_within_m": None})
-        alone = Person(spec, np.random.default_rng(0), self._boxes_odom_m)
-        route = self._task.route
-        pauses = sum(stop.for_s for stop in route.stops[:-1])
-        longest_s = _MAX_FREE_TIME_FACTOR * (route.length_m / spec.speed_mps + 5.0) + pauses
-        along_m = []
-        while alone._task.arrived_s is None:
-            alone.advance((alone._tick + 1) * DECISION_PERIOD_S, ALONE)
-            along_m.append(alone._task.along_m)
-            if alone._tick * DECISION_PERIOD_S > longest_s:
-                return None
-        return FreeWalk(alone._task.arrived_s, alone._walked_m, DECISION_PERIOD_S, tuple(along_m))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 from ._spec import PersonSpec
 
@@ -142,30 +142,6 @@ class Route:
         return max(bisect.bisect_right(self._along_m, along_m) - 1, 0)
 
 
-class FreeWalk(NamedTuple):
-    """A walk along a route without robot and other people.
-
-    Attributes:
-        time_s: from the start to the end.
-        length_m: length of the path walked.
-        tick_s: time from one of ``along_m`` to the next.
-        along_m: length of the route covered at each tick, from the start on.
-    """
-
-    time_s: float
-    length_m: float
-    tick_s: float
-    along_m: tuple[float, ...]
-
-    def late_s(self, elapsed_s: float, along_m: float) -> float:
-        """Return how much longer than this walk somebody took to come so far, or more.
-
-        The free walk's pause at that place counts as taken, because it may not be over.
-        """
-        ticks = bisect.bisect_right(self.along_m, along_m + _REACHED_M)
-        return max(elapsed_s - ticks * self.tick_s, 0.0)
-
-
 class RouteFollower:
     """Leads one person along a route with its stops.
 
@@ -220,17 +196,6 @@ class RouteFollower:
         self._start_s = min(self._start_s, t_s)
         if self._resumes_s is not None and self.arrived_s is None:
             self._resumes_s = min(self._resumes_s, t_s)
-
-    def times_s(self, now_s: float, alone: FreeWalk) -> tuple[float | None, float | None]:
-        """Return the time from the start to the end, and how late somebody on the way is.
-
-        Both are None before the start, and one of them after it; see :class:`PersonOutcome`.
-        """
-        if self.started_s is None:
-            return None, None
-        if self.arrived_s is not None:
-            return self.arrived_s - self.started_s, None
-        return None, alone.late_s(now_s - self.started_s, self.along_m)
 
     def _update(self, t_s: float, x: float, y: float, speed_mps: float) -> bool:
         """Update progress, stops and times; return whether the person is walking."""

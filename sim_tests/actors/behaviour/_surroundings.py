@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray
 
 from ..body import KNEELING_EYE_HEIGHT_SHARE, SEATED_EYE_HEIGHT_SHARE, Activity, GaitPose
@@ -18,6 +19,8 @@ from ._hearing import Heard
 _AWAY_M: Final = 1000.0
 #: Height of the eyes as a share of stature.
 EYE_HEIGHT_SHARE: Final = 0.94
+#: A slower robot counts as standing.
+ROBOT_STANDING_MPS: Final = 0.08
 _LOW_EYE_HEIGHT_SHARES: Final = {
     "sitting": SEATED_EYE_HEIGHT_SHARE,
     "kneeling": KNEELING_EYE_HEIGHT_SHARE,
@@ -52,6 +55,7 @@ class RobotBody:
         half_length_m: half the rectangle's length along the heading.
         half_width_m: half its width.
         camera_m: (x, y, z) of the camera.
+        yaw_rate_radps: counter-clockwise positive.
     """
 
     x_m: float
@@ -62,6 +66,7 @@ class RobotBody:
     half_length_m: float
     half_width_m: float
     camera_m: tuple[float, float, float]
+    yaw_rate_radps: float = 0.0
 
     def nearest_point_m(self, x_m: float, y_m: float) -> tuple[float, float]:
         """Return the point of the rectangle nearest to (x, y)."""
@@ -79,19 +84,30 @@ class RobotBody:
         half_m += self.half_width_m * abs(ux * cos + uy * sin)
         return max(abs(ux * (self.y_m - y) - uy * (self.x_m - x)) - half_m, 0.0)
 
+    @property
+    def course(self) -> Motion:
+        """The robot as it goes on, heading where it drives; that of its body while it stands."""
+        speed_mps = math.hypot(self.vx_mps, self.vy_mps)
+        if speed_mps <= ROBOT_STANDING_MPS:
+            return Motion(self.x_m, self.y_m, self.heading_rad)
+        along_rad = math.atan2(self.vy_mps, self.vx_mps)
+        return Motion(self.x_m, self.y_m, along_rad, speed_mps, 0.0, self.yaw_rate_radps)
+
     def extrapolated(self, dt_s: float) -> RobotBody:
-        """Return the robot after ``dt_s`` of constant velocity."""
-        dx, dy = self.vx_mps * dt_s, self.vy_mps * dt_s
+        """Return the robot after ``dt_s`` on its present curve."""
+        motion = Motion(self.x_m, self.y_m, 0.0, self.vx_mps, self.vy_mps, self.yaw_rate_radps)
+        later = motion.at(dt_s)
         x, y, z = self.camera_m
+        camera = later.point(x - self.x_m, y - self.y_m)
         return RobotBody(
-            self.x_m + dx,
-            self.y_m + dy,
-            self.heading_rad,
-            self.vx_mps,
-            self.vy_mps,
+            later.x_m,
+            later.y_m,
+            self.heading_rad + later.heading_rad,
+            *later.velocity_mps,
             self.half_length_m,
             self.half_width_m,
-            (x + dx, y + dy, z),
+            (*camera, z),
+            self.yaw_rate_radps,
         )
 
 
@@ -173,12 +189,12 @@ class PersonOutcome:
         reaction: first reaction to the robot: ``"walk_on"``, ``"wait"``, ``"hurry"``,
             ``"pass_behind"`` or ``"claim"``; empty without an encounter.
         time_s: from the start to the end of the route; None if the end was not reached.
-        free_time_s: the same without robot and other people, pauses included; None without a route
-            or without an end of it.
+        free_time_s: the same for the same people with the same seed, the robot absent; None where
+            that walk has no route or did not end by now.
         length_m: length of the path walked.
-        free_length_m: the same without robot and other people; None as ``free_time_s``.
-        late_s: of somebody on the way: how much longer than alone they took to come so far, or
-            more. None before the start, at the end of the route, and without ``free_time_s``.
+        free_length_m: the same without the robot; None as ``free_time_s``.
+        late_s: of somebody on the way: how much longer than without the robot they took to come so
+            far, or more. None before the start, at the end of the route, and without one.
     """
 
     name: str

@@ -208,5 +208,5 @@ def _free_run(task: str, planner: str) -> FreeRun:
     return FreeRun(first.time_to_goal_s, path_length_m(path_m), repeats)
 
 
-def _commands(result: CrossingResult) -> list[tuple[float, float]]:
-    return [frame.command for frame in result.frames]
+def _commands(result: CrossingResult) -> list[tuple[float, float, float]]:
+    return [(*frame.command, frame.lateral_command_mps) for frame in result.frames]

@@ -293,6 +293,11 @@ class RunFolder(AbstractContextManager["RunFolder"]):
                 f"{files.folder} holds a finished run of {episodes}: replace it with --overwrite, "
                 "choose another --out, or read its table again with --resume"
             )
+        if about.get("state") != "running" and done > 0:
+            raise SimError(
+                f"{files.folder} holds {counted(done, 'episode')} of a run whose {files.run.name} "
+                "cannot be read: choose another --out, or replace them with --overwrite"
+            )
         if about.get("state") != "running" and files.episodes.exists():
             raise SimError(
                 f"{files.folder} holds a table {files.episodes.name} that is not of a run: there "

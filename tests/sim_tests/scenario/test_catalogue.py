@@ -118,6 +118,17 @@ def test_impossible_positions_are_reported():
     assert any("from route point 0 to 1 leads through" in each for each in found)
     outside = changed("crossing_from_left", route=({"x_m": 99, "y_m": 0},))
     assert any("outside the hall" in each for each in scenario_problems(outside))
+    ends = {"turns_back_at_m": 20.0, "pauses": ({"at_m": 14.0, "for_s": 1.0},)}
+    stops = scenario_problems(changed("crossing_from_left", **ends))
+    assert [each.partition(" is not before the end of the")[0] for each in stops] == [
+        "people: worker: turns_back_at_m 20",
+        "people: worker: the pause at_m 14",
+    ]
+    back = {"turns_back_at_m": 4.0, "pauses": ({"at_m": 7.9, "for_s": 1.0},)}
+    assert scenario_problems(changed("crossing_from_left", **back)) == ()
+    back["pauses"] = ({"at_m": 8.1, "for_s": 1.0},)
+    (beyond,) = scenario_problems(changed("crossing_from_left", **back))
+    assert "8.1 is not before the end of the way of 8 m" in beyond
     replay = inside.model_copy(update={"people": (), "replay_csv": "nowhere.csv"})
     assert scenario_problems(replay) == ("replay_csv: there is no file nowhere.csv",)
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, SimError, shipped_scenarios
 from sim_tests.actors.robot import RobotModel, shipped_robots
@@ -74,6 +76,52 @@ def test_a_task_along_y_is_widened_along_x() -> None:
     after = scenario_for_robot(before, FORKLIFT)
     assert after.layout.x_max_m > before.layout.x_max_m
     assert [rack.y_m for rack in after.layout.racks] == [rack.y_m for rack in before.layout.racks]
+
+
+@given(turn_rad=st.floats(-math.pi, math.pi), beyond_m=st.floats(-2.0, 2.0))
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_people_beside_a_line_at_any_angle_move_as_beside_one_along_an_axis(turn_rad, beyond_m):
+    cos, sin = math.cos(turn_rad), math.sin(turn_rad)
+
+    def task(turned: bool) -> Scenario:
+        def place(x_m: float, y_m: float) -> dict[str, float]:
+            c, s = (cos, sin) if turned else (1.0, 0.0)
+            return {"x_m": c * x_m - s * y_m, "y_m": s * x_m + c * y_m}
+
+        hall = dict.fromkeys(("x_min_m", "y_min_m"), -30.0)
+        hall |= dict.fromkeys(("x_max_m", "y_max_m"), 30.0)
+        route = [place(6.0, -4.0), place(6.0, beyond_m), place(9.0, 5.0)]
+        person = {"name": "p", "route": route, "pauses": [{"at_m": 3.0, "for_s": 1.0}]}
+        goal = place(12.0, 0.0)
+        robot = {"goal_x_m": goal["x_m"], "goal_y_m": goal["y_m"]}
+        data = {"name": "t", "duration_s": 20.0, "layout": hall, "robot": robot}
+        return scenario_for_robot(Scenario.model_validate({**data, "people": [person]}), FORKLIFT)
+
+    usual, turned = task(turned=False), task(turned=True)
+    assert turned.duration_s == pytest.approx(usual.duration_s)
+    assert turned.layout.aisle_width_m == pytest.approx(usual.layout.aisle_width_m)
+    for old, new in zip(usual.people[0].route, turned.people[0].route, strict=True):
+        there = (cos * old.x_m - sin * old.y_m, sin * old.x_m + cos * old.y_m)
+        assert (new.x_m, new.y_m) == pytest.approx(there, abs=1e-9)
+    assert turned.people[0].pauses[0].at_m == pytest.approx(usual.people[0].pauses[0].at_m)
+
+
+@pytest.mark.parametrize("beside_m", [1e-9, 0.2, -0.2])
+def test_a_goal_beside_the_line_hardly_changes_the_fit(beside_m: float) -> None:
+    """The aisle is as wide, racks keep their size, and nobody's route moves along the aisle."""
+    data = Scenario.shipped("blind_corner").model_dump()
+    data["robot"] |= {"lane_half_width_m": None}
+    straight = scenario_for_robot(Scenario.model_validate(data), FORKLIFT)
+    data["robot"] |= {"goal_y_m": data["robot"]["goal_y_m"] + beside_m}
+    beside = scenario_for_robot(Scenario.model_validate(data), FORKLIFT)
+    for name, value in straight.layout.model_dump().items():
+        if isinstance(value, float):
+            assert beside.layout.model_dump()[name] == pytest.approx(value, abs=0.1), name
+    for old, new in zip(straight.layout.racks, beside.layout.racks, strict=True):
+        assert new.box_odom_m == pytest.approx(old.box_odom_m, abs=0.15)
+    for before, after in zip(straight.people, beside.people, strict=True):
+        for old, new in zip(before.route, after.route, strict=True):
+            assert (new.x_m, new.y_m) == pytest.approx((old.x_m, old.y_m), abs=0.15)
 
 
 def test_a_fitted_scenario_is_not_fitted_again() -> None:

@@ -381,12 +381,13 @@ def test_the_next_command_repeats_the_sensors_and_is_safe_for_a_shell():
     )
     words = episode_words(experiment)
     assert shlex.split(command_text("falsify", *words)) == ["awarenav", "falsify", *words]
-    assert words[:3] == ["--scenario", "my file.yaml", "runs_out"]
-    assert words[3:] == [
+    assert words[:4] == ["--scenario", "my file.yaml", "--scenario", "runs_out"]
+    assert words[4:] == [
         *("--planner", "a.b:C", "--perception", "keypoints", "--sensors", "camera+scanner")
     ]
     others = episode_words(experiment.replaced(population="recorded", robot="my robot.yaml"))
     assert others[-4:] == ["--population", "recorded", "--robot", "my robot.yaml"]
     assert episode_words(Experiment.taken_from({**values, "planner": ""})) == [
-        *("--scenario", "my file.yaml", "runs_out", "--perception", "keypoints")
+        *("--scenario", "my file.yaml", "--scenario", "runs_out"),
+        *("--perception", "keypoints", "--sensors", "camera"),
     ]

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import json
+import shlex
 import subprocess
 import sys
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from paths import ROOT
 from run_scenes import SHORT
 
 from awarenav.cli import app
 from sim_tests import run_crossing
 from sim_tests.actors.robot import RobotModel
-from sim_tests.conditions import AXES, OPTIONS, Conditions, Experiment
+from sim_tests.conditions import AXES, OPTIONS, Conditions, Experiment, Perception
 from sim_tests.crossing import Setup
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import RECORD_COLUMNS, EpisodeRecord, Variant, labels
-from sim_tests.study.runs import Job, experiment_jobs
+from sim_tests.study.runs import Job, about_run, experiment_jobs
+from sim_tests.world.errors import SimError
 
 #: Options that a command of crossings does not have.
 WITHOUT = {
@@ -56,6 +61,63 @@ def test_a_robot_has_all_of_its_sensors_unless_scanners_add_nothing(name, percep
     experiment = Experiment.taken_from(context.params)
     assert experiment["sensors"] == (sensors,)
     assert experiment.replaced(sensors="scanner")["sensors"] == ("scanner",)
+
+
+NAMES = st.text("abcdefg_ .'", min_size=1).filter(str.strip)
+VALUES = {
+    "scenario": st.lists(NAMES, min_size=1, max_size=3).map(tuple),
+    "seed": st.integers(0, 99),
+    "policy": st.lists(NAMES, min_size=1, max_size=2).map(tuple),
+    "planner": st.lists(st.sampled_from(["", "costmap", "a.b:C"]), min_size=1).map(tuple),
+    "perception": st.sampled_from(["truth", "keypoints", "pixels"]),
+    "sensors": st.sampled_from([("camera",), ("scanner",), ("camera", "camera+scanner")]),
+    "camera": st.one_of(st.just(""), NAMES),
+    "networks": st.one_of(st.just(""), NAMES),
+    "robot": st.one_of(st.just(""), NAMES),
+    "population": st.sampled_from([None, "classic", "recorded,answers=0.25"]),
+    "fault": st.lists(NAMES, min_size=1, max_size=2).map(tuple),
+}
+
+
+@given(values=st.fixed_dictionaries(VALUES), episodes=st.integers(1, 9), sample=st.integers(1, 9))
+@settings(deadline=None, derandomize=True)
+def test_the_command_of_a_run_gives_the_same_experiment(values, episodes, sample):
+    assert set(VALUES) == set(OPTIONS)
+    experiment = Experiment(values, episodes)
+    for name, more in (("crossings", {"sample": sample}), ("frontier", {})):
+        asked = experiment
+        if name == "frontier":
+            one = {key: each[:1] for key, each in values.items() if isinstance(each, tuple)}
+            asked = Experiment({**values, **one, "scenario": values["scenario"]}, episodes)
+            for missing in WITHOUT[name]:
+                del asked.values[missing]
+        text = about_run(asked, name, Path("out"), **more)["command"]
+        words = shlex.split(text)
+        assert words[:2] == ["awarenav", name]
+        context = app.get_command(None, name).make_context(name, words[2:])
+        again = Experiment.taken_from(context.params)
+        assert again.episodes == episodes
+        assert {key: again[key] or None for key in asked.values} == {
+            key: asked[key] or None for key in asked.values
+        }
+        assert context.params.get("sample") == more.get("sample")
+        assert context.params["out"] == Path("out")
+
+
+@pytest.mark.parametrize("name", ["keypoints", "pixels", "keypoints+scanner", "scanner", "truth"])
+def test_the_options_of_a_perception_give_it_in_crossings(name):
+    words = Perception.named(name).options.split()
+    experiment = Experiment.taken_from(
+        app.get_command(None, "crossings").make_context("crossings", words).params
+    )
+    assert Perception.of(experiment["perception"], experiment.one("sensors")).name == name
+
+
+def test_the_truth_with_scanners_is_refused_and_the_oracle_is_a_policy():
+    for sensors in ("scanner", "camera+scanner"):
+        with pytest.raises(SimError, match="no use for a scanner: sensors must be 'camera'"):
+            Perception.of("truth", sensors)
+    assert Perception("oracle").options == "--policy oracle"
 
 
 def test_the_api_and_a_job_have_the_same_conditions():

@@ -156,6 +156,17 @@ def test_another_run_is_not_resumed(jobs, about, message, killed):
     assert len(read_attempts(killed)) == 3
 
 
+@pytest.mark.parametrize("text", ['{"state": "running", "epi', "[]", None])
+def test_episodes_are_kept_where_run_json_cannot_be_read(text, killed):
+    RunFiles(killed).run.unlink()
+    if text is not None:
+        RunFiles(killed).run.write_text(text)
+    before = read_attempts(killed)
+    with pytest.raises(SimError, match=r"3 episodes of a run whose run\.json cannot be read"):
+        run_jobs(short_jobs(1), killed, workers=1)
+    assert read_attempts(killed) == before
+
+
 def test_a_run_is_only_overwritten_on_request(serial, killed, tmp_path):
     with pytest.raises(SimError, match="3 of 8 episodes done: go on with --resume, replace"):
         run_jobs(short_jobs(1), killed, workers=1)

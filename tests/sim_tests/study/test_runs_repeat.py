@@ -47,6 +47,10 @@ class Unseeded(Straight):
     def speed_mps(self):
         return 0.2 + 0.4 * self.rng.random()
 
+class Sideways(Unseeded):
+    def plan(self, robot_state, goal_odom_m, constraints, dt_s):
+        return 0.4, 0.01 * self.rng.random(), 0.0
+
 DRAWN = np.random.random() + random.random()
 
 class DrawnAtImport(Straight):
@@ -90,6 +94,12 @@ def test_a_planner_that_is_not_deterministic_is_found_and_named(drawing, tmp_pat
         "balanced, Unseeded"
     ] == 1
     assert "balanced, Unseeded: the planner is not deterministic" in summary_text(summary)
+
+
+def test_sideways_speeds_that_differ_are_not_deterministic(drawing):
+    (job,) = short_jobs(1, planners=[f"{drawing}:Sideways"], robot="omni")[::2]
+    record = run_episode(job)
+    assert (record.error, record.nondeterministic) == ("", True)
 
 
 _SHORT = SHORT.format(name="short")
