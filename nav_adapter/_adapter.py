@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -146,6 +146,7 @@ class NavAdapter:
         stamp_s: float,
         *,
         perception_stamp_s: float | None = None,
+        seen_stamp_s: Callable[[float, float], float | None] | None = None,
     ) -> NavConstraints:
         """Return the constraints at ``stamp_s``.
 
@@ -158,6 +159,9 @@ class NavAdapter:
                 without people. If it is None, the newest track's stamp is used, and empty
                 ``tracks`` mean that no person is there. So a dead camera stops a robot without
                 tracks only if this stamp is given.
+            seen_stamp_s: returns the time from which sensors know what is in a sector, given the
+                bearing of its middle in the base frame and half its width in radians; None for a
+                sector that no sensor has seen. Without it all directions count as seen.
 
         Returns:
             Obstacles in the order of track ids, the speed limit with the rule that set it, and

@@ -106,7 +106,11 @@ class Crossing(AbstractContextManager["Crossing"]):
         state = self.stage.amr.state(t_s)
         sensed = self._sensing.step(t_s, truth)
         constraints = self._adapter.update(
-            sensed.tracks, sensed.state, t_s, perception_stamp_s=sensed.stamp_s
+            sensed.tracks,
+            sensed.state,
+            t_s,
+            perception_stamp_s=sensed.stamp_s,
+            seen_stamp_s=sensed.seen_stamp_s,
         )
         self._ask(constraints, sensed)
         observed = sensed.observed
