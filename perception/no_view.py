@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import FloatArray, ImageRgb
+from .errors import PerceptionError
 
 #: Why a picture is no view: it is …
 NoView: TypeAlias = Literal["black", "of one colour", "the same picture as before"]
@@ -84,7 +85,15 @@ def why_no_view(image_rgb: ImageRgb, last: LastFrames | None = None) -> NoView |
     Args:
         image_rgb: (H, W, 3) uint8.
         last: the last pictures of the camera, to which this one is added; None to compare none.
+
+    Raises:
+        PerceptionError: for a ``last`` that is neither, such as the picture before.
     """
+    if not isinstance(last, LastFrames | None):
+        raise PerceptionError(
+            "last must be the camera's LastFrames(), made once and given with every picture, or "
+            f"None, got {type(last).__name__}"
+        )
     repeats = last is not None and last.repeats(image_rgb)
     blocks = _blocks(image_rgb)
     level = np.median(blocks.reshape(-1, 3), axis=0).round()
