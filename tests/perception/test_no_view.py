@@ -133,5 +133,5 @@ def test_without_noise_a_frame_repeats_only_once_the_robot_has_moved(
 
 
 def test_the_picture_before_is_refused_by_name() -> None:
-    with pytest.raises(PerceptionError, match="LastFrames.*got ndarray"):
+    with pytest.raises(PerceptionError, match=r"LastFrames.*got ndarray"):
         why_no_view(noise(), noise(1))  # type: ignore[arg-type]
