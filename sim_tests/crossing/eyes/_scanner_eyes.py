@@ -94,7 +94,7 @@ class ScannerEyes:
         ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
         due = [(number, arrives_s) for number, is_due, arrives_s in ticks if is_due]
         if due:
-            motion, known_motion = _motion(T_odom_base, state), _motion(_pose_of(known), known)
+            motion, known_motion = _motion(T_odom_base, state), motion_of(known)
             # The noise of a lost scan is drawn, so that a loss changes no other scan.
             scans = scan_all([self._scanners[number] for number, _ in due], motion)
             for (number, arrives_s), scan in zip(due, scans, strict=True):
@@ -179,6 +179,11 @@ def _pose_of(state: RobotState) -> FloatArray:
     T[:2, :2] = [[cos, -sin], [sin, cos]]
     T[:2, 3] = state.position_odom_m
     return T
+
+
+def motion_of(state: RobotState) -> RobotMotion:
+    """Return the motion of a robot on the floor, from its state."""
+    return _motion(_pose_of(state), state)
 
 
 def _motion(T_odom_base: FloatArray, state: RobotState) -> RobotMotion:
