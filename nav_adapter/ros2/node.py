@@ -17,6 +17,7 @@ missing.
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -81,8 +82,8 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
     def __init__(self) -> None:
         if rclpy is None:
             raise NavError(
-                "the node needs rclpy, which comes with ROS 2 and not from pip: source its "
-                "setup.bash, or use `awarenav bridge`, which needs no ROS"
+                "the node needs rclpy: source ROS 2's setup.bash, try it with wheels (docs/nav2.md, "
+                "With ROS), or use `awarenav bridge`, which needs no ROS"
             )
         super().__init__("awarenav")
         robot = RobotFile.from_yaml(self._parameter("robot_file", ""))
@@ -226,10 +227,12 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
 
 
 def main() -> int:
-    """Run the node until Ctrl-C; return 0, or 2 for bad input."""
+    """Run the node until Ctrl-C or SIGTERM; return 0, or 2 for bad input."""
     if rclpy is not None:
         # rclpy's own signal handlers would shut ROS down before the last stop is published.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    # What ros2 launch sends to a process that does not end on Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         node = AwarenessNode()
     except (NavError, PerceptionError, TrackingError) as problem:
