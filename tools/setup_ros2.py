@@ -55,12 +55,8 @@ class UnavailableError(Exception):
 
 def main() -> int:
     """Make .venv-ros2 unless it is up to date; return 0, or 3 if that is not possible here."""
-    wanted = hashlib.sha256(
-        b"".join(
-            [WHEELS.read_bytes(), Path(__file__).read_bytes(), sys.version.encode()]
-            + [str(VENV).encode(), *sorted(text.encode() for _, text in _definitions())]
-        )
-    ).hexdigest()
+    parts = [WHEELS.read_text(), Path(__file__).read_text(), sys.version, str(VENV)]
+    wanted = hashlib.sha256("".join([*parts, *map(str, _definitions())]).encode()).hexdigest()
     stamp = VENV / "awarenav.stamp"
     if stamp.exists() and stamp.read_text() == wanted:
         return 0

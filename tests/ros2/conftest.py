@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -15,7 +16,25 @@ TESTS = Path(__file__).resolve().parents[1]
 # The scenes of the bridge's own tests.
 sys.path += [str(TESTS / "nav_adapter"), str(TESTS / "awarenav" / "bridge")]
 
+if TYPE_CHECKING:
+    from nav_adapter.ros2 import Topic
+
 PATIENCE_S = 30.0
+
+
+def until(condition: Callable[[], Any]) -> Any:
+    """Return what the condition returns as soon as it holds, or at last."""
+    end = time.monotonic() + PATIENCE_S
+    while not (found := condition()) and time.monotonic() < end:
+        pass
+    return found
+
+
+def qos(topic: Topic) -> Any:
+    """Return a topic's quality of service for rclpy."""
+    from nav_adapter.ros2.node import _qos  # noqa: PLC0415 - needs rclpy
+
+    return _qos(topic)
 
 
 @pytest.fixture(scope="session", autouse=True)

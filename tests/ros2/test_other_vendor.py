@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 from bridge_scenes import INFO, image, odometry, tf
-from conftest import PATIENCE_S
+from conftest import qos, until
 from ros2_scenes import everything
 from scan_scenes import planar, scan_message
 
-from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, DdsNode, Topic, decode, encode
+from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, DdsNode, decode, encode
 from nav_adapter.ros2.conversions import from_ros, header, ros_class, to_ros
 from nav_adapter.ros2.messages import Message
 from nav_adapter.ros2.messages.nav2_msgs import CostmapFilterInfo
@@ -36,19 +35,6 @@ MASKS = {
     "speed_mask": SENT["map"],
     "speed_mask_info": CostmapFilterInfo(filter_mask_topic="/awarenav/speed_mask", multiplier=1.0),
 }
-
-
-def until(condition: Callable[[], Any]) -> Any:
-    end = time.monotonic() + PATIENCE_S
-    while not (found := condition()) and time.monotonic() < end:
-        pass
-    return found
-
-
-def qos(topic: Topic) -> Any:
-    from nav_adapter.ros2.node import _qos  # noqa: PLC0415 - needs rclpy
-
-    return _qos(topic)
 
 
 def rounded(message: Message) -> Message:
