@@ -236,7 +236,8 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             raise NavError(str(problem)) from problem
 
     def _now_s(self) -> float:
-        return float(self.get_clock().now().nanoseconds) * 1e-9
+        # The nearest number, as for a recording.
+        return float(self.get_clock().now().nanoseconds / 1e9)
 
 
 def main() -> int:
