@@ -1,9 +1,10 @@
 """Command ``python -m benchmarks.bridge.soak``: the bridge over a long time; memory must be flat.
 
-``peers VENDOR [COMINGS]`` lets publishers of ``own`` (Cyclone DDS) or ``ros`` (rclpy, Fast DDS) come
-and go in another process; no message may be lost between the first and the last of a publisher.
-``day [HOURS]`` passes the messages of so many hours through :class:`~nav_adapter.ros2.
-AwarenessBridge`, as fast as they are processed, while sensors come and go and the clock is set back.
+``peers VENDOR [COMINGS]`` lets publishers of ``own`` (Cyclone DDS) or ``ros`` (rclpy, Fast DDS)
+come and go in another process; after its first message nothing of a publisher may be lost.
+``day [HOURS]`` passes the messages of so many hours through
+:class:`~nav_adapter.ros2.AwarenessBridge`, as fast as they are processed, while sensors come and go
+and the clock is set back.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from nav_adapter import AwarenessPolicy
-from nav_adapter.ros2 import READ, AwarenessBridge, DdsNode, RobotFile, Topic, scanner_inputs
+from nav_adapter.ros2 import AwarenessBridge, DdsNode, RobotFile, Topic, scanner_inputs
 from nav_adapter.ros2.conversions import header, ros_class, to_ros
 from nav_adapter.ros2.messages.builtin_interfaces import Time
 from nav_adapter.ros2.messages.nav_msgs import Odometry

@@ -11,8 +11,8 @@ calibrate``; by default none), ``rate_hz`` (20.0), ``scanners`` (number of laser
 without it), ``odom_frame``, ``base_frame``, ``camera_frame``; for Nav2's speed filter
 ``speed_mask_hz`` (0.0; masks per second, 0 for none), ``speed_mask_size_m`` (10.0) and
 ``speed_mask_resolution_m`` (0.1). Topics are renamed by ROS's
-remapping. The module can be imported without ROS; the node then raises an error that says what is
-missing.
+remapping. rclpy comes with ROS 2, or from wheels for trying it (docs/nav2.md, With ROS). The module
+can be imported without it; the node then raises an error that says what is missing.
 """
 
 from __future__ import annotations
