@@ -143,6 +143,8 @@ def _compile(package: str, messages: dict[str, str]) -> None:
     environment = {
         **os.environ,
         "AMENT_PREFIX_PATH": str(VENV),
+        # CMake takes the interpreter from an active environment first.
+        "VIRTUAL_ENV": str(VENV),
         "PATH": f"{VENV / 'bin'}{os.pathsep}{os.environ['PATH']}",
     }
     build = source / "build"

@@ -1,7 +1,7 @@
 """Command ``python -m benchmarks.bridge.soak``: the bridge over a long time; memory must be flat.
 
 ``peers VENDOR [COMINGS]`` lets publishers of ``own`` (Cyclone DDS) or ``ros`` (rclpy, Fast DDS)
-come and go in another process; after its first message nothing of a publisher may be lost.
+come and go in another process; once a publisher is heard, nothing that it sends may be lost.
 ``day [HOURS]`` passes the messages of so many hours through
 :class:`~nav_adapter.ros2.AwarenessBridge`, as fast as they are processed, while sensors come and go
 and the clock is set back.
@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import os
 import random
+import select
 import subprocess
 import sys
 import time
@@ -19,7 +20,6 @@ from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -33,8 +33,8 @@ from nav_adapter.ros2.messages.std_msgs import Header
 
 ROBOT = Path(__file__).resolve().parents[2] / "docs" / "nav2" / "robot.yaml"
 TOPICS = [Topic(f"odom_{number}", Odometry, reliable=False, depth=50) for number in range(10)]
-# Messages of one publisher and the time between them.
-EACH, PAUSE_S = 5, 0.01
+# Messages of one publisher once it is heard, and times between them and before it leaves.
+EACH, PAUSE_S, LEAVE_S = 5, 0.01, 0.05
 #: Growth of memory that is not flat, MiB.
 FLAT_MIB = 8.0
 
@@ -46,17 +46,24 @@ def memory_mib() -> float:
 
 
 def publish(vendor: str, comings: int) -> None:
-    """Come and go, ten publishers at once."""
+    """Come and go, ten publishers at once; one byte of input says that all of them are heard."""
     advertise = _ros_publishers() if vendor == "ros" else _own_publishers()
+
+    def message(coming: int, number: int) -> Odometry:
+        # The sequence of a publisher is its stamp.
+        return Odometry(Header(Time(coming, number), "odom"), "base_link")
+
     for coming in range(comings // len(TOPICS)):
         send, leave = advertise()
-        for number in range(EACH):
-            # The sequence of a publisher is its stamp.
-            send(Odometry(Header(Time(coming, number), "odom"), "base_link"))
+        while not select.select([sys.stdin], [], [], PAUSE_S)[0]:
+            send(message(coming, 0))
+        os.read(sys.stdin.fileno(), 1)
+        for number in range(1, EACH + 1):
+            send(message(coming, number))
             time.sleep(PAUSE_S)
+        # What is still on its way when a publisher leaves is lost with it.
+        time.sleep(LEAVE_S)
         leave()
-    print("done", flush=True)
-    sys.stdin.readline()
     os._exit(0)
 
 
@@ -103,29 +110,36 @@ def peers(vendor: str, comings: int) -> bool:
     for topic in TOPICS:
         node.subscribe(topic)
     command = [sys.executable, "-m", "benchmarks.bridge.soak", "publish", vendor, str(comings)]
-    heard: dict[tuple[str, int], list[int]] = defaultdict(list)
-    early_mib, done = 0.0, False
-    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen(command, **pipes) as process:
-        assert process.stdout is not None
-        os.set_blocking(process.stdout.fileno(), False)
-        while process.poll() is None:
-            node.wait(0.05)
+    heard: dict[str, list[int]] = defaultdict(list)
+    present, messages, lost, early_mib = 0, 0, 0, 0.0
+
+    def losses() -> int:
+        """Return how many publishers have not been heard to the end, once known."""
+        ends = [[n for n in heard[topic.name] if n] for topic in TOPICS]
+        return sum(numbers != list(range(1, EACH + 1)) for numbers in ends)
+
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        said = -1
+        while node.wait(0.5) or process.poll() is None:
             for topic in TOPICS:
                 for message in node.take(topic):
                     stamp = message.header.stamp
-                    heard[topic.name, stamp.sec].append(stamp.nanosec)
-            if early_mib == 0.0 and len(heard) >= comings // 4:
-                early_mib = memory_mib()
-            done = done or process.stdout.read() is not None
-            if done and not node.wait(1.0):
-                process.communicate(b"\n")
-    # The record of what was heard grows too: a list of five numbers for each coming.
-    lost = sum(numbers != list(range(numbers[0], EACH)) for numbers in heard.values())
+                    if stamp.sec > present:
+                        lost += losses()
+                        heard.clear()
+                        present = stamp.sec
+                        if present == comings // len(TOPICS) // 4:
+                            early_mib = memory_mib()
+                    heard[topic.name].append(stamp.nanosec)
+                    messages += 1
+            if len(heard) == len(TOPICS) and said < present:
+                said = present
+                os.write(process.stdin.fileno(), b"\n")
+    lost += losses()
     growth_mib = memory_mib() - early_mib
-    messages = sum(map(len, heard.values()))
     print(
-        f"{vendor}: {len(heard)} of {comings} publishers heard, {messages} messages, {lost} "
+        f"{vendor}: {len(TOPICS) * (present + 1)} publishers, {messages} messages, {lost} "
         f"publishers with a loss, memory {early_mib:.1f} + {growth_mib:.1f} MiB"
     )
     return not lost and growth_mib < FLAT_MIB
