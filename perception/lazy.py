@@ -25,6 +25,8 @@ def lazy_page(package: str, file: str) -> Callable[[str], Any]:
     def get(name: str) -> Any:
         if not module_of:
             module_of.update(_imports(Path(file)))
+        if name == "__all__":  # of a page whose imports are all of its names
+            return sorted(module_of)
         if name not in module_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value = getattr(import_module(module_of[name], package), name)

@@ -14,27 +14,3 @@ from ._separations import (
 )
 from ._stage import Stage, TrueView
 from .planner import StraightOn
-
-__all__ = [
-    "STANDING_SPEED_MPS",
-    "ContactEvent",
-    "Crossing",
-    "CrossingFrame",
-    "CrossingResult",
-    "Observer",
-    "RequestMemory",
-    "SafetyFigures",
-    "Setup",
-    "Stage",
-    "StraightOn",
-    "TopView",
-    "TrueView",
-    "axis_names",
-    "changed",
-    "contact_by",
-    "draw_camera_view",
-    "drive",
-    "named_fault",
-    "named_policy",
-    "run_crossing",
-]

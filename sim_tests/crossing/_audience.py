@@ -38,15 +38,7 @@ class Audience:
         robot_odom_m: FloatArray,
         motions: Sequence[PersonMotion],
     ) -> tuple[Heard | None, ...]:
-        """Return what each person does who hears a request; None for nothing.
-
-        Args:
-            t_s: time.
-            means: a light or a voice.
-            place_odom_m: (2,) where the robot takes the addressed person to be.
-            robot_odom_m: (2,) the robot.
-            motions: everybody now.
-        """
+        """Return what each person does who hears a request; None for nothing."""
         away_m = [math.dist(motion.position_odom_m, place_odom_m[:2]) for motion in motions]
         nearest = int(np.argmin(away_m)) if away_m else 0
         heard = []

@@ -225,10 +225,6 @@ def drive(setup: Setup, observer: Observer | None = None) -> CrossingResult:
     A planner that is given by its name is new, and the global random generators of ``random`` and
     ``numpy`` have the seed of the episode while it drives.
 
-    Args:
-        setup: the episode.
-        observer: as for :func:`run_crossing`.
-
     Raises:
         SimError: a planner that cannot be made, or a command that is not finite numbers.
     """

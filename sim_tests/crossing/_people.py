@@ -25,13 +25,7 @@ from ..scenario import Scenario
 def staged_people(
     scenario: Scenario, boxes_odom_m: FloatArray, rng: np.random.Generator
 ) -> tuple[tuple[Person, ...], tuple[Ears, ...]]:
-    """Return the people of a scenario, then those who are replayed, and everybody's ears.
-
-    Args:
-        scenario: the scenario.
-        boxes_odom_m: (N, 4) racks and walls.
-        rng: random generator of the people; each has one of their own.
-    """
+    """Return the people of a scenario, then those who are replayed, and everybody's ears."""
     jitter, habits = scenario.start_jitter_s, habits_of(scenario.population)
     everybody = []
     for spec, own in zip(scenario.people, rng.spawn(len(scenario.people)), strict=True):
@@ -58,12 +52,6 @@ def recorded_people(
     path: str | Path, boxes_odom_m: FloatArray, *, reacts: bool = False, leaves: bool = False
 ) -> list[Person]:
     """Return the recorded people of a table in order of their first rows, with different looks.
-
-    Args:
-        path: the table, see :func:`read_recordings`.
-        boxes_odom_m: (N, 4) racks and walls.
-        reacts: as for :class:`Track`.
-        leaves: as for :class:`Track`.
 
     Raises:
         SimError: see :func:`read_recordings`.

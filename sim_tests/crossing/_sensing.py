@@ -71,16 +71,6 @@ class Sensed:
 class Sensing:
     """Camera, scanners, odometry and tracker of a robot on a stage.
 
-    Args:
-        stage: the stage of the crossing.
-        perception: how it perceives people.
-        policy: has the settings of the awareness filter.
-        seed: of the episode.
-        cone: attention cone; None for the default.
-        noise: noise of the keypoint camera; None for the default.
-        pipeline: pipeline for pixels; None for the scenario's networks.
-        fault: a fault of the sensors; None for none.
-
     Raises:
         SimError: for a perception with scanners and a scenario without any.
     """
@@ -136,12 +126,7 @@ class Sensing:
         ]
 
     def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
-        """Take the images and scans that are due; return what the robot knows then.
-
-        Args:
-            t_s: time; grows from call to call.
-            truth: the truth about each person.
-        """
+        """Take the images and scans that are due; return what the robot knows then."""
         amr = self._stage.amr
         T_odom_camera, state = amr.T_odom_camera, amr.state(t_s)
         known = self._odometry.take(OdometryReading(state, T_odom_camera))
@@ -207,11 +192,7 @@ class Sensing:
 
 
 class Odometry:
-    """The robot's odometry: the newest message that has arrived, one of which is sent every cycle.
-
-    Args:
-        change: faults of the messages; None for none.
-    """
+    """The robot's odometry: the newest message that has arrived, one of which is sent a cycle."""
 
     def __init__(self, change: Change[OdometryReading] | None) -> None:
         self._change = change

@@ -193,12 +193,7 @@ class SafetyFigures:
     max_speed_within_2m_mps: float = 0.0
 
     def after(self, t_s: float, now: Separations) -> SafetyFigures:
-        """Return the figures after one more control cycle.
-
-        Args:
-            t_s: time of the cycle.
-            now: the separations as last observed; those of an earlier cycle add nothing.
-        """
+        """Return the figures after one more control cycle."""
         if now.t_s < t_s:
             return self
         margin_m = min(now.margins_m, default=math.inf) if now.robot_moves else math.inf

@@ -91,10 +91,6 @@ class Stage(AbstractContextManager["Stage"]):
         scenario: the scenario.
         people_rng: random generator of the people; None for the generator of seed 0.
         renderer: renderer for images of the stage.
-
-    Attributes:
-        scenario: as given.
-        contacts: all contacts so far.
     """
 
     def __init__(
@@ -193,10 +189,6 @@ class Stage(AbstractContextManager["Stage"]):
 
         The person nearest to the place, and within 1 m of it, is addressed. Everybody else within
         earshot may hear it as well.
-
-        Args:
-            means: a light or a voice.
-            place_odom_m: (2,) where the robot takes the person to be.
         """
         robot = self.amr.T_odom_base[:2, 3]
         heard = self._audience.hear(self.t_s, means, place_odom_m, robot, self._motions)
@@ -205,12 +197,7 @@ class Stage(AbstractContextManager["Stage"]):
                 news.append(what)
 
     def observe(self, t_s: float, lasts_s: float) -> Separations:
-        """Return the separations of all people from the robot now.
-
-        Args:
-            t_s: time of the control cycle.
-            lasts_s: time to the next observation.
-        """
+        """Return the separations of all people from the robot now."""
         approaches = tuple(self._approach(index) for index in range(len(self._motions)))
         self._near_robot = [each.separation_m < _TOUCH_WITHIN_M for each in approaches]
         robot = self.amr.profile

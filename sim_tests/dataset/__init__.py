@@ -11,12 +11,4 @@ if TYPE_CHECKING:
     from ._render import render
     from ._scene import RenderScene, random_pose
 
-__all__ = [
-    "RenderConfig",
-    "RenderScene",
-    "parse_image_size",
-    "random_pose",
-    "render",
-]
-
 __getattr__ = lazy_page(__name__, __file__)

@@ -42,11 +42,6 @@ def contact_sheet(folder: Path, records: Sequence[Record], camera: Camera) -> Im
 
     Boxes and gaze lines have the colour of the awareness score, from red to green.
 
-    Args:
-        folder: of the images.
-        records: the truth of all images, at least one.
-        camera: of the images.
-
     Raises:
         SimError: when an image cannot be read.
     """

@@ -327,15 +327,7 @@ def random_pose(
     rng: np.random.Generator,
     eyes: str = "wander",
 ) -> None:
-    """Place a worker with random heading, activity, gait, head pose and gaze.
-
-    Args:
-        worker: the worker to place.
-        position_odom_m: (2,) position.
-        camera_odom_m: (3,) the robot's camera; three in ten workers look at it.
-        rng: random generator.
-        eyes: see :class:`RenderConfig`.
-    """
+    """Place a worker with random heading, activity, gait, head pose and gaze."""
     x, y = position_odom_m
     heading = float(rng.uniform(-math.pi, math.pi))
     activity = str(rng.choice(_ACTIVITIES, p=_ACTIVITY_SHARES))

@@ -45,12 +45,7 @@ class CameraPicture:
 
 
 class OverlayCamera:
-    """Draws what the robot's camera sees, with the robot's newest observations.
-
-    Args:
-        camera: of the pictures, at the place of the robot's camera.
-        text_px: as for :func:`~awarenav.overlay.draw_people`.
-    """
+    """Draws what the robot's camera sees, with the robot's newest observations."""
 
     def __init__(self, camera: Camera, text_px: int | None = None) -> None:
         self._camera, self._text_px = camera, text_px

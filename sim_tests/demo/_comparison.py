@@ -15,14 +15,7 @@ WITHOUT_AWARENESS: Final = ("blind", "scanner")
 
 @dataclass(frozen=True, slots=True)
 class ComparisonRow:
-    """One row of the comparison.
-
-    Attributes:
-        label: of the row.
-        result: the crossing.
-        scenario: its scenario.
-        pictures: of the robot's camera, one for each picture of the film; empty without a film.
-    """
+    """One row of the comparison."""
 
     label: str
     result: CrossingResult

@@ -45,14 +45,7 @@ _FILMED: Final = {
 
 
 def run_demo(out: Path, *, seed: int | None, video: bool, as_json: bool) -> None:
-    """Run the four robots with one seed, film them, and print them beside the reported seeds.
-
-    Args:
-        out: folder for ``lanes.jsonl``, ``crossing.webp`` and ``crossing.mp4``; made when missing.
-        seed: of the crossing; None for the median one of the reported seeds.
-        video: whether to film.
-        as_json: print the tables as JSON.
-    """
+    """Run the robots with a seed (None: the median one reported), film and print them."""
     require_pybullet()
     about, reported = read_report()
     median = shown_seed(reported)
@@ -92,13 +85,7 @@ def run_demo(out: Path, *, seed: int | None, video: bool, as_json: bool) -> None
 
 
 def run_seeds(out: Path, *, seeds: int, as_json: bool) -> None:
-    """Run the four robots with the seeds 0, 1, … and print their table.
-
-    Args:
-        out: folder for ``lanes.jsonl``; made when missing.
-        seeds: number of seeds.
-        as_json: print the table as JSON.
-    """
+    """Run the four robots with the seeds 0, 1, … and print their table."""
     require_pybullet()
     pairs = [(seed, lane) for seed in range(seeds) for lane in LANES]
     bar = tqdm(pairs, desc="crossings", unit="crossing", disable=None, file=sys.stderr)
@@ -119,16 +106,7 @@ def _write_rows(out: Path, rows: list[LaneRow]) -> None:
 
 
 def run_paper(out: Path, *, seed: int, video: bool, perception: str, as_json: bool) -> None:
-    """Run the paper's encounter and write its files.
-
-    Args:
-        out: folder for ``encounter.png``, ``encounter.mp4`` and ``encounter.csv``; made when
-            missing.
-        seed: seed of everything random.
-        video: whether to film.
-        perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
-        as_json: print the table as JSON.
-    """
+    """Run the paper's encounter and write its files."""
     require_pybullet()
     if perception == "pixels":
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing

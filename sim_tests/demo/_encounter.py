@@ -83,13 +83,7 @@ def observed_values(observation: PersonObservation | None) -> EncounterValues:
 
 
 def plot_encounter(path: Path, result: CrossingResult, images: Sequence[CaseImages]) -> None:
-    """Plot the encounter: images of the three cases, and awareness and position over time.
-
-    Args:
-        path: the PNG file.
-        result: the encounter.
-        images: images of each case.
-    """
+    """Plot the encounter: images of the three cases, and awareness and position over time."""
     figure = new_figure(7.8, 14.2)
     halves = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.0, 1.5])
     pictures, curves = halves.ravel()
@@ -187,12 +181,6 @@ def run_encounter(
     perception: str = "keypoints",
 ) -> CrossingResult:
     """Run the encounter and write its table, plot and video.
-
-    Args:
-        out: folder for ``encounter.csv``, ``encounter.png`` and ``encounter.mp4``.
-        seed: seed of the perception's noise.
-        video: whether to render the video, which takes most of the time with keypoints.
-        perception: ``"keypoints"``, or ``"pixels"``: rendered images, through the shipped networks.
 
     Returns:
         The crossing, with the truth and the observation of every frame.

@@ -107,14 +107,7 @@ class LaneRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LaneRun:
-    """A recorded run.
-
-    Attributes:
-        lane: the robot.
-        scenario: as drawn for the seed.
-        result: the log.
-        row: its figures.
-    """
+    """A recorded run."""
 
     lane: Lane
     scenario: Scenario

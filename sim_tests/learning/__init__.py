@@ -16,13 +16,6 @@ if TYPE_CHECKING:
     from ._environment import CrossingEnv, RewardWeights
     from ._policy_planner import ObservationEncoder, PolicyPlanner, command_of
 
-__all__ = [
-    "CrossingEnv",
-    "ObservationEncoder",
-    "PolicyPlanner",
-    "RewardWeights",
-    "command_of",
-]
 
 # The name in Gymnasium's registry.
 _ENVIRONMENT_ID = "awarenav/Crossing-v0"

@@ -90,13 +90,7 @@ class ObservationEncoder:
     def encode(
         self, robot_state: RobotState, goal_odom_m: FloatArray, constraints: NavConstraints
     ) -> Observation:
-        """Return the observation of a control cycle.
-
-        Args:
-            robot_state: the robot's state, as it knows it.
-            goal_odom_m: (2,).
-            constraints: from the adapter.
-        """
+        """Return the observation of a control cycle."""
         speed, yaw_rate = robot_state.speed_mps, robot_state.yaw_rate_radps
         x, y = robot_state.position_odom_m.tolist()
         c, s = math.cos(robot_state.heading_odom_rad), math.sin(robot_state.heading_odom_rad)

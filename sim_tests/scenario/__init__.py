@@ -14,20 +14,4 @@ if TYPE_CHECKING:
     from ._scenario import CameraSpec, RobotTask, Scenario
     from ._template import ScenarioTemplate, shipped_templates
 
-__all__ = [
-    "SCENARIO_SETS",
-    "CameraSpec",
-    "Choice",
-    "Distribution",
-    "Integers",
-    "RobotTask",
-    "Scenario",
-    "ScenarioTemplate",
-    "load_networks",
-    "read_distribution",
-    "scenario_for_robot",
-    "shipped_scenarios",
-    "shipped_templates",
-]
-
 __getattr__ = lazy_page(__name__, __file__)

@@ -220,10 +220,6 @@ def read_distribution(path: str, kind: str, data: Any) -> Distribution:
 def find_parameters(data: Mapping[str, Any], source: str) -> dict[str, Distribution]:
     """Return the distributions in a scenario's data by dotted path, as ``"people.0.speed_mps"``.
 
-    Args:
-        data: the keys of a scenario, as read from YAML.
-        source: name of the scenario in messages.
-
     Raises:
         SimError: for an impossible distribution, and for one outside people and robot.
     """
@@ -247,13 +243,7 @@ def with_numbers(
     values: Mapping[str, float],
     source: str,
 ) -> dict[str, Any]:
-    """Return the data with a number in place of each distribution.
-
-    Args:
-        data: the keys of a scenario.
-        parameters: its distributions, from :func:`find_parameters`.
-        values: numbers for some parameters; the others get their medians.
-        source: name of the scenario in messages.
+    """Return the data with a value, or the median, in place of each distribution.
 
     Raises:
         SimError: for a path that is no parameter, and for a value that is not finite.

@@ -32,9 +32,6 @@ _CAMERAS: Final = _FOLDER / "cameras"
 def shipped_scenarios(scenario_set: str = "all") -> tuple[str, ...]:
     """Return the names of a set of the scenarios that come with the package, sorted.
 
-    Args:
-        scenario_set: one of :data:`SCENARIO_SETS`.
-
     Raises:
         SimError: for another set.
     """
@@ -118,10 +115,6 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
 
     ``extends: NAME`` takes the keys of ``shipped/defaults/NAME.yaml`` that the file does not have.
     Mappings are merged key by key, everything else is replaced.
-
-    Args:
-        text: YAML.
-        source: name of the text in messages.
 
     Raises:
         SimError: for text that is not a YAML mapping, and for unknown defaults.

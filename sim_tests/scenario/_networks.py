@@ -61,9 +61,6 @@ def networks_data(path: str | Path) -> dict[str, Any]:
 def load_networks(text: str) -> Networks:
     """Load the networks of a scenario, once in a process.
 
-    Args:
-        text: YAML of a scenario's ``networks``.
-
     Raises:
         SimError: for networks that cannot be loaded, or are not those of their checksums.
     """

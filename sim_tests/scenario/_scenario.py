@@ -286,10 +286,6 @@ class Scenario(SimConfig):
     def from_data(cls, data: Mapping[str, Any], source: str = "scenario") -> Scenario:
         """Validate the keys of a scenario.
 
-        Args:
-            data: without distributions.
-            source: name of the scenario in messages.
-
         Raises:
             SimError: naming the wrong key.
         """

@@ -253,11 +253,7 @@ def _robot_of(value: Any, source: str) -> RobotModel:
 
 
 def shipped_templates(scenario_set: str = "all") -> tuple[ScenarioTemplate, ...]:
-    """Return a set of the scenarios that come with the package, sorted by name.
-
-    Args:
-        scenario_set: as for :func:`shipped_scenarios`.
-    """
+    """Return a set of the scenarios that come with the package, sorted by name."""
     return tuple(ScenarioTemplate.shipped(name) for name in shipped_scenarios(scenario_set))
 
 

@@ -69,9 +69,6 @@ class SearchSettings:
 def common_settings(experiment: Experiment) -> dict[str, Any]:
     """Return the settings of an experiment, but for the episodes and the generation.
 
-    Args:
-        experiment: of the command, with one policy, one planner and one set of sensors.
-
     Raises:
         SimError: an unknown scenario, camera or robot.
         NavError: an unusable policy.

@@ -215,12 +215,7 @@ class SharedStudy:
     def evaluate(
         self, most: int, outcomes_of: Callable[[Mapping[int, ParameterValues]], Sequence[Outcome]]
     ) -> None:
-        """Evaluate trials of the current generation.
-
-        Args:
-            most: number of trials at most.
-            outcomes_of: returns the outcomes of trials, given their parameters by number.
-        """
+        """Evaluate trials of the current generation."""
         with self._said():
             self._read()
             proposals = dict(enumerate(self._optimizer.ask(), start=self._told))
@@ -305,11 +300,6 @@ def importances(
 
     By PED-ANOVA (Watanabe, Bansal and Hutter 2023). All are 0 for fewer than three trials, and
     where the values do not differ.
-
-    Args:
-        points: parameters of the trials.
-        values: of the trials; smaller is better.
-        space: range of each parameter.
     """
     nothing = dict.fromkeys(sorted(space), 0.0)
     if len(points) < 3 or len(set(values)) < 2:

@@ -53,16 +53,6 @@ def crossings_command(
 
     All errors are raised before anything runs.
 
-    Args:
-        experiment: the episodes.
-        out: folder of the run.
-        sample: number of episodes to draw; None for all.
-        time_limit: of an episode, seconds; None for no limit.
-        no_report: write no report.
-        as_json: print the table as JSON.
-        running: ``workers``, ``scheduler``, ``resume`` and ``overwrite`` of
-            :func:`~sim_tests.study.runs.run_jobs`.
-
     Raises:
         SimError: an unknown or unusable option.
         NavError: an unknown preset or unusable policy file.

@@ -4,15 +4,3 @@ from __future__ import annotations
 
 from ._page import LivePage, page_text, show_page, write_page
 from ._recorder import CameraPictures, CrossingRecorder, begin_of, outcome_text, state_of
-
-__all__ = [
-    "CameraPictures",
-    "CrossingRecorder",
-    "LivePage",
-    "begin_of",
-    "outcome_text",
-    "page_text",
-    "show_page",
-    "state_of",
-    "write_page",
-]

@@ -62,13 +62,6 @@ def write_page(
 ) -> None:
     """Write the page of a recorded crossing; the file appears whole or not at all.
 
-    Args:
-        path: of the HTML file.
-        begin: hall, robot and names.
-        states: the states; at least one.
-        outcome: one sentence on the end of the crossing.
-        note: why there are no pictures; empty where there are.
-
     Raises:
         SimError: there are no states, or the file cannot be written.
     """
@@ -107,10 +100,6 @@ class LivePage(AbstractContextManager["LivePage"]):
     The stream follows the standard of server-sent events. Its events are ``begin`` (hall, robot and
     names), messages (states) and ``end`` (outcome). Every reader gets all of them from the
     beginning.
-
-    Args:
-        page: the HTML text.
-        port: 0 for any free one.
 
     Raises:
         SimError: the port cannot be used.

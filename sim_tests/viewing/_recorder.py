@@ -47,12 +47,6 @@ class CrossingRecorder:
 
     Give it to :func:`~sim_tests.crossing.run_crossing` as ``observer``.
 
-    Args:
-        conditions: the names that the page shows.
-        pictures: of the robot's camera; None for none.
-        on_begin: called once, before the first state, with the hall and the robot.
-        on_state: called with every state.
-
     Attributes:
         begin: hall, robot and names; empty before the first control cycle.
         states: the states so far.
@@ -214,12 +208,6 @@ def state_of(
     memory: RequestMemory | None = None,
 ) -> dict[str, Any]:
     """Return one control cycle as a JSON value.
-
-    Args:
-        frame: the control cycle.
-        stage: gives the places of the people's eyes.
-        scan_points_odom_m: (N, 2) points of the newest scans; None for those of the frame.
-        memory: of the frames so far.
 
     Returns:
         ``robot_odom`` is x (m), y (m) and heading (rad); each of ``people``, the truth, has

@@ -18,20 +18,4 @@ if TYPE_CHECKING:
     )
     from ._warehouse import GRAVITY_MPS2, PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Nearest, Warehouse
 
-__all__ = [
-    "FACE_DEPTH_M",
-    "FACE_KEYPOINTS",
-    "GRAVITY_MPS2",
-    "JOINT_DEPTH_M",
-    "PERSON_GROUP",
-    "RAY_GROUP",
-    "ROBOT_GROUP",
-    "Nearest",
-    "Warehouse",
-    "crosses_boxes",
-    "first_body_before",
-    "keypoints_in_front",
-    "sees",
-]
-
 __getattr__ = lazy_page(__name__, __file__)

@@ -61,13 +61,7 @@ def crosses_boxes(boxes_odom_m: FloatArray, start_m: Any, ends_m: Any) -> NDArra
 
 
 def sees(viewer: Viewer, target_odom_m: FloatArray, through: frozenset[int] = frozenset()) -> bool:
-    """Return whether nothing stands between a person's eyes and a point in the physics world.
-
-    Args:
-        viewer: the person; their own body never blocks.
-        target_odom_m: (3,).
-        through: ids of other bodies that do not block, such as the robot that carries the target.
-    """
+    """Return whether nothing stands between a person's eyes and a point in the physics world."""
     first = first_body_before(viewer, target_odom_m)
     return first in (-1, viewer.body) or first in through
 

@@ -6,6 +6,8 @@ import bisect
 from collections.abc import Sequence
 from typing import Any, Final, Generic, Protocol, TypeVar
 
+from ._route import RouteFollower
+from ._spec import PersonSpec
 from ._surroundings import ALONE, MovingBody, Surroundings
 
 # Somebody as far along a route as this is level with another.
@@ -17,16 +19,14 @@ _LONGEST_S: Final = 120.0
 class Walker(Protocol):
     """A person as far as a free walk goes: see :class:`Person`."""
 
+    spec: PersonSpec
+    task: RouteFollower
+
     @property
     def arrived(self) -> bool: ...
     @property
-    def along_m(self) -> float: ...
-    @property
-    def started_s(self) -> float | None: ...
-    @property
     def moving_body(self) -> MovingBody | None: ...
     def twin(self) -> Any: ...
-    def set_off(self, t_s: float) -> None: ...
     def advance(self, t_s: float, around: Surroundings) -> None: ...
 
 
@@ -67,8 +67,9 @@ class FreeWalks(Generic[WalkerT]):
             self._step()
         # A pause of the free walk at this place counts as taken, because it may not be over.
         along = self._along_m[index]
-        level = bisect.bisect_right(along, person.along_m + _LEVEL_M)
-        elapsed_s = now_s - (now_s if person.started_s is None else person.started_s)
+        level = bisect.bisect_right(along, person.task.along_m + _LEVEL_M)
+        started_s = person.task.started_s
+        elapsed_s = now_s - (now_s if started_s is None else started_s)
         return twin, max(elapsed_s - level * self._tick_s, 0.0)
 
     def _step(self) -> None:
@@ -76,10 +77,11 @@ class FreeWalks(Generic[WalkerT]):
         t_s, bodies = self._ticks * self._tick_s, self._bodies
         self._ticks += 1
         for index, (twin, person) in enumerate(zip(self._twins, self._people, strict=True)):
-            if person.started_s is not None and t_s >= person.started_s - 1e-9:
-                twin.set_off(t_s)
+            started_s, waits = person.task.started_s, twin.spec.sets_off_within_m is not None
+            if waits and started_s is not None and t_s >= started_s - 1e-9:
+                twin.task.go(t_s)
             others = tuple(each for each in (*bodies[:index], *bodies[index + 1 :]) if each)
             twin.advance(t_s, Surroundings(None, others, ALONE.sees_robot))
-            if twin.started_s is not None and t_s > twin.started_s + 1e-9:
-                self._along_m[index].append(twin.along_m)
+            if twin.task.started_s is not None and t_s > twin.task.started_s + 1e-9:
+                self._along_m[index].append(twin.task.along_m)
         self._bodies = [twin.moving_body for twin in self._twins]

@@ -72,11 +72,6 @@ class GlanceProcess:
     time, and 62, 74, 87 and 93 % have looked within the last 0.5, 1, 2 and 3 s. Before
     crossing, 41, 54, 75 and 82 % were observed. If a share of people never looks (least squares:
     19 %), the process gives 50, 60, 70 and 75 %: see :attr:`Glances.looker_share`.
-
-    Args:
-        glance: duration of glances.
-        away: duration of looking away.
-        rng: draws them.
     """
 
     def __init__(
@@ -104,12 +99,7 @@ class GlanceProcess:
 
 
 class EyeRest:
-    """The yaw in the head at which eyes come to rest, drawn anew with every shift of the gaze.
-
-    Args:
-        spread_rad: standard deviation.
-        rng: draws it.
-    """
+    """The yaw in the head at which eyes come to rest, drawn anew with every shift of the gaze."""
 
     def __init__(self, spread_rad: float, rng: np.random.Generator) -> None:
         self._spread_rad, self._rng = spread_rad, rng
@@ -138,13 +128,6 @@ def planned_gaze(
     """Return yaw and pitch of the head from the body as a gaze plan says.
 
     A head turns through the front from one key to the next.
-
-    Args:
-        plan: at least one key.
-        t_s: now.
-        place: x, y and heading of the body.
-        camera_odom_m: (x, y, z) of the robot's camera.
-        eyes_m: height of the eyes.
     """
     after = sum(key.t_s <= t_s for key in plan)
     first, second = plan[max(after - 1, 0)], plan[min(after, len(plan) - 1)]
@@ -170,12 +153,6 @@ class Gaze:
 
     Left and up are positive. The head's angles are relative to the body, those of the eyes relative
     to the head. The head turns from one side to the other through the front.
-
-    Args:
-        glances: the scenario's figures.
-        stature_m: height of the body.
-        rng: draws glances.
-        activity: of the person, who may sit or kneel.
 
     Attributes:
         noticed_s: time of the first look at the robot; None before.
@@ -285,13 +262,7 @@ class Gaze:
     def in_field_of_view(
         self, after_s: float, place: tuple[float, float, float], robot: RobotBody
     ) -> bool:
-        """Return whether the robot is near enough and in the field of view; obstacles are ignored.
-
-        Args:
-            after_s: time since the last update.
-            place: x, y and heading of the body.
-            robot: the robot now.
-        """
+        """Return whether the robot is near and in the field of view; obstacles are ignored."""
         dx, dy = robot.camera_m[0] - place[0], robot.camera_m[1] - place[1]
         distance = math.hypot(dx, dy)
         range_m = self._notices_within_m if self._first_glance_s is None else _SEEN_WITHIN_M

@@ -215,18 +215,7 @@ def _as_recorded(spec: PersonSpec, speed_mps: float) -> PersonSpec:
 
 
 class Manner:
-    """The manner of one person whose habits vary: how they walk, look aside and start by chance.
-
-    Args:
-        habits: of the population.
-        variation: of the walk.
-        free_mps: the person's own speed.
-        rngs: four generators: of the walk, of starts, of the eyes and of errands.
-
-    Attributes:
-        eye_rest: where the eyes come to rest.
-        starting: decides when the person starts.
-    """
+    """The manner of one person whose habits vary: how they walk, look aside and start by chance."""
 
     def __init__(
         self,
@@ -250,15 +239,7 @@ class Manner:
         *,
         walking: bool,
     ) -> tuple[DesiredVelocity, tuple[float, float], tuple[float, float]]:
-        """Return the desired velocity as the walk varies it, and its rate ahead and aside.
-
-        Args:
-            desired: velocity without variation.
-            place: x, y of the person.
-            robot: the robot as the person knows it.
-            dt_s: time since the last call.
-            walking: the person is on the way.
-        """
+        """Return the desired velocity as the walk varies it, and its rate ahead and aside."""
         share = desired.speed_mps / self._free_mps if walking else 0.0
         along, across, d_along, d_across = self._variation.step(dt_s, share)
         ux, uy, habits = desired.ux, desired.uy, self._habits
@@ -291,12 +272,7 @@ class Manner:
 
 
 class GaitVariation:
-    """The variation of one person's walk, and its rate of change.
-
-    Args:
-        figures: of the population.
-        rng: the person's own generator.
-    """
+    """The variation of one person's walk, and its rate of change."""
 
     def __init__(self, figures: VariationFigures, rng: np.random.Generator) -> None:
         self._figures, self._rng = figures, rng

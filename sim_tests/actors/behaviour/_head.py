@@ -35,12 +35,7 @@ _SEARCH_S: Final = 1.5
 
 
 class AnsweringLook:
-    """A look that answers a request; its duration counts from the moment it meets the robot.
-
-    Args:
-        from_s: time at which the person begins to turn.
-        for_s: duration of the look.
-    """
+    """A look that answers a request; its duration counts from the moment it meets the robot."""
 
     def __init__(self, from_s: float, for_s: float) -> None:
         self._from_s, self._for_s = from_s, for_s
@@ -174,13 +169,7 @@ def twisted(feet: GaitPose, twist_rad: float) -> GaitPose:
 def angles_to(
     target_odom_m: tuple[float, float, float], place: tuple[float, float, float], eyes_m: float
 ) -> tuple[float, float]:
-    """Return yaw and pitch of a target from the body.
-
-    Args:
-        target_odom_m: (x, y, z).
-        place: x, y and heading of the body.
-        eyes_m: height of the eyes.
-    """
+    """Return yaw and pitch of a target from the body."""
     x, y, z = target_odom_m
     dx, dy = x - place[0], y - place[1]
     yaw = math.remainder(math.atan2(dy, dx) - place[2], math.tau)

@@ -165,10 +165,6 @@ class Ears:
     Every request draws the same random numbers in the same order, whatever comes of it. With one
     seed, a person who answers at one value of ``answers`` therefore also answers at any higher one,
     at the same time and for as long.
-
-    Args:
-        hearing: the figures.
-        rng: the ears' own generator.
     """
 
     def __init__(self, hearing: Hearing, rng: np.random.Generator) -> None:

@@ -76,17 +76,13 @@ class Person:
     place where the recording has them at the present time. There the recording goes on. People on a
     track know the robot from any side, and look at it only where it asks.
 
-    Args:
-        spec: the person.
-        rng: the person's own generator, for glances, reactions and habits.
-        boxes_odom_m: (N, 4) racks and walls, x_min, y_min, x_max, y_max.
-        habits: of the population; with a variation, speed and glances are drawn by
-            :func:`draw_person`.
-        track: recorded motion in place of the route; None for none.
-        offset_s: delay of the start; the person never starts before 0.
+    ``rng`` is the person's own, for glances, reactions and habits. With a variation of the habits,
+    speed and glances are drawn by :func:`draw_person`. ``offset_s`` delays the start, which is
+    never before 0.
 
     Attributes:
         spec: the person, with the speed and the glances that were drawn.
+        task: the route from the scenario.
         on_track: the person moves as recorded now.
 
     Raises:
@@ -118,7 +114,7 @@ class Person:
         route = Route.from_spec(spec)
         start_s = max(spec.start_s + offset_s, 0.0)
         self._span = AttentionSpan(spec.lapse, spec.sets_off_within_m, start_s)
-        self._follower = self._task = RouteFollower(route, spec.speed_mps, self._span.starts_s)
+        self._follower = self.task = RouteFollower(route, spec.speed_mps, self._span.starts_s)
         if track is None:
             for number, point in enumerate(spec.route):
                 self._obstacles.check_free(
@@ -174,17 +170,7 @@ class Person:
     @property
     def arrived(self) -> bool:
         """True once the end of the route was reached."""
-        return self._task.arrived_s is not None
-
-    @property
-    def along_m(self) -> float:
-        """Length of the route covered so far."""
-        return self._task.along_m
-
-    @property
-    def started_s(self) -> float | None:
-        """Time of the start on the route; None before."""
-        return self._task.started_s
+        return self.task.arrived_s is not None
 
     @property
     def moving_body(self) -> MovingBody | None:
@@ -206,14 +192,9 @@ class Person:
         rng = copy.deepcopy(rng)
         return Person(spec, rng, boxes_odom_m, habits=habits, track=track, offset_s=offset_s)
 
-    def set_off(self, t_s: float) -> None:
-        """Let somebody who waits for the robot set off without it."""
-        if self.spec.sets_off_within_m is not None:
-            self._task.go(t_s)
-
     def outcome(self) -> PersonOutcome:
         """Return the outcome for the person up to now."""
-        end_s, started_s = self._task.arrived_s, self.started_s
+        end_s, started_s = self.task.arrived_s, self.task.started_s
         outcome = PersonOutcome(
             name=self.spec.name,
             noticed_s=self._gaze.noticed_s,
@@ -221,10 +202,10 @@ class Person:
             time_s=None if end_s is None or started_s is None else end_s - started_s,
             length_m=self._length_m,
         )
-        if self._task.route.length_m == 0.0 or started_s is None:
+        if self.task.route.length_m == 0.0 or started_s is None:
             return outcome
         free, late_s = self._free_walks.of(self, self._now_s)
-        end_s, started_s = free._task.arrived_s, free.started_s
+        end_s, started_s = free.task.arrived_s, free.task.started_s
         return replace(
             outcome,
             late_s=None if self.arrived else late_s,
@@ -349,7 +330,7 @@ class Person:
             self._walked_m += math.dist((x, y), self._trajectory.start)
             self._heading += self._turning * DECISION_PERIOD_S
         heading = self._recorded_heading(t_s) + self._heading
-        self._span.maybe_set_off(self._task, t_s, around.robot)
+        self._span.maybe_set_off(self.task, t_s, around.robot)
         robot = self._look_at_robot(t_s, (x, y, heading), around)
         if self._track is not None:
             robot = around.robot
@@ -445,19 +426,15 @@ class Person:
     def _acceleration(
         self, state: State, desired: DesiredVelocity, robot: RobotBody | None, around: Surroundings
     ) -> tuple[float, float]:
-        """Return the acceleration, and to it the rate at which the walk varies."""
-        if self._manner is None:
-            return self._acceleration_to(state, desired, robot, around)
-        desired, ahead, aside = self._manner.varied(
-            desired, state[:2], robot, DECISION_PERIOD_S, walking=self._follower.walking
-        )
-        ax, ay = self._acceleration_to(state, desired, robot, around)
-        return ax + ahead[0] + aside[0], ay + ahead[1] + aside[1]
+        """Return the acceleration: by the desired velocity and social forces within human limits.
 
-    def _acceleration_to(
-        self, state: State, desired: DesiredVelocity, robot: RobotBody | None, around: Surroundings
-    ) -> tuple[float, float]:
-        """Return the acceleration by desired velocity and social forces, within human limits."""
+        To it comes the rate at which the walk varies.
+        """
+        ahead = aside = 0.0, 0.0
+        if self._manner is not None:
+            desired, ahead, aside = self._manner.varied(
+                desired, state[:2], robot, DECISION_PERIOD_S, walking=self._follower.walking
+            )
         _, _, vx, vy = state
         desired_vx, desired_vy = desired.speed_mps * desired.ux, desired.speed_mps * desired.uy
         slower = desired.speed_mps < math.hypot(vx, vy)
@@ -479,7 +456,8 @@ class Person:
         next_vx, next_vy = limited(next_vx, next_vy, fastest)
         if self._touch is not None and t_s - self._touch[2] <= _TOUCHING_S:
             next_vx, next_vy = without_part(next_vx, next_vy, self._touch[0], self._touch[1])
-        return (next_vx - vx) / DECISION_PERIOD_S, (next_vy - vy) / DECISION_PERIOD_S
+        ax, ay = (next_vx - vx) / DECISION_PERIOD_S, (next_vy - vy) / DECISION_PERIOD_S
+        return ax + ahead[0] + aside[0], ay + ahead[1] + aside[1]
 
     def _social_force(
         self, state: State, robot: RobotBody | None, around: Surroundings
@@ -507,7 +485,7 @@ class Person:
         t_s = (self._tick + 1) * DECISION_PERIOD_S
         x, y, vx, vy = self._trajectory.end
         leader = self._follower
-        before_start = self._task.started_s is None
+        before_start = self.task.started_s is None
         if not manner.starting.starts(
             t_s,
             DECISION_PERIOD_S,

@@ -67,10 +67,6 @@ class ReactionModel:
     An encounter starts when a person who knows of the robot is on a conflicting course: the closest
     approach at constant velocities is too near.
 
-    Args:
-        reactions: shares of the reactions.
-        rng: draws them.
-
     Attributes:
         reaction: reaction of the present encounter; empty without one.
         first_reaction: reaction of the first encounter; empty before it.
@@ -249,12 +245,7 @@ class ReactionModel:
 
 
 class Startle:
-    """A startle: the person stops, steps aside, or steps into the robot's path for a second.
-
-    Args:
-        kind: what the person does.
-        from_s: time of its start.
-    """
+    """A startle: the person stops, steps aside, or steps into the robot's path for a second."""
 
     def __init__(self, kind: StartleKind, from_s: float) -> None:
         self._kind, self._from_s = kind, from_s
@@ -275,11 +266,6 @@ class Startle:
 
         The step leads straight away from the line of the robot's course, or towards it and not past
         it. Its direction stays that of the start.
-
-        Args:
-            t_s: now.
-            place: x, y of the person.
-            robot: the robot now.
         """
         if not self.is_on(t_s):
             return None

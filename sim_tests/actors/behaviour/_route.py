@@ -145,11 +145,6 @@ class Route:
 class RouteFollower:
     """Leads one person along a route with its stops.
 
-    Args:
-        route: the route.
-        speed_mps: free walking speed.
-        start_s: time of the start.
-
     Attributes:
         route: as given.
         started_s: time at which the person started; None before.

@@ -49,10 +49,6 @@ class StartingModel:
 
     Somebody who stands on the way, or waits for the robot, starts as people at the kerb do, see
     :data:`START_SHARES`. Somebody who has nowhere to go starts at a constant rate.
-
-    Args:
-        idle_share: share of people with nowhere to go who start within a second.
-        rng: the person's own generator.
     """
 
     def __init__(self, idle_share: float, rng: np.random.Generator) -> None:
@@ -71,17 +67,7 @@ class StartingModel:
         place: tuple[float, float],
         robot: RobotBody | None,
     ) -> bool:
-        """Return whether the person starts now.
-
-        Args:
-            t_s: now.
-            dt_s: time since the last call.
-            standing: the person stands.
-            idle: the person has nowhere to go.
-            looking: the person looks at the robot.
-            place: x and y of the person.
-            robot: the robot, whether the person knows it or not; None without one.
-        """
+        """Return whether the person starts now."""
         if looking:
             self._looked_s = t_s
         if not standing:

@@ -73,10 +73,6 @@ class Track:
         recording: the path of one person.
         reacts: the robot can force the person off the track.
         leaves: the person is away before the first and after the last row.
-
-    Attributes:
-        recording: as given.
-        reacts: as given.
     """
 
     def __init__(
@@ -156,15 +152,7 @@ class Track:
         on_track: bool,
         startled: bool,
     ) -> bool:
-        """Return whether a person in this state moves as recorded from ``t_s`` on.
-
-        Args:
-            t_s: now.
-            state: position and velocity.
-            robot: the robot; None without one.
-            on_track: the person has moved as recorded up to now.
-            startled: the person stops, or steps beside the track.
-        """
+        """Return whether a person in this state moves as recorded from ``t_s`` on."""
         if robot is None or self.is_away(t_s):
             return True
         if startled:

@@ -94,11 +94,6 @@ class Obstacles:
 class Trajectory:
     """Segments of constant acceleration, one after the other.
 
-    Args:
-        x_m: start of the first segment, at rest.
-        y_m: start of the first segment.
-        obstacles: racks and walls that no segment leads into.
-
     Attributes:
         acceleration: of the present segment, m/s².
         end: state at the planned end of the present segment.
@@ -149,11 +144,7 @@ class Trajectory:
 
 
 class Feet:
-    """The feet of one person, who stands at the first place.
-
-    Args:
-        spec: the person.
-    """
+    """The feet of one person, who stands at the first place."""
 
     def __init__(self, spec: PersonSpec) -> None:
         self._spec = spec

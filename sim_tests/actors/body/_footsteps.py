@@ -111,14 +111,7 @@ class _Foot:
 
 
 class OnlineFootsteps:
-    """The feet of one body, placed step by step.
-
-    Args:
-        gait: the body's gait.
-        x_m: where the body stands.
-        y_m: where the body stands.
-        heading_rad: which way it faces.
-    """
+    """The feet of one body, placed step by step."""
 
     def __init__(self, gait: Gait, x_m: float, y_m: float, heading_rad: float) -> None:
         self._gait = gait
@@ -154,14 +147,7 @@ class OnlineFootsteps:
         velocity: tuple[float, float, float],
         acceleration: tuple[float, float],
     ) -> GaitPose:
-        """Advance by ``dt_s`` ≥ 0 and return the pose in odom.
-
-        Args:
-            dt_s: time since the last step.
-            place: x, y and heading of the body now.
-            velocity: of the body, m/s and rad/s.
-            acceleration: of the body, m/s².
-        """
+        """Advance by ``dt_s`` ≥ 0 and return the pose in odom."""
         left_foot, right_foot = self._feet
         feet_before = [left_foot.copy(), right_foot.copy()]
         self._before_step = {**vars(self), "_feet": feet_before, "_before_step": {}}
@@ -382,11 +368,6 @@ def steady_walk(gait: Gait, walked_m: float, speed_mps: float) -> GaitPose:
     """Return the pose in a straight walk at one speed, in the body's frame.
 
     The feet have walked two to three cycles from standing; the distance gives the phase.
-
-    Args:
-        gait: the body's gait.
-        walked_m: distance walked so far.
-        speed_mps: speed ≥ 0; one too low to walk stands.
     """
     if speed_mps <= _STANDING_BELOW_MPS:
         return gait.standing

@@ -84,9 +84,6 @@ class Gait:
 
     NumPy is slow on two feet, so the figures come from look-up tables of plain numbers.
 
-    Args:
-        skeleton: the body.
-
     Attributes:
         stature_m: height of the body.
         comfortable_stride_m: stride at 1.2 m/s.

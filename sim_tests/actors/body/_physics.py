@@ -39,14 +39,6 @@ class WorkerBody:
     """A kinematic multibody that stays where it is placed, even if a robot pushes it.
 
     Its base is the pelvis with the hips' midpoint as origin (x forward, y left, z up at rest).
-
-    Args:
-        warehouse: the world to stand in.
-        skeleton: bones and capsules.
-        seat: what the person sits on when seated.
-
-    Attributes:
-        body: PyBullet's id of the multibody.
     """
 
     def __init__(self, warehouse: Warehouse, skeleton: Skeleton, seat: Seat) -> None:
@@ -196,15 +188,7 @@ class WorkerBody:
 
 
 class SeatBody:
-    """The collision shape of a seat, a box without legs; a robot cannot move it.
-
-    Args:
-        warehouse: the world to stand in.
-        size_m: depth, width and height.
-
-    Attributes:
-        body: PyBullet's id.
-    """
+    """The collision shape of a seat, a box without legs; a robot cannot move it."""
 
     def __init__(self, warehouse: Warehouse, size_m: Vector) -> None:
         self._client = warehouse.client

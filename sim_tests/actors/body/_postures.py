@@ -371,14 +371,7 @@ def kneeling_pose(bones: Skeleton) -> GaitPose:
 
 @dataclass(frozen=True, slots=True)
 class Trunk:
-    """Hips, trunk and head in the heading frame: the body's position with x along its heading.
-
-    Attributes:
-        hips_m: midpoint of the hips.
-        pelvis: rotation of the pelvis.
-        thorax: rotation of the thorax.
-        head: rotation of the head.
-    """
+    """Hips, trunk and head in the heading frame: the body's position with x along its heading."""
 
     hips_m: Vector
     pelvis: Quaternion
@@ -387,11 +380,7 @@ class Trunk:
 
 
 class JointAngles:
-    """The joint angles of one body.
-
-    Args:
-        bones: the bones.
-    """
+    """The joint angles of one body."""
 
     def __init__(self, bones: Skeleton) -> None:
         self._legs = bones.legs
@@ -423,15 +412,7 @@ class JointAngles:
         eyes_rad: tuple[float, float],
         activity: Activity,
     ) -> tuple[Quaternion, ...]:
-        """Return the rotation of every joint in the order of :data:`JOINTS`.
-
-        Args:
-            trunk: of this posture.
-            gait_pose: the gait.
-            feet: left and right foot in the heading frame.
-            eyes_rad: yaw and pitch of the eyes from the head.
-            activity: of the hands.
-        """
+        """Return the rotation of every joint in the order of :data:`JOINTS`."""
         pelvis = trunk.pelvis
         back = inverse(pelvis)
         legs: list[Quaternion] = []

@@ -107,12 +107,7 @@ def from_axes(x_axis: Vector, y_axis: Vector, z_axis: Vector) -> Quaternion:
 
 
 def aligned(x_axis: Vector, towards: Vector) -> Quaternion:
-    """Return the rotation that takes x to the unit ``x_axis`` and y as near ``towards`` as it can.
-
-    Args:
-        x_axis: unit vector.
-        towards: any vector that is not parallel to it.
-    """
+    """Return the rotation that takes x to the unit ``x_axis`` and y near to ``towards``."""
     # Written out: every placing of a body takes four of them.
     ax, ay, az = x_axis
     tx, ty, tz = towards

@@ -190,10 +190,6 @@ class WorkerSkin:
     Args:
         worker: the body to show.
         textures: (H, W, 3) uint8 per level of detail, finest first; None takes the shipped ones.
-
-    Attributes:
-        worker: as given.
-        kind: ``"person"``.
     """
 
     kind = "person"
@@ -353,12 +349,6 @@ class HeldObject:
     """The visual actor of the object that a :class:`Worker` holds or sits on.
 
     It is separate from the person's actor, so that a box hides the chest behind it.
-
-    Args:
-        worker: the person who holds it.
-
-    Attributes:
-        kind: ``"prop"``.
     """
 
     kind = "prop"

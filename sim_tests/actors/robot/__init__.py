@@ -14,20 +14,3 @@ from ._model import (
     shipped_robots,
 )
 from ._robots import Amr, KinematicRobot, Robot, robot_of
-
-__all__ = [
-    "CAMERA_FORWARD_M",
-    "CAMERA_HEIGHT_M",
-    "NOVA_CARTER",
-    "TRACK_M",
-    "WHEEL_RADIUS_M",
-    "Amr",
-    "BodyPart",
-    "KinematicRobot",
-    "Robot",
-    "RobotLook",
-    "RobotModel",
-    "amr_meshes",
-    "robot_of",
-    "shipped_robots",
-]

@@ -16,29 +16,3 @@ from ._messages import (
 )
 from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
 from ._scanner_eyes import ScannerEyes, motion_of, scanner_sensors
-
-__all__ = [
-    "NOBODY",
-    "PIXEL_RATE_HZ",
-    "Change",
-    "Delivery",
-    "Exposure",
-    "Eyes",
-    "KeypointCamera",
-    "KeypointNoise",
-    "MapView",
-    "MountedScan",
-    "OdometryReading",
-    "PixelEyes",
-    "ScannerEyes",
-    "Sighting",
-    "SurroundEyes",
-    "TimedEyes",
-    "TrueEyes",
-    "WorkerObservations",
-    "make_eyes",
-    "match_to_workers",
-    "motion_of",
-    "pixel_timing",
-    "scanner_sensors",
-]

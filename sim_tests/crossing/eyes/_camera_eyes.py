@@ -156,12 +156,7 @@ def _true_observation(stamp_s: float, view: TrueView) -> PersonObservation:
 
 
 class SurroundEyes:
-    """The eyes of a camera with several flat views, whose observations are merged as on a robot.
-
-    Args:
-        views: views of the camera, the first one straight ahead.
-        eyes: eyes of each view.
-    """
+    """The eyes of a camera with several flat views, whose observations are merged as on a robot."""
 
     def __init__(self, views: Sequence[FlatView], eyes: Sequence[Eyes]) -> None:
         self._views = tuple(views)
@@ -194,10 +189,6 @@ class PicturelessEyes:
 
     The fault changes a picture that stands for the missing one. Where the result shows nothing, as
     the judgement of real pictures says, the eyes see nothing.
-
-    Args:
-        eyes: eyes of the camera without the fault.
-        change: the fault.
     """
 
     def __init__(self, eyes: Eyes, change: Change[ImageRgb]) -> None:
@@ -226,14 +217,7 @@ def delivered_picture(
 
 
 class TimedEyes:
-    """Eyes with the frame rate, losses and delays of a camera, and with faults.
-
-    Args:
-        eyes: observe an image that is taken.
-        timing: timing of the camera.
-        rng: random generator of losses and delays.
-        change: faults of the images; None for none.
-    """
+    """Eyes with the frame rate, losses and delays of a camera, and with faults."""
 
     def __init__(
         self,

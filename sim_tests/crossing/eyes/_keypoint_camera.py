@@ -123,12 +123,6 @@ class KeypointCamera:
     """A :class:`perception.PersonDetector` and :class:`perception.PoseEstimator` in one.
 
     Call :meth:`look` once per frame, then run the pipeline with this camera.
-
-    Args:
-        camera: camera model.
-        sight: occlusion test of the hall.
-        noise: noise of the keypoints.
-        rng: random generator of the noise.
     """
 
     def __init__(
@@ -260,17 +254,7 @@ class KeypointCamera:
 
 
 class KeypointEyes:
-    """Eyes with a keypoint camera and the awareness pipeline.
-
-    Args:
-        stage: the stage of the crossing.
-        camera: camera model.
-        cone: attention cone of the pipeline.
-        noise: noise of the keypoints.
-        rng: random generator of the noise.
-        sight: occlusion test of the hall.
-        unusual_size_probability: as the pipeline takes it.
-    """
+    """Eyes with a keypoint camera and the awareness pipeline."""
 
     def __init__(
         self,

@@ -45,16 +45,6 @@ def make_eyes(
 ) -> Eyes:
     """Return the eyes of a perception.
 
-    Args:
-        kind: one of :data:`PerceptionKind`, or :data:`ORACLE`.
-        stage: the stage of the crossing.
-        camera: camera model of one view.
-        rng: random generator of the noise.
-        cone: attention cone.
-        noise: noise of the keypoint camera.
-        pipeline: pipeline for pixels; None for the scenario's networks.
-        pictures: faults of the pictures; None for none.
-
     Raises:
         SimError: for another kind.
     """

@@ -32,15 +32,6 @@ class PixelEyes:
     the mounting of its camera. Nothing else of the simulation reaches it. The worker of each
     observation is found afterwards, for metrics and drawings only.
 
-    Args:
-        stage: the stage of the crossing.
-        camera: camera model.
-        sensor: the noise of the images.
-        rng: random generator of the sensor's noise.
-        pipeline: pipeline for the images.
-        renderer: renderer of the images; None renders the scenery as finely as the people.
-        change: faults of the pictures; None for none.
-
     Raises:
         SimError: for a pipeline with another camera.
     """

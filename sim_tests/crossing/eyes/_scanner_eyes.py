@@ -83,14 +83,7 @@ class ScannerEyes:
     def look(
         self, now_s: float, T_odom_base: FloatArray, state: RobotState, known: RobotState
     ) -> tuple[Sighting, ...]:
-        """Take the scans that are due; return those that have arrived by now, in order of arrival.
-
-        Args:
-            now_s: time; grows from call to call.
-            T_odom_base: (4, 4) true pose of the robot.
-            state: its true state.
-            known: the state that it knows.
-        """
+        """Take the scans that are due; return those that have arrived by now, in that order."""
         ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
         due = [(number, arrives_s) for number, is_due, arrives_s in ticks if is_due]
         if due:

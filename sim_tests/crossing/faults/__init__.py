@@ -4,5 +4,3 @@ from __future__ import annotations
 
 from ._fault import FAULT_KINDS, EpisodeFaults, Fault, shipped_faults
 from ._sensor_fault import SensorFault, Start
-
-__all__ = ["FAULT_KINDS", "EpisodeFaults", "Fault", "SensorFault", "Start", "shipped_faults"]

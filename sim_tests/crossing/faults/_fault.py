@@ -129,13 +129,7 @@ def shipped_faults() -> tuple[str, ...]:
 
 
 class EpisodeFaults:
-    """The faults of one episode, as changes of what the sensors deliver.
-
-    Args:
-        fault: the faults; None for none.
-        seed: seed of the episode.
-        camera: camera of the robot.
-    """
+    """The faults of one episode, as changes of what the sensors deliver."""
 
     def __init__(self, fault: Fault | None, seed: int, camera: Camera) -> None:
         self._faults: list[tuple[SensorFault, Start]] = []

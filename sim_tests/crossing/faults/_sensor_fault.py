@@ -187,12 +187,7 @@ class Appearing(SimConfig):
 
 
 class Appearances(Generic[_ThingT]):
-    """The things that appear in one episode.
-
-    Args:
-        appearing: how often they appear.
-        rng: draws the times.
-    """
+    """The things that appear in one episode."""
 
     def __init__(self, appearing: Appearing, rng: np.random.Generator) -> None:
         self._rate_hz, self._rng = appearing.rate_hz, rng

@@ -13,17 +13,3 @@ from ._choice import (
 from ._config import PlannerConfig
 from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
 from ._sampling_planner import SamplingPlanner
-
-__all__ = [
-    "KNOWN_PLANNERS",
-    "CostmapPlanner",
-    "LocalPlanner",
-    "PlannerConfig",
-    "SamplingPlanner",
-    "StraightOn",
-    "import_planner",
-    "make_planner",
-    "planner_label",
-    "refuse_unusable_planner",
-    "seeded_generators",
-]

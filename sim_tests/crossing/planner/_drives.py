@@ -139,12 +139,7 @@ class Candidates:
 
 
 class Drive(ABC):
-    """The kinematics of a robot.
-
-    Args:
-        robot: limits of the motion.
-        config: horizon, number of samples, limits of turning.
-    """
+    """The kinematics of a robot."""
 
     def __init__(self, robot: RobotProfile, config: PlannerConfig) -> None:
         self._robot = robot

@@ -102,12 +102,6 @@ class SamplingPlanner:
     ) -> tuple[float, ...]:
         """Choose the command for the next tick.
 
-        Args:
-            robot_state: state of the robot.
-            goal_odom_m: (2,) goal of its base origin.
-            constraints: people as discs and the speed limit, at the time of the state.
-            dt_s: time for which the command is held, > 0.
-
         Returns:
             ``(speed_mps, yaw_rate_radps)``, of a holonomic robot ``(forward_mps, left_mps,
             yaw_rate_radps)``. The robot can reach the speed in ``dt_s``. It is negative only for a

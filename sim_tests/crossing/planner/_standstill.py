@@ -67,12 +67,6 @@ class Reversing:
     if its goal lies beside it, where no forward arc leads, or if it has stood for a second although
     nobody is in its way. It remembers that it reverses, since the first metre back would otherwise
     look like a way ahead.
-
-    Args:
-        turning_radius_m: of the robot.
-        footprint: its outline.
-        clearance_m: gap to boxes that an arc keeps.
-        tolerance_m: distance from the goal that counts as reached.
     """
 
     def __init__(

@@ -10,6 +10,4 @@ if TYPE_CHECKING:
     from ._no_floor_planner import NoFloorPlanner
     from ._results import run_falsify
 
-__all__ = ["NoFloorPlanner", "run_falsify"]
-
 __getattr__ = lazy_page(__name__, __file__)

@@ -91,12 +91,7 @@ SETS_OFF: Final = {
 def person_parameters(
     person: Mapping[str, Any], fastest_mps: float = FASTEST_WALK_MPS
 ) -> dict[str, Parameter]:
-    """Return the parameters of a person: start, speed, route, a pause, gaze, reaction, lapse.
-
-    Args:
-        person: the person in the scenario as written.
-        fastest_mps: highest speed of somebody who walks ahead.
-    """
+    """Return the parameters of a person: start, speed, route, a pause, gaze, reaction, lapse."""
     start_s, speed_mps = float(person["start_s"]), float(person["speed_mps"])
     walks = len(person["route"]) > 1
     parameters = dict(_ENDS)

@@ -126,15 +126,7 @@ def write_summary(
     verdict: str,
     against: Mapping[str, EpisodeRecord],
 ) -> None:
-    """Write the figures of a falsification as JSON.
-
-    Args:
-        falsification: the finished search.
-        cases: its worst cases.
-        path: the file.
-        verdict: the verdict in sentences.
-        against: records of the worst cases with another policy, by the name of the file.
-    """
+    """Write the figures of a falsification as JSON."""
     scenarios = {}
     for name in falsification.spaces:
         scores = [each.score for each in falsification.episodes if each.scenario == name]

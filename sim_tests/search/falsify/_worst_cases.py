@@ -70,13 +70,7 @@ class WorstCase:
 def worst_episodes(
     episodes: Sequence[SearchedEpisode], ranges: Mapping[str, Mapping[str, Range]], most: int
 ) -> list[SearchedEpisode]:
-    """Return the episodes with the lowest scores, which differ in each scenario.
-
-    Args:
-        episodes: episodes to choose from.
-        ranges: ranges of the parameters, by scenario.
-        most: number of episodes to return at most.
-    """
+    """Return the episodes with the lowest scores, which differ in each scenario."""
     worst: list[SearchedEpisode] = []
     for each in sorted(episodes, key=lambda each: each.score):
         if len(worst) == most or each.score >= NO_MARGIN_SCORE:

@@ -156,11 +156,6 @@ def dropped(candidate: Evaluation, base: Evaluation, risk: float) -> Dropped:
     A contact of a moving robot ends it. So does a 95 % interval of the step-out impacts above the
     given risk, and a paired one that shows that it loses more time than a base policy within that
     risk.
-
-    Args:
-        candidate: the episodes of the trial so far.
-        base: the base policy on at least the same episodes.
-        risk: the given step-out impacts per 1 000 crossings.
     """
     if candidate.moving_contacts:
         return "contact"

@@ -61,10 +61,6 @@ class PolicySpace:
     point of the space is a valid policy: numbers that do not fit together are moved to the
     nearest that do. No policy is below the floor.
 
-    Args:
-        base: the policy that gives all other numbers.
-        ranges: search ranges, by dotted key of the policy file; None for the shipped ranges.
-
     Raises:
         SimError: a key that the policy does not have, or a range below the floor.
     """

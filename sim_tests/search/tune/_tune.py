@@ -267,16 +267,7 @@ def _anchors(policy_name: str, base: AwarenessPolicy) -> dict[str, AwarenessPoli
 
 @dataclass(frozen=True, slots=True)
 class _Race:
-    """Runs trials, each only as long as it does not lose to the base policy, and the finalists.
-
-    Attributes:
-        settings: settings of the tuning.
-        folder: its folder, where the records of all episodes are kept.
-        runner: runs episodes.
-        space: gives the policy of a trial.
-        anchors: the base policy and the presets, by name.
-        tuned: their evaluations on the tuning seeds.
-    """
+    """Runs trials, each only as long as it does not lose to the base policy, and the finalists."""
 
     settings: TuneSettings
     folder: Path

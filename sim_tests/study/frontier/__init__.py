@@ -4,5 +4,3 @@ from __future__ import annotations
 
 from ._frontier import TODAY, sensors_of_today
 from ._show import frontier_command
-
-__all__ = ["TODAY", "frontier_command", "sensors_of_today"]

@@ -48,14 +48,6 @@ def frontier_command(
 ) -> int:
     """Run the family unless a folder of episodes is given, and write what it shows.
 
-    Args:
-        folder: of episodes; None to run the family.
-        experiment: the episodes to run.
-        out: folder of the episodes to run.
-        as_json: print the frontier as JSON.
-        running: ``workers``, ``resume`` and ``overwrite`` of
-            :func:`~sim_tests.study.runs.run_jobs`.
-
     Raises:
         SimError: an unusable option or folder, or no episode to compare.
     """

@@ -22,11 +22,6 @@ from ._trace import Trace
 class Log:
     """The log of one episode; what several measures need of it is computed once.
 
-    Args:
-        result: the crossing.
-        time_without_people_s: time to goal of the same task without people; None if not known.
-        length_without_people_m: driven length of the same task without people; None if not known.
-
     Attributes:
         result: as given.
         trace: the true course as arrays.

@@ -312,11 +312,6 @@ def check_columns(columns: Sequence[str], source: str) -> None:
 def parse_row(columns: Sequence[str], cells: Sequence[str], source: str) -> EpisodeRecord:
     """Return the episode of a row.
 
-    Args:
-        columns: the header, already checked.
-        cells: one text per column.
-        source: file and line, for messages.
-
     Raises:
         SimError: a cell does not fit its column, or there are more or fewer cells than columns.
     """

@@ -39,16 +39,7 @@ class Metric:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column of ``episodes.csv``.
-
-    Attributes:
-        name: its heading.
-        kind: of its values.
-        meaning: its definition.
-        of: function of the log of an episode; None for what the log does not tell.
-        default: value without a log.
-        required: every table must have the column.
-    """
+    """A column of ``episodes.csv``."""
 
     name: str
     kind: Kind

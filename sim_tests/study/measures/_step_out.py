@@ -137,11 +137,6 @@ def step_out_impacts(
     with the person's centre, plus what turning adds at the touching point. A path through a rack, a
     wall or a prop gives none.
 
-    Args:
-        result: the crossing.
-        model: the people's constants.
-        trace: the course of the crossing; None to take it from the result.
-
     Raises:
         SimError: a result without frames, or with frames that do not hold all people.
     """
@@ -191,16 +186,6 @@ class _Starts:
     """The M starts that a moving robot can meet before it stands: an instant and a person each.
 
     Vectors are in the base frame of the instant.
-
-    Args:
-        trace: course of the episode.
-        instants: rows of the trace at which people set off.
-        robot: the robot.
-        model: the people's constants.
-
-    Attributes:
-        row: (M,) row of the trace.
-        person: (M,) index of the person.
     """
 
     def __init__(

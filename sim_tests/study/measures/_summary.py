@@ -93,11 +93,6 @@ def baselines_of(variant: Variant, variants: Iterable[Variant], policy: str) -> 
     the most similar conditions is taken: the same table, then the same camera, robot and the like,
     then the same fault, then the same perception. The second is the same variant in the first of
     several tables.
-
-    Args:
-        variant: the variant to compare.
-        variants: all variants, those of the first table first.
-        policy: name of the baseline policy.
     """
     known = tuple(variants)
     found: list[Variant] = []

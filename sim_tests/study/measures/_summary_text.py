@@ -19,12 +19,7 @@ _Row = TypeVar("_Row", Comparison, SummaryRow)
 
 
 def summary_text(summary: Summary, notes: Iterable[str] = ()) -> str:
-    """Return all tables of a summary, each with a heading, and notes on what is left out.
-
-    Args:
-        summary: the summary.
-        notes: further notes, put last.
-    """
+    """Return all tables of a summary, each with a heading, and notes on what is left out."""
     if not summary.policies:
         return "no episodes"
     percent = f"{100.0 * summary.level:g} %"

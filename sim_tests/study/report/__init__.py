@@ -11,6 +11,4 @@ if TYPE_CHECKING:
     from ._page import Table
     from ._write import write_report
 
-__all__ = ["Table", "compare_planners", "write_report"]
-
 __getattr__ = lazy_page(__name__, __file__)

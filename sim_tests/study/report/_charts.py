@@ -136,12 +136,7 @@ def _reach(interval: Interval) -> tuple[tuple[float], tuple[float]] | None:
 
 
 def _svg(name: str, draw: Callable[[Axes], None]) -> str:
-    """Return a chart as the SVG element of an HTML page.
-
-    Args:
-        name: keeps its ids apart from those of other charts.
-        draw: draws into the axes of the chart.
-    """
+    """Return a chart as the SVG element of an HTML page."""
     file = io.StringIO()
     with rc_context(_STYLE):
         figure = new_figure(*_SIZE_IN)

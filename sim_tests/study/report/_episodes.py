@@ -26,12 +26,6 @@ def stills_section(run: Run, results: Results, *, pictures: bool, progress: bool
 
     A failure affects only its own episode. Contacts of any arm come first. Only the arms that
     verdicts are about count for the smallest margins.
-
-    Args:
-        run: the run, whose jobs are run again.
-        results: its figures.
-        pictures: run the episodes again for pictures.
-        progress: show progress on standard error.
     """
     judged = {arm.name for arm in results.judged}
     points = [
@@ -130,13 +124,7 @@ def reproduction_section(run: Run) -> Section:
 
 
 def episodes_section(run: Run, results: Results, folder: Path) -> Section:
-    """Return the list of all episodes, or of those with the smallest margins if there are too many.
-
-    Args:
-        run: the run.
-        results: its figures.
-        folder: of the report, where the links to replay pages begin.
-    """
+    """Return the list of all episodes, or of too many those with the smallest margins."""
     name_of = {id(e): arm.name for arm in results.arms for e in (*arm.episodes, *arm.others)}
     chosen = list(run.episodes)
     lead = "“Watch” opens a replay page. A command writes the page where there is none yet."

@@ -80,14 +80,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """An episode with its pictures.
-
-    Attributes:
-        title: of the episode.
-        text: its figures, or why there is no picture.
-        command: the command that shows it.
-        pictures: ``data:`` addresses, each with a description.
-    """
+    """An episode with its pictures."""
 
     title: str
     text: str
@@ -97,19 +90,7 @@ class Still:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A section of a page; its parts are shown in the order of the attributes.
-
-    Attributes:
-        anchor: its address on the page.
-        title: its heading.
-        lead: one or two sentences below it.
-        charts: SVG texts, each with a caption.
-        stills: episodes with pictures.
-        commands: commands to copy.
-        tables: tables.
-        texts: names and texts that are folded away.
-        folded: the section is folded away.
-    """
+    """A section of a page; its parts are shown in the order of the attributes."""
 
     anchor: str
     title: str
@@ -132,14 +113,6 @@ def write_page(
     notices: Sequence[str] = (),
 ) -> None:
     """Write a page; it appears whole or not at all, and equal content gives equal bytes.
-
-    Args:
-        path: of the page.
-        title: its heading.
-        sections: what stands on it; every text of them is escaped but the charts.
-        lead: a line below the heading.
-        verdicts: names, and the sentences that are read first.
-        notices: what is missing.
 
     Raises:
         SimError: the page cannot be written, or the extra ``bench`` is missing.

@@ -84,10 +84,6 @@ class _WorstInstant:
 def pictures_of(job: Job, record: EpisodeRecord) -> tuple[tuple[tuple[str, str], ...], str]:
     """Run an episode again up to its smallest margin, and draw that instant.
 
-    Args:
-        job: the episode.
-        record: its row.
-
     Returns:
         Pictures as ``data:`` addresses, each with a description, and a message about trouble,
         empty without trouble.

@@ -206,13 +206,7 @@ class Results:
         return tuple(arm for arm in self.arms if arm.variant.policy not in _ORDER) or self.arms
 
     def against(self, arm: Arm, part: str = "", *, scenario: bool = False) -> Comparison | None:
-        """Return the comparison of an arm with ``blind`` and the same planner; None without one.
-
-        Args:
-            arm: the arm.
-            part: a part of :func:`measured_part`, or a scenario; empty for all episodes.
-            scenario: ``part`` is a scenario.
-        """
+        """Return the comparison of an arm with ``blind`` and the same planner; None without one."""
         summary = self.summary
         comparisons = summary.scenario_comparisons if scenario else summary.comparisons
         return next((c for c in comparisons if (c.variant, c.part) == (arm.name, part)), None)

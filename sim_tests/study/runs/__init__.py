@@ -45,38 +45,4 @@ if TYPE_CHECKING:
         read_run,
     )
 
-__all__ = [
-    "Job",
-    "RunFiles",
-    "Workers",
-    "about_run",
-    "answering_note",
-    "attempt",
-    "box_scale_of",
-    "died",
-    "experiment_jobs",
-    "fault_of",
-    "find_episode",
-    "free_run_of",
-    "in_parallel",
-    "job_of",
-    "named_templates",
-    "observed_episode",
-    "plan_jobs",
-    "policy_of",
-    "policy_text",
-    "read_attempts",
-    "read_jobs",
-    "read_rows",
-    "read_run",
-    "recorder_of",
-    "replay_command",
-    "run_episode",
-    "run_jobs",
-    "sample_jobs",
-    "setup_of",
-    "template_of",
-    "tidy",
-]
-
 __getattr__ = lazy_page(__name__, __file__)

@@ -57,16 +57,7 @@ _MAP_MARGIN_M: Final = 3.0
 
 
 class ReplayPictures(AbstractContextManager["ReplayPictures"]):
-    """The video of an episode, and the map of its closest instant with all paths up to there.
-
-    Args:
-        map_path: PNG file of the map.
-        video_path: MP4 file of the robot's camera beside the map; None for no video.
-        box_scale: as for :func:`~sim_tests.crossing.draw_camera_view`.
-
-    Attributes:
-        written: paths of the files that have been written.
-    """
+    """The video of an episode, and the map of its closest instant with all paths up to there."""
 
     def __init__(self, map_path: Path, video_path: Path | None, box_scale: float) -> None:
         self._box_scale = box_scale
@@ -145,13 +136,6 @@ def replay_command(
 ) -> int:
     """Run an episode again, write its pictures or its page, and compare its row with the run's.
 
-    Args:
-        folder: of the run.
-        episode: as for :func:`find_episode`; or ``"all"``.
-        out: folder of the pictures; None for the one in the folder of the run.
-        no_video: draw only the map.
-        view: write a page instead of pictures, and show it.
-
     Raises:
         SimError: the folder holds no run, or the run does not have the episode.
     """
@@ -218,15 +202,7 @@ def recorder_of(
     on_begin: Callable[[dict[str, Any]], None] | None = None,
     on_state: Callable[[dict[str, Any]], None] | None = None,
 ) -> CrossingRecorder:
-    """Return an observer that records a job's crossing.
-
-    Args:
-        job: the episode.
-        camera: whether to render the robot's camera.
-        share: most of the elapsed time that rendering may take; 1 for no limit.
-        on_begin: as for :class:`~sim_tests.viewing.CrossingRecorder`.
-        on_state: likewise.
-    """
+    """Return an observer that records a job's crossing; ``share`` bounds the time of rendering."""
     pictures = CameraPictures(box_scale=box_scale_of(job), share=share) if camera else None
     return CrossingRecorder(job.conditions, pictures=pictures, on_begin=on_begin, on_state=on_state)
 

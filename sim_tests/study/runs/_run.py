@@ -192,13 +192,6 @@ class RunFolder(AbstractContextManager["RunFolder"]):
     The file of an episode appears whole when the episode has ended, so a process that is killed at
     any moment leaves whole files alone. Resuming runs the episodes that have none.
 
-    Args:
-        path: the folder, made when missing.
-        jobs: all episodes of the run.
-        about: content of ``run.json`` beside the state: versions, command, settings.
-        resume: continue the run that the folder holds.
-        overwrite: replace the run that the folder holds.
-
     Attributes:
         done: outcomes of the episodes that have ended, by the number of their job.
 

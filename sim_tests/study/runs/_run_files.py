@@ -49,13 +49,7 @@ JOB_FIELDS: Final = tuple(field.name for field in fields(Job))
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """The outcome of one episode.
-
-    Attributes:
-        record: its row in the table.
-        traceback: of the error that ended it; empty without an error.
-        conduct: of its planner; None for an episode that ended with an error.
-    """
+    """The outcome of one episode."""
 
     record: EpisodeRecord
     traceback: str = ""
@@ -75,9 +69,6 @@ def versions() -> dict[str, str]:
 
 class RunFiles:
     """The paths of the files in the folder of a run.
-
-    Args:
-        folder: of the run.
 
     Attributes:
         folder: of the run.
@@ -224,9 +215,6 @@ def not_of_this_run(path: Path, reason: str) -> SimError:
 
 def answering_note(about: Any) -> str:
     """Return a sentence on the probability with which simulated people answer a request.
-
-    Args:
-        about: content of ``run.json``.
 
     Returns:
         The sentence; empty where the settings of the run are not known.

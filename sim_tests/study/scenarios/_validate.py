@@ -42,10 +42,6 @@ _WRONG_LABEL, _CANNOT_RUN = 1, 2
 def validate_command(files: Sequence[str], episodes: int) -> int:
     """Check scenarios and print what is wrong.
 
-    Args:
-        files: names of shipped scenarios or of their sets, or YAML files.
-        episodes: number of crossings that measure the attention of people.
-
     Returns:
         0; 1 if a scenario's people contradict its ``attention``; 2 if one cannot be run.
     """
@@ -203,10 +199,6 @@ class AttentionCheck:
 
 def check_attention(template: ScenarioTemplate, seeds: Iterable[int]) -> AttentionCheck:
     """Run a scenario with perfect perception and return what its people looked at.
-
-    Args:
-        template: the scenario; with the policy ``balanced``, which asks nobody.
-        seeds: one crossing each.
 
     Raises:
         MissingSimulatorError: the extra ``sim`` is missing.

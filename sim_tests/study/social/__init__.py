@@ -6,15 +6,3 @@ from ._episode import Outcome, SocialEpisode
 from ._files import read_track, write_episode
 from ._measures import SOCIAL_MEASURES, social_measures
 from ._runs import EpisodeRecorder, export_episode, measure_sources
-
-__all__ = [
-    "SOCIAL_MEASURES",
-    "EpisodeRecorder",
-    "Outcome",
-    "SocialEpisode",
-    "export_episode",
-    "measure_sources",
-    "read_track",
-    "social_measures",
-    "write_episode",
-]

@@ -50,12 +50,7 @@ def format_of(path: Path) -> str:
 
 
 def write_episode(path: Path, episode: SocialEpisode, format: str = "") -> None:
-    """Write an episode.
-
-    Args:
-        path: of the file.
-        episode: to write.
-        format: a name of :data:`FORMATS`; empty for the one of the file's end.
+    """Write an episode; without a format in that of the file's end.
 
     Raises:
         SimError: an unknown format, the file cannot be written, or the goal of the robot is not

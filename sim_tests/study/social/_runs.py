@@ -66,11 +66,6 @@ class EpisodeRecorder:
     ) -> SocialEpisode:
         """Return the recorded episode.
 
-        Args:
-            result: the crossing that was recorded.
-            outcome: its outcome; None if it is not known.
-            name: a text that identifies it.
-
         Raises:
             SimError: nothing was recorded.
         """

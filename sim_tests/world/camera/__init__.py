@@ -4,17 +4,3 @@ from __future__ import annotations
 
 from ._renderer import FINE_PX_PER_M, CameraRenderer, CoarseSceneryRenderer, RenderedView
 from ._sensor import CameraTiming, FrameClock, FrameQueue, SensorConfig, expose, to_linear, to_srgb
-
-__all__ = [
-    "FINE_PX_PER_M",
-    "CameraRenderer",
-    "CameraTiming",
-    "CoarseSceneryRenderer",
-    "FrameClock",
-    "FrameQueue",
-    "RenderedView",
-    "SensorConfig",
-    "expose",
-    "to_linear",
-    "to_srgb",
-]

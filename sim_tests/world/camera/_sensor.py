@@ -133,10 +133,6 @@ class FrameClock:
     """The clock of a camera: decides at each tick of the simulation whether a frame is taken.
 
     A frame is taken at the first tick at or after its time.
-
-    Args:
-        timing: timing of the camera.
-        rng: draws losses and delays.
     """
 
     def __init__(self, timing: CameraTiming, rng: np.random.Generator) -> None:

@@ -18,26 +18,3 @@ from ._meshes import (
     scenery_texture,
 )
 from ._scenery import scenery
-
-__all__ = [
-    "BOX_FACES",
-    "LAYOUTS",
-    "LIGHTINGS",
-    "PROP_PARTS",
-    "TEXTURE_NAMES",
-    "Atlas",
-    "Colour",
-    "Lighting",
-    "Mesh",
-    "Prop",
-    "RackBox",
-    "Region",
-    "SceneryChunk",
-    "WarehouseLayout",
-    "box",
-    "merge",
-    "quad",
-    "read_meshes",
-    "scenery",
-    "scenery_texture",
-]

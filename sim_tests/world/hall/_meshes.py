@@ -222,10 +222,6 @@ class Atlas:
     Args:
         size_px: side of the texture.
         cells_px: left, top, width and height of each image, from the texture's upper left corner.
-
-    Attributes:
-        size_px: as given.
-        cells_px: as given.
     """
 
     def __init__(self, size_px: int, cells_px: Mapping[str, tuple[int, int, int, int]]) -> None:

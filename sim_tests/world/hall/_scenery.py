@@ -254,15 +254,7 @@ def marking_chunks(layout: WarehouseLayout, variant: int) -> Iterator[SceneryChu
 def free_spans(
     layout: WarehouseLayout, low: float, high: float, across: float, *, along_x: bool
 ) -> list[tuple[float, float]]:
-    """Return the parts of a line on the floor that are free of racks and props.
-
-    Args:
-        layout: the hall.
-        low: start of the line along its axis, metres.
-        high: its end.
-        across: its coordinate on the other axis.
-        along_x: whether it runs along odom x.
-    """
+    """Return the parts of a line on the floor that are free of racks and props."""
     props = [box for prop in layout.props for box in prop.boxes_odom_m]
     occupied = []
     for x_min, y_min, x_max, y_max in (*(rack.box_odom_m for rack in layout.racks), *props):
@@ -410,10 +402,6 @@ def scenery(layout: WarehouseLayout, variant: int = 0) -> tuple[SceneryChunk, ..
 
     Chunks that usually hide others come first, so a renderer with a depth buffer shades fewer
     pixels twice.
-
-    Args:
-        layout: the hall.
-        variant: chooses goods, prints, tones and wall fixtures; a whole number ≥ 0.
 
     Raises:
         SimError: for a variant that is not a whole number ≥ 0.

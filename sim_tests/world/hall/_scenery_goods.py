@@ -50,15 +50,7 @@ def pallet_load(
     max_height_m: float,
     rng: np.random.Generator,
 ) -> Iterator[Mesh]:
-    """Yield the meshes of a pallet and its load.
-
-    Args:
-        load: the load.
-        foot_m: the middle of the pallet's underside.
-        size_m: extents of the pallet along x and y.
-        max_height_m: greatest height of pallet and goods together.
-        rng: draws heights and prints.
-    """
+    """Yield the meshes of a pallet and its load."""
     if load == "nothing":
         return
     x, y, z = foot_m

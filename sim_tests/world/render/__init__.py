@@ -13,16 +13,3 @@ from ._backend import (
 )
 from ._backend_gl import gl_works
 from ._visuals import VisualActor, Visuals
-
-__all__ = [
-    "RENDERERS",
-    "Drawing",
-    "RenderView",
-    "RendererName",
-    "VisualActor",
-    "Visuals",
-    "box_corners",
-    "gl_works",
-    "in_view",
-    "to_camera",
-]

@@ -4,11 +4,3 @@ from __future__ import annotations
 
 from ._scanner import DIAGONAL_SCANNERS, ScannerSpec, SimulatedScanner, scan_all
 from ._scene import ScanScene
-
-__all__ = [
-    "DIAGONAL_SCANNERS",
-    "ScanScene",
-    "ScannerSpec",
-    "SimulatedScanner",
-    "scan_all",
-]

@@ -4,12 +4,3 @@ from __future__ import annotations
 
 from ._sight_lines import Occluder, PlacedSurface, SightLines, cut_surfaces, scenery_surface
 from ._triangles import TriangleSet
-
-__all__ = [
-    "Occluder",
-    "PlacedSurface",
-    "SightLines",
-    "TriangleSet",
-    "cut_surfaces",
-    "scenery_surface",
-]

@@ -34,9 +34,6 @@ _TINY_M: Final = 1e-12
 class TriangleSet:
     """Triangles in P rigid pieces, divided into C clusters, prepared for lines of sight.
 
-    Args:
-        pieces: surface of each piece, in the piece's own frame.
-
     Attributes:
         pieces: P.
         clusters: C.
