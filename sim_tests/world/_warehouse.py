@@ -54,8 +54,6 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         variant: number of the scenery's variant (goods, colours, wear).
 
     Attributes:
-        layout: as given.
-        variant: as given.
         steps: number of physics steps since the start.
         client: PyBullet's id of this world; −1 once it is closed.
         obstacle_boxes_odom: (N, 4) x_min, y_min, x_max, y_max of racks, walls and props, metres.

@@ -128,8 +128,7 @@ class Person:
         self._detour = SlowRobotDetour()
         self._activity = Activity(spec.activity, spec.activity)
         self._trajectory = Trajectory(*route.start, self._obstacles)
-        self._tick = -1
-        self._now_s = 0.0
+        self._tick, self._now_s = -1, 0.0
         # Heading at the last tick, from the recorded one on a track, and its rate since.
         self._reverse_rad = math.pi if spec.backwards else 0.0
         self._standing_heading = (
@@ -238,18 +237,9 @@ class Person:
         twist = self._gaze.twist_rad(after_s)
         if self._track is not None and not self._gaze.turned:
             head, twist = (self._track.head_yaw_rad(t_s), 0.0, 0.0, 0.0), 0.0
-        head_yaw, head_pitch, eye_yaw, eye_pitch = head
+        place, velocity, feet = np.array([x, y]), np.array([vx, vy]), twisted(feet, twist)
         motion = PersonMotion(
-            position_odom_m=np.array([x, y]),
-            velocity_odom_mps=np.array([vx, vy]),
-            heading_odom_rad=heading + twist,
-            walked_m=self._walked_m,
-            feet=twisted(feet, twist),
-            head_yaw_rad=head_yaw,
-            head_pitch_rad=head_pitch,
-            eye_yaw_rad=eye_yaw,
-            eye_pitch_rad=eye_pitch,
-            activity=self._activity,
+            place, velocity, heading + twist, self._walked_m, feet, *head, activity=self._activity
         )
         away = self._track is not None and self._track.is_away(t_s)
         return motion.far_away() if away else motion
@@ -471,8 +461,7 @@ class Person:
         if self._track is None:
             ax, ay = self._obstacles.force(x, y)
             fx, fy = people_force(x, y, vx, vy, around.others)
-            share = self._habits.people_share
-            ax, ay = ax + share * fx, ay + share * fy
+            ax, ay = ax + self._habits.people_share * fx, ay + self._habits.people_share * fy
         if robot is not None:
             too_near = math.dist(robot.nearest_point_m(x, y), (x, y)) < _TOO_NEAR_M
             if too_near or not self._reactions.expects_robot_to_yield:

@@ -146,7 +146,6 @@ class RouteFollower:
     """Leads one person along a route with its stops.
 
     Attributes:
-        route: as given.
         started_s: time at which the person started; None before.
         arrived_s: time at which the end was reached; None before.
         along_m: length of the route covered so far.

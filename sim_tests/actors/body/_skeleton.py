@@ -59,9 +59,6 @@ class TwoBoneLimb:
         axis: (3,) unit vector of the hinge at rest.
 
     Attributes:
-        first_m: as given.
-        second_m: as given.
-        axis: as given.
         reach_m: largest distance from root to tip.
     """
 

@@ -59,7 +59,6 @@ class Robot(ABC):
     Attributes:
         body: PyBullet's id of the robot.
         bumps: number of contacts with racks, walls and props.
-        profile: as given.
         T_base_camera: (4, 4) pose of the optical frame in the base frame.
     """
 
@@ -342,7 +341,6 @@ class KinematicRobot(Robot):
         heading_odom_rad: heading at the start, counter-clockwise from odom x.
 
     Attributes:
-        model: as given.
 
     Raises:
         SimError: for a position or heading that is not finite.

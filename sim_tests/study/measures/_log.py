@@ -23,11 +23,8 @@ class Log:
     """The log of one episode; what several measures need of it is computed once.
 
     Attributes:
-        result: as given.
         trace: the true course as arrays.
         contacts: all contacts.
-        time_without_people_s: as given.
-        length_without_people_m: as given.
 
     Raises:
         SimError: a result without frames, or with frames that do not hold all people.

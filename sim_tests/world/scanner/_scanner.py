@@ -125,8 +125,6 @@ class SimulatedScanner:
         rng: draws noise and dropouts; every ray of every sweep draws the same number of values.
 
     Attributes:
-        scene: as given.
-        spec: as given.
         mounting: its place on the robot.
         hit_by: (N,) number of the actor that each ray of the last sweep met, −1 for the hall and
             for nothing; the truth, for tests and training.
