@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
@@ -28,7 +28,7 @@ from ._separations import Separations
 from ._stage import Stage, TrueView
 from .eyes import KeypointNoise
 from .faults import Fault
-from .planner import LocalPlanner, import_planner, seeded_generators
+from .planner import LocalPlanner, SeatedPlanner, import_planner, seeded_generators
 
 Observer = Callable[[CrossingFrame, Stage], None]
 
@@ -63,11 +63,16 @@ class Situation:
     at_goal: bool
 
     def frame(
-        self, command: tuple[float, float], plan_s: float = 0.0, lateral_mps: float = 0.0
+        self,
+        command: tuple[float, float],
+        plan_s: float = 0.0,
+        lateral_mps: float = 0.0,
+        late_s: float | None = None,
     ) -> CrossingFrame:
         """Return the control cycle with its command, and the time that planning it took.
 
-        The command is speed (m/s) and yaw rate (rad/s), ``lateral_mps`` its speed to the left.
+        The command is speed (m/s) and yaw rate (rad/s), ``lateral_mps`` its speed to the left, and
+        ``late_s`` that of a planner in real time.
         """
         observed = self.sensed.observed
         return CrossingFrame(
@@ -84,6 +89,7 @@ class Situation:
             self.sensed.scan_points_odom_m,
             plan_s,
             lateral_mps,
+            late_s,
         )
 
 
@@ -283,7 +289,10 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
     driver = setup.driver()
     frames: list[CrossingFrame] = []
     reached_s: float | None = None
-    with Crossing(setup) as crossing:
+    with Crossing(setup) as crossing, ExitStack() as seat:
+        clocked = driver if isinstance(driver, SeatedPlanner) else None
+        if clocked is not None:
+            seat.enter_context(clocked.seated(crossing.stage))
         while not crossing.time_is_up:
             now = crossing.sense()
             asked_s = process_time()
@@ -295,7 +304,8 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
                 driver, returned, now.t_s, sideways=crossing.robot.drive == "holonomic"
             )
             crossing.command(speed, yaw_rate, lateral)
-            frames.append(now.frame((speed, yaw_rate), plan_s, lateral))
+            late_s = None if clocked is None else clocked.late_s
+            frames.append(now.frame((speed, yaw_rate), plan_s, lateral, late_s))
             if observer is not None:
                 observer(frames[-1], crossing.stage)
             if now.at_goal:

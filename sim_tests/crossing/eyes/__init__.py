@@ -15,7 +15,7 @@ from ._messages import (
     WorkerObservations,
 )
 from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
-from ._scanner_eyes import ScannerEyes, scanner_sensors
+from ._scanner_eyes import ScannerEyes, hall_grid, motion_of, scanner_sensors
 
 __all__ = [
     "NOBODY",
@@ -36,8 +36,10 @@ __all__ = [
     "TimedEyes",
     "TrueEyes",
     "WorkerObservations",
+    "hall_grid",
     "make_eyes",
     "match_to_workers",
+    "motion_of",
     "pixel_timing",
     "scanner_sensors",
 ]

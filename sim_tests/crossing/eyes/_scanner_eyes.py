@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nav_adapter import RobotState
 from perception.arrays import FloatArray
@@ -94,7 +95,7 @@ class ScannerEyes:
         ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
         due = [(number, arrives_s) for number, is_due, arrives_s in ticks if is_due]
         if due:
-            motion, known_motion = _motion(T_odom_base, state), _motion(_pose_of(known), known)
+            motion, known_motion = motion_of(T_odom_base, state), motion_of(_pose_of(known), known)
             # The noise of a lost scan is drawn, so that a loss changes no other scan.
             scans = scan_all([self._scanners[number] for number, _ in due], motion)
             for (number, arrives_s), scan in zip(due, scans, strict=True):
@@ -181,13 +182,18 @@ def _pose_of(state: RobotState) -> FloatArray:
     return T
 
 
-def _motion(T_odom_base: FloatArray, state: RobotState) -> RobotMotion:
+def motion_of(T_odom_base: FloatArray, state: RobotState) -> RobotMotion:
     velocity = np.array([state.speed_mps, state.lateral_mps])
     return RobotMotion(state.stamp_s, T_odom_base, velocity, state.yaw_rate_radps)
 
 
 def map_of(warehouse: Warehouse) -> StaticMap:
     """Return the map of a robot that knows the boxes of its hall."""
+    return StaticMap(*hall_grid(warehouse))
+
+
+def hall_grid(warehouse: Warehouse) -> tuple[NDArray[np.bool_], FloatArray, float]:
+    """Return the cells (H, W) that boxes of the hall occupy, their corner (2,), and their side."""
     boxes = warehouse.obstacle_boxes_odom
     low = boxes[:, :2].min(axis=0) - 1.0
     columns, rows = (
@@ -198,4 +204,4 @@ def map_of(warehouse: Warehouse) -> StaticMap:
         first = np.floor((box[:2] - low) / _MAP_RESOLUTION_M).astype(int)
         last = np.ceil((box[2:] - low) / _MAP_RESOLUTION_M).astype(int)
         occupied[first[1] : last[1], first[0] : last[0]] = True
-    return StaticMap(occupied, low, _MAP_RESOLUTION_M)
+    return occupied, low, _MAP_RESOLUTION_M

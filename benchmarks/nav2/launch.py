@@ -1,0 +1,141 @@
+"""Starts a Nav2 for a crossing, brings it up, and ends with it; it runs in a ROS environment.
+
+``python -m benchmarks.nav2.launch RPP --face limit``, from the root of the checkout, where ``OVERLAY``
+is the folder with Nav2's programs (else ``/opt/ros/$ROS_DISTRO``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, Final
+
+from .parameters import CONTROLLERS, FACES, parameters
+
+#: Servers with their packages, in the order in which they are brought up.
+SERVERS: Final = {
+    "controller_server": "nav2_controller",
+    "planner_server": "nav2_planner",
+    "velocity_smoother": "nav2_velocity_smoother",
+    "collision_monitor": "nav2_collision_monitor",
+}
+_REMAPPINGS: Final = {
+    "controller_server": ["cmd_vel:=cmd_vel_nav"],
+    "velocity_smoother": ["cmd_vel:=cmd_vel_nav"],
+}
+_CONFIGURE_S: Final = 60.0
+# No limit, in a message of Nav2's.
+_NONE: Final = 0.0
+
+
+def start(controller: str, face: str, log: Path) -> list[subprocess.Popen[bytes]]:
+    """Start the servers, and return their processes."""
+    prefix = Path(os.environ.get("OVERLAY") or f"/opt/ros/{os.environ.get('ROS_DISTRO', 'jazzy')}")
+    settings = log.with_suffix(".yaml")
+    settings.write_text(json.dumps(parameters(controller, face)))  # JSON is YAML
+    environment = dict(os.environ)
+    if "OVERLAY" in os.environ:
+        # ROS from wheels leaves the symbols of Python to the program.
+        import sysconfig  # noqa: PLC0415
+
+        library = Path(sysconfig.get_config_var("LIBDIR")) / sysconfig.get_config_var("INSTSONAME")
+        found = next(iter(Path("/usr/lib").glob(f"*/{library.name}")), library)
+        environment["LD_PRELOAD"] = str(found)
+    output = log.open("wb")
+    started = []
+    for name, package in SERVERS.items():
+        remaps = [word for each in _REMAPPINGS.get(name, []) for word in ("-r", each)]
+        words = [str(prefix / "lib" / package / name), "--ros-args", "--params-file", str(settings)]
+        started.append(
+            subprocess.Popen(
+                [*words, *remaps], env=environment, stdout=output, stderr=subprocess.STDOUT
+            )
+        )
+    return started
+
+
+def bring_up(node: Any, processes: list[subprocess.Popen[bytes]]) -> None:
+    """Configure all servers, then activate them; costmaps wait for the robot's transforms."""
+    import rclpy  # noqa: PLC0415
+    from lifecycle_msgs.msg import Transition  # noqa: PLC0415
+    from lifecycle_msgs.srv import ChangeState  # noqa: PLC0415
+
+    for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        for name in SERVERS:
+            client = node.create_client(ChangeState, f"/{name}/change_state")
+            while not client.wait_for_service(timeout_sec=0.5):
+                _refuse_dead(processes)
+            future = client.call_async(ChangeState.Request(transition=Transition(id=transition)))
+            while not future.done():
+                rclpy.spin_once(node, timeout_sec=0.2)
+                _refuse_dead(processes)
+            if not future.result().success:
+                raise SystemExit(f"{name} refuses transition {transition}; see its log")
+
+
+def _refuse_dead(processes: list[subprocess.Popen[bytes]]) -> None:
+    for name, process in zip(SERVERS, processes, strict=True):
+        if process.poll() is not None:
+            raise SystemExit(f"{name} has ended with status {process.returncode}; see its log")
+
+
+def keep_lower(node: Any) -> None:
+    """Publish the lower of the limits of the bridge and of the speed filter, as docs/nav2.md says."""
+    from nav2_msgs.msg import SpeedLimit  # noqa: PLC0415
+
+    limits: dict[str, float] = {}
+    out = node.create_publisher(SpeedLimit, "lower_speed_limit", 10)
+
+    def take(topic: str, message: Any) -> None:
+        value = message.speed_limit
+        limits[topic] = value * 1.5 / 100.0 if message.percentage and value else value
+        known = [each for each in limits.values() if each != _NONE]
+        out.publish(SpeedLimit(speed_limit=min(known, default=_NONE)))
+
+    for topic in ("speed_limit", "mask_speed_limit"):
+        node.create_subscription(SpeedLimit, topic, lambda m, t=topic: take(t, m), 10)
+
+
+def main() -> int:
+    """Run until it is ended."""
+    import rclpy  # noqa: PLC0415
+
+    parser = argparse.ArgumentParser(prog="benchmarks.nav2.launch", description=__doc__)
+    parser.add_argument("controller", choices=CONTROLLERS)
+    parser.add_argument("--face", choices=FACES, default="limit")
+    parser.add_argument("--log", type=Path, default=Path(tempfile.gettempdir()) / "nav2.log")
+    options = parser.parse_args()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    processes = start(options.controller, options.face, options.log)
+    try:
+        rclpy.init()
+        node = rclpy.create_node("nav2_launch")
+        if options.face == "mask":
+            keep_lower(node)
+        bring_up(node, processes)
+        print(f"{options.controller} with {options.face} is active", flush=True)
+        while True:
+            rclpy.spin_once(node, timeout_sec=0.2)
+            _refuse_dead(processes)
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        for each in processes:
+            each.terminate()
+        ends = time.monotonic() + 5.0
+        for each in processes:
+            try:
+                each.wait(max(ends - time.monotonic(), 0.1))
+            except subprocess.TimeoutExpired:
+                each.kill()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,7 @@
+"""A crossing as a ROS 2 robot: the planner is a stack outside, over DDS."""
+
+from __future__ import annotations
+
+from ._planner import Ros2Planner
+
+__all__ = ["Ros2Planner"]
