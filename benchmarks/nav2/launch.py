@@ -26,17 +26,20 @@ SERVERS: Final = {
     "velocity_smoother": "nav2_velocity_smoother",
     "collision_monitor": "nav2_collision_monitor",
 }
-_REMAPPINGS: Final = {
-    "controller_server": ["cmd_vel:=cmd_vel_nav"],
-    "velocity_smoother": ["cmd_vel:=cmd_vel_nav"],
-}
-_CONFIGURE_S: Final = 60.0
+#: Those that plan; the others filter the commands.
+BARE: Final = ("controller_server", "planner_server")
+# As in nav2_bringup.
+_REMAPPED: Final = ("controller_server", "velocity_smoother")
+_REMAPPING: Final = ("-r", "cmd_vel:=cmd_vel_nav")
 # No limit, in a message of Nav2's.
 _NONE: Final = 0.0
 
 
-def start(controller: str, face: str, log: Path) -> list[subprocess.Popen[bytes]]:
-    """Start the servers, and return their processes."""
+Processes = dict[str, "subprocess.Popen[bytes]"]
+
+
+def start(controller: str, face: str, log: Path, *, bare: bool) -> Processes:
+    """Start the servers, and return their processes by name."""
     prefix = Path(os.environ.get("OVERLAY") or f"/opt/ros/{os.environ.get('ROS_DISTRO', 'jazzy')}")
     settings = log.with_suffix(".yaml")
     settings.write_text(json.dumps(parameters(controller, face)))  # JSON is YAML
@@ -49,26 +52,25 @@ def start(controller: str, face: str, log: Path) -> list[subprocess.Popen[bytes]
         found = next(iter(Path("/usr/lib").glob(f"*/{library.name}")), library)
         environment["LD_PRELOAD"] = str(found)
     output = log.open("wb")
-    started = []
-    for name, package in SERVERS.items():
-        remaps = [word for each in _REMAPPINGS.get(name, []) for word in ("-r", each)]
-        words = [str(prefix / "lib" / package / name), "--ros-args", "--params-file", str(settings)]
-        started.append(
-            subprocess.Popen(
-                [*words, *remaps], env=environment, stdout=output, stderr=subprocess.STDOUT
-            )
+    started = {}
+    for name in BARE if bare else SERVERS:
+        program = prefix / "lib" / SERVERS[name] / name
+        words = [str(program), "--ros-args", "--params-file", str(settings)]
+        words += () if bare or name not in _REMAPPED else _REMAPPING
+        started[name] = subprocess.Popen(
+            words, env=environment, stdout=output, stderr=subprocess.STDOUT
         )
     return started
 
 
-def bring_up(node: Any, processes: list[subprocess.Popen[bytes]]) -> None:
+def bring_up(node: Any, processes: Processes) -> None:
     """Configure all servers, then activate them; costmaps wait for the robot's transforms."""
     import rclpy  # noqa: PLC0415
     from lifecycle_msgs.msg import Transition  # noqa: PLC0415
     from lifecycle_msgs.srv import ChangeState  # noqa: PLC0415
 
     for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
-        for name in SERVERS:
+        for name in processes:
             client = node.create_client(ChangeState, f"/{name}/change_state")
             while not client.wait_for_service(timeout_sec=0.5):
                 _refuse_dead(processes)
@@ -80,8 +82,8 @@ def bring_up(node: Any, processes: list[subprocess.Popen[bytes]]) -> None:
                 raise SystemExit(f"{name} refuses transition {transition}; see its log")
 
 
-def _refuse_dead(processes: list[subprocess.Popen[bytes]]) -> None:
-    for name, process in zip(SERVERS, processes, strict=True):
+def _refuse_dead(processes: Processes) -> None:
+    for name, process in processes.items():
         if process.poll() is not None:
             raise SystemExit(f"{name} has ended with status {process.returncode}; see its log")
 
@@ -110,10 +112,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="benchmarks.nav2.launch", description=__doc__)
     parser.add_argument("controller", choices=CONTROLLERS)
     parser.add_argument("--face", choices=FACES, default="limit")
+    parser.add_argument(
+        "--bare", action="store_true", help="no velocity smoother and no collision monitor"
+    )
     parser.add_argument("--log", type=Path, default=Path(tempfile.gettempdir()) / "nav2.log")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    processes = start(options.controller, options.face, options.log)
+    processes = start(options.controller, options.face, options.log, bare=options.bare)
     try:
         rclpy.init()
         node = rclpy.create_node("nav2_launch")
@@ -127,10 +132,10 @@ def main() -> int:
     except KeyboardInterrupt:
         return 0
     finally:
-        for each in processes:
+        for each in processes.values():
             each.terminate()
         ends = time.monotonic() + 5.0
-        for each in processes:
+        for each in processes.values():
             try:
                 each.wait(max(ends - time.monotonic(), 0.1))
             except subprocess.TimeoutExpired:

@@ -8,15 +8,15 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from nav_adapter import NavConstraints, NavError, RobotProfile, RobotState
+from nav_adapter import NavConstraints, RobotProfile, RobotState
 from nav_adapter.ros2 import MASK_TOPICS, Frames, SpeedMaskSettings, SpeedMaskStream, outgoing
+from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.geometry_msgs import Twist
 from nav_adapter.ros2.messages.rosgraph_msgs import Clock
-from nav_adapter.ros2.conversions import to_time
 from perception.arrays import FloatArray, finite_number
 
 from ....world.camera import FrameClock
@@ -27,7 +27,6 @@ from ...eyes import hall_grid, motion_of
 from ._actions import Actions, actions_of, python_with_ros
 from ._link import Link, link_to
 from ._messages import (
-    MAP,
     ODOM,
     base_transform,
     goal_pose,
@@ -183,10 +182,10 @@ class Ros2Planner:
         self.late_s = late_s
         self._began += max(late_s - _MADE_UP_S, 0.0)
         self._take(t_s)
-        self._publish_robot(robot_state, self._start_s)
         if not self._alone and t_s + 1e-6 >= self._next_publication_s:
             self._next_publication_s += 1.0 / _PUBLISHED_HZ
             self._publish_constraints(constraints, robot_state)
+        self._publish_robot(robot_state, self._start_s)
         Ros2Planner._latest_s = self._start_s + t_s
         self._await_command(t_s, dt_s)
         if not self._driven and t_s > _FIRST_COMMAND_S:
@@ -317,9 +316,7 @@ class Ros2Planner:
             """Publish the state that the robot knows; its stamp counts from ``start_s``."""
             now_s = start_s + known.stamp_s
             stamped = replace(known, stamp_s=now_s)
-            link.publish("clock", Clock(to_time(now_s)))
             link.publish("tf", base_transform(stamped))
-            link.publish("odom", odometry(stamped))
             due = [n for n, clock in enumerate(clocks) if clock.tick(now_s)[1] is not None]
             true = stage.amr.state(known.stamp_s)
             motion = motion_of(stage.amr.T_odom_base, true)
@@ -327,5 +324,8 @@ class Ros2Planner:
                 period_s = 1.0 / (specs[number].timing.rate_hz or stage.scenario.control_hz)
                 message = scan_message(scan, start_s, self._scans[number], period_s)
                 link.publish(f"scan {number}", message)
+            link.publish("odom", odometry(stamped))
+            # Last: what begins with the time finds the rest of it.
+            link.publish("clock", Clock(to_time(now_s)))
 
         return publish
