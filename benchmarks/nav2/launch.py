@@ -1,7 +1,7 @@
 """Starts a Nav2 for a crossing, brings it up, and ends with it; it runs in a ROS environment.
 
-``python -m benchmarks.nav2.launch RPP --face limit``, from the root of the checkout, where ``OVERLAY``
-is the folder with Nav2's programs (else ``/opt/ros/$ROS_DISTRO``).
+``python -m benchmarks.nav2.launch RPP --face limit``, from the root of the checkout. ``OVERLAY`` is
+the folder with Nav2's programs; without it they are those of ``/opt/ros/$ROS_DISTRO``.
 """
 
 from __future__ import annotations
@@ -64,12 +64,21 @@ def start(controller: str, face: str, log: Path, *, bare: bool) -> Processes:
 
 
 def bring_up(node: Any, processes: Processes) -> None:
-    """Configure all servers, then activate them; costmaps wait for the robot's transforms."""
+    """Configure all servers; activate them once there is a robot.
+
+    Costmaps wait for its transforms for a time by its clock, which begins far from 0.
+    """
     import rclpy  # noqa: PLC0415
     from lifecycle_msgs.msg import Transition  # noqa: PLC0415
     from lifecycle_msgs.srv import ChangeState  # noqa: PLC0415
+    from rosgraph_msgs.msg import Clock  # noqa: PLC0415
 
+    ticks: list[Any] = []
+    clock = node.create_subscription(Clock, "/clock", ticks.append, 1)
     for transition in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
+        while transition == Transition.TRANSITION_ACTIVATE and not ticks:
+            rclpy.spin_once(node, timeout_sec=0.2)
+            _refuse_dead(processes)
         for name in processes:
             client = node.create_client(ChangeState, f"/{name}/change_state")
             while not client.wait_for_service(timeout_sec=0.5):
@@ -80,6 +89,7 @@ def bring_up(node: Any, processes: Processes) -> None:
                 _refuse_dead(processes)
             if not future.result().success:
                 raise SystemExit(f"{name} refuses transition {transition}; see its log")
+    node.destroy_subscription(clock)
 
 
 def _refuse_dead(processes: Processes) -> None:
@@ -89,7 +99,7 @@ def _refuse_dead(processes: Processes) -> None:
 
 
 def keep_lower(node: Any) -> None:
-    """Publish the lower of the limits of the bridge and of the speed filter, as docs/nav2.md says."""
+    """Publish the lower of the limits of the bridge and of the speed filter."""
     from nav2_msgs.msg import SpeedLimit  # noqa: PLC0415
 
     limits: dict[str, float] = {}

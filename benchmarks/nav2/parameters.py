@@ -1,4 +1,4 @@
-"""Nav2's parameters for the robot of the crossings: its own defaults (nav2_bringup, Jazzy), changed.
+"""Nav2's parameters for the robot of the crossings: the defaults of nav2_bringup (Jazzy), changed.
 
 Every change is written here with its reason. The robot is 0.72 × 0.50 m, drives 1.5 m/s and brakes
 at 1 m/s²; the defaults are for one of 0.22 m radius at 0.5 m/s.
@@ -196,8 +196,8 @@ def parameters(controller: str, face: str) -> dict[str, Any]:
                 # The planner plans once a second.
                 update_frequency=4.0,
                 publish_frequency=1.0,
-                # Over the half of an aisle: paths keep away from people as far as there is room. With
-                # the default (0.7, 3.0) they pass somebody at a shelf at 0.8 m.
+                # Half an aisle: paths keep away from people as far as there is room. With the
+                # default (0.7, 3.0) they pass somebody at a shelf at 0.8 m.
                 inflation=(1.2, 2.0),
             )
         },

@@ -79,7 +79,7 @@ class Peer:
                 self.limits_mps.append(limit.speed_limit)
                 self._limit_mps = min(limit.speed_limit, 1.2)
             for name, kept in self.heard.items():
-                kept += self._node.take(TAPPED[name])
+                kept.extend(self._node.take(TAPPED[name]))
             for odom in self._node.take(ODOM):
                 if self._goal is not None:
                     self._drive(odom)
@@ -97,6 +97,5 @@ class Peer:
         speed = min(self._limit_mps if self._obeys else 1.2, max(left_m - 0.1, 0.0))
         turn = math.remainder(math.atan2(dy, dx) - yaw, math.tau) if left_m > 0.3 else 0.0
         twist = Twist(Vector3(x=speed), Vector3(z=max(-0.5, min(0.5, turn))))
-        self._node.publish(
-            self._command, twist if self._kind is Twist else TwistStamped(odom.header, twist)
-        )
+        message = twist if self._kind is Twist else TwistStamped(odom.header, twist)
+        self._node.publish(self._command, message)

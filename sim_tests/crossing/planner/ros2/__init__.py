@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._actions import python_with_ros
 from ._planner import Ros2Planner
 
-__all__ = ["Ros2Planner"]
+__all__ = ["Ros2Planner", "python_with_ros"]

@@ -1,8 +1,8 @@
 """The client of Nav2's actions: a process of its own with rclpy, which this process need not have.
 
-It is run by its path, and imports nothing of the project. Lines of JSON come in, ``{"do": "begin"}``,
-``{"do": "go", "x": …, "y": …, "yaw": …, "path": [[x, y], …]}`` and ``{"do": "stop"}``; lines
-``{"ready": true}`` or ``{"missing": "…"}`` go out.
+It is run by its path, and imports nothing of the project. Lines of JSON come in: ``{"do":
+"begin"}``, ``{"do": "go", "x": …, "y": …, "yaw": …, "path": [[x, y], …]}`` and ``{"do": "stop"}``.
+Lines ``{"ready": true}`` or ``{"missing": "…"}`` go out.
 """
 
 import json

@@ -63,8 +63,8 @@ class Ros2Planner:
     """A ROS 2 stack outside, which sees the crossing as its robot and sends ``cmd_vel``.
 
     Published are ``/clock``, ``/odom``, ``/tf``, ``/tf_static``, ``/map``, the scans of the
-    scenario's scanners, the goal, and what the bridge publishes of the constraints. A command counts
-    from the beginning of a control cycle if it comes in the first half of it.
+    scenario's scanners, the goal, and what the bridge publishes of the constraints. A command
+    counts from the beginning of a control cycle if it comes in the first half of it.
 
     Args:
         robot: the robot of the episode.
@@ -127,6 +127,7 @@ class Ros2Planner:
         self._publish_robot: Callable[[RobotState, float], None] | None = None
         self._command, self._command_s = _STILL, -math.inf
         self._driven = False
+        self._actions: Actions | None = None
 
     @contextlib.contextmanager
     def seated(self, stage: Stage) -> Iterator[None]:
@@ -148,7 +149,6 @@ class Ros2Planner:
             SpeedMaskSettings(topic=f"/{MASK_TOPICS['speed_mask'].name}"), ODOM
         )
         self._next_publication_s = 0.0
-        self._actions: Actions | None = None
         try:
             self._wait(stage, link)
             self._send_goal(link)
