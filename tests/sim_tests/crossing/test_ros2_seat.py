@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import random
+import sys
 import time
 
 import numpy as np
@@ -12,6 +14,7 @@ import pytest
 pytest.importorskip("pybullet", reason="the crossings need the extra sim")
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
 
+from paths import ROOT
 from ros2_peer import Peer
 
 from awarenav.errors import AwarenavError
@@ -218,3 +221,17 @@ def test_known_planners_take_settings_too() -> None:
     planner = make_planner("ros2(pace=2)", WATCHED)
     with pytest.raises(SimError, match="drives in crossings only"):
         planner.plan(None, None, None, 0.05)
+
+
+def test_the_client_of_actions_needs_nothing_of_the_project() -> None:
+    """It runs in the Python of ROS, where the project need not be installed."""
+    client = ROOT / "sim_tests" / "crossing" / "planner" / "ros2" / "_client.py"
+    imported: set[str] = set()
+    for node in ast.walk(ast.parse(client.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            imported |= {each.name.partition(".")[0] for each in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            imported.add(str(node.module).partition(".")[0])
+    assert {"rclpy", "nav2_msgs"} <= imported
+    assert imported <= {*sys.stdlib_module_names, "rclpy", "geometry_msgs", "nav_msgs", "nav2_msgs"}

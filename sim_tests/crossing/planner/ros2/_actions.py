@@ -63,7 +63,12 @@ class Actions:
         """
         if self.has_ended:
             raise SimError(f"the client of Nav2's actions has ended: {' '.join(self._errors)}")
-        return "" if self._said.get("ready") else self._said.get("missing", "rclpy has not begun")
+        return str(self._said.get("missing", "the client of its actions has not begun"))
+
+    @property
+    def refused(self) -> str:
+        """The action whose server refused a goal last, since :meth:`begin`; empty for none."""
+        return str(self._said.get("refused", ""))
 
     @property
     def has_ended(self) -> bool:
@@ -103,7 +108,7 @@ class Actions:
         assert self._process.stdout is not None
         for line in self._process.stdout:
             with contextlib.suppress(json.JSONDecodeError):
-                self._said = json.loads(line)
+                self._said |= json.loads(line)
 
     def _read_errors(self) -> None:
         assert self._process.stderr is not None

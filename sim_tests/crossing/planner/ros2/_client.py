@@ -2,7 +2,7 @@
 
 It is run by its path, and imports nothing of the project. Lines of JSON come in: ``{"do":
 "begin"}``, ``{"do": "go", "x": …, "y": …, "yaw": …, "path": [[x, y], …]}`` and ``{"do": "stop"}``.
-Lines ``{"ready": true}`` or ``{"missing": "…"}`` go out.
+Lines ``{"missing": "…"}``, empty once nothing is, and ``{"refused": "…"}`` go out.
 """
 
 import json
@@ -89,6 +89,7 @@ class Client(Node):
         handle = future.result()
         if not handle.accepted:
             self.planning = False
+            say(refused="compute_path_to_pose")
             return
         handle.get_result_async().add_done_callback(self.found)
 
@@ -117,6 +118,7 @@ class Client(Node):
         handle = future.result()
         if not handle.accepted:
             self.asked = False
+            say(refused=self.drive._action_name)
             return
         self.sent_goal = handle
         handle.get_result_async().add_done_callback(lambda _: self.ended(handle))
@@ -142,6 +144,11 @@ class Client(Node):
         return made
 
 
+def say(**line: Any) -> None:
+    """Tell the seat something."""
+    print(json.dumps(line), flush=True)
+
+
 def main() -> None:
     """Serve until the input ends."""
     rclpy.init()
@@ -154,7 +161,8 @@ def main() -> None:
         lines.put(None)
 
     threading.Thread(target=read, daemon=True).start()
-    said, waits = "", False
+    said: str | None = None
+    waits = False
     while True:
         rclpy.spin_once(client, timeout_sec=0.02)
         while not lines.empty():
@@ -166,17 +174,16 @@ def main() -> None:
             asked = json.loads(line)
             if asked["do"] == "begin":
                 client.begin()
-                said, waits = "", True
+                said, waits = None, True
             elif asked["do"] == "go":
                 client.go(asked)
             else:
                 client.stop()
         if waits:
             missing = client.missing()
-            text = json.dumps({"missing": missing} if missing else {"ready": True})
-            if text != said:
-                print(text, flush=True)
-                said = text
+            if missing != said:
+                say(missing=missing)
+                said = missing
             waits = bool(missing)
 
 

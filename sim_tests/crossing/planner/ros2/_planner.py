@@ -189,10 +189,12 @@ class Ros2Planner:
         Ros2Planner._latest_s = self._start_s + t_s
         self._await_command(t_s, dt_s)
         if not self._driven and t_s > _FIRST_COMMAND_S:
+            refused = self._actions.refused if self._actions is not None else ""
             raise SimError(
-                f"the stack has sent no cmd_vel in {t_s:.0f} s after its goal: are its lifecycle "
-                "nodes active (ros2 lifecycle get /controller_server), and does it read /clock "
-                "(use_sim_time) and the frames map, odom and base_link?"
+                f"the stack has sent no cmd_vel in {t_s:.0f} s after its goal"
+                f"{f', which {refused} has refused' if refused else ''}: are its lifecycle nodes "
+                "active (ros2 lifecycle get /controller_server), and does it find the frames map, "
+                "odom and base_link?"
             )
         if t_s - self._command_s > _SILENT_S:
             return 0.0, 0.0
