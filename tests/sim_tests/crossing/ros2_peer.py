@@ -19,6 +19,8 @@ TAPPED = {
     "map": READ["map"],
     "scan": READ["scan"],
     "scan_2": READ["scan_2"],
+    "image": READ["image"],
+    "camera_info": READ["camera_info"],
 }
 
 

@@ -18,6 +18,8 @@ from paths import ROOT
 from ros2_peer import Peer
 
 from awarenav.errors import AwarenavError
+from nav_adapter.ros2 import camera_of, picture_of
+from nav_adapter.ros2.conversions import pose_matrix
 from nav_adapter.ros2.messages.geometry_msgs import Twist, TwistStamped
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing.planner import is_outside, make_planner, planner_label
@@ -114,6 +116,23 @@ def test_the_robot_publishes_what_a_stack_needs(domain) -> None:
     y = np.array(first.ranges) * np.sin(angles)
     assert (np.hypot(x - 4.5, y - 2.4) < 0.4).any()
     assert len(heard["scan_2"]) == len(heard["scan"]) > 20
+
+
+def test_the_camera_of_the_robot_shows_what_is_ahead(domain) -> None:
+    with Peer(domain, tap=True) as peer:
+        cross(domain, f"{LOCKSTEP}, camera_hz=2")
+    spec = WATCHED.camera
+    camera = camera_of(peer.heard["camera_info"][0])
+    assert (camera.width_px, camera.height_px) == (spec.width_px, spec.height_px)
+    assert camera.fx_px == pytest.approx(spec.camera().fx_px)
+    picture = picture_of(peer.heard["image"][-1])
+    assert picture.shape == (spec.height_px, spec.width_px, 3)
+    assert picture.std() > 10.0
+    transforms = [each for message in peer.heard["tf_static"] for each in message.transforms]
+    (mount,) = (each for each in transforms if each.child_frame_id == "camera_optical_frame")
+    # An optical frame: its z axis points ahead.
+    turn = pose_matrix((0.0, 0.0, 0.0), mount.transform.rotation)
+    assert turn[0, 2] > 0.9
 
 
 def test_the_robot_stops_when_commands_fall_silent(domain) -> None:

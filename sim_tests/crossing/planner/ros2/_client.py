@@ -25,7 +25,7 @@ from rclpy.parameter import Parameter
 REPLAN_S = 1.0
 
 
-class Client(Node):
+class Client(Node):  # type: ignore[misc]
     """Sends goals: to ``navigate_to_pose``, or paths to ``follow_path``.
 
     Paths are those of the planner server, a new one every second; straight ones without it.

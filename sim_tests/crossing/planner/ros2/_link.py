@@ -18,7 +18,7 @@ _COMMANDS: Final = (Topic("cmd_vel", Twist), Topic("cmd_vel", TwistStamped))
 _ROBOT: Final = {
     name: Topic(READ[name].name, READ[name].message, depth=10) for name in ("odom", "tf")
 }
-_LATCHED: Final = {name: READ[name] for name in ("map", "tf_static")}
+_AS_READ: Final = {name: READ[name] for name in ("map", "tf_static", "image", "camera_info")}
 
 
 class Link:
@@ -34,7 +34,7 @@ class Link:
 
     def __init__(self, domain: int, scans: Sequence[str]) -> None:
         self.domain = domain
-        own = {"clock": _CLOCK, "goal_pose": _GOAL, **_ROBOT, **_LATCHED}
+        own = {"clock": _CLOCK, "goal_pose": _GOAL, **_ROBOT, **_AS_READ}
         laser = Topic("scan", READ["scan"].message, depth=5)
         own |= {f"scan {number}": renamed(laser, name) for number, name in enumerate(scans)}
         self._topics: dict[str, Topic] = {**own, **PUBLISHED, **MASK_TOPICS}

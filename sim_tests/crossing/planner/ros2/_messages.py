@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -25,15 +24,16 @@ from nav_adapter.ros2.messages.geometry_msgs import (
     Vector3,
 )
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid, Odometry
-from nav_adapter.ros2.messages.sensor_msgs import LaserScan
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
-from perception import laser
-from perception.arrays import FloatArray
+from perception import Camera, laser
+from perception.arrays import FloatArray, ImageRgb
 
 #: Frames by their usual names (REP-105).
 MAP: Final = "map"
 ODOM: Final = "odom"
 BASE: Final = "base_link"
+CAMERA: Final = "camera_optical_frame"
 
 
 def odometry(state: RobotState) -> Odometry:
@@ -112,13 +112,23 @@ def map_message(
     return OccupancyGrid(header(stamp_s, MAP), about, cells)
 
 
+def picture_messages(
+    stamp_s: float, frame_id: str, camera: Camera, rgb: ImageRgb
+) -> tuple[Image, CameraInfo]:
+    """Return an image (H, W, 3) and the calibration of its camera, which has no distortion."""
+    top = header(stamp_s, frame_id)
+    height, width = camera.height_px, camera.width_px
+    image = Image(top, height, width, "rgb8", 0, 3 * width, np.ascontiguousarray(rgb).tobytes())
+    k = camera.matrix
+    eye = tuple(np.eye(3).ravel().tolist())
+    p = tuple(np.column_stack([k, np.zeros(3)]).ravel().tolist())
+    about = CameraInfo(
+        *(top, height, width, "plumb_bob", (0.0,) * 5, tuple(k.ravel().tolist()), eye, p)
+    )
+    return image, about
+
+
 def goal_pose(stamp_s: float, goal_m: Sequence[float], yaw_rad: float) -> PoseStamped:
     """Return a goal in the map."""
     x, y = goal_m
     return PoseStamped(header(stamp_s, MAP), Pose(Point(x, y, 0.0), yaw_quaternion(yaw_rad)))
-
-
-def heading_of(way_m: FloatArray) -> float:
-    """Return the heading of the way from one point to another, rows of (2, 2)."""
-    dx, dy = (way_m[1] - way_m[0]).tolist()
-    return math.atan2(dy, dx)

@@ -19,7 +19,7 @@ from nav_adapter.ros2.messages.geometry_msgs import Twist
 from nav_adapter.ros2.messages.rosgraph_msgs import Clock
 from perception.arrays import FloatArray, finite_number
 
-from ....world.camera import FrameClock
+from ....world.camera import CameraTiming, CoarseSceneryRenderer, FrameClock
 from ....world.errors import SimError
 from ....world.scanner import ScanScene, SimulatedScanner, scan_all
 from ..._stage import Stage
@@ -27,12 +27,13 @@ from ...eyes import hall_grid, motion_of
 from ._actions import Actions, actions_of, python_with_ros
 from ._link import Link, link_to
 from ._messages import (
+    CAMERA,
     ODOM,
     base_transform,
     goal_pose,
-    heading_of,
     map_message,
     odometry,
+    picture_messages,
     scan_message,
     static_transforms,
 )
@@ -79,6 +80,7 @@ class Ros2Planner:
         command_hz: rate at which the stack sends commands, in simulated time: the clock then waits
             for each of them (lockstep), but goes no faster than the pace; 0 does not wait.
         scans: names of the topics of scans, in the order of the scanners.
+        camera_hz: images of the camera per simulated second, on ``camera/image_raw``; 0 for none.
         wait_s: time to wait for the stack.
 
     Attributes:
@@ -105,6 +107,7 @@ class Ros2Planner:
         pace: float = 1.0,
         command_hz: float = 0.0,
         scans: str = "scan scan_2",
+        camera_hz: float = 0.0,
         wait_s: float = 30.0,
     ) -> None:
         from nav_adapter.ros2 import DdsNode  # noqa: F401, PLC0415 - says what is missing
@@ -122,6 +125,7 @@ class Ros2Planner:
         self._pace = finite_number("pace", pace, SimError, minimum=0.05, maximum=100.0)
         self._command_hz = finite_number("command_hz", command_hz, SimError, minimum=0.0)
         self._scans = tuple(str(scans).split())
+        self._camera_hz = finite_number("camera_hz", camera_hz, SimError, minimum=0.0)
         self._wait_s = finite_number("wait_s", wait_s, SimError, minimum=1.0)
         self.late_s = self._given_up_s = 0.0
         self._publish_robot: Callable[[RobotState, float], None] | None = None
@@ -285,8 +289,8 @@ class Ros2Planner:
         return self._actions.missing()
 
     def _send_goal(self, link: Link) -> None:
-        yaw = heading_of(self._way_m[[0, -1]])
-        x, y = self._way_m[-1].tolist()
+        (x0, y0), (x, y) = self._way_m[[0, -1]].tolist()
+        yaw = math.atan2(y - y0, x - x0)
         if self._actions is not None:
             self._actions.go(x=x, y=y, yaw=yaw, path=self._way_m.tolist())
         else:
@@ -310,6 +314,12 @@ class Ros2Planner:
             name: each.mounting.T_base_scanner
             for name, each in zip(self._scans, scanners, strict=False)
         }
+        spec = stage.scenario.camera
+        camera, renderer = spec.camera(spec.picture_scale), None
+        if self._camera_hz:
+            renderer = CoarseSceneryRenderer(stage.warehouse, spec.scenery_divisor)
+            mounts[CAMERA] = np.linalg.inv(stage.amr.T_odom_base) @ stage.amr.T_odom_camera
+        images = FrameClock(CameraTiming(rate_hz=self._camera_hz or None), np.random.default_rng(0))
         stamp_s = self._stamp()
         link.publish("map", map_message(stamp_s, *hall_grid(stage.warehouse)))
         link.publish("tf_static", static_transforms(stamp_s, mounts))
@@ -326,6 +336,11 @@ class Ros2Planner:
                 period_s = 1.0 / (specs[number].timing.rate_hz or stage.scenario.control_hz)
                 message = scan_message(scan, start_s, self._scans[number], period_s)
                 link.publish(f"scan {number}", message)
+            if renderer is not None and images.tick(now_s)[0]:
+                rgb = renderer.render(camera, stage.amr.T_odom_camera).rgb
+                image, about = picture_messages(now_s, CAMERA, camera, rgb)
+                link.publish("image", image)
+                link.publish("camera_info", about)
             link.publish("odom", odometry(stamped))
             # Last: what begins with the time finds the rest of it.
             link.publish("clock", Clock(to_time(now_s)))
