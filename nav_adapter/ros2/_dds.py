@@ -108,7 +108,8 @@ class DdsNode:
         """Return the messages since the last call as CDR bytes."""
         declared, reader = self._readers[topic.name]
         kind = topic_type(declared.message)
-        return [each.cdr for each in reader.take(N=topic.depth) if isinstance(each, kind)]
+        # One more than the messages: the news that the last publisher has left.
+        return [each.cdr for each in reader.take(N=topic.depth + 1) if isinstance(each, kind)]
 
     def wait(self, timeout_s: float) -> bool:
         """Wait for a message on a topic that wakes; return False if none came in time."""
@@ -186,6 +187,9 @@ def topic_type(kind: type[Message]) -> Any:
     made.cdr = b""
     made.serialize = serialize
     made.deserialize = classmethod(deserialize)
+    # When the last publisher leaves, DDS delivers a sample that is no message. Cyclone wraps it and
+    # would first make a message of its keys, of which ROS has none.
+    made.deserialize_key = classmethod(lambda cls, data: None)
     return made
 
 
