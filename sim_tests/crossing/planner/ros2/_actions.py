@@ -129,13 +129,15 @@ def actions_of(domain: int, kind: str) -> Actions:
 
 @lru_cache(maxsize=1)
 def python_with_ros() -> str:
-    """Return a Python that has rclpy and nav2_msgs: this one, that on the path, the system's.
+    """Return a Python that has rclpy and nav2_msgs: this one, one on the path, or the system's.
 
     Raises:
         SimError: none has.
     """
-    for python in (sys.executable, shutil.which("python3"), "/usr/bin/python3"):
-        if python and Path(python).exists():
+    folders = [*os.environ.get("PATH", "").split(os.pathsep), "/usr/bin"]
+    found = (shutil.which("python3", path=folder) for folder in folders)
+    for python in dict.fromkeys([sys.executable, *found]):
+        if python:
             probe = subprocess.run(
                 [python, "-c", _PROBE], capture_output=True, timeout=_PROBE_S, check=False
             )

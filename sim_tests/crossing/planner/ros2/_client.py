@@ -62,13 +62,10 @@ class Client(Node):  # type: ignore[misc]
 
     def go(self, wanted: dict[str, Any]) -> None:
         """Send a goal."""
-        self.wanted = wanted
+        self.wanted, self.asked = wanted, False
+        self.replan()
         if not self.follows:
             self.send(NavigateToPose.Goal(pose=self.pose(wanted["x"], wanted["y"], wanted["yaw"])))
-        elif not self.plan.server_is_ready():
-            self.send_straight()
-        else:
-            self.replan()
 
     def replan(self) -> None:
         """Ask for a new path, or send the straight one again after it was given up."""
@@ -101,7 +98,6 @@ class Client(Node):  # type: ignore[misc]
             self.send(FollowPath.Goal(path=path))
 
     def send_straight(self) -> None:
-        """Send the straight path."""
         path = Path()
         path.header.frame_id = "map"
         path.header.stamp = self.get_clock().now().to_msg()

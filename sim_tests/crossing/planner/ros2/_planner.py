@@ -5,15 +5,18 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import ClassVar, Final
 
 import numpy as np
+from filelock import FileLock, Timeout
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
-from nav_adapter.ros2 import MASK_TOPICS, Frames, SpeedMaskSettings, SpeedMaskStream, outgoing
+from nav_adapter.ros2 import Frames, SpeedMaskSettings, SpeedMaskStream, outgoing
 from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.geometry_msgs import Twist
 from nav_adapter.ros2.messages.rosgraph_msgs import Clock
@@ -55,7 +58,7 @@ _PUBLISHED_HZ: Final = 20.0
 # A cycle later than this is not made up for; all later ones begin later.
 _MADE_UP_S: Final = 0.2
 # In lockstep, a command that has not come after so long is not waited for.
-_GIVEN_UP_S: Final = 0.5
+_GIVEN_UP_S: Final = 2.0
 _STREAM: Final = 0x205
 _STILL: Final = Twist()
 
@@ -146,23 +149,36 @@ class Ros2Planner:
                 f"the robot has {count} scanners; give a topic for each, such as "
                 f"scans='scan_front scan_rear', got {' '.join(self._scans)!r}"
             )
-        link = link_to(self._domain, self._scans[:count])
-        self._link = link
-        self._publish_robot = self._robots_publisher(stage, link)
-        self._mask = SpeedMaskStream(
-            SpeedMaskSettings(topic=f"/{MASK_TOPICS['speed_mask'].name}"), ODOM
-        )
-        self._next_publication_s = 0.0
+        with self._alone_with_the_stack():
+            self._link = link = link_to(self._domain, self._scans[:count])
+            self._publish_robot = self._robots_publisher(stage, link)
+            self._mask = SpeedMaskStream(SpeedMaskSettings(), ODOM)
+            self._next_publication_s = 0.0
+            try:
+                self._wait(stage, link)
+                self._send_goal(link)
+                self._start_s = self._stamp()
+                self._began = time.monotonic()
+                yield
+            finally:
+                if self._actions is not None:
+                    self._actions.stop()
+
+    @contextlib.contextmanager
+    def _alone_with_the_stack(self) -> Iterator[None]:
+        """Keep other crossings of this computer from the stack; raise SimError if one has it."""
+        lock = FileLock(Path(tempfile.gettempdir()) / f"awarenav_ros2_{self._domain}.lock")
         try:
-            self._wait(stage, link)
-            self._send_goal(link)
-            # The stack reads the clock; a clock that stood would be one that was set back.
-            self._start_s = self._stamp()
-            self._began = time.monotonic()
+            lock.acquire(timeout=self._wait_s)
+        except Timeout as cause:
+            raise SimError(
+                f"another crossing has the stack on ROS_DOMAIN_ID {self._domain}: give 1 worker, "
+                "or a domain with a stack of its own"
+            ) from cause
+        try:
             yield
         finally:
-            if self._actions is not None:
-                self._actions.stop()
+            lock.release()
 
     def plan(
         self,
@@ -217,7 +233,7 @@ class Ros2Planner:
         """Take what comes in the first half of the cycle; in lockstep, wait for what is due."""
         self._sleep_until(t_s + 0.5 * dt_s)
         self._take(t_s)
-        if not (self._command_hz and self._driven):
+        if not (self._command_hz and t_s - self._command_s < _SILENT_S):
             return
         asked = time.monotonic()
         waited_s = 0.0
