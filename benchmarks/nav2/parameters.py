@@ -98,6 +98,7 @@ _MPPI: Final[dict[str, Any]] = {
     "motion_model": "DiffDrive",
     # 2.8 s at 1.5 m/s.
     "prune_distance": 4.5,
+    "regenerate_noises": True,
     "transform_tolerance": 0.3,
     "critics": [
         "ConstraintCritic", "CostCritic", "GoalCritic", "GoalAngleCritic", "PathAlignCritic",
