@@ -56,7 +56,7 @@ def measure(
     bare: bool,
 ) -> None:
     """Run the missing crossings of a controller with a face, in a folder of their own."""
-    alone = ", alone=True" if face == "today" else ""
+    alone = ", limit='nobody'" if face == "today" else ""
     jobs = plan_jobs(
         scenarios,
         # Alone, no policy reaches the stack; the measures are those of one.

@@ -80,12 +80,15 @@ def test_a_stack_drives_to_the_goal_within_the_limit_that_it_hears(domain, kind)
     assert row.late_worst_s == 0.0
 
 
-def test_a_stack_that_drives_alone_hears_no_limit_and_is_faster(domain) -> None:
+@pytest.mark.parametrize("limit", ["nobody", "outside"])
+def test_a_stack_that_is_not_told_of_people_is_faster(domain, limit) -> None:
     with Peer(domain) as peer:
-        alone = cross(domain, f"{LOCKSTEP}, alone=True")
-        assert not peer.limits_mps
-        within = cross(domain)
-    assert alone.time_to_goal_s < within.time_to_goal_s - 0.5
+        untold = cross(domain, f"{LOCKSTEP}, limit={limit!r}")
+        heard = tuple(peer.limits_mps)
+        told = cross(domain)
+    # A robot that meets nobody has its own maximum; DWB ignores a limit that is not below it.
+    assert set(heard) == ({0.999 * 1.5} if limit == "nobody" else set())
+    assert untold.time_to_goal_s < told.time_to_goal_s - 0.5
 
 
 def test_in_lockstep_the_same_stack_gives_the_same_commands(domain) -> None:
@@ -167,7 +170,7 @@ def test_cycles_that_begin_late_are_counted(domain) -> None:
 def test_in_real_time_a_second_takes_a_second(domain) -> None:
     with Peer(domain):
         began = time.monotonic()
-        result = cross(domain, "alone=True")
+        result = cross(domain, "limit='nobody'")
         took_s = time.monotonic() - began
     assert result.time_to_goal_s < took_s
 
@@ -253,6 +256,7 @@ def test_a_run_has_rows_like_any_other_and_one_worker(domain, tmp_path) -> None:
     ("settings", "text"),
     [
         ("goal='somewhere'", "goal must be one of auto, goal_pose"),
+        ("limit='mine'", "limit must be one of policy, nobody, outside"),
         ("pace=0", "pace must lie in"),
         ("domain=300", "domain"),
         ("speed=2", "speed"),

@@ -43,6 +43,8 @@ from ._messages import (
 
 #: Ways to send the goal.
 GOALS: Final = ("auto", "goal_pose", "follow_path", "navigate_to_pose")
+#: What is published of limit and people.
+LIMITS: Final = ("policy", "nobody", "outside")
 _TOPIC: Final = "goal_pose"
 # A reader of goal_pose is found within this time.
 _FOUND_S: Final = 3.0
@@ -78,7 +80,9 @@ class Ros2Planner:
         goal: ``"goal_pose"``, a topic; or the action ``"follow_path"`` (with paths of the planner
             server, if there is one) or ``"navigate_to_pose"``, which need rclpy. ``"auto"`` is the
             topic where somebody reads it, else ``"follow_path"``.
-        alone: nothing of the constraints is published: the stack drives as without this library.
+        limit: ``"policy"`` publishes the constraints; ``"nobody"`` those of a robot that meets
+            nobody, with which the stack drives as without this library; ``"outside"`` none, for
+            something else that does, such as ``awarenav bridge``.
         pace: simulated seconds per second; 1 is real time. Another pace needs ``use_sim_time``.
         command_hz: rate at which the stack sends commands, in simulated time: the clock then waits
             for each of them (lockstep), but goes no faster than the pace; 0 does not wait.
@@ -106,7 +110,7 @@ class Ros2Planner:
         *,
         domain: int | None = None,
         goal: str = GOALS[0],
-        alone: bool = False,
+        limit: str = LIMITS[0],
         pace: float = 1.0,
         command_hz: float = 0.0,
         scans: str = "scan scan_2",
@@ -117,6 +121,8 @@ class Ros2Planner:
 
         if goal not in GOALS:
             raise SimError(f"goal must be one of {', '.join(GOALS)}, got {goal!r}")
+        if limit not in LIMITS:
+            raise SimError(f"limit must be one of {', '.join(LIMITS)}, got {limit!r}")
         if goal in GOALS[2:]:
             python_with_ros()
         self._robot, self._way_m, self._seed = robot, np.asarray(reference_path_odom_m), seed
@@ -124,7 +130,7 @@ class Ros2Planner:
         self._domain = int(
             finite_number("domain", float(own if domain is None else domain), SimError)
         )
-        self._goal, self._alone = goal, bool(alone)
+        self._goal, self._limit = goal, limit
         self._pace = finite_number("pace", pace, SimError, minimum=0.05, maximum=100.0)
         self._command_hz = finite_number("command_hz", command_hz, SimError, minimum=0.0)
         self._scans = tuple(str(scans).split())
@@ -202,7 +208,7 @@ class Ros2Planner:
         self.late_s = late_s
         self._began += max(late_s - _MADE_UP_S, 0.0)
         self._take(t_s)
-        if not self._alone and t_s + 1e-6 >= self._next_publication_s:
+        if self._limit != LIMITS[2] and t_s + 1e-6 >= self._next_publication_s:
             self._next_publication_s += 1.0 / _PUBLISHED_HZ
             self._publish_constraints(constraints, robot_state)
         self._publish_robot(robot_state, self._start_s)
@@ -253,11 +259,13 @@ class Ros2Planner:
         """Publish what the bridge does, on topics that somebody reads."""
         stamp_s = self._start_s + constraints.stamp_s
         stamped = replace(constraints, stamp_s=stamp_s)
+        if self._limit == LIMITS[1]:
+            stamped = NavConstraints(stamp_s, (), self._robot.max_speed_mps, "nobody", False)
         state = replace(state, stamp_s=self._start_s + state.stamp_s)
         read_by = self._link.read_by
         for messages in (
             outgoing(stamped, (), self._robot, state, Frames(), wanted=read_by),
-            self._mask.messages(stamped, state, read_by),
+            () if self._limit == LIMITS[1] else self._mask.messages(stamped, state, read_by),
         ):
             for key, message in messages:
                 self._link.publish(key, message)
