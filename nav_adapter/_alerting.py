@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Iterable
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -27,70 +26,63 @@ _CLOSING_M2PS: Final = 1e-9
 _PREDICTED_S: Final = 2.0
 # The lower bound of α below which a person is warned.
 _UNAWARE_BELOW: Final = 0.3
-# Shortest time until the same person gets the same alert again, and between two sounds.
+# Shortest time until the same person gets the same alert again, and between a sound and another
+# that is no louder.
 _REPEAT_AFTER_S: Final = 3.0
 _QUIET_S: Final = 1.0
-_SOUNDS: Final[frozenset[AlertKind]] = frozenset(("horn", "voice"))
+_LOUDNESS: Final[dict[AlertKind, int]] = {"voice": 1, "horn": 2}
 
 
-@dataclass(frozen=True, slots=True)
-class AlertHistory:
-    """The stamps of the latest alerts.
+class Sound(NamedTuple):
+    """The latest warning that sounded: its stamp, and how loud it was."""
 
-    Attributes:
-        alert_stamps_s: stamp of the latest alert of each person and kind.
-        sound_stamp_s: stamp of the latest sound.
-    """
+    stamp_s: float = -math.inf
+    loudness: int = 0
 
-    alert_stamps_s: Mapping[tuple[int, AlertKind], float] = field(default_factory=dict)
-    sound_stamp_s: float = -math.inf
+    def holds_back(self, kind: AlertKind, now: float) -> bool:
+        """Return whether an alert of this kind has to wait, so that people can tell the two."""
+        return now - self.stamp_s < _QUIET_S and 0 < _LOUDNESS.get(kind, 0) <= self.loudness
 
 
 def alerts_due(
     rules: AlertRules,
     robot: RobotProfile,
-    people: Mapping[int, Person],
+    people: dict[int, Person],
     robot_state: RobotState,
     now: float,
     sigmas: float,
-    history: AlertHistory,
+    sound: Sound,
     prediction: PredictionModel | None = None,
-) -> tuple[tuple[Alert, ...], AlertHistory]:
-    """Return the alerts to give now, the most urgent first, and the history with them.
+) -> tuple[list[Alert], Sound]:
+    """Return the alerts to give now, the most urgent first, and the latest sound with them.
 
     Tentative tracks may be clutter and are not warned. Robot and people are predicted with their
     present velocities, the robot straight ahead. The robot counts as its circumscribed circle, and
     a body is enlarged by ``sigmas`` standard deviations of its position: the present one, or with a
-    ``prediction`` the one at the closest approach, at most 2 s ahead.
+    ``prediction`` the one at the closest approach, at most 2 s ahead. Of ``people``, those who are
+    warned are replaced.
     """
-    candidates = _candidates(rules, robot, people, robot_state, now, sigmas, prediction)
+    candidates = _candidates(rules, robot, people.values(), robot_state, now, sigmas, prediction)
     candidates.sort(key=lambda alert: (alert.time_to_closest_s, alert.track_id))
-    latest = {
-        key: stamp for key, stamp in history.alert_stamps_s.items() if now - stamp < _REPEAT_AFTER_S
-    }
-    sound_stamp_s, alerts = history.sound_stamp_s, []
+    alerts = []
     for alert in candidates:
-        key = (alert.track_id, alert.kind)
-        if now - latest.get(key, -math.inf) < _REPEAT_AFTER_S:
+        person = people[alert.track_id]
+        warned_s = dict(person.warned_s)
+        repeats = now - warned_s.get(alert.kind, -math.inf) < _REPEAT_AFTER_S
+        if repeats or sound.holds_back(alert.kind, now):
             continue
-        if alert.kind in _SOUNDS:
-            if now - sound_stamp_s < _QUIET_S:
-                continue
-            sound_stamp_s = now
-        latest[key] = now
+        if alert.kind in _LOUDNESS:
+            sound = Sound(now, _LOUDNESS[alert.kind])
+        warned_s[alert.kind] = now
+        people[person.id] = person._replace(warned_s=tuple(warned_s.items()))
         alerts.append(alert)
-    return tuple(alerts), AlertHistory(latest, sound_stamp_s)
-
-
-def is_quiet(history: AlertHistory, now: float) -> bool:
-    """Return whether no warning has sounded in the last second."""
-    return now - history.sound_stamp_s >= _QUIET_S
+    return alerts, sound
 
 
 def _candidates(
     rules: AlertRules,
     robot: RobotProfile,
-    people: Mapping[int, Person],
+    people: Iterable[Person],
     robot_state: RobotState,
     now: float,
     sigmas: float,
@@ -104,7 +96,7 @@ def _candidates(
     velocity = robot_state.velocity_odom_mps
     reach_m = robot.circumscribed_radius_m + BODY_RADIUS_M
     candidates = []
-    for track_id, memory in people.items():
+    for memory in people:
         if memory.track.status == "tentative" or memory.awareness_lower >= _UNAWARE_BELOW:
             continue
         time_s, gap_m = closest_approach(
@@ -117,10 +109,10 @@ def _candidates(
         kind = _kind(rules, time_s) if gap_m <= rules.miss_within_m else None
         if kind is not None:
             reason = (
-                f"track {track_id}: unaware (lower bound {memory.awareness_lower:.2f}), "
+                f"track {memory.id}: unaware (lower bound {memory.awareness_lower:.2f}), "
                 f"closest approach of {gap_m:.1f} m in {time_s:.1f} s"
             )
-            candidates.append(Alert(track_id, kind, time_s, gap_m, reason))
+            candidates.append(Alert(memory.id, kind, time_s, gap_m, reason))
     return candidates
 
 

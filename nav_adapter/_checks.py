@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from types import UnionType
 from typing import Final, get_args
 
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._people import Person
-from ._places import velocity_variance_m2ps2
 
 # Data older than this, over 30 000 years, have a stamp that was never a time.
 _MOST_S: Final = 1e12
 # Tolerated difference between the clocks of two computers, or of a camera and a control loop.
 _CLOCK_TOLERANCE_S: Final = 0.05
-# Positions, speeds and standard deviations beyond these are errors of whoever sent them. Beyond
-# 1e15 m a circle's corners fall together.
-_MOST_M: Final = 1e12
-_MOST_MPS: Final = 1e4
 
 
 def age_of_s(name: str, stamp_s: float, now: float) -> float:
@@ -72,27 +66,3 @@ def require_type(name: str, value: object, kind: type | UnionType) -> None:
 def goes_back(now: float, last_s: float) -> str:
     """Return the message about a stamp that goes back."""
     return f"stamp_s must not go backward, got {now:.6f} s after {last_s:.6f} s"
-
-
-def refuse_absurd(people: Mapping[int, Person]) -> None:
-    """Refuse people whose finite numbers are too large for any person."""
-    for track_id, person in people.items():
-        x_m, y_m = person.position_odom_m
-        vx_mps, vy_mps = person.velocity_odom_mps
-        place_m, speed_mps = max(abs(x_m), abs(y_m)), max(abs(vx_mps), abs(vy_mps))
-        # A NaN, which an overflow may leave, fails the comparison too.
-        for name, value, most, unit in (
-            ("position_odom_m", place_m, _MOST_M, "m"),
-            ("velocity_odom_mps", speed_mps, _MOST_MPS, "m/s"),
-            ("the standard deviation of covariance_odom", person.sigma_m, _MOST_M, "m"),
-            (
-                "the velocity's variance in covariance_odom",
-                velocity_variance_m2ps2(person.track),
-                _MOST_MPS**2,
-                "m²/s²",
-            ),
-        ):
-            if not value <= most:
-                raise NavError(
-                    f"track {track_id}: {name} must be at most {most:g} {unit}, got {value:g}"
-                )

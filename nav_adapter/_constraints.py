@@ -86,42 +86,28 @@ class PersonObstacle(_WithOutline):
         # Called for fields that are not set: the polygon of the adapter's obstacles, at first.
         if name != "polygon":
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        polygon = self._outline()
-        _SET_POLYGON(self, polygon)
-        return polygon
+        set_fields(self, polygon=self._outline())
+        return self.polygon
 
 
-(
-    *(_SET_ID, _SET_CENTER, _SET_VELOCITY, _SET_RADIUS, _SET_HEIGHT, _SET_LOWER, _SET_POLYGON),
-    _SET_COVARIANCE,
-) = (cast(Any, getattr(PersonObstacle, each.name)).__set__ for each in fields(PersonObstacle))
 _SET_OUTLINE = cast(Any, _WithOutline)._outline.__set__
+_SETTERS = [
+    cast(Any, getattr(PersonObstacle, each.name)).__set__
+    for each in fields(PersonObstacle)
+    if each.name != "polygon"
+]
 
 
-def trusted_obstacle(
-    track_id: int,
-    center_odom_m: FloatArray,
-    velocity_odom_mps: FloatArray,
-    radius_m: float,
-    height_m: float,
-    awareness_lower: float,
-    outline: Callable[[], Polygon],
-    covariance_odom: FloatArray,
-) -> PersonObstacle:
-    """Make an obstacle without checks.
+def trusted_obstacle(outline: Callable[[], Polygon], *values: Any) -> PersonObstacle:
+    """Make an obstacle of the values of its other fields, in their order, without checks.
 
     For the adapter's own numbers only, with read-only arrays. It takes a fifth of the time of the
     constructor. ``outline`` gives the polygon when it is first asked for: many planners never do.
     """
     obstacle = object.__new__(PersonObstacle)
-    _SET_ID(obstacle, track_id)
-    _SET_CENTER(obstacle, center_odom_m)
-    _SET_VELOCITY(obstacle, velocity_odom_mps)
-    _SET_RADIUS(obstacle, radius_m)
-    _SET_HEIGHT(obstacle, height_m)
-    _SET_LOWER(obstacle, awareness_lower)
+    for assign, value in zip(_SETTERS, values, strict=True):
+        assign(obstacle, value)
     _SET_OUTLINE(obstacle, outline)
-    _SET_COVARIANCE(obstacle, covariance_odom)
     return obstacle
 
 
@@ -143,7 +129,7 @@ class NavConstraints:
             speeds must not be empty. It starts from the measured speed, so a drive with its own
             ramp should get ``speed_limit_mps``: following a late measurement brakes too softly.
         alerts: people to warn now, and then the person to ask for attention, if any. An alert is
-            given once, not in every update.
+            given once, not in every update, and none by the watchdog.
         braking_suffices: False if a robot that brakes from now on at full deceleration may still be
             met before it stands, by the model of people. A limit is then not enough: warn, evade or
             stop harder.

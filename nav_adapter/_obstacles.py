@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection
 from functools import partial
 from typing import Final
 
@@ -21,35 +21,28 @@ _ANGLES = np.arange(_SIDES) * (2.0 * math.pi / _SIDES)
 _UNIT_POLYGON = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1) / math.cos(math.pi / _SIDES)
 
 
-def obstacles_of(people: Mapping[int, Person], now: float) -> tuple[PersonObstacle, ...]:
+def obstacles_of(people: Collection[Person], now: float) -> tuple[PersonObstacle, ...]:
     """Return one obstacle per person, in the order of ``people``."""
     if not people:
         return ()
-    centers = np.array([m.position_odom_m for m in people.values()])
+    centers = np.array([person.position_odom_m for person in people])
     # The rows become the obstacles' read-only centres.
     centers.setflags(write=False)
-    covariances = _covariances_at(people, now)
-    # Huge numbers may have overflowed to infinity: the checking constructor refuses those.
-    all_finite = math.isfinite(sum(sum(m.position_odom_m) + m.radius_m for m in people.values()))
-    obstacles = []
-    for (track_id, memory), center, covariance in zip(
-        people.items(), centers, covariances, strict=True
-    ):
-        values = (
-            track_id,
+    return tuple(
+        trusted_obstacle(
+            partial(_polygon, person.radius_m, center),
+            person.id,
             center,
-            memory.track.velocity_odom_mps,
-            memory.radius_m,
-            memory.track.height_m,
-            memory.awareness_lower,
+            person.track.velocity_odom_mps,
+            person.radius_m,
+            person.track.height_m,
+            person.awareness_lower,
+            covariance,
         )
-        outline = partial(_polygon, memory.radius_m, center)
-        obstacles.append(
-            trusted_obstacle(*values, outline, covariance)
-            if all_finite
-            else PersonObstacle(*values, outline(), covariance)
+        for person, center, covariance in zip(
+            people, centers, _covariances_at(people, now), strict=True
         )
-    return tuple(obstacles)
+    )
 
 
 def _polygon(radius_m: float, center: FloatArray) -> shapely.Polygon:
@@ -57,10 +50,10 @@ def _polygon(radius_m: float, center: FloatArray) -> shapely.Polygon:
     return shapely.polygons(center + radius_m * _UNIT_POLYGON)
 
 
-def _covariances_at(people: Mapping[int, Person], now: float) -> FloatArray:
+def _covariances_at(people: Collection[Person], now: float) -> FloatArray:
     """Return the covariances (N, 4, 4) of all tracks, predicted to ``now``; read-only."""
-    covariances = np.array([m.track.covariance_odom for m in people.values()])
-    ages_s = [max(now - m.track.stamp_s, 0.0) for m in people.values()]
+    covariances = np.array([person.track.covariance_odom for person in people])
+    ages_s = [max(now - person.track.stamp_s, 0.0) for person in people]
     if any(ages_s):
         dt_s = np.array(ages_s)[:, None, None]
         # F P Fᵀ by blocks, F = [[I, dt I], [0, I]].

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -12,9 +12,10 @@ from perception.arrays import finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
-from ._places import has_jumped, position_sigma_m
+from ._places import checked_sigma_m, position_sigma_m
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile
+from .alerts import AlertKind
 from .limit import passing_radius_m
 from .reach import Reach, covariance_terms
 
@@ -28,22 +29,40 @@ _FIRST_SIGHT_S: Final = 0.2
 _NOTICED: Final = 0.5
 # Walking speed of ISO 13855: the way that explains a new place, at least.
 _WALKER_MPS: Final = 1.6
+# Standard deviations by which two positions of one person may differ. 4 are exceeded once in
+# 3000 frames, which costs a moment of speed.
+_EXPLAINED_SIGMAS: Final = 4.0
+# Places closer than this are the same, also for a tracker that reports no uncertainty.
+_SAME_PLACE_M: Final = 0.05
+#: A look lasts about so long, and what is remembered of it comes on top.
+LOOK_S: Final = 1.0
 # Stamps closer than this are equal: the stamp of a sighting is a difference of floats, computed
 # anew for every frame.
 _SAME_STAMP_S: Final = 1e-6
 # Tolerance for rounding where sums of frame periods are compared with a setting.
 _ROUNDING_S: Final = 1e-9
-# The id of somebody whose own now belongs to another; −1 is that of the bridge's stop polygon.
-_FIRST_KEPT_ID: Final = -2
+# People whose id now belongs to another are known by ids below this, that of the bridge's stop
+# polygon.
+_STOP_POLYGON_ID: Final = -1
+
+
+class Asked(NamedTuple):
+    """The requests to one person: how many, when the last was, and whether they have answered."""
+
+    times: int
+    stamp_s: float
+    answered: bool = False
 
 
 class Person(NamedTuple):
-    """One person as of the adapter's last update.
+    """One person as of the adapter's last update: an identity of the adapter's own.
 
-    Values of the track that every rule needs are kept as floats, since reading them from their
-    arrays again and again would take longer than the rules.
+    Each update hands a person on to the next, with all that is remembered of them; the id of a
+    track is only what outputs call them. Values of the track that every rule needs are kept as
+    floats, since reading them from their arrays again and again would take longer than the rules.
 
     Attributes:
+        id: of the latest track, or a negative one if that id now belongs to somebody else.
         track: the latest track of this person.
         track_position_odom_m: position of the track, at its own stamp.
         position_odom_m: position predicted to the update.
@@ -57,8 +76,11 @@ class Person(NamedTuple):
         lost_since_s: when a person who was dropped ceased to count in full; None for one who has
             not been dropped.
         lost_limit_mps: the limit that they set then, once it is known.
+        asked: the requests to look at the robot, or None.
+        warned_s: each kind of warning that they have had, with the stamp of the latest.
     """
 
+    id: int
     track: PersonTrack
     track_position_odom_m: Vector2
     position_odom_m: Vector2
@@ -71,25 +93,46 @@ class Person(NamedTuple):
     was_confirmed: bool
     lost_since_s: float | None = None
     lost_limit_mps: float | None = None
+    asked: Asked | None = None
+    warned_s: tuple[tuple[AlertKind, float], ...] = ()
 
     @property
     def is_at_first_sight(self) -> bool:
         """True until frames have shown this person long enough for awareness to raise a speed."""
         return self.known_s < _FIRST_SIGHT_S - _ROUNDING_S
 
+    @property
+    def is_lost(self) -> bool:
+        """True for a person who has been dropped and still limits the speed."""
+        return self.lost_since_s is not None
+
     def lost_for_s(self, stamp_s: float) -> float:
         """Return for how long a person has been lost; 0 for one who has not been dropped."""
         return 0.0 if self.lost_since_s is None else stamp_s - self.lost_since_s
 
-    def is_kept(self, stamp_s: float, hold_s: float) -> bool:
-        """Return whether a person who is missing from the input must be kept at ``stamp_s``.
+    def may_be(self, track: PersonTrack, walking_mps: float) -> bool:
+        """Return whether a track is where this person can be.
 
-        The tracker of this project reports a coasting person before it deletes the track. Another
-        tracker may delete a track as soon as a detection fails, which is when the person is most
-        likely hidden and still there. A track that was never more than tentative may be clutter and
-        is not kept.
+        The place is explained by that of their own track, or by its prediction with constant
+        velocity, within the covariances of both and the way walked at ``walking_mps``. Somebody who
+        is lost may have walked since a frame showed them.
         """
-        return self.was_confirmed and stamp_s - self.seen_stamp_s <= hold_s
+        elapsed_s = max(track.stamp_s - self.track.stamp_s, 0.0)
+        walked_s = max(track.stamp_s - self.seen_stamp_s, 0.0) if self.is_lost else elapsed_s
+        x, y = track.position_odom_m.tolist()
+        (old_x, old_y), (vx, vy) = self.track_position_odom_m, self.velocity_odom_mps
+        way_m = walking_mps * walked_s + _SAME_PLACE_M
+        apart_m = math.hypot(x - old_x, y - old_y)
+        if apart_m <= way_m:
+            return True
+        apart_m = min(apart_m, math.hypot(x - old_x - elapsed_s * vx, y - old_y - elapsed_s * vy))
+        sigma_m = math.hypot(position_sigma_m(self.track, elapsed_s), position_sigma_m(track, 0.0))
+        return apart_m <= way_m + _EXPLAINED_SIGMAS * sigma_m
+
+
+_NOTHING_KEPT: Final[
+    tuple[float | None, float | None, Asked | None, tuple[tuple[AlertKind, float], ...]]
+] = (None, None, None, ())
 
 
 class People:
@@ -101,7 +144,7 @@ class People:
 
     Awareness raises no speed until frames have shown a person for 0.2 s. A known id at a place that
     the person could not have reached belongs to a new, unaware person. The person who had it is
-    kept for ``hold_s`` under a negative id.
+    kept under a negative id, as they would be without a track.
 
     Args:
         policy: radii, human speeds, margins and time behaviour.
@@ -119,6 +162,9 @@ class People:
         self._unaware_mps = self._policy_speed_mps(0.0)
         # People walk even where their speed does not count.
         self._jump_mps = max(self._unaware_mps, _WALKER_MPS)
+        # An answer may be remembered for as long after the request.
+        self._answer_s = LOOK_S + policy.filter.noticed_memory_s
+        self._answer_s += 0.0 if policy.attention is None else policy.attention.pause_s
         # A circle that is too small leads a planner to where the robot may hardly move.
         speeds = np.linspace(self._policy_speed_mps(1.0), self._unaware_mps, 5).tolist()
         self._passing_speeds: list[float] = sorted(set(speeds))
@@ -127,85 +173,115 @@ class People:
             for each in self._passing_speeds
         ]
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
+        self._unaware_m = self._policy_radius_m(0.0)
 
-    def updated(
+    def follow(
         self,
-        people: Mapping[int, Person],
-        tracks: tuple[PersonTrack, ...],
+        people: Iterable[Person],
+        tracks: Iterable[PersonTrack],
         now: float,
+        before_s: float | None,
+        *,
         stale: bool,
-        answered: Collection[int] = (),
-    ) -> dict[int, Person]:
-        """Return all people as of ``now``, in the order of their ids.
+        silent: bool,
+    ) -> list[Person]:
+        """Return everybody as of ``now``, in the order of their ids: present, missing and lost.
+
+        A track goes on with the person of its id, if they can be there. A track that is new, or
+        whose own person cannot be there, goes on with somebody who has lost their id, if they can
+        be there: at first sight again, but not forgotten. Each track stands for one person, and
+        clutter for nobody.
 
         Args:
             people: of the update before.
             tracks: the input.
             now: stamp of the update.
+            before_s: stamp of the update before.
             stale: whether the data are too old to trust.
-            answered: who has just looked because the robot asked for it.
+            silent: whether there was a pause in the updates.
+
+        Raises:
+            NavError: for finite numbers that are too large for any person.
         """
-        jumped = {
-            track.id
-            for track in tracks
-            if track.id in people and has_jumped(people[track.id].track, track, self._jump_mps)
-        }
-        current = {
-            track.id: self._at(track, None, 0.0, now)
-            if track.id in jumped
-            else self._tracked(track, people.get(track.id), now, stale, track.id in answered)
-            for track in tracks
-        }
-        if jumped:
-            people = self._without_owner(people, jumped, tracks)
-        for track_id, person in people.items():
-            if track_id not in current and person.is_kept(now, self._timing.hold_s):
-                current[track_id] = self._missing(person, now)
-        return dict(sorted(current.items()))
-
-    def lost(
-        self,
-        lost: Mapping[int, Person],
-        before: Mapping[int, Person],
-        before_s: float | None,
-        people: Mapping[int, Person],
-        now: float,
-    ) -> dict[int, Person]:
-        """Return all lost people as of ``now``; nobody who is there is lost.
-
-        A tracker gives somebody up when they have been out of sight for long, which is when least
-        is known of them. Nobody is lost whose place a sensor has shown empty
-        (:attr:`~tracking.PersonTrack.place_empty`).
-
-        Args:
-            lost: of the update before.
-            before: people of the update before.
-            before_s: its stamp, or None if there was none.
-            people: who are there now.
-            now: stamp of the update.
-        """
-        if self._timing.lost_rise_mps2 is None or before_s is None:
-            return {}
-        missing = {track_id: person for track_id, person in lost.items() if track_id not in people}
-        for track_id, person in before.items():
-            if track_id in people or not person.was_confirmed or person.track.place_empty:
+        if silent:
+            people = [self._after_silence(person) for person in people]
+        left = {person.id: person for person in people}
+        lowest_id = min((_STOP_POLYGON_ID, *left))
+        followed, robbed = [], []
+        strangers: dict[int, PersonTrack] = {}
+        for track in sorted(tracks, key=lambda track: track.id):
+            person = left.pop(track.id, None)
+            if person is not None and person.may_be(track, self._jump_mps):
+                followed.append(self._shown(track, person, now, stale))
                 continue
-            # After a pause in the updates they have been lost for some time.
-            since_s = min(max(person.seen_stamp_s + self._timing.hold_s, before_s), now)
-            missing[track_id] = person._replace(lost_since_s=since_s, lost_limit_mps=None)
-        return {track_id: self._missing(person, now) for track_id, person in missing.items()}
+            strangers[track.id] = track
+            if person is not None:
+                robbed.append(person)
+        heirs = self._heirs(robbed, strangers.values())
+        exchanged = {person.id for person in robbed}
+        for track_id, track in strangers.items():
+            had = heirs.pop(track_id, None)
+            lower = self._trusted_lower(track, None, now, stale or track_id in exchanged)
+            followed.append(_remembering(self._at(track, None, lower, now), had))
+            if had is not None:
+                robbed.remove(had)
+        for person in robbed:
+            lowest_id -= 1
+            left[lowest_id] = person._replace(id=lowest_id)
+        for person in left.values():
+            kept = self._without_track(person, now, before_s)
+            if kept is not None:
+                followed.append(kept)
+        return sorted(followed, key=lambda person: person.id)
 
-    def after_silence(self, people: Mapping[int, Person]) -> dict[int, Person]:
-        """Return the people after a pause in the updates: unaware, and no smaller than that."""
-        return {
-            track_id: person._replace(
-                awareness_lower=0.0,
-                # The next sighting, which ends the pause, is the first.
-                known_s=-self._timing.fresh_within_s,
-                radius_m=max(person.radius_m, self._target_m(0.0, person.sigma_m)),
-            )
-            for track_id, person in people.items()
-        }
+    def _heirs(
+        self, robbed: Iterable[Person], strangers: Iterable[PersonTrack]
+    ) -> dict[int, Person]:
+        """Return the people who go on under another id, by that id, the nearest first."""
+        pairs = [
+            (math.dist(person.track_position_odom_m, track.position_odom_m), track.id, person)
+            for person in robbed
+            for track in strangers
+            if not person.is_lost
+            and track.status != "tentative"
+            and person.may_be(track, self._jump_mps)
+        ]
+        heirs: dict[int, Person] = {}
+        for _, track_id, person in sorted(pairs, key=lambda pair: pair[0]):
+            if track_id not in heirs and person not in heirs.values():
+                heirs[track_id] = person
+        return heirs
+
+    def _without_track(self, person: Person, now: float, before_s: float | None) -> Person | None:
+        """Return a person without a track in the input: missing at first, then lost, then None.
+
+        They are unaware and walk on. The tracker of this project reports a coasting person before
+        it deletes the track. Another tracker may delete a track as soon as a detection fails, which
+        is when the person is most likely hidden and still there. A tracker gives somebody up when
+        they have been out of sight for long, which is when least is known of them. So all are kept
+        but for a track that was never more than tentative, which may be clutter, and for somebody
+        whose place a sensor has shown empty (:attr:`~tracking.PersonTrack.place_empty`).
+        """
+        hold_s = self._timing.hold_s
+        if not person.is_lost and not (
+            person.was_confirmed and now - person.seen_stamp_s <= hold_s
+        ):
+            gone = not person.was_confirmed or person.track.place_empty
+            if gone or self._timing.lost_rise_mps2 is None or before_s is None:
+                return None
+            # After a pause in the updates they have been lost for some time.
+            since_s = min(max(person.seen_stamp_s + hold_s, before_s), now)
+            person = person._replace(lost_since_s=since_s)
+        return self._at(person.track, person, 0.0, now)
+
+    def _after_silence(self, person: Person) -> Person:
+        """Return a person after a pause in the updates: unaware, and no smaller than that."""
+        return _remembering(person, person)._replace(
+            awareness_lower=0.0,
+            # The next sighting, which ends the pause, is the first.
+            known_s=-self._timing.fresh_within_s,
+            radius_m=max(person.radius_m, self._target_m(0.0, person.sigma_m)),
+        )
 
     def reach(self, person: Person, now: float) -> Reach | None:
         """Return how far a person can come, or None under a policy that knows no motion."""
@@ -244,30 +320,38 @@ class People:
             return max(margins.uncertainty_sigmas, margins.unseen_sigmas)
         return margins.uncertainty_sigmas
 
-    def _tracked(
-        self,
-        track: PersonTrack,
-        before: Person | None,
-        now: float,
-        stale: bool,
-        answered: bool,
-    ) -> Person:
-        """Return the person of a track in the input."""
-        seen_stamp_s, fresh_s = track.stamp_s - track.time_since_seen_s, self._timing.fresh_within_s
-        lower = 0.0
-        if not stale and track.status != "tentative" and now - seen_stamp_s <= fresh_s:
-            lower = max(track.awareness_lower, self._noticed_lower(track, answered))
-        if before is None:
-            return self._at(track, None, lower, now)
-        advance_s = seen_stamp_s - before.seen_stamp_s
-        if advance_s <= _SAME_STAMP_S:
-            # Without a new frame there is no new evidence, whatever the track says.
-            advance_s, lower = 0.0, min(lower, before.awareness_lower)
-        return self._at(track, before, lower, now, 0.0 if stale else min(advance_s, fresh_s))
+    def _shown(self, track: PersonTrack, before: Person, now: float, stale: bool) -> Person:
+        """Return the person of a track in the input, which goes on with theirs."""
+        if before.is_lost:
+            lower = self._trusted_lower(track, None, now, stale)
+            return _remembering(self._at(track, None, lower, now), before)
+        lower = self._trusted_lower(track, before, now, stale)
+        advance_s = track.stamp_s - track.time_since_seen_s - before.seen_stamp_s
+        counts = advance_s > _SAME_STAMP_S and not stale
+        shown_s = min(advance_s, self._timing.fresh_within_s) if counts else 0.0
+        return self._at(track, before, lower, now, shown_s)
 
-    def _missing(self, person: Person, now: float) -> Person:
-        """Return a person who is missing from the input: unaware, and walking on."""
-        return self._at(person.track, person, 0.0, now)
+    def _trusted_lower(
+        self, track: PersonTrack, before: Person | None, now: float, stale: bool
+    ) -> float:
+        """Return the lower bound of α that counts, or the one that stands for having noticed.
+
+        It is 0 with stale data, for clutter, and for people out of sight. Without a new frame there
+        is no new evidence, whatever the track says. A look at a robot that has just asked for it is
+        no chance look: the belief counts until it ends.
+        """
+        seen_stamp_s, status = track.stamp_s - track.time_since_seen_s, track.status
+        if stale or status == "tentative" or now - seen_stamp_s > self._timing.fresh_within_s:
+            return 0.0
+        lower, counts_as = track.awareness_lower, self._policy.noticed_counts_as
+        if counts_as is not None and track.noticed > 0.0 and status == "confirmed":
+            asked = None if before is None else before.asked
+            answered = asked and asked.answered and now - asked.stamp_s <= self._answer_s
+            if answered or track.noticed >= _NOTICED:
+                lower = max(lower, counts_as)
+        if before is not None and seen_stamp_s - before.seen_stamp_s <= _SAME_STAMP_S:
+            return min(lower, before.awareness_lower)
+        return lower
 
     def _at(
         self,
@@ -283,74 +367,43 @@ class People:
         """
         ahead_s = now - track.stamp_s
         (x, y), (vx, vy) = track.position_odom_m.tolist(), track.velocity_odom_mps.tolist()
+        place = x + ahead_s * vx, y + ahead_s * vy
         # Growth ends where the robot stops for lack of data: more would only block its restart.
-        sigma_m = position_sigma_m(track, min(max(ahead_s, 0.0), self._timing.stop_after_s))
-        person = Person(
-            track=track,
-            track_position_odom_m=(x, y),
-            position_odom_m=(x + ahead_s * vx, y + ahead_s * vy),
-            velocity_odom_mps=(vx, vy),
-            seen_stamp_s=track.stamp_s - track.time_since_seen_s,
-            awareness_lower=lower,
-            radius_m=self._target_m(0.0 if before is None else lower, sigma_m),
-            sigma_m=sigma_m,
-            known_s=0.0,
-            was_confirmed=track.status != "tentative",
+        grown_s = min(max(ahead_s, 0.0), self._timing.stop_after_s)
+        sigma_m = checked_sigma_m(track, place, (vx, vy), grown_s)
+        seen_stamp_s = track.stamp_s - track.time_since_seen_s
+        confirmed = track.status != "tentative"
+        radius_m = self._target_m(0.0 if before is None else lower, sigma_m)
+        known_s, kept = 0.0, _NOTHING_KEPT
+        if before is not None:
+            # A late frame is no evidence of awareness, but it does show the position. Without it,
+            # the uncertainty of the first sighting would never shrink with a slow camera.
+            shrinks = track.status == "confirmed" and before.known_s >= 0.0
+            shrunk_m = self._timing.shrink_rate_mps * shown_s if shrinks else 0.0
+            radius_m = max(radius_m, before.radius_m - shrunk_m)
+            seen_stamp_s = max(seen_stamp_s, before.seen_stamp_s)
+            known_s = before.known_s + shown_s
+            confirmed = confirmed or before.was_confirmed
+            kept = before.lost_since_s, before.lost_limit_mps, before.asked, before.warned_s
+        return Person(
+            track.id if before is None else before.id,
+            track,
+            (x, y),
+            place,
+            (vx, vy),
+            seen_stamp_s,
+            lower,
+            radius_m,
+            sigma_m,
+            known_s,
+            confirmed,
+            *kept,
         )
-        if before is None:
-            return person
-        # A late frame is no evidence of awareness, but it does show the position. Without it, the
-        # uncertainty of the first sighting would never shrink with a slow camera.
-        shrinks = track.status == "confirmed" and before.known_s >= 0.0
-        shrunk_m = self._timing.shrink_rate_mps * shown_s if shrinks else 0.0
-        return person._replace(
-            seen_stamp_s=max(person.seen_stamp_s, before.seen_stamp_s),
-            radius_m=max(person.radius_m, before.radius_m - shrunk_m),
-            known_s=before.known_s + shown_s,
-            was_confirmed=person.was_confirmed or before.was_confirmed,
-            lost_since_s=before.lost_since_s,
-            lost_limit_mps=before.lost_limit_mps,
-        )
-
-    def _noticed_lower(self, track: PersonTrack, answered: bool) -> float:
-        """Return the lower bound of α that stands for having noticed the robot before.
-
-        A look at a robot that has just asked for it is no chance look: the belief counts until it
-        ends.
-        """
-        counts_as = self._policy.noticed_counts_as
-        believed = track.noticed >= _NOTICED or (answered and track.noticed > 0.0)
-        return (
-            counts_as if counts_as is not None and believed and track.status == "confirmed" else 0.0
-        )
-
-    def _without_owner(
-        self, people: Mapping[int, Person], jumped: set[int], tracks: tuple[PersonTrack, ...]
-    ) -> dict[int, Person]:
-        """Return the people, those under a new id whose own now belongs to somebody else.
-
-        Somebody whose place has the track of another id that is new or has jumped is known by that
-        one; each track stands for one person.
-        """
-        kept = {track_id: person for track_id, person in people.items() if track_id not in jumped}
-        # Clutter, and people who are known by their own id, explain nobody's absence.
-        takers = [
-            track
-            for track in sorted(tracks, key=lambda track: track.id)
-            if track.status != "tentative" and (track.id in jumped or track.id not in people)
-        ]
-        for track_id in sorted(jumped):
-            person = people[track_id]
-            near = [each for each in takers if not has_jumped(person.track, each, self._jump_mps)]
-            if near:
-                takers.remove(near[0])
-            else:
-                kept[min(_FIRST_KEPT_ID + 1, *kept, *people) - 1] = person
-        return kept
 
     def _target_m(self, lower: float, sigma_m: float) -> float:
         """Return the radius that this awareness allows."""
-        return self._policy_radius_m(lower) + self._margins.uncertainty_sigmas * sigma_m
+        radius_m = self._policy_radius_m(lower) if lower else self._unaware_m
+        return radius_m + self._margins.uncertainty_sigmas * sigma_m
 
     def _policy_radius_m(self, awareness_lower: float) -> float:
         """Return the policy's radius, or the smallest with which the limit beside it is usable."""
@@ -375,6 +428,14 @@ class People:
             return speed_mps
         name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
         return finite_number(name, speed_mps, NavError, minimum=0.0)
+
+
+def _remembering(person: Person, before: Person | None) -> Person:
+    """Return a person with what the robot has said to them, but no answer: it may be another."""
+    if before is None:
+        return person
+    asked = before.asked and before.asked._replace(answered=False)
+    return person._replace(asked=asked, warned_s=before.warned_s)
 
 
 def _is_finite_float(value: float) -> bool:

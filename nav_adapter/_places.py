@@ -1,4 +1,4 @@
-"""Places of tracks: how certain they are, and whether two can be those of one person."""
+"""Places and velocities of tracks: how certain they are, and what no person can have."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Final
 from perception.matrices import larger_eigenvalue
 from tracking import PersonTrack
 
-# Standard deviations by which two positions of one person may differ. 4 are exceeded once in
-# 3000 frames, which costs a moment of speed.
-_EXPLAINED_SIGMAS: Final = 4.0
-# Places closer than this are the same, also for a tracker that reports no uncertainty.
-_SAME_PLACE_M: Final = 0.05
+from ._errors import NavError
+
+# Positions, speeds and standard deviations beyond these are errors of whoever sent them. Beyond
+# 1e15 m a circle's corners fall together.
+_MOST_M: Final = 1e12
+_MOST_MPS: Final = 1e4
 
 
 def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
@@ -21,13 +22,7 @@ def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
     It is that of the most uncertain direction: the root of the larger eigenvalue of the position's
     part of F P Fᵀ.
     """
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = (
-        track.covariance_odom.tolist()
-    )
-    xx += ahead_s * (2.0 * xu + ahead_s * uu)
-    yy += ahead_s * (2.0 * yv + ahead_s * vv)
-    xy += ahead_s * (xv + yu + ahead_s * uv)
-    return math.sqrt(max(larger_eigenvalue(xx, xy, yy), 0.0))
+    return _sigma_m(track.covariance_odom.tolist(), ahead_s)
 
 
 def velocity_variance_m2ps2(track: PersonTrack) -> float:
@@ -37,21 +32,43 @@ def velocity_variance_m2ps2(track: PersonTrack) -> float:
     return variance_m2ps2
 
 
-def has_jumped(old: PersonTrack, track: PersonTrack, walking_mps: float) -> bool:
-    """Return whether a track is where the person of an older one cannot be.
+def checked_sigma_m(
+    track: PersonTrack,
+    place_m: tuple[float, float],
+    velocity_mps: tuple[float, float],
+    ahead_s: float,
+) -> float:
+    """Return :func:`position_sigma_m` of a person whose numbers are not too large for any person.
 
-    The place is explained by the place of the older track, or by its prediction with constant
-    velocity, within the covariances of both and the way walked at ``walking_mps``.
+    Args:
+        track: of the person.
+        place_m: predicted place, in odom.
+        velocity_mps: of the track.
+        ahead_s: as there.
+
+    Raises:
+        NavError: for such a number.
     """
-    elapsed_s = max(track.stamp_s - old.stamp_s, 0.0)
-    x, y = track.position_odom_m.tolist()
-    (old_x, old_y), (vx, vy) = old.position_odom_m.tolist(), old.velocity_odom_mps.tolist()
-    apart_m = min(
-        math.hypot(x - old_x, y - old_y),
-        math.hypot(x - old_x - elapsed_s * vx, y - old_y - elapsed_s * vy),
-    )
-    way_m = walking_mps * elapsed_s + _SAME_PLACE_M
-    if apart_m <= way_m:
-        return False
-    sigma_m = math.hypot(position_sigma_m(old, elapsed_s), position_sigma_m(track, 0.0))
-    return apart_m > way_m + _EXPLAINED_SIGMAS * sigma_m
+    rows = track.covariance_odom.tolist()
+    place, speed = max(map(abs, place_m)), max(map(abs, velocity_mps))
+    sigma_m, variance = _sigma_m(rows, ahead_s), max(rows[2][2], rows[3][3])
+    for name, value, most, unit in (
+        ("position_odom_m", place, _MOST_M, "m"),
+        ("velocity_odom_mps", speed, _MOST_MPS, "m/s"),
+        ("the standard deviation of covariance_odom", sigma_m, _MOST_M, "m"),
+        ("the velocity's variance in covariance_odom", variance, _MOST_MPS**2, "m²/s²"),
+    ):
+        # A NaN, which an overflow may leave, fails the comparison too.
+        if not value <= most:
+            raise NavError(
+                f"track {track.id}: {name} must be at most {most:g} {unit}, got {value:g}"
+            )
+    return sigma_m
+
+
+def _sigma_m(covariance: list[list[float]], ahead_s: float) -> float:
+    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = covariance
+    xx += ahead_s * (2.0 * xu + ahead_s * uu)
+    yy += ahead_s * (2.0 * yv + ahead_s * vv)
+    xy += ahead_s * (xv + yu + ahead_s * uv)
+    return math.sqrt(max(larger_eigenvalue(xx, xy, yy), 0.0))

@@ -65,7 +65,7 @@ class Answer:
 
     Attributes:
         track_id: the person.
-        after_s: ≥ 0, time from the request to the frame that showed it.
+        after_s: ≥ 0, time from the request to the picture that showed it.
     """
 
     track_id: int

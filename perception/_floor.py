@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -57,6 +57,10 @@ class FloorPlane:
                 f"z = {pose[2, 3]:g} m"
             )
         return cls(pose[2, :3], float(pose[2, 3]), height_std_m, tilt_std_rad)
+
+    def in_view(self, rotation_camera_view: FloatArray) -> FloorPlane:
+        """Return the floor in the frame of a view that is turned by (3, 3) against the camera."""
+        return replace(self, normal_camera=rotation_camera_view.T @ self.normal_camera)
 
     def depth_of(
         self, rays: FloatArray, above_m: float, above_std_m: float, ray_std: float | FloatArray

@@ -25,7 +25,14 @@ from ._stages import (
     check_count,
 )
 from .anthropometry import UNUSUAL_SIZE_PROBABILITY
-from .arrays import FloatArray, ImageRgb, check_image, finite_array, finite_number
+from .arrays import (
+    FloatArray,
+    ImageRgb,
+    check_image,
+    finite_array,
+    finite_number,
+    rotation_matrix,
+)
 from .awareness import AttentionCone, AwarenessEstimate, estimate_awareness
 from .body import DEFAULT_MIN_SCORE
 from .confirmation import KeypointConfirmation
@@ -176,15 +183,23 @@ class AwarenessPipeline:
             )
         self._eye_estimator = eye_estimator
 
-    def for_another_view(self) -> AwarenessPipeline:
+    def for_another_view(self, rotation_camera_view: Any | None = None) -> AwarenessPipeline:
         """Return a pipeline with the same camera, networks and settings that has seen no image.
 
         With ``detect_every_s``, a pipeline keeps people from one image to the
         next. Each of several cameras, or views of one, therefore needs its own; this one shares
         the networks.
+
+        Args:
+            rotation_camera_view: (3, 3) from the frame of the view to the camera's, in which the
+                points of the robot and the constant floor are given; None for the same frame.
         """
         other = copy.copy(self)
         other._people = self._people.for_another_view()
+        if rotation_camera_view is not None:
+            R = rotation_matrix("rotation_camera_view", rotation_camera_view)
+            other._robot_points = self._robot_points @ R
+            other._floor = None if self._floor is None else self._floor.in_view(R)
         return other
 
     def process(

@@ -14,7 +14,9 @@ SEARCHED = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 
 # Packages that an example needs beyond the core.
-NEEDS = {"orca_rvo2": "pyrvo"}
+NEEDS = {"orca_rvo2": "pyrvo", "ros2_robot": "cyclonedds"}
+# An example that would run for long.
+ARGUMENTS = {"ros2_robot": ("1",)}
 # Examples that drive end with a line of results.
 DRIVING = (
     "crossing_person",
@@ -46,7 +48,7 @@ def printed(name, *arguments):
 def test_example_runs(path):
     if path.stem in NEEDS:
         pytest.importorskip(NEEDS[path.stem], reason="the example needs the extra dev")
-    out = printed(path.name)
+    out = printed(path.name, *ARGUMENTS.get(path.stem, ()))
     assert out.strip()
     if path.stem in DRIVING:
         last = out.splitlines()[-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Final, Literal, cast, get_args
 
@@ -47,6 +48,8 @@ class PersonTrack:
             person was out of sight and may still be there.
         noticed: lower bound, in [0, 1], of the probability that this person has noticed the robot
             by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
+        time_since_face_s: ≥ 0, time since the latest picture whose view of the face α rests on;
+            infinite if there is none, and None from a tracker that does not say.
     """
 
     id: int
@@ -62,6 +65,7 @@ class PersonTrack:
     time_since_seen_s: float
     place_empty: bool = False
     noticed: float = 0.0
+    time_since_face_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.status not in get_args(TrackStatus):
@@ -99,6 +103,8 @@ class PersonTrack:
             place_empty=bool(self.place_empty),
             noticed=number("noticed", 0.0, 1.0),
         )
+        if self.time_since_face_s not in (None, math.inf):
+            set_fields(self, time_since_face_s=number("time_since_face_s", 0.0))
 
 
 _SETTERS: Final = tuple(
@@ -168,6 +174,7 @@ def _snapshot(
         stamp_s - track.last_seen_s,
         shown_empty(track, state, sensors.config),
         noticed(track, stamp_s, state, sensors),
+        stamp_s - track.face_s,
     )
     for assign, value in zip(_SETTERS, values, strict=True):
         assign(made, value)

@@ -163,8 +163,9 @@ class BagReplay:
             # Times of the recorder may go back a little; a tick is never repeated.
             while began_s + self._period_s * ticks <= recorded_s:
                 tick_s = began_s + self._period_s * ticks
-                if seconds is not None and tick_s - began_s >= seconds:
-                    return tick_s - began_s
+                # Not the difference of two times, which is rounded.
+                if seconds is not None and self._period_s * ticks >= seconds:
+                    return self._period_s * ticks
                 self._tick(tick_s, report if tick_s - reported_s >= _REPORT_PERIOD_S else None)
                 reported_s = tick_s if tick_s - reported_s >= _REPORT_PERIOD_S else reported_s
                 ticks += 1

@@ -19,6 +19,7 @@ from nav_adapter.ros2.messages.sensor_msgs import CompressedImage, Image, LaserS
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import PerceptionError
 from perception.laser import Scanner, sight_of
+from perception.no_view import LastFrames
 
 from ..errors import counted
 from ..estimate import BagMessages
@@ -127,7 +128,7 @@ def _scanner_findings(
     refused: Counter[str] = Counter()
     blind: Counter[str] = Counter()
     frozen: Counter[str] = Counter()
-    before = None
+    last = LastFrames()
     frame = scans[0][1].header.frame_id
     try:
         mounting, where = Scanner(mounts.lookup(base, frame, 0.0)), f"in {base!r}"
@@ -139,9 +140,8 @@ def _scanner_findings(
         except NavError as problem:
             refused[str(problem)] += 1
             continue
-        if before is not None and scan.repeats(before):
-            frozen["all ranges are those of the scan before"] += 1
-        before = scan
+        if scan.repeats(last):
+            frozen["all ranges are those of a scan before"] += 1
         sight = sight_of(scan, mounting)
         if sight.blind_text:
             blind[sight.blind_text] += 1

@@ -216,7 +216,7 @@ class BagMessages:
                 raise AwarenavError(
                     f"{self._path}: the rest cannot be read: {_explained(cause)}"
                 ) from cause
-            yield topic_name(connection.topic), recorded_ns * 1e-9, message
+            yield topic_name(connection.topic), recorded_ns / 1e9, message
 
 
 class BagSource(ImageSource):

@@ -23,10 +23,10 @@ from perception import (
     PersonObservation,
     PoseEstimator,
 )
-from perception.arrays import FloatArray, ImageRgb
+from perception.arrays import FloatArray
 from perception.errors import DepthImageError
 from perception.networks.detectors import for_wide_view
-from perception.no_view import NoView, why_no_view
+from perception.no_view import LastFrames, NoView, why_no_view
 from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
@@ -175,7 +175,7 @@ class PeopleEstimator:
         self._pipelines: dict[Camera, AwarenessPipeline] = {}
         self._track, self._unfit, self._depth = track, unfit, depth
         self._tracker: PersonTracker | None = None
-        self._before: ImageRgb | None = None
+        self._last = LastFrames()
 
     def estimate(self, frame: SourceFrame) -> FrameEstimate:
         """Estimate the people in a frame that has an image.
@@ -192,8 +192,7 @@ class PeopleEstimator:
         camera = self._cameras.of_size(width, height)
         pose = self._fixed_pose if frame.T_odom_camera is None else frame.T_odom_camera
         self._pose_estimator.forget()
-        no_view = why_no_view(frame.image_rgb, self._before)
-        self._before = frame.image_rgb
+        no_view = why_no_view(frame.image_rgb, self._last)
         observations = self._process(camera, frame)
         tracks: tuple[PersonTrack, ...] | None = None
         track_ids: tuple[int | None, ...] = (None,) * len(observations)
@@ -224,7 +223,8 @@ class PeopleEstimator:
 
     def pass_over(self, frame: SourceFrame) -> None:
         """Note a frame that is not estimated: the next one may be the same picture."""
-        self._before = frame.image_rgb
+        if frame.image_rgb is not None:
+            self._last.repeats(frame.image_rgb)
 
     def _require_known_turn(self, frame: SourceFrame) -> None:
         """Refuse a picture that its file has turned where the pixels of the sensor count.

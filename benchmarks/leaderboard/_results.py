@@ -61,8 +61,11 @@ def headline(board: Board, folder: Path = RESULTS) -> str:
 
 
 def times(base: Standing, other: Standing) -> Interval:
-    """Return the time to the goal of one row over that of another, as a ratio of sums."""
-    pairs = _by_scenario(base.ran, other.ran, "time_to_goal_s")
+    """Return the time to the goal of one row over that of another, as a ratio of sums.
+
+    An episode that never arrives counts with what it lasted.
+    """
+    pairs = _by_scenario(base.ran, other.ran, "lasted_s")
     return bootstrap_interval(
         [second for _, second in pairs],
         np.random.default_rng(0),

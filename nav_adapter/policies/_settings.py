@@ -87,8 +87,8 @@ class AlertRules(NavConfig):
 
     A person is warned if the lower bound of α is below 0.3 and the moving robot passes within
     ``miss_within_m``. Of the alerts whose time is reached, the loudest is given: horn before voice
-    before light. The same person gets the same alert again after 3 s at the earliest, and two
-    sounds are at least 1 s apart.
+    before light. The same person gets the same alert again after 3 s at the earliest. A sound
+    comes at least 1 s after the last one that was as loud or louder.
 
     Attributes:
         miss_within_m: a person is warned if the gap between robot and body at the closest approach,

@@ -24,7 +24,7 @@ from ._clock import BridgeClock
 from ._image_input import ImageInput, PerceivedFrame
 from ._outgoing import Frames, outgoing
 from ._poses import RobotPoses
-from ._scan_input import ScanInput, ScannerInput, ScanPerception
+from ._scan_input import MapInput, ScanInput, ScannerInput, ScanPerception
 from ._sensor_watch import CAMERA, SensorWatch
 from ._shared import Shared
 from ._shared_tracker import SharedTracker
@@ -132,10 +132,15 @@ class AwarenessBridge:
         self._images = ImageInput(
             shared, make_pipeline, camera, rectified=rectified, with_depth=with_depth
         )
-        self._scans: ScanInput | None = None
+        self._map = MapInput(shared, self.frames.odom)
+        self._scans: tuple[ScanInput, ...] = ()
+        self._scans_dropped = 0
         if inputs := tuple(scanners):
             legs = ScanPerception(robot.footprint_m, inputs, make_detector)
-            self._scans = ScanInput(shared, inputs, legs, self.frames.odom)
+            self._scans = tuple(
+                ScanInput(shared, number, each, legs, self._map)
+                for number, each in enumerate(inputs)
+            )
 
     @property
     def frame(self) -> PerceivedFrame | None:
@@ -159,17 +164,25 @@ class AwarenessBridge:
         used, ``depth_images_refused`` for any reason, and ``depth_images_from_future``.
         """
         with self._lock:
-            refused = self._clock.refused
             depth, scans = self._images.depth, self._scans
-            readers = {"scans": scans, "depth_images": depth}
-            absent = {kind for kind, reader in readers.items() if reader is None}
-            return {
-                "frames": self._images.frames,
-                **{f"{key}_from_future": n for key, n in refused.items() if key not in absent},
+            counts = {
+                "frames": self._images.used,
+                **{f"{key}_from_future": count for key, count in self._clock.refused.items()},
                 "perception_failures": self._perception_failures,
                 "clock_restarts": self._clock.restarts,
-                **({} if depth is None else depth.counts),
-                **({} if scans is None else scans.counts),
+            }
+            if depth is None:
+                del counts["depth_images_from_future"]
+            else:
+                counts |= {"depth_images": depth.used, "depth_images_refused": depth.refused}
+            if not scans:
+                del counts["scans_from_future"]
+                return counts
+            return counts | {
+                "scans": sum(each.used for each in scans),
+                "scans_refused": sum(each.refused for each in scans),
+                "scans_dropped": self._scans_dropped,
+                "frames_refused_by_tracker": self._tracker.refused_frames,
             }
 
     @property
@@ -245,25 +258,27 @@ class AwarenessBridge:
         Raises:
             NavError: for a number that no scanner has.
         """
-        return self._scan_input().read(number, message, now_s)
+        return self._scan_input(number).read(message, now_s)
 
     def on_map(self, message: OccupancyGrid | MapCells) -> None:
         """Use a map of fixed things, also one from a file: they are not taken for legs.
 
         It is used while tf tells where the map is in odom.
         """
+        self._scan_input()
         try:
-            self._scan_input().set_map(message)
+            self._map.set(message)
         except NavError as problem:
             self._warn(f"map: {problem}")
 
     def refuse_scan(self, number: int, problem: str, now_s: float) -> None:
         """Count and report a scan that could not be decoded."""
-        self._scan_input().refuse(number, problem, now_s)
+        self._scan_input(number).refuse(problem, now_s)
 
     def scan_dropped(self) -> None:
         """Count a scan that was dropped, because others came faster than they are processed."""
-        self._scan_input().dropped()
+        with self._lock:
+            self._scans_dropped += 1
 
     def tick(self, now_s: float) -> NavConstraints:
         """Publish every topic at ``now_s`` and return the constraints."""
@@ -336,10 +351,12 @@ class AwarenessBridge:
         if missing or state is None or seen_s is None:
             return stopped(now_s, missing or "no sensor sees what is ahead")
         tracks = self.tracks
-        if self._scans is not None and CAMERA in self._watch.lost(now_s):
+        if self._scans and CAMERA in self._watch.lost(now_s):
             # As the camera alone would have it, whatever the tracker remembers.
             tracks = tuple(replace(each, awareness_lower=0.0, noticed=0.0) for each in tracks)
-        return guarded_update(self._adapter, tracks, state, now_s, seen_s, self._warn)
+        return guarded_update(
+            *(self._adapter, tracks, state, now_s, seen_s, self._warn), self._watch.seen.stamp_s
+        )
 
     def _missing(self) -> str:
         """Return what has not come yet or cannot be trusted; empty if nothing is missing."""
@@ -357,22 +374,25 @@ class AwarenessBridge:
         self._tracker.forget()
         self._poses.forget()
         self._watch.forget()
-        self._images.forget()
-        if self._scans is not None:
-            self._scans.forget()
+        for each in (self._images, *self._scans):
+            each.forget()
         self._warn("the clock has been set back: all tracks and moving transforms are deleted")
 
     def _sensors(self, now_s: float) -> tuple[DiagnosticStatus | None, list[str]]:
         """Return the status of the sensors, and a line for each loss and return."""
-        if self._scans is None and self._images.depth is None:
+        if not self._scans and self._images.depth is None:
             return None, []
         status = sensor_status(self._watch.ages_s(now_s), self._watch.lost(now_s))
         return status, self._watch.news(now_s)
 
-    def _scan_input(self) -> ScanInput:
-        if self._scans is None:
+    def _scan_input(self, number: int = 0) -> ScanInput:
+        if not self._scans:
             raise NavError("the bridge was made without scanners")
-        return self._scans
+        if not 0 <= number < len(self._scans):
+            raise NavError(
+                f"number must be that of a scanner, 0 to {len(self._scans) - 1}, got {number}"
+            )
+        return self._scans[number]
 
     def _warn(self, text: str) -> bool:
         """Pass on a problem; return False for the one that was passed on last."""
@@ -391,6 +411,7 @@ def guarded_update(
     now_s: float,
     perception_stamp_s: float,
     warn: Callable[[str], bool],
+    seen_stamp_s: Callable[[float, float], float | None] | None = None,
 ) -> NavConstraints:
     """Return the adapter's constraints, or a stop with the reason if it refuses or fails.
 
@@ -401,9 +422,16 @@ def guarded_update(
         now_s: the present time.
         perception_stamp_s: time from which perception is.
         warn: called with the problem; returns whether it is a new one.
+        seen_stamp_s: as for :meth:`NavAdapter.update`.
     """
     try:
-        return adapter.update(tracks, robot_state, now_s, perception_stamp_s=perception_stamp_s)
+        return adapter.update(
+            tracks,
+            robot_state,
+            now_s,
+            perception_stamp_s=perception_stamp_s,
+            seen_stamp_s=seen_stamp_s,
+        )
     except NavError as problem:
         warn(str(problem))
         reason = f"refused: {problem}"

@@ -7,7 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,74 +16,49 @@ from perception import (
     AwarenessPipeline,
     Camera,
     FloorPlane,
-    PerceptionError,
     PersonObservation,
 )
 from perception.arrays import FloatArray
 from perception.depth_image import MOST_APART_S
 from perception.errors import DepthImageError
-from perception.no_view import FROZEN, NoView, why_no_view
-from tracking import PersonTrack, TrackingError
+from perception.no_view import FROZEN, why_no_view
+from tracking import PersonTrack
 
 from .._errors import NavError
 from ._images import camera_of, depth_of, picture_of
-from ._shared import Refusals, Shared
+from ._poses import PoseSpread
+from ._shared import Input, Shared
 from .conversions import to_seconds
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 
 # Uncertainty of the height and the tilt of a camera on a driving robot.
 _HEIGHT_STD_M = 0.05
 _TILT_STD_RAD = math.radians(2.0)
+_NEEDS_NOISE: Final = " (frozen? a simulated camera needs noise)"
 # Depth images that are kept: a quarter of a second at 30 Hz.
 _KEPT: Final = 8
 
 
-@dataclass(frozen=True, eq=False)
-class StampedDepth:
-    """A depth image.
-
-    Attributes:
-        stamp_s: its time.
-        depth: (H, W) uint16 millimetres or float32 metres.
-    """
+class StampedDepth(NamedTuple):
+    """A depth image (H, W), uint16 millimetres or float32 metres, and its time."""
 
     stamp_s: float
     depth: NDArray[Any]
 
 
-class DepthReader:
-    """Keeps the latest depth images, and gives each picture the one nearest to it in time.
+class DepthInput(Input):
+    """The latest depth images, of which each picture is given the one nearest to it in time.
 
-    A depth image that cannot be used is refused, counted and reported; the picture is then seen
-    without. Only one that perception has used counts as heard.
+    Where one cannot be used, the picture is seen without. Only one that perception has used counts
+    as heard.
 
     Args:
         shared: by the bridge's inputs.
     """
 
     def __init__(self, shared: Shared) -> None:
-        self._shared = shared
-        self._refusals = Refusals(shared, "depth image")
+        super().__init__(shared, "depth image")
         self._kept: deque[StampedDepth] = deque(maxlen=_KEPT)
-        self._used = 0
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """Numbers of depth images that were used, and refused."""
-        return {"depth_images": self._used, "depth_images_refused": self._refusals.count}
-
-    def read(self, message: Image, now_s: float) -> bool:
-        """Keep a depth image; return False if it was refused."""
-        stamp_s = to_seconds(message.header.stamp)
-        try:
-            depth = depth_of(message)
-            with self._shared.lock:
-                self._shared.clock.check("depth_images", stamp_s, now_s, "its")
-                self._kept.append(StampedDepth(stamp_s, depth))
-        except NavError as problem:
-            self.refuse(str(problem), now_s)
-            return False
-        return True
 
     def nearest(self, stamp_s: float) -> StampedDepth | None:
         """Return the depth image of a picture; None if none is near enough in time."""
@@ -93,19 +68,23 @@ class DepthReader:
             return None
         return found
 
-    def refuse(self, problem: str, now_s: float) -> None:
-        """Count a depth image that cannot be used, and report it if none was lately."""
-        self._refusals.add(problem, now_s)
-
-    def used(self, depth: StampedDepth) -> None:
+    def note_used(self, depth: StampedDepth) -> None:
         """Note a depth image that perception has used; called with the lock."""
-        self._used += 1
+        self.used += 1
         self._shared.watch.saw_depth(depth.stamp_s)
 
     def forget(self) -> None:
-        """Forget all depth images; called with the lock."""
+        super().forget()
         self._kept.clear()
-        self._refusals.forget()
+
+    def _use(self, message: Image, now_s: float) -> bool:
+        stamp_s, depth = to_seconds(message.header.stamp), depth_of(message)
+        with self._shared.lock:
+            self._shared.clock.check("depth_images", stamp_s, now_s, "its")
+            if self._last.repeats(depth):
+                raise NavError(f"it is the same depth image as before{_NEEDS_NOISE}")
+            self._kept.append(StampedDepth(stamp_s, depth))
+        return True
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +110,7 @@ class PerceivedFrame:
     depth_problem: str = ""
 
 
-class ImageInput:
+class ImageInput(Input):
     """The bridge's camera: from its images to tracks, from the first calibration on.
 
     One thread at a time is in :meth:`read` or :meth:`calibrate`; others wait.
@@ -145,7 +124,6 @@ class ImageInput:
 
     Attributes:
         frame: the latest, or None before the first.
-        frames: number of images that were used.
         depth: the depth images; None if there are none.
     """
 
@@ -158,16 +136,14 @@ class ImageInput:
         rectified: bool = False,
         with_depth: bool = False,
     ) -> None:
-        self._shared, self._make_pipeline = shared, make_pipeline
+        super().__init__(shared, "image")
+        self._make_pipeline = make_pipeline
         self.frame: PerceivedFrame | None = None
-        self.frames = 0
-        self.depth = DepthReader(shared) if with_depth else None
+        self.depth = DepthInput(shared) if with_depth else None
         self._busy = threading.Lock()
         self._camera: Camera | None = None
         self._info: CameraInfo | None = None
         self._rectified = rectified
-        self._before: NDArray[np.uint8] | None = None
-        self._has_had_view = False
         if camera is not None:
             self._start(camera)
 
@@ -187,41 +163,39 @@ class ImageInput:
                 self._start(camera_of(message, rectified=self._rectified))
                 self._info = message
 
-    def read(self, message: Image | CompressedImage, now_s: float) -> bool:
-        """Process one image; return True if it was used."""
-        shared = self._shared
-        stamp_s, frame_id = to_seconds(message.header.stamp), message.header.frame_id
-        try:
-            with shared.lock:
-                if self._camera is None:
-                    raise NavError("no camera_info yet: the image cannot be used")
-                shared.clock.check("images", stamp_s, now_s, "the image's")
-                restarts = shared.clock.restarts
-                T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
-            frame = self._process(
-                message, stamp_s, T_odom_camera, lambda: shared.clock.restarts == restarts
-            )
-        except (NavError, PerceptionError, TrackingError) as problem:
-            shared.warn(f"image: {problem}")
-            return False
-        with shared.lock:
-            if frame is None or shared.clock.restarts != restarts:
-                return False
-            self.frame = frame
-            self.frames += 1
-            T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
-            shared.watch.saw_image(stamp_s, self._camera, T_base_camera)
-            if self.depth is not None and frame.depth is not None:
-                self.depth.used(frame.depth)
-        if self.depth is not None and frame.depth_problem:
-            self.depth.refuse(frame.depth_problem, now_s)
-        return True
+    def refuse(self, problem: str, now_s: float) -> None:
+        """Report an image that cannot be used: each is, for none may come that can."""
+        self._shared.warn(f"image: {problem}")
 
     def forget(self) -> None:
-        """Forget the latest frame and all depth images; called with the lock."""
+        super().forget()
         self.frame = None
         if self.depth is not None:
             self.depth.forget()
+
+    def _use(self, message: Image | CompressedImage, now_s: float) -> bool:
+        shared = self._shared
+        stamp_s, frame_id = to_seconds(message.header.stamp), message.header.frame_id
+        with shared.lock:
+            if self._camera is None:
+                raise NavError("no camera_info yet: the image cannot be used")
+            shared.clock.check("images", stamp_s, now_s, "the image's")
+            is_current = shared.still_current()
+            T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
+            spread = shared.poses.spread(stamp_s, frame_id)
+        frame = self._process(message, stamp_s, T_odom_camera, is_current, spread)
+        with shared.lock:
+            if frame is None or not is_current():
+                return False
+            self.frame = frame
+            self.used += 1
+            T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
+            shared.watch.saw_image(stamp_s, self._camera, T_base_camera)
+            if self.depth is not None and frame.depth is not None:
+                self.depth.note_used(frame.depth)
+        if self.depth is not None and frame.depth_problem:
+            self.depth.refuse(frame.depth_problem, now_s)
+        return True
 
     def _process(
         self,
@@ -229,6 +203,7 @@ class ImageInput:
         stamp_s: float,
         T_odom_camera: FloatArray,
         is_current: Callable[[], bool],
+        spread: PoseSpread,
     ) -> PerceivedFrame | None:
         """Return the frame of an image, or None if ``is_current`` says that it came too late.
 
@@ -242,10 +217,9 @@ class ImageInput:
         with self._busy:
             image = picture_of(message)
             self._fit(image.shape[1], image.shape[0])
-            no_view, self._before = why_no_view(image, self._before), image
-            if no_view and self._has_had_view:
-                raise _refusal(no_view)
-            self._has_had_view = no_view is None
+            if no_view := why_no_view(image, self._last):
+                hint = _NEEDS_NOISE if no_view == FROZEN else ""
+                raise NavError(f"the picture is no view: it is {no_view}{hint}")
             floor, problem = _floor(T_odom_camera), ""
             try:
                 given: dict[str, Any] = {}
@@ -255,11 +229,9 @@ class ImageInput:
             except DepthImageError as cause:  # before any network has run
                 depth, problem = None, str(cause)
                 observations = self._pipeline.process(image, stamp_s, floor=floor)
-            # Of a camera that has never had a view, such as a stand-in with blank pictures, people
-            # who are found count; that nobody is found means nothing.
-            if no_view and not observations:
-                raise _refusal(no_view)
-            tracks = self._shared.tracker.update(observations, stamp_s, T_odom_camera, is_current)
+            tracks = self._shared.tracker.update(
+                observations, stamp_s, T_odom_camera, is_current, spread
+            )
         if tracks is None:
             return None
         return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera, depth, problem)
@@ -287,11 +259,6 @@ class ImageInput:
         self._pipeline = self._make_pipeline(camera)
         self._shared.tracker.use_camera(camera)
         self._camera = camera
-
-
-def _refusal(no_view: NoView) -> NavError:
-    hint = " (frozen? a simulated camera needs noise)" if no_view == FROZEN else ""
-    return NavError(f"the picture is no view: it is {no_view}{hint}")
 
 
 def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
+from perception import PersonObservation
 from perception.arrays import FloatArray
 from perception.laser import RobotMotion
 
 from .._errors import NavError
 from .._robot import RobotState
+from ..rigid import Motion
 from ._clock import CLOCK_TOLERANCE_S, BridgeClock, InputKind
 from ._odometry_check import OdometryCheck
 from ._outgoing import Frames
@@ -26,11 +29,41 @@ from .messages.tf2_msgs import TFMessage
 # No robot drives or turns so fast: more is an error of the sender.
 _FASTEST_MPS: Final = 100.0
 _FASTEST_RADPS: Final = 100.0
+# After the newest odometry a robot keeps its velocity and its yaw rate but for this share, by which
+# wheels slip, and these standard deviations of their change.
+_RATE_SHARE: Final = 0.1
+_CHANGE_MPS2: Final = 1.0
+_CHANGE_RADPS2: Final = 2.0
 # A camera on a robot that looks for people never looks further up.
 _STEEPEST_RAD: Final = math.radians(60.0)
 # A body frame (x ahead, y left, z up) that is tilted down looks like an optical one that is rolled
 # by a quarter turn and looks up. No camera that is mounted so looks further up than this.
 _STEEPEST_ROLLED_RAD: Final = math.radians(30.0)
+
+
+class PoseSpread(NamedTuple):
+    """Standard deviations of a robot's pose: of its place, to all sides, and of its heading."""
+
+    place_m: float = 0.0
+    heading_rad: float = 0.0
+
+    def widened(
+        self, observations: Iterable[PersonObservation], T_odom_sensor: FloatArray
+    ) -> tuple[PersonObservation, ...]:
+        """Return the observations of a sensor on the robot with its pose's error in their places.
+
+        An error of the heading moves people aside, the more the farther away they are.
+        """
+        if not any(self):
+            return tuple(observations)
+        up = T_odom_sensor[2, :3]
+        level = self.place_m**2 * (np.eye(3) - np.outer(up, up))
+        widened = []
+        for each in observations:
+            aside = self.heading_rad * np.cross(up, each.position_camera_m)
+            covariance = each.position_covariance_m2 + level + np.outer(aside, aside)
+            widened.append(replace(each, position_covariance_m2=covariance))
+        return tuple(widened)
 
 
 class RobotPoses:
@@ -145,11 +178,11 @@ class RobotPoses:
             NavError: for a pose that is not known at that time, or not of an optical frame.
         """
         T_base_camera = self._T_base_camera
+        if in_odom := self._frame_in_odom(frame):
+            T_odom_camera = self.transforms.lookup(self._frames.odom, in_odom, stamp_s)
+            return _optical(T_odom_camera, in_odom, self._frames.odom)
         if T_base_camera is None:
             frame = self._frames.camera or frame
-            if not self._is_on_robot(frame):
-                T_odom_camera = self.transforms.lookup(self._frames.odom, frame, stamp_s)
-                return _optical(T_odom_camera, frame, self._frames.odom)
             T_base_camera = _optical(self.in_base(frame, stamp_s), frame, self._frames.base)
         return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
 
@@ -181,15 +214,41 @@ class RobotPoses:
         state = self.state
         if state is None:
             raise NavError("no odometry yet: the pose of the robot is unknown")
-        velocity_mps = np.array([state.speed_mps, state.lateral_mps])
         # Raises where the odometry ends too long before, also for a scan after its end.
         T_end = self._T_odom_base(end_s)
-        if end_s > state.stamp_s:
-            T = self._T_odom_base(state.stamp_s)
-            return RobotMotion(state.stamp_s, T, velocity_mps, state.yaw_rate_radps)
-        if end_s <= start_s:
-            return RobotMotion(end_s, T_end, velocity_mps, state.yaw_rate_radps)
-        return RobotMotion.between(start_s, self._T_odom_base(start_s), end_s, T_end)
+        if start_s < end_s <= state.stamp_s:
+            return RobotMotion.between(start_s, self._T_odom_base(start_s), end_s, T_end)
+        at_s = min(end_s, state.stamp_s)
+        velocity_mps = np.array([state.speed_mps, state.lateral_mps])
+        return RobotMotion(at_s, self._T_odom_base(at_s), velocity_mps, state.yaw_rate_radps)
+
+    def spread(self, stamp_s: float, camera: str | None = None) -> PoseSpread:
+        """Return the error of the pose of the robot, or of its camera, at a time.
+
+        There is none up to the newest odometry. A camera whose pose in odom comes from tf is held
+        where it was, so that the whole motion since then is its error.
+
+        Args:
+            stamp_s: the time.
+            camera: frame of the images; None for the robot's own pose.
+        """
+        state, share = self.state, _RATE_SHARE
+        if state is None:
+            return PoseSpread()
+        after_s = stamp_s - state.stamp_s
+        if camera is not None and (frame := self._frame_in_odom(camera)):
+            after_s, share = stamp_s - self.transforms.latest_s(self._frames.odom, frame), 1.0
+        if after_s <= 0.0:
+            return PoseSpread()
+        return PoseSpread(
+            after_s * (share * state.travel_mps + 0.5 * after_s * _CHANGE_MPS2),
+            after_s * (share * abs(state.yaw_rate_radps) + 0.5 * after_s * _CHANGE_RADPS2),
+        )
+
+    def _frame_in_odom(self, camera: str) -> str:
+        """Return the frame of a camera whose pose in odom tf has; empty for one on the robot."""
+        frame = self._frames.camera or camera
+        return "" if self._T_base_camera is not None or self._is_on_robot(frame) else frame
 
     def _is_future(self, kind: InputKind, stamp_s: float, now_s: float | None) -> bool:
         """Return whether a message is from the future; it is then counted."""
@@ -246,7 +305,8 @@ class RobotPoses:
             turning_base[2],
             velocity_base[:2],
         )
-        self._odometry.add(self._frames.odom, base, stamp_s, T_odom_base)
+        motion = Motion(0.0, 0.0, 0.0, state.speed_mps, state.lateral_mps, state.yaw_rate_radps)
+        self._odometry.add(self._frames.odom, base, stamp_s, T_odom_base, motion=motion)
         if self.state is None or stamp_s >= self.state.stamp_s:
             self.state = state
             self._check.add(stamp_s, T_odom_child, velocity, turning, child)

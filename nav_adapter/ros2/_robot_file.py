@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
+from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray
 from perception.laser import Scanner
@@ -47,23 +48,9 @@ class CameraMount(NavConfig):
 
     def T_base_camera(self) -> FloatArray:  # noqa: N802 - frames in names
         """(4, 4) pose of the optical frame (x right, y down, z forward) in the base frame."""
-        yaw, pitch = math.radians(self.yaw_deg), math.radians(self.pitch_down_deg)
-        turn_left = np.array(
-            [
-                [math.cos(yaw), -math.sin(yaw), 0.0],
-                [math.sin(yaw), math.cos(yaw), 0.0],
-                [0.0, 0.0, 1.0],
-            ]
-        )
-        turn_down = np.array(
-            [
-                [math.cos(pitch), 0.0, math.sin(pitch)],
-                [0.0, 1.0, 0.0],
-                [-math.sin(pitch), 0.0, math.cos(pitch)],
-            ]
-        )
+        turn = Rotation.from_euler("ZY", (self.yaw_deg, self.pitch_down_deg), degrees=True)
         T = np.eye(4)
-        T[:3, :3] = turn_left @ turn_down @ [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+        T[:3, :3] = turn.as_matrix() @ [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
         T[:3, 3] = self.position_base_m
         return T
 

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from perception import PerceptionError, PersonObservation
+from perception import PersonObservation
 from perception.arrays import FloatArray
 from perception.laser import (
     LaserScan,
@@ -25,12 +25,14 @@ from perception.laser import (
     scan_points,
     sight_of,
 )
-from tracking import ScannerView, TrackingError
+from perception.no_view import LastFrames
+from tracking import ScannerView
 
 from .._errors import NavError
 from ._robot_file import RobotFile, ScannerMount
 from ._scans import ScanMessages, map_cells_of
-from ._shared import Refusals, Shared
+from ._shared import Input, Shared
+from .conversions import pose_matrix, yaw_quaternion
 from .messages.nav_msgs import OccupancyGrid
 from .messages.sensor_msgs import LaserScan as LaserScanMessage
 
@@ -43,9 +45,8 @@ _MAP_REACH_M: Final = 30.0
 _MAP_LEFT_M: Final = 10.0
 _MAP_MOVED_M: Final = 0.03
 _MAP_TURNED_RAD: Final = math.radians(0.2)
-# A robot that has moved so far sees other ranges than before.
-_MOVED_M: Final = 0.05
-_TURNED_RAD: Final = math.radians(2.0)
+# Scans agree with the map again when they have done so for this time.
+_AGREES_AFTER_S: Final = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +129,8 @@ class ScanPerception:
         T_base_scanner: FloatArray,
         motion: RobotMotion,
         static_map: tuple[MapCells, FloatArray] | None = None,
-    ) -> PerceivedScan:
-        """Return the people in a scan.
+    ) -> tuple[PerceivedScan, bool]:
+        """Return the people in a scan, and whether it contradicts the map.
 
         Args:
             number: of the scanner.
@@ -158,24 +159,26 @@ class ScanPerception:
             )
         points = scan_points(scan, scanner, motion)
         low, high = float(angles.min()), float(angles.max())
-        turned = _turned_about_z(T_base_scanner, 0.5 * (low + high))
-        T_odom_scanner = motion.pose_at(points.stamp_s) @ turned
+        to_middle = pose_matrix((0.0, 0.0, 0.0), yaw_quaternion(0.5 * (low + high)))
+        T_odom_scanner = motion.pose_at(points.stamp_s) @ T_base_scanner @ to_middle
         with self._busy:
             self._use_map(static_map, motion.T_odom_base[:2, 3])
             candidates = self._detector.detect(points, number)
             self._found[number] = points.stamp_s, candidates
             own = self._without_others_trolleys(number)
+            contradicted = self._detector.map_contradicted
         field_rad = min(high - low + abs(scan.angle_increment_rad), 2.0 * math.pi)
         default = ScannerView()
         reach_m = min(default.max_range_m, scan.range_max_m)
         nearest_m = min(max(default.min_range_m, scan.range_min_m), reach_m)
-        return PerceivedScan(
+        perceived = PerceivedScan(
             points.stamp_s,
             T_odom_scanner,
             sight_of(scan, scanner, points),
             ScannerView(reach_m, nearest_m, field_rad, points),
             observations_of(own, T_odom_scanner),
         )
+        return perceived, contradicted
 
     def _without_others_trolleys(self, number: int) -> tuple[PersonCandidate, ...]:
         """Return a scanner's candidates but for trolleys of people whom another one sees.
@@ -215,168 +218,132 @@ class ScanPerception:
         self._placed = cells, T, np.array(robot_odom_m)
 
 
-def _turned_about_z(T: FloatArray, angle_rad: float) -> FloatArray:
-    turn = np.eye(4)
-    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
-    turn[:2, :2] = [[cos, -sin], [sin, cos]]
-    return np.asarray(T @ turn)
-
-
-class ScanInput:
-    """The bridge's laser scanners: from their scans to tracks.
-
-    A scan that cannot be used is refused, counted and reported; the next one is read as if it had
-    not come. So it is, but for its stamp, with a scan that shows nothing: its scanner is blind.
+class MapInput:
+    """The map of what stands still, and whether the scans agree with it. Each change is reported.
 
     Args:
         shared: by the bridge's inputs.
-        inputs: the scanners.
-        perception: finds the people.
         odom_frame: name of the fixed frame.
     """
 
-    def __init__(
-        self,
-        shared: Shared,
-        inputs: tuple[ScannerInput, ...],
-        perception: ScanPerception,
-        odom_frame: str,
-    ) -> None:
-        self._shared, self._inputs, self._perception = shared, inputs, perception
-        self._odom_frame = odom_frame
-        self._last_s = [-math.inf] * len(inputs)
-        # The first of the scans that are equal, and the robot's pose then.
-        self._repeated: list[tuple[LaserScan, FloatArray] | None] = [None] * len(inputs)
-        self._messages = [ScanMessages(each.name, shared.warn) for each in inputs]
-        self._refusals = [Refusals(shared, f"{each.name}: scan") for each in inputs]
-        self._map: MapCells | None = None
-        # None until the first scan after a new map; each change is reported once.
-        self._map_used: bool | None = None
-        self._read = self._dropped = 0
+    def __init__(self, shared: Shared, odom_frame: str) -> None:
+        self._shared, self._odom_frame = shared, odom_frame
+        self._cells: MapCells | None = None
+        self._said = ""
+        self._contradicted_s = -math.inf
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Numbers of scans that were used, refused, and dropped because the computer was busy."""
-        return {
-            "scans": self._read,
-            "scans_refused": sum(each.count for each in self._refusals),
-            "scans_dropped": self._dropped,
-            "frames_refused_by_tracker": self._shared.tracker.refused_frames,
-        }
-
-    def read(self, number: int, message: LaserScanMessage, now_s: float) -> bool:
-        """Process one scan; return True if it was used.
-
-        Raises:
-            NavError: for a number that no scanner has.
-        """
-        if not 0 <= number < len(self._inputs):
-            raise NavError(
-                f"number must be that of a scanner, 0 to {len(self._inputs) - 1}, got {number}"
-            )
-        try:
-            used = self._process(number, message, now_s)
-        except (NavError, PerceptionError, TrackingError) as problem:
-            self.refuse(number, str(problem), now_s)
-            return False
-        return used
-
-    def refuse(self, number: int, problem: str, now_s: float) -> None:
-        """Count a scan that cannot be used, and report it if none of its scanner was lately."""
-        self._refusals[number].add(problem, now_s)
-
-    def dropped(self) -> None:
-        """Count a scan that was dropped."""
-        with self._shared.lock:
-            self._dropped += 1
-
-    def set_map(self, message: OccupancyGrid | MapCells) -> None:
-        """Use a map of what stands still, a message or from a file, from now on.
+    def set(self, message: OccupancyGrid | MapCells) -> None:
+        """Use a map, a message or from a file, from now on.
 
         Raises:
             NavError: for a map that cannot be used.
         """
         cells = message if isinstance(message, MapCells) else map_cells_of(message)
         with self._shared.lock:
-            self._map, self._map_used = cells, None
+            self._cells, self._said = cells, ""
 
-    def forget(self) -> None:
-        """Forget the stamps of earlier scans, and the scans."""
-        self._last_s = [-math.inf] * len(self._inputs)
-        self._repeated = [None] * len(self._inputs)
-        for each in self._refusals:
-            each.forget()
-
-    def _process(self, number: int, message: LaserScanMessage, now_s: float) -> bool:
-        scan = self._messages[number].read(message, now_s)
-        middle_s = 0.5 * (scan.stamp_s + scan.end_s)
-        with self._shared.lock:
-            self._shared.clock.check("scans", middle_s, now_s, "the scan's")
-            last_s = self._last_s[number]
-            if scan.stamp_s <= last_s:
-                raise NavError(
-                    f"the scan's stamp is {last_s - scan.stamp_s:.3f} s before that of the last one"
-                )
-            restarts = self._shared.clock.restarts
-            mount = self._inputs[number].mount
-            if mount is None:
-                T_base_scanner = self._shared.poses.in_base(message.header.frame_id, scan.stamp_s)
-            else:
-                T_base_scanner = mount.T_base_scanner()
-            motion = self._shared.poses.motion(scan.stamp_s, scan.end_s)
-            static_map = self._map_in_odom(scan.stamp_s)
-            self._require_live(number, scan, motion.T_odom_base)
-        seen = self._perception.process(number, scan, T_base_scanner, motion, static_map)
-        if seen.sight.nothing:
-            with self._shared.lock:
-                if self._shared.clock.restarts == restarts:
-                    self._last_s[number] = scan.stamp_s
-                    self._shared.watch.saw_scan(number, seen.stamp_s, seen.sight)
-            return False
-        tracks = self._shared.tracker.update(
-            seen.observations,
-            seen.stamp_s,
-            seen.T_odom_scanner,
-            lambda: self._shared.clock.restarts == restarts,
-            scanner=number,
-            view=seen.view,
-        )
-        with self._shared.lock:
-            if tracks is None or self._shared.clock.restarts != restarts:
-                return False
-            self._last_s[number] = scan.stamp_s
-            self._shared.watch.saw_scan(number, seen.stamp_s, seen.sight)
-            self._read += 1
-        return True
-
-    def _require_live(self, number: int, scan: LaserScan, T_odom_base: FloatArray) -> None:
-        """Refuse a scan that repeats those before it although the robot has moved.
-
-        While it stands, a scanner without noise, as in a simulator, repeats itself as well.
-        """
-        since = self._repeated[number]
-        if since is None or not scan.repeats(since[0]):
-            self._repeated[number] = scan, T_odom_base
-            return
-        step = np.linalg.inv(since[1]) @ T_odom_base
-        moved_m, turned_rad = math.hypot(*step[:2, 3]), abs(math.atan2(step[1, 0], step[0, 0]))
-        if moved_m > _MOVED_M or turned_rad > _TURNED_RAD:
-            raise NavError(
-                "all ranges are those of scans before the robot moved, so the scanner is frozen"
-            )
-
-    def _map_in_odom(self, stamp_s: float) -> tuple[MapCells, FloatArray] | None:
+    def in_odom(self, stamp_s: float) -> tuple[MapCells, FloatArray] | None:
         """Return the map and its pose, or None without a map, or while its pose is unknown."""
-        if self._map is None:
+        cells = self._cells
+        if cells is None:
             return None
         try:
-            T = self._shared.poses.transforms.lookup(self._odom_frame, self._map.frame_id, stamp_s)
+            T = self._shared.poses.transforms.lookup(self._odom_frame, cells.frame_id, stamp_s)
         except NavError as problem:
-            if self._map_used is not False:
-                self._shared.warn(f"the map is not used: {problem}")
-            self._map_used = False
+            self._say("the map is not used", f": {problem}")
             return None
-        if self._map_used is not True:
-            self._shared.warn("the map is used")
-        self._map_used = True
-        return self._map, T
+        return cells, T
+
+    def judge(self, contradicted: bool, stamp_s: float) -> None:
+        """Note whether a scan contradicts the map; after one that does, others must agree for 2 s.
+
+        Args:
+            contradicted: whether it does.
+            stamp_s: of the scan.
+        """
+        if contradicted:
+            self._contradicted_s = stamp_s
+        if 0.0 <= stamp_s - self._contradicted_s <= _AGREES_AFTER_S:
+            more = ", so the robot is elsewhere than localisation says; it is used for no such scan"
+            self._say("the scans contradict the map", more)
+        else:
+            self._say("the map is used")
+
+    def _say(self, text: str, more: str = "") -> None:
+        if text != self._said:
+            self._said = text
+            self._shared.warn(text + more)
+
+
+class ScanInput(Input):
+    """A laser scanner of the bridge: from its scans to tracks.
+
+    After a scan that cannot be used, the next one is read as if it had not come. So it is, but for
+    its stamp, after one that shows nothing: the scanner is blind.
+
+    Args:
+        shared: by the bridge's inputs.
+        number: of the scanner.
+        scanner: its name and mount.
+        perception: finds the people in the scans of all scanners.
+        static_map: what stands still.
+    """
+
+    def __init__(
+        self,
+        shared: Shared,
+        number: int,
+        scanner: ScannerInput,
+        perception: ScanPerception,
+        static_map: MapInput,
+    ) -> None:
+        super().__init__(shared, f"{scanner.name}: scan")
+        self._number, self._mount = number, scanner.mount
+        self._perception, self._map = perception, static_map
+        self._messages = ScanMessages(scanner.name, shared.warn)
+        self._last_s = -math.inf
+
+    def forget(self) -> None:
+        super().forget()
+        self._last_s, self._last = -math.inf, LastFrames()
+
+    def _use(self, message: LaserScanMessage, now_s: float) -> bool:
+        shared, scan = self._shared, self._messages.read(message, now_s)
+        middle_s = 0.5 * (scan.stamp_s + scan.end_s)
+        with shared.lock:
+            shared.clock.check("scans", middle_s, now_s, "the scan's")
+            if (late_s := self._last_s - scan.stamp_s) >= 0.0:
+                raise NavError(f"the scan's stamp is {late_s:.3f} s before that of the last one")
+            is_current, mount = shared.still_current(), self._mount
+            if mount is None:
+                T_base_scanner = shared.poses.in_base(message.header.frame_id, scan.stamp_s)
+            else:
+                T_base_scanner = mount.T_base_scanner()
+            motion = shared.poses.motion(scan.stamp_s, scan.end_s)
+            spread = shared.poses.spread(middle_s)
+            static_map = self._map.in_odom(scan.stamp_s)
+            if scan.repeats(self._last, motion.T_odom_base):
+                raise NavError(
+                    "all ranges are those of a scan before the robot moved, so the scanner is "
+                    "frozen"
+                )
+        seen, contradicted = self._perception.process(
+            *(self._number, scan, T_base_scanner, motion, static_map)
+        )
+        if static_map is not None:
+            self._map.judge(contradicted, seen.stamp_s)
+        if not seen.sight.nothing:
+            tracks = shared.tracker.update(
+                *(seen.observations, seen.stamp_s, seen.T_odom_scanner, is_current, spread),
+                scanner=self._number,
+                view=seen.view,
+            )
+            if tracks is None:
+                return False
+        with shared.lock:
+            if not is_current():
+                return False
+            self._last_s = scan.stamp_s
+            shared.watch.saw_scan(self._number, seen.stamp_s, seen.sight)
+            self.used += not seen.sight.nothing
+        return not seen.sight.nothing

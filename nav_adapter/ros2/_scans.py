@@ -32,6 +32,11 @@ _SWEEP_SHARE: Final = 1.5
 # So many scans show how often they come. Two scanners may share a topic.
 _SCANS: Final = 5
 _SWEEPS_AT_ONCE: Final = 2.5
+# A scanner is stamped at the end of its sweeps if that many of so many scans come before they end
+# by their stamps: all do then, but for those that are delayed, and of others only those of a clock
+# that is being set.
+_ARRIVALS: Final = 20
+_EARLY_SHARE: Final = 0.25
 # No scanner that is used on a robot sweeps more slowly.
 _LONGEST_SWEEP_S: Final = 2.0
 # Ranges beyond the limit with fewer values are codes of a driver, not distances.
@@ -57,15 +62,15 @@ class ScanMessages:
 
     def __init__(self, name: str, warn: Callable[[str], object]) -> None:
         self._name, self._warn = name, warn
-        self._stamped_at_end = False
+        self._came_early: deque[bool] = deque(maxlen=_ARRIVALS)
         self._stamps_s: deque[float] = deque(maxlen=_SCANS)
         self._said: set[str] = set()
 
     def read(self, message: Any, now_s: float) -> LaserScan:
         """Return the scan of a message that came at ``now_s``.
 
-        A scanner whose sweep ends after its message has come is stamped at the end of the sweep.
-        From then on its scans are read so.
+        A scanner whose sweeps end after their messages have come is stamped at the end of the
+        sweep, and its scans are read so while at least a quarter of the last ones came so early.
 
         Raises:
             NavError: as :func:`laser_scan_of`, for sweeps that would go on while others begin, and
@@ -81,22 +86,24 @@ class ScanMessages:
             raise NavError(
                 f"time_increment × rays is {sweep_s:.3f} s, but scans come every {every_s:.3f} s"
             )
-        latest_s = now_s + CLOCK_TOLERANCE_S
-        if not self._stamped_at_end and scan.stamp_s <= latest_s < scan.end_s:
-            if 0.0 < _SWEEP_SHARE * message.scan_time < sweep_s:
-                raise NavError(
-                    f"time_increment × rays is {sweep_s:.3f} s, but scan_time "
-                    f"{message.scan_time:.3f} s: the last ray would be {scan.end_s - now_s:.3f} s "
-                    "ahead of this computer's clock"
-                )
-            self._stamped_at_end = True
-            self._say(
-                "stamp",
-                f"the sweep ends {scan.end_s - now_s:.3f} s after its message came "
-                f"(time_increment × rays is {sweep_s:.3f} s): the stamp is taken for that of the "
-                "last ray",
+        if scan.stamp_s <= (latest_s := now_s + CLOCK_TOLERANCE_S):
+            self._came_early.append(scan.end_s > latest_s)
+        share = sum(self._came_early) / max(len(self._came_early), 1)
+        if share < _EARLY_SHARE:
+            return scan
+        if scan.end_s > latest_s and 0.0 < _SWEEP_SHARE * message.scan_time < sweep_s:
+            raise NavError(
+                f"time_increment × rays is {sweep_s:.3f} s, but scan_time "
+                f"{message.scan_time:.3f} s: the last ray would be {scan.end_s - now_s:.3f} s "
+                "ahead of this computer's clock"
             )
-        return replace(scan, stamp_s=scan.stamp_s - sweep_s) if self._stamped_at_end else scan
+        self._say(
+            "stamp",
+            f"the sweep ends {scan.end_s - now_s:.3f} s after its message came "
+            f"(time_increment × rays is {sweep_s:.3f} s): the stamp is taken for that of the "
+            "last ray, while scans come so early",
+        )
+        return replace(scan, stamp_s=scan.stamp_s - sweep_s)
 
     def _say(self, what: str, text: str) -> None:
         if what not in self._said:

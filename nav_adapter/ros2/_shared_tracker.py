@@ -20,6 +20,8 @@ from tracking import (
     View,
 )
 
+from ._poses import PoseSpread
+
 # Networks may take so long for an image; the scans of that time are computed again.
 _MAX_LAG_S: Final = 1.0
 
@@ -93,6 +95,7 @@ class SharedTracker:
         stamp_s: float,
         T_odom_sensor: FloatArray,
         is_current: Callable[[], bool],
+        spread: PoseSpread,
         *,
         scanner: int | None = None,
         view: ScannerView | None = None,
@@ -104,6 +107,7 @@ class SharedTracker:
             stamp_s: of the frame.
             T_odom_sensor: (4, 4) pose of camera or scanner.
             is_current: called once the tracker is free, and reset if that was wanted.
+            spread: of the robot's pose, which the people's places share.
             scanner: number of the scanner; None for the camera.
             view: of the scan.
 
@@ -119,12 +123,11 @@ class SharedTracker:
                 self._tracker.reset()
             if not is_current():
                 return None
-            if scanner is None:
-                tracks = self._tracker.update(observations, stamp_s, T_odom_sensor)
-            else:
-                tracks = self._tracker.update(
-                    observations, stamp_s, T_odom_sensor, sensor=self._names[scanner], view=view
-                )
+            named: dict[str, Any] = {}
+            if scanner is not None:
+                named = {"sensor": self._names[scanner], "view": view}
+            widened = spread.widened(observations, T_odom_sensor)
+            tracks = self._tracker.update(widened, stamp_s, T_odom_sensor, **named)
             with self._handing_over:
                 if not self._reset_wanted:
                     self._latest = tracks

@@ -4,33 +4,44 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right, insort
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray, finite_number, rigid_transform
 
 from .._errors import NavError
-from .conversions import pose_matrix, to_seconds
+from ..rigid import Motion
+from .conversions import pose_matrix, to_seconds, yaw_quaternion
 from .messages.geometry_msgs import TransformStamped
 
 _KEPT_S: Final = 5.0
 #: The newest transform is used for at most this long after its stamp.
 HOLD_S: Final = 0.1
+# Below this turn an arc is a straight line but for rounding.
+_STRAIGHT_RAD: Final = 1e-6
+
+
+class _Sample(NamedTuple):
+    """The pose of a frame in its parent, and how it moves on from there, in itself."""
+
+    stamp_s: float
+    T: FloatArray
+    motion: Motion
 
 
 class TransformBuffer:
     """Stores the transforms of the last 5 s and looks up those between any two frames of a tree.
 
-    It interpolates between two stamps. The newest transform is used for up to 0.1 s after its
-    stamp; there is no extrapolation before the oldest. Static transforms hold at all times and
-    have no stamp.
+    Between two stamps, a frame moves at constant velocity and turning speed, along an arc. For up
+    to 0.1 s after the newest it keeps its motion, as far as it is known; there is no extrapolation
+    before the oldest. Static transforms hold at all times and have no stamp.
     """
 
     def __init__(self) -> None:
         self._parents: dict[str, str] = {}
-        self._histories: dict[str, list[tuple[float, FloatArray]]] = {}
+        self._histories: dict[str, list[_Sample]] = {}
         self._static: set[str] = set()
 
     def add(
@@ -41,8 +52,9 @@ class TransformBuffer:
         T_parent_child: FloatArray,
         *,
         static: bool = False,
+        motion: Motion | None = None,
     ) -> None:
-        """Store the pose of ``child`` in ``parent``.
+        """Store the pose of ``child`` in ``parent``, and its motion from there in its own frame.
 
         A frame has one parent. A transform with another parent replaces the frame's history.
 
@@ -60,8 +72,9 @@ class TransformBuffer:
         self._parents[child] = parent
         (self._static.add if static else self._static.discard)(child)
         history = self._histories[child]
-        insort(history, (stamp, T), key=lambda entry: entry[0])
-        while history[-1][0] - history[0][0] > _KEPT_S:
+        sample = _Sample(stamp, T, motion or Motion(0.0, 0.0))
+        insort(history, sample, key=lambda entry: entry.stamp_s)
+        while history[-1].stamp_s - history[0].stamp_s > _KEPT_S:
             del history[0]
 
     def add_message(self, message: TransformStamped, *, static: bool) -> None:
@@ -90,9 +103,9 @@ class TransformBuffer:
         """
         forgotten = 0
         for child, history in list(self._histories.items()):
-            if child in self._static or history[-1][0] <= after_s:
+            if child in self._static or history[-1].stamp_s <= after_s:
                 continue
-            kept = [entry for entry in history if entry[0] <= after_s]
+            kept = [entry for entry in history if entry.stamp_s <= after_s]
             forgotten += len(history) - len(kept)
             if kept:
                 self._histories[child] = kept
@@ -139,7 +152,7 @@ class TransformBuffer:
         """
         children = [child for way in self.ways(target, source) for child in way[:-1]]
         moving = (child for child in children if child not in self._static)
-        return min((self._histories[child][-1][0] for child in moving), default=math.inf)
+        return min((self._histories[child][-1].stamp_s for child in moving), default=math.inf)
 
     def _path(self, frame: str) -> list[str]:
         """Return the frame and all its ancestors, up to the root."""
@@ -158,26 +171,49 @@ class TransformBuffer:
     def _at(self, child: str, stamp: float) -> FloatArray:
         """Return the pose of a frame in its parent."""
         history = self._histories[child]
-        after = bisect_right(history, stamp, key=lambda entry: entry[0])
-        if child in self._static or (after > 0 and history[after - 1][0] == stamp):
-            return history[max(after - 1, 0)][1]
+        if child in self._static:
+            return history[-1].T
+        after = bisect_right(history, stamp, key=lambda entry: entry.stamp_s)
         if after == 0:
             raise NavError(
                 f"transform of {child!r} is wanted at {stamp:.3f} s and known from "
-                f"{history[0][0]:.3f} s on"
+                f"{history[0].stamp_s:.3f} s on"
             )
-        before_s, before = history[after - 1]
-        if after == len(history):
-            if stamp - before_s > HOLD_S:
-                raise NavError(
-                    f"transform of {child!r} is wanted at {stamp:.3f} s and known until "
-                    f"{before_s:.3f} s (holds {HOLD_S:g} s longer)"
-                )
-            return before
-        later_s, later = history[after]
-        share = (stamp - before_s) / (later_s - before_s)
-        T = np.eye(4)
-        turns = Rotation.from_matrix(np.stack([before[:3, :3], later[:3, :3]]))
-        T[:3, :3] = Slerp([0.0, 1.0], turns)(share).as_matrix()
-        T[:3, 3] = (1.0 - share) * before[:3, 3] + share * later[:3, 3]
-        return T
+        before_s, before, motion = history[after - 1]
+        since_s = stamp - before_s
+        if after < len(history):
+            later = history[after]
+            step = np.linalg.inv(before) @ later.T
+            return np.asarray(before @ _part(step, since_s / (later.stamp_s - before_s)))
+        if since_s > HOLD_S:
+            raise NavError(
+                f"transform of {child!r} is wanted at {stamp:.3f} s and known until "
+                f"{before_s:.3f} s (holds {HOLD_S:g} s longer)"
+            )
+        x_m, y_m, heading_rad, *_ = motion.at(since_s)
+        return np.asarray(before @ pose_matrix((x_m, y_m, 0.0), yaw_quaternion(heading_rad)))
+
+
+def _part(step: FloatArray, share: float) -> FloatArray:
+    """Return the part (4, 4) of a step that a body at constant velocity in itself has made.
+
+    It moves along a screw, so that the part is the same from whichever frame it is looked at.
+    """
+    turn = Rotation.from_matrix(step[:3, :3]).as_rotvec()
+    part = np.eye(4)
+    part[:3, :3] = Rotation.from_rotvec(share * turn).as_matrix()
+    velocity = np.linalg.solve(_way(turn), step[:3, 3])
+    part[:3, 3] = _way(share * turn) @ (share * velocity)
+    return part
+
+
+def _way(turn: FloatArray) -> FloatArray:
+    """Return the matrix (3, 3) from a velocity in a body to its way in a second of that turn."""
+    x, y, z = turn.tolist()
+    angle = math.hypot(x, y, z)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < _STRAIGHT_RAD:
+        return np.eye(3) + 0.5 * cross
+    aside = 2.0 * math.sin(0.5 * angle) ** 2 / angle**2
+    along = (angle - math.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) + aside * cross + along * cross @ cross)

@@ -11,12 +11,13 @@ calibrate``; by default none), ``rate_hz`` (20.0), ``scanners`` (number of laser
 without it), ``odom_frame``, ``base_frame``, ``camera_frame``; for Nav2's speed filter
 ``speed_mask_hz`` (0.0; masks per second, 0 for none), ``speed_mask_size_m`` (10.0) and
 ``speed_mask_resolution_m`` (0.1). Topics are renamed by ROS's
-remapping. The module can be imported without ROS; the node then raises an error that says what is
-missing.
+remapping. rclpy comes with ROS 2, or from wheels for trying it (docs/nav2.md, With ROS). The module
+can be imported without it; the node then raises an error that says what is missing.
 """
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -30,6 +31,7 @@ from perception import (
     OnnxPoseEstimator,
     PerceptionError,
 )
+from perception.arrays import finite_number
 from perception.networks import OnnxModel
 from perception.shipped import (
     DETECTOR,
@@ -57,6 +59,8 @@ from .messages.tf2_msgs import TFMessage
 
 try:
     import rclpy
+    from rclpy.exceptions import InvalidParameterTypeException
+    from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
     from rclpy.signals import SignalHandlerOptions
@@ -64,6 +68,7 @@ except ImportError:  # AwarenessNode says what is missing
     rclpy = None
     Node = object
 
+_LONGEST_WAIT_S: Final = 0.1
 _TOPICS: Final = {**PUBLISHED, **MASK_TOPICS}
 
 
@@ -81,11 +86,17 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
     def __init__(self) -> None:
         if rclpy is None:
             raise NavError(
-                "the node needs rclpy, which comes with ROS 2 and not from pip: source its "
-                "setup.bash, or use `awarenav bridge`, which needs no ROS"
+                "the node needs rclpy: source ROS 2's setup.bash, take it from wheels "
+                "(docs/nav2.md, With ROS), or use `awarenav bridge`, which needs no ROS"
             )
         super().__init__("awarenav")
-        robot = RobotFile.from_yaml(self._parameter("robot_file", ""))
+        robot_file = self._parameter("robot_file", "")
+        if not robot_file:
+            raise NavError("robot_file must name the robot's file: -p robot_file:=robot.yaml")
+        robot = RobotFile.from_yaml(robot_file)
+        rate_hz = finite_number(
+            "rate_hz", self._parameter("rate_hz", 20.0), NavError, minimum=1.0, maximum=200.0
+        )
         policy = self._parameter("policy", "balanced")
         calibration = self._parameter("prediction_file", "")
         use_camera = self._parameter("use_camera", True)
@@ -139,7 +150,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             self._subscribe(topic, partial(self._scan, number))
         if use_map:
             self._subscribe(READ["map"], self._map)
-        self.create_timer(1.0 / self._parameter("rate_hz", 20.0), self._tick)
+        self.create_timer(1.0 / rate_hz, self._tick)
 
     def stop(self) -> None:
         """Publish a stop and end perception, before the node ends."""
@@ -219,24 +230,36 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         self.create_subscription(ros_class(topic.message), topic.name, callback, _qos(topic))
 
     def _parameter(self, name: str, default: Any) -> Any:
-        return self.declare_parameter(name, default).value
+        try:
+            return self.declare_parameter(name, default).value
+        except InvalidParameterTypeException as problem:
+            raise NavError(str(problem)) from problem
 
     def _now_s(self) -> float:
-        return float(self.get_clock().now().nanoseconds) * 1e-9
+        # The nearest number, as for a recording.
+        return float(self.get_clock().now().nanoseconds / 1e9)
 
 
 def main() -> int:
-    """Run the node until Ctrl-C; return 0, or 2 for bad input."""
+    """Run the node until Ctrl-C or SIGTERM; return 0, or 2 for bad input."""
     if rclpy is not None:
         # rclpy's own signal handlers would shut ROS down before the last stop is published.
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    # What ros2 launch sends to a process that does not end on Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         node = AwarenessNode()
     except (NavError, PerceptionError, TrackingError) as problem:
         print(f"awarenav node: {problem}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        return 0  # nothing was published yet
     try:
-        rclpy.spin(node)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        # Waiting hears no signal, and lasts forever while simulated time stands still.
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=_LONGEST_WAIT_S)
     except KeyboardInterrupt:
         pass
     finally:

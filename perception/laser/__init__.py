@@ -29,7 +29,7 @@ from ._hypotheses import (
 from ._memory import OccupancyMemory
 from ._points import RobotMotion, ScanPoints, scan_points
 from ._scan import LaserScan, Scanner
-from ._sight import AHEAD_RAD, ScannerSight, SeenDirections, sight_of
+from ._sight import AHEAD_RAD, ScannerSight, SeenDirections, camera_field, sight_of
 from ._static_map import MapCells, StaticMap
 
 __all__ = [
@@ -53,6 +53,7 @@ __all__ = [
     "ScannerSight",
     "SeenDirections",
     "StaticMap",
+    "camera_field",
     "clusters_of",
     "hypotheses_of",
     "merge_candidates",

@@ -98,7 +98,11 @@ class LegDetector:
     Args:
         config: settings.
         classifier: judges hypotheses; None for the shipped network.
-        static_map: map of what stands still; None without. What it holds is never a person.
+        static_map: map of what stands still; None without. What it holds is never a person, but
+            in scans that contradict it: the robot is then elsewhere.
+
+    Attributes:
+        map_contradicted: whether the latest scan that shows enough of the map contradicts it.
 
     Raises:
         PerceptionError: for a missing or altered network.
@@ -114,6 +118,7 @@ class LegDetector:
         self.config = LegDetectorConfig() if config is None else config
         self._map: StaticMap | None = None
         self.static_map = static_map
+        self.map_contradicted = False
         self._classify = OnnxLegClassifier() if classifier is None else classifier
         self._memory = OccupancyMemory()
         self._found: deque[tuple[float, FloatArray]] = deque(maxlen=_MOST_RECENT)
@@ -140,6 +145,8 @@ class LegDetector:
         """
         config, usable = self.config, points.usable
         xy = points.points_odom_m[:, :2]
+        if self._map is not None and (wrong := self._map.is_contradicted(points)) is not None:
+            self.map_contradicted = wrong
         known = self._known(xy, usable)
         clusters = clusters_of(
             xy,
@@ -205,7 +212,7 @@ class LegDetector:
         rows = usable.nonzero()[0]
         own = points_m.T.take(rows, axis=1).T
         found = self._memory.known(own) if self.config.learn else known[rows]
-        if self._map is not None:
+        if self._map is not None and not self.map_contradicted:
             found[self._map.holds(own) & (found == 0)] = -1
         known[rows] = found
         return known

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import FloatArray, finite_array, finite_number, rigid_transform, set_fields
 from ..errors import PerceptionError
+from ..no_view import LastFrames
 
 # More than a full turn is no 2-D sweep; the rest is the rounding of 32-bit messages.
 _MAX_TURN_RAD: Final = 2.0 * np.pi + 0.02
@@ -119,13 +120,12 @@ class LaserScan:
         """The time of the last ray."""
         return self.stamp_s + self.time_increment_s * (len(self.ranges_m) - 1)
 
-    def repeats(self, before: LaserScan) -> bool:
-        """Return whether all ranges are those of another scan, and some ray measured something.
+    def repeats(self, last: LastFrames, T_odom_robot: FloatArray | None = None) -> bool:
+        """Return whether the scanner is frozen: :meth:`LastFrames.repeats`, of the ranges.
 
-        A live scanner has noise. It is frozen if this holds while the robot moves.
+        A scan whose rays have measured nothing is none that repeats.
         """
-        same = np.array_equal(self.ranges_m, before.ranges_m, equal_nan=True)
-        return bool(same and self.measured.any())
+        return bool(self.measured.any()) and last.repeats(self.ranges_m, T_odom_robot)
 
     @property
     def free_m(self) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from .._camera import Camera
 from ..arrays import FloatArray
 from ._points import RobotMotion, ScanPoints, beams_of, scan_points
 from ._scan import LaserScan, Scanner
@@ -31,6 +32,8 @@ AHEAD_RAD: Final = math.radians(60.0)
 # Directions in the base frame for which it is known when they were last seen.
 _BEARINGS_RAD: Final = np.radians(np.arange(360.0))
 _FULL_TURN_RAD: Final = 2.0 * math.pi
+# A camera whose axis is steeper than this looks everywhere.
+_STEEP: Final = 0.2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +131,7 @@ class ScannerSight:
 
 
 class SeenDirections:
-    """The time at which the scanners of a robot last saw what is in each direction.
+    """The time at which the sensors of a robot last saw what is in each direction.
 
     A scanner that is blind has not seen what is there, as if it were silent.
     """
@@ -145,6 +148,11 @@ class SeenDirections:
         seen_s = np.where(sight.seen[near] & within, stamp_s, -math.inf)
         np.maximum(self._seen_s, seen_s, out=self._seen_s)
 
+    def note_field(self, middle_rad: float, half_rad: float, stamp_s: float) -> None:
+        """Note a picture of a camera, from its field as :func:`camera_field` returns it."""
+        field = _sector(middle_rad, half_rad)
+        self._seen_s[field] = np.maximum(self._seen_s[field], stamp_s)
+
     def stamp_s(self, middle_rad: float, half_rad: float) -> float | None:
         """Return the time from which all of a sector is; None if not all of it has been seen.
 
@@ -154,6 +162,26 @@ class SeenDirections:
         """
         oldest_s = float(self._seen_s[_sector(middle_rad, half_rad)].min())
         return oldest_s if math.isfinite(oldest_s) else None
+
+
+def camera_field(camera: Camera, T_base_camera: FloatArray) -> tuple[float, float]:
+    """Return the bearing in the base frame of a camera's axis, and the angle to its widest side.
+
+    A camera that looks steeply down, or up, sees all directions.
+
+    Args:
+        camera: its calibration.
+        T_base_camera: (4, 4) its pose.
+    """
+    x, y = T_base_camera[:2, 2].tolist()
+    if math.hypot(x, y) < _STEEP:
+        return 0.0, math.pi
+    right, middle = camera.width_px - 0.5, camera.cy_px
+    sides = camera.normalise([[-0.5, middle], [right, middle]], nearest=True)
+    rays = np.column_stack((sides, np.ones(2))) @ T_base_camera[:3, :3].T
+    bearing = math.atan2(y, x)
+    off = np.remainder(np.arctan2(*rays.T[1::-1]) - bearing + math.pi, _FULL_TURN_RAD) - math.pi
+    return bearing, float(np.abs(off).max())
 
 
 @lru_cache(maxsize=16)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..arrays import FloatArray, finite_array, finite_number, set_fields
 from ..documents import read_yaml
 from ..errors import PerceptionError, did_you_mean
+from ._points import ScanPoints
 
 _REQUIRED: Final = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 _MODES: Final = ("trinary", "scale", "raw")
@@ -28,6 +29,16 @@ _MAX_IMAGE_BYTES: Final = 256 << 20
 _NETPBM_HEAD: Final = re.compile(rb"P[2356]" + 3 * rb"(?:\s|#[^\n]*\n)+(\d+)" + rb"\s")
 # A PNG names its transparent grey before its pixels.
 _PNG_HEAD_BYTES: Final = 4096
+# A scan is compared with a map by about so many of its rays, up to this distance.
+_RAYS: Final = 60
+_COMPARED_M: Final = 10.0
+# So many of them must meet something of the map; else it says nothing about the robot's place.
+_FEWEST: Final = 10
+# It contradicts the map if of the rays that the map accounts for, and those that pass through what
+# it holds, more than this share pass through; or if it accounts for no more than this share of
+# those that it would stop, all others end before, as in a crowd.
+_THROUGH_SHARE: Final = 0.2
+_LEAST_SHARE: Final = 0.1
 _LOG: Final = logging.getLogger("perception")
 
 
@@ -168,6 +179,7 @@ class StaticMap:
         resolution_m: side of a cell.
         margin_m: points this near to an occupied cell belong to it; allow for the error of the
             robot's place in the map.
+        bare: ``occupied`` as given; after that it has the margin.
 
     Raises:
         PerceptionError: for a map that is not two-dimensional, or a size that is not positive.
@@ -177,6 +189,7 @@ class StaticMap:
     origin_odom_m: FloatArray
     resolution_m: float
     margin_m: float = 0.1
+    bare: NDArray[np.bool_] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         occupied: Any = np.array(self.occupied, dtype=bool, copy=True)
@@ -184,11 +197,13 @@ class StaticMap:
             raise PerceptionError(f"occupied must have shape (H, W), got {occupied.shape}")
         side = finite_number("resolution_m", self.resolution_m, minimum=0.0, exclusive_minimum=True)
         margin = finite_number("margin_m", self.margin_m, minimum=0.0)
+        occupied.setflags(write=False)
         grown = _grown(occupied, math.ceil(margin / side - 1e-9))
         grown.setflags(write=False)
         set_fields(
             self,
             occupied=grown,
+            bare=occupied,
             origin_odom_m=finite_array("origin_odom_m", self.origin_odom_m, (2,)),
             resolution_m=side,
             margin_m=margin,
@@ -196,11 +211,50 @@ class StaticMap:
 
     def holds(self, points_m: FloatArray) -> NDArray[np.bool_]:
         """Return (N,) whether points (N, 2) in odom belong to it; False outside the map."""
-        height, width = self.occupied.shape
-        cell = (points_m.T - self.origin_odom_m[:, None]) / self.resolution_m
-        inside = (cell[0] >= 0.0) & (cell[1] >= 0.0) & (cell[0] < width) & (cell[1] < height)
-        column, row = np.where(inside, cell, 0.0).astype(np.int64)
-        return np.asarray(inside & self.occupied[row, column])
+        return self._at(self.occupied, points_m)
+
+    def is_contradicted(self, points: ScanPoints) -> bool | None:
+        """Return whether a scan shows that the robot is not where the map has it.
+
+        Its rays then pass through what the map holds, by more than the margin, or end where the map
+        has nothing. What stands before the map's walls contradicts nothing. None if too little of
+        the map is in view.
+        """
+        rows = points.usable.nonzero()[0]
+        rays = rows[:: max(1, len(rows) // _RAYS)]
+        origins, ends = points.origins_odom_m[rays, :2], points.points_odom_m[rays, :2]
+        lengths_m = np.maximum(points.ranges_m[rays], 1e-6)
+        steps_m = np.arange(self.resolution_m, _COMPARED_M, self.resolution_m)
+        along = ((ends - origins) / lengths_m[:, None])[:, None] * steps_m[:, None]
+        held = self._at(self.bare, origins[:, None] + along)
+        meets = held.any(axis=1)
+        if np.count_nonzero(meets) < _FEWEST:
+            return None
+        first = held.argmax(axis=1)
+        explained = self.holds(ends)
+        through = meets & (steps_m[first] < lengths_m - 2.0 * self.margin_m - self.resolution_m)
+        passed = through.nonzero()[0]
+        # What is passed by a hair is seen by the rays beside.
+        crossed = (origins + along[np.arange(len(rays)), first])[passed]
+        apart = np.linalg.norm(crossed[:, None] - points.points_odom_m[rows, :2], axis=2)
+        seen = apart.min(axis=1, initial=np.inf) <= self.margin_m + 1.5 * self.resolution_m
+        through[passed[seen]] = False
+        explained &= ~through
+        known, wrong = np.count_nonzero(explained), np.count_nonzero(through)
+        return bool(
+            wrong > _THROUGH_SHARE * (known + wrong)
+            or known < _LEAST_SHARE * np.count_nonzero(meets)
+        )
+
+    def _at(self, cells: NDArray[np.bool_], points_m: FloatArray) -> NDArray[np.bool_]:
+        height, width = cells.shape
+        column, row = (
+            np.floor((points_m[..., axis] - self.origin_odom_m[axis]) / self.resolution_m)
+            for axis in (0, 1)
+        )
+        inside = (column >= 0.0) & (row >= 0.0) & (column < width) & (row < height)
+        number = np.where(inside, row * width + column, 0.0).astype(np.int64)
+        return np.asarray(inside & cells.ravel()[number])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -119,7 +119,8 @@ class SurroundPipeline:
         views: flat views to cut from an image, for example from :func:`ring_of_views`.
         make_pipeline: makes the pipeline for the camera of a view; default one with the shipped
             networks. It is called once for each camera object; the views with that camera share its
-            networks (:meth:`~perception.AwarenessPipeline.for_another_view`).
+            networks (:meth:`~perception.AwarenessPipeline.for_another_view`). Points of the robot,
+            and a constant floor, are those of the lens's camera frame.
 
     Raises:
         PerceptionError: without views, or from ``make_pipeline``.
@@ -138,7 +139,9 @@ class SurroundPipeline:
         cameras = {id(view.camera): view.camera for view in self.views}
         made = {key: make_pipeline(camera) for key, camera in cameras.items()}
         # A pipeline keeps people from one image of its view to the next.
-        self._pipelines = [made[id(view.camera)].for_another_view() for view in self.views]
+        self._pipelines = [
+            made[id(view.camera)].for_another_view(view.rotation_camera_view) for view in self.views
+        ]
         self._maps = [
             # Fixed-point maps make cv2.remap several times faster.
             cv2.convertMaps(*view.sampling_maps(lens), cv2.CV_16SC2)
@@ -176,7 +179,9 @@ class SurroundPipeline:
             PerceptionError: as :meth:`AwarenessPipeline.process`.
         """
         seen = [
-            pipeline.process(flat, stamp_s, None if floor is None else _floor_in_view(floor, view))
+            pipeline.process(
+                flat, stamp_s, None if floor is None else floor.in_view(view.rotation_camera_view)
+            )
             for flat, pipeline, view in zip(
                 self.flat_pictures(image_rgb), self._pipelines, self.views, strict=True
             )
@@ -189,8 +194,3 @@ class SurroundPipeline:
         if box is None:
             return seen.observation
         return replace(seen.observation, box_xyxy_px=self.views[seen.view].box_in(self.lens, box))
-
-
-def _floor_in_view(floor: FloorPlane, view: FlatView) -> FloorPlane:
-    """Return the floor in the view's frame."""
-    return replace(floor, normal_camera=view.rotation_camera_view.T @ floor.normal_camera)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ._assembly import Setup, axis_names, changed, named_fault, named_policy
-from ._crossing import Crossing, Observer, Situation, drive, run_crossing
+from ._crossing import Crossing, Observer, drive, run_crossing
 from ._drawing import RequestMemory, TopView, draw_camera_view
 from ._result import CrossingFrame, CrossingResult
 from ._separations import (
@@ -25,7 +25,6 @@ __all__ = [
     "RequestMemory",
     "SafetyFigures",
     "Setup",
-    "Situation",
     "Stage",
     "StraightOn",
     "TopView",

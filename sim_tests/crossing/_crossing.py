@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from time import process_time
 from typing import Final
@@ -25,7 +25,7 @@ from ._command import checked_command
 from ._result import CrossingFrame, CrossingResult
 from ._sensing import Sensed
 from ._separations import Separations
-from ._stage import Stage, TrueView
+from ._stage import Stage
 from .eyes import KeypointNoise
 from .faults import Fault
 from .planner import LocalPlanner, SeatedPlanner, import_planner, seeded_generators
@@ -36,61 +36,6 @@ Observer = Callable[[CrossingFrame, Stage], None]
 _GOAL_SPEED_MPS: Final = 0.2
 # Rate at which separations are observed; contacts are checked in every physics step.
 _OBSERVED_HZ: Final = 20.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Situation:
-    """One control cycle before its command: the truth, and what the robot knows.
-
-    Attributes:
-        t_s: simulated time.
-        state: true state of the robot.
-        T_odom_camera: (4, 4) true pose of the camera.
-        truth: the truth about each person.
-        sensed: the knowledge of the robot: its own state, and its tracks of the people.
-        constraints: constraints from the adapter.
-        separations: separations of the people, as last observed.
-        at_goal: the robot stands at its goal.
-    """
-
-    t_s: float
-    state: RobotState
-    T_odom_camera: FloatArray
-    truth: tuple[TrueView, ...]
-    sensed: Sensed
-    constraints: NavConstraints
-    separations: Separations
-    at_goal: bool
-
-    def frame(
-        self,
-        command: tuple[float, float],
-        plan_s: float = 0.0,
-        lateral_mps: float = 0.0,
-        late_s: float | None = None,
-    ) -> CrossingFrame:
-        """Return the control cycle with its command, and the time that planning it took.
-
-        The command is speed (m/s) and yaw rate (rad/s), ``lateral_mps`` its speed to the left, and
-        ``late_s`` that of a planner in real time.
-        """
-        observed = self.sensed.observed
-        return CrossingFrame(
-            self.t_s,
-            self.state,
-            self.T_odom_camera,
-            self.truth,
-            tuple(observation for observation, _ in observed),
-            tuple(worker for _, worker in observed),
-            self.sensed.tracks,
-            self.constraints,
-            command,
-            self.separations,
-            self.sensed.scan_points_odom_m,
-            plan_s,
-            lateral_mps,
-            late_s,
-        )
 
 
 class Crossing(AbstractContextManager["Crossing"]):
@@ -143,10 +88,11 @@ class Crossing(AbstractContextManager["Crossing"]):
         """True once all control cycles of the scenario have run."""
         return self._tick >= self._ticks
 
-    def sense(self) -> Situation:
+    def sense(self) -> CrossingFrame:
         """Observe the separations, take images and scans, update the constraints.
 
-        Call it once per control cycle. After the last one no separations are observed any more.
+        The frame has no command yet. Call it once per control cycle. After the last one no
+        separations are observed any more.
         """
         t_s = self.t_s
         separations = self._separations
@@ -160,18 +106,27 @@ class Crossing(AbstractContextManager["Crossing"]):
         state = self.stage.amr.state(t_s)
         sensed = self._sensing.step(t_s, truth)
         constraints = self._adapter.update(
-            sensed.tracks, sensed.state, t_s, perception_stamp_s=sensed.stamp_s
+            sensed.tracks,
+            sensed.state,
+            t_s,
+            perception_stamp_s=sensed.stamp_s,
+            seen_stamp_s=sensed.seen_stamp_s,
         )
         self._ask(constraints, sensed)
-        return Situation(
-            t_s,
-            state,
-            T_odom_camera,
-            truth,
-            sensed,
-            constraints,
-            separations,
-            _at_goal(self.scenario, state, self.goal_odom_m),
+        observed = sensed.observed
+        return CrossingFrame(
+            t_s=t_s,
+            robot_state=state,
+            known_state=sensed.state,
+            T_odom_camera=T_odom_camera,
+            truth=truth,
+            observations=tuple(observation for observation, _ in observed),
+            observed_workers=tuple(worker for _, worker in observed),
+            tracks=sensed.tracks,
+            constraints=constraints,
+            separations=separations,
+            at_goal=_at_goal(self.scenario, state, self.goal_odom_m),
+            scan_points_odom_m=sensed.scan_points_odom_m,
         )
 
     def _ask(self, constraints: NavConstraints, sensed: Sensed) -> None:
@@ -297,15 +252,22 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
             now = crossing.sense()
             asked_s = process_time()
             returned = driver.plan(
-                now.sensed.state, crossing.goal_odom_m, now.constraints, crossing.dt_s
+                now.known_state, crossing.goal_odom_m, now.constraints, crossing.dt_s
             )
             plan_s = process_time() - asked_s
             speed, yaw_rate, lateral = checked_command(
                 driver, returned, now.t_s, sideways=crossing.robot.drive == "holonomic"
             )
             crossing.command(speed, yaw_rate, lateral)
-            late_s = None if clocked is None else clocked.late_s
-            frames.append(now.frame((speed, yaw_rate), plan_s, lateral, late_s))
+            frames.append(
+                replace(
+                    now,
+                    command=(speed, yaw_rate),
+                    lateral_command_mps=lateral,
+                    plan_s=plan_s,
+                    late_s=None if clocked is None else clocked.late_s,
+                )
+            )
             if observer is not None:
                 observer(frames[-1], crossing.stage)
             if now.at_goal:
@@ -325,6 +287,7 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
             people=stage.outcomes,
             robot=crossing.robot,
             obstacle_boxes_odom_m=setup.scenario.layout.obstacle_boxes_odom,
+            bumps=stage.amr.bumps,
         )
 
 

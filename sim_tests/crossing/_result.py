@@ -27,6 +27,7 @@ class CrossingFrame:
     Attributes:
         t_s: simulated time.
         robot_state: true state of the robot.
+        known_state: the robot's own state, as it knows it.
         T_odom_camera: (4, 4) true pose of the camera.
         truth: the truth about each person.
         observations: observations of the newest image that arrived in this cycle.
@@ -34,9 +35,10 @@ class CrossingFrame:
             for none.
         tracks: tracks of the people.
         constraints: constraints from the adapter.
-        command: commanded speed (m/s) and yaw rate (rad/s).
         separations: separations of the people, as last observed, which is in every frame up to 20 a
             second.
+        at_goal: the robot stands at its goal.
+        command: commanded speed (m/s) and yaw rate (rad/s); 0 before there is one.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle, as the robot
             places them.
         plan_s: processor time of this process in the planner's ``plan``, seconds: the load of the
@@ -49,14 +51,16 @@ class CrossingFrame:
 
     t_s: float
     robot_state: RobotState
+    known_state: RobotState
     T_odom_camera: FloatArray
     truth: tuple[TrueView, ...]
     observations: tuple[PersonObservation, ...]
     observed_workers: tuple[int, ...]
     tracks: tuple[PersonTrack, ...]
     constraints: NavConstraints
-    command: tuple[float, float]
     separations: Separations
+    at_goal: bool = False
+    command: tuple[float, float] = (0.0, 0.0)
     scan_points_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     plan_s: float = 0.0
     lateral_command_mps: float = 0.0
@@ -66,10 +70,7 @@ class CrossingFrame:
 
     @property
     def separations_m(self) -> tuple[float, ...]:
-        """Distance between the surfaces of each person and the robot, as last observed.
-
-        It is a lower bound with centres more than 4 m apart.
-        """
+        """Distance between the surfaces of each person and the robot, as last observed."""
         return self.separations.separations_m
 
     @property
@@ -96,13 +97,14 @@ class CrossingResult:
         planner: name of the planner's class.
         perception: ``"truth"``, ``"keypoints"``, ``"pixels"``, ``"keypoints+scanner"``,
             ``"pixels+scanner"``, ``"scanner"`` or ``"oracle"``.
-        contacts: all contacts.
+        contacts: all contacts of the robot and a person.
         time_to_goal_s: None when the goal was not reached.
         frames: one per control cycle.
         people: outcomes of the people of the scenario, who come first in lists of all people;
             replayed people come after them.
         robot: the robot.
         obstacle_boxes_odom_m: (B, 4) x_min, y_min, x_max, y_max of racks, walls and props.
+        bumps: number of contacts of the robot with them.
     """
 
     scenario: str
@@ -116,6 +118,7 @@ class CrossingResult:
     people: tuple[PersonOutcome, ...] = ()
     robot: RobotProfile = NOVA_CARTER
     obstacle_boxes_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
+    bumps: int = 0
 
     def __repr__(self) -> str:
         """Return the fields and the main figures, with long values described."""
@@ -123,8 +126,8 @@ class CrossingResult:
 
     @property
     def success(self) -> bool:
-        """True if the goal was reached, and the robot hit nobody by its own motion."""
-        return self.time_to_goal_s is not None and self.contact_by != "robot"
+        """True if the goal was reached, and the robot ran into nobody, no rack and no wall."""
+        return self.time_to_goal_s is not None and self.contact_by != "robot" and not self.bumps
 
     @property
     def contact(self) -> bool:
@@ -164,10 +167,5 @@ class CrossingResult:
 
     @property
     def violation_time_s(self) -> float:
-        """Time with a negative margin while the robot moved."""
+        """Time with a negative margin to anybody while the robot moved."""
         return self.safety.violation_time_s
-
-    @property
-    def max_speed_within_2m_mps(self) -> float:
-        """Highest speed of the robot with a person's surface within 2 m."""
-        return self.safety.max_speed_within_2m_mps

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -10,7 +11,7 @@ import numpy as np
 from nav_adapter import AwarenessPolicy, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import FloatArray
-from perception.laser import AHEAD_RAD, SeenDirections
+from perception.laser import AHEAD_RAD, SeenDirections, camera_field
 from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
 
 from ..conditions import ORACLE, Perception
@@ -28,6 +29,7 @@ from .eyes import (
     TimedEyes,
     WorkerObservations,
     make_eyes,
+    motion_of,
     pixel_timing,
     scanner_sensors,
 )
@@ -54,6 +56,8 @@ class Sensed:
         stamp_s: stamp of the newest image, or of scans that show all that is ahead.
         observed: observations of the newest image if it arrived in this cycle, else none.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle.
+        seen_stamp_s: from when on it knows what is in a sector, as :meth:`NavAdapter.update` takes
+            it; None for a robot that knows the truth in all directions.
     """
 
     state: RobotState
@@ -61,6 +65,7 @@ class Sensed:
     stamp_s: float
     observed: WorkerObservations
     scan_points_odom_m: FloatArray
+    seen_stamp_s: Callable[[float, float], float | None] | None
 
 
 class Sensing:
@@ -123,7 +128,12 @@ class Sensing:
         self._tracker = _make_tracker(perception, policy, stage, model)
         self._newest_s: dict[str, float] = {}
         self._seen = SeenDirections()
-        self._ahead_s: float | None = None
+        self._sees_all = perception.kind in ("truth", ORACLE)
+        T_base_camera = np.linalg.inv(stage.amr.T_odom_base) @ stage.amr.T_odom_camera
+        self._fields = [
+            camera_field(model, T_base_camera @ view.T_camera_view)
+            for view in stage.scenario.camera.flat_views(model)
+        ]
 
     def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
         """Take the images and scans that are due; return what the robot knows then.
@@ -139,7 +149,7 @@ class Sensing:
         if self._scanners is not None:
             sightings = self._scanners.look(t_s, amr.T_odom_base, state, known.state)
         if self._camera is not None:
-            sightings += self._camera.look(t_s, T_odom_camera, known.T_odom_camera, truth)
+            sightings += self._camera.look(t_s, T_odom_camera, _camera_at(t_s, known), truth)
         observed: WorkerObservations = ()
         tracks: tuple[PersonTrack, ...] = ()
         for sighting in sightings:
@@ -154,7 +164,9 @@ class Sensing:
             )
             if sighting.sight is not None:
                 self._seen.note(sighting.sight, sighting.stamp_s)
-                self._ahead_s = self._seen.stamp_s(0.0, AHEAD_RAD)
+            else:
+                for field in self._fields:
+                    self._seen.note_field(*field, sighting.stamp_s)
             if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
                 self._newest_s[sighting.sensor] = sighting.stamp_s
                 if sighting.points_odom_m is None:
@@ -170,12 +182,15 @@ class Sensing:
             self._perceived_s(),
             observed,
             np.concatenate(points) if points else np.zeros((0, 2)),
+            None if self._sees_all else self._seen.stamp_s,
         )
 
     def _perceived_s(self) -> float:
         """Return the time from which camera or scanners know what is ahead, as on a robot."""
-        newest_s = self._newest_s.get("camera", -_NEVER_S)
-        return newest_s if self._ahead_s is None else max(newest_s, self._ahead_s)
+        ahead_s = self._seen.stamp_s(0.0, AHEAD_RAD)
+        return max(
+            self._newest_s.get("camera", -_NEVER_S), -_NEVER_S if ahead_s is None else ahead_s
+        )
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:
         """Return whether the tracker takes a sighting.
@@ -216,6 +231,15 @@ class Odometry:
         arrived = self._queue.take(now_s)
         self._known = arrived[-1] if arrived else self._known
         return self._known
+
+
+def _camera_at(t_s: float, known: OdometryReading) -> FloatArray:
+    """Return T_odom_camera (4, 4) of a robot that keeps its motion after its newest odometry."""
+    if known.state.stamp_s == t_s:
+        return known.T_odom_camera
+    motion = motion_of(known.state)
+    moved = motion.pose_at(t_s) @ np.linalg.inv(motion.T_odom_base)
+    return np.asarray(moved @ known.T_odom_camera)
 
 
 def _camera_and_timing(stage: Stage, kind: str) -> tuple[Camera, CameraTiming]:

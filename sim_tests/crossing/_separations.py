@@ -6,10 +6,15 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
+
+import numpy as np
 
 from nav_adapter import RobotProfile, protective_separation_m
+from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray
+
+from ..world import Nearest
 
 #: A robot at this speed or slower counts as standing (wheel motors never hold exactly zero).
 STANDING_SPEED_MPS: Final = 0.03
@@ -18,39 +23,110 @@ CLEARANCE_M: Final = 0.10
 #: Distance to a person within which the robot's highest speed is reported.
 NEAR_M: Final = 2.0
 
+# Share of a normal that must be level to say where a body lies.
+_LEVEL: Final = 0.3
 
-@dataclass(frozen=True, slots=True, eq=False)
+Vector = tuple[float, float]
+
+
+class Approach(NamedTuple):
+    """Robot and one person at one instant, where they are nearest to each other, in odom.
+
+    Attributes:
+        separation_m: distance between the surfaces, 0 when touching; infinite for a person who is
+            away.
+        towards_person: unit vector from the robot to the person.
+        robot_mps: velocity of the point of the robot that is nearest to the person.
+        person_mps: velocity of the person.
+    """
+
+    separation_m: float
+    towards_person: Vector
+    robot_mps: Vector
+    person_mps: Vector = (0.0, 0.0)
+
+    @classmethod
+    def at(cls, nearest: Nearest, robot: Motion, person_mps: Vector, towards: Vector) -> Approach:
+        """Return the approach where two bodies are nearest.
+
+        Args:
+            nearest: the places, first on the robot and then on the person.
+            robot: motion of the robot.
+            person_mps: velocity of the person.
+            towards: direction where the places do not tell it, as with one above the other.
+        """
+        (x, y, _), (to_x, to_y, _) = nearest.first_odom_m, nearest.second_odom_m
+        separation_m, level = max(nearest.distance_m, 0.0), 1e-3
+        gap = to_x - x, to_y - y
+        if separation_m == 0.0:  # the bodies overlap
+            gap, level = (-nearest.towards_first[0], -nearest.towards_first[1]), _LEVEL
+        length = math.hypot(*gap)
+        if length > level:
+            towards = gap[0] / length, gap[1] / length
+        return cls(separation_m, towards, robot.velocity_at(x, y), person_mps)
+
+    @property
+    def robot_speed_mps(self) -> float:
+        """Speed of the robot's nearest point."""
+        return math.hypot(*self.robot_mps)
+
+    @property
+    def closing_mps(self) -> float:
+        """Speed of the robot's nearest point towards the person, negative away from them."""
+        (x, y), (vx, vy) = self.towards_person, self.robot_mps
+        return x * vx + y * vy
+
+    @property
+    def person_closing_mps(self) -> float:
+        """Speed of the person towards the robot, negative away from it."""
+        (x, y), (vx, vy) = self.towards_person, self.person_mps
+        return -x * vx - y * vy
+
+
+#: The approach of somebody who is away.
+AWAY: Final = Approach(math.inf, (0.0, 0.0), (0.0, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
 class ContactEvent:
     """A contact of robot and person, as observed when it began.
 
     Attributes:
         t_s: time at which it began.
         worker: number of the person.
-        robot_velocity_odom_mps: (2,) velocity of the robot; 0 if its wheels stood.
-        towards_person: (2,) unit vector from the robot to the person, in odom.
+        approach: robot and person where they touch, before the collision; the velocity of a robot
+            whose wheels stand is 0.
     """
 
     t_s: float
     worker: int
-    robot_velocity_odom_mps: FloatArray
-    towards_person: FloatArray
+    approach: Approach
 
     @property
     def by(self) -> Literal["robot", "person"]:
-        """``"robot"`` if the robot moved into the person, else ``"person"``."""
-        closing_mps = float(self.robot_velocity_odom_mps @ self.towards_person)
-        return "robot" if closing_mps > STANDING_SPEED_MPS else "person"
+        """``"robot"`` if the robot's touching point moved towards the person, else ``"person"``."""
+        return "robot" if self.approach.closing_mps > STANDING_SPEED_MPS else "person"
 
     @property
     def robot_speed_mps(self) -> float:
-        """Speed of the robot."""
-        return _length(self.robot_velocity_odom_mps)
+        """Speed of the robot's touching point."""
+        return self.approach.robot_speed_mps
+
+    @property
+    def robot_velocity_odom_mps(self) -> FloatArray:
+        """(2,) velocity of the robot's touching point."""
+        return np.array(self.approach.robot_mps)
 
 
 def contact_by(contacts: Iterable[ContactEvent]) -> Literal["", "robot", "person"]:
     """Return ``"robot"`` if the robot caused a contact, else ``"person"``; empty for none."""
     causes = {contact.by for contact in contacts}
     return "robot" if "robot" in causes else "person" if causes else ""
+
+
+def moves(motion: Motion, robot: RobotProfile) -> bool:
+    """Return whether a point of the robot moves: it drives, or turns on the spot."""
+    return motion.fastest_mps(robot.circumscribed_radius_m) > STANDING_SPEED_MPS
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,52 +141,38 @@ class Separations:
         t_s: time of the observation.
         lasts_s: time to the next observation.
         robot: limits of the robot.
-        robot_velocity_odom_mps: (2,).
-        people_velocities_odom_mps: (2,) for each person.
-        separations_m: distance between the surfaces of each person and the robot, 0 when touching.
-        towards_people: (2,) unit vector from the robot to each person, in odom.
+        robot_moves: whether a point of the robot moves.
+        approaches: robot and person, for each person.
     """
 
     t_s: float
     lasts_s: float
     robot: RobotProfile
-    robot_velocity_odom_mps: FloatArray
-    people_velocities_odom_mps: tuple[FloatArray, ...]
-    separations_m: tuple[float, ...]
-    towards_people: tuple[FloatArray, ...]
+    robot_moves: bool
+    approaches: tuple[Approach, ...]
 
     @cached_property
-    def robot_speed_mps(self) -> float:
-        """Speed of the robot."""
-        return _length(self.robot_velocity_odom_mps)
+    def separations_m(self) -> tuple[float, ...]:
+        """Distance between the surfaces of each person and the robot.
 
-    @property
-    def robot_moves(self) -> bool:
-        """True if the robot does not stand."""
-        return self.robot_speed_mps > STANDING_SPEED_MPS
+        It is a lower bound with centres more than 4 m apart, and infinite for people who are away.
+        """
+        return tuple(each.separation_m for each in self.approaches)
 
     @cached_property
     def margins_m(self) -> tuple[float, ...]:
         """Separation margin of each person."""
         if not self.robot_moves:
             return tuple(each - CLEARANCE_M for each in self.separations_m)
-        pairs = zip(self.towards_people, self.people_velocities_odom_mps, strict=True)
         protective_m = protective_separation_m(
-            [
-                max(float(self.robot_velocity_odom_mps.dot(each)), 0.0)
-                for each in self.towards_people
-            ],
-            [max(float(-velocity.dot(towards)), 0.0) for towards, velocity in pairs],
+            [max(each.closing_mps, 0.0) for each in self.approaches],
+            [max(each.person_closing_mps, 0.0) for each in self.approaches],
             deceleration_mps2=self.robot.max_deceleration_mps2,
             reaction_time_s=self.robot.reaction_time_s,
             clearance_m=CLEARANCE_M,
         )
-        return tuple(
-            separation_m - needed_m
-            for separation_m, needed_m in zip(
-                self.separations_m, protective_m.tolist(), strict=True
-            )
-        )
+        pairs = zip(self.separations_m, protective_m.tolist(), strict=True)
+        return tuple(separation_m - needed_m for separation_m, needed_m in pairs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +182,9 @@ class SafetyFigures:
     Attributes:
         min_separation_m: smallest separation; infinite without people.
         min_margin_m: smallest margin while the robot moved.
-        violation_time_s: time with a negative margin while the robot moved, added over the people.
-        max_speed_within_2m_mps: highest speed of the robot with a person's surface within 2 m.
+        violation_time_s: time with a negative margin, to anybody, while the robot moved.
+        max_speed_within_2m_mps: highest speed of the robot's nearest point to a person whose
+            surface is within 2 m.
     """
 
     min_separation_m: float = math.inf
@@ -138,22 +201,11 @@ class SafetyFigures:
         """
         if now.t_s < t_s:
             return self
-        nearest_m = min(now.separations_m, default=math.inf)
-        margin_m, violation_s, near_mps = self.min_margin_m, self.violation_time_s, 0.0
-        if now.robot_moves:
-            margin_m = min((margin_m, *now.margins_m))
-            for each in now.margins_m:
-                violation_s += now.lasts_s if each < 0.0 else 0.0
-        if nearest_m < NEAR_M:
-            near_mps = now.robot_speed_mps
+        margin_m = min(now.margins_m, default=math.inf) if now.robot_moves else math.inf
+        near = [each.robot_speed_mps for each in now.approaches if each.separation_m < NEAR_M]
         return SafetyFigures(
-            min(self.min_separation_m, nearest_m),
-            margin_m,
-            violation_s,
-            max(self.max_speed_within_2m_mps, near_mps),
+            min((self.min_separation_m, *now.separations_m)),
+            min(self.min_margin_m, margin_m),
+            self.violation_time_s + (now.lasts_s if margin_m < 0.0 else 0.0),
+            max((self.max_speed_within_2m_mps, *near)),
         )
-
-
-def _length(vector: FloatArray) -> float:
-    """Return the length of a vector (2,)."""
-    return math.sqrt(vector.dot(vector))

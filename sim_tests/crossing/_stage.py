@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from nav_adapter.rigid import Motion
 from perception import AttentionCone
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
@@ -31,7 +32,7 @@ from ..world.render import RendererName
 from ._audience import Audience
 from ._people import staged_people
 from ._robot_sight import RobotSight, near_robot
-from ._separations import STANDING_SPEED_MPS, ContactEvent, Separations
+from ._separations import AWAY, STANDING_SPEED_MPS, Approach, ContactEvent, Separations, moves
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.
 _EXACT_WITHIN_M: Final = 4.0
@@ -59,6 +60,7 @@ class TrueView:
         velocity_odom_mps: (2,) velocity.
         could_look: the camera is in front of the person's body, at most 90° aside, and in their
             line of sight.
+        away: the person is not there: out of every sensor's range, and in no figure.
     """
 
     position_camera_m: FloatArray
@@ -67,6 +69,7 @@ class TrueView:
     position_odom_m: FloatArray
     velocity_odom_mps: FloatArray
     could_look: bool = True
+    away: bool = False
 
     @property
     def d_fwd_m(self) -> float:
@@ -125,7 +128,7 @@ class Stage(AbstractContextManager["Stage"]):
         steps = 1.0 / (_BODY_UPDATE_HZ * self.warehouse.physics_dt_s)
         self._steps_per_body_update = max(round(steps), 1)
         self.contacts: list[ContactEvent] = []
-        self._touching = [False] * len(self.workers)
+        self._touching: list[ContactEvent | None] = [None] * len(self.workers)
         self._near_robot = [False] * len(self.workers)
         self._last_separation_m = [math.inf] * len(self.workers)
         corners = self.amr.profile.footprint_m
@@ -139,7 +142,7 @@ class Stage(AbstractContextManager["Stage"]):
         self._heard: list[list[Heard]] = [[] for _ in self.workers]
         self._touches: list[list[tuple[float, float]]] = [[] for _ in self.workers]
         self._placed_at_step = 0
-        self._last_velocity_mps: FloatArray | None = None
+        self._last_motion: Motion | None = None
         self._place_workers()
 
     def close(self) -> None:
@@ -158,19 +161,18 @@ class Stage(AbstractContextManager["Stage"]):
         """Run physics until ``until_s``; move the people and record contacts."""
         dt_s = self.warehouse.physics_dt_s
         near = [index for index, is_near in enumerate(self._near_robot) if is_near]
+        bodies = [self.workers[index].body for index in near]
         while self.t_s < until_s - 0.5 * dt_s:
             # Far from the robot, bodies move once per control cycle and touch nobody.
             if near and self._bodies_move():
                 self._place_workers(in_between=True)
-            self.amr.advance(dt_s)
+            self.amr.advance(dt_s, bodies)
             # A collision slows the robot in the step that reports it, and in the one before, which
             # stops the robot at the body. The velocity before the collision is the one that counts.
-            previous, self._last_velocity_mps = self._last_velocity_mps, None
-            if near:
-                self._last_velocity_mps = current = self.robot_velocity_odom_mps
+            before, self._last_motion = self._last_motion, self.amr.motion if near else None
             self.warehouse.step()
             for index in near:
-                self._update_contact(index, (previous, current))
+                self._update_contact(index, before, self._last_motion)
         self._place_workers()
 
     def _bodies_move(self) -> bool:
@@ -209,22 +211,10 @@ class Stage(AbstractContextManager["Stage"]):
             t_s: time of the control cycle.
             lasts_s: time to the next observation.
         """
-        observed = [self._separation(index) for index in range(len(self._motions))]
-        self._near_robot = [separation_m < _TOUCH_WITHIN_M for separation_m, _ in observed]
-        return Separations(
-            t_s,
-            lasts_s,
-            self.amr.profile,
-            self.robot_velocity_odom_mps,
-            tuple(motion.velocity_odom_mps for motion in self._motions),
-            tuple(separation_m for separation_m, _ in observed),
-            tuple(towards for _, towards in observed),
-        )
-
-    @property
-    def robot_velocity_odom_mps(self) -> FloatArray:
-        """Velocity (2,) of the base origin."""
-        return self.amr.velocity_odom_mps
+        approaches = tuple(self._approach(index) for index in range(len(self._motions)))
+        self._near_robot = [each.separation_m < _TOUCH_WITHIN_M for each in approaches]
+        robot = self.amr.profile
+        return Separations(t_s, lasts_s, robot, moves(self.amr.motion, robot), approaches)
 
     def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
         """Return the truth about every person, seen from the robot's camera."""
@@ -235,7 +225,7 @@ class Stage(AbstractContextManager["Stage"]):
             gaze = worker.gaze_odom
             alpha = cone.score_of(worker.eyes_odom_m.tolist(), gaze.tolist(), camera)
             in_front = _faces(motion, camera)
-            sighted = (in_front or alpha > 0.0) and self._sight.seen_by(worker)
+            sighted = not motion.away and (in_front or alpha > 0.0) and self._sight.seen_by(worker)
             views.append(
                 TrueView(
                     # On three numbers dot takes half the time of @.
@@ -245,6 +235,7 @@ class Stage(AbstractContextManager["Stage"]):
                     motion.position_odom_m,
                     motion.velocity_odom_mps,
                     in_front and sighted,
+                    motion.away,
                 )
             )
         return tuple(views)
@@ -311,18 +302,15 @@ class Stage(AbstractContextManager["Stage"]):
         return 0.0 if nearest is None else -nearest.distance_m
 
     def _robot_body(self) -> RobotBody:
-        (xx, xy, _, x), (yx, yy, _, y) = self.amr.T_odom_base[:2].tolist()
-        vx, vy = self.amr.velocity_odom_mps.tolist()
+        motion = self.amr.motion
+        x, y = motion.point(*self._middle_base_m)
         camera_x, camera_y, camera_z = self.amr.T_odom_camera[:3, 3].tolist()
-        ahead, left = self._middle_base_m
         return RobotBody(
-            x + ahead * xx + left * xy,
-            y + ahead * yx + left * yy,
-            math.atan2(yx, xx),
-            vx,
-            vy,
+            *(x, y, motion.heading_rad),
+            *motion.velocity_at(x, y),
             *self._half_size_m,
             (camera_x, camera_y, camera_z),
+            motion.yaw_rate_radps,
         )
 
     def _moving_bodies(self) -> tuple[MovingBody, ...]:
@@ -332,53 +320,53 @@ class Stage(AbstractContextManager["Stage"]):
             for motion in self._motions
         )
 
-    def _separation(self, index: int) -> tuple[float, FloatArray]:
-        """Return the distance between the surfaces and the direction (2,) from robot to worker."""
-        centre = self._motions[index].position_odom_m - self.amr.T_odom_base[:2, 3]
+    def _approach(self, index: int, motion: Motion | None = None) -> Approach:
+        """Return robot and person where they are nearest; the robot moves as now, or as given."""
+        person, motion = self._motions[index], motion or self.amr.motion
+        if person.away:
+            return AWAY
+        centre = person.position_odom_m - motion[:2]
         distance = math.sqrt(centre.dot(centre))
-        towards = centre / max(distance, 1e-9)
+        ux, uy = (centre / max(distance, 1e-9)).tolist()
+        vx, vy = person.velocity_odom_mps.tolist()
         bound = distance - self.amr.profile.circumscribed_radius_m - BODY_RADIUS_M
-        if distance > _EXACT_WITHIN_M:
-            return bound, towards
         # The surfaces are nearly always closer than the first distance, and except for what a
         # person carries on the far side always closer than the second.
         first = self._last_separation_m[index] + _MOVED_M
         second = max(bound, 0.0) + _NEARER_THAN_BOUND_M
         for within in (min(first, second), second, _EXACT_WITHIN_M):
+            if distance > _EXACT_WITHIN_M:
+                break
             nearest = self.warehouse.nearest(self.amr.body, self.workers[index].body, within)
             if nearest is not None:
-                break
-        else:
-            return bound, towards
-        gap = np.array(nearest.second_odom_m[:2]) - np.array(nearest.first_odom_m[:2])
-        length = math.sqrt(gap @ gap)
-        separation = self._last_separation_m[index] = max(nearest.distance_m, 0.0)
-        return separation, gap / length if separation > 0.0 and length > 1e-3 else towards
+                found = Approach.at(nearest, motion, (vx, vy), (ux, uy))
+                self._last_separation_m[index] = found.separation_m
+                return found
+        return Approach(bound, (ux, uy), motion.velocity_mps, (vx, vy))
 
-    def _update_contact(
-        self,
-        index: int,
-        velocities_mps: tuple[FloatArray | None, FloatArray],
-    ) -> None:
+    def _update_contact(self, index: int, *before: Motion | None) -> None:
         """Record whether a person touches the robot.
 
-        ``velocities_mps`` are those (2,) of the robot before the last step but one, if it is known,
-        and before the last step.
+        ``before`` are the motions of the robot before the last step but one, if it is known, and
+        before the last step.
         """
         if not self._held[index] and not self.amr.touches(self.workers[index].body):
-            self._touching[index] = False
+            self._touching[index] = None
             return
-        previous, velocity = velocities_mps
-        if previous is not None and previous @ previous > velocity @ velocity:
-            velocity = previous
-        if abs(self.amr.driven_speed_mps) <= STANDING_SPEED_MPS:
-            velocity = np.zeros(2)  # only a person who walks into it moves a standing robot
-        _, towards = self._separation(index)
-        if not self._touching[index]:  # a continuing touch is one contact
-            self._touching[index] = True
-            self.contacts.append(ContactEvent(self.t_s, index, velocity, towards))
-        x, y = (-towards).tolist()
-        self._touches[index].append((x, y))
+        approach = max(
+            (self._approach(index, each) for each in before if each is not None),
+            key=lambda each: each.robot_speed_mps,
+        )
+        if self.amr.driven_mps <= STANDING_SPEED_MPS:
+            # Only a person who walks into it moves a standing robot.
+            approach = approach._replace(robot_mps=(0.0, 0.0))
+        now, began = ContactEvent(self.t_s, index, approach), self._touching[index]
+        # A continuing touch is one contact, unless a robot that stood sets off into the person.
+        if began is None or (began.robot_speed_mps <= STANDING_SPEED_MPS and now.by == "robot"):
+            self._touching[index] = now
+            self.contacts.append(now)
+        x, y = approach.towards_person
+        self._touches[index].append((-x, -y))
 
 
 def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:

@@ -20,15 +20,13 @@ from perception.arrays import FloatArray
 from perception.installation import install_command
 from tracking.config import complaints
 
-from ..actors.robot import NOVA_CARTER, RobotModel
+from ..actors.robot import RobotModel
 from ..conditions import Perception, refuse_unused_networks
 from ..crossing import (
-    STANDING_SPEED_MPS,
     Crossing,
     CrossingFrame,
     SafetyFigures,
     Setup,
-    Situation,
     TopView,
     axis_names,
     changed,
@@ -72,7 +70,8 @@ class RewardWeights(SimConfig):
         over_limit_per_m: for each metre that the commanded speed exceeds the limit, summed over
             time. The speed is that of the robot's fastest point, |v| + |ω| R.
         negative_margin_per_s: for each second with a negative separation margin of a moving robot.
-        contact: once for each contact that the robot caused.
+        contact: once for each contact with a person that the robot caused.
+        bump: once for each contact with a rack, a wall or a prop.
     """
 
     progress_per_m: float = 1.0
@@ -81,6 +80,7 @@ class RewardWeights(SimConfig):
     over_limit_per_m: float = -2.0
     negative_margin_per_s: float = -2.0
     contact: float = -20.0
+    bump: float = -20.0
 
 
 class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
@@ -101,9 +101,11 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         people_slots: number of people in an observation.
         scan_rays: number of rays of the scan in an observation; 0 for no scan.
         normalised_actions: actions are shares of the robot's largest speed and yaw rate, float32 in
-            [−1, 1]; else they are in m/s and rad/s, float64 within the robot's limits.
+            [−1, 1]; else they are in m/s and rad/s, float64 within the robot's limits, or within
+            the largest of all scenarios' robots.
         reward: weights of the reward, as an object or as a mapping; None for the defaults.
-        end_at_contact: a contact that the robot caused ends the episode.
+        end_at_contact: a contact that the robot caused ends the episode, and so does one with a
+            rack or a wall.
         render_mode: ``"rgb_array"`` or None.
         render_view: ``"top"`` for a plan, ``"camera"`` for the robot's camera.
         robot: another robot, to which every scenario is fitted: a model, a shipped name, a YAML
@@ -182,17 +184,17 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             }
         )
         self.observation_space = cast("spaces.Space[Observation]", arrays)
-        profile = NOVA_CARTER if own_robot is None else own_robot.profile
-        limits = np.array(action_limits(profile))
+        drawn = [each if isinstance(each, Scenario) else each.median() for each in self._scenarios]
+        limits = np.max([action_limits(each.robot_profile) for each in drawn], axis=0)
         self.action_space = (
             spaces.Box(-1.0, 1.0, (2,), np.float32)
             if normalised_actions
             else spaces.Box(-limits, limits, dtype=np.float64)
         )
         self._crossing: Crossing | None = None
-        self._situation: Situation | None = None
+        self._situation: CrossingFrame | None = None
         self._safety = SafetyFigures()
-        self._last: tuple[Situation, tuple[float, float]] | None = None
+        self._last: CrossingFrame | None = None
         self._plan: TopView | None = None
         self._camera: CameraRenderer | None = None
         self._ended = False
@@ -205,8 +207,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         return self._crossing
 
     @property
-    def situation(self) -> Situation:
-        """The present control cycle, with the constraints a planner gets."""
+    def situation(self) -> CrossingFrame:
+        """The present control cycle before its command, with the constraints a planner gets."""
         if self._situation is None:
             raise SimError(_NO_EPISODE)
         return self._situation
@@ -214,10 +216,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
     @property
     def frame(self) -> CrossingFrame | None:
         """The control cycle of the last step, as ``run_crossing`` records it; None before it."""
-        if self._last is None:
-            return None
-        situation, command = self._last
-        return situation.frame(command)
+        return self._last
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -260,16 +259,16 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if self._ended:
             raise SimError("the episode has ended: call reset")
         command = command_of(action, crossing.stage.amr.profile, normalised=self._normalised)
-        contacts = _by_robot(crossing)
+        hits, bumps, safety = _by_robot(crossing), crossing.stage.amr.bumps, self._safety
         crossing.command(*command)
-        self._last = before, command
+        self._last = replace(before, command=command)
         crossing.advance()
         now = self._sense()
-        hits = _by_robot(crossing) - contacts
+        hits, bumps = _by_robot(crossing) - hits, crossing.stage.amr.bumps - bumps
         terminated = now.at_goal and not crossing.time_is_up
         reason = "goal" if terminated else ""
-        if hits and self._end_at_contact:
-            terminated, reason = True, "contact"
+        if (hits or bumps) and self._end_at_contact:
+            terminated, reason = True, "contact" if hits else "bump"
         truncated = crossing.time_is_up and not terminated
         if truncated:
             reason = "time"
@@ -284,8 +283,10 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             "over_limit": weights.over_limit_per_m
             * _over_limit_mps(before.constraints, command)
             * dt_s,
-            "margin": weights.negative_margin_per_s * _violates(now) * dt_s,
+            "margin": weights.negative_margin_per_s
+            * (self._safety.violation_time_s - safety.violation_time_s),
             "contact": weights.contact * hits,
+            "bump": weights.bump * bumps,
         }
         info = self._info(command, parts, reason, None)
         return self._observation(), float(sum(parts.values())), terminated, truncated, info
@@ -295,8 +296,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if self.render_mode is None:
             return None
         crossing = self.crossing
-        command = (0.0, 0.0) if self._last is None else self._last[1]
-        frame, cone = self.situation.frame(command), AttentionCone()
+        command = (0.0, 0.0) if self._last is None else self._last.command
+        frame, cone = replace(self.situation, command=command), AttentionCone()
         if self._render_view == "top":
             if self._plan is None:
                 window_odom_m = crossing.scenario.robot.window_odom_m(_PLAN_MARGIN_M)
@@ -316,7 +317,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._crossing, self._situation = None, None
         self._plan, self._camera = None, None
 
-    def _sense(self) -> Situation:
+    def _sense(self) -> CrossingFrame:
         now = self._situation = self.crossing.sense()
         self._safety = self._safety.after(now.t_s, now.separations)
         return now
@@ -332,7 +333,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
 
     def _observation(self) -> Observation:
         now = self.situation
-        return self._encoder.encode(now.sensed.state, self.crossing.goal_odom_m, now.constraints)
+        return self._encoder.encode(now.known_state, self.crossing.goal_odom_m, now.constraints)
 
     def _info(
         self,
@@ -354,7 +355,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             "min_separation_m": safety.min_separation_m,
             "violation_time_s": safety.violation_time_s,
             "speed_limit_mps": limits.speed_limit_mps,
-            "yaw_rate_limit_radps": limits.yaw_rate_limit_radps(now.sensed.state.speed_mps),
+            "yaw_rate_limit_radps": limits.yaw_rate_limit_radps(now.known_state.speed_mps),
             "limited_by": limits.limited_by,
             "stale": limits.stale,
             "braking_suffices": limits.braking_suffices,
@@ -369,8 +370,11 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
                 for each in limits.obstacles
             ],
             "contact": contact_by(self.crossing.stage.contacts),
+            "bumps": self.crossing.stage.amr.bumps,
             "end": reason,
-            "is_success": reason == "goal" and not _by_robot(self.crossing),
+            "is_success": reason == "goal"
+            and not _by_robot(self.crossing)
+            and not self.crossing.stage.amr.bumps,
             "reward_parts": parts,
         }
         if seed is not None:
@@ -400,17 +404,10 @@ def _over_limit_mps(constraints: NavConstraints, command: tuple[float, float]) -
     return over
 
 
-def _distance_m(now: Situation, goal_odom_m: FloatArray) -> float:
+def _distance_m(now: CrossingFrame, goal_odom_m: FloatArray) -> float:
     """Return the true distance of the base origin to the goal."""
-    off_m = goal_odom_m - now.state.position_odom_m
+    off_m = goal_odom_m - now.robot_state.position_odom_m
     return math.sqrt(off_m.dot(off_m))
-
-
-def _violates(now: Situation) -> bool:
-    return (
-        now.state.travel_mps > STANDING_SPEED_MPS
-        and min(now.separations.margins_m, default=0.0) < 0.0
-    )
 
 
 def _by_robot(crossing: Crossing) -> int:

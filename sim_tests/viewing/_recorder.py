@@ -291,6 +291,8 @@ def outcome_text(result: CrossingResult) -> str:
         moving = any(each.robot_speed_mps > STANDING_SPEED_MPS for each in result.contacts)
         robot = "moving" if moving else "standing"
         parts.append(f"contact with the {robot} robot, caused by the {result.contact_by}")
+    if result.bumps:
+        parts.append("the robot ran into a rack or a wall")
     return ", ".join(parts)
 
 

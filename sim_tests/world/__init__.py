@@ -16,7 +16,7 @@ if TYPE_CHECKING:
         keypoints_in_front,
         sees,
     )
-    from ._warehouse import GRAVITY_MPS2, PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Warehouse
+    from ._warehouse import GRAVITY_MPS2, PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Nearest, Warehouse
 
 __all__ = [
     "FACE_DEPTH_M",
@@ -26,6 +26,7 @@ __all__ = [
     "PERSON_GROUP",
     "RAY_GROUP",
     "ROBOT_GROUP",
+    "Nearest",
     "Warehouse",
     "crosses_boxes",
     "first_body_before",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Final, NamedTuple
@@ -31,11 +32,13 @@ class Nearest(NamedTuple):
         distance_m: between them; negative where the bodies overlap.
         first_odom_m: (3,) the place on the first body.
         second_odom_m: (3,) the place on the second.
+        towards_first: (3,) unit normal on the second body.
     """
 
     distance_m: float
     first_odom_m: tuple[float, float, float]
     second_odom_m: tuple[float, float, float]
+    towards_first: tuple[float, float, float]
 
 
 class Warehouse(AbstractContextManager["Warehouse"]):
@@ -56,6 +59,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         steps: number of physics steps since the start.
         client: PyBullet's id of this world; −1 once it is closed.
         obstacle_boxes_odom: (N, 4) x_min, y_min, x_max, y_max of racks, walls and props, metres.
+        obstacle_bodies: PyBullet's ids of the same.
 
     Raises:
         SimError: for an unknown renderer, and after :meth:`close`.
@@ -93,7 +97,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
             physicsClientId=self.client,
         )
         self._add_floor()
-        self._add_boxes()
+        self.obstacle_bodies = frozenset(self._add_boxes())
 
     @property
     def visuals(self) -> Visuals:
@@ -161,7 +165,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         if not pairs:
             return None
         closest = min(pairs, key=lambda pair: pair[8])
-        return Nearest(float(closest[8]), closest[5], closest[6])
+        return Nearest(float(closest[8]), *closest[5:8])
 
     def _add_floor(self) -> None:
         shape = pybullet.createCollisionShape(
@@ -181,7 +185,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
         )
         self._make_static(body)
 
-    def _add_boxes(self) -> None:
+    def _add_boxes(self) -> Iterator[int]:
         for (x_min, y_min, x_max, y_max), height in zip(
             self.obstacle_boxes_odom.tolist(), self.layout.obstacle_heights_m.tolist(), strict=True
         ):
@@ -198,6 +202,7 @@ class Warehouse(AbstractContextManager["Warehouse"]):
                 physicsClientId=self.client,
             )
             self._make_static(body)
+            yield body
 
     def _make_static(self, body: int) -> None:
         pybullet.setCollisionFilterGroupMask(

@@ -90,6 +90,11 @@ def test_the_results_compare_the_same_episodes_of_two_rows():
     assert (same.value, same.low, same.high) == pytest.approx((1.0, 1.0, 1.0))
     slower = times(_times(), _times(1.5))
     assert (slower.value, slower.low, slower.high) == pytest.approx((1.5, 1.5, 1.5))
+    arrives = _times()
+    stuck = (replace(each, time_to_goal_s=None, duration_s=30.0) for each in arrives.records)
+    never = times(arrives, replace(arrives, records=tuple(stuck)))
+    base_s = sum(each.time_to_goal_s for each in arrives.records) / len(arrives.records)
+    assert never.value == pytest.approx(30.0 / base_s)
     saved = over_scenarios(_times(lost_s=2.0).ran, _times(lost_s=3.5).ran, lambda a, b: b - a)
     assert (saved.value, saved.low, saved.high) == pytest.approx((1.5, 1.5, 1.5))
     assert saved.n == 4

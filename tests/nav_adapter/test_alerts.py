@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -101,11 +103,28 @@ def test_the_most_urgent_person_gets_the_horn_first() -> None:
     assert [(alert.track_id, alert.kind) for alert in alerts] == [(2, "horn")]
 
 
+def test_a_louder_sound_waits_for_no_softer_one() -> None:
+    """Somebody gets the voice; then another one steps out, for whom only the horn is left."""
+    adapter = NavAdapter(AwarenessPolicy(), ROBOT)
+    far, out = person(position=(3.0, 0.0)), person(position=(1.2, 0.1), track_id=2)
+    given_: list[tuple[int, str]] = []
+    for now, people in ((0.0, [far]), (0.4, [far, out]), (0.8, [far, out]), (1.3, [far])):
+        tracks = [replace(each, stamp_s=now) for each in people]
+        result = adapter.update(tracks, robot_at(now, speed_mps=1.0), now)
+        given_ += [(alert.track_id, alert.kind) for alert in result.alerts]
+    assert given_ == [(1, "voice"), (2, "horn")]
+    other = replace(far, id=3, stamp_s=1.35)
+    soft = adapter.update([other], robot_at(1.35, speed_mps=1.0), 1.35)
+    assert soft.alerts == ()  # no voice within a second of the horn
+    loud = adapter.update([replace(other, stamp_s=1.45)], robot_at(1.45, speed_mps=1.0), 1.45)
+    assert [alert.kind for alert in loud.alerts] == ["voice"]
+
+
 @given(people=crowds(max_size=3), rates=st.lists(finite(0.05, 0.4), min_size=1, max_size=20))
 def test_alerts_are_limited_in_rate(people: tuple[PersonTrack, ...], rates: list[float]) -> None:
     adapter, now = NavAdapter(AwarenessPolicy(), ROBOT), 0.0
     given_s: dict[tuple[int, str], float] = {}
-    sounded_s = -100.0
+    loudness, sounded_s = {"light": 0, "voice": 1, "horn": 2}, {0: -100.0, 1: -100.0, 2: -100.0}
     for dt in rates:
         now += dt
         result: NavConstraints = adapter.update(
@@ -118,9 +137,10 @@ def test_alerts_are_limited_in_rate(people: tuple[PersonTrack, ...], rates: list
             key = (alert.track_id, alert.kind)
             assert now - given_s.get(key, -100.0) >= REPEAT_AFTER_S
             given_s[key] = now
-            if alert.kind != "light":
-                assert now - sounded_s >= QUIET_S
-                sounded_s = now
+            loud = loudness[alert.kind]
+            if loud:
+                assert all(now - sounded_s[each] >= QUIET_S for each in range(loud, 3))
+                sounded_s[loud] = now
 
 
 def test_a_refused_update_uses_up_no_alert() -> None:

@@ -196,6 +196,31 @@ def test_a_look_long_after_the_request_is_no_answer() -> None:
     assert not any(result.answers for result in late)
 
 
+@pytest.mark.parametrize(("after_s", "answers"), [(0.1, []), (0.2, []), (0.3, [0.3])])
+def test_a_look_before_anybody_could_react_is_no_answer(
+    after_s: float, answers: list[float]
+) -> None:
+    results = driven(answering(0.2 + after_s, 0.05), 2.0)
+    assert [t for t, _ in requests(results)] == [0.2]
+    assert [each.after_s for r in results for each in r.answers] == pytest.approx(answers)
+
+
+@pytest.mark.parametrize(("picture_s", "answers"), [(0.1, 0), (0.45, 0), (0.55, 1), (None, 1)])
+def test_scans_show_nobody_look(picture_s: float | None, answers: int) -> None:
+    """A look in the picture of an instant; scans go on to show the person."""
+
+    def tracks(t_s: float) -> list[PersonTrack]:
+        looks = 0.55 < t_s < 1.05
+        (track,) = standing(BESIDE, awareness_lower=0.7 if looks else 0.0)(t_s)
+        return [replace(track, time_since_face_s=None if picture_s is None else t_s - picture_s)]
+
+    def scanned(t_s: float) -> list[PersonTrack]:
+        return tracks(t_s) if t_s >= 0.55 else standing(BESIDE)(t_s)
+
+    results = driven(scanned, 2.0)
+    assert sum(len(result.answers) for result in results) == answers
+
+
 def test_an_answer_is_remembered_until_the_belief_ends() -> None:
     """A look leaves a belief of 0.3, too weak to count by itself, for 2 s."""
 

@@ -37,6 +37,7 @@ class BlindedRobot(Robot):
         sent = image(now_s, self.picture)
         if self.compressed:
             sent = jpeg_of(self.picture, now_s)
+        self.bridge.on_odometry(self.odometry(now_s), now_s)
         self.used = self.bridge.on_image(sent, now_s)
         return super().step(now_s)
 
@@ -72,6 +73,25 @@ def test_the_camera_is_back_with_its_first_view() -> None:
     robot.picture = None
     robot.silent.clear()
     assert robot.drive(START_S + 2.5, 2.0)[-1].speed_limit_mps > 0.3
+
+
+def test_the_buffers_of_a_frozen_driver_in_turn_are_no_view() -> None:
+    robot = BlindedRobot(make_pipeline=attentive)
+    robot.drive(START_S, 1.0)
+    used = []
+    for step in range(40):
+        robot.picture = image(float(step % 3)).data
+        limit = robot.step(START_S + 1.0 + step * PERIOD_S).speed_limit_mps
+        used.append(robot.used)
+    assert used == [True] * 3 + [False] * 37
+    assert limit == 0.0
+
+
+def test_people_in_a_picture_without_a_view_do_not_count() -> None:
+    robot = BlindedRobot(make_pipeline=attentive)
+    robot.picture = GREY
+    assert robot.drive(START_S, 1.0)[-1].obstacles == ()
+    assert robot.bridge.counts["frames"] == 0
 
 
 def test_one_picture_that_is_sent_twice_costs_nothing() -> None:

@@ -17,7 +17,9 @@ from perception import AwarenessPipeline, Camera, PersonDetection, PersonKeypoin
 
 
 def depth_image(stamp_s: float, depth: np.ndarray | None = None, *, padding: int = 0) -> Image:
-    pixels = np.full((48, 64), 3000, np.uint16) if depth is None else depth
+    """Return a depth image of 3 m with noise, another one for each stamp, or one of those given."""
+    noise = np.random.default_rng(round(1e6 * stamp_s)).integers(0, 9, (48, 64), np.uint16)
+    pixels = 2996 + noise if depth is None else depth
     encoding = "16UC1" if pixels.dtype.kind == "u" else "32FC1"
     rows = np.ascontiguousarray(pixels).view(np.uint8).reshape(len(pixels), -1)
     rows = np.pad(rows, [(0, 0), (0, padding)])
@@ -118,13 +120,29 @@ def test_a_bad_depth_image_costs_no_picture(depth: np.ndarray, reason: str) -> N
     nav = DepthListener()
     for index in range(5):
         now = START_S + 0.05 * index
-        nav.bridge.on_depth(depth_image(now, depth), now)
+        nav.bridge.on_depth(depth_image(now, depth + depth.dtype.type(index)), now)
         nav.picture(now)
     assert nav.bridge.counts["frames"] == 5
     assert nav.bridge.counts["depth_images_refused"] == 5
     (said,) = nav.warnings  # once in ten seconds
     assert said.startswith("depth image refused and counted")
     assert reason in said
+
+
+@pytest.mark.parametrize("buffers", [1, 2, 4])
+def test_a_frozen_depth_stream_is_no_depth(buffers: int) -> None:
+    nav, without = DepthListener(), DepthListener()
+    for index in range(20):
+        now = START_S + 0.1 * index
+        frozen = depth_image(START_S + index % buffers).data
+        used = nav.bridge.on_depth(replace(depth_image(now), data=frozen), now)
+        placed_m, alone_m = nav.picture(now), without.picture(now)
+        assert used is (index < buffers)
+        assert (placed_m == alone_m) is not used
+    assert "frozen" in nav.warnings[0]
+    assert nav.bridge.counts["depth_images"] == buffers
+    nav.bridge.tick(now)
+    assert nav.heard["alerts"][-1].status[1].message == "lost: depth images"
 
 
 def test_one_from_the_future_is_refused_and_counted() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -157,18 +158,24 @@ def test_lookups_compose_and_invert(first, second, third) -> None:
     )
 
 
-@given(finite(0.0, 1.0), finite(-3.0, 3.0), finite(-1.0, 1.0))
-def test_poses_are_interpolated_between_two_stamps(
-    share: float, start_rad: float, turn_rad: float
+@given(poses, poses, poses, finite(-1.0, 1.0))
+def test_between_two_stamps_a_frame_moves_at_constant_velocity_in_itself(
+    start, seen_from, mount, share: float
 ) -> None:
-    buffer = TransformBuffer()
-    for stamp_s, yaw in ((10.0, start_rad), (10.1, start_rad + turn_rad)):
-        x = 2.0 * (stamp_s - 10.0)
-        buffer.add("odom", "base", stamp_s, pose_matrix((x, 0.0, 0.0), yaw_quaternion(yaw)))
-    T = buffer.lookup("odom", "base", 10.0 + 0.1 * share)
-    assert T[0, 3] == pytest.approx(0.2 * share, abs=1e-6)
-    wanted = Rotation.from_euler("z", start_rad + share * turn_rad).as_matrix()
-    assert np.allclose(T[:3, :3], wanted, atol=1e-6)
+    """It is the same motion from whichever frame it is seen, and of whichever point of the body."""
+    step = pose_matrix((0.3, -0.2, 0.1), yaw_quaternion(share))
+    lookups = []
+    for before, after in ((np.eye(4), np.eye(4)), (seen_from, mount)):
+        buffer = TransformBuffer()
+        for stamp_s, T in ((10.0, start), (10.4, start @ step)):
+            buffer.add("odom", "base", stamp_s, before @ T @ after)
+        lookups.append([buffer.lookup("odom", "base", 10.0 + 0.1 * n) for n in range(5)])
+    bare, framed = lookups
+    for T, other in zip(bare, framed, strict=True):
+        assert np.allclose(seen_from @ T @ mount, other, atol=1e-6)
+    steps = [np.linalg.inv(T) @ later for T, later in pairwise(bare)]
+    for each in steps[1:]:
+        assert np.allclose(each, steps[0], atol=1e-6)
 
 
 def test_a_lookup_outside_the_known_times_is_refused_with_the_times() -> None:

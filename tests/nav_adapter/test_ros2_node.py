@@ -119,6 +119,8 @@ def node_module(monkeypatch: pytest.MonkeyPatch) -> Any:
     anything = SimpleNamespace(RELIABLE=1, BEST_EFFORT=2, TRANSIENT_LOCAL=1, VOLATILE=2)
     for name, content in {
         "rclpy": {},
+        "rclpy.exceptions": {"InvalidParameterTypeException": TypeError},
+        "rclpy.executors": {"SingleThreadedExecutor": anything},
         "rclpy.node": {"Node": StandInNode},
         "rclpy.qos": {
             "DurabilityPolicy": anything,

@@ -18,7 +18,7 @@ from bridge_scenes import (
     scanning,
     tf,
 )
-from scan_scenes import RAYS, planar, scan_message
+from scan_scenes import RAYS, planar, ranges_of, scan_message
 from scipy.spatial.transform import Rotation
 
 from nav_adapter.ros2 import ScannerInput, ScannerMount
@@ -33,6 +33,7 @@ from nav_adapter.ros2.messages.geometry_msgs import (
 )
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
 from nav_adapter.ros2.messages.std_msgs import Header
+from perception.laser import MapCells
 
 PERIOD_S = Robot.period_s
 
@@ -182,6 +183,24 @@ def test_what_the_map_holds_is_nobody_until_the_map_moves_in_odom() -> None:
     assert np.linalg.norm(track.position_odom_m - PERSON) < 0.1
     nav.bridge.on_map(replace(given, data=b""))
     assert nav.warnings[-1].startswith("map: a map must have width")
+
+
+def test_scans_that_contradict_the_map_are_told_once_and_when_it_is_over() -> None:
+    """The person is kept: the map of a robot that is elsewhere has a wall where they stand."""
+    nav = scanning(people=[PERSON])
+    angles = np.linspace(-np.pi, np.pi, 20_000)
+    directions = np.column_stack((np.cos(angles), np.sin(angles)))
+    walls = ranges_of([], np.zeros((20_000, 2)), directions)[:, None] * directions
+    pillar = np.array([PERSON[0], PERSON[1] - 2.0]) + 0.3 * directions
+    nav.bridge.on_map(MapCells(np.concatenate((walls, pillar)), 0.1))
+    for start_s, shift_m in ((0.0, 2.0), (1.0, 2.0), (2.0, 0.0), (4.5, 0.0)):
+        nav.bridge.on_transforms(tf("map", "odom", planar(0.0, -shift_m, 0.0), START_S + start_s))
+        nav.drive(START_S + start_s, 1.0 if shift_m else 2.5)
+        (track,) = nav.bridge.tracks
+        assert np.linalg.norm(track.position_odom_m - PERSON) < 0.1
+    lost, over = nav.warnings
+    assert lost.startswith("the scans contradict the map, so the robot is elsewhere")
+    assert over == "the map is used"
 
 
 def test_a_map_whose_place_is_unknown_is_not_used() -> None:

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from scan_scenes import RAYS, planar, scan_message
 
 from nav_adapter import NavError
-from nav_adapter.ros2 import decode, encode, laser_scan_of, map_cells_of
-from nav_adapter.ros2.conversions import from_ros, to_ros, to_time, yaw_quaternion
+from nav_adapter.ros2 import ScanMessages, decode, encode, laser_scan_of, map_cells_of
+from nav_adapter.ros2.conversions import from_ros, header, to_ros, to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import Point, Pose
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
 from nav_adapter.ros2.messages.sensor_msgs import LaserScan
@@ -271,6 +271,39 @@ def test_stamps_at_the_end_of_the_sweep_place_people_as_stamps_at_its_start(rate
     (track,), (wanted,) = nav.bridge.tracks, right.bridge.tracks
     np.testing.assert_allclose(track.position_odom_m, wanted.position_odom_m, atol=0.02)
     assert np.linalg.norm(track.position_odom_m - PLACE) < 0.1
+
+
+def sweep_at(stamp_s: float) -> LaserScan:
+    """Return a scan of 0.1 s."""
+    head, ray_s = header(stamp_s, "scan"), 0.1 / (RAYS - 1)
+    return replace(HEADED, header=head, scan_time=0.1, time_increment=ray_s)
+
+
+@pytest.mark.parametrize("early", [(0,), (1,), (7,), (17, 18, 19)])
+def test_scans_that_come_early_while_a_clock_is_set_shift_no_later_one(early) -> None:
+    """A scan that came first or second decides until later ones show another clock."""
+    said: list[str] = []
+    messages = ScanMessages("front", said.append)
+    shifted = []
+    for sweep in range(40):
+        start_s = START_S + 0.1 * sweep
+        message = sweep_at(start_s)
+        now_s = start_s + 0.105 - (0.07 if sweep in early else 0.0)
+        shifted.append(messages.read(message, now_s).stamp_s < start_s - 1e-6)
+    assert not any(shifted[max(early) + 10 :])
+    assert any(shifted) is (early[0] < 2)
+    assert len(said) == (early[0] < 2)
+
+
+@given(st.lists(st.booleans(), min_size=20, max_size=60))
+def test_a_scanner_stamped_at_the_end_stays_so_while_some_scans_come_at_once(late) -> None:
+    messages, told = ScanMessages("front", lambda text: None), []
+    for sweep, delayed in enumerate([False] * 20 + late):
+        end_s = START_S + 0.1 * sweep
+        scan = messages.read(sweep_at(end_s), end_s + (0.2 if delayed else 0.01))
+        told.append(scan.end_s == pytest.approx(end_s, abs=1e-3))
+        last = ([False] * 20 + late)[max(0, sweep - 19) : sweep + 1]
+        assert told[-1] is (last.count(False) >= 0.25 * len(last))
 
 
 @pytest.mark.parametrize("scan_time", [0.0, 1.0])

@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from bridge_scenes import Listener
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scan_scenes import planar
 
-from nav_adapter.ros2 import CameraMount
+from nav_adapter import NavError
+from nav_adapter.ros2 import CameraMount, ScannerInput
 from nav_adapter.ros2._sensor_watch import SensorWatch
 from perception import Camera
 from perception.laser import LaserScan, Scanner, sight_of
@@ -113,3 +115,77 @@ def test_a_blind_sector_is_as_old_as_the_last_scan_that_saw_it() -> None:
     scanned(watch, 0, 1.6, 0.0, 270.0, (-70.0, -30.0))
     scanned(watch, 1, 1.5, 0.0, 270.0)
     assert watch.stamp_s == 1.5
+
+
+@pytest.mark.parametrize(
+    "names", [("camera",), ("depth images",), ("scan", "scan"), ("front", "camera")]
+)
+def test_a_scanner_with_the_name_of_another_sensor_is_refused(names) -> None:
+    for with_camera in (False, True):
+        with pytest.raises(NavError, match=f"name of its own.*got {names[-1]!r} again"):
+            SensorWatch(names, with_camera=with_camera, lost_after_s=0.5)
+    with pytest.raises(NavError, match="name of its own"):
+        Listener(scanners=[ScannerInput(name) for name in names])
+
+
+scans = st.lists(
+    st.tuples(st.integers(0, 2), st.floats(0.0, 9.0), st.floats(-180.0, 180.0)), max_size=8
+)
+
+
+@settings(max_examples=30)
+@given(scans, st.permutations(["one", "two", "three"]), st.text("/_", min_size=1), st.randoms())
+def test_order_and_names_of_the_sensors_do_not_matter(seen, order, prefix, random) -> None:
+    """Nor does the order of scans with their stamps: what is seen depends on the stamps alone."""
+    found = []
+    for names in (["one", "two", "three"], [prefix + name for name in order]):
+        watch = SensorWatch(names, with_camera=True, lost_after_s=0.5)
+        plain = {name.removeprefix(prefix): name for name in names} if names[0] != "one" else {}
+        notes = [("camera", 4.0, 0.0), *seen]
+        random.shuffle(notes)
+        for who, stamp_s, yaw_deg in notes:
+            if who == "camera":
+                watch.saw_image(stamp_s, CAMERA, AHEAD)
+            else:
+                name = ["one", "two", "three"][who]
+                scanned(watch, names.index(plain.get(name, name)), stamp_s, yaw_deg, 120.0)
+        sectors = [watch.seen.stamp_s(0.3 * k - 3.0, 0.2) for k in range(20)]
+        lost = {name.removeprefix(prefix) if plain else name for name in watch.lost(5.0)}
+        found.append((watch.stamp_s, sectors, lost))
+    assert found[0] == found[1]
+
+
+def test_the_loss_of_every_sensor_is_seen_and_its_return() -> None:
+    watch = SensorWatch(("one", "two"), with_camera=True, with_depth=True, lost_after_s=0.5)
+
+    def all_but(silent: str, now_s: float) -> None:
+        if silent != "camera":
+            watch.saw_image(now_s, CAMERA, AHEAD)
+        if silent != "depth images":
+            watch.saw_depth(now_s)
+        for number, name in enumerate(("one", "two")):
+            if silent != name:
+                scanned(watch, number, now_s, 0.0, 360.0)
+
+    all_but("", 0.0)
+    for start_s, silent in enumerate(("camera", "depth images", "one", "two")):
+        all_but(silent, start_s + 0.9)
+        assert watch.lost(start_s + 0.9) == (silent,)
+        (line,) = watch.news(start_s + 0.9)
+        assert line.startswith(f"{silent} has been silent for")
+        assert watch.news(start_s + 0.9) == []
+        all_but("", start_s + 1.0)
+        assert watch.news(start_s + 1.0) == [f"{silent} is back"]
+
+
+@given(st.floats(-180.0, 180.0), st.floats(-math.pi, math.pi), st.floats(0.0, 1.0))
+def test_a_direction_is_seen_by_the_sensors_that_look_there(yaw_deg, bearing, half) -> None:
+    """The field of the camera is noted as that of a scanner is."""
+    watch = looking(yaw_deg)
+    off = abs(math.remainder(bearing - math.radians(yaw_deg), math.tau))
+    slack = math.radians(45.0) - off - half
+    seen_s = watch.seen.stamp_s(bearing, half)
+    if abs(slack) > math.radians(1.0):
+        assert seen_s == (0.0 if slack > 0.0 else None)
+    scanned(watch, 0, 3.0, 0.0, 360.0)
+    assert watch.seen.stamp_s(bearing, half) == 3.0

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from random import Random
+
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from perception.no_view import FROZEN, why_no_view
+from perception import PerceptionError
+from perception.no_view import FROZEN, LastFrames, why_no_view
 
 SIZE = (480, 640, 3)
 
@@ -69,10 +75,63 @@ def test_somebody_small_or_lit_in_the_dark_is_a_view() -> None:
 
 
 def test_the_same_picture_again_is_no_view_and_one_other_bit_makes_it_one() -> None:
-    picture = noise()
+    last, picture = LastFrames(), noise()
+    assert why_no_view(picture, last) is None
     again = picture.copy()
-    assert why_no_view(again, picture) == FROZEN
+    assert why_no_view(again, last) == FROZEN
     again[-1, -1, 2] ^= 1
-    assert why_no_view(again, picture) is None
-    assert why_no_view(picture[:240], picture) is None  # of another size
-    assert why_no_view(one_colour(0, 0, 0), one_colour(0, 0, 0)) == "black"
+    assert why_no_view(again, last) is None
+    assert why_no_view(picture[:240], last) is None  # of another size
+    assert why_no_view(one_colour(0, 0, 0), last) == "black"
+    assert why_no_view(one_colour(0, 0, 0), last) == "black"
+
+
+@settings(max_examples=30)
+@given(st.integers(1, 32), st.sampled_from(["u1", "<u2", "<f4", "<f8"]), st.randoms())
+def test_the_buffers_of_a_frozen_driver_repeat_and_a_live_sensor_never_does(
+    buffers: int, kind: str, random: Random
+) -> None:
+    rng, last = np.random.default_rng(random.getrandbits(32)), LastFrames()
+    frames = [rng.integers(0, 255, (6, 8)).astype(kind) for _ in range(200)]
+    # A still scene is live by its noise, however long it stands.
+    still = [frames[0] + (frame % 2).astype(kind) for frame in frames]
+    assert not any(last.repeats(frame) for frame in still)
+    # From the second round on, in any order.
+    frozen, first = frames[:buffers], LastFrames()
+    for frame in frozen:
+        first.repeats(frame)
+    order = random.choices(range(buffers), k=100)
+    assert all(first.repeats(frozen[index].copy()) for index in order)
+    assert not first.repeats(frames[-1])
+
+
+@given(
+    st.floats(-math.pi, math.pi), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.floats(-0.1, 0.1)
+)
+def test_without_noise_a_frame_repeats_only_once_the_robot_has_moved(
+    heading: float, x: float, y: float, turn: float
+) -> None:
+    def pose(x_m: float, y_m: float, yaw_rad: float) -> np.ndarray:
+        T = np.eye(4)
+        T[:2, :2] = [
+            [math.cos(yaw_rad), -math.sin(yaw_rad)],
+            [math.sin(yaw_rad), math.cos(yaw_rad)],
+        ]
+        T[:2, 3] = x_m, y_m
+        return T
+
+    last, (one, other), here = (
+        LastFrames(),
+        np.random.default_rng(0).random((2, 50)),
+        pose(3, 4, heading),
+    )
+    assert not any(last.repeats(frame, here) for frame in (one, other, one, other))
+    moved = math.hypot(x, y) > 0.05 or abs(turn) > math.radians(2.0)
+    assert last.repeats(other, pose(3 + x, 4 + y, heading + turn)) is moved
+    assert last.repeats(one, pose(3 + x, 4 + y, heading + turn)) is moved
+    assert not last.repeats(one, here)
+
+
+def test_the_picture_before_is_refused_by_name() -> None:
+    with pytest.raises(PerceptionError, match=r"LastFrames.*got ndarray"):
+        why_no_view(noise(), noise(1))  # type: ignore[arg-type]

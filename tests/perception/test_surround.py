@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 from synthetic_people import person_at
 
 from perception import (
     AwarenessPipeline,
     Camera,
+    HeadPose,
     PersonDetection,
     PersonKeypoints,
     PersonObservation,
@@ -331,3 +334,38 @@ def test_one_pipeline_for_several_cameras_is_not_shared_either() -> None:
     # Somebody new is found within the detector's interval.
     for index in range(10, 16):
         assert headings_seen(pipeline, index, 0.0, 90.0) == [0, 90]
+
+
+class Looking(Networks):
+    """The same, with a head that looks past the camera."""
+
+    def estimate(self, image_rgb, detections, people=None):
+        if people is None:
+            return super().estimate(image_rgb, detections)
+        turn = Rotation.from_euler("y", 40.0, degrees=True).as_matrix()
+        head = turn @ np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+        return tuple(
+            HeadPose(np.array([0.0, -0.2, 3.0]), head, 1e-4 * np.eye(6), 1.0) for _ in people
+        )
+
+
+@pytest.mark.parametrize("heading_deg", [0.0, 90.0, 150.0, -90.0])
+@pytest.mark.parametrize("aside_m", [-1.5, 0.0, 1.5])
+def test_the_robot_is_where_it_is_in_every_view(heading_deg: float, aside_m: float) -> None:
+    """People look at the robot's points, which turn with the views as the people do."""
+    networks = Looking()
+    view = ring_of_views(VIEW, [math.radians(heading_deg)])[0]
+    in_view = np.array([[aside_m, 0.5, 0.4], [aside_m, 0.5, -0.4]])
+
+    def make(points_m: np.ndarray, camera: Camera) -> AwarenessPipeline:
+        return AwarenessPipeline(
+            camera, networks, networks, networks, robot_points_camera_m=points_m
+        )
+
+    picture = panorama(0, heading_deg)
+    in_camera = in_view @ view.rotation_camera_view.T
+    surround = SurroundPipeline(PANORAMA, [view], partial(make, in_camera))
+    (seen,) = surround.process(picture, 0.0)
+    (flat,) = make(in_view, VIEW).process(surround.flat_pictures(picture)[0], 0.0)
+    assert seen.awareness == pytest.approx(flat.awareness, abs=1e-6)
+    assert flat.awareness is not None

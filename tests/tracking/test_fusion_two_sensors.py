@@ -308,3 +308,21 @@ def test_the_view_of_a_scanner_has_a_range_and_a_field() -> None:
     upside_down = turned @ np.diag([1.0, -1.0, -1.0, 1.0])
     np.testing.assert_allclose(view.visibility(places, upside_down), [1, 0.5, 0, 0, 1, 0])
     assert ScannerView().visibility(np.array([[-3.0, 0.0]]), laser_at()).tolist() == [1.0]
+
+
+def test_scans_do_not_make_the_latest_picture_of_a_face_newer() -> None:
+    """A camera at 0.0 to 1.0 s sees a face, then none of it; scans go on."""
+    tracker, place = both(), (3.0, 0.5)
+    for step in range(50):
+        now = 0.04 * step
+        tracks = tracker.update([seen_by_laser(place, now)], now, laser_at(), sensor=LASER)
+        if step % 2 == 0 and now <= 1.0:
+            face = seen_by_camera(place, now, awareness=0.9)
+            tracks = tracker.update([face], now, camera_at())
+        if step > 5:
+            (track,) = tracks
+            assert track.time_since_seen_s == 0.0
+            pictured_s = min(now - now % 0.08, 0.96) if now > 1.0 else 0.08 * (step // 2)
+            assert now - track.time_since_face_s == pytest.approx(pictured_s)
+    faceless = tracker.update([seen_by_camera(place, 2.0)], 2.0, camera_at())
+    assert faceless[0].time_since_face_s == math.inf

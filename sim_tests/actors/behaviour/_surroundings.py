@@ -47,11 +47,11 @@ class RobotBody:
     """The robot as a person can see it, in odom: a moving rectangle with a camera.
 
     Attributes:
-        x_m: position of the base.
-        y_m: position of the base.
+        x_m: position of the rectangle's middle.
+        y_m: the same.
         heading_rad: heading of the base.
-        vx_mps: velocity.
-        vy_mps: velocity.
+        vx_mps: velocity of the middle.
+        vy_mps: the same.
         half_length_m: half the rectangle's length along the heading.
         half_width_m: half its width.
         camera_m: (x, y, z) of the camera.

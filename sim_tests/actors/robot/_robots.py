@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from importlib import resources
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 import numpy as np
 import shapely
 
 from nav_adapter import RobotProfile, RobotState
+from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray, finite_array, finite_number
 
 from ...world import ROBOT_GROUP, Warehouse
@@ -56,6 +58,7 @@ class Robot(ABC):
 
     Attributes:
         body: PyBullet's id of the robot.
+        bumps: number of contacts with racks, walls and props.
         profile: as given.
         T_base_camera: (4, 4) pose of the optical frame in the base frame.
     """
@@ -71,6 +74,8 @@ class Robot(ABC):
         T_base_camera.setflags(write=False)
         self.T_base_camera: FloatArray = T_base_camera
         self._warehouse, self._client = warehouse, warehouse.client
+        self.bumps = 0
+        self._bumped_at_m: tuple[float, ...] | None = None
         # Speed forward and to the left, and yaw rate: as commanded, and now.
         self._targets = (0.0, 0.0, 0.0)
         self._forward_mps, self._left_mps, self._yaw_rate_radps = 0.0, 0.0, 0.0
@@ -98,27 +103,43 @@ class Robot(ABC):
         self._targets = forward, left, min(max(yaw_rate, -most), most)
 
     @abstractmethod
-    def advance(self, dt_s: float) -> None:
-        """Follow the command for ``dt_s`` > 0; call it before a physics step."""
+    def advance(self, dt_s: float, beside: Sequence[int] = ()) -> None:
+        """Follow the command for ``dt_s`` > 0; call it before a physics step.
+
+        ``beside`` are the bodies of people whom the robot may touch in this step.
+        """
+
+    def _count_bump(self) -> None:
+        """Count a contact with a rack or a wall, once for as long as the robot pushes on."""
+        here = self.motion[:2]
+        last, self._bumped_at_m = self._bumped_at_m, here
+        self.bumps += last is None or math.dist(here, last) > _SAME_PLACE_M
 
     @property
-    def driven_speed_mps(self) -> float:
-        """Speed of the drive along the direction of travel, negative backward.
+    def driven_mps(self) -> float:
+        """Bound of the speed of all points of the outline, by the drive alone.
 
         A push from outside does not change it.
         """
-        if self._left_mps == 0.0:
-            return self._forward_mps
-        return math.hypot(self._forward_mps, self._left_mps)
-
-    @abstractmethod
-    def state(self, stamp_s: float) -> RobotState:
-        """Return the robot's state."""
+        driven = Motion(*(0.0, 0.0, 0.0), self._forward_mps, self._left_mps, self._yaw_rate_radps)
+        return driven.fastest_mps(self.profile.circumscribed_radius_m)
 
     @property
     @abstractmethod
-    def velocity_odom_mps(self) -> FloatArray:
-        """(2,) velocity of the base origin."""
+    def motion(self) -> Motion:
+        """The robot's motion now."""
+
+    def state(self, stamp_s: float) -> RobotState:
+        """Return the robot's state."""
+        now, holonomic = self.motion, self.profile.drive == "holonomic"
+        return RobotState(
+            stamp_s=stamp_s,
+            position_odom_m=np.array([now.x_m, now.y_m]),
+            heading_odom_rad=math.remainder(now.heading_rad, math.tau),
+            speed_mps=now.forward_mps,
+            yaw_rate_radps=now.yaw_rate_radps,
+            velocity_base_mps=np.array([now.forward_mps, now.left_mps]) if holonomic else None,
+        )
 
     @property
     @abstractmethod
@@ -161,15 +182,6 @@ class Robot(ABC):
             most = abs(self._forward_mps) / profile.min_turning_radius_m
             self._yaw_rate_radps = min(max(self._yaw_rate_radps, -most), most)
         return before != (self._forward_mps, self._left_mps, self._yaw_rate_radps)
-
-
-class _Motion(NamedTuple):
-    """Pose and velocity of the base after one step of the physics."""
-
-    T_odom_base: FloatArray
-    heading_rad: float
-    speed_mps: float
-    yaw_rate_radps: float
 
 
 class Amr(Robot):
@@ -215,37 +227,29 @@ class Amr(Robot):
         dynamics = pybullet.getDynamicsInfo(self.body, -1, physicsClientId=self._client)
         self._to_base_m = -np.array(dynamics[3])
         self._read_at_step = -1
-        self._last_motion = _Motion(np.eye(4), 0.0, 0.0, 0.0)
+        self._last_pose: tuple[FloatArray, Motion] = np.eye(4), Motion(0.0, 0.0)
         self._drive()
 
-    def advance(self, dt_s: float) -> None:
-        """Ramp the wheels towards the command for ``dt_s`` > 0."""
+    def advance(self, dt_s: float, beside: Sequence[int] = ()) -> None:
+        """Ramp the wheels towards the command for ``dt_s`` > 0; physics keeps bodies apart."""
         dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
         if self._ramp(dt):
             self._drive()
-
-    def state(self, stamp_s: float) -> RobotState:
-        """Return the robot's state in the physics."""
-        motion = self._motion()
-        return RobotState(
-            stamp_s=stamp_s,
-            position_odom_m=motion.T_odom_base[:2, 3],
-            heading_odom_rad=motion.heading_rad,
-            speed_mps=motion.speed_mps,
-            yaw_rate_radps=motion.yaw_rate_radps,
-        )
+        # Of the last step. The wheels touch the floor, the body racks, walls and people alone.
+        points = pybullet.getContactPoints(self.body, linkIndexA=-1, physicsClientId=self._client)
+        obstacles = self._warehouse.obstacle_bodies
+        if any(point[2] in obstacles and point[8] <= 0.0 for point in points):
+            self._count_bump()
 
     @property
-    def velocity_odom_mps(self) -> FloatArray:
-        """(2,) velocity of the base origin, which points along the heading."""
-        motion = self._motion()
-        heading, speed = motion.heading_rad, motion.speed_mps
-        return np.array([speed * math.cos(heading), speed * math.sin(heading)])
+    def motion(self) -> Motion:
+        """The motion in the physics; the velocity points along the heading."""
+        return self._pose()[1]
 
     @property
     def T_odom_base(self) -> FloatArray:  # noqa: N802
         """(4, 4) pose of the base frame in odom, with the slight pitch of its motion."""
-        return self._motion().T_odom_base
+        return self._pose()[0]
 
     @property
     def wheel_angles_rad(self) -> tuple[float, float]:
@@ -258,10 +262,10 @@ class Amr(Robot):
         points = pybullet.getContactPoints(self.body, body, physicsClientId=self._client)
         return any(point[8] <= 0.0 for point in points)
 
-    def _motion(self) -> _Motion:
-        """Return the motion after the latest step; it is read once per step."""
+    def _pose(self) -> tuple[FloatArray, Motion]:
+        """Return pose and motion after the latest step; they are read once per step."""
         if self._read_at_step == self._warehouse.steps:
-            return self._last_motion
+            return self._last_pose
         self._read_at_step = self._warehouse.steps
         com, quaternion = pybullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self._client
@@ -278,13 +282,10 @@ class Amr(Robot):
         T = _IDENTITY.copy()
         T[:3, :3], T[:3, 3] = rotation, com + arm
         T.setflags(write=False)
-        self._last_motion = _Motion(
-            T,
-            math.atan2(entries[3], entries[0]),
-            float(origin_velocity.dot(rotation[:, 0])),
-            angular[2],
-        )
-        return self._last_motion
+        heading, forward = math.atan2(entries[3], entries[0]), origin_velocity.dot(rotation[:, 0])
+        x, y = T[:2, 3].tolist()
+        self._last_pose = T, Motion(x, y, heading, float(forward), 0.0, angular[2])
+        return self._last_pose
 
     def _set_up_dynamics(self) -> None:
         links = {
@@ -331,8 +332,8 @@ class Amr(Robot):
 class KinematicRobot(Robot):
     """Any robot that drives as its profile says, without wheels and motors.
 
-    The outline, extruded up to the height of the body, is what people touch. Racks and walls stop
-    it.
+    The outline, extruded up to the height of the body, is what people touch. Racks, walls and
+    people stop it.
 
     Args:
         warehouse: the world to drive in.
@@ -342,7 +343,6 @@ class KinematicRobot(Robot):
 
     Attributes:
         model: as given.
-        bumps: number of times that a rack or a wall stopped it.
 
     Raises:
         SimError: for a position or heading that is not finite.
@@ -356,59 +356,41 @@ class KinematicRobot(Robot):
         heading_odom_rad: float = 0.0,
     ) -> None:
         x, y = finite_array("position_odom_m", position_odom_m, (2,), SimError).tolist()
-        self._x_m, self._y_m = x, y
-        self._heading_rad = finite_number("heading_odom_rad", heading_odom_rad, SimError)
+        heading = finite_number("heading_odom_rad", heading_odom_rad, SimError)
+        self._at = Motion(x, y, heading)
         super().__init__(warehouse, model.profile, model.camera_m)
         self.model = model
-        self.bumps = 0
         self._outline_m = model.outline_m
         self._boxes = shapely.STRtree(shapely.box(*warehouse.obstacle_boxes_odom.T))
-        self._bumped_at_m: tuple[float, float] | None = None
         self.body = self._make_body()
         self._place()
 
-    def advance(self, dt_s: float) -> None:
-        """Move the body for ``dt_s`` > 0."""
+    def advance(self, dt_s: float, beside: Sequence[int] = ()) -> None:
+        """Move the body for ``dt_s`` > 0, but no deeper into people whom it touches."""
         dt = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
         self._ramp(dt)
         if self._forward_mps == self._left_mps == self._yaw_rate_radps == 0.0:
             return
-        before = self._x_m, self._y_m, self._heading_rad
-        middle = self._heading_rad + 0.5 * self._yaw_rate_radps * dt
-        cos, sin = math.cos(middle), math.sin(middle)
-        self._x_m += (self._forward_mps * cos - self._left_mps * sin) * dt
-        self._y_m += (self._forward_mps * sin + self._left_mps * cos) * dt
-        self._heading_rad += self._yaw_rate_radps * dt
-        if self._hits_a_box():
-            self._x_m, self._y_m, self._heading_rad = before
+        before, touched = self._at, [each for each in beside if self.touches(each)]
+        deep_m = [self._depth_m(each) for each in touched]
+        self._at = self.motion.at(dt)
+        bumps = self._hits_a_box()
+        if not bumps:
+            self._place()
+        if bumps or any(self._depth_m(b) > d for b, d in zip(touched, deep_m, strict=True)):
+            self._at = before
             self._forward_mps = self._left_mps = self._yaw_rate_radps = 0.0
+            self._place()
+        if bumps:
             self._count_bump()
-            return
-        self._place()
-
-    def state(self, stamp_s: float) -> RobotState:
-        """Return the robot's state."""
-        holonomic = self.profile.drive == "holonomic"
-        return RobotState(
-            stamp_s=stamp_s,
-            position_odom_m=np.array([self._x_m, self._y_m]),
-            heading_odom_rad=math.remainder(self._heading_rad, math.tau),
-            speed_mps=self._forward_mps,
-            yaw_rate_radps=self._yaw_rate_radps,
-            velocity_base_mps=(
-                np.array([self._forward_mps, self._left_mps]) if holonomic else None
-            ),
-        )
 
     @property
-    def velocity_odom_mps(self) -> FloatArray:
-        """(2,) velocity of the base origin."""
-        cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
-        return np.array(
-            [
-                self._forward_mps * cos - self._left_mps * sin,
-                self._forward_mps * sin + self._left_mps * cos,
-            ]
+    def motion(self) -> Motion:
+        """The robot's motion now."""
+        return self._at._replace(
+            forward_mps=self._forward_mps,
+            left_mps=self._left_mps,
+            yaw_rate_radps=self._yaw_rate_radps,
         )
 
     @property
@@ -420,17 +402,14 @@ class KinematicRobot(Robot):
         """Return whether another body touches the outline."""
         return self._warehouse.nearest(self.body, body, 0.0) is not None
 
-    def _count_bump(self) -> None:
-        """Count a stop at a rack or wall, once for as long as the robot pushes on."""
-        here = self._x_m, self._y_m
-        last = self._bumped_at_m
-        self.bumps += last is None or math.dist(here, last) > _SAME_PLACE_M
-        self._bumped_at_m = here
+    def _depth_m(self, body: int) -> float:
+        """Return how deep another body and the outline overlap, 0 when apart."""
+        nearest = self._warehouse.nearest(self.body, body, 0.0)
+        return 0.0 if nearest is None else -nearest.distance_m
 
     def _hits_a_box(self) -> bool:
         """Return whether the outline overlaps a rack, a wall or a prop."""
-        cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
-        corners = self._outline_m @ np.array([[cos, sin], [-sin, cos]]) + (self._x_m, self._y_m)
+        corners = [self._at.point(*corner) for corner in self._outline_m.tolist()]
         return bool(len(self._boxes.query(shapely.polygons(corners), predicate="intersects")))
 
     def _make_body(self) -> int:
@@ -454,17 +433,18 @@ class KinematicRobot(Robot):
 
     def _place(self) -> None:
         """Put the body where the robot is."""
-        half = 0.5 * self._heading_rad
+        x, y, heading = self._at[:3]
+        half = 0.5 * heading
         pybullet.resetBasePositionAndOrientation(
             self.body,
-            [self._x_m, self._y_m, 0.0],
+            [x, y, 0.0],
             [0.0, 0.0, math.sin(half), math.cos(half)],
             physicsClientId=self._client,
         )
-        cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
+        cos, sin = math.cos(heading), math.sin(heading)
         T = np.eye(4)
         T[:2, :2] = [[cos, -sin], [sin, cos]]
-        T[:2, 3] = self._x_m, self._y_m
+        T[:2, 3] = x, y
         T.setflags(write=False)
         self._T_odom_base: FloatArray = T
 

@@ -95,7 +95,7 @@ class ScannerEyes:
         ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
         due = [(number, arrives_s) for number, is_due, arrives_s in ticks if is_due]
         if due:
-            motion, known_motion = motion_of(T_odom_base, state), motion_of(_pose_of(known), known)
+            motion, known_motion = _motion(T_odom_base, state), motion_of(known)
             # The noise of a lost scan is drawn, so that a loss changes no other scan.
             scans = scan_all([self._scanners[number] for number, _ in due], motion)
             for (number, arrives_s), scan in zip(due, scans, strict=True):
@@ -182,7 +182,12 @@ def _pose_of(state: RobotState) -> FloatArray:
     return T
 
 
-def motion_of(T_odom_base: FloatArray, state: RobotState) -> RobotMotion:
+def motion_of(state: RobotState) -> RobotMotion:
+    """Return the motion of a robot on the floor, from its state."""
+    return _motion(_pose_of(state), state)
+
+
+def _motion(T_odom_base: FloatArray, state: RobotState) -> RobotMotion:
     velocity = np.array([state.speed_mps, state.lateral_mps])
     return RobotMotion(state.stamp_s, T_odom_base, velocity, state.yaw_rate_radps)
 

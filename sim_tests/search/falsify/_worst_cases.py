@@ -210,7 +210,7 @@ def _draw_plan(axes: Axes, case: WorstCase) -> None:
     """Draw ways, robot, people and gazes at the first contact, or at the smallest margin."""
     frames, contacts, record = case.result.frames, case.result.contacts, case.record
     margins = [
-        min(frame.margins_m, default=math.inf) if frame.robot_state.travel_mps > 0.03 else math.inf
+        min(frame.margins_m, default=math.inf) if frame.separations.robot_moves else math.inf
         for frame in frames
     ]
     worst = int(np.argmin(margins))

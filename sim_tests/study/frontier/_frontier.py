@@ -102,7 +102,8 @@ class Point:
         name: name of the policy.
         member: its place in the family; None for today's AMR and for any other policy.
         time_lost_s: mean time lost to people.
-        time_over_today: time to the goal over that of today's AMR on the same episodes.
+        time_over_today: time to the goal over that of today's AMR on the same episodes; an episode
+            that never arrives counts with what it lasted.
         step_out_unaware: mean step-out impacts with unaware people, per 1 000 crossings.
     """
 
@@ -191,18 +192,14 @@ def frontier_of(records: Iterable[EpisodeRecord]) -> Frontier:
     strata = [task[:2] for task in tasks]
     lost_s = np.array([[each.time_lost_s for each in row] for row in rows], dtype=np.float64)
     impacts = np.array([[each.step_out_unaware for each in row] for row in rows], dtype=np.float64)
-    free_s = np.array([row[0].time_without_people_s or 0.0 for row in rows])
+    lasted_s = np.array([[each.lasted_s for each in row] for row in rows], dtype=np.float64)
+    free_s = [row[0].time_without_people_s or 0.0 for row in rows]
     points = tuple(
         Point(
             name,
             member_named(name),
             bootstrap_interval(lost_s[:, column], _rng(), strata=strata),
-            bootstrap_interval(
-                free_s + lost_s[:, column],
-                _rng(),
-                over=free_s + lost_s[:, 0],
-                strata=strata,
-            ),
+            bootstrap_interval(lasted_s[:, column], _rng(), over=lasted_s[:, 0], strata=strata),
             bootstrap_interval(impacts[:, column], _rng(), strata=strata),
         )
         for column, name in enumerate(names)
@@ -211,7 +208,7 @@ def frontier_of(records: Iterable[EpisodeRecord]) -> Frontier:
     return Frontier(
         points,
         _worth(points, _Means.of(lost_s, impacts, attentive, strata), len(rows)),
-        float(free_s.mean()),
+        float(np.mean(free_s)),
         len(rows),
         len(set(strata)),
     )

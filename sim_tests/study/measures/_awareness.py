@@ -84,8 +84,6 @@ def track_awareness(result: CrossingResult, trace: Trace) -> tuple[FloatArray, F
     """
     mean = np.full(trace.awareness.shape, np.nan)
     lower = np.full(trace.awareness.shape, np.nan)
-    if not trace.people:
-        return mean, lower
     for row, frame in enumerate(result.frames):
         if frame.tracks:
             positions = np.array([track.position_odom_m for track in frame.tracks])
@@ -231,7 +229,7 @@ def _person_of(track_id: int, frame: CrossingFrame, trace: Trace, row: int) -> i
     )
     if place is None or not trace.people:
         return None
-    distances_m = np.hypot(*(trace.people_odom_m[row] - place).T)
+    distances_m = np.nan_to_num(np.hypot(*(trace.people_odom_m[row] - place).T), nan=np.inf)
     nearest = int(np.argmin(distances_m))
     return nearest if distances_m[nearest] <= MATCHED_WITHIN_M else None
 

@@ -118,15 +118,13 @@ def min_time_to_collision_s(
     At each instant it is the time until outline and body disc touch if robot and person keep their
     velocities (Hayward 1972). The robot's turning is not extrapolated.
     """
-    if not trace.people:
-        return None
     relative = trace.people_odom_m - trace.robot_odom_m[:, None, :]
     times = outline.time_to_disc(
         trace.to_base(relative).reshape(-1, 2),
         (trace.to_base(trace.people_odom_mps) - trace.velocity_base_mps[:, None, :]).reshape(-1, 2),
         body_radius_m,
     )
-    smallest = float(times.min())
+    smallest = float(np.fmin.reduce(times, initial=np.inf))
     return smallest if np.isfinite(smallest) else None
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray
 
 from ...world.errors import SimError
@@ -200,12 +201,12 @@ def fastest_point_excess_mps(frames: Sequence[CrossingFrame], robot: RobotProfil
     as in :func:`limit_excess_mps`. None if no cycle has such a limit.
     """
     radius_m = robot.circumscribed_radius_m
-    states = [frame.robot_state for frame in frames]
+    motions = [Motion.of(frame.robot_state) for frame in frames]
     limits = [frame.constraints.fastest_point_limit_mps for frame in frames]
     return _largest_excess(
         frames,
         robot,
-        [state.travel_mps + abs(state.yaw_rate_radps) * radius_m for state in states],
+        [motion.fastest_mps(radius_m) for motion in motions],
         [math.inf if limit is None else limit for limit in limits],
     )
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray
 
 from ...crossing import STANDING_SPEED_MPS, ContactEvent, CrossingResult
@@ -61,10 +62,26 @@ class Log:
         margins_m = np.array([frame.margins_m for frame in self.result.frames], dtype=np.float64)
         return margins_m.reshape(self.trace.separation_m.shape)
 
+    @cached_property
+    def nearest_point_mps(self) -> FloatArray:
+        """(N, P) speeds of the point of the robot that is nearest to each person."""
+        speeds_mps = [
+            [each.robot_speed_mps for each in frame.separations.approaches]
+            for frame in self.result.frames
+        ]
+        return np.array(speeds_mps, dtype=np.float64).reshape(self.trace.separation_m.shape)
+
+    @cached_property
+    def fastest_point_mps(self) -> FloatArray:
+        """(N,) bound of the speed of all points of the robot."""
+        radius_m = self.result.robot.circumscribed_radius_m
+        motions = (Motion.of(frame.robot_state) for frame in self.result.frames)
+        return np.array([motion.fastest_mps(radius_m) for motion in motions])
+
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """(N,) whether the robot moves."""
-        moves: NDArray[np.bool_] = self.trace.travel_mps > STANDING_SPEED_MPS
+        """(N,) whether the robot moves: it drives, or turns on the spot."""
+        moves: NDArray[np.bool_] = self.fastest_point_mps > STANDING_SPEED_MPS
         return moves
 
     @cached_property

@@ -90,7 +90,7 @@ _conditions(required=True)
 
 @column
 def success(log: Log) -> bool:
-    """The goal was reached and the robot touched nobody by its own motion."""
+    """The goal was reached, and the robot ran into nobody, no rack and no wall."""
     return log.result.success
 
 
@@ -102,15 +102,16 @@ def contact(log: Log) -> bool:
 
 @column
 def contact_by(log: Log) -> str:
-    """``"robot"`` if the robot moved into a person, else ``"person"``, or empty."""
+    """``"robot"`` if its touching point moved into a person, else ``"person"``, or empty."""
     return log.result.contact_by
 
 
 @measure_of_log("Smallest separation", better="higher")
 def min_separation_m(log: Log) -> float | None:
-    """Smallest distance between the surfaces of robot and person."""
-    if not log.trace.people:
-        return None
+    """Smallest distance between the surfaces of robot and person.
+
+    It is a lower bound where the centres are more than 4 m apart.
+    """
     return 0.0 if log.contacts else float(log.nearest_m.min())
 
 
@@ -122,8 +123,8 @@ def time_to_goal_s(log: Log) -> float | None:
 
 @measure_of_log("Highest speed within 2 m")
 def max_speed_within_2m_mps(log: Log) -> float | None:
-    """The robot's highest speed with a person's surface within 2 m."""
-    return log.result.max_speed_within_2m_mps if log.trace.people else None
+    """The robot's highest speed, at its point nearest to a person whose surface is within 2 m."""
+    return log.result.safety.max_speed_within_2m_mps if log.trace.anybody else None
 
 
 @measure_of_log("Smallest margin", better="higher")
@@ -137,7 +138,7 @@ def min_margin_m(log: Log) -> float:
 
 @measure_of_log("Margin violated", decimals=3)
 def violation_time_s(log: Log) -> float:
-    """Seconds an episode with the separation margin S − S_p below 0 at a moving robot."""
+    """Seconds an episode with the separation margin S − S_p to anybody below 0, robot moving."""
     return log.result.violation_time_s
 
 
@@ -197,13 +198,11 @@ def spl(log: Log) -> float | None:
 
 @measure_of_log("Speed when nearest")
 def speed_at_min_separation_mps(log: Log) -> float | None:
-    """The robot's speed at the instant of smallest separation."""
-    if not log.trace.people:
-        return None
+    """Speed of the robot's nearest point to a person at the instant of smallest separation."""
     fastest = log.fastest_mps(log.contacts)
-    if fastest is not None:
+    if fastest is not None or not log.trace.anybody:
         return fastest
-    return float(log.trace.travel_mps[int(np.argmin(log.nearest_m))])
+    return float(log.nearest_point_mps.flat[int(np.argmin(log.trace.separation_m))])
 
 
 @measure_of_log("Smallest time to collision", better="higher")
@@ -232,7 +231,7 @@ def personal_s(log: Log) -> float:
 
 @measure_of_log("Contacts by the robot", decimals=3)
 def robot_contacts(log: Log) -> int:
-    """Contacts of a robot that moved into a person."""
+    """Contacts of a robot whose touching point moved into a person."""
     return len(log.contacts_by_robot)
 
 
@@ -242,9 +241,15 @@ def person_contacts(log: Log) -> int:
     return len(log.contacts) - len(log.contacts_by_robot)
 
 
+@measure_of_log("Contacts with racks and walls", decimals=3)
+def bumps(log: Log) -> int:
+    """Contacts of the robot with racks, walls and props."""
+    return log.result.bumps
+
+
 @measure_of_log("Speed at contact")
 def contact_speed_mps(log: Log) -> float | None:
-    """The robot's highest speed at a contact that it caused."""
+    """Highest speed of the robot's touching point at a contact that it caused."""
     return log.fastest_mps(log.contacts_by_robot)
 
 
@@ -262,7 +267,7 @@ def peak_jerk_mps3(log: Log) -> float | None:
 
 @measure_of_log("Stops")
 def stops(log: Log) -> int:
-    """Number of times that the robot came to a stand before the goal."""
+    """Number of times that the robot came to a stand before the goal; turning is no standing."""
     arrived = log.result.time_to_goal_s is not None
     return _driving.count_stops(log.trace.travel_mps, ~log.moves, arrived)
 
@@ -370,7 +375,7 @@ def moving_contacts(log: Log) -> int:
 
 @measure_of_log("Speed at contact, any cause")
 def moving_contact_mps(log: Log) -> float | None:
-    """The robot's highest speed at a contact with a person, by any cause."""
+    """Highest speed of the robot's touching point at a contact with a person, by any cause."""
     return log.fastest_mps(log.moving_contacts)
 
 

@@ -100,6 +100,12 @@ class EpisodeRecord:
         return self.scenario, self.scenario_version, self.seed
 
     @property
+    def lasted_s(self) -> float | None:
+        """Time to the goal; of an episode that never arrives, what it lasted."""
+        arrived_s: float | None = self.time_to_goal_s
+        return self.duration_s if arrived_s is None else arrived_s
+
+    @property
     def moving_touched(self) -> bool:
         """True if a moving robot and a person touched, by any cause.
 

@@ -131,10 +131,11 @@ def step_out_impacts(
 
     Every 0.1 s at which the robot moves, each person sets off in each of 16 directions, evenly
     spaced from the robot's heading on, and ignores the robot. The robot keeps its curve, holds its
-    speed for its reaction time and ``noticed_after_s``, and brakes. An impact is the first touch of
-    the convex hull of its footprint and the body circle of 0.30 m, if the base origin then closes
-    at more than 0.03 m/s with the person's centre. A path through a rack, a wall or a prop gives
-    none.
+    speed for its reaction time and ``noticed_after_s``, and brakes; one that turns on the spot
+    brakes its farthest corner. An impact is the first touch of the convex hull of its footprint and
+    the body circle of 0.30 m, if robot and person then close at more than 0.03 m/s: the base origin
+    with the person's centre, plus what turning adds at the touching point. A path through a rack, a
+    wall or a prop gives none.
 
     Args:
         result: the crossing.
@@ -145,7 +146,7 @@ def step_out_impacts(
         SimError: a result without frames, or with frames that do not hold all people.
     """
     trace = Trace.of(result) if trace is None else trace
-    if not trace.people:
+    if not trace.anybody:
         return StepOutImpacts(*[math.nan] * 5)
     t_s = trace.t_s
     every = 1
@@ -153,8 +154,7 @@ def step_out_impacts(
         every = max(round(_EVERY_S / float(np.median(np.diff(t_s)))), 1)
     instants = np.arange(0, len(t_s), every)
     lasts_s = np.diff(t_s[instants], append=t_s[-1])
-    yaw_rates = np.array([frame.robot_state.yaw_rate_radps for frame in result.frames])
-    starts = _Starts(trace, yaw_rates, instants, result.robot, model)
+    starts = _Starts(trace, instants, result.robot, model)
     closing_mps = starts.impacts(result.obstacle_boxes_odom_m)  # (M, 16), 0 without an impact
     since_look_s = since_look_of(trace)[starts.row, starts.person]
     rates_hz = -np.log1p(-np.array(model.start_shares))
@@ -194,7 +194,6 @@ class _Starts:
 
     Args:
         trace: course of the episode.
-        yaw_rates_radps: (N,) of the robot.
         instants: rows of the trace at which people set off.
         robot: the robot.
         model: the people's constants.
@@ -207,7 +206,6 @@ class _Starts:
     def __init__(
         self,
         trace: Trace,
-        yaw_rates_radps: FloatArray,
         instants: NDArray[np.intp],
         robot: RobotProfile,
         model: StepOut,
@@ -216,7 +214,9 @@ class _Starts:
         self._outline = Outline(robot.footprint_m)
         places = trace.to_base(trace.people_odom_m - trace.robot_odom_m[:, None])
         velocities = trace.to_base(trace.people_odom_mps)
-        speed = trace.travel_mps[:, None]
+        # That of the farthest corner of a robot that turns on the spot.
+        turn_mps = np.abs(trace.yaw_rate_radps) * robot.circumscribed_radius_m
+        speed = np.maximum(trace.travel_mps, turn_mps)[:, None]
         brakes_s = speed / robot.max_deceleration_mps2
         until_s = robot.reaction_time_s + model.noticed_after_s + brakes_s
         reach_m = until_s * np.maximum(np.linalg.norm(velocities, axis=2), model.speed_mps)
@@ -227,12 +227,16 @@ class _Starts:
         self.row, self.person = row, person = np.nonzero(near & chosen[:, None])
         self._poses_odom = np.column_stack((trace.robot_odom_m, trace.heading_odom_rad))[row]
         self._place_m, self._velocity_mps = places[row, person], velocities[row, person]
-        self._robot_mps, self._yaw_rate_radps = trace.velocity_base_mps[row], yaw_rates_radps[row]
+        self._robot_mps, self._yaw_rate_radps = (
+            trace.velocity_base_mps[row],
+            trace.yaw_rate_radps[row],
+        )
+        self._speed_mps = speed[row, 0]
 
     def impacts(self, boxes_odom_m: FloatArray) -> FloatArray:
         """Return the (M, 16) closing speeds of the impacts; 0 for a start that ends in none."""
         found = np.zeros((len(self.row), _DIRECTIONS))
-        speed = float(np.linalg.norm(self._robot_mps, axis=1).max(initial=0.0))
+        speed = float(self._speed_mps.max(initial=0.0))
         until_s = self._holds_s + speed / self._robot.max_deceleration_mps2
         t_s = np.arange(math.ceil(until_s / _STEP_S) + 1, dtype=np.float64) * _STEP_S
         at_once = max(_PLACES_AT_ONCE // (_DIRECTIONS * len(t_s)), 1)
@@ -286,18 +290,23 @@ class _Starts:
     def _closing_mps(
         self, start: NDArray[np.intp], direction: NDArray[np.intp], t_s: FloatArray
     ) -> FloatArray:
-        """Return the speed of the base origin towards the person's centre."""
+        """Return the speed of the base origin towards the person's centre, and that of turning."""
         x_m, y_m, left = self._relative(start, direction, t_s)
         ahead, aside = self._robot_mps[start].T
-        closing: FloatArray = left * (ahead * x_m + aside * y_m)
-        return closing / np.maximum(np.hypot(x_m, y_m), 1e-9)
+        closing: FloatArray = (ahead * x_m + aside * y_m) / np.maximum(np.hypot(x_m, y_m), 1e-9)
+        centre = np.stack([x_m, y_m], axis=1)
+        gap = self._outline.gap(centre)
+        touch_x, touch_y = (centre - gap).T
+        normal_x, normal_y = (gap / np.maximum(np.hypot(*gap.T), 1e-9)[:, None]).T
+        closing += self._yaw_rate_radps[start] * (touch_x * normal_y - touch_y * normal_x)
+        return left * closing
 
     def _relative(
         self, start: Any, direction: Any, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return x and y of people in the base frame then, and the share of its speed left."""
         ahead, aside = self._robot_mps[start, 0], self._robot_mps[start, 1]
-        speed = np.hypot(ahead, aside)
+        speed = self._speed_mps[start]
         deceleration = self._robot.max_deceleration_mps2
         braking_s = np.clip(t_s - self._holds_s, 0.0, speed / deceleration)
         left = 1.0 - deceleration * braking_s / speed

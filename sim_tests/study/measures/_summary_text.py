@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from awarenav.cli import styled, table_text
 from awarenav.errors import counted
@@ -32,20 +32,20 @@ def summary_text(summary: Summary, notes: Iterable[str] = ()) -> str:
         return "no episodes"
     percent = f"{100.0 * summary.level:g} %"
     blocks = [
-        _titled(f"Policies: means with {percent} intervals", _policy_table(summary.policies)),
-        _titled("Safety: the worst of all episodes", _safety_table(summary.policies)),
+        _titled(f"Policies: means with {percent} intervals", _table(summary.policies, _POLICIES)),
+        _titled("Safety: the worst of all episodes", _table(summary.policies, _SAFETY)),
     ]
     if any(row.means["step_out_unaware"].known for row in summary.policies):
         title = "Step-out impacts per 1 000 crossings: an index, not a rate of accidents"
-        blocks.append(_titled(title, _step_out_table(summary.policies)))
+        blocks.append(_titled(title, _table(summary.policies, _STEP_OUT)))
     asking = [row for row in summary.policies if row.asked]
     if asking:
-        blocks.append(_titled("Requests for attention", _request_table(asking)))
+        blocks.append(_titled("Requests for attention", _table(asking, _REQUESTS)))
     if summary.comparisons:
         blocks.append(
             _titled(
                 "Pairs of the same scenario and seed",
-                _comparison_table(summary.comparisons),
+                _table(summary.comparisons, _COMPARISONS, 3),
             )
         )
     for title, rows in (
@@ -53,7 +53,7 @@ def summary_text(summary: Summary, notes: Iterable[str] = ()) -> str:
         ("By awareness of the person who came nearest (not paired)", summary.awareness),
         ("By scenario", summary.scenarios),
     ):
-        blocks.append(_titled(title, _part_table(rows)))
+        blocks.append(_titled(title, _table(rows, _PARTS, 2)))
     blocks.append("\n".join([*_notes(summary), *notes]))
     return "\n\n".join(blocks)
 
@@ -80,104 +80,6 @@ def short_text(summary: Summary) -> str:
 
 def _titled(title: str, table: str) -> str:
     return f"{styled(title, bold=True)}\n\n{table}"
-
-
-def _policy_table(rows: Sequence[SummaryRow]) -> str:
-    return _table(
-        rows,
-        {
-            "policy": lambda row: row.variant,
-            "success": _successes,
-            "time to goal s": _mean("time_to_goal_s"),
-            "time lost s": _mean("time_lost_s"),
-            "SPL": _mean("spl", bounds=False),
-            "personal zone s": _mean("personal_s"),
-        },
-    )
-
-
-def _safety_table(rows: Sequence[SummaryRow]) -> str:
-    return _table(
-        rows,
-        {
-            "policy": lambda row: row.variant,
-            "contact, moving": lambda row: row.moving_contact.share_text(),
-            "by robot": lambda row: row.robot_contact.share_text(),
-            "by person": lambda row: row.person_contact.share_text(),
-            "nearest m": _worst("min_separation_m"),
-            "margin m": _worst("min_margin_m"),
-            "violated s": _worst("violation_time_s"),
-            "TTC s": _worst("min_time_to_collision_s"),
-            "PET s": _worst("post_encroachment_s"),
-        },
-    )
-
-
-def _step_out_table(rows: Sequence[SummaryRow]) -> str:
-    return _table(
-        rows,
-        {
-            "policy": lambda row: row.variant,
-            "unaware": _mean("step_out_unaware"),
-            "> 0.25 m/s": _mean("step_out_unaware_fast", bounds=False),
-            "worst m/s": _worst("step_out_worst_mps"),
-            "aware": _mean("step_out_aware"),
-            "aware > 0.25 m/s": _mean("step_out_aware_fast", bounds=False),
-            "faster starts": _mean("step_out_stress_unaware", bounds=False),
-            "their worst m/s": _worst("step_out_stress_worst_mps"),
-        },
-    )
-
-
-def _request_table(rows: Sequence[SummaryRow]) -> str:
-    return _table(
-        rows,
-        {
-            "policy": lambda row: row.variant,
-            "per crossing": _mean("requests"),
-            "per hour": _mean("requests_per_hour"),
-            "answered %": _mean("answered_share"),
-            "needless %": _mean("needless_share"),
-            "people asked twice": _mean("asked_twice"),
-        },
-    )
-
-
-def _comparison_table(comparisons: Sequence[Comparison]) -> str:
-    return _table(
-        comparisons,
-        {
-            "policy": lambda each: each.variant,
-            "against": lambda each: each.baseline,
-            "episodes": lambda each: each.part or "all",
-            "pairs": lambda each: str(each.pairs),
-            "won back %": lambda each: each.won_back.text(0, 100.0),
-            "time lost s": lambda each: _signed(each.time_lost_s),
-            "violation %": lambda each: _signed(each.violation_excess, 0, 100.0),
-            "% of time": lambda each: _signed(each.violation_excess_of_time, 2, 100.0),
-            "longer violation": lambda each: each.violates_more.share_text(),
-        },
-        left=3,
-    )
-
-
-def _part_table(rows: Sequence[SummaryRow]) -> str:
-    return _table(
-        rows,
-        {
-            "episodes": lambda row: row.part.replace("_", " "),
-            "policy": lambda row: row.variant,
-            "success": _successes,
-            "contacts": _moving_contacts,
-            "step-out": _mean("step_out_unaware", bounds=False),
-            "time lost s": _mean("time_lost_s"),
-            "nearest m": _worst("min_separation_m"),
-            "margin m": _worst("min_margin_m"),
-            "violated s": _mean("violation_time_s", bounds=False),
-            "α error": _mean("awareness_error", bounds=False),
-        },
-        left=2,
-    )
 
 
 def _table(rows: Sequence[_Row], columns: dict[str, Callable[[_Row], str]], left: int = 1) -> str:
@@ -222,6 +124,73 @@ def _moving_contacts(row: SummaryRow) -> str:
 def _signed(interval: Interval, decimals: int = 2, scale: float = 1.0) -> str:
     text = interval.text(decimals, scale)
     return f"+{text}" if interval.known and round(interval.value * scale, decimals) > 0.0 else text
+
+
+_POLICIES: Final[dict[str, Callable[[SummaryRow], str]]] = {
+    "policy": lambda row: row.variant,
+    "success": _successes,
+    "time to goal s": _mean("time_to_goal_s"),
+    "time lost s": _mean("time_lost_s"),
+    "SPL": _mean("spl", bounds=False),
+    "personal zone s": _mean("personal_s"),
+}
+
+_SAFETY: Final[dict[str, Callable[[SummaryRow], str]]] = {
+    "policy": lambda row: row.variant,
+    "contact, moving": lambda row: row.moving_contact.share_text(),
+    "by robot": lambda row: row.robot_contact.share_text(),
+    "by person": lambda row: row.person_contact.share_text(),
+    "nearest m": _worst("min_separation_m"),
+    "margin m": _worst("min_margin_m"),
+    "violated s": _worst("violation_time_s"),
+    "TTC s": _worst("min_time_to_collision_s"),
+    "PET s": _worst("post_encroachment_s"),
+}
+
+_STEP_OUT: Final[dict[str, Callable[[SummaryRow], str]]] = {
+    "policy": lambda row: row.variant,
+    "unaware": _mean("step_out_unaware"),
+    "> 0.25 m/s": _mean("step_out_unaware_fast", bounds=False),
+    "worst m/s": _worst("step_out_worst_mps"),
+    "aware": _mean("step_out_aware"),
+    "aware > 0.25 m/s": _mean("step_out_aware_fast", bounds=False),
+    "faster starts": _mean("step_out_stress_unaware", bounds=False),
+    "their worst m/s": _worst("step_out_stress_worst_mps"),
+}
+
+_REQUESTS: Final[dict[str, Callable[[SummaryRow], str]]] = {
+    "policy": lambda row: row.variant,
+    "per crossing": _mean("requests"),
+    "per hour": _mean("requests_per_hour"),
+    "answered %": _mean("answered_share"),
+    "needless %": _mean("needless_share"),
+    "people asked twice": _mean("asked_twice"),
+}
+
+_COMPARISONS: Final[dict[str, Callable[[Comparison], str]]] = {
+    "policy": lambda each: each.variant,
+    "against": lambda each: each.baseline,
+    "episodes": lambda each: each.part or "all",
+    "pairs": lambda each: str(each.pairs),
+    "won back %": lambda each: each.won_back.text(0, 100.0),
+    "time lost s": lambda each: _signed(each.time_lost_s),
+    "violation %": lambda each: _signed(each.violation_excess, 0, 100.0),
+    "% of time": lambda each: _signed(each.violation_excess_of_time, 2, 100.0),
+    "longer violation": lambda each: each.violates_more.share_text(),
+}
+
+_PARTS: Final[dict[str, Callable[[SummaryRow], str]]] = {
+    "episodes": lambda row: row.part.replace("_", " "),
+    "policy": lambda row: row.variant,
+    "success": _successes,
+    "contacts": _moving_contacts,
+    "step-out": _mean("step_out_unaware", bounds=False),
+    "time lost s": _mean("time_lost_s"),
+    "nearest m": _worst("min_separation_m"),
+    "margin m": _worst("min_margin_m"),
+    "violated s": _mean("violation_time_s", bounds=False),
+    "α error": _mean("awareness_error", bounds=False),
+}
 
 
 def _notes(summary: Summary) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray
 
 from ...world.errors import SimError
@@ -20,11 +21,14 @@ if TYPE_CHECKING:
 class Trace:
     """The true course of an episode: N instants, P people.
 
+    People who are away at an instant have NaN for place and velocity, and are infinitely far.
+
     Attributes:
         t_s: (N,) increasing.
         robot_odom_m: (N, 2) positions of the base origin.
         heading_odom_rad: (N,) headings of the robot.
         velocity_base_mps: (N, 2) velocity of the base origin, forward and to the left.
+        yaw_rate_radps: (N,) of the robot.
         people_odom_m: (N, P, 2) positions of the centre lines.
         people_odom_mps: (N, P, 2) velocities.
         awareness: (N, P) true α.
@@ -37,6 +41,7 @@ class Trace:
     robot_odom_m: FloatArray
     heading_odom_rad: FloatArray
     velocity_base_mps: FloatArray
+    yaw_rate_radps: FloatArray
     people_odom_m: FloatArray
     people_odom_mps: FloatArray
     awareness: FloatArray
@@ -61,19 +66,21 @@ class Trace:
                 f"every frame must hold the truth and the separation of all {people} people"
             )
         count = len(frames)
-        states = [frame.robot_state for frame in frames]
+        course = np.array([Motion.of(frame.robot_state) for frame in frames])
 
         def of_people(name: str, size: tuple[int, ...]) -> FloatArray:
             rows = [[getattr(view, name) for view in frame.truth] for frame in frames]
             return np.array(rows, dtype=np.float64).reshape(count, people, *size)
 
+        here = np.where(of_people("away", (1,)), np.nan, 1.0)
         return cls(
             t_s=np.array([frame.t_s for frame in frames]),
-            robot_odom_m=np.array([state.position_odom_m for state in states]),
-            heading_odom_rad=np.array([state.heading_odom_rad for state in states]),
-            velocity_base_mps=np.array([[state.speed_mps, state.lateral_mps] for state in states]),
-            people_odom_m=of_people("position_odom_m", (2,)),
-            people_odom_mps=of_people("velocity_odom_mps", (2,)),
+            robot_odom_m=course[:, :2],
+            heading_odom_rad=course[:, 2],
+            velocity_base_mps=course[:, 3:5],
+            yaw_rate_radps=course[:, 5],
+            people_odom_m=here * of_people("position_odom_m", (2,)),
+            people_odom_mps=here * of_people("velocity_odom_mps", (2,)),
             awareness=of_people("awareness", ()),
             separation_m=np.array([frame.separations_m for frame in frames]).reshape(count, people),
             could_look=of_people("could_look", ()).astype(np.bool_),
@@ -83,6 +90,11 @@ class Trace:
     def people(self) -> int:
         """Number of people."""
         return int(self.separation_m.shape[1])
+
+    @property
+    def anybody(self) -> bool:
+        """True if somebody was there at some instant."""
+        return bool(np.isfinite(self.separation_m).any())
 
     @property
     def travel_mps(self) -> FloatArray:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from perception import AttentionCone
 from perception.arrays import FloatArray
 
-from ...crossing import STANDING_SPEED_MPS, CrossingFrame, Stage, TopView, draw_camera_view
+from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
 from ...world.camera import CameraRenderer
 from ..measures import EpisodeRecord
 from ..runs import Job, box_scale_of, observed_episode
@@ -48,8 +48,7 @@ class _WorstInstant:
 
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
         self._frames.append(frame)
-        speed = frame.robot_state.travel_mps
-        if not frame.margins_m or speed <= STANDING_SPEED_MPS:
+        if not frame.margins_m or not frame.separations.robot_moves:
             return
         self.least_m = min(self.least_m, *frame.margins_m)
         if self.least_m <= self._margin_m + _SAME_M:

@@ -342,4 +342,6 @@ def outcome_of(episode: Episode) -> str:
         return "a person walked into the moving robot"
     if record.person_contacts:
         return "a person walked into the robot"
+    if record.bumps:
+        return "robot ran into a rack or a wall"
     return "goal not reached" if record.time_to_goal_s is None else ""

@@ -60,7 +60,7 @@ def messages(
             found.append(("/camera/image_raw", at_s + 0.01, picture))
         if depth:
             encoding, kind = ("mono8", "u1") if tick == BAD_DEPTH else ("16UC1", "<u2")
-            far = np.full((48, 64), 30 if tick == BAD_DEPTH else 3000, kind)
+            far = np.full((48, 64), 30 if tick == BAD_DEPTH else 3000 + tick, kind)
             sent = Image(header, 48, 64, encoding, 0, 64 * far.itemsize, far.tobytes())
             found.append(("/camera/depth", at_s + 0.03, sent))
     return sorted(found, key=lambda each: each[1])

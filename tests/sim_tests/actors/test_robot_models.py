@@ -108,7 +108,7 @@ def test_a_holonomic_robot_moves_sideways_along_its_left(hall) -> None:
         robot.advance(STEP_S)
     state = robot.state(2.0)
     assert state.velocity_base_mps == pytest.approx([0.0, 0.6])
-    np.testing.assert_allclose(state.velocity_odom_mps, robot.velocity_odom_mps)
+    np.testing.assert_allclose(state.velocity_odom_mps, robot.motion.velocity_mps)
     along = state.position_odom_m / np.linalg.norm(state.position_odom_m)
     np.testing.assert_allclose(along, [-math.sin(0.5), math.cos(0.5)], atol=1e-6)
 
@@ -120,7 +120,7 @@ def test_a_rack_stops_a_robot_once(hall) -> None:
         robot.advance(STEP_S)
     racks = shapely.union_all(shapely.box(*hall.obstacle_boxes_odom.T))
     assert robot.bumps == 1
-    assert robot.driven_speed_mps == 0.0
+    assert robot.driven_mps == 0.0
     assert 0.0 <= outline(robot).distance(racks) < 0.01
     robot.command(-0.5, 0.0)
     for _ in range(240):

@@ -58,7 +58,7 @@ def test_the_reference_planner_drives_the_crossing_of_run_crossing() -> None:
     while not ended:
         now = env.situation
         action = planner.plan(
-            now.sensed.state, env.crossing.goal_odom_m, now.constraints, env.crossing.dt_s
+            now.known_state, env.crossing.goal_odom_m, now.constraints, env.crossing.dt_s
         )
         _, _, terminated, truncated, info = env.step(np.array(action))
         assert env.frame is not None

@@ -6,15 +6,18 @@ import math
 
 import numpy as np
 from shapely.geometry import Point, Polygon
+from shapely.ops import nearest_points
 
 from nav_adapter import NavConstraints, RobotState
+from nav_adapter.rigid import Motion
 from sim_tests import NOVA_CARTER, CrossingFrame, CrossingResult
-from sim_tests.crossing._separations import ContactEvent, Separations
+from sim_tests.crossing._separations import AWAY, Approach, ContactEvent, Separations, moves
 from sim_tests.crossing._stage import TrueView
 from sim_tests.study.measures._trace import Trace
 from tracking import PersonTrack
 
 BODY_RADIUS_M = 0.30
+FAR = (1000.0, 0.0, 0.5, -0.5)  # where the bodies of people who are away are put, and how they move
 ALONG_M, ACROSS_M = 0.3625, 0.25  # half the robot's length and width
 
 
@@ -57,27 +60,29 @@ def crossing(
 ):
     """A result whose frames follow formulas.
 
-    ``robot(t)`` gives x, y, heading, forward speed, and perhaps the speed to the left; each of
-    ``walks``, of t, gives x, y, vx, vy; ``awareness(t, person)`` the truth, ``tracked(t, person)``
-    α and lower bound or None; ``constraints(t)`` fields of the constraints.
+    ``robot(t)`` gives x, y, heading, forward speed, and perhaps the speed to the left and the yaw
+    rate; each of ``walks``, of t, gives x, y, vx, vy, or None while away; ``awareness(t, person)``
+    the truth, ``tracked(t, person)`` α and lower bound or None; ``constraints(t)`` fields of the
+    constraints.
     """
     frames = []
     for t in np.asarray(times).tolist():
         x, y, heading, *velocity = robot(t)
-        speed = velocity[0]
+        speed, yaw_rate = velocity[0], velocity.pop() if len(velocity) == 3 else 0.0
         state = RobotState(
             t,
             np.array([x, y]),
             heading,
             speed,
-            0.0,
+            yaw_rate,
             velocity_base_mps=None if len(velocity) == 1 else np.array(velocity),
         )
         outline = footprint_at((x, y), heading, footprint_m)
-        views, tracks, separations = [], [], []
+        views, tracks, approaches = [], [], []
         for index, person in enumerate(walks):
-            px, py, vx, vy = person(t)
-            true = 0.0 if awareness is None else awareness(t, index)
+            away = (now := person(t)) is None
+            px, py, vx, vy = FAR if away else now
+            true = 0.0 if awareness is None or away else awareness(t, index)
             views.append(
                 TrueView(
                     np.zeros(3),
@@ -85,12 +90,14 @@ def crossing(
                     true,
                     np.array([px, py]),
                     np.array([vx, vy]),
+                    not away,
+                    away,
                 )
             )
-            said = None if tracked is None else tracked(t, index)
+            said = None if tracked is None or away else tracked(t, index)
             if said is not None:
                 tracks.append(track_at((px + 0.1, py), *said, ident=index + 1, t_s=t))
-            separations.append(max(outline.distance(Point(px, py)) - BODY_RADIUS_M, 0.0))
+            approaches.append(AWAY if away else approach_of(state, outline, (px, py), (vx, vy)))
         given = {
             "obstacles": (),
             "limited_by": "nothing",
@@ -102,6 +109,7 @@ def crossing(
             CrossingFrame(
                 t_s=t,
                 robot_state=state,
+                known_state=state,
                 T_odom_camera=np.eye(4),
                 truth=tuple(views),
                 observations=(),
@@ -109,7 +117,9 @@ def crossing(
                 tracks=tuple(tracks),
                 constraints=limits,
                 command=(speed, 0.0),
-                separations=separations_of(t, state, views, separations),
+                separations=Separations(
+                    t, 0.05, NOVA_CARTER, moves(Motion.of(state), NOVA_CARTER), tuple(approaches)
+                ),
             )
         )
     values = {
@@ -126,24 +136,21 @@ def crossing(
     return CrossingResult(**values)
 
 
-def separations_of(t_s, state, views, separations_m):
-    """The separations of people, each in the direction of their centre."""
-    offsets = [view.position_odom_m - state.position_odom_m for view in views]
-    return Separations(
-        t_s,
-        0.05,
-        NOVA_CARTER,
-        np.array(state.velocity_odom_mps),
-        tuple(view.velocity_odom_mps for view in views),
-        tuple(separations_m),
-        tuple(offset / max(np.linalg.norm(offset), 1e-9) for offset in offsets),
-    )
+def approach_of(state, outline, place, velocity):
+    """The approach of an outline and a disc about a place."""
+    centre = Point(place)
+    point = nearest_points(outline, centre)[0]
+    gap = np.array(place) - (state.position_odom_m if outline.contains(centre) else point.coords[0])
+    x, y = (gap / max(np.linalg.norm(gap), 1e-9)).tolist()
+    robot_mps = Motion.of(state).velocity_at(point.x, point.y)
+    separation_m = max(outline.distance(centre) - BODY_RADIUS_M, 0.0)
+    return Approach(separation_m, (x, y), robot_mps, velocity)
 
 
 def contact(t_s, person, by, robot_mps):
     """A contact of a robot that drives in the direction of x, into somebody or away from them."""
-    towards = np.array([1.0 if by == "robot" else -1.0, 0.0])
-    return ContactEvent(t_s, person, np.array([robot_mps, 0.0]), towards)
+    towards = (1.0 if by == "robot" else -1.0, 0.0)
+    return ContactEvent(t_s, person, Approach(0.0, towards, (robot_mps, 0.0)))
 
 
 def straight(speed_mps, start=(0.0, 0.0), heading=0.0):
@@ -172,6 +179,7 @@ def trace(times, robot, people):
         robot_odom_m=poses[:, :2],
         heading_odom_rad=poses[:, 2],
         velocity_base_mps=np.column_stack((poses[:, 3], np.zeros(len(poses)))),
+        yaw_rate_radps=np.zeros(len(poses)),
         people_odom_m=walks.reshape(len(times), len(people), 4)[..., :2],
         people_odom_mps=walks.reshape(len(times), len(people), 4)[..., 2:],
         awareness=nothing,

@@ -30,12 +30,14 @@ def rows(policies, *, seeds=6, spread=0.0, free_s=10.0, attentive_s=0.0):
             for policy, (lost_s, impacts) in policies.items():
                 # Attentive people cost less and others more; the mean is the same.
                 shift_s = attentive_s if attention == "attentive" else -attentive_s
+                own_s = lost_s + chance - shift_s * lost_s
                 found.append(
                     EpisodeRecord(
                         *(scenario, seed, policy, "SamplingPlanner", "truth"),
                         attention=attention,
                         time_without_people_s=free_s,
-                        time_lost_s=lost_s + chance - shift_s * lost_s,
+                        time_to_goal_s=free_s + own_s,
+                        time_lost_s=own_s,
                         step_out_unaware=impacts,
                     )
                 )
@@ -78,6 +80,17 @@ def test_awareness_wins_the_distance_to_the_line_at_equal_risk_and_at_equal_time
     # Sibling: between today's AMR and the first policy of the family, and a loss.
     assert worth_of("memory_u0.6", 2.5, 8.0).at_equal_risk_s.value == pytest.approx(-1.0)
     assert worth_of("memory_u0.6", 1.5, 9.0).at_equal_time.value == pytest.approx(-1.0)
+
+
+def test_an_episode_that_never_arrives_costs_what_it_lasted():
+    stuck = [
+        replace(each, time_to_goal_s=None, time_lost_s=40.0, duration_s=40.0)
+        if each.policy == "blind_u1.5"
+        else each
+        for each in rows(LINE)
+    ]
+    point = next(each for each in frontier_of(stuck).points if each.name == "blind_u1.5")
+    assert point.time_over_today.value == pytest.approx(40.0 / 11.0)
 
 
 def test_the_line_is_not_prolonged():

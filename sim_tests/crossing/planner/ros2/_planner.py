@@ -355,7 +355,7 @@ class Ros2Planner:
             link.publish("tf", base_transform(stamped))
             due = [n for n, clock in enumerate(clocks) if clock.tick(now_s)[1] is not None]
             true = stage.amr.state(known.stamp_s)
-            motion = motion_of(stage.amr.T_odom_base, true)
+            motion = motion_of(true)
             for number, scan in zip(due, scan_all([scanners[n] for n in due], motion), strict=True):
                 period_s = 1.0 / (specs[number].timing.rate_hz or stage.scenario.control_hz)
                 message = scan_message(scan, start_s, self._scans[number], period_s)
