@@ -485,18 +485,14 @@ def requests_after_answer(log: Log) -> int:
     return log.requests.after_answer
 
 
-def _late_s(log: Log) -> list[float]:
-    return [each.late_s for each in log.result.frames if each.late_s is not None]
-
-
 @column
 def late_share(log: Log) -> float | None:
     """Share of control cycles that began over 10 ms late, with a stack outside in real time."""
-    late_s = _late_s(log)
+    late_s = _driving.late_s(log.result.frames)
     return sum(each > LATE_S for each in late_s) / len(late_s) if late_s else None
 
 
 @column
 def late_worst_s(log: Log) -> float | None:
     """The latest beginning of a control cycle, with a stack outside in real time."""
-    return max(_late_s(log), default=None)
+    return max(_driving.late_s(log.result.frames), default=None)
