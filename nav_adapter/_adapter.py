@@ -17,11 +17,14 @@ from ._checks import age_of_s, checked_tracks, goes_back, require_type
 from ._constraints import NavConstraints
 from ._errors import NavError
 from ._governor import GovernedSpeed, SpeedGovernor
+from ._known import SpeedBasis
 from ._obstacles import obstacles_of
 from ._people import People, Person
 from ._policy import AwarenessPolicy
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
-from ._speed_basis import SpeedBasis
+from .course import stands_still
+from .rigid import Motion
+from .rules import Sectors, seen_sectors
 
 _LOG = logging.getLogger("nav_adapter")
 # A stamp that is later than the last one by more than this may be wrong.
@@ -36,7 +39,7 @@ class _Memory:
         people: everybody, those who were dropped and still limit the speed included.
         addressed: the latest warnings and requests.
         constraints: the latest, or None before the first update.
-        given: the latest tracks, state of the robot, and stamp of perception.
+        given: the latest tracks, state of the robot, stamp of perception, and what was seen when.
         ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
         silent: whether the people count as after a pause in the updates.
     """
@@ -44,7 +47,7 @@ class _Memory:
     people: tuple[Person, ...] = ()
     addressed: AddressHistory = field(default_factory=AddressHistory)
     constraints: NavConstraints | None = None
-    given: tuple[tuple[PersonTrack, ...], RobotState, float] | None = None
+    given: tuple[tuple[PersonTrack, ...], RobotState, float, Sectors] | None = None
     ceiling_mps: float | None = None
     silent: bool = False
 
@@ -65,7 +68,7 @@ class NavAdapter:
 
     The speed limit is the lowest of all people: the highest speed at which the robot stands before
     it meets their reach (:mod:`nav_adapter.limit`), with the speed that the policy assumes for
-    their awareness, and never more than a protective field in the robot's straight path allows.
+    their awareness, and never more than a protective field along the robot's own curve allows.
 
     When a person is dropped whom no sensor has shown to be gone, the limit that they set rises
     slowly (``lost_rise_mps2``).
@@ -114,7 +117,7 @@ class NavAdapter:
         self._robot = robot
         self._prediction = prediction
         self._people = People(policy, robot)
-        self._governor = SpeedGovernor(policy, robot, self._people)
+        self._governor = SpeedGovernor(policy, robot)
         self._addressing = Addressing(policy, robot, self._governor, prediction)
         self._memory = _Memory()
         # As of the latest watchdog since then. No update knows of it.
@@ -159,9 +162,10 @@ class NavAdapter:
                 without people. If it is None, the newest track's stamp is used, and empty
                 ``tracks`` mean that no person is there. So a dead camera stops a robot without
                 tracks only if this stamp is given.
-            seen_stamp_s: returns the time from which sensors know what is in a sector, given the
-                bearing of its middle in the base frame and half its width in radians; None for a
-                sector that no sensor has seen. Without it all directions count as seen.
+            seen_stamp_s: gives, for a bearing from the base and half the width of a sector (rad),
+                the stamp from which all of it has been seen, or None if not all of it has been,
+                such as ``SeenDirections.stamp_s``. The robot then creeps where no sensor has
+                looked lately. None: it is not known what the sensors see, and all counts as seen.
 
         Returns:
             Obstacles in the order of track ids, the speed limit with the rule that set it, and
@@ -178,7 +182,8 @@ class NavAdapter:
         require_type("robot_state", robot_state, RobotState)
         entry = self._entry(now, robot_state)
         perceived_s = self._perceived_s(current, now, perception_stamp_s)
-        memory = self._following(entry.memory, current, robot_state, perceived_s, now)
+        given = current, robot_state, perceived_s, seen_sectors(seen_stamp_s)
+        memory = self._following(entry.memory, *given, now)
         # Nothing can fail from here on. An error above leaves the adapter unchanged.
         if entry.anew:
             last_s = self._memory.stamp_s
@@ -269,6 +274,7 @@ class NavAdapter:
         current: tuple[PersonTrack, ...],
         robot_state: RobotState,
         perceived_s: float,
+        seen_s: Sectors,
         now: float,
         *,
         addresses: bool = True,
@@ -289,7 +295,7 @@ class NavAdapter:
         )
         people = {person.id: person for person in everybody if not person.is_lost}
         lost = {person.id: person for person in everybody if person.is_lost}
-        limit, lost = self._governor.limit(people, lost, robot_state, now, robot_age_s)
+        limit, lost = self._governor.limit(people, lost, robot_state, now, robot_age_s, seen_s)
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
                 limit = limit.stopped(f"stale data: {name} is {age_s:.2f} s old")
@@ -304,6 +310,7 @@ class NavAdapter:
         people = addressed.people
         braked_mps = _latest_travel_mps(before, robot_state)
         braked_mps -= self._robot.max_deceleration_mps2 * pause_s
+        stands = stands_still(Motion.of(robot_state))
         constraints = NavConstraints(
             stamp_s=now,
             obstacles=obstacles_of(people.values(), now),
@@ -316,16 +323,18 @@ class NavAdapter:
             braking_suffices=limit.braking_suffices,
             fastest_point_limit_mps=limit.fastest_point_mps,
             robot=self._robot,
+            other_way_limit_mps=limit.other_way_mps,
             speed_basis=SpeedBasis(
-                *(self._policy, self._people, people, lost, current),
-                *(robot_age_s, perception_age_s, ceiling_mps, self._prediction),
+                *(now, self._policy, people, lost, current, robot_age_s, perception_age_s),
+                *(ceiling_mps, self._prediction, seen_s),
+                None if stands else (robot_state.speed_mps, robot_state.lateral_mps),
             ),
         )
         return _Memory(
             (*people.values(), *lost.values()),
             addressed.history,
             constraints,
-            (current, robot_state, perceived_s),
+            (current, robot_state, perceived_s, seen_s),
             ceiling_mps,
         )
 

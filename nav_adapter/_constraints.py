@@ -19,8 +19,8 @@ from perception.arrays import (
 from perception.short_repr import short_repr
 
 from ._errors import NavError
+from ._known import SpeedBasis
 from ._robot import RobotProfile
-from ._speed_basis import SpeedBasis
 from .alerts import Alert, Answer
 
 
@@ -119,9 +119,9 @@ class NavConstraints:
         stamp_s: the time that they hold for.
         obstacles: one per person.
         speed_limit_mps: ≥ 0; 0 means stop.
-        limited_by: the person and the rule that set the limit: ``"track 3: reach"``, ``"track 3: in
-            the path"`` (the protective field of a scanner) or ``"track 3: lost"``; what stops the
-            robot; or ``"robot maximum"``.
+        limited_by: the person and the rule (:mod:`nav_adapter.rules`) that set the limit, such as
+            ``"track 3: reach"`` or ``"track 3: in the path"`` (the protective field of a scanner);
+            what else stops or slows the robot; or ``"robot maximum"``.
         stale: True if the data are too old to trust; everyone then counts as unaware.
         reachable_speed_limit_mps: the limit that the robot can follow from its present speed with
             its full deceleration. It equals ``speed_limit_mps`` (and is never below it) unless the
@@ -137,6 +137,11 @@ class NavConstraints:
             corner of its footprint. It is ``speed_limit_mps`` where people set the limit. Where the
             robot's own maximum does, it is higher, and infinite if nobody is near. If it is not
             given, it is ``speed_limit_mps``.
+        other_way_limit_mps: the limit, for the fastest point, of going another way than
+            ``speed_limit_mps`` is for, which is that of the robot's motion, or forwards for a robot
+            that stands. Backwards or sideways from a stand, people there count, and so they do if
+            the robot turns on the spot. Otherwise it is 0: the robot must stand first. Infinite if
+            nobody is near, and for constraints made by hand.
         robot: the profile that they hold for; None if they were made without an adapter.
         speed_basis: what the limit was computed from, for
             :func:`nav_adapter.exporters.speed_limit_at`; None for constraints made by hand.
@@ -155,6 +160,7 @@ class NavConstraints:
     robot: RobotProfile | None = field(default=None, repr=False)
     speed_basis: SpeedBasis | None = field(default=None, repr=False)
     answers: tuple[Answer, ...] = ()
+    other_way_limit_mps: float = field(default=math.inf, repr=False)
 
     __repr__ = short_repr
 
@@ -211,6 +217,10 @@ class NavConstraints:
                 "them; these have robot=None"
             )
         limits = [left_mps / self.robot.circumscribed_radius_m]
+        if self.speed_basis is not None and self.speed_basis.stands:
+            other_mps = max(self.other_way_limit_mps - speed, 0.0)
+            straight = max(speed_mps, 0.0) / self.robot.half_width_m
+            limits.append(max(other_mps / self.robot.circumscribed_radius_m, straight))
         if self.robot.max_yaw_rate_radps is not None:
             limits.append(self.robot.max_yaw_rate_radps)
         if self.robot.min_turning_radius_m is not None:

@@ -6,20 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from perception.anthropometry import BODY_RADIUS_M
-
-from ._people import People, Person
+from ._known import known_now
+from ._people import Person, human_speed_mps
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
-from .limit import (
-    STANDING_MPS,
-    Course,
-    courses_of,
-    in_the_path_mps,
-    limit_mps,
-    stops_in_time,
-    straight_course_of,
-)
+from .course import Course, stands_still, travel_bearing_rad
+from .rigid import Motion
+from .rules import Courses, Lost, Sectors, Unseen, lowest, rules_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +26,8 @@ class GovernedSpeed:
         fastest_point_mps: the limit without the robot's own maximum, ≥ ``limit_mps``; infinite if
             nobody limits the robot.
         track_id: the person who sets the limit; None if nobody does, or somebody who is lost.
+        other_way_mps: the same as ``fastest_point_mps`` for a robot that goes another way than it
+            moves.
     """
 
     limit_mps: float
@@ -40,36 +35,35 @@ class GovernedSpeed:
     braking_suffices: bool
     fastest_point_mps: float
     track_id: int | None = None
+    other_way_mps: float = math.inf
 
     def at_most(self, limit_mps: float, limited_by: str) -> GovernedSpeed:
         """Return the lower of this limit and another one, which has a reason of its own."""
+        fastest_mps = min(self.fastest_point_mps, limit_mps)
+        other_mps = min(self.other_way_mps, limit_mps)
+        found = replace(self, fastest_point_mps=fastest_mps, other_way_mps=other_mps)
         if limit_mps < self.limit_mps:
-            return GovernedSpeed(limit_mps, limited_by, self.braking_suffices, limit_mps)
-        return replace(self, fastest_point_mps=min(self.fastest_point_mps, limit_mps))
+            found = replace(found, limit_mps=limit_mps, limited_by=limited_by, track_id=None)
+        return found
 
     def stopped(self, limited_by: str) -> GovernedSpeed:
         """Return a limit of 0 for this reason."""
-        return GovernedSpeed(0.0, limited_by, self.braking_suffices, 0.0)
+        return GovernedSpeed(0.0, limited_by, self.braking_suffices, 0.0, None, 0.0)
 
 
 class SpeedGovernor:
-    """Computes the speed limit for the people around the robot.
-
-    Each person sets the lower of two limits: that of their reach (:func:`~nav_adapter.limit.
-    limit_mps`), and that of a protective field in the robot's straight path, where they are or
-    where their track was, which today's robots have too.
+    """Computes the speed limit for the people around the robot: the lowest of all people and rules.
 
     Args:
-        policy: reach, margins and time behaviour.
+        policy: rules, margins and time behaviour.
         robot: footprint, braking and reaction time.
-        people: gives the reach of each person.
     """
 
-    def __init__(self, policy: AwarenessPolicy, robot: RobotProfile, people: People) -> None:
-        self._robot, self._people = robot, people
-        self._clearance_m = policy.margins.clearance_m
-        self._rise_mps2 = policy.timing.lost_rise_mps2
-        self._turn_rad = None if policy.reach is None else math.radians(policy.reach.turn_deg)
+    def __init__(self, policy: AwarenessPolicy, robot: RobotProfile) -> None:
+        self._policy, self._robot = policy, robot
+        self._unaware_mps = human_speed_mps(policy, 0.0)
+        self._rules, self._lost = rules_of(policy), Lost(policy.timing.lost_rise_mps2)
+        self._unseen = Unseen(policy.timing.stale_after_s)
 
     def limit(
         self,
@@ -78,97 +72,89 @@ class SpeedGovernor:
         robot_state: RobotState,
         now: float,
         robot_age_s: float,
+        seen_s: Sectors = (),
     ) -> tuple[GovernedSpeed, dict[int, Person]]:
         """Return the limit at ``now`` for a robot whose state is ``robot_age_s`` old.
 
-        The limit that a lost person sets rises by ``lost_rise_mps2``. It is never lower than if
-        they were still held, so a robot that has passed them is free. Those who still limit it are
-        returned too.
+        Those lost people who still limit it are returned too.
         """
-        maximum_mps = self._robot.max_speed_mps
-        lowest_mps, reason, suffices = math.inf, "robot maximum", True
-        lowest_id: int | None = None
+        motion, maximum_mps = Motion.of(robot_state), self._robot.max_speed_mps
+        stands = stands_still(motion)
         kept: dict[int, Person] = {}
+        lowest_mps, reason, key, suffices = math.inf, "robot maximum", None, True
+        # A robot that moves must stand before it goes another way.
+        other_mps = math.inf if stands else 0.0
+        courses = other = None
         if people or lost:
-            straight, courses = self.courses(robot_state, robot_age_s)
-            speed_mps = robot_state.travel_mps
-            for track_id, person in people.items():
-                # A limit that is not the lowest counts only where it is below the speed.
-                counts_mps = max(lowest_mps, speed_mps)
-                own_mps, rule = self.person_mps(person, straight, courses, now, counts_mps)
-                if own_mps < lowest_mps:
-                    lowest_mps, reason = own_mps, f"track {track_id}: {rule}"
-                    lowest_id = track_id
-                # A robot within its limit has the whole reaction time left.
-                if own_mps < speed_mps and suffices and speed_mps >= STANDING_MPS:
-                    suffices = self._stops_in_time(person, straight, courses, speed_mps, now)
-            for track_id, person in lost.items():
-                own_mps, _ = self.person_mps(person, straight, courses, now)
-                first_mps = own_mps if person.lost_limit_mps is None else person.lost_limit_mps
-                ceiling_mps = first_mps + (self._rise_mps2 or 0.0) * person.lost_for_s(now)
-                if ceiling_mps >= maximum_mps:
-                    continue
-                kept[track_id] = person._replace(lost_limit_mps=first_mps)
-                if max(own_mps, ceiling_mps) < lowest_mps:
-                    lowest_mps = max(own_mps, ceiling_mps)
-                    reason, lowest_id = f"track {track_id}: lost", None
+            courses = Courses.of(self._policy, self._robot, motion, robot_age_s)
+            if stands:
+                other = Courses.of_starts(self._policy, self._robot, motion, robot_age_s)
+        speed_mps = motion.travel_mps
+        for each, person in people.items():
+            assert courses is not None
+            known = known_now(self._policy, self._unaware_mps, each, person, now)
+            # A limit that is not the lowest counts only where it is below the speed.
+            own_mps, rule = lowest(known, courses, self._rules, max(lowest_mps, speed_mps))
+            if own_mps < lowest_mps:
+                lowest_mps, reason, key = own_mps, f"track {each}: {rule}", each
+            if other is not None:
+                other_mps = min(other_mps, lowest(known, other, self._rules, other_mps)[0])
+            # A robot within its limit has the whole reaction time left.
+            if own_mps < speed_mps and suffices and not stands:
+                suffices = all(rule.suffices(known, courses, speed_mps) for rule in self._rules)
+        for each, person in lost.items():
+            assert courses is not None
+            known = known_now(self._policy, self._unaware_mps, each, person, now)
+            own_mps, _ = lowest(known, courses, self._rules)
+            first_mps = own_mps if person.lost_limit_mps is None else person.lost_limit_mps
+            least_mps = self._lost.least_mps(first_mps, person.lost_for_s(now))
+            if least_mps >= maximum_mps:
+                continue
+            kept[each] = person._replace(lost_limit_mps=first_mps)
+            if max(own_mps, least_mps) < lowest_mps:
+                lowest_mps = max(own_mps, least_mps)
+                reason, key = f"track {each}: {self._lost.name}", None
+            if other is not None:
+                back_mps, _ = lowest(known, other, self._rules, other_mps)
+                other_mps = min(other_mps, max(back_mps, least_mps))
         if lowest_mps >= maximum_mps:
-            return GovernedSpeed(maximum_mps, "robot maximum", suffices, lowest_mps), kept
-        return GovernedSpeed(lowest_mps, reason, suffices, lowest_mps, lowest_id), kept
+            reason, key = "robot maximum", None
+        limit_mps = min(lowest_mps, maximum_mps)
+        found = GovernedSpeed(limit_mps, reason, suffices, lowest_mps, key, other_mps)
+        return self._seen(found, motion, seen_s, now), kept
 
-    def courses(
-        self, robot_state: RobotState, robot_age_s: float
-    ) -> tuple[Course, tuple[Course, ...]]:
-        """Return the straight course, and those that count for the reach."""
-        straight = straight_course_of(self._robot, robot_state, robot_age_s)
-        if self._turn_rad is None:
-            return straight, ()
-        return straight, courses_of(self._robot, robot_state, self._turn_rad, robot_age_s)
+    def _seen(
+        self,
+        found: GovernedSpeed,
+        motion: Motion,
+        seen_s: Sectors,
+        now: float,
+    ) -> GovernedSpeed:
+        """Return a limit under that of a direction of travel that no sensor has seen lately."""
+        if not seen_s or not self._policy.applies(self._unseen.name):
+            return found
+        ahead_rad = travel_bearing_rad(motion.forward_mps, motion.left_mps)
+        back_mps = self._unseen.cap(seen_s, math.pi, now)
+        found = replace(found, other_way_mps=min(found.other_way_mps, back_mps))
+        cap_mps = self._unseen.cap(seen_s, ahead_rad, now)
+        if cap_mps == math.inf:
+            return found
+        where = f"{math.degrees(ahead_rad):.0f} degrees from ahead"
+        return found.at_most(cap_mps, f"{self._unseen.name}: no sensor sees the way, {where}")
+
+    def courses(self, robot_state: RobotState, robot_age_s: float) -> tuple[Course, Courses]:
+        """Return the robot's own course, and all that the rules ask for."""
+        courses = Courses.of(self._policy, self._robot, Motion.of(robot_state), robot_age_s)
+        return courses.own, courses
 
     def person_mps(
         self,
         person: Person,
-        straight: Course,
-        courses: tuple[Course, ...],
+        _: Course,
+        courses: Courses,
         now: float,
-        counts_mps: float = math.inf,
+        at_most_mps: float = math.inf,
     ) -> tuple[float, str]:
-        """Return the limit that one person sets, infinite for none, and the rule.
-
-        A limit of ``counts_mps`` or more may be any other such one.
-        """
-        lowest_mps, rule = straight.maximum_mps, "in the path"
-        body_m = BODY_RADIUS_M + self._people.sigmas(person, now) * person.sigma_m
-        aged = straight._replace(
-            reaction_s=straight.reaction_s + max(now - person.track.stamp_s, 0.0)
-        )
-        # The nearer of predicted and tracked position counts: the person may have stopped.
-        for place_m in {person.position_odom_m, person.track_position_odom_m}:
-            path_mps = in_the_path_mps(place_m, body_m, self._clearance_m, aged)
-            lowest_mps = min(lowest_mps, path_mps)
-        reach = self._people.reach(person, now)
-        if reach is not None:
-            reach_mps = counts_mps
-            for course in courses:
-                reach_mps = limit_mps(reach, course, reach_mps)
-            if reach.walks_faster:
-                # Whoever keeps to their motion is not met by a robot that keeps to its own.
-                reach_mps = limit_mps(reach.walking_on(), straight, reach_mps)
-            if reach_mps <= lowest_mps:
-                lowest_mps, rule = reach_mps, "reach"
-        return (math.inf if lowest_mps >= straight.maximum_mps else lowest_mps), rule
-
-    def _stops_in_time(
-        self,
-        person: Person,
-        straight: Course,
-        courses: tuple[Course, ...],
-        speed_mps: float,
-        now: float,
-    ) -> bool:
-        """Return whether a robot that brakes fully from now on stops before it meets a person."""
-        reach = self._people.reach(person, now)
-        if reach is not None:
-            return all(stops_in_time(reach, course, speed_mps) for course in courses)
-        own_mps, _ = self.person_mps(person, straight._replace(reaction_s=0.0), (), now)
-        return speed_mps <= own_mps
+        """Return the limit that one person sets, infinite for none, and the rule."""
+        known = known_now(self._policy, self._unaware_mps, person.id, person, now)
+        return lowest(known, courses, self._rules, at_most_mps)

@@ -17,12 +17,9 @@ from ._policy import AwarenessPolicy
 from ._robot import RobotProfile
 from .alerts import AlertKind
 from .limit import passing_radius_m
-from .reach import Reach, covariance_terms
 
 Vector2 = tuple[float, float]
 
-#: Ages count up to this one, with which a person may be anywhere near.
-OLDEST_S: Final = 10.0
 # Awareness raises no speed before frames have shown a person for this long.
 _FIRST_SIGHT_S: Final = 0.2
 # The belief in having noticed the robot from which it counts.
@@ -157,7 +154,7 @@ class People:
     def __init__(self, policy: AwarenessPolicy, robot: RobotProfile) -> None:
         self._policy, self._timing, self._margins = policy, policy.timing, policy.margins
         inflation, speed = policy.inflation, policy.speed
-        self._radius_of, self._speed_of = inflation.radius_m, speed.human_speed_mps
+        self._radius_of = inflation.radius_m
         _require_non_increasing(self._policy_speed_mps, type(speed).__name__, "m/s")
         self._unaware_mps = self._policy_speed_mps(0.0)
         # People walk even where their speed does not count.
@@ -168,8 +165,9 @@ class People:
         # A circle that is too small leads a planner to where the robot may hardly move.
         speeds = np.linspace(self._policy_speed_mps(1.0), self._unaware_mps, 5).tolist()
         self._passing_speeds: list[float] = sorted(set(speeds))
+        reach = policy.reach if policy.applies("reach") else None
         self._passing_radii = [
-            passing_radius_m(each, policy.reach, self._margins.clearance_m, robot)
+            passing_radius_m(each, reach, self._margins.clearance_m, robot)
             for each in self._passing_speeds
         ]
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
@@ -283,43 +281,6 @@ class People:
             radius_m=max(person.radius_m, self._target_m(0.0, person.sigma_m)),
         )
 
-    def reach(self, person: Person, now: float) -> Reach | None:
-        """Return how far a person can come, or None under a policy that knows no motion."""
-        rules = self._policy.reach
-        if rules is None:
-            return None
-        track = person.track
-        speed_mps = self._unaware_mps
-        if not person.is_at_first_sight:
-            speed_mps = self._policy_speed_mps(person.awareness_lower)
-        velocity = person.velocity_odom_mps
-        walking_mps = math.hypot(*velocity)
-        if walking_mps > self._unaware_mps > 0.0:
-            # Faster people may stay so. In proportion, so that presets stay ordered.
-            speed_mps *= walking_mps / self._unaware_mps
-        # Between the frame that showed the person and the track's stamp nobody looked. The
-        # covariance grows with it; what they began in the last moments it does not know.
-        unseen_s = min(max(track.stamp_s - person.seen_stamp_s, 0.0), self._timing.fresh_within_s)
-        return Reach(
-            *person.track_position_odom_m,
-            *velocity,
-            speed_mps,
-            rules.time_constant_s,
-            rules.delay_s + unseen_s,
-            min(max(now - track.stamp_s, 0.0), OLDEST_S),
-            self._margins.floor_m,
-            covariance_terms(track.covariance_odom.tolist(), self.sigmas(person, now)),
-        )
-
-    def sigmas(self, person: Person, now: float) -> float:
-        """Return by how many standard deviations a person may be nearer than estimated."""
-        margins = self._margins
-        # The position is that of the track, which may be older than the latest sighting.
-        seen_s = min(person.seen_stamp_s, person.track.stamp_s - person.track.time_since_seen_s)
-        if now - seen_s > self._timing.fresh_within_s:
-            return max(margins.uncertainty_sigmas, margins.unseen_sigmas)
-        return margins.uncertainty_sigmas
-
     def _shown(self, track: PersonTrack, before: Person, now: float, stale: bool) -> Person:
         """Return the person of a track in the input, which goes on with theirs."""
         if before.is_lost:
@@ -423,11 +384,20 @@ class People:
         return radii[-1]
 
     def _policy_speed_mps(self, awareness_lower: float) -> float:
-        speed_mps = self._speed_of(awareness_lower)
-        if _is_finite_float(speed_mps) and speed_mps >= 0.0:
-            return speed_mps
-        name = f"{type(self._policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
-        return finite_number(name, speed_mps, NavError, minimum=0.0)
+        return human_speed_mps(self._policy, awareness_lower)
+
+
+def human_speed_mps(policy: AwarenessPolicy, awareness_lower: float) -> float:
+    """Return U of a policy, whose speed may be an object of any kind.
+
+    Raises:
+        NavError: for a speed that is not finite or below 0.
+    """
+    speed_mps = policy.speed.human_speed_mps(awareness_lower)
+    if _is_finite_float(speed_mps) and speed_mps >= 0.0:
+        return speed_mps
+    name = f"{type(policy.speed).__name__}.human_speed_mps({awareness_lower:g})"
+    return finite_number(name, speed_mps, NavError, minimum=0.0)
 
 
 def _remembering(person: Person, before: Person | None) -> Person:

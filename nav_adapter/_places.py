@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 from perception.matrices import larger_eigenvalue
 from tracking import PersonTrack
 
 from ._errors import NavError
+from .reach import Spread
 
 # Positions, speeds and standard deviations beyond these are errors of whoever sent them. Beyond
 # 1e15 m a circle's corners fall together.
@@ -19,16 +19,14 @@ _MOST_MPS: Final = 1e4
 def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
     """Return the standard deviation of the position after ``ahead_s`` ≥ 0 at constant velocity.
 
-    It is that of the most uncertain direction: the root of the larger eigenvalue of the position's
-    part of F P Fᵀ.
+    It is that of the most uncertain direction.
     """
-    return _sigma_m(track.covariance_odom.tolist(), ahead_s)
+    return Spread.of(track.covariance_odom.tolist()).after(ahead_s).sigma_m
 
 
 def velocity_variance_m2ps2(track: PersonTrack) -> float:
     """Return the variance of the velocity along its most uncertain direction."""
-    _, _, (_, _, uu, uv), (_, _, _, vv) = track.covariance_odom.tolist()
-    variance_m2ps2: float = larger_eigenvalue(uu, uv, vv)
+    variance_m2ps2: float = larger_eigenvalue(*Spread.of(track.covariance_odom.tolist()).velocity)
     return variance_m2ps2
 
 
@@ -51,7 +49,8 @@ def checked_sigma_m(
     """
     rows = track.covariance_odom.tolist()
     place, speed = max(map(abs, place_m)), max(map(abs, velocity_mps))
-    sigma_m, variance = _sigma_m(rows, ahead_s), max(rows[2][2], rows[3][3])
+    sigma_m = Spread.of(rows).after(ahead_s).sigma_m
+    variance = max(rows[2][2], rows[3][3])
     for name, value, most, unit in (
         ("position_odom_m", place, _MOST_M, "m"),
         ("velocity_odom_mps", speed, _MOST_MPS, "m/s"),
@@ -64,11 +63,3 @@ def checked_sigma_m(
                 f"track {track.id}: {name} must be at most {most:g} {unit}, got {value:g}"
             )
     return sigma_m
-
-
-def _sigma_m(covariance: list[list[float]], ahead_s: float) -> float:
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = covariance
-    xx += ahead_s * (2.0 * xu + ahead_s * uu)
-    yy += ahead_s * (2.0 * yv + ahead_s * vv)
-    xy += ahead_s * (xv + yu + ahead_s * uv)
-    return math.sqrt(max(larger_eigenvalue(xx, xy, yy), 0.0))

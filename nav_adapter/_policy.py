@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
@@ -81,8 +81,10 @@ class AwarenessPolicy(NavConfig):
         inflation: radius of a person over ``awareness_lower``: a ramp or a custom object.
         speed: U over ``awareness_lower``, the speed that a person may change to: a ramp or a custom
             object.
-        reach: how people change their motion and the robot its course, or None for a robot that
-            knows no motion of people: the protective field of a safety laser scanner alone.
+        reach: how people change their motion and the robot its course.
+        without: names of rules of the limit (:mod:`nav_adapter.rules`) that are left out. Without
+            ``reach``, ``walking on`` and ``first sight``, a robot knows no motion of people: it has
+            the protective field of a safety laser scanner alone.
         noticed_counts_as: while ``PersonTrack.noticed`` is at least 0.5, the belief that a person
             who does not look now knows of the robot, the lower bound of α is at least this; None
             for nothing. It needs ``filter.noticed_memory_s`` and a laser scanner: with a camera
@@ -102,13 +104,18 @@ class AwarenessPolicy(NavConfig):
     speed: Annotated[SpeedPolicy, _ShippedOrCustom("speed", "human_speed_mps")] = (
         InterpolatedHumanSpeed()
     )
-    reach: ReachRules | None = ReachRules()
+    reach: ReachRules = ReachRules()
+    without: tuple[Literal["reach", "walking on", "first sight", "unseen"], ...] = ()
     noticed_counts_as: float | None = Field(default=0.6, ge=0.0, le=1.0)
     alerts: AlertRules | None = AlertRules()
     attention: AttentionRules | None = AttentionRules()
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
     filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=3.0)
+
+    def applies(self, rule: str) -> bool:
+        """Return whether a rule of the limit (:mod:`nav_adapter.rules`) counts, given its name."""
+        return rule not in self.without
 
     @classmethod
     def preset(cls, name: str) -> AwarenessPolicy:

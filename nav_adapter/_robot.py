@@ -150,6 +150,11 @@ class RobotProfile:
         """Radius of the circle about the base origin that contains the footprint."""
         return float(np.linalg.norm(self.footprint_m, axis=1).max())
 
+    @cached_property
+    def half_width_m(self) -> float:
+        """Farthest part of the footprint to either side of the base."""
+        return float(np.abs(self.footprint_m[:, 1]).max())
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotState:

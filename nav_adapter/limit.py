@@ -23,107 +23,34 @@ from typing import Final
 import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
-from perception.arrays import FloatArray
 
-from ._contact import Course, contact_m, reach_at
-from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
+from ._robot import RobotProfile
+from .course import ROOM, STANDING_MPS, Course, contact_m, course_of, reach_at
 from .policies import ReachRules
 from .reach import Reach
+from .rigid import Motion
 
 __all__ = [
     "FINEST",
     "PASSING_MPS",
-    "ROOM",
     "STANDING_MPS",
     "STEPS",
-    "Course",
-    "any_course_of",
-    "course_of",
-    "courses_of",
     "in_the_path_mps",
     "limit_mps",
     "passing_radius_m",
     "stops_in_time",
-    "straight_course_of",
 ]
 
-#: Below this speed the robot counts as standing: it may start either way.
-STANDING_MPS: Final = 0.05
 #: Steps of time while the robot brakes from its maximum.
 STEPS: Final = 12
 #: Share of such a step that the one that decides is refined to.
 FINEST: Final = 0.13
-#: The limit beside a circle that a planner keeps to.
+#: The limit beside a circle that a planner keeps to, or the maximum of a slower robot.
 PASSING_MPS: Final = 0.3
-#: The room above the robot's maximum up to which limits are computed.
-ROOM: Final = 1.5
 # So many steps are first looked at as one.
 _STEPS_A_LOOK: Final = 6
 # More than the rounding of any distance that matters.
 _ROUNDING_M: Final = 1e-9
-
-
-def courses_of(
-    robot: RobotProfile, state: RobotState, turn_rad: float, age_s: float = 0.0
-) -> tuple[Course, ...]:
-    """Return the fans of courses of a robot whose state is ``age_s`` old: the lowest limit counts.
-
-    There is one, along the direction of travel. A robot that stands has a second one backwards, or
-    one in all directions if it may be able to move sideways.
-    """
-    sideways = abs(state.lateral_mps) > LATERAL_NOISE_MPS
-    if sideways or abs(state.speed_mps) >= STANDING_MPS:
-        return (course_of(robot, state, turn_rad, age_s),)
-    if robot.moves_sideways is not False:
-        return (any_course_of(robot, state, age_s),)
-    forward = course_of(robot, state, turn_rad, age_s)
-    front_m, rear_m = forward.front_m, forward.rear_m
-    driven_m = _driven_m(robot, state.travel_mps, age_s)
-    backward = forward._replace(
-        cos=-forward.cos,
-        sin=-forward.sin,
-        front_m=driven_m - rear_m,
-        rear_m=driven_m - front_m,
-    )
-    return forward, backward
-
-
-def course_of(
-    robot: RobotProfile, state: RobotState, turn_rad: float, age_s: float = 0.0
-) -> Course:
-    """Return the courses along the direction of travel of a robot whose state is ``age_s`` old.
-
-    It turns by at most ``turn_rad`` off the curve that it drives. The footprint is measured along
-    the course. The maximum is one and a half times the robot's own, so that a limit of the fastest
-    point of a robot that turns has room.
-    """
-    forward, left = state.speed_mps, state.lateral_mps
-    sideways = abs(left) > LATERAL_NOISE_MPS
-    speed = math.hypot(forward, left) if sideways else abs(forward)
-    off_rad, fan_rad, noise_rad = _off_heading_rad(state), turn_rad, 0.0
-    if not sideways and robot.moves_sideways is not False:
-        # What counts as noise may be motion.
-        noise_rad = math.atan2(abs(left), max(speed, STANDING_MPS))
-    # On its curve the robot turns by an angle until it stands. The chord has up to half of it, and
-    # the heading up to half of it more than the chord.
-    stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
-    half_rad = 0.5 * min(max(state.yaw_rate_radps * stopping_s, -math.pi), math.pi)
-    fan_rad = min(fan_rad + noise_rad + 0.5 * abs(half_rad), math.pi)
-    extent = _extent_m(robot.footprint_m, off_rad, abs(half_rad) + noise_rad)
-    return _course(robot, state, age_s, off_rad + 0.5 * half_rad, fan_rad, extent)
-
-
-def any_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.0) -> Course:
-    """Return all the courses of a robot that may be turned by any angle: its circle counts."""
-    course = _course(robot, state, age_s, 0.0, math.pi, (0.0, 0.0, 0.0))
-    return course._replace(circle_m=robot.circumscribed_radius_m)
-
-
-def straight_course_of(robot: RobotProfile, state: RobotState, age_s: float = 0.0) -> Course:
-    """Return the course of a robot that goes straight on, whatever it turns."""
-    off_rad = _off_heading_rad(state)
-    extent = _extent_m(robot.footprint_m, off_rad, 0.0)
-    return _course(robot, state, age_s, off_rad, 0.0, extent)
 
 
 def limit_mps(person: Reach, course: Course, at_most_mps: float = math.inf) -> float:
@@ -246,38 +173,41 @@ def _way_m(speed_mps: float, a: float, T: float, t: float) -> float:
 
 
 def in_the_path_mps(
-    place_m: tuple[float, float], margin_m: float, clearance_m: float, course: Course
+    place_m: tuple[float, float], margin_m: float, field: Course, age_s: float = 0.0
 ) -> float:
     """Return the highest speed by the protective field of a safety laser scanner.
 
-    The field is a rectangle along the middle of the fan: the robot's width with ``clearance_m`` on
-    either side, and its stopping distance with the same. Scanners know neither people nor speeds,
-    so this is today's AMR. A body of radius ``margin_m`` at ``place_m`` (odom) may not be in it. A
-    person behind the rear edge is not, and a number that is not finite gives 0.
+    The field is the robot's own course until it stands, its footprint larger by a clearance ahead
+    and on either side. Scanners know neither people nor speeds, so this is today's AMR. A body of
+    radius ``margin_m`` at ``place_m`` (odom), seen ``age_s`` ago, may not be in it. A body behind
+    the rear edge is not, and a number that is not finite gives 0.
     """
-    dx, dy = place_m[0] - course.x_m, place_m[1] - course.y_m
-    x = course.cos * dx + course.sin * dy
-    off = abs(course.cos * dy - course.sin * dx) - course.half_m - clearance_m
-    if x < course.rear_m - margin_m or off > margin_m:
-        return course.maximum_mps
-    ahead = math.sqrt(margin_m * margin_m - off * off) if off > 0.0 else margin_m
-    gap_m = x - course.front_m - ahead - clearance_m
-    if not gap_m > 0.0:
+    dx, dy = place_m[0] - field.x_m, place_m[1] - field.y_m
+    x, y = field.cos * dx + field.sin * dy, abs(field.cos * dy - field.sin * dx)
+    if x > 0.0 and field.fan_cos * y - field.fan_sin * x > field.half_m + margin_m:
+        return field.maximum_mps  # beside it
+    near, past, past_behind = contact_m(field, 0.0, x, y, dx * dx + dy * dy, margin_m)
+    if past_behind >= 0.0:
         return 0.0
-    a, T = course.deceleration_mps2, course.reaction_s
-    # The root of v T + v²/2a = gap.
-    return min(2.0 * gap_m / (T + math.sqrt(T * T + 2.0 * gap_m / a)), course.maximum_mps)
+    if past == -math.inf:
+        return field.maximum_mps
+    if not near > 0.0:
+        return 0.0
+    a, T = field.deceleration_mps2, field.reaction_s + age_s
+    # The root of v T + v²/2a = near.
+    return min(2.0 * near / (T + math.sqrt(T * T + 2.0 * near / a)), field.maximum_mps)
 
 
 @lru_cache(maxsize=64)
 def passing_radius_m(
     speed_mps: float, rules: ReachRules | None, clearance_m: float, robot: RobotProfile
 ) -> float:
-    """Return the smallest radius of a circle beside which the limit is at least 0.3 m/s.
+    """Return the smallest radius of a circle beside which the limit is at least ``PASSING_MPS``.
 
-    The robot passes straight along the circle's edge, with the person standing anywhere beside it.
-    A planner that reads circles and knows no limit would otherwise be led to where the robot hardly
-    moves. It is at least the body radius and the clearance.
+    For a slower robot, it is its maximum. The robot passes straight along the circle's edge, with
+    the person standing anywhere beside it. A planner that reads circles and knows no limit would
+    otherwise be led to where the robot hardly moves. It is at least the body radius and the
+    clearance.
 
     Args:
         speed_mps: U.
@@ -288,15 +218,15 @@ def passing_radius_m(
     floor_m = BODY_RADIUS_M + clearance_m
     if rules is None:
         return floor_m
-    state = RobotState(0.0, np.zeros(2), 0.0, PASSING_MPS, 0.0)
-    course = course_of(robot, state, math.radians(rules.turn_deg))
+    passing_mps = min(PASSING_MPS, robot.max_speed_mps)
+    course = course_of(robot, Motion(0.0, 0.0, 0.0, passing_mps), math.radians(rules.turn_deg))
     motion = 0.0, 0.0, speed_mps, rules.time_constant_s, rules.delay_s
 
     def passes(radius_m: float) -> bool:
         beside_m = radius_m + course.half_m
         places = np.linspace(course.rear_m - radius_m, course.front_m + 3.0 * radius_m, 16)
         return all(
-            limit_mps(Reach(x_m, beside_m, *motion, margin_m=floor_m), course) >= PASSING_MPS
+            limit_mps(Reach(x_m, beside_m, *motion, margin_m=floor_m), course) >= passing_mps
             for x_m in places.tolist()
         )
 
@@ -334,64 +264,3 @@ def _later_s(t: float, step_s: float) -> float:
     for _ in range(_STEPS_A_LOOK):
         t += step_s
     return t
-
-
-def _off_heading_rad(state: RobotState) -> float:
-    """Return the direction of travel off the heading; 0 at a stand."""
-    if abs(state.lateral_mps) > LATERAL_NOISE_MPS:
-        return math.atan2(state.lateral_mps, state.speed_mps)
-    return math.pi if state.speed_mps <= -STANDING_MPS else 0.0
-
-
-def _course(
-    robot: RobotProfile,
-    state: RobotState,
-    age_s: float,
-    middle_rad: float,
-    fan_rad: float,
-    extent_m: tuple[float, float, float],
-) -> Course:
-    """Return a fan about ``middle_rad`` off the heading, of a robot that may have driven since."""
-    x, y = state.position_odom_m.tolist()
-    driven_m = _driven_m(robot, state.travel_mps, age_s)
-    front_m, rear_m, half_m = extent_m
-    middle_rad += state.heading_odom_rad
-    return Course(
-        *(x, y, math.cos(middle_rad), math.sin(middle_rad)),
-        *(math.cos(fan_rad), math.sin(fan_rad), front_m + driven_m, rear_m, half_m),
-        *(robot.circumscribed_radius_m + driven_m, 0.0),
-        ROOM * robot.max_speed_mps,
-        robot.max_deceleration_mps2,
-        robot.reaction_time_s,
-    )
-
-
-def _driven_m(robot: RobotProfile, travel_mps: float, age_s: float) -> float:
-    """Return how far a robot may have driven since its state, speeding up to its maximum."""
-    fastest_mps = max(travel_mps, robot.max_speed_mps)
-    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
-    return min(travel_mps * age_s + faster_m, fastest_mps * age_s)
-
-
-def _extent_m(
-    footprint_m: FloatArray, off_rad: float, swing_rad: float
-) -> tuple[float, float, float]:
-    """Return front, rear and half the width along a course ``off_rad`` from the heading.
-
-    They hold the footprint turned by up to ``swing_rad`` about that course, either way.
-    """
-    cos, sin = math.cos(off_rad), math.sin(off_rad)
-    corners = [(cos * x + sin * y, cos * y - sin * x) for x, y in footprint_m.tolist()]
-    front, rear = max(x for x, _ in corners), min(x for x, _ in corners)
-    half = max(abs(y) for _, y in corners)
-    if swing_rad <= 0.0:
-        return front, rear, half
-    radius = max(math.hypot(x, y) for x, y in corners)
-    cos, sin = math.cos(min(swing_rad, 0.5 * math.pi)), math.sin(min(swing_rad, 0.5 * math.pi))
-    long = max(front, -rear)
-    return (
-        min(front + half * sin, radius),
-        max(rear - half * sin, -radius),
-        # A corner that has swung past the side was out at the radius.
-        min(half * cos + long * sin, radius) if half * sin < long * cos else radius,
-    )

@@ -13,6 +13,7 @@ use, and assumption 4 of ``docs/safety.md`` says what they are for.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -22,9 +23,10 @@ from perception.arrays import FloatArray, finite_array, finite_number
 
 from ._constraints import NavConstraints
 from ._errors import NavError
-from ._free_ahead import is_free_ahead
-from ._robot import RobotProfile, RobotState
-from .exporters import speed_limit_at
+from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
+from .course import travel_bearing_rad
+from .rigid import Motion
+from .rules import Courses, Unseen, lowest, rules_of
 
 __all__ = [
     "ControlPoint",
@@ -38,8 +40,6 @@ __all__ = [
 # Behind the robot, within this angle's sine, noise would decide to which side it turns: a turn
 # that has begun goes on.
 _BEHIND_SINE = 0.3
-# The field ends at the robot's maximum, less its rounding error.
-_FIELD_ENDS_MPS = 1e-3
 
 
 def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> FloatArray:
@@ -47,7 +47,8 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
 
     For a solver that chooses v (m/s) and ω (rad/s). The region is convex and contains (0, 0):
     |v| at most the speed limit, |v| + |ω| R at most the limit of the fastest point, and |ω| at most
-    ``max_yaw_rate_radps`` of the robot's profile. Limits that are not there have no rows.
+    ``max_yaw_rate_radps`` of the robot's profile. For a robot that stands, |ω| R − v is at most
+    ``other_way_limit_mps``. Limits that are not there have no rows.
 
     The twists of a robot that steers (``min_turning_radius_m``) are two cones, one for each
     direction of travel, and not convex together. The region then holds one of them.
@@ -67,6 +68,12 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
         rows += [[v, w * radius_m, -fastest_mps] for v, w in signs]
     if math.isfinite(highest_radps):
         rows += [[0.0, 1.0, -highest_radps], [0.0, -1.0, -highest_radps]]
+    basis, other_mps = constraints.speed_basis, constraints.other_way_limit_mps
+    if basis is not None and other_mps < fastest_mps:
+        if basis.velocity_base_mps is None:
+            rows += [[1.0, turn * radius_m, -other_mps] for turn in (1.0, -1.0)]
+        elif (forward_mps := basis.velocity_base_mps[0]) != 0.0:
+            rows.append([math.copysign(1.0, forward_mps), 0.0, -other_mps])
     if (curve_m := _tightest_curve_m(constraints)) > 0.0:
         direction = -1.0 if backward else 1.0
         rows += [[direction, curve_m, 0.0], [direction, -curve_m, 0.0]]
@@ -109,15 +116,15 @@ def clip_twists_ahead(
 
     A limit is that of a measurement, and a command takes effect after it. Meanwhile robot and
     people come nearer to each other and the limit falls. A planner that uses its limit to the last
-    centimetre per second is then too fast for a cycle. So this function also asks
-    :func:`~nav_adapter.exporters.speed_limit_at` for the limits at the ends of the next cycles:
-    where each twist leads, and where the robot's present motion leads. People move as predicted.
+    centimetre per second is then too fast for a cycle. So this function also asks the rules for the
+    limits at the ends of the next cycles: where each twist leads, and where the robot's present
+    motion leads. People move as predicted.
     The lowest of these limits counts, less the slack.
 
     A robot that cannot brake to a twist's speed within a cycle has less left for turning. Only then
     the curve becomes flatter. Otherwise this is :func:`clip_twists`, and it is never faster.
 
-    For the last line of a planner. One twist takes about as long as one call of the field.
+    For the last line of a planner: one twist takes about as long as an update.
 
     Args:
         constraints: of ``NavAdapter.update`` in the present cycle.
@@ -139,40 +146,60 @@ def clip_twists_ahead(
     now = _clipped(constraints, twists, 0.0, math.inf)
     if cycles == 0 or now.size == 0:
         return _clipped(constraints, twists, slack, math.inf)
-    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
-    if now.ndim == 1 and is_free_ahead(constraints, robot_state, now.tolist(), slack, times_s):
-        return _clipped(constraints, now, slack, math.inf)
-    speeds = np.zeros((now.size // now.shape[-1] + 1, 3))
-    speeds[:-1, 0], speeds[:-1, 2] = now[..., 0].ravel(), now[..., -1].ravel()
-    if now.shape[-1] == 3:
-        speeds[:-1, 1] = now[..., 1].ravel()
-    speeds[-1] = robot_state.speed_mps, robot_state.lateral_mps, robot_state.yaw_rate_radps
-    positions, headings = _driven(robot_state, speeds, times_s)
-    every_time = np.broadcast_to(speeds[:, None], (*headings.shape, 3))
-    limits = speed_limit_at(
-        constraints,
-        positions,
-        headings,
-        dt_s=period_s,
-        first_s=period_s,
-        speeds_mps=every_time[..., :2],
-        yaw_rates_radps=every_time[..., 2],
-        fine=True,
-    )
-    lowest = limits.min(axis=1)
-    lowest = np.minimum(lowest[:-1], lowest[-1]).reshape(now.shape[:-1])
+    if now.ndim > 1:
+        rows = now.reshape(-1, now.shape[-1])
+        found = [
+            clip_twists_ahead(constraints, robot_state, row, dt_s, cycles=cycles, slack_mps=slack)
+            for row in rows
+        ]
+        return np.array(found).reshape(now.shape)
     robot, fastest_mps = constraints.robot, constraints.fastest_point_limit_mps
     assert robot is not None
     assert fastest_mps is not None
-    people = lowest < robot.max_speed_mps - _FIELD_ENDS_MPS
-    fastest = np.minimum(np.where(people, lowest, math.inf), fastest_mps)
-    slower = _clipped(constraints, now, slack, fastest)
+    radius_m, (*velocity, turn) = robot.circumscribed_radius_m, now.tolist()
     still_mps = robot_state.travel_mps - robot.max_deceleration_mps2 * period_s
-    left = np.maximum(fastest - slack - still_mps, 0.0) / robot.circumscribed_radius_m
-    turning = np.minimum(np.maximum(slower[..., -1], -left), left)
-    too_fast = np.sqrt((slower[..., :-1] ** 2).sum(axis=-1)) < still_mps
-    slower[..., -1] = np.where(too_fast, turning, slower[..., -1])
+    needed_mps = max(math.hypot(*velocity), still_mps) + slack + radius_m * abs(turn)
+    times_s = period_s * np.arange(1, cycles + 1, dtype=np.float64)
+    present = Motion.of(robot_state)
+    left_mps = velocity[1] if len(velocity) == 2 else 0.0
+    asked = present._replace(forward_mps=velocity[0], left_mps=left_mps, yaw_rate_radps=turn)
+    ahead_mps = _lowest_ahead_mps(constraints, {asked, present}, times_s, needed_mps)
+    fastest_mps = min(ahead_mps, fastest_mps)
+    slower = _clipped(constraints, now, slack, fastest_mps)
+    if math.hypot(*slower[:-1].tolist()) < still_mps:
+        left_radps = max(fastest_mps - slack - still_mps, 0.0) / radius_m
+        slower[-1] = min(max(slower[-1], -left_radps), left_radps)
     return slower
+
+
+def _lowest_ahead_mps(
+    constraints: NavConstraints, motions: Iterable[Motion], times_s: FloatArray, needed_mps: float
+) -> float:
+    """Return the lowest limit at times ahead on any of the motions; infinite from a speed on."""
+    basis, robot = constraints.speed_basis, constraints.robot
+    assert robot is not None
+    if basis is None and constraints.speed_limit_mps > 0.0:
+        raise NavError("constraints must come from NavAdapter.update, got some without speed_basis")
+    if basis is None or basis.stopped:
+        return 0.0
+    least_mps = needed_mps
+    if basis.ceiling_mps is not None:
+        rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
+        least_mps = min(least_mps, basis.ceiling_mps + rise_mps2 * float(times_s[0]))
+    unseen = Unseen(basis.policy.timing.stale_after_s)
+    for motion in motions:
+        if robot.moves_sideways is False and abs(motion.left_mps) > LATERAL_NOISE_MPS:
+            return 0.0
+        if basis.policy.applies(unseen.name):
+            bearing_rad = travel_bearing_rad(motion.forward_mps, motion.left_mps)
+            least_mps = min(least_mps, unseen.cap(basis.seen_s, bearing_rad, basis.stamp_s))
+    people, rules = list(basis.known_ahead(times_s)), rules_of(basis.policy)
+    for index, time_s in enumerate(times_s.tolist() if people else ()):
+        for motion in motions:
+            courses = Courses.of(basis.policy, robot, motion.at(time_s), basis.robot_age_s)
+            for ahead in people:
+                least_mps = min(least_mps, lowest(ahead[index], courses, rules, least_mps)[0])
+    return least_mps if least_mps < needed_mps else math.inf
 
 
 def _clipped(
@@ -187,6 +214,7 @@ def _clipped(
         )
     limit_mps, fastest_mps, radius_m, highest_radps = _limits_of(constraints)
     curve_m = _tightest_curve_m(constraints)
+    other_mps = constraints.other_way_limit_mps
     if given.ndim == 1 and isinstance(ahead_mps, float):
         # The same for one twist, in a tenth of the time.
         *velocity, turn = given.tolist()
@@ -194,6 +222,8 @@ def _clipped(
             most = abs(velocity[0]) / curve_m
             turn = min(max(turn, -most), most)
         pace, turning = math.sqrt(sum(part * part for part in velocity)), abs(turn)
+        if other_mps < fastest_mps and _leads_another_way(constraints, *velocity, turn):
+            fastest_mps = other_mps
         point_mps = max(min(fastest_mps, ahead_mps) - slack_mps, 0.0)
         share = min(
             _share_of_one(pace, limit_mps),
@@ -208,9 +238,31 @@ def _clipped(
     speed = np.sqrt((given[..., :-1] ** 2).sum(axis=-1))
     yaw_rate = np.abs(given[..., -1])
     factor = np.minimum(_share(speed, limit_mps), _share(yaw_rate, highest_radps))
-    fastest = np.maximum(np.minimum(fastest_mps, ahead_mps) - slack_mps, 0.0)
+    fastest = np.minimum(fastest_mps, ahead_mps)
+    if other_mps < fastest_mps:
+        another = _leads_another_way(constraints, *np.moveaxis(given, -1, 0))
+        fastest = np.where(another, np.minimum(fastest, other_mps), fastest)
+    fastest = np.maximum(fastest - slack_mps, 0.0)
     factor = np.minimum(factor, _share(speed + radius_m * yaw_rate, fastest))
     return np.asarray(given * factor[..., None])
+
+
+def _leads_another_way(constraints: NavConstraints, forward: Any, *left_and_turn: Any) -> Any:
+    """Return whether a twist leads another way than the one that the speed limit is for.
+
+    From a stand that is backwards or sideways, also for a point of the rear edge alone.
+    """
+    basis, robot = constraints.speed_basis, constraints.robot
+    if basis is None or robot is None:
+        return np.zeros(np.shape(forward), dtype=bool)  # nothing is known
+    if basis.velocity_base_mps is not None:
+        moves_forward, moves_left = basis.velocity_base_mps
+        left = left_and_turn[0] if len(left_and_turn) == 2 else 0.0
+        return forward * moves_forward + left * moves_left < 0.0
+    another = forward < abs(left_and_turn[-1]) * robot.half_width_m
+    if len(left_and_turn) == 2:
+        another = another | (abs(left_and_turn[0]) > LATERAL_NOISE_MPS)
+    return another
 
 
 class ControlPoint(NamedTuple):
@@ -334,20 +386,6 @@ def differential_drive(
     if curve_m > 0.0:  # the yaw rate of a robot that steers falls with its speed
         yaw_rate = min(max(yaw_rate, -abs(speed) / curve_m), abs(speed) / curve_m)
     return speed, yaw_rate
-
-
-def _driven(
-    robot_state: RobotState, velocities: FloatArray, times_s: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return positions (K, T, 2) and headings (K, T) of K constant base velocities x, y, ω."""
-    turned = velocities[:, 2:] * times_s
-    # The chord of an arc: it points along the mean heading, and is shorter than the arc.
-    towards = robot_state.heading_odom_rad + 0.5 * turned
-    chords_s = times_s * np.sinc(0.5 * turned / np.pi)
-    forward, left = velocities[:, 0, None] * chords_s, velocities[:, 1, None] * chords_s
-    c, s = np.cos(towards), np.sin(towards)
-    moved = np.stack([c * forward - s * left, s * forward + c * left], axis=-1)
-    return robot_state.position_odom_m + moved, robot_state.heading_odom_rad + turned
 
 
 def _share(value: FloatArray, most: float | FloatArray) -> FloatArray:

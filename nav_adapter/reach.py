@@ -94,18 +94,50 @@ class Reach(NamedTuple):
         return self.radius_m(ahead_s) + walked_m + uncertainty_m
 
 
-def covariance_terms(
-    covariance_odom: list[list[float]], sigmas: float
-) -> tuple[float, float, float]:
-    """Return :attr:`Reach.variances` of a track's covariance (4, 4), x, y, vx, vy.
+class Spread(NamedTuple):
+    """The covariance of a place that drifts for m seconds: P + m (C + Cᵀ) + m² V, in blocks.
 
-    After a drift m the place has the covariance P + m (C + Cᵀ) + m² V by blocks. Its largest
-    eigenvalue is at most the sum of those of the three.
+    It is the place's part of F P Fᵀ. Each block is xx, xy and yy of a symmetric matrix.
+
+    Attributes:
+        place: P.
+        cross: C + Cᵀ.
+        velocity: V.
     """
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = covariance_odom
-    factor = sigmas * sigmas
-    return (
-        factor * larger_eigenvalue(xx, xy, yy),
-        factor * larger_eigenvalue(2.0 * xu, xv + yu, 2.0 * yv),
-        factor * larger_eigenvalue(uu, uv, vv),
-    )
+
+    place: tuple[float, float, float]
+    cross: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, covariance_odom: list[list[float]]) -> Spread:
+        """Return that of a track's covariance (4, 4), x, y, vx, vy."""
+        (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = covariance_odom
+        return cls((xx, xy, yy), (2.0 * xu, xv + yu, 2.0 * yv), (uu, uv, vv))
+
+    def after(self, drift_s: float) -> Spread:
+        """Return the spread of the same track predicted at constant velocity."""
+        p, c, v = self
+        return Spread(
+            (
+                p[0] + drift_s * (c[0] + drift_s * v[0]),
+                p[1] + drift_s * (c[1] + drift_s * v[1]),
+                p[2] + drift_s * (c[2] + drift_s * v[2]),
+            ),
+            (c[0] + 2.0 * drift_s * v[0], c[1] + 2.0 * drift_s * v[1], c[2] + 2.0 * drift_s * v[2]),
+            v,
+        )
+
+    @property
+    def sigma_m(self) -> float:
+        """The standard deviation of the place along its most uncertain direction."""
+        return math.sqrt(max(larger_eigenvalue(*self.place), 0.0))
+
+    def terms(self, sigmas: float) -> tuple[float, float, float]:
+        """Return :attr:`Reach.variances`: the eigenvalue of a sum is at most that of the three."""
+        factor = sigmas * sigmas
+        return (
+            factor * larger_eigenvalue(*self.place),
+            factor * larger_eigenvalue(*self.cross),
+            factor * larger_eigenvalue(*self.velocity),
+        )

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Final, NamedTuple
 
 from ._robot import RobotState
+
+# Places on an arc are given so many times while a body moves.
+_PLACES: Final = 24
 
 
 class Motion(NamedTuple):
@@ -79,3 +83,31 @@ class Motion(NamedTuple):
         middle = self._replace(heading_rad=self.heading_rad + half_rad)
         x_m, y_m = middle.point(chord_s * self.forward_mps, chord_s * self.left_mps)
         return self._replace(x_m=x_m, y_m=y_m, heading_rad=self.heading_rad + 2.0 * half_rad)
+
+    def stopping_s(self, reaction_s: float, deceleration_mps2: float, radius_m: float) -> float:
+        """Return the time in which a body at this velocity moves as far as until it has braked.
+
+        It brakes after the reaction time and keeps its curve. One that turns on the spot brakes the
+        points at a radius as it would brake its base.
+        """
+        fastest_mps = max(self.travel_mps, abs(self.yaw_rate_radps) * radius_m)
+        return reaction_s + 0.5 * fastest_mps / deceleration_mps2
+
+    def swept(
+        self, points_m: Iterable[tuple[float, float]], until_s: float
+    ) -> tuple[list[tuple[float, float]], float]:
+        """Return places that points of the body pass until a time, and how far apart they bulge.
+
+        The points are given from the base. Between two of the places a point is no farther from the
+        straight line than by the second number, in metres.
+        """
+        points = list(points_m)
+        count = _PLACES if self.yaw_rate_radps else 1
+        motions = [self.at(until_s * index / count) for index in range(count + 1)]
+        places = [motion.point(*point) for motion in motions for point in points]
+        if count == 1:
+            return places, 0.0
+        radius_m = max(math.hypot(*point) for point in points)
+        radius_m += self.travel_mps / abs(self.yaw_rate_radps)
+        step_rad = self.yaw_rate_radps * until_s / count
+        return places, radius_m * (1.0 - math.cos(0.5 * min(abs(step_rad), math.pi)))

@@ -182,8 +182,8 @@ class Upgrade:
         if field is None:
             return rules, None
         field = mapping(field, ("beside_m",), "rules.protective_field")
-        self.policy["reach"] = None
-        self._say("renamed", "rules.protective_field", "reach: null")
+        self.policy["without"] = ["reach", "walking on", "first sight"]
+        self._say("renamed", "rules.protective_field", "without: [reach, walking on, first sight]")
         for key in ("standing", "walking", "turn_within_stop_deg", "people_turn_deg"):
             if rules.get(key) is not None:
                 self._say("dropped", f"rules.{key}", "it did not count with a protective field")
@@ -245,7 +245,7 @@ class Upgrade:
         """Say what is lost of the rules that only lowered the limit, and of the closing speed."""
         speed = self.policy["speed"]
         unaware, aware = (number(speed, key, 0.0, "speed") for key in HUMAN_SPEEDS)
-        moving = self.policy.get("reach", {}) is not None
+        moving = "without" not in self.policy
         if moving and aware < unaware:
             self._say(
                 "check",
@@ -260,7 +260,7 @@ class Upgrade:
                 "rules.start_reserve",
                 "people who set off are within U"
                 if moving
-                else "dropped: with reach: null no motion of people counts",
+                else "dropped: without reach no motion of people counts",
             )
         for key in ("zones", "near_cap"):
             if rules.get(key) is not None:

@@ -12,7 +12,7 @@ from ._cost import people_cost
 from ._costmap import CostmapPainter, paint_costmap
 from ._horizon import PredictedPeople, predicted_circles, predicted_people
 from ._shapes import boxes, circles, points, polygons
-from ._speed_field import limited_by_at, speed_limit_at, time_cost
+from ._speed_field import speed_limit_at, time_cost
 from ._speed_map import SpeedMap
 from ._velocity import half_planes, velocity_obstacles
 
@@ -23,7 +23,6 @@ __all__ = [
     "boxes",
     "circles",
     "half_planes",
-    "limited_by_at",
     "paint_costmap",
     "people_cost",
     "points",

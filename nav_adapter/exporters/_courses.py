@@ -5,17 +5,16 @@ Values are numbers, or arrays of one number per pose.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from perception.arrays import FloatArray
 
-from .._robot import LATERAL_NOISE_MPS, RobotProfile
-from .._speed_basis import SpeedBasis
-from ..limit import STANDING_MPS
+from .._robot import RobotProfile
+from ..course import Course, course_of, driven_since_m
+from ..rigid import Motion
 
 Value = Any
 #: Instead of an infinite way.
@@ -24,171 +23,40 @@ NOWHERE_M: Final = np.float32(1e9)
 _NEAR_M: Final = np.float32(1e-5)
 
 
-@dataclass(frozen=True, slots=True)
-class Courses:
-    """Courses of the robot at N poses; see :class:`~nav_adapter.limit.Course`.
-
-    Attributes:
-        x_m: (N,) place of the base.
-        y_m: (N,).
-        driven_m: how far the robot may have driven since its state.
-        cos: direction of the middle of the fan, or None for a robot that may go anywhere at once.
-        sin: the same.
-        fan_cos: half the opening of the fan.
-        fan_sin: the same.
-        front_m: of the footprint.
-        rear_m: the same.
-        half_m: the same.
-        radius_m: no part of the robot is farther from the base of its course.
-        straight: cosine and sine of the straight course, and front, rear and half the width along
-            it.
-    """
-
-    x_m: FloatArray
-    y_m: FloatArray
-    driven_m: Value
-    cos: Value = None
-    sin: Value = None
-    fan_cos: Value = -1.0
-    fan_sin: Value = 0.0
-    front_m: Value = 0.0
-    rear_m: Value = 0.0
-    half_m: Value = 0.0
-    radius_m: Value = 0.0
-    straight: tuple[Value, ...] = ()
-
-    def straight_on(self) -> Courses:
-        """Return the courses of a robot that goes straight on, without a fan."""
-        if not self.straight:
-            return self
-        cos, sin, front, rear, half = self.straight
-        return replace(
-            self,
-            **{"cos": cos, "sin": sin, "fan_cos": np.float32(1.0), "fan_sin": np.float32(0.0)},
-            **{"front_m": front, "rear_m": rear, "half_m": half},
-        )
-
-
-def courses_of(
+def courses_at(
     robot: RobotProfile,
-    basis: SpeedBasis,
     positions_m: FloatArray,
-    headings_rad: FloatArray | None,
-    velocities_mps: tuple[FloatArray, Value] | None,
+    headings_rad: Value,
+    velocities_mps: tuple[Value, Value] | None,
     yaw_rates_radps: Value,
-    anywhere: bool = False,
-) -> Courses:
-    """Return the courses at poses (N, 2), as :func:`~nav_adapter.limit.courses_of` has them.
+    age_s: float,
+) -> Course:
+    """Return the courses at poses (N, 2), as :func:`~nav_adapter.course.course_of` has them.
 
-    A robot that stands has one fan of all directions, whichever end leads.
-
-    Args:
-        robot: of the constraints.
-        basis: of the constraints.
-        positions_m: (N, 2).
-        headings_rad: (N,), or None for any.
-        velocities_mps: forward and left, (N,), or None for a robot that drives forwards.
-        yaw_rates_radps: (N,), or 0.
-        anywhere: the robots stand, and may start in any direction.
+    Without headings (None) a robot may go anywhere at once: only its circle counts, ``radius_m``.
+    Without velocities it drives forwards.
     """
+    forward, left = (robot.max_speed_mps, 0.0) if velocities_mps is None else velocities_mps
+    heading = 0.0 if headings_rad is None else headings_rad
     x, y = positions_m.T
-    age_s = basis.robot_age_s
-    if velocities_mps is None:
-        travel: Value = robot.max_speed_mps
-    else:
-        forward, left = velocities_mps
-        travel = np.hypot(forward, left)
-    fastest = np.maximum(travel, robot.max_speed_mps)
-    faster_m = 0.5 * robot.max_acceleration_mps2 * age_s**2
-    driven_m = np.minimum(travel * age_s + faster_m, fastest * age_s)
-    radius_m = robot.circumscribed_radius_m + driven_m + _NEAR_M
+    motion = Motion(x, y, heading, forward, left, yaw_rates_radps)
+    course = course_of(robot, motion, 0.0, age_s, np)
     if headings_rad is None:
-        return Courses(x, y, _single(driven_m), radius_m=_single(radius_m))
-    turn_rad = 0.0 if basis.policy.reach is None else math.radians(basis.policy.reach.turn_deg)
-    off: Value = 0.0
-    speed: Value = travel
-    noise_rad: Value = 0.0
-    stands: Value = False
-    if velocities_mps is not None:
-        sideways, speed = np.abs(left) > LATERAL_NOISE_MPS, course_speed_mps(forward, left)
-        off = np.where(forward <= -STANDING_MPS, math.pi, 0.0)
-        off = np.where(sideways, np.arctan2(left, forward), off)
-        if robot.moves_sideways is not False:
-            noise_rad = np.arctan2(np.abs(left), np.maximum(speed, STANDING_MPS))
-            noise_rad = np.where(sideways, 0.0, noise_rad)
-        stands = stands_at(forward, left)
-    straight_rad = headings_rad + off
-    extent = extents_m(robot, off)
-    straight = (*_directions(straight_rad), *extent)
-    if anywhere:
-        return Courses(x, y, _single(driven_m), radius_m=_single(radius_m), straight=straight)
-    # The chord of a curve, as in course_of.
-    stopping_s = robot.reaction_time_s + age_s + 0.5 * speed / robot.max_deceleration_mps2
-    half_rad = 0.5 * np.clip(yaw_rates_radps * stopping_s, -math.pi, math.pi)
-    fan_rad = np.minimum(turn_rad + noise_rad + 0.5 * np.abs(half_rad), math.pi)
-    swing_rad = np.abs(half_rad) + noise_rad
-    middle = straight
-    if np.any(swing_rad):
-        swung = _swung(robot, extent, swing_rad)
-        middle = (*_directions(straight_rad + 0.5 * half_rad), *swung)
-    cos, sin, front, rear, half = middle
-    if np.any(stands):
-        fan_rad = np.where(stands, math.pi, fan_rad)
-        long = np.maximum(front, -rear)
-        front, rear = np.where(stands, long, front), np.where(stands, -long, rear)
-    fan_cos, fan_sin = _directions(fan_rad)
-    return Courses(
-        *(x, y, _single(driven_m), cos, sin, fan_cos, fan_sin, front, rear, half),
-        _single(radius_m),
-        straight,
-    )
-
-
-def course_speed_mps(forward: Value, left: Value) -> Value:
-    """Return the speed on the course: lateral noise does not count."""
-    return np.where(np.abs(left) > LATERAL_NOISE_MPS, np.hypot(forward, left), np.abs(forward))
-
-
-def stands_at(forward: Value, left: Value) -> Value:
-    """Return whether a robot stands, so that it may start either way."""
-    return (np.abs(left) <= LATERAL_NOISE_MPS) & (np.abs(forward) < STANDING_MPS)
-
-
-def _single(value: Value) -> Value:
-    return np.asarray(value, dtype=np.float32)
-
-
-def _directions(angle_rad: Value) -> tuple[Value, Value]:
-    """Return cosine and sine in single precision."""
-    return _single(np.cos(angle_rad)), _single(np.sin(angle_rad))
-
-
-def extents_m(robot: RobotProfile, off_rad: Value) -> tuple[Value, Value, Value]:
-    """Return front, rear and half the width along a course ``off_rad`` from the heading."""
-    if not np.any(off_rad):
-        off_rad = 0.0
-    cos, sin = _directions(off_rad)
-    front, rear, half = -np.inf, np.inf, 0.0
-    for x, y in robot.footprint_m.astype(np.float32):
-        along, across = cos * x + sin * y, cos * y - sin * x
-        front, rear = np.maximum(front, along), np.minimum(rear, along)
-        half = np.maximum(half, np.abs(across))
-    return front + _NEAR_M, rear - _NEAR_M, half + _NEAR_M
-
-
-def _swung(
-    robot: RobotProfile, extent_m: tuple[Value, Value, Value], swing_rad: Value
-) -> tuple[Value, Value, Value]:
-    """Return what they are for a footprint turned by up to ``swing_rad`` either way."""
-    (front, rear, half), radius = extent_m, np.float32(robot.circumscribed_radius_m + _NEAR_M)
-    cos, sin = _directions(np.minimum(swing_rad, 0.5 * math.pi))
-    long = np.maximum(front, -rear)
-    wide = np.minimum(half * cos + long * sin, radius)
-    wide = np.where(half * sin < long * cos - _NEAR_M, wide, radius)
-    return (
-        np.where(sin > 0.0, np.minimum(front + half * sin, radius), front),
-        np.where(sin > 0.0, np.maximum(rear - half * sin, -radius), rear),
-        np.where(sin > 0.0, wide, half),
+        driven_m = driven_since_m(robot, np.hypot(forward, left), age_s, np)
+        course = course._replace(
+            front_m=driven_m, rear_m=0.0, half_m=0.0, circle_m=robot.circumscribed_radius_m
+        )
+    single = (np.asarray(value, dtype=np.float32) for value in course[2:10])
+    cos, sin, fan_cos, fan_sin, front, rear, half, radius = single
+    return course._replace(
+        cos=cos,
+        sin=sin,
+        fan_cos=fan_cos,
+        fan_sin=fan_sin,
+        front_m=front + _NEAR_M,
+        rear_m=rear - _NEAR_M,
+        half_m=half + _NEAR_M,
+        radius_m=radius + _NEAR_M,
     )
 
 
@@ -256,7 +124,7 @@ def contacts_m(
     distance = np.sqrt(distance2)
     cos_x, sin_x, cos_y, sin_y = cos * x, sin * x, cos * y, sin * y
     low_y = cos_y - sin_x
-    low_x = np.where(low_y <= 0.0, distance, cos_x + sin_y)
+    low_x = np.where(low_y < 0.0, distance, cos_x + sin_y)
     np.maximum(low_y, 0.0, out=low_y)
     high_y = cos_y + sin_x
     high_x = np.where(high_y < 0.0, -distance, cos_x - sin_y)

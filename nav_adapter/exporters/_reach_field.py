@@ -15,21 +15,12 @@ import numpy as np
 
 from perception.arrays import FloatArray
 
-from .._people_ahead import PersonAhead, listed, varies
+from .._known import SpeedBasis
 from .._robot import RobotProfile
-from .._speed_basis import SpeedBasis
+from ..course import Course
 from ..limit import STEPS
-from ._courses import (
-    NOWHERE_M,
-    Courses,
-    Pairs,
-    Value,
-    chosen_of,
-    contacts_m,
-    extents_m,
-    in_table,
-    stopping_mps,
-)
+from ..rules import Known
+from ._courses import NOWHERE_M, Pairs, Value, chosen_of, contacts_m, in_table, stopping_mps
 
 # Parts of a step of time: the step that decides is divided into these.
 _PARTS: Final = 16
@@ -46,7 +37,6 @@ class Reaches:
     A row is one person at one time. Tables (J, rows) have one column where all rows are equal.
 
     Attributes:
-        people: in the order of their rows.
         first: (P,) the first row of each person.
         follows: (P,) 1 for a person with a row for each of the times, 0 for one row for all.
         x_m: (rows,) place.
@@ -65,7 +55,6 @@ class Reaches:
         braked_m: (J, rows) way that braking has saved.
     """
 
-    people: tuple[PersonAhead, ...]
     first: Any
     follows: Any
     x_m: FloatArray
@@ -84,28 +73,37 @@ class Reaches:
     braked_m: Any
 
     @classmethod
-    def of(
-        cls, people: tuple[PersonAhead, ...], times: int, basis: SpeedBasis, robot: RobotProfile
-    ) -> Reaches:
-        """Return the tables of one or more people."""
+    def of(cls, people: list[list[Known]], basis: SpeedBasis, robot: RobotProfile) -> Reaches:
+        """Return the tables of one or more people, who are known at each of the times."""
         places: list[tuple[float, ...]] = []
         values: list[tuple[float, ...]] = []
         first: list[int] = []
         follows: list[bool] = []
         column_of: list[int] = []
-        for each in people:
+        for ahead in people:
             # Most people differ in place alone from time to time.
-            place = each.x_m, each.y_m, -np.inf if each.least_mps is None else each.least_mps
-            rest = (*each[3:9], *each.variances, each.body_m)
-            differs = any(map(varies, rest))
-            count = times if differs or any(map(varies, place)) else 1
+            place = [(each.reach.x_m, each.reach.y_m, each.least_mps) for each in ahead]
+            rest = [
+                (
+                    *each.reach[2:4],
+                    max(each.reach.speed_mps, each.first_sight_mps),
+                    *each.reach[5:8],
+                    *each.reach.variances,
+                    each.body_m,
+                )
+                for each in ahead
+            ]
+            if rest.count(rest[0]) == len(rest):
+                rest = rest[:1]
+                if place.count(place[0]) == len(place):
+                    place = place[:1]
             first.append(len(places))
-            follows.append(count > 1)
+            follows.append(len(place) > 1)
             begin = len(values)
-            column_of += range(begin, begin + count) if differs else [begin] * count
-            places += zip(*(listed(value, count) for value in place), strict=True)
-            columns = count if differs else 1
-            values += zip(*(listed(value, columns) for value in rest), strict=True)
+            differs = len(rest) > 1
+            column_of += range(begin, begin + len(rest)) if differs else [begin] * len(place)
+            places += place
+            values += rest
         x, y, least = np.ascontiguousarray(np.array(places).T)
         vx, vy, U, tau, delay, elapsed, a0, a1, a2, body = np.ascontiguousarray(np.array(values).T)
         each_row = np.array(column_of)
@@ -115,13 +113,11 @@ class Reaches:
         t = (step_s / _PARTS) * np.arange(_PARTS * steps + 1)[:, None]
         late = np.maximum(t - react, 0.0)
         walking = np.hypot(vx, vy)
-        m, r = np.zeros((len(t), 1)), np.zeros((len(t), 1))
-        if basis.policy.reach is not None:
-            m = tau * -np.expm1(-(t + elapsed) / tau)
-            since = t + elapsed + delay
-            r = U * (since + tau * np.expm1(-since / tau))
-            variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
-            r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))
+        m = tau * -np.expm1(-(t + elapsed) / tau)
+        since = t + elapsed + delay
+        r = U * (since + tau * np.expm1(-since / tau))
+        variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
+        r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))
         around = np.maximum.accumulate(r + (m + 0.5 * step_s) * walking, axis=0)
         margin = np.maximum(basis.policy.margins.floor_m, body + basis.policy.margins.clearance_m)
         around = around + margin + elapsed * walking
@@ -139,7 +135,6 @@ class Reaches:
             react, late = react[:1], late[:, :1]
         return cls(
             *(
-                people,
                 np.array(first),
                 np.array(follows, dtype=np.intp),
                 x,
@@ -158,75 +153,61 @@ class Field:
 
     Args:
         reaches: of the people.
-        courses: (N,) of the robot.
+        course: (N,) of the robot, for the reach; None if no reach counts.
+        field: (N,) of the protective field; None if none counts.
         times: (N,) index of the time of each pose.
         basis: of the constraints.
         robot: of the constraints.
         reach_m: the limits hold within this distance of the poses.
-        fine: all steps of time are as short as the shortest of ``limit_mps``, for a few poses.
-        walking_on: the limits are lowered already to those of people as they are; here they walk
-            straight on, and no protective field counts.
     """
 
     def __init__(
         self,
         reaches: Reaches,
-        courses: Courses,
+        course: Course | None,
+        field: Course | None,
         times: Any,
         basis: SpeedBasis,
         robot: RobotProfile,
         reach_m: float,
-        fine: bool = False,
-        walking_on: bool = False,
     ) -> None:
-        self._reaches, self._courses, self._times = reaches, courses, times
+        self._reaches, self._times = reaches, times
+        self._course, self._field = course, field
         self._margin_m = np.float32(basis.policy.margins.floor_m)
-        self._clearance_m = np.float32(basis.policy.margins.clearance_m)
-        self._has_reach = basis.policy.reach is not None
         self._a = np.float32(robot.max_deceleration_mps2)
-        self._fine, self._walking_on, self._reach_m = fine, walking_on, np.float32(reach_m)
-        # The field is a rectangle, so its corners are farther away than the robot's.
-        clearance = basis.policy.margins.clearance_m
-        front, rear, half = extents_m(robot, 0.0)
-        long = max(front, -rear)
-        corner = math.hypot(long + clearance, half + clearance)
-        if robot.moves_sideways is not False and not courses.straight:
-            corner = math.sqrt(2.0) * (robot.circumscribed_radius_m + clearance)
-        self._corner_m = np.float32(corner + reach_m)
+        self._reach_m = np.float32(reach_m)
         # No farther from the base is any part of robot or field, wherever they point.
-        sizes = np.hypot(np.maximum(courses.front_m, -courses.rear_m), courses.half_m) + clearance
-        size = max(float(np.max(sizes)), corner + reach_m)
-        self._size_m = np.float32(size + float(np.max(courses.driven_m)))
+        size = 0.0
+        for each in (course, field):
+            if each is not None:
+                sizes = np.hypot(np.maximum(each.front_m, -each.rear_m), each.half_m)
+                size = max(size, float(np.max(np.maximum(sizes, each.radius_m))) + reach_m)
+        self._size_m = np.float32(size)
         self._step_s = float(reaches.ahead_s[_PARTS])
 
-    def lower(self, limits: FloatArray) -> Any:
-        """Lower limits (N,) in place to those that people set, and return by whom.
-
-        The result (N,) is twice the index of a person, one more for the path, or −1 for nobody.
-        """
-        reaches, courses = self._reaches, self._courses
-        by = np.full(len(limits), -1)
+    def lower(self, limits: FloatArray) -> None:
+        """Lower limits (N,) in place to those that people set."""
+        reaches = self._reaches
+        course = self._field if self._course is None else self._course
+        assert course is not None
+        people = range(len(reaches.first))
         nearest, least = np.full(len(limits), -1), np.full(len(limits), np.inf)
         away = []
-        for index in range(len(reaches.people)):
+        for index in people:
             row = reaches.first[index] + reaches.follows[index] * self._times
-            dx, dy = reaches.x_m[row] - courses.x_m, reaches.y_m[row] - courses.y_m
+            dx, dy = reaches.x_m[row] - course.x_m, reaches.y_m[row] - course.y_m
             distance = np.sqrt(dx * dx + dy * dy)
             away.append((row, distance))
-            if self._walking_on:
-                continue
             free = distance - in_table(reaches.around_m, len(reaches.ahead_s) // 2, row)
             nearest[free < least] = index
             np.minimum(least, free, out=least)
-        if not self._walking_on:
-            rows = reaches.first[nearest] + reaches.follows[nearest] * self._times
-            self._lower_by([(np.arange(len(limits)), nearest, rows)], limits, by)
+        rows = reaches.first[nearest] + reaches.follows[nearest] * self._times
+        self._lower_by([(np.arange(len(limits)), rows)], limits)
         others = []
         for index, (row, distance) in enumerate(away):
             poses = np.flatnonzero((distance < self._near_m(row, limits)) & (nearest != index))
-            others.append((poses, np.full(len(poses), index), row[poses]))
-        self._lower_by(others, limits, by)
-        return by
+            others.append((poses, row[poses]))
+        self._lower_by(others, limits)
 
     def _near_m(self, row: Any, limits: Any) -> Any:
         """Return the distances (n,) from which on a person sets no lower limit."""
@@ -244,60 +225,55 @@ class Field:
     def _reacts_s(self, row: Any) -> Value:
         return in_table(self._reaches.react_s[None], 0, row)
 
-    def _lower_by(self, pairs: list[Any], limits: FloatArray, by: Any) -> None:
-        """Lower the limits by pairs (poses, people, rows); each pose is in each of them once."""
-        poses, people, rows = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    def _lower_by(self, pairs: list[Any], limits: FloatArray) -> None:
+        """Lower the limits by pairs (poses, rows); each pose is in each of them once."""
+        poses, rows = (np.concatenate(each) for each in zip(*pairs, strict=True))
         before, own = limits[poses].astype(np.float32), np.empty(len(poses), dtype=np.float32)
-        in_the_path = np.empty(len(poses), dtype=bool)
-        together = _TOGETHER if not self._fine else 1 + _TOGETHER // len(self._reaches.ahead_s)
-        for start in range(0, len(poses), together):
-            some = slice(start, start + together)
-            path, reach = self._limits(poses[some], rows[some], before[some])
-            own[some], in_the_path[some] = np.minimum(path, reach), path < reach
+        for start in range(0, len(poses), _TOGETHER):
+            some = slice(start, start + _TOGETHER)
+            own[some] = self._limits(poses[some], rows[some], before[some])
         lowest = np.maximum(own * (1.0 - _ROUNDING), self._reaches.least_mps[rows])
         end = 0
-        for each in pairs:
-            begin, end = end, end + len(each[0])
-            lower = begin + np.flatnonzero(lowest[begin:end] < limits[each[0]])
-            limits[poses[lower]] = lowest[lower]
-            by[poses[lower]] = 2 * people[lower] + in_the_path[lower]
+        for chosen, _ in pairs:
+            begin, end = end, end + len(chosen)
+            limits[chosen] = np.minimum(limits[chosen], lowest[begin:end])
 
-    def _limits(self, pose: Any, row: Any, before: Any) -> tuple[Any, Any]:
-        """Return the limits (n,) by the path and by the reach, ∞ where not below ``before``."""
-        reaches, courses = self._reaches, self._courses
-        dx = (reaches.x_m[row] - courses.x_m[pose]).astype(np.float32)
-        dy = (reaches.y_m[row] - courses.y_m[pose]).astype(np.float32)
-        vx, vy = reaches.velocity_x_mps[row], reaches.velocity_y_mps[row]
-        driven, react = chosen_of(courses.driven_m, pose), self._reacts_s(row)
-        body, elapsed = reaches.body_m[row], reaches.elapsed_s[row]
-        straight = tuple(chosen_of(each, pose) for each in courses.straight)
-        path = np.full(len(pose), NOWHERE_M)
-        if not self._walking_on:
-            path = self._path_mps(dx, dy, straight, body, driven, react)
-        if not self._walking_on and np.any(elapsed):
-            x, y = dx + vx * elapsed, dy + vy * elapsed
-            np.minimum(path, self._path_mps(x, y, straight, body, driven, react), out=path)
-        if not self._has_reach:
-            return path, np.full(len(pose), NOWHERE_M)
-        if courses.cos is None:
-            radius = chosen_of(courses.radius_m, pose) + self._reach_m
-            pairs = Pairs(row, dx, dy, vx, vy, None, None, 0.0, 0.0, 0.0, radius)
-        else:
-            cos, sin = chosen_of(courses.cos, pose), chosen_of(courses.sin, pose)
-            fan = (chosen_of(each, pose) for each in (courses.fan_cos, courses.fan_sin))
-            extent = (chosen_of(courses.front_m, pose) + driven, chosen_of(courses.rear_m, pose))
-            pairs = Pairs(
-                *(row, cos * dx + sin * dy, cos * dy - sin * dx),
-                *(cos * vx + sin * vy, cos * vy - sin * vx),
-                *(*fan, *extent),
-                *(chosen_of(each, pose) for each in (courses.half_m, courses.radius_m)),
-            )
-        np.minimum(before, path, out=before)
-        reach = np.full(len(pose), NOWHERE_M)
+    def _limits(self, pose: Any, row: Any, before: Any) -> Any:
+        """Return the limits (n,), ∞ where not below ``before``."""
+        reaches, field = self._reaches, self._field
+        own = np.full(len(pose), NOWHERE_M)
+        if field is not None:
+            elapsed = reaches.elapsed_s[row]
+            pairs = self._pairs(field, pose, row)
+            own = self._path_mps(pairs, pairs.x_m, pairs.y_m)
+            if np.any(elapsed):
+                x, y = (
+                    pairs.x_m + elapsed * pairs.velocity_x_mps,
+                    pairs.y_m + elapsed * pairs.velocity_y_mps,
+                )
+                np.minimum(own, self._path_mps(pairs, x, y), out=own)
+        if self._course is None:
+            return own
+        np.minimum(before, own, out=before)
+        pairs = self._pairs(self._course, pose, row)
         near = self._near(pairs, before)
-        reach_mps = self._finely_mps if self._fine else self._reach_mps
-        reach[near] = reach_mps(pairs.at(near), before[near])
-        return path, reach
+        own[near] = np.minimum(own[near], self._reach_mps(pairs.at(near), before[near]))
+        return own
+
+    def _pairs(self, course: Course, pose: Any, row: Any) -> Pairs:
+        """Return pairs of the courses at some poses and the people of some rows."""
+        reaches = self._reaches
+        dx = (reaches.x_m[row] - course.x_m[pose]).astype(np.float32)
+        dy = (reaches.y_m[row] - course.y_m[pose]).astype(np.float32)
+        vx, vy = reaches.velocity_x_mps[row], reaches.velocity_y_mps[row]
+        if course.circle_m:
+            radius = chosen_of(course.radius_m, pose) + self._reach_m
+            return Pairs(row, dx, dy, vx, vy, None, None, 0.0, 0.0, 0.0, radius)
+        cos, sin, *rest = (chosen_of(each, pose) for each in course[2:10])
+        return Pairs(
+            *(row, cos * dx + sin * dy, cos * dy - sin * dx),
+            *(cos * vx + sin * vy, cos * vy - sin * vx, *rest),
+        )
 
     def _near(self, pairs: Pairs, before: Any) -> Any:
         """Return the indices of pairs whose person may come to where the robot may be."""
@@ -326,30 +302,19 @@ class Field:
             low, high = np.where(apart, middle + 1, low), np.where(apart, high, middle)
         return np.minimum(low, steps)
 
-    def _path_mps(
-        self, dx: Any, dy: Any, straight: tuple[Value, ...], body: Any, driven: Value, react: Value
-    ) -> Any:
-        """Return the limits (n,) of the protective field; ∞ for none."""
-        if not straight:
-            gap = np.sqrt(dx * dx + dy * dy) - body - (driven + self._corner_m)
-        else:
-            cos, sin, front, rear, half = straight
-            x = cos * dx + sin * dy
-            off = np.abs(cos * dy - sin * dx) - (half + self._clearance_m)
-            inside = (x >= rear - body) & (off <= body)
-            np.maximum(off, 0.0, out=off)
-            ahead = np.sqrt(np.maximum(body * body - off * off, 0.0))
-            gap = np.where(inside, x - ahead - (front + driven + self._clearance_m), NOWHERE_M)
-        return stopping_mps(gap, react, self._a)
+    def _path_mps(self, pairs: Pairs, x: Any, y: Any) -> Any:
+        """Return the limits (n,) of the protective field with people at these places; ∞ for none.
 
-    def _finely_mps(self, pairs: Pairs, before: Any) -> Any:
-        """Return what :meth:`_reach_mps` does, with all the shortest steps of time at once."""
-        parts = np.arange(len(self._reaches.ahead_s) - 1)
-        each = np.repeat(np.arange(len(before)), len(parts))
-        part = np.tile(parts, len(before))
-        own = self._lowest_mps(pairs.at(each), part, part + 1)
-        limits = own.reshape(len(before), len(parts)).min(axis=1)
-        return np.where(limits < before, limits, NOWHERE_M)
+        It is that of :func:`~nav_adapter.limit.in_the_path_mps`.
+        """
+        body = self._reaches.body_m[pairs.row]
+        if pairs.fan_cos is None:
+            gap = np.sqrt(x * x + y * y) - body - pairs.radius_m
+        else:
+            gap, _, behind = contacts_m(x, y, pairs, body, np.float32(0.0))
+            if behind is not None:
+                gap = np.where(behind >= 0.0, np.float32(0.0), gap)
+        return stopping_mps(gap, self._reacts_s(pairs.row), self._a)
 
     def _reach_mps(self, pairs: Pairs, before: Any, first: Any = None, again: int = 2) -> Any:
         """Return the limits (n,) by the reach; they are ∞ where they are not below ``before``.

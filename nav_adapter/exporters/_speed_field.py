@@ -6,13 +6,17 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from perception.arrays import FloatArray, finite_array, finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._limits_at import limits_at
+from .._known import SpeedBasis
+from .._robot import LATERAL_NOISE_MPS, RobotProfile
+from ..course import travel_bearing_rad
+from ..rules import Unseen
+from ._courses import Value, courses_at
+from ._reach_field import Field, Reaches
 
 
 def speed_limit_at(
@@ -25,7 +29,6 @@ def speed_limit_at(
     speeds_mps: Any = None,
     yaw_rates_radps: Any = None,
     aware_for_s: float = math.inf,
-    fine: bool = False,
 ) -> Any:
     """Return (K, T), the speed limit in m/s at K × T poses, people moving as predicted.
 
@@ -58,40 +61,34 @@ def speed_limit_at(
         yaw_rates_radps: (K, T), or None.
         aware_for_s: ≥ 0, how long after the stamp awareness counts. People are unaware from then
             on, as they may have looked away.
-        fine: steps of time as short as those of ``update``, for a higher limit at a few poses.
 
     Raises:
         NavError: for an argument that is not finite, out of bounds or of a wrong shape, and for
             constraints that do not come from ``update`` unless they stop the robot.
     """
-    limits, _, _ = _limits(
-        *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
-        *(speeds_mps, yaw_rates_radps, aware_for_s, fine),
+    positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
+    shape = positions.shape[:2]
+    dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
+    first = finite_number("first_s", first_s, NavError, minimum=0.0)
+    if not aware_for_s >= 0.0:
+        raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
+
+    def of_shape(name: str, values: Any, *more: int) -> Any:
+        return None if values is None else finite_array(name, values, (*shape, *more), NavError)
+
+    headings = of_shape("headings_odom_rad", headings_odom_rad)
+    rates = of_shape("yaw_rates_radps", yaw_rates_radps)
+    velocities = None  # forward and to the left
+    if np.ndim(speeds_mps) == 3:
+        both = of_shape("speeds_mps", speeds_mps, 2)
+        velocities = both[:, :, 0], both[:, :, 1]
+    elif speeds_mps is not None:
+        velocities = of_shape("speeds_mps", speeds_mps), np.float64(0.0)
+    return limits_at(
+        *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
+        first + dt * np.arange(shape[1], dtype=np.float64),
+        aware_for_s,
     )
-    return limits
-
-
-def limited_by_at(
-    constraints: NavConstraints,
-    positions_odom_m: Any,
-    headings_odom_rad: Any = None,
-    *,
-    dt_s: float,
-    first_s: float = 0.0,
-    speeds_mps: Any = None,
-    yaw_rates_radps: Any = None,
-    aware_for_s: float = math.inf,
-) -> NDArray[np.object_]:
-    """Return (K, T), the person and the rule that set each limit of :func:`speed_limit_at`.
-
-    The texts are those of :attr:`~nav_adapter.NavConstraints.limited_by`, such as ``"track 3:
-    reach"``. The arguments and errors are those of :func:`speed_limit_at`.
-    """
-    _, by, texts = _limits(
-        *(constraints, positions_odom_m, headings_odom_rad, dt_s, first_s),
-        *(speeds_mps, yaw_rates_radps, aware_for_s),
-    )
-    return np.array(texts, dtype=object)[by]
 
 
 def time_cost(
@@ -147,39 +144,100 @@ def time_cost(
     return np.where(lengths > 0.0, seconds, 0.0).sum(axis=1)
 
 
-def _limits(
+def limits_at(
     constraints: NavConstraints,
-    positions_odom_m: Any,
-    headings_odom_rad: Any,
-    dt_s: float,
-    first_s: float,
-    speeds_mps: Any,
-    yaw_rates_radps: Any,
+    positions_m: FloatArray,
+    headings_rad: FloatArray | None,
+    velocities_mps: tuple[FloatArray, Value] | None,
+    yaw_rates_radps: Value,
+    times_s: FloatArray,
     aware_for_s: float,
-    fine: bool = False,
-) -> tuple[FloatArray, NDArray[np.intp], list[str]]:
-    """Return the limits and their reasons after a check of all arguments."""
-    positions = finite_array("positions_odom_m", positions_odom_m, ("K", "T", 2), NavError)
-    shape = positions.shape[:2]
-    dt = finite_number("dt_s", dt_s, NavError, minimum=0.0, exclusive_minimum=True)
-    first = finite_number("first_s", first_s, NavError, minimum=0.0)
-    if not aware_for_s >= 0.0:
-        raise NavError(f"aware_for_s must be >= 0 s, got {aware_for_s!r:.80}")
+    reach_m: float = 0.0,
+) -> FloatArray:
+    """Return the limits (K, T) at poses (K, T, …).
 
-    def of_shape(name: str, values: Any, *more: int) -> Any:
-        return None if values is None else finite_array(name, values, (*shape, *more), NavError)
+    Args:
+        constraints: of ``NavAdapter.update``, or some that stop the robot.
+        positions_m: (K, T, 2).
+        headings_rad: (K, T), or None for any.
+        velocities_mps: forward and left, (K, T), or None for a robot that drives forwards.
+        yaw_rates_radps: (K, T), or 0.
+        times_s: (T,) after the stamp.
+        aware_for_s: how long awareness counts.
+        reach_m: the limits hold within this distance of the poses; they have no heading then.
 
-    headings = of_shape("headings_odom_rad", headings_odom_rad)
-    rates = of_shape("yaw_rates_radps", yaw_rates_radps)
-    velocities = None  # forward and to the left
-    if np.ndim(speeds_mps) == 3:
-        both = of_shape("speeds_mps", speeds_mps, 2)
-        velocities = both[:, :, 0], both[:, :, 1]
-    elif speeds_mps is not None:
-        velocities = of_shape("speeds_mps", speeds_mps), np.float64(0.0)
-    return limits_at(
-        *(constraints, positions, headings, velocities, 0.0 if rates is None else rates),
-        first + dt * np.arange(shape[1], dtype=np.float64),
-        aware_for_s,
-        fine=fine,
+    Raises:
+        NavError: for constraints that do not come from ``update`` unless they stop the robot.
+    """
+    if not isinstance(constraints, NavConstraints):
+        raise NavError(f"constraints must be NavConstraints, got {type(constraints).__name__}")
+    basis, robot = constraints.speed_basis, constraints.robot
+    shape = positions_m.shape[:2]
+    if basis is None or robot is None:
+        if constraints.speed_limit_mps > 0.0:
+            raise NavError(
+                "constraints must come from NavAdapter.update, got some without speed_basis"
+            )
+        return np.zeros(shape)
+
+    def flat(value: Value) -> Value:
+        """Return values (K, T, …) as (K·T, …)."""
+        is_array = isinstance(value, np.ndarray) and value.ndim
+        return value.reshape(-1, *value.shape[2:]) if is_array else value
+
+    velocities = velocities_mps and tuple(map(flat, velocities_mps))
+    limits = np.tile(_without_people_mps(constraints, basis, robot, times_s), shape[0])
+    if velocities is not None:
+        _lower_by_direction(limits, velocities, basis, robot)
+    known = list(basis.known_ahead(times_s, aware_for_s))
+    if not known or not limits.size:
+        return limits.reshape(shape)
+    told = flat(positions_m), flat(headings_rad), velocities, flat(yaw_rates_radps)
+    own = courses_at(robot, *told, basis.robot_age_s)
+    turned = None
+    if basis.policy.applies("reach"):
+        turned = own.turned(np.float32(math.radians(basis.policy.reach.turn_deg)), np)
+    field = (
+        own.grown(basis.policy.margins.clearance_m) if basis.policy.applies("in the path") else None
     )
+    given = np.tile(np.arange(shape[1]), shape[0]), basis, robot, reach_m
+    Field(Reaches.of(known, basis, robot), turned, field, *given).lower(limits)
+    walkers = [ahead for ahead in known if any(each.reach.walks_faster for each in ahead)]
+    if walkers and basis.policy.applies("walking on"):
+        on = [
+            [each._replace(reach=each.reach.walking_on(), first_sight_mps=0.0) for each in ahead]
+            for ahead in walkers
+        ]
+        Field(Reaches.of(on, basis, robot), own, None, *given).lower(limits)
+    return limits.reshape(shape)
+
+
+def _without_people_mps(
+    constraints: NavConstraints, basis: SpeedBasis, robot: RobotProfile, times_s: FloatArray
+) -> FloatArray:
+    """Return the limits (T,) by the robot's maximum, old data and the recovery after them."""
+    if basis.stopped:
+        return np.zeros(len(times_s))
+    limits = np.full(len(times_s), robot.max_speed_mps)
+    if basis.ceiling_mps is not None:
+        rise_mps2 = 0.0 if constraints.stale else robot.max_acceleration_mps2
+        limits = np.minimum(limits, basis.ceiling_mps + rise_mps2 * times_s)
+    return limits
+
+
+def _lower_by_direction(
+    limits: FloatArray,
+    velocities_mps: tuple[Value, ...],
+    basis: SpeedBasis,
+    robot: RobotProfile,
+) -> None:
+    """Lower limits (N,) in place where the drive, or what sensors see, forbids the direction."""
+    forward, left = velocities_mps
+    if robot.moves_sideways is False:
+        limits[np.broadcast_to(np.abs(left) > LATERAL_NOISE_MPS, limits.shape)] = 0.0
+    unseen = Unseen(basis.policy.timing.stale_after_s)
+    if basis.seen_s and basis.policy.applies(unseen.name):
+        bearings = np.broadcast_to(travel_bearing_rad(forward, left, np), limits.shape)
+        directions, which = np.unique(bearings, return_inverse=True)
+        caps = [unseen.cap(basis.seen_s, each, basis.stamp_s) for each in directions.tolist()]
+        np.minimum(limits, np.array(caps)[which], out=limits)

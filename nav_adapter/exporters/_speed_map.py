@@ -15,8 +15,8 @@ from perception.short_repr import short_repr
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from ._limits_at import limits_at
 from ._person_costs import checked_grid
+from ._speed_field import limits_at
 
 _LARGEST_CELLS: Final = 4_000_000
 
@@ -120,7 +120,7 @@ class SpeedMap:
         positions = positions.reshape(-1, 1, 2)
         limits = np.full(side * side, robot.max_speed_mps)
         for time_s in times:
-            at_time, _, _ = limits_at(
+            at_time = limits_at(
                 *(constraints, positions, None, None, 0.0, np.array([time_s]), aware_for_s),
                 reach_m=math.sqrt(0.5) * cell,
             )

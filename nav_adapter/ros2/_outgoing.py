@@ -9,6 +9,7 @@ from tracking import PersonTrack
 
 from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
+from ..rigid import Motion
 from ._alerts import alerts
 from ._people import circle_objects, detections, markers, occupancy_grid, people, teb_obstacles
 from ._polygons import collision_polygons, stop_zone
@@ -60,9 +61,15 @@ def outgoing(
     if wanted("alerts"):
         yield "alerts", alerts(constraints, details=details, sensors=sensors)
     if wanted("stop_zone"):
-        moving = robot_state
-        forward, left = (moving.speed_mps, moving.lateral_mps) if moving else (0.0, 0.0)
-        zone = stop_zone(robot, forward, constraints.stamp_s, lateral_mps=left, base_frame=base)
+        _, _, _, forward, left, turn = Motion.of(robot_state) if robot_state else Motion(0.0, 0.0)
+        zone = stop_zone(
+            robot,
+            forward,
+            constraints.stamp_s,
+            lateral_mps=left,
+            yaw_rate_radps=turn,
+            base_frame=base,
+        )
         yield "stop_zone", zone
     if robot_state is not None and wanted("grid"):
         center = robot_state.position_odom_m

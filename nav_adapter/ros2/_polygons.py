@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +11,7 @@ from perception.arrays import FloatArray
 
 from .._constraints import NavConstraints
 from .._robot import RobotProfile, RobotState
+from ..rigid import Motion
 from ._speed_limit import SLOWEST_MPS, controller_limit_mps
 from .conversions import header
 from .messages.geometry_msgs import Point32, PolygonInstance, PolygonInstanceStamped, PolygonStamped
@@ -75,20 +75,22 @@ def stop_zone(
     stamp_s: float,
     *,
     lateral_mps: float = 0.0,
+    yaw_rate_radps: float = 0.0,
     base_frame: str = "base_link",
 ) -> PolygonStamped:
     """Return ``geometry_msgs/PolygonStamped``: the area that a robot passes when it brakes now.
 
-    It is the footprint, stretched along the direction of travel by the stopping distance
-    v·T + v²/2a (speed and separation without the person): a stop zone that grows with speed, for
-    the collision monitor's ``polygon_sub_topic``. ``lateral_mps`` is the speed to the left.
+    It is the convex hull of the footprint all along the robot's curve, as far as the stopping
+    distance v·T + v²/2a (speed and separation without the person): a stop zone that grows with
+    speed, for the collision monitor's ``polygon_sub_topic``. ``lateral_mps`` is the speed to the
+    left, and ``yaw_rate_radps`` bends the zone.
     """
-    travel_mps = math.hypot(speed_mps, lateral_mps)
-    # The stopping distance over the speed, so that a standing robot has no direction to divide by.
-    stop_s = robot.reaction_time_s + travel_mps / (2.0 * robot.max_deceleration_mps2)
-    footprint = np.asarray(robot.footprint_m)
-    ahead = footprint + np.array([speed_mps * stop_s, lateral_mps * stop_s])
-    zone = MultiPoint(np.concatenate([footprint, ahead])).convex_hull
+    motion = Motion(0.0, 0.0, 0.0, speed_mps, lateral_mps, yaw_rate_radps)
+    stopping_s = motion.stopping_s(
+        robot.reaction_time_s, robot.max_deceleration_mps2, robot.circumscribed_radius_m
+    )
+    places, bulge_m = motion.swept(robot.footprint_m.tolist(), stopping_s)
+    zone = MultiPoint(places).convex_hull.buffer(bulge_m, join_style="mitre")
     return PolygonStamped(header(stamp_s, base_frame), _polygon(zone))
 
 

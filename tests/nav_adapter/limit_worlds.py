@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from nav_adapter import RobotProfile, RobotState
-from nav_adapter.limit import Course, courses_of, limit_mps
+from nav_adapter import RobotProfile
+from nav_adapter.course import Course, course_of
+from nav_adapter.limit import limit_mps
 from nav_adapter.reach import Reach
+from nav_adapter.rigid import Motion
 from perception.arrays import FloatArray
 
 BODY_M = 0.30
@@ -74,9 +76,9 @@ def _drawn(rng: np.random.Generator, worlds: int) -> _Worlds:
         rate = float(rng.choice([0.0, rng.uniform(-1.0, 1.0)]))
         speed = robot.max_speed_mps
         for _ in range(4):  # the limit depends on how fast the robot drives along its curve
-            state = RobotState(0.0, np.zeros(2), 0.0, speed, rate)
-            courses = courses_of(robot, state, turn_rad)
-            limit = min(limit_mps(person, each) for each in courses)
+            limit = limit_mps(
+                person, course_of(robot, Motion(0.0, 0.0, 0.0, speed, 0.0, rate), turn_rad)
+            )
             if speed <= limit:
                 break
             speed = limit

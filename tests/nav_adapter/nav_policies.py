@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
-from nav_scenes import crowds, finite, robot_at
+from nav_scenes import SCANNER, crowds, finite, robot_at
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
 from nav_adapter.policies import (
@@ -76,7 +76,8 @@ def policies(draw: st.DrawFn) -> AwarenessPolicy:
     return AwarenessPolicy(
         inflation=draw(inflations()),
         speed=draw(human_speeds()),
-        reach=draw(reach_rules() | reach_rules() | reach_rules() | st.none()),
+        reach=draw(reach_rules()),
+        without=draw(st.sampled_from([(), (), (), SCANNER])),
         noticed_counts_as=draw(st.none() | finite(0.0, 1.0)),
         margins=SafetyMargins(
             clearance_m=draw(finite(0.1, 0.5)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from hypothesis import strategies as st
@@ -32,6 +33,10 @@ ROBOT = RobotProfile(
 )
 
 FLOOR_M = 0.40
+
+
+# The rules that a robot leaves out that has the protective field of a scanner alone.
+SCANNER: Final = ("reach", "walking on", "first sight")
 
 
 def person(
@@ -66,7 +71,10 @@ def policy_radius_m(policy: AwarenessPolicy, alpha: float, robot: RobotProfile =
     It is that of the policy, or the one beside which a robot may pass at 0.3 m/s.
     """
     passing_m = passing_radius_m(
-        policy.speed.human_speed_mps(alpha), policy.reach, policy.margins.clearance_m, robot
+        policy.speed.human_speed_mps(alpha),
+        policy.reach if policy.applies("reach") else None,
+        policy.margins.clearance_m,
+        robot,
     )
     return max(policy.inflation.radius_m(alpha), passing_m)
 

@@ -14,6 +14,7 @@ from nav_policies import Own, policies, robots
 from nav_scenes import (
     FLOOR_M,
     ROBOT,
+    SCANNER,
     crowds,
     finite,
     numbers,
@@ -32,8 +33,10 @@ from nav_adapter import (
     PersonObstacle,
     RobotProfile,
 )
-from nav_adapter.limit import course_of, limit_mps
+from nav_adapter.course import course_of
+from nav_adapter.limit import limit_mps
 from nav_adapter.reach import Reach
+from nav_adapter.rigid import Motion
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -63,7 +66,7 @@ def expected_mps(distance_m: float, human_mps: float) -> float:
     assert rules is not None
     times = rules.time_constant_s, rules.delay_s
     standing = Reach(distance_m, 0.0, 0.0, 0.0, human_mps, *times, margin_m=FLOOR_M)
-    course = course_of(ROBOT, robot_at(speed_mps=0.1), math.radians(30.0))
+    course = course_of(ROBOT, Motion.of(robot_at(speed_mps=0.1)), math.radians(30.0))
     return min(limit_mps(standing, course), ROBOT.max_speed_mps)
 
 
@@ -93,14 +96,14 @@ def test_without_people_the_limit_is_the_robots_maximum() -> None:
 @pytest.mark.parametrize("radius", [0.0, -3.0, 0.39, 0.41, 5.0])
 def test_the_floor_holds_for_any_policy_object(radius: float) -> None:
     """The floor of the field alone is body and clearance; of reach, the way past the person."""
-    for reach in (AwarenessPolicy().reach, None):
-        policy = AwarenessPolicy(inflation=Own(lambda _: radius), reach=reach)
+    for without in ((), SCANNER):
+        policy = AwarenessPolicy(inflation=Own(lambda _: radius), without=without)
         adapter = NavAdapter(policy, ROBOT)
         for now in (0.0, 0.5, 1.0, 5.0):
             result = adapter.update((person(now, awareness_lower=1.0),), robot_at(now), now)
             found = result.obstacles[0].radius_m
             assert found >= max(FLOOR_M, radius)
-            if reach is None or radius == 5.0:
+            if without or radius == 5.0:
                 assert found == max(FLOOR_M, radius)
 
 
@@ -167,7 +170,7 @@ def test_people_are_predicted_with_the_age_of_their_track() -> None:
 
 def test_the_protective_field_counts_the_nearer_of_old_and_predicted_place() -> None:
     """A person last seen walking away may have stopped."""
-    field = AwarenessPolicy(reach=None)
+    field = AwarenessPolicy(without=SCANNER)
 
     def limit(vx: float) -> float:
         track = person(position=(2.0, 0.0), velocity=(vx, 0.0))
@@ -275,7 +278,7 @@ def test_finite_tracks_give_constraints_or_an_error_of_the_package(
         person(0.0, position=(position_m, 1.0), velocity=(0.0, -speed_mps)),
         covariance_odom=np.diag([variance_m2, variance_m2, variance_m2ps2, variance_m2ps2]),
     )
-    policy = AwarenessPolicy(reach=None)
+    policy = AwarenessPolicy(without=SCANNER)
     if preset != "field":
         policy = AwarenessPolicy.preset(preset)
     adapter = NavAdapter(policy, ROBOT)
@@ -306,10 +309,14 @@ def test_a_robot_limits_itself_the_way_it_drives(bearing: float, distance: float
     forward = limit_for(bearing, distance, 1.0).speed_limit_mps
     backward = limit_for(bearing + math.pi, distance, -1.0).speed_limit_mps
     assert backward == pytest.approx(forward, abs=1e-6)
-    # A robot that stands may start either way.
-    standing = limit_for(bearing, distance, 0.0).speed_limit_mps
-    reversing = limit_for(bearing, distance, -1.0).speed_limit_mps
-    assert standing <= min(forward, reversing) + 0.02
+    # A robot that stands starts forwards; another way has a limit of its own.
+    slowly = limit_for(bearing, distance, 0.05).speed_limit_mps
+    standing = limit_for(bearing, distance, 0.0)
+    assert standing.speed_limit_mps == pytest.approx(slowly, abs=1e-6)
+    reversing = limit_for(bearing, distance, -0.05)
+    reversing_mps = reversing.fastest_point_limit_mps
+    assert reversing_mps is not None
+    assert standing.other_way_limit_mps <= reversing_mps + 1e-9
 
 
 @pytest.mark.parametrize("first", [2, 9])
@@ -319,7 +326,7 @@ def test_the_limiting_rule_and_person_are_named(first: int) -> None:
         person(track_id=7, position=(3.5, 0.0)),
         person(track_id=first, position=(1.0, 0.0)),
     )
-    driving, field = robot_at(speed_mps=0.3), AwarenessPolicy(reach=None)
+    driving, field = robot_at(speed_mps=0.3), AwarenessPolicy(without=SCANNER)
     for state, (policy, rule) in product(
         (driving, robot_at()), ((POLICY, "reach"), (field, "in the path"))
     ):

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from nav_scenes import (
     FLOOR_M,
     ROBOT,
+    SCANNER,
     finite,
     numbers,
     person,
@@ -23,8 +24,10 @@ from nav_scenes import (
 )
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError
-from nav_adapter.limit import in_the_path_mps, straight_course_of
+from nav_adapter.course import course_of
+from nav_adapter.limit import in_the_path_mps
 from nav_adapter.policies import SafetyMargins
+from nav_adapter.rigid import Motion
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTrack
 
@@ -243,7 +246,7 @@ def test_unseen_people_count_with_more_standard_deviations(
     seen_sigmas: float, unseen_sigmas: float, sigma_m: float, reach: bool
 ) -> None:
     """As many of a tracked place as if the place were certain and the clearance as much larger."""
-    policy = AwarenessPolicy() if reach else AwarenessPolicy(reach=None)
+    policy = AwarenessPolicy() if reach else AwarenessPolicy(without=SCANNER)
 
     def limit_mps(margins: SafetyMargins, sigma_m: float, unseen_s: float) -> float:
         adapter = NavAdapter(policy.model_copy(update={"margins": margins}), ROBOT)
@@ -410,13 +413,12 @@ def test_a_robot_that_stands_has_braked() -> None:
 
 @pytest.mark.parametrize("sigma_m", [0.0, 0.1, 0.3])
 def test_the_protective_field_counts_how_near_the_person_may_be(sigma_m: float) -> None:
-    policy = AwarenessPolicy(reach=None)
+    policy = AwarenessPolicy(without=SCANNER)
     standing = person(position=(2.0, 0.0), sigma_m=sigma_m)
     found = NavAdapter(policy, ROBOT).update([standing], FAST, 0.0).speed_limit_mps
     body_m = BODY_RADIUS_M + policy.margins.uncertainty_sigmas * sigma_m
-    course = straight_course_of(ROBOT, FAST)
-    clearance_m = policy.margins.clearance_m
-    assert found == pytest.approx(in_the_path_mps((2.0, 0.0), body_m, clearance_m, course))
+    field = course_of(ROBOT, Motion.of(FAST), 0.0).grown(policy.margins.clearance_m)
+    assert found == pytest.approx(in_the_path_mps((2.0, 0.0), body_m, field))
 
 
 def test_after_a_pause_the_limit_rises_from_the_robots_speed() -> None:

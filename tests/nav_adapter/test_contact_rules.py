@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from nav_adapter._contact import Course, contact_m, reach_at
+from nav_adapter.course import Course, contact_m, reach_at
 from nav_adapter.reach import Reach
 
 GRID = 4001

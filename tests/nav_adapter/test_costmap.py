@@ -9,7 +9,17 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_scenes import ROBOT, Circle, constraints_of, crowds, finite, person, robot_at, some_circles
+from nav_scenes import (
+    ROBOT,
+    SCANNER,
+    Circle,
+    constraints_of,
+    crowds,
+    finite,
+    person,
+    robot_at,
+    some_circles,
+)
 from shapely.geometry import Point
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, NavError, paint_costmap
@@ -19,7 +29,7 @@ from tracking import PersonTrack
 
 def constraints_for(*tracks: PersonTrack) -> NavConstraints:
     # Without reach the unaware radius is that of the policy, 1 m.
-    return NavAdapter(AwarenessPolicy(reach=None), ROBOT).update(tracks, robot_at(), 0.0)
+    return NavAdapter(AwarenessPolicy(without=SCANNER), ROBOT).update(tracks, robot_at(), 0.0)
 
 
 def brute_force(

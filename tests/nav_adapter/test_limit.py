@@ -11,19 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from limit_worlds import brute_force_mps, run_worlds
 
-from nav_adapter import AwarenessPolicy, RobotProfile, RobotState
-from nav_adapter._contact import contact_m, reach_at
+from nav_adapter import AwarenessPolicy, RobotProfile
+from nav_adapter.course import Course, contact_m, course_of, reach_at, starts_of
 from nav_adapter.limit import (
-    Course,
-    course_of,
-    courses_of,
     in_the_path_mps,
     limit_mps,
     passing_radius_m,
     stops_in_time,
-    straight_course_of,
 )
 from nav_adapter.reach import Reach
+from nav_adapter.rigid import Motion
 
 ROBOT = RobotProfile(
     footprint_m=[(0.36, 0.25), (0.36, -0.25), (-0.36, -0.25), (-0.36, 0.25)],
@@ -59,9 +56,8 @@ def state(
     heading: float = 0.0,
     left: float | None = None,
     place: tuple[float, float] = (0.0, 0.0),
-) -> RobotState:
-    velocity = None if left is None else np.array([speed, left])
-    return RobotState(0.0, np.array(place), heading, speed, yaw_rate, velocity)
+) -> Motion:
+    return Motion(*place, heading, speed, 0.0 if left is None else left, yaw_rate)
 
 
 def course(turn_deg: float = 30.0, age_s: float = 0.0, **motion: float) -> Course:
@@ -232,19 +228,18 @@ def test_a_robot_that_may_start_in_any_direction_counts_people_in_all() -> None:
         reaction_time_s=0.3,
         drive="holonomic",
     )
-    (at,) = courses_of(omni, state(0.0), 0.5)
+    at = starts_of(omni, state(0.0), 0.5)
     limits = [limit_mps(person((2.0, bearing)), at) for bearing in (0.0, 1.0, 2.5, math.pi)]
     assert limits == pytest.approx([limits[0]] * 4, abs=1e-6)
 
 
-def test_a_robot_that_stands_counts_people_ahead_and_behind() -> None:
-    forward, backward = courses_of(ROBOT, state(0.0), 0.5)
-    for bearing in (0.0, math.pi):
+def test_a_robot_that_stands_starts_forwards_or_asks_for_another_way() -> None:
+    forward, backward = course_of(ROBOT, state(0.0), 0.5), starts_of(ROBOT, state(0.0), 0.5)
+    for bearing, course in ((0.0, forward), (math.pi, backward)):
         close, far = person((1.2, bearing), top=0.0), person((4.0, bearing), top=0.0)
-        assert min(limit_mps(close, each) for each in (forward, backward)) < 0.8
-        assert min(limit_mps(far, each) for each in (forward, backward)) > 1.5
-    (moving,) = courses_of(ROBOT, state(0.1), 0.5)
-    assert limit_mps(person((1.2, math.pi), top=0.0), moving) == moving.maximum_mps
+        assert limit_mps(close, course) < 0.8
+        assert limit_mps(far, course) > 1.5
+        assert limit_mps(person((1.2, bearing + math.pi), top=0.0), course) == course.maximum_mps
 
 
 def test_a_curve_leads_to_people_beside_the_way() -> None:
@@ -308,7 +303,7 @@ def test_a_robot_drives_on_while_its_state_ages(
     speed_mps: float, faster_mps2: float, way_m: float
 ) -> None:
     robot, driving = replace(ROBOT, max_acceleration_mps2=faster_mps2), state(speed_mps)
-    now, later = (straight_course_of(robot, driving, age_s) for age_s in (0.0, 0.3))
+    now, later = (course_of(robot, driving, 0.0, age_s) for age_s in (0.0, 0.3))
     assert later.front_m - now.front_m == pytest.approx(way_m)
     assert later.radius_m - now.radius_m == pytest.approx(way_m)
     assert later.rear_m == now.rear_m
@@ -316,25 +311,23 @@ def test_a_robot_drives_on_while_its_state_ages(
 
 @pytest.mark.parametrize("gap_m", [0.05, 0.4, 1.1])
 def test_the_protective_field_is_the_stopping_distance(gap_m: float) -> None:
-    course = straight_course_of(SOFT, state(0.5))
-    front_m, half_m = course.front_m, course.half_m
-    limit = in_the_path_mps((front_m + gap_m + 0.35, 0.0), 0.25, 0.1, course)
+    course = course_of(replace(SOFT, drive="differential"), state(0.5), 0.0)
+    front_m, half_m, field = course.front_m, course.half_m, course.grown(0.1)
+    limit = in_the_path_mps((front_m + gap_m + 0.35, 0.0), 0.25, field)
     assert limit * 0.4 + limit**2 / (2.0 * 0.7) == pytest.approx(gap_m)
     # A body beside the middle is round, and one beside the field does not count.
     off_m = half_m + 0.1 + 0.15
-    assert in_the_path_mps((front_m + gap_m + 0.3, off_m), 0.25, 0.1, course) == pytest.approx(
-        limit
-    )
-    assert in_the_path_mps((front_m, half_m + 0.36), 0.25, 0.1, course) == course.maximum_mps
-    assert in_the_path_mps((course.rear_m - 0.26, 0.0), 0.25, 0.1, course) == course.maximum_mps
-    assert in_the_path_mps((course.rear_m - 0.24, 0.0), 0.25, 0.1, course) == 0.0
-    assert in_the_path_mps((math.nan, 0.0), 0.25, 0.1, course) == 0.0
+    assert in_the_path_mps((front_m + gap_m + 0.3, off_m), 0.25, field) == pytest.approx(limit)
+    assert in_the_path_mps((front_m, half_m + 0.36), 0.25, field) == course.maximum_mps
+    assert in_the_path_mps((course.rear_m - 0.26, 0.0), 0.25, field) == course.maximum_mps
+    assert in_the_path_mps((course.rear_m - 0.24, 0.0), 0.25, field) == 0.0
+    assert in_the_path_mps((math.nan, 0.0), 0.25, field) == 0.0
 
 
 @pytest.mark.parametrize("yaw_rate_radps", [0.3, -0.8, 2.0, 5.0])
 def test_a_footprint_that_turns_stays_within_the_course(yaw_rate_radps: float) -> None:
     robot = replace(ROBOT, drive="differential")
-    course = course_of(robot, RobotState(0.0, np.zeros(2), 0.0, 0.6, yaw_rate_radps), 0.0)
+    course = course_of(robot, state(0.6, yaw_rate_radps), 0.0)
     # The heading turns by up to half of the angle until the stop, off the chord.
     turned_rad = 0.5 * min(abs(yaw_rate_radps) * (0.3 + 0.5 * 0.6 / 1.0), math.pi)
     for angle in np.linspace(-turned_rad, turned_rad, 41):
@@ -345,7 +338,7 @@ def test_a_footprint_that_turns_stays_within_the_course(yaw_rate_radps: float) -
         assert np.abs(turned[:, 1]).max() <= course.half_m + 1e-9
     radius_m = robot.circumscribed_radius_m
     assert max(course.front_m, -course.rear_m, course.half_m) <= radius_m + 1e-9
-    straight = straight_course_of(robot, state(0.6))
+    straight = course_of(robot, state(0.6), 0.0)
     assert course.front_m <= straight.front_m + straight.half_m * math.sin(min(turned_rad, 1.5708))
 
 
@@ -354,7 +347,6 @@ def test_beside_the_passing_radius_stands_the_nearest_person_who_lets_the_robot_
     top_mps: float,
 ) -> None:
     rules = AwarenessPolicy().reach
-    assert rules is not None
     course = course_of(ROBOT, state(0.3), math.radians(rules.turn_deg))
 
     def lowest_mps(radius_m: float) -> float:

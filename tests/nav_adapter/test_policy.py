@@ -90,7 +90,9 @@ def test_a_file_that_sets_a_part_leaves_the_rest_at_its_defaults() -> None:
     assert policy.speed.human_speed_mps(0.0) == AwarenessPolicy().speed.human_speed_mps(0.0)
     assert policy.speed.human_speed_mps(1.0) == 0.5
     assert policy.reach == AwarenessPolicy().reach
-    assert AwarenessPolicy.model_validate({"reach": None}).reach is None
+    assert not AwarenessPolicy.model_validate({"without": ["reach"]}).applies("reach")
+    with pytest.raises(ValueError, match="in the path"):
+        AwarenessPolicy.model_validate({"without": ["in the path"]})
 
 
 def test_custom_policy_objects_are_accepted_but_not_written(tmp_path: Path) -> None:

@@ -10,12 +10,15 @@ import nav_scenes
 import numpy as np
 import pytest
 import yaml
+from nav_scenes import SCANNER
 from paths import ROOT
 
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
 from nav_adapter.reach import Reach
+from nav_adapter.rules import RULES, rules_of
 from perception.anthropometry import BODY_RADIUS_M
+from tools.docs_site.rules import PAGE, rules_list, with_rules
 
 TEXT = (ROOT / "docs" / "policies.md").read_text(encoding="utf-8")
 PRESETS = ["blind", "conservative", "balanced", "assertive"]
@@ -112,7 +115,6 @@ def reach(
     name: str, alpha: float, x_m: float = 0.0, y_m: float = 0.0, *, walks: float = 0.0
 ) -> Reach:
     policy = AwarenessPolicy.preset(name)
-    assert policy.reach is not None
     return Reach(
         *(x_m, y_m, walks, 0.0, policy.speed.human_speed_mps(alpha)),
         policy.reach.time_constant_s,
@@ -140,3 +142,14 @@ def test_an_aware_person_who_walks_may_stop_or_walk_on() -> None:
     assert walker.radius_m(2.0) == 0.0
     assert walker.walks_faster
     assert 1.2 * walker.walking_on().drift_s(2.0) == pytest.approx(2.4, abs=0.01)
+
+
+def test_the_safety_argument_lists_the_rules_of_the_code() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    assert page == with_rules(page)
+    assert [f"`{rule.name}`" for rule in RULES] == re.findall(
+        r"^- \*\*(`.*?`)\*\*", rules_list(), re.M
+    )
+    # Each rule of one person can be left out by its name, but for the floor.
+    left_out = AwarenessPolicy(without=SCANNER)
+    assert [rule.name for rule in rules_of(left_out)] == ["in the path"]

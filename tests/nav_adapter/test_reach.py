@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from paths import SHARED
 
 from nav_adapter import AwarenessPolicy
-from nav_adapter.reach import Reach, covariance_terms
+from nav_adapter.reach import Reach, Spread
 from perception.arrays import FloatArray
 
 SPEEDS = st.floats(0.0, 2.0)
@@ -76,7 +76,7 @@ def test_the_uncertainty_covers_place_and_velocity(seed: int, drift: float, sigm
     covariance = root @ root.T
     F = np.array([[1.0, 0.0, drift, 0.0], [0.0, 1.0, 0.0, drift]])
     largest = float(np.linalg.eigvalsh(F @ covariance @ F.T)[-1])
-    terms = covariance_terms(covariance.tolist(), sigmas)
+    terms = Spread.of(covariance.tolist()).terms(sigmas)
     found = person(variances=terms).uncertainty_m(drift)
     assert found >= sigmas * math.sqrt(largest) - 1e-9
     assert person(variances=terms).uncertainty_m(0.0) == pytest.approx(
@@ -108,7 +108,6 @@ def excess_m(policy: AwarenessPolicy) -> list[FloatArray]:
     """
     found: list[list[float]] = [[] for _ in TIMES_S]
     rules = policy.reach
-    assert rules is not None
     back, latest = round(STILL_S * FRAMES_PER_S), round(0.2 * FRAMES_PER_S)
     for stamps_s, places in walks():
         for row in range(back, len(stamps_s)):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_policies import STEPS_S, Walk, driven, histories, policies, robots
-from nav_scenes import crowds, finite, moved_person, moved_robot, numbers, robot_at
+from nav_scenes import SCANNER, crowds, finite, moved_person, moved_robot, numbers, robot_at
 from shapely.geometry import Point
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
@@ -74,7 +74,7 @@ def test_no_policy_is_looser_than_the_protective_field_alone(
     policy: AwarenessPolicy, robot: RobotProfile, walk: Walk
 ) -> None:
     """Not in the limit of any update, nor in any radius."""
-    field = policy.model_copy(update={"reach": None})
+    field = policy.model_copy(update={"without": SCANNER})
     _assert_ordered(run(policy, robot, walk), run(field, robot, walk))
 
 

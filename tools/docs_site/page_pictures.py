@@ -20,9 +20,11 @@ from scipy.sparse.csgraph import dijkstra
 from awarenav.drawing import awareness_colour
 from awarenav.figures import Axes, Circle, Figure, Image, Line2D, Patch, Polygon, new_figure
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
+from nav_adapter.course import Course, course_of
 from nav_adapter.exporters import CostmapPainter
-from nav_adapter.limit import Course, course_of, limit_mps
+from nav_adapter.limit import limit_mps
 from nav_adapter.reach import Reach
+from nav_adapter.rigid import Motion
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 from sim_tests.learning import CrossingEnv
@@ -53,9 +55,7 @@ _ROWS: Final = (("has not noticed", 0.0), ("has noticed", 1.0))
 def reach_figure() -> Figure:
     """Return a robot that brakes from its limit beside somebody, at three times, in two rows."""
     policy, robot = AwarenessPolicy.preset("balanced"), _robot()
-    assert policy.reach is not None
-    state = RobotState(0.0, np.zeros(2), 0.0, 1.0, 0.0)
-    course = course_of(robot, state, math.radians(policy.reach.turn_deg))
+    course = course_of(robot, Motion(0.0, 0.0, 0.0, 1.0), math.radians(policy.reach.turn_deg))
     figure = new_figure(_WIDTH_IN, 7.1)
     panels = figure.subplots(2, 3, sharex=True, sharey=True)
     for (title, alpha), row in zip(_ROWS, panels, strict=True):

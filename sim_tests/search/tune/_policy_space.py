@@ -125,7 +125,8 @@ class PolicySpace:
         """Return whether the policy has null for a part that holds the dotted key."""
         parts = place.split(".")
         above = (".".join(parts[:depth]) for depth in range(1, len(parts)))
-        return any(part in self._base and self._base[part] is None for part in above)
+        without = self._base["without"]
+        return any(self._base.get(part, part) is None or part in without for part in above)
 
 
 def shipped_ranges() -> dict[str, PolicyRange]:
