@@ -225,9 +225,9 @@ class Conditions:
     )
     planner: str = _axis(
         "Name of the planner.",
-        help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', or a "
-        "class of your own, which gets the robot's profile, and static_boxes_odom_m if it "
-        "accepts it.",
+        help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', 'ros2' "
+        "(a stack outside, such as your Nav2), or a class of your own, which gets the robot's "
+        "profile, and static_boxes_odom_m if it accepts it.",
         default=REFERENCE_PLANNER,
         metavar="MODULE:CLASS",
         callback=_without_reference,

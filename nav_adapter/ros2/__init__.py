@@ -23,7 +23,7 @@ from ._robot_file import CameraMount, RobotFile, ScannerMount
 from ._scan_input import ScannerInput, scanner_inputs
 from ._scans import ScanMessages, laser_scan_of, map_cells_of
 from ._speed_limit import SLOWEST_MPS, speed_limit
-from ._speed_mask import SpeedMaskSettings, speed_mask
+from ._speed_mask import SpeedMaskSettings, SpeedMaskStream, speed_mask
 from ._threads import PerceptionThread, ScanThread
 from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, is_rectified, renamed
 from ._transforms import TransformBuffer
@@ -52,6 +52,7 @@ __all__ = [
     "ScannerInput",
     "ScannerMount",
     "SpeedMaskSettings",
+    "SpeedMaskStream",
     "Topic",
     "TransformBuffer",
     "alerts",

@@ -119,6 +119,10 @@ class DdsNode:
         """Return the number of matched subscribers."""
         return len(self._writers[topic.name][1].get_matched_subscriptions())
 
+    def publishers_of(self, topic: Topic) -> int:
+        """Return the number of matched publishers."""
+        return len(self._readers[topic.name][1].get_matched_publications())
+
     def has_unfit_publisher(self, topic: Topic) -> bool:
         """Return whether a publisher was found whose quality of service lets nothing through."""
         status = self._readers[topic.name][1].get_requested_incompatible_qos_status()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -28,7 +28,7 @@ from ._separations import Separations
 from ._stage import Stage
 from .eyes import KeypointNoise
 from .faults import Fault
-from .planner import LocalPlanner, import_planner, seeded_generators
+from .planner import LocalPlanner, SeatedPlanner, import_planner, seeded_generators
 
 Observer = Callable[[CrossingFrame, Stage], None]
 
@@ -240,7 +240,10 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
     driver = setup.driver()
     frames: list[CrossingFrame] = []
     reached_s: float | None = None
-    with Crossing(setup) as crossing:
+    with Crossing(setup) as crossing, ExitStack() as seat:
+        clocked = driver if isinstance(driver, SeatedPlanner) else None
+        if clocked is not None:
+            seat.enter_context(clocked.seated(crossing.stage))
         while not crossing.time_is_up:
             now = crossing.sense()
             asked_s = process_time()
@@ -252,8 +255,15 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
                 driver, returned, now.t_s, sideways=crossing.robot.drive == "holonomic"
             )
             crossing.command(speed, yaw_rate, lateral)
-            command = speed, yaw_rate
-            frames.append(replace(now, command=command, lateral_command_mps=lateral, plan_s=plan_s))
+            frames.append(
+                replace(
+                    now,
+                    command=(speed, yaw_rate),
+                    lateral_command_mps=lateral,
+                    plan_s=plan_s,
+                    late_s=None if clocked is None else clocked.late_s,
+                )
+            )
             if observer is not None:
                 observer(frames[-1], crossing.stage)
             if now.at_goal:

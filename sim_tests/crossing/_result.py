@@ -45,6 +45,8 @@ class CrossingFrame:
             computer changes it little. Waiting for another process does not count. It is the only
             field that differs when the same episode is run again.
         lateral_command_mps: commanded speed to the left, of a robot that can move sideways.
+        late_s: how much later than its time the cycle began, seconds on the clock of the computer;
+            None but for a planner that drives in real time.
     """
 
     t_s: float
@@ -62,6 +64,7 @@ class CrossingFrame:
     scan_points_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     plan_s: float = 0.0
     lateral_command_mps: float = 0.0
+    late_s: float | None = None
 
     __repr__ = short_repr
 

@@ -54,6 +54,14 @@ class Pose(Message):
 
 
 @dataclass(frozen=True)
+class PoseStamped(Message):
+    """A pose with time and frame."""
+
+    header: Header = Header()
+    pose: Pose = Pose()
+
+
+@dataclass(frozen=True)
 class PoseWithCovariance(Message):
     """A pose with covariance, row by row over x, y, z and rotations about X, Y, Z."""
 
@@ -67,6 +75,14 @@ class Twist(Message):
 
     linear: Vector3 = Vector3()
     angular: Vector3 = Vector3()
+
+
+@dataclass(frozen=True)
+class TwistStamped(Message):
+    """A velocity with time and frame."""
+
+    header: Header = Header()
+    twist: Twist = Twist()
 
 
 @dataclass(frozen=True)

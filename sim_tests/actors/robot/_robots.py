@@ -340,8 +340,6 @@ class KinematicRobot(Robot):
         position_odom_m: (2,) start of the base origin.
         heading_odom_rad: heading at the start, counter-clockwise from odom x.
 
-    Attributes:
-
     Raises:
         SimError: for a position or heading that is not finite.
     """

@@ -15,4 +15,4 @@ from ._messages import (
     WorkerObservations,
 )
 from ._pixel_eyes import PIXEL_RATE_HZ, PixelEyes, match_to_workers, pixel_timing
-from ._scanner_eyes import ScannerEyes, motion_of, scanner_sensors
+from ._scanner_eyes import ScannerEyes, hall_grid, motion_of, scanner_sensors

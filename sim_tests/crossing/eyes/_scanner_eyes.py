@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from nav_adapter import RobotState
 from perception.arrays import FloatArray
@@ -186,6 +187,11 @@ def _motion(T_odom_base: FloatArray, state: RobotState) -> RobotMotion:
 
 def map_of(warehouse: Warehouse) -> StaticMap:
     """Return the map of a robot that knows the boxes of its hall."""
+    return StaticMap(*hall_grid(warehouse))
+
+
+def hall_grid(warehouse: Warehouse) -> tuple[NDArray[np.bool_], FloatArray, float]:
+    """Return the cells (H, W) that boxes of the hall occupy, their corner (2,), and their side."""
     boxes = warehouse.obstacle_boxes_odom
     low = boxes[:, :2].min(axis=0) - 1.0
     columns, rows = (
@@ -196,4 +202,4 @@ def map_of(warehouse: Warehouse) -> StaticMap:
         first = np.floor((box[:2] - low) / _MAP_RESOLUTION_M).astype(int)
         last = np.ceil((box[2:] - low) / _MAP_RESOLUTION_M).astype(int)
         occupied[first[1] : last[1], first[0] : last[0]] = True
-    return StaticMap(occupied, low, _MAP_RESOLUTION_M)
+    return occupied, low, _MAP_RESOLUTION_M

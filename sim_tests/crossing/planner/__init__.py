@@ -5,11 +5,12 @@ from __future__ import annotations
 from ._choice import (
     KNOWN_PLANNERS,
     import_planner,
+    is_outside,
     make_planner,
     planner_label,
     refuse_unusable_planner,
     seeded_generators,
 )
 from ._config import PlannerConfig
-from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
+from ._local_planner import CostmapPlanner, LocalPlanner, SeatedPlanner, StraightOn
 from ._sampling_planner import SamplingPlanner

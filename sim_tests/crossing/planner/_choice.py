@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from nav_adapter import RobotProfile
+from perception.arrays import FloatArray
 
 from ...conditions import REFERENCE_PLANNER
 from ...scenario import Scenario
@@ -55,10 +56,24 @@ def straight_to_goal(robot: RobotProfile) -> StraightOn:
     return StraightOn(robot.max_speed_mps, stops_at_goal=True)
 
 
+def ros2_stack(
+    robot: RobotProfile, reference_path_odom_m: FloatArray, seed: int = 0, **settings: Any
+) -> LocalPlanner:
+    """Return a seat for a ROS 2 stack outside, such as your Nav2, which drives in real time."""
+    from .ros2 import Ros2Planner  # noqa: PLC0415 - needs the extra ros2
+
+    return Ros2Planner(robot, reference_path_odom_m, seed, **settings)
+
+
 #: Planners that have a name without a module, beside the reference planner.
 KNOWN_PLANNERS: Final[Mapping[str, Callable[..., LocalPlanner]]] = MappingProxyType(
-    {"costmap": CostmapPlanner, "straight_on": straight_to_goal}
+    {"costmap": CostmapPlanner, "straight_on": straight_to_goal, "ros2": ros2_stack}
 )
+
+
+def is_outside(planner: str) -> bool:
+    """Return whether a planner is a stack outside: one episode at a time, never quite the same."""
+    return KNOWN_PLANNERS.get(planner.partition("(")[0]) is ros2_stack
 
 
 @contextlib.contextmanager
@@ -211,9 +226,10 @@ def import_planner(planner: str) -> PlannerFactory:
     Raises:
         SimError: it cannot be imported, or is neither a class nor a function nor a planner.
     """
-    if planner in KNOWN_PLANNERS:
-        return PlannerFactory(KNOWN_PLANNERS[planner], inspect.signature(KNOWN_PLANNERS[planner]))
     target, settings = _split_settings(planner)
+    if target in KNOWN_PLANNERS:
+        known = KNOWN_PLANNERS[target]
+        return PlannerFactory(known, inspect.signature(known), settings)
     module_name, colon, name = target.partition(":")
     if not (colon and module_name and name):
         raise SimError(

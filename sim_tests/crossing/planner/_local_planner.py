@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,9 @@ from perception.arrays import FloatArray
 
 from ._config import PlannerConfig
 from ._sampling_planner import SamplingPlanner
+
+if TYPE_CHECKING:
+    from .._stage import Stage
 
 # A planner that stops at the goal brakes at this rate, and stands this near to it.
 _GENTLE_MPS2: Final = 0.5
@@ -44,6 +48,21 @@ class LocalPlanner(Protocol):
         For a robot that can move sideways it may return ``(forward_mps, left_mps,
         yaw_rate_radps)``.
         """
+        ...
+
+
+@runtime_checkable
+class SeatedPlanner(LocalPlanner, Protocol):
+    """A planner that sees the crossing with sensors of its own, and drives in real time.
+
+    Attributes:
+        late_s: how much later than its time the last control cycle began.
+    """
+
+    late_s: float
+
+    def seated(self, stage: Stage) -> AbstractContextManager[None]:
+        """Return the time in which it has the robot of a stage."""
         ...
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -228,3 +228,8 @@ def _largest_excess(
             excess_mps = speeds_mps[after] - allowed_mps
             largest = excess_mps if largest is None else max(largest, excess_mps)
     return largest
+
+
+def late_s(frames: Iterable[CrossingFrame]) -> list[float]:
+    """Return how late each control cycle in real time began; empty without a stack outside."""
+    return [each.late_s for each in frames if each.late_s is not None]

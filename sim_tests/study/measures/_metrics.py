@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 #: Far edges of the intimate and the personal zone (E. T. Hall, The Hidden Dimension, 1966).
 INTIMATE_M: Final = 0.45
 PERSONAL_M: Final = 1.2
+#: A control cycle in real time that begins later than this is late.
+LATE_S: Final = 0.01
 # By what a measure returns, and what an episode without a log has.
 _KINDS: Final[dict[str, Kind]] = {
     "str": "text",
@@ -481,3 +483,16 @@ def asked_twice(log: Log) -> int:
 def requests_after_answer(log: Log) -> int:
     """Requests to a track that had answered before; there should be none."""
     return log.requests.after_answer
+
+
+@column
+def late_share(log: Log) -> float | None:
+    """Share of control cycles that began over 10 ms late, with a stack outside in real time."""
+    late_s = _driving.late_s(log.result.frames)
+    return sum(each > LATE_S for each in late_s) / len(late_s) if late_s else None
+
+
+@column
+def late_worst_s(log: Log) -> float | None:
+    """The latest beginning of a control cycle, with a stack outside in real time."""
+    return max(_driving.late_s(log.result.frames), default=None)

@@ -15,6 +15,9 @@ from ._registry import RATIOS
 from ._statistics import NOTHING, Interval, number_text, percent
 from ._summary import UNCONFIRMED, Comparison, Summary, SummaryRow
 
+# Share of late cycles up to which a computer keeps up.
+_KEPT_UP = 0.01
+
 _Row = TypeVar("_Row", Comparison, SummaryRow)
 
 
@@ -238,7 +241,11 @@ def _notes(summary: Summary) -> list[str]:
 
 
 def nondeterminism_notes(records: Iterable[EpisodeRecord]) -> tuple[str, ...]:
-    """Return one sentence about each planner that is not deterministic in some episode."""
+    """Return one sentence about each planner that is not deterministic in some episode.
+
+    And one about each in real time whose computer did not keep up.
+    """
+    records = tuple(records)
     by_planner: dict[str, list[bool]] = {}
     for record in records:
         if not record.error:  # an episode that broke off says nothing
@@ -247,6 +254,23 @@ def nondeterminism_notes(records: Iterable[EpisodeRecord]) -> tuple[str, ...]:
         nondeterminism_note(planner, sum(flags), len(flags))
         for planner, flags in sorted(by_planner.items())
         if any(flags)
+    ) + tuple(
+        _lateness_note(planner, [each for each in records if each.planner == planner])
+        for planner in sorted({each.planner for each in records if _is_behind(each)})
+    )
+
+
+def _is_behind(record: EpisodeRecord) -> bool:
+    return (record.late_share or 0.0) > _KEPT_UP
+
+
+def _lateness_note(planner: str, records: Sequence[EpisodeRecord]) -> str:
+    behind = [each for each in records if _is_behind(each)]
+    return (
+        f"{planner}: {_of(len(behind), len(records))} could not keep up with the clock: over "
+        f"{100.0 * _KEPT_UP:g} % of the cycles began more than 10 ms late (at worst "
+        f"{max(each.late_worst_s for each in behind):.2f} s). Give the computer less to do, or the "
+        "planner a lower pace."
     )
 
 
@@ -254,8 +278,8 @@ def nondeterminism_note(label: str, differing: int, episodes: int) -> str:
     """Return the sentence about a planner, or about a policy and its planner."""
     return (
         f"{label}: the planner is not deterministic. In {_of(differing, episodes)} it drove the "
-        "task without people differently the second time, with the same seed; such rows may "
-        "differ when they are run again."
+        "task without people differently the second time, with the same seed, or is a stack "
+        "outside; such rows may differ when they are run again."
     )
 
 

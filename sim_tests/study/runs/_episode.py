@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from ...crossing import CrossingResult, Observer, Setup, drive
+from ...crossing.planner import is_outside
 from ...scenario import Scenario
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, measure, path_length_m
@@ -196,12 +197,15 @@ def died(job: Job, reason: str) -> Attempt:
 def _free_run(task: str, planner: str) -> FreeRun:
     """Return the figures of a task without people: JSON of a :class:`Scenario`.
 
-    A planner of the user's drives it twice, and both must give the same commands in every cycle.
+    A planner of the user's drives it twice, and both must give the same commands in every cycle. A
+    stack outside never does, and drives it once.
     """
     scenario = Scenario.model_validate_json(task)
     setup = Setup.of(scenario, policy=_FREE_POLICY, planner=planner, seed=_FREE_SEED)
     first = drive(setup)
-    repeats = not planner or _commands(first) == _commands(drive(setup))
+    repeats = not planner or (
+        not is_outside(planner) and _commands(first) == _commands(drive(setup))
+    )
     if first.time_to_goal_s is None:
         return FreeRun(None, None, repeats)
     path_m = np.array([frame.robot_state.position_odom_m for frame in first.frames])

@@ -23,6 +23,7 @@ from awarenav.files import write_text
 from perception.arrays import finite_number
 from perception.documents import parse_yaml
 
+from ...crossing.planner import is_outside
 from ...world.bullet import require_pybullet
 from ...world.errors import SimError
 from ..measures import EpisodeRecord, write_records
@@ -96,6 +97,13 @@ def run_jobs(
         limit_s = finite_number("time_limit_s", time_limit_s, SimError, minimum=1.0)
         if scheduler is not None:
             raise SimError("a time limit works in processes of this computer, not on a cluster")
+    if any(is_outside(job.planner_text) for job in jobs):
+        if scheduler is not None or workers not in (None, 1):
+            raise SimError(
+                "a stack outside drives one robot, so that its episodes run one after the other: "
+                "give 1 worker and no scheduler"
+            )
+        workers = 1
     needed = versions()
     if scheduler is None:
         require_pybullet()

@@ -1,0 +1,140 @@
+"""The command ``python -m benchmarks.nav2``: crossings under Nav2, controller by controller."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Final
+
+from awarenav.errors import AwarenavError
+from benchmarks._harness import count, make_parser
+from sim_tests.crossing.planner.ros2 import python_with_ros
+from sim_tests.study.measures import EpisodeRecord, read_records, write_records
+from sim_tests.study.runs import RunFiles, plan_jobs, run_jobs
+from sim_tests.world.errors import SimError
+
+from .parameters import CONTROLLERS, FACES
+
+_TIME_LIMIT_S: Final = 300.0
+
+
+@contextlib.contextmanager
+def nav2(controller: str, face: str, log: Path, *, bare: bool) -> Iterator[None]:
+    """Have a Nav2 in the domain of this process until the block ends; it goes on by itself."""
+    words = [python_with_ros(), "-m", "benchmarks.nav2.launch", controller, "--face", face]
+    words += ["--log", str(log), *(["--bare"] if bare else [])]
+    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True)
+    try:
+        time.sleep(1.0)
+        if process.poll() is not None:
+            raise SimError(f"Nav2 did not start; see above, and {log}")
+        yield
+    finally:
+        process.terminate()
+        try:
+            process.wait(15.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+
+
+def measure(
+    out: Path,
+    controller: str,
+    face: str,
+    *,
+    scenarios: Sequence[str],
+    seeds: int,
+    policies: Sequence[str],
+    perception: str,
+    settings: str,
+    bare: bool,
+) -> None:
+    """Run the missing crossings of a controller with a face, in a folder of their own."""
+    alone = ", limit='nobody'" if face == "today" else ""
+    jobs = plan_jobs(
+        scenarios,
+        # Alone, no policy reaches the stack; the measures are those of one.
+        policies if face != "today" else ["balanced"],
+        range(seeds),
+        planners=[f"ros2(goal='follow_path'{alone}{settings})"],
+        perception=perception.removesuffix("+scanner"),
+        sensors=["camera+scanner" if perception.endswith("+scanner") else "camera"],
+    )
+    folder = out / f"{controller}_{face}{'_bare' if bare else ''}"
+    files = RunFiles(folder)
+    with contextlib.suppress(AwarenavError, OSError):
+        if len(read_records(files.episodes)) == len(jobs):
+            return
+    with nav2(controller, face, out / f"{folder.name}.log", bare=bare):
+        run_jobs(
+            jobs,
+            folder,
+            workers=1,
+            time_limit_s=_TIME_LIMIT_S,
+            resume=files.jobs.exists(),
+            progress=True,
+        )
+
+
+def collect(out: Path) -> Path:
+    """Write the rows of all folders as one table, whose planners are controllers and faces."""
+    rows = []
+    for path in sorted(out.glob("*/episodes.csv")):
+        controller, _, face = path.parent.name.partition("_")
+        for record in read_records(path):
+            values = {each.name: getattr(record, each.name) for each in fields(record)}
+            rows.append(EpisodeRecord(**{**values, "planner": f"{controller}, {face}"}))
+    table = out / "rows.csv"
+    write_records(table, rows)
+    return table
+
+
+def main() -> int:
+    """Run the command; return 2 for bad input."""
+    parser = make_parser(
+        "benchmarks.nav2",
+        "Drive crossings with a Nav2 that is started here, in real time. Source a ROS environment "
+        "first. An interrupted run continues with the same command.",
+    )
+    parser.add_argument("--controller", nargs="+", choices=CONTROLLERS, default=list(CONTROLLERS))
+    parser.add_argument("--face", nargs="+", choices=FACES, default=list(FACES))
+    parser.add_argument("--scenario", nargs="+", default=["all"], metavar="NAME")
+    parser.add_argument("--policy", nargs="+", default=["balanced", "blind"], metavar="NAME")
+    parser.add_argument("--seeds", type=count, default=3, metavar="N")
+    parser.add_argument("--perception", default="truth", metavar="NAME")
+    parser.add_argument("--settings", default="", help="of the planner, such as ', pace=2'")
+    parser.add_argument("--bare", action="store_true", help="no smoother, no collision monitor")
+    parser.add_argument("--domain", default="77", help="ROS_DOMAIN_ID")
+    parser.add_argument("--out", type=Path, default=Path("runs/nav2"), metavar="FOLDER")
+    options = parser.parse_args()
+    os.environ["ROS_DOMAIN_ID"] = options.domain
+    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        for controller in options.controller:
+            for face in options.face:
+                measure(
+                    options.out,
+                    controller,
+                    face,
+                    scenarios=options.scenario,
+                    seeds=options.seeds,
+                    policies=options.policy,
+                    perception=options.perception,
+                    settings=options.settings,
+                    bare=options.bare,
+                )
+                print(f"written: {collect(options.out)}")
+    except AwarenavError as error:
+        print(f"nav2: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
