@@ -355,12 +355,7 @@ def changed_scenario(scenario: _ScenarioT, values: Mapping[str, Any]) -> _Scenar
 
 
 def refuse_unused_networks(values: Mapping[str, Any], kind: str) -> None:
-    """Raise SimError if there are networks among the values of axes, and no pictures for them.
-
-    Args:
-        values: by the name of the axis.
-        kind: of :class:`Perception`.
-    """
+    """Raise SimError if there are networks among the values of axes, and no pictures for them."""
     if values.get("networks") and kind != "pixels":
         raise SimError(
             f"networks see pictures: they need perception 'pixels', got {kind or _SCANNER!r}"
@@ -467,9 +462,6 @@ class Experiment:
 
         Without those that are None or empty. Commands differ in their usual sensors: these are
         always said.
-
-        Args:
-            more: further values, by the names of their options.
         """
         found = {**self.values, "sensors": self["sensors"], "episodes": self.episodes, **more}
         if "planner" in found:

@@ -29,9 +29,8 @@ from ..actors.robot import Amr, KinematicRobot, RobotLook, robot_of
 from ..scenario import Scenario
 from ..world import Warehouse
 from ..world.render import RendererName
-from ._audience import Audience
+from ._audience import Audience, RobotSight, near_robot
 from ._people import staged_people
-from ._robot_sight import RobotSight, near_robot
 from ._separations import AWAY, STANDING_SPEED_MPS, Approach, ContactEvent, Separations, moves
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.

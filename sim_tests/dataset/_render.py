@@ -124,14 +124,6 @@ def render(
     moves into ``truth.jsonl``. ``camera.yaml`` is ROS camera_info, ``render.yaml`` holds the
     settings, and ``contact_sheet.png`` shows a sample with the true boxes.
 
-    Args:
-        config: settings of the set.
-        out: folder, made when missing.
-        processes: number of processes; None for one per processor.
-        resume: accept a finished set as well, and require a set to continue.
-        overwrite: remove the set in the folder first.
-        progress: show a progress bar on standard error.
-
     Returns:
         Path of the truth file.
 

@@ -41,15 +41,7 @@ def frame_truth(
     view: RenderedView,
     workers: Sequence[Worker],
 ) -> list[Record]:
-    """Return one record per worker who is visible in ``view``.
-
-    Args:
-        renderer: draws each worker alone, to measure how much of them is hidden.
-        camera: camera of the image.
-        T_odom_camera: (4, 4) pose of the camera.
-        view: the rendered image.
-        workers: all workers of the warehouse.
-    """
+    """Return one record per worker who is visible in ``view``."""
     people = []
     for index, worker in enumerate(workers):
         mask = view.actors == worker.actor

@@ -17,9 +17,8 @@ from ..crossing import CrossingResult
 from ..world.bullet import require_pybullet
 from ..world.errors import SimError
 from ._camera_film import CameraRecorder
-from ._comparison import ComparisonRow
 from ._encounter import case_values, encounter_table, run_encounter
-from ._film import write_crossing_film
+from ._film import ComparisonRow, write_crossing_film
 from ._lanes import (
     LANES,
     REPORTED,

@@ -26,8 +26,8 @@ from perception import AttentionCone
 from perception.arrays import FloatArray, ImageRgb
 
 from ..crossing import STANDING_SPEED_MPS, CrossingFrame, CrossingResult, RequestMemory
+from ..scenario import Scenario
 from ._camera_film import CAMERA_PX, PICTURE_S, CameraPicture
-from ._comparison import WITHOUT_AWARENESS, ComparisonRow, time_lost_s
 
 #: Pictures per second: the film runs at twice the real speed.
 FILM_HZ: Final = 10
@@ -67,6 +67,9 @@ _LEGEND: Final = (
     ("ring", awareness_colour(0.0), "kept free by the planner"),
 )
 
+#: Policies that ignore awareness: α says nothing about what the robot does.
+WITHOUT_AWARENESS: Final = ("blind", "scanner")
+
 #: Rows of the comparison that the film shows, and the title of each lane.
 LANES: Final[dict[str, str]] = {
     "today's AMR": "Today’s AMR",
@@ -76,15 +79,25 @@ LANES: Final[dict[str, str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
-    """The moment at which a moving robot comes nearest to a person.
+class ComparisonRow:
+    """One row of the comparison."""
 
-    Attributes:
-        t_s: time.
-        distance_m: between their surfaces; 0 for a touch.
-        speed_mps: of the robot.
-        hit: the robot touched the person by its own motion.
-    """
+    label: str
+    result: CrossingResult
+    scenario: Scenario
+    pictures: tuple[CameraPicture, ...] = ()
+
+
+def time_lost_s(result: CrossingResult, free: CrossingResult) -> float | None:
+    """Return how much later a robot arrives than with nobody there; None if one never arrives."""
+    if result.time_to_goal_s is None or free.time_to_goal_s is None:
+        return None
+    return result.time_to_goal_s - free.time_to_goal_s
+
+
+@dataclass(frozen=True, slots=True)
+class Passage:
+    """The moment at which a moving robot comes nearest to a person."""
 
     t_s: float
     distance_m: float
@@ -244,11 +257,8 @@ def draw_map(row: ComparisonRow, t_s: float | None) -> ImageRgb:
 
     Shows racks, people with their attention cones in the colour of their awareness, each obstacle
     as its circle in the colour of the bound that the robot uses (grey: it uses none), the robot
-    with the way it has come, and requests to look.
-
-    Args:
-        row: the crossing.
-        t_s: the time; None draws each person at the moment at which the robot is nearest to them.
+    with the way it has come, and requests to look. Without a time each person is drawn at the
+    moment at which the robot is nearest to them.
 
     Returns:
         An (H, W, 3) RGB image.
@@ -294,12 +304,7 @@ def _draw_circle(
 
 @dataclass(frozen=True, slots=True)
 class MapScale:
-    """Map of the hall: from odom to pixels, with x to the right and y up.
-
-    Attributes:
-        px_per_m: scale.
-        centre_odom_m: (2,) place in the middle of the map.
-    """
+    """Map of the hall: from odom to pixels, with x to the right and y up."""
 
     px_per_m: float
     centre_odom_m: FloatArray

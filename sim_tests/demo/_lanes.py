@@ -40,15 +40,7 @@ _BESIDE_M: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """A robot of the comparison.
-
-    Attributes:
-        name: in files.
-        label: in tables.
-        policy: as for ``awarenav crossings``.
-        planner: likewise; empty for the reference planner.
-        sensors: likewise.
-    """
+    """A robot of the comparison."""
 
     name: str
     label: str

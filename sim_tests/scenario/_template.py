@@ -166,9 +166,6 @@ class ScenarioTemplate:
     def with_robot(self, robot: RobotModel | RobotProfile | str | Path) -> ScenarioTemplate:
         """Return the same scenario fitted to another robot.
 
-        Args:
-            robot: as for :func:`scenario_for_robot`; empty for the scenario's own.
-
         Raises:
             SimError: for an unknown robot, and a scenario that has another robot already.
         """
@@ -185,10 +182,6 @@ class ScenarioTemplate:
     def with_camera(self, name: str) -> ScenarioTemplate:
         """Return the same scenario with another camera on the robot.
 
-        Args:
-            name: a shipped camera (``"forward"``, ``"surround"``), or a YAML file with the keys of
-                :class:`CameraSpec`; empty for the scenario's own.
-
         Raises:
             SimError: for other names, and for a camera that is not valid.
         """
@@ -199,10 +192,6 @@ class ScenarioTemplate:
     def with_networks(self, path: str | Path) -> ScenarioTemplate:
         """Return the same scenario with other networks for the pictures of its camera.
 
-        Args:
-            path: a YAML file as for ``--networks`` of ``awarenav estimate``; empty for the
-                scenario's own.
-
         Raises:
             SimError: for a file that cannot be read, and networks that cannot be loaded.
         """
@@ -212,9 +201,6 @@ class ScenarioTemplate:
 
     def with_population(self, text: str) -> ScenarioTemplate:
         """Return the same scenario among people with other habits.
-
-        Args:
-            text: as for :meth:`Scenario.with_population`; empty for the scenario's own.
 
         Raises:
             SimError: for an unknown population or number.

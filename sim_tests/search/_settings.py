@@ -98,15 +98,6 @@ def write_or_check_settings(
 ) -> None:
     """Write the settings of a new search, or check that a resumed search has the same.
 
-    Args:
-        settings: of the search.
-        path: the file; its folder is made when missing.
-        search: name of the search in messages: ``"tuning"`` or ``"falsification"``.
-        resume: continue the search in the folder.
-        overwrite: remove the search in the folder first.
-        results: patterns of the result files of the search, which ``overwrite`` removes.
-        may_grow: fields that may be larger than in the file.
-
     Raises:
         SimError: the folder holds a search and neither ``resume`` nor ``overwrite`` is True, it
             holds none and ``resume`` is True, it holds results of something else, the settings

@@ -50,11 +50,6 @@ class Stop:
 class Route:
     """A line of straight pieces to walk along.
 
-    Args:
-        points: corners (x, y) in odom, at least one.
-        stops: stops on the way, in order.
-        end_heading_rad: heading at the end; None for any.
-
     Attributes:
         length_m: length of the whole route.
         stops: the given stops, then the end.

@@ -110,14 +110,7 @@ class AttentionSpan:
         self._robot: tuple[RobotBody, float] | None = None  # as last known, and its time
 
     def sees(self, t_s: float, noticed_s: float | None, touched: bool, visible: bool) -> bool:
-        """Update the attention; return whether the person may look at the robot.
-
-        Args:
-            t_s: now.
-            noticed_s: time of the first look at the robot; None before.
-            touched: whether the robot has touched the person, who then remembers it.
-            visible: whether the robot is in the field of view with a free line of sight.
-        """
+        """Update the attention; return whether the person may look at the robot."""
         if self._lapse is None or noticed_s is None:
             return visible
         over = t_s - noticed_s >= self._lapse.after_look_s - 1e-9

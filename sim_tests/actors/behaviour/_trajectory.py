@@ -164,13 +164,7 @@ class Feet:
     ) -> GaitPose:
         """Return the pose of the feet under a body that has moved on.
 
-        Args:
-            t_s: now.
-            place: x, y and heading of the body.
-            velocity_mps: of the body.
-            acceleration_mps2: of the body.
-            turning_radps: of the body; None is that since the last call.
-            slide: the body was bumped, and the feet are shifted with it.
+        Its turning is that since the last call unless given. ``slide`` shifts the feet with it.
         """
         dt_s, before = t_s - self._now_s, self._place
         self._now_s, self._place, self._place_before = t_s, place, before

@@ -169,10 +169,6 @@ class Skeleton:
 def skeleton(look: str | None, stature_m: float) -> Skeleton:
     """Return the bones of the worker called ``look``, scaled to a stature.
 
-    Args:
-        look: name of a shipped worker; None takes the one of nearest stature.
-        stature_m: standing height with shoes.
-
     Raises:
         SimError: for a look that is not shipped, or a stature outside [1.0, 2.1] m.
     """

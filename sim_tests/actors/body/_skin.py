@@ -310,12 +310,7 @@ _HELD_REACH_M: Final = 0.5 * float(np.linalg.norm(BOX_SIZE_M))
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """A seat, which stands on the floor.
-
-    Attributes:
-        kind: a stool with four legs, or a closed box, which hides the legs behind it.
-        size_m: depth, width and height.
-    """
+    """A seat, which stands on the floor."""
 
     kind: SeatKind
     size_m: Vector

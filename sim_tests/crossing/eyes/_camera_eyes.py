@@ -66,14 +66,7 @@ class MapView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exposure:
-    """The instant at which an image is taken.
-
-    Attributes:
-        stamp_s: time.
-        T_odom_camera: (4, 4) true pose of the camera.
-        T_odom_camera_known: (4, 4) the pose that the robot takes it to have.
-        truth: the truth about each person.
-    """
+    """The instant at which an image is taken."""
 
     stamp_s: float
     T_odom_camera: FloatArray

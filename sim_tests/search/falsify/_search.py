@@ -160,10 +160,7 @@ class Falsification:
 class Budget:
     """The episodes of a falsification, in whole generations.
 
-    Attributes:
-        first: episodes in every scenario.
-        total_if_worst: episodes in each of the worst scenarios, the first ones included.
-        worst: number of the worst scenarios.
+    ``total_if_worst`` is that of each of the ``worst`` scenarios, its ``first`` ones included.
     """
 
     first: int
@@ -325,16 +322,8 @@ def search(
 ) -> list[SearchedEpisode]:
     """Search one scenario for the smallest score, or continue, up to a number of episodes.
 
-    Args:
-        name: name of the scenario.
-        ranges: ranges of the parameters.
-        neutral: values of the scenario as written, where the first round starts; later rounds start
-            at points drawn from the seed.
-        evaluate: returns the outcomes of trials, given their parameters by number.
-        folder: folder of the search; every round has a study in it.
-        seed: seed of the search.
-        generation: episodes per generation.
-        total: a multiple of the generation.
+    The first round starts at ``neutral``, the scenario as written; later ones at points drawn from
+    the seed. Each has a study in the folder. ``total`` is a multiple of the generation.
 
     Returns:
         All episodes so far, in the order in which they were proposed.

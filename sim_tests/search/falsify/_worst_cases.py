@@ -41,15 +41,7 @@ _ARROW_M: Final = 0.7
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstCase:
-    """One of the worst cases.
-
-    Attributes:
-        episode: the episode of the search.
-        path: the file of its scenario.
-        scenario: the scenario, as read from the file.
-        result: the crossing, run from the file.
-        record: the record of that crossing.
-    """
+    """One of the worst cases."""
 
     episode: SearchedEpisode
     path: Path

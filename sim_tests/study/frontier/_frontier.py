@@ -140,15 +140,7 @@ class Worth:
 
 @dataclass(frozen=True, slots=True)
 class Frontier:
-    """The frontier of a run.
-
-    Attributes:
-        points: today's AMR, the family, then other policies of the run.
-        worth: one row per policy with awareness.
-        free_s: mean time to the goal without people.
-        episodes: number of episodes of each policy.
-        scenarios: number of scenarios.
-    """
+    """The frontier of a run."""
 
     points: tuple[Point, ...]
     worth: tuple[Worth, ...]

@@ -170,14 +170,6 @@ def bootstrap_interval(
     """Return the mean of (N,) values with its bootstrap interval; with ``over``, a ratio of sums.
 
     :func:`ratio_intervals` describes the method and the other arguments.
-
-    Args:
-        values: (N,) finite.
-        rng: draws the resamples.
-        level: confidence of the interval.
-        over: (N,) finite denominators; None for the mean.
-        strata: a label for each value.
-        resamples: number of resamples.
     """
     top = finite_array("values", values, ("N",), SimError)
     bottom = np.ones_like(top) if over is None else over

@@ -234,12 +234,6 @@ def summarise(
 ) -> Summary:
     """Return the summary of episodes; it does not depend on their order.
 
-    Args:
-        records: episodes of any policies, scenarios and seeds.
-        baseline: name of the policy that others are compared with.
-        level: confidence of the intervals.
-        seed: seed of the bootstrap.
-
     Raises:
         SimError: an episode is there twice.
     """
@@ -253,14 +247,9 @@ def summarise_sources(
     level: float = 0.95,
     seed: int = 0,
 ) -> Summary:
-    """Return the summary of episodes of several tables, as :func:`summarise`.
+    """Return the summary of episodes of several tables by name, as :func:`summarise`.
 
-    Args:
-        sources: records by the name of their table. With several tables, each variant is also
-            compared with itself in the first.
-        baseline: as in :func:`summarise`.
-        level: as in :func:`summarise`.
-        seed: as in :func:`summarise`.
+    Each variant is also compared with itself in the first table.
     """
     rng = np.random.default_rng(seed)
     groups: dict[Variant, list[EpisodeRecord]] = {}

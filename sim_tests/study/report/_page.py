@@ -40,14 +40,7 @@ Row = Sequence[Cell | str]
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table whose columns sort.
-
-    Attributes:
-        columns: heading and meaning of each column; a meaning may be empty.
-        rows: cells, or texts.
-        text_columns: number of first columns that hold text.
-        caption: a line above it.
-    """
+    """A table whose columns sort."""
 
     columns: Mapping[str, str]
     rows: Sequence[Row]

@@ -136,15 +136,7 @@ def _fits(job: Job, record: EpisodeRecord) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """One arm of the comparison, in the sense of a clinical trial.
-
-    Attributes:
-        name: unique name in tables.
-        variant: its policy, planner and perception.
-        row: summary of its episodes under the fault of the report.
-        episodes: these episodes, the failed ones included.
-        others: its episodes under other faults.
-    """
+    """One arm of the comparison, in the sense of a clinical trial."""
 
     name: str
     variant: Variant

@@ -54,12 +54,6 @@ def write_report(
     The same folder gives the same page, byte for byte. The page says what is missing or unfinished
     in the folder.
 
-    Args:
-        out_dir: folder of a run (:class:`~sim_tests.study.runs.RunFiles`).
-        stills: run the worst episodes again for pictures.
-        path: the file; default ``report.html`` in the folder.
-        progress: show progress on standard error.
-
     Raises:
         SimError: there is no ``episodes.csv``, it is not a table of episodes, or the page cannot
             be written.

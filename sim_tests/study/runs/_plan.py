@@ -126,12 +126,7 @@ def experiment_jobs(
     experiment: Experiment,
     policies: Sequence[str | tuple[str, AwarenessPolicy]] | None = None,
 ) -> tuple[Job, ...]:
-    """Return the episodes of a command; :func:`plan_jobs` names the errors.
-
-    Args:
-        experiment: the values of its options.
-        policies: other policies than those of the experiment.
-    """
+    """Return the episodes of a command; :func:`plan_jobs` names the errors."""
     first = experiment["seed"]
     return plan_jobs(
         experiment["scenario"],
@@ -146,14 +141,7 @@ def experiment_jobs(
 
 
 def about_run(experiment: Experiment, command: str, out: Path, **more: Any) -> dict[str, Any]:
-    """Return a command and its settings for ``run.json``; resuming a run gives the same.
-
-    Args:
-        experiment: the values of its options.
-        command: its name.
-        out: folder of the run.
-        more: further settings, by the names of their options; None and empty ones are left out.
-    """
+    """Return a command and its settings for ``run.json``; resuming a run gives the same."""
     settings = experiment.settings(**more)
     words = ["awarenav", *command.split(), *option_words(settings), "--out", str(out)]
     return {"command": shlex.join(words), "settings": settings}
@@ -303,11 +291,6 @@ def sample_jobs(jobs: Sequence[Job], count: int, seed: int = 0) -> tuple[Job, ..
     jobs of a fault, those come first whose scenario, then whose policy, planner and perception,
     were drawn least. Otherwise chance decides. A smaller sample with the same seed is part of a
     larger one.
-
-    Args:
-        jobs: the plan, for example of :func:`plan_jobs`.
-        count: number of jobs to draw.
-        seed: of the draw.
 
     Raises:
         SimError: for a count that is no whole number of jobs of the plan, at least 1.

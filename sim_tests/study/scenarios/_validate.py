@@ -124,13 +124,7 @@ class PersonAttention:
 
 @dataclass(frozen=True, slots=True)
 class AttentionCheck:
-    """The label of a scenario, and the attention of its people.
-
-    Attributes:
-        label: the scenario's ``attention``.
-        crossings: number of crossings.
-        people: the people who had the robot before them for half a second or more.
-    """
+    """The label of a scenario, and the attention of its people."""
 
     label: str
     crossings: int

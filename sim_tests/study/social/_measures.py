@@ -1,4 +1,4 @@
-"""The measures that others use: each is one decorated function of an episode's course.
+"""The measures that others use: each is one function of an episode's course.
 
 A new measure is one function here; the order of the functions is that of ``social.csv``.
 docs/social_measures.md has the definitions and their sources. Robot and people are discs, as in the
@@ -89,6 +89,12 @@ def _measure(
         return function
 
     return register
+
+
+def _figures(source: Source, *figures: tuple[str, str, Better, Measure]) -> None:
+    """Add measures that are one expression: column, published name, better direction, value."""
+    for name, published, better, value in figures:
+        _measure(source, published, better, name)(value)
 
 
 def _zones(source: Source, name: str, published: str, value: Callable[..., float | None]) -> None:
@@ -197,22 +203,13 @@ def _zone_s(episode: SocialEpisode, zone: str) -> float | None:
 _zones("general", "{}_s", "time in {} distance", _zone_s)
 
 
-@_measure("general", "human delay")
-def human_delay_s(episode: SocialEpisode) -> float | None:
-    """Delay of all people over their walks without a robot."""
-    return episode.outcome.human_delay_s
-
-
-@_measure("general", "Aavg, of people")
-def people_acceleration_mps2(episode: SocialEpisode) -> float | None:
-    """NavWareSet's mean acceleration of all people."""
-    return people_motion(episode)[0]
-
-
-@_measure("general", "Javg, of people")
-def people_jerk_mps3(episode: SocialEpisode) -> float | None:
-    """NavWareSet's mean jerk of all people."""
-    return people_motion(episode)[1]
+# Over the walks without a robot; means of all people as NavWareSet takes them.
+_figures(
+    "general",
+    ("human_delay_s", "human delay", "lower", lambda e: e.outcome.human_delay_s),
+    ("people_acceleration_mps2", "Aavg, of people", "lower", lambda e: people_motion(e)[0]),
+    ("people_jerk_mps3", "Javg, of people", "lower", lambda e: people_motion(e)[1]),
+)
 
 
 @_measure("general", "cumulative heading changes, of people")
@@ -229,22 +226,18 @@ def people_heading_changes_rad(episode: SocialEpisode) -> float | None:
 # -- HuNavSim ------------------------------------------------------------------------------------
 
 
-@_measure("HuNavSim", "time_to_reach_goal")
-def hunav_time_s(episode: SocialEpisode) -> float:
-    """Time from the first instant to the last."""
-    return float(episode.t_s[-1] - episode.t_s[0])
-
-
-@_measure("HuNavSim", "path_length")
-def hunav_path_length_m(episode: SocialEpisode) -> float:
-    """Length of the polygon through the positions."""
-    return path_length_m(episode.robot_m)
-
-
-@_measure("HuNavSim", "cumulative_heading_changes")
-def hunav_heading_changes_rad(episode: SocialEpisode) -> float:
-    """Heading changes of the robot."""
-    return heading_changes_rad(episode.robot_heading_rad)
+# From the first instant to the last; the polygon through the positions.
+_figures(
+    "HuNavSim",
+    ("hunav_time_s", "time_to_reach_goal", "lower", lambda e: float(e.t_s[-1] - e.t_s[0])),
+    ("hunav_path_length_m", "path_length", "lower", lambda e: path_length_m(e.robot_m)),
+    (
+        "hunav_heading_changes_rad",
+        "cumulative_heading_changes",
+        "lower",
+        lambda e: heading_changes_rad(e.robot_heading_rad),
+    ),
+)
 
 
 @_measure("HuNavSim", "avg_distance_to_closest_person", "neither")
@@ -287,22 +280,23 @@ _zones("HuNavSim", "hunav_{}_percent", "{}_space_intrusions", _zone_percent)
 _zones("HuNavSim", "hunav_group_{}_percent", "group_{}_space_intrusions", _group_zone_percent)
 
 
-@_measure("HuNavSim", "avg_robot_linear_speed", "neither")
-def hunav_speed_mps(episode: SocialEpisode) -> float:
-    """Mean length of the robot's velocity."""
-    return float(episode.robot_speed_mps.mean())
-
-
-@_measure("HuNavSim", "avg_acceleration", "neither")
-def hunav_acceleration_mps2(episode: SocialEpisode) -> float:
-    """Σ Δv/Δt over N − 1 steps, divided by N; signed."""
-    return speed_changes(episode, 1)
-
-
-@_measure("HuNavSim", "avg_overacceleration", "neither")
-def hunav_overacceleration_mps3(episode: SocialEpisode) -> float:
-    """Σ Δv/Δt² over N − 1 steps, divided by N; signed."""
-    return speed_changes(episode, 2)
+# Mean length of the velocity; Σ Δv/Δt and Σ Δv/Δt² over N − 1 steps, divided by N, signed.
+_figures(
+    "HuNavSim",
+    (
+        "hunav_speed_mps",
+        "avg_robot_linear_speed",
+        "neither",
+        lambda e: float(e.robot_speed_mps.mean()),
+    ),
+    ("hunav_acceleration_mps2", "avg_acceleration", "neither", lambda e: speed_changes(e, 1)),
+    (
+        "hunav_overacceleration_mps3",
+        "avg_overacceleration",
+        "neither",
+        lambda e: speed_changes(e, 2),
+    ),
+)
 
 
 @_measure("HuNavSim", "avg_pedestrian_velocity", "neither")
@@ -314,28 +308,20 @@ def hunav_people_speed_mps(episode: SocialEpisode) -> float | None:
     return float(np.hypot(velocities[:, 0], velocities[:, 1]).mean())
 
 
-@_measure("HuNavSim", "social_force_on_agents")
-def hunav_force_on_people_mps2(episode: SocialEpisode) -> float | None:
-    """Sum of the robot's forces on people."""
-    return SocialWork.of(episode).on_people if episode.people else None
+def _force(name: str, published: str, part: str) -> None:
+    """Add a sum of forces; without people None, but for that of the walls."""
+
+    def value(episode: SocialEpisode) -> float | None:
+        work: float = getattr(SocialWork.of(episode), part)
+        return work if episode.people or part == "obstacles_on_robot" else None
+
+    _measure("HuNavSim", published, name=name)(value)
 
 
-@_measure("HuNavSim", "social_force_on_robot")
-def hunav_force_on_robot_mps2(episode: SocialEpisode) -> float | None:
-    """Sum of people's forces on the robot."""
-    return SocialWork.of(episode).on_robot if episode.people else None
-
-
-@_measure("HuNavSim", "obstacle_force_on_robot")
-def hunav_obstacle_force_mps2(episode: SocialEpisode) -> float:
-    """Sum of the walls' forces on the robot."""
-    return SocialWork.of(episode).obstacles_on_robot
-
-
-@_measure("HuNavSim", "social_work")
-def hunav_social_work_mps2(episode: SocialEpisode) -> float | None:
-    """Sum of all these forces."""
-    return SocialWork.of(episode).work if episode.people else None
+_force("hunav_force_on_people_mps2", "social_force_on_agents", "on_people")
+_force("hunav_force_on_robot_mps2", "social_force_on_robot", "on_robot")
+_force("hunav_obstacle_force_mps2", "obstacle_force_on_robot", "obstacles_on_robot")
+_force("hunav_social_work_mps2", "social_work", "work")
 
 
 # -- SocNavGym -----------------------------------------------------------------------------------
@@ -394,22 +380,12 @@ def navwareset_speed_mps(episode: SocialEpisode) -> float | None:
     return path_length_m(episode.robot_m) / duration_s if duration_s > 0.0 else None
 
 
-@_measure("NavWareSet", "Aavg")
-def navwareset_acceleration_mps2(episode: SocialEpisode) -> float | None:
-    """Mean acceleration of the robot."""
-    return robot_motion(episode)[0]
-
-
-@_measure("NavWareSet", "Javg")
-def navwareset_jerk_mps3(episode: SocialEpisode) -> float | None:
-    """Mean jerk of the robot."""
-    return robot_motion(episode)[1]
-
-
-@_measure("NavWareSet", "PLavg")
-def navwareset_path_length_m(episode: SocialEpisode) -> float:
-    """Length of the polygon through the positions."""
-    return path_length_m(episode.robot_m)
+_figures(
+    "NavWareSet",
+    ("navwareset_acceleration_mps2", "Aavg", "lower", lambda e: robot_motion(e)[0]),
+    ("navwareset_jerk_mps3", "Javg", "lower", lambda e: robot_motion(e)[1]),
+    ("navwareset_path_length_m", "PLavg", "lower", lambda e: path_length_m(e.robot_m)),
+)
 
 
 @_measure("NavWareSet", "PSC, of the notebook")

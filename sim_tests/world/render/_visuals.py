@@ -159,12 +159,7 @@ class Visuals(AbstractContextManager["Visuals"]):
         return tuple(self._actors)
 
     def prepare(self, view: RenderView, only: AbstractSet[int] | None = None) -> None:
-        """Pose the actors in view, and hide the others.
-
-        Args:
-            view: the view of the next image.
-            only: numbers of the actors to draw, without scenery; None draws everything.
-        """
+        """Pose the actors in view, and hide the others."""
         if self._closed:
             raise SimError("the render world is closed: it cannot draw any more")
         self._show(_SCENERY, self._scenery if only is None else set())

@@ -215,10 +215,6 @@ def scan_all(scanners: Sequence[SimulatedScanner], motion: RobotMotion) -> list[
     """Return the sweep of each scanner of one robot; see :meth:`SimulatedScanner.scan`.
 
     Scanners of one height and scene share most of the work.
-
-    Args:
-        scanners: they see one scene.
-        motion: pose and velocity of the robot at the present time, its ``stamp_s``.
     """
     cuts: dict[Plane, SceneCut] = {}
     scans = []

@@ -9,7 +9,7 @@ import pytest
 
 from sim_tests.actors.body import Worker
 from sim_tests.actors.robot import Amr
-from sim_tests.crossing._robot_sight import RobotSight, near_robot
+from sim_tests.crossing._audience import RobotSight, near_robot
 from sim_tests.world import Warehouse, sees
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import WarehouseLayout

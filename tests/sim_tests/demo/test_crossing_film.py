@@ -12,16 +12,17 @@ from awarenav.figures import Image
 from nav_adapter import Alert
 from sim_tests import Scenario, run_crossing
 from sim_tests.demo._camera_film import CAMERA_PX, PICTURE_S, CameraRecorder
-from sim_tests.demo._comparison import ComparisonRow, time_lost_s
 from sim_tests.demo._film import (
     FILM_HZ,
     FILM_PX,
     HOLD_S,
+    ComparisonRow,
     MapScale,
     decisive_picture,
     draw_lane,
     draw_map,
     passage,
+    time_lost_s,
     unaware_person,
     write_crossing_film,
 )
