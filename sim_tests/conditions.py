@@ -96,11 +96,7 @@ class Perception(NamedTuple):
 
     @classmethod
     def named(cls, name: str) -> Perception:
-        """Return the perception of a name in tables.
-
-        Raises:
-            SimError: for another name.
-        """
+        """Return the perception of a name in tables."""
         if name == _SCANNER:
             return cls("", has_scanners=True)
         kind = name.removesuffix(_AND_SCANNER)

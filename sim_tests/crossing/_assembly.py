@@ -112,11 +112,7 @@ class Setup:
         )
 
     def driver(self) -> LocalPlanner:
-        """Return the planner, or make the one of that name.
-
-        Raises:
-            SimError: it cannot be made, or has no ``plan``.
-        """
+        """Return the planner, or make the one of that name."""
         if isinstance(self.planner, str):
             return make_planner(self.planner, self.scenario, self.conditions.seed)
         return self.planner
@@ -211,11 +207,7 @@ def _own_presets() -> dict[str, AwarenessPolicy]:
 
 
 def named_fault(fault: Fault | str | None) -> Fault | None:
-    """Return a fault, the one of a name or a file, or None for ``"none"``, empty and None.
-
-    Raises:
-        SimError: an unknown name, or a file that cannot be used.
-    """
+    """Return a fault, the one of a name or a file, or None for ``"none"``, empty and None."""
     if isinstance(fault, str):
         return None if fault in ("", NO_FAULT) else Fault.of(fault)
     return fault

@@ -65,9 +65,6 @@ def draw_camera_view(
             camera.
         captions: also write the speed limit and its reason.
         memory: of the frames so far: tells the captions how long ago somebody has looked.
-
-    Returns:
-        A new image.
     """
     image: ImageRgb = picture.copy()
     rotation, origin = frame.T_odom_camera[:3, :3], frame.T_odom_camera[:3, 3]
@@ -111,7 +108,6 @@ def draw_camera_view(
 
 
 def _draw_box(image: ImageRgb, box_xyxy_px: FloatArray, observation: PersonObservation) -> None:
-    """Draw the box of an observation with its α."""
     left, top, right, bottom = box_xyxy_px.round().astype(int).tolist()
     colour = awareness_colour(observation.awareness)
     cv2.rectangle(image, (left, top), (right, bottom), colour, 1, cv2.LINE_AA)

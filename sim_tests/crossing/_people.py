@@ -51,11 +51,7 @@ def staged_people(
 def recorded_people(
     path: str | Path, boxes_odom_m: FloatArray, *, reacts: bool = False, leaves: bool = False
 ) -> list[Person]:
-    """Return the recorded people of a table in order of their first rows, with different looks.
-
-    Raises:
-        SimError: see :func:`read_recordings`.
-    """
+    """Return the recorded people of a table in order of their first rows, with different looks."""
     looks = worker_names()
     people = []
     for number, recording in enumerate(read_recordings(path)):

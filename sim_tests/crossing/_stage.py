@@ -356,7 +356,6 @@ class Stage(AbstractContextManager["Stage"]):
 
 
 def _robot(warehouse: Warehouse, scenario: Scenario) -> Amr | KinematicRobot:
-    """Return the robot of a scenario at its start."""
     task, model = scenario.robot, scenario.robot_model
     start, heading_rad = (task.start_x_m, task.start_y_m), math.radians(task.start_heading_deg)
     return robot_of(warehouse, model, start, heading_rad, camera_mount=scenario.camera.mount)

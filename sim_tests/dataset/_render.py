@@ -41,9 +41,6 @@ def contact_sheet(folder: Path, records: Sequence[Record], camera: Camera) -> Im
     """Return up to 24 evenly spaced images of a folder as one, with true boxes and gazes.
 
     Boxes and gaze lines have the colour of the awareness score, from red to green.
-
-    Raises:
-        SimError: when an image cannot be read.
     """
     count = min(_COLUMNS * _ROWS, len(records))
     chosen = (records[k * len(records) // count] for k in range(count))
@@ -123,9 +120,6 @@ def render(
     interrupted set is continued with those that are missing. At the end the truth of all images
     moves into ``truth.jsonl``. ``camera.yaml`` is ROS camera_info, ``render.yaml`` holds the
     settings, and ``contact_sheet.png`` shows a sample with the true boxes.
-
-    Returns:
-        Path of the truth file.
 
     Raises:
         SimError: when ``out`` holds images of other settings, a finished set (with neither
@@ -248,7 +242,6 @@ def _finished_records(config: RenderConfig, out: Path) -> dict[str, Record]:
 
 
 def _group_by_scene(config: RenderConfig, frames: Sequence[int]) -> list[list[int]]:
-    """Return the frames in groups of one scene each."""
     scenes: dict[int, list[int]] = {}
     for frame in frames:
         scenes.setdefault(config.scene_of(frame), []).append(frame)
@@ -271,7 +264,6 @@ def _render_scene(config: RenderConfig, out: Path, frames: list[int]) -> list[Re
 
 
 def _write_png(path: Path, image_rgb: NDArray[np.uint8]) -> None:
-    """Write a PNG; the file appears whole or not at all."""
     encoded, data = cv2.imencode(".png", image_rgb[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 3])
     if not encoded:
         raise SimError(f"cannot encode {path.name}")

@@ -121,7 +121,6 @@ def run_paper(out: Path, *, seed: int, video: bool, perception: str, as_json: bo
 
 
 def _cases_as_data(encounter: CrossingResult) -> list[dict[str, Any]]:
-    """Return the cases of the encounter as plain data."""
     return [
         {
             "t_s": case.t_s,

@@ -180,11 +180,7 @@ def run_encounter(
     video: bool = True,
     perception: str = "keypoints",
 ) -> CrossingResult:
-    """Run the encounter and write its table, plot and video.
-
-    Returns:
-        The crossing, with the truth and the observation of every frame.
-    """
+    """Run the encounter and write its table, plot and video."""
     scenario = Scenario.shipped("paper_encounter")
     # The robot of the paper asks nobody, and the worker looks as planned.
     policy = AwarenessPolicy.preset("balanced").model_copy(update={"attention": None})

@@ -137,9 +137,6 @@ def write_crossing_film(paths: Sequence[Path], rows: Sequence[ComparisonRow]) ->
         paths: files to write, each ``.webp`` (animated image) or ``.mp4``.
         rows: the comparison. The first row is the crossing with nobody there, against which time
             is lost; the film shows those of :data:`LANES`.
-
-    Raises:
-        AwarenavError: for another kind of file.
     """
     with ExitStack() as stack:
         writers = [stack.enter_context(VideoWriter(path, FILM_HZ, FILM_PX)) for path in paths]
@@ -289,7 +286,6 @@ def draw_map(row: ComparisonRow, t_s: float | None) -> ImageRgb:
 def _draw_circle(
     image: ImageRgb, result: CrossingResult, person: int, index: int, place: MapScale
 ) -> None:
-    """Draw the circle of a person, if the robot has one."""
     frame = result.frames[index]
     where = frame.truth[person].position_odom_m
     for obstacle in frame.constraints.obstacles:

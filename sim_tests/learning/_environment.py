@@ -405,13 +405,11 @@ def _over_limit_mps(constraints: NavConstraints, command: tuple[float, float]) -
 
 
 def _distance_m(now: CrossingFrame, goal_odom_m: FloatArray) -> float:
-    """Return the true distance of the base origin to the goal."""
     off_m = goal_odom_m - now.robot_state.position_odom_m
     return math.sqrt(off_m.dot(off_m))
 
 
 def _by_robot(crossing: Crossing) -> int:
-    """Return how many contacts the robot has caused."""
     return sum(contact.by == "robot" for contact in crossing.stage.contacts)
 
 

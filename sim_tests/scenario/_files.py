@@ -30,11 +30,7 @@ _CAMERAS: Final = _FOLDER / "cameras"
 
 
 def shipped_scenarios(scenario_set: str = "all") -> tuple[str, ...]:
-    """Return the names of a set of the scenarios that come with the package, sorted.
-
-    Raises:
-        SimError: for another set.
-    """
+    """Return the names of a set of the scenarios that come with the package, sorted."""
     if scenario_set not in _SETS:
         raise SimError(not_one_of("set of scenarios", scenario_set, SCENARIO_SETS))
     return _names_in(_SETS[scenario_set])
@@ -45,9 +41,6 @@ def shipped_text(name: str) -> tuple[str, str]:
 
     Args:
         name: such as ``name``, or ``name@2`` with a version; see :func:`require_version`.
-
-    Raises:
-        SimError: for a name that is not shipped.
     """
     plain = str(name).partition("@")[0]
     folders = {name: folder for folder in _SETS.values() for name in _names_in(folder)}
@@ -59,11 +52,7 @@ def shipped_text(name: str) -> tuple[str, str]:
 
 
 def require_version(name: str, version: int) -> None:
-    """Check the version in a name such as ``name@2``; a name without one is always right.
-
-    Raises:
-        SimError: for another version.
-    """
+    """Check the version in a name such as ``name@2``; a name without one is always right."""
     plain, at, wanted = str(name).partition("@")
     if at and wanted != str(version):
         raise SimError(
@@ -78,11 +67,7 @@ def shipped_cameras() -> tuple[str, ...]:
 
 
 def camera_data(name: str) -> dict[str, Any]:
-    """Return the keys of a scenario's ``camera``, from a YAML file or a shipped camera's name.
-
-    Raises:
-        SimError: for a name that is not shipped, and for a file that cannot be read.
-    """
+    """Return the keys of a scenario's ``camera``, from a YAML file or a shipped camera's name."""
     if name.endswith((".yaml", ".yml")):
         return _completed(documents.read_yaml(Path(name), SimError), name)
     names = shipped_cameras()

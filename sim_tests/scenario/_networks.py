@@ -36,9 +36,6 @@ def networks_data(path: str | Path) -> dict[str, Any]:
 
     The paths of files are absolute, and each network that is a file has its checksum, so that
     the keys give the same networks in every process, or none.
-
-    Raises:
-        SimError: for a file that cannot be read, and networks that cannot be loaded.
     """
     # Only crossings with networks of one's own need the modules that run them.
     from awarenav.estimate import NetworkChoice  # noqa: PLC0415
@@ -59,11 +56,7 @@ def networks_data(path: str | Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=4)
 def load_networks(text: str) -> Networks:
-    """Load the networks of a scenario, once in a process.
-
-    Raises:
-        SimError: for networks that cannot be loaded, or are not those of their checksums.
-    """
+    """Load the networks of a scenario, once in a process."""
     from awarenav.estimate import NetworkChoice, choose_networks  # noqa: PLC0415
 
     data = parse_yaml(text, "networks", SimError)
@@ -95,11 +88,7 @@ def _absolute(value: Any) -> Any:
 
 
 def _checksums(data: Mapping[str, Any]) -> dict[str, str]:
-    """Return the sha256 of each network that is a file, by its role.
-
-    Raises:
-        AwarenavError: for a network that is not fetched.
-    """
+    """Return the sha256 of each network that is a file, by its role."""
     from awarenav.models import ModelStore  # noqa: PLC0415
 
     store = ModelStore()

@@ -284,11 +284,7 @@ class Scenario(SimConfig):
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], source: str = "scenario") -> Scenario:
-        """Validate the keys of a scenario.
-
-        Raises:
-            SimError: naming the wrong key.
-        """
+        """Validate the keys of a scenario."""
         try:
             scenario = cls.model_validate(data)
         except ValidationError as cause:
@@ -334,9 +330,6 @@ class Scenario(SimConfig):
         Args:
             text: a population, ``"classic"`` or ``"recorded"``, numbers of :class:`Hearing`, or
                 both: ``"recorded"``, ``"recorded,answers=0.8,startles=0.2"``, ``"answers=0.3"``.
-
-        Raises:
-            SimError: for an unknown population or number.
         """
         name, numbers = population_of(text)
         changes: dict[str, Any] = {} if name is None else {"population": name}

@@ -82,11 +82,7 @@ class ScenarioTemplate:
 
     @classmethod
     def shipped(cls, name: str) -> ScenarioTemplate:
-        """Load one that comes with the package, by ``name``, or by ``name@2`` with a version.
-
-        Raises:
-            SimError: for other names and versions.
-        """
+        """Load one that comes with the package, by ``name``, or by ``name@2`` with a version."""
         plain, text = shipped_text(name)
         template = cls.from_text(text, plain)
         require_version(name, template.version)
@@ -164,11 +160,7 @@ class ScenarioTemplate:
         return scenario if self._robot is None else scenario_for_robot(scenario, self._robot)
 
     def with_robot(self, robot: RobotModel | RobotProfile | str | Path) -> ScenarioTemplate:
-        """Return the same scenario fitted to another robot.
-
-        Raises:
-            SimError: for an unknown robot, and a scenario that has another robot already.
-        """
+        """Return the same scenario fitted to another robot."""
         if robot == "":
             return self
         model = RobotModel.of(robot)
@@ -176,35 +168,18 @@ class ScenarioTemplate:
 
     @property
     def _scenario_data(self) -> dict[str, Any]:
-        """The keys of the scenario alone."""
         return {key: value for key, value in self._data.items() if key != _FOR_ROBOT}
 
     def with_camera(self, name: str) -> ScenarioTemplate:
-        """Return the same scenario with another camera on the robot.
-
-        Raises:
-            SimError: for other names, and for a camera that is not valid.
-        """
-        if not name:
-            return self
-        return self._with(name, camera=camera_data(name))
+        """Return the same scenario with another camera on the robot."""
+        return self._with(name, camera=camera_data(name)) if name else self
 
     def with_networks(self, path: str | Path) -> ScenarioTemplate:
-        """Return the same scenario with other networks for the pictures of its camera.
-
-        Raises:
-            SimError: for a file that cannot be read, and networks that cannot be loaded.
-        """
-        if not path:
-            return self
-        return self._with(path, networks=networks_data(path))
+        """Return the same scenario with other networks for the pictures of its camera."""
+        return self._with(path, networks=networks_data(path)) if path else self
 
     def with_population(self, text: str) -> ScenarioTemplate:
-        """Return the same scenario among people with other habits.
-
-        Raises:
-            SimError: for an unknown population or number.
-        """
+        """Return the same scenario among people with other habits."""
         if not text:
             return self
         name, numbers = population_of(text)
@@ -231,7 +206,6 @@ class ScenarioTemplate:
 
 
 def _robot_of(value: Any, source: str) -> RobotModel:
-    """Return the robot of the key ``for_robot``."""
     try:
         return RobotModel.model_validate(value) if isinstance(value, dict) else RobotModel.of(value)
     except ValidationError as cause:

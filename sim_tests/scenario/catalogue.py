@@ -248,7 +248,6 @@ def list_command(*, as_json: bool = False) -> int:
 
 
 def _list_row(template: ScenarioTemplate, scenario_set: str) -> dict[str, Any]:
-    """Return a row of the list as plain data."""
     scenario = template.median()
     return {
         "set": scenario_set,

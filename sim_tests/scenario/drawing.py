@@ -47,11 +47,7 @@ _RECORDED: Final = "#6a4c93"
 
 
 def draw_scenario(name: str, out: Path) -> None:
-    """Draw a scenario, a shipped one or a YAML file, into a picture, and print its path.
-
-    Raises:
-        SimError: the picture has another ending than .png, .svg or .pdf.
-    """
+    """Draw a scenario, a shipped one or a YAML file, into a picture, and print its path."""
     if out.suffix.lower() not in _FORMATS:
         raise SimError(f"--out must end in {', '.join(_FORMATS)}, got {out}")
     save_figure(scenario_figure(ScenarioTemplate.named(name)), out)

@@ -399,7 +399,6 @@ def _scenario_data(
     task: tuple[_Point, _Point],
     options: RecordingOptions,
 ) -> dict[str, Any]:
-    """Return the keys of the scenario's file."""
     places = np.vstack([*(track.positions_odom_m for track in people), np.array(task)])
     low, high = np.floor(places.min(axis=0) - _MARGIN_M), np.ceil(places.max(axis=0) + _MARGIN_M)
     start, goal = task

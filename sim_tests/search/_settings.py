@@ -67,12 +67,7 @@ class SearchSettings:
 
 
 def common_settings(experiment: Experiment) -> dict[str, Any]:
-    """Return the settings of an experiment, but for the episodes and the generation.
-
-    Raises:
-        SimError: an unknown scenario, camera or robot.
-        NavError: an unusable policy.
-    """
+    """Return the settings of an experiment, but for the episodes and the generation."""
     name, own_policy = named_policy(experiment.one("policy"))
     refuse_unused_networks(experiment.changes, experiment["perception"])
     templates = named_templates(experiment["scenario"], **experiment.changes)

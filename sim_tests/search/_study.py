@@ -321,7 +321,6 @@ def importances(
 def _distributions(
     space: Mapping[str, Range],
 ) -> dict[str, optuna.distributions.BaseDistribution]:
-    """Return ranges as Optuna's distributions."""
     return {
         name: optuna.distributions.FloatDistribution(each.low, each.high, log=each.log)
         for name, each in space.items()

@@ -52,11 +52,6 @@ def crossings_command(
     """Run episodes, print a short table, write the report.
 
     All errors are raised before anything runs.
-
-    Raises:
-        SimError: an unknown or unusable option.
-        NavError: an unknown preset or unusable policy file.
-        PerceptionError: for pixels, the shipped networks cannot be loaded.
     """
     jobs = experiment_jobs(experiment)
     sees = experiment["perception"] == "pixels" and set(experiment["sensors"]) != {"scanner"}
@@ -116,13 +111,7 @@ def watch_command(
     no_camera: bool,
     no_browser: bool,
 ) -> int:
-    """Serve the page, run the crossing at the pace of the clock, and end with it.
-
-    Raises:
-        SimError: an unknown or unusable option.
-        NavError: an unknown preset or unusable policy file.
-        PerceptionError: for pixels, the shipped networks cannot be loaded.
-    """
+    """Serve the page, run the crossing at the pace of the clock, and end with it."""
     require_pybullet()
     job = _job(experiment)
     if out is not None and not out.parent.is_dir():

@@ -24,6 +24,11 @@ from ..conditions import COMPLETE_SCENARIOS, USUAL_SENSORS, Experiment, conditio
 
 #: Names of the formats of exported episodes; those of ``_files.FORMATS``.
 FORMAT_NAMES = ("socnav3", "navwareset")
+_FIRST_SEED = {"note": " It is that of the first episode; the next ones count up."}
+_EPISODE = (
+    "The number of the episode in episodes.csv, from 0; or SCENARIO:SEED:POLICY, followed by "
+    ":PLANNER and :FAULT if the run has several"
+)
 
 
 @command(
@@ -49,7 +54,7 @@ FORMAT_NAMES = ("socnav3", "navwareset")
     many=("scenario", "policy", "planner", "sensors", "fault"),
     policy={"default": ["scanner", "blind", "balanced"]},
     sensors=USUAL_SENSORS,
-    seed={"note": " It is that of the first episode; the next ones count up."},
+    seed=_FIRST_SEED,
 )
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
 @option(
@@ -107,11 +112,7 @@ def crossings(**values: Any) -> int:
     },
 )
 @argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")
-@argument(
-    "episode",
-    help="The number of the episode in episodes.csv, from 0; or SCENARIO:SEED:POLICY, followed by "
-    ":PLANNER and :FAULT if the run has several; or 'all'.",
-)
+@argument("episode", help=f"{_EPISODE}; or 'all'.")
 @options.out_folder(
     None, "Folder of the video and the map, or of the page.", show_default="DIR/replays"
 )
@@ -264,7 +265,7 @@ def compare(**values: Any) -> int:
     many=("scenario",),
     repeated=True,
     without=("policy", "fault"),
-    seed={"note": " It is that of the first episode; the next ones count up."},
+    seed=_FIRST_SEED,
 )
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
 @options.workers()
@@ -339,11 +340,7 @@ def export() -> None:
     epilog="docs/social_measures.md describes the formats.",
 )
 @argument("folder", type=FolderPath(), metavar="DIR", help="Folder of `awarenav crossings --out`.")
-@argument(
-    "episode",
-    help="The number of the episode in episodes.csv, from 0; or SCENARIO:SEED:POLICY, followed by "
-    ":PLANNER and :FAULT if the run has several.",
-)
+@argument("episode", help=f"{_EPISODE}.")
 @option(
     "--format",
     type=OneOf(FORMAT_NAMES),

@@ -60,11 +60,7 @@ def write_page(
     outcome: str,
     note: str = "",
 ) -> None:
-    """Write the page of a recorded crossing; the file appears whole or not at all.
-
-    Raises:
-        SimError: there are no states, or the file cannot be written.
-    """
+    """Write the page of a recorded crossing; the file appears whole or not at all."""
     if not states:
         raise SimError(f"cannot write {path}: the crossing has no states")
     title = f"{begin['scenario']}, seed {begin['seed']}, policy {begin['policy']}"
@@ -100,9 +96,6 @@ class LivePage(AbstractContextManager["LivePage"]):
     The stream follows the standard of server-sent events. Its events are ``begin`` (hall, robot and
     names), messages (states) and ``end`` (outcome). Every reader gets all of them from the
     beginning.
-
-    Raises:
-        SimError: the port cannot be used.
     """
 
     def __init__(self, page: str, port: int = 0) -> None:
@@ -175,7 +168,6 @@ class LivePage(AbstractContextManager["LivePage"]):
             self._changed.notify_all()
 
     def _answer(self, request: BaseHTTPRequestHandler) -> None:
-        """Answer one request."""
         host = request.headers.get("Host", _HOST).partition(":")[0]
         if host not in _NAMES:  # a page of another site that uses its name for this computer
             request.send_error(403)

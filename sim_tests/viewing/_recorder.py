@@ -285,7 +285,6 @@ def outcome_text(result: CrossingResult) -> str:
 
 
 def _people(frame: CrossingFrame) -> list[dict[str, Any]]:
-    """Return the truth about each person."""
     people = []
     for index, view in enumerate(frame.truth):
         gaze = frame.T_odom_camera[:3, :3] @ view.gaze_camera

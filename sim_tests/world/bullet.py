@@ -50,11 +50,7 @@ def _flush_c_streams() -> None:
 
 
 def require_pybullet() -> None:
-    """Import PyBullet, if that has not been done.
-
-    Raises:
-        MissingSimulatorError: it is not installed.
-    """
+    """Import PyBullet, if that has not been done."""
     pybullet.connect  # noqa: B018 - the first look-up of a name imports it
 
 

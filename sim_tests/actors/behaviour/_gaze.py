@@ -142,7 +142,6 @@ def planned_gaze(
 
 
 def _key_angles(key: GazeKey, to_robot: tuple[float, float]) -> tuple[float, float]:
-    """Return yaw and pitch of the head at a key."""
     yaw, pitch = to_robot if key.look == "robot" else (0.0, 0.0)
     yaw = math.remainder(yaw + math.radians(key.yaw_deg), math.tau)
     return yaw, pitch + math.radians(key.pitch_deg)
@@ -273,7 +272,6 @@ class Gaze:
         return abs(math.remainder(math.atan2(dy, dx) - facing, math.tau)) <= FIELD_RAD
 
     def _glances_now(self, t_s: float, visible: bool) -> bool:
-        """Return whether the person looks at the robot now."""
         glances = self._glances
         if self._first_glance_s is None:
             if not visible:

@@ -166,11 +166,7 @@ def population_of(text: str) -> tuple[PopulationName | None, dict[str, float]]:
 
 
 def habits_of(population: str) -> Habits:
-    """Return the habits of the people of a population.
-
-    Raises:
-        SimError: for an unknown name.
-    """
+    """Return the habits of the people of a population."""
     return _HABITS[known_population(population)]
 
 

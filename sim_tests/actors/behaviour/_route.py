@@ -213,7 +213,6 @@ class RouteFollower:
         return False
 
     def _stay(self, x: float, y: float) -> DesiredVelocity:
-        """Return the velocity to the place of the stop, 0 on it."""
         settled = self.started_s is None or self._resumes_s is not None
         at_m = self.route.stops[self._next_stop].at_m if self.started_s is not None else 0.0
         stop_x, stop_y = self.route.point(at_m)

@@ -172,11 +172,7 @@ def load_worker(name: str) -> WorkerAsset:
 
 @lru_cache(maxsize=64)
 def worker_stature_m(name: str) -> float:
-    """Return the stature of a worker, without reading the rest.
-
-    Raises:
-        SimError: as :func:`load_worker`.
-    """
+    """Return the stature of a worker, without reading the rest."""
     with _file_of(name).open("rb") as file, np.load(file, allow_pickle=False) as data:
         return float(data["stature_m"])
 

@@ -167,11 +167,7 @@ class Skeleton:
 
 @lru_cache(maxsize=64)
 def skeleton(look: str | None, stature_m: float) -> Skeleton:
-    """Return the bones of the worker called ``look``, scaled to a stature.
-
-    Raises:
-        SimError: for a look that is not shipped, or a stature outside [1.0, 2.1] m.
-    """
+    """Return the bones of the worker called ``look``, scaled to a stature."""
     stature = finite_number(
         "stature_m", stature_m, SimError, minimum=MIN_STATURE_M, maximum=MAX_STATURE_M
     )

@@ -441,11 +441,7 @@ def _coloured(parts: list[tuple[Mesh, tuple[float, float]]]) -> Mesh:
 
 
 def fitting_seat(bones: Skeleton, kind: SeatKind) -> Seat:
-    """Return the seat that fits a body.
-
-    Raises:
-        SimError: for another kind.
-    """
+    """Return the seat that fits a body."""
     if kind not in get_args(SeatKind):
         valid = ", ".join(map(repr, get_args(SeatKind)))
         raise SimError(f"seat must be one of {valid}, got {kind!r}")

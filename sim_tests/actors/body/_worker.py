@@ -344,7 +344,6 @@ class Worker:
 
     @property
     def _joints(self) -> tuple[Quaternion, ...]:
-        """The rotation of every joint, solved when it is first asked for."""
         if self._solved_joints is None:
             left, right = self._gait_pose.feet
             self._solved_joints = self._angles.joints(
@@ -357,7 +356,6 @@ class Worker:
         return self._solved_joints
 
     def _local_foot(self, foot: FootPose) -> Foot:
-        """Return a foot in the heading frame."""
         x, y, z, yaw, pitch = foot
         if self._feet_are_local:
             return (x, y, z), yaw, pitch

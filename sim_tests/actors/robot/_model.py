@@ -125,11 +125,7 @@ class RobotModel(SimConfig):
 
     @classmethod
     def shipped(cls, name: str) -> RobotModel:
-        """Load a robot that comes with the package.
-
-        Raises:
-            SimError: for another name.
-        """
+        """Load a robot that comes with the package."""
         names = shipped_robots()
         if name not in names:
             raise SimError(not_one_of("robot", name, names, or_else="a YAML file"))

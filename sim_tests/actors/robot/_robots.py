@@ -428,7 +428,6 @@ class KinematicRobot(Robot):
         return body
 
     def _place(self) -> None:
-        """Put the body where the robot is."""
         x, y, heading = self._at[:3]
         half = 0.5 * heading
         pybullet.resetBasePositionAndOrientation(

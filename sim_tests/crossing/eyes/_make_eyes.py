@@ -43,11 +43,7 @@ def make_eyes(
     pipeline: AwarenessPipeline | None = None,
     pictures: Change[ImageRgb] | None = None,
 ) -> Eyes:
-    """Return the eyes of a perception.
-
-    Raises:
-        SimError: for another kind.
-    """
+    """Return the eyes of a perception."""
     views = stage.scenario.camera.flat_views(camera)
     eyes: list[Eyes]
     if kind == "truth":
@@ -76,12 +72,7 @@ def unusual_size_probability(scenario: Scenario) -> float:
 
 
 def _pipeline(scenario: Scenario, cone: AttentionCone) -> AwarenessPipeline:
-    """Return a pipeline that has seen no image, with the scenario's networks or the shipped ones.
-
-    Raises:
-        PerceptionError: the shipped networks cannot be loaded.
-        SimError: likewise for those of the scenario.
-    """
+    """Return a pipeline that has seen no image, with the scenario's or the shipped networks."""
     unusual = unusual_size_probability(scenario)
     networks = yaml_text(scenario.networks) if scenario.networks else ""
     return _shared_pipeline(scenario.camera, unusual, cone, networks).for_another_view()

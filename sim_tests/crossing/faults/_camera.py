@@ -240,7 +240,6 @@ class FrozenCamera(Outage, ImageFault):
 
 
 def _image_restamped(last: Sighting, image: Sighting) -> Sighting:
-    """Return an image with the observations of the last one."""
     rows = ((replace(each, stamp_s=image.stamp_s), worker) for each, worker in last.observations)
     return replace(image, observations=tuple(rows))
 
@@ -273,7 +272,6 @@ class LateImages(ImageFault):
 def _with(
     image: Delivery[Sighting], observations: Iterable[tuple[PersonObservation, int]]
 ) -> Delivery[Sighting]:
-    """Return an image with other observations."""
     rows: WorkerObservations = tuple(observations)
     return replace(image, message=replace(image.message, observations=rows))
 

@@ -98,9 +98,6 @@ class Fault(SimConfig):
         Args:
             name: a name or a file; several are joined by ``+``, as in ``ghosts+scanner_late``, and
                 act in this order.
-
-        Raises:
-            SimError: for an unknown name, or a file that cannot be used.
         """
         if name.endswith((".yaml", ".yml")) and (Path(name).exists() or _JOINT not in name):
             return cls.from_yaml(name)

@@ -243,7 +243,6 @@ class TurnedScanner(ScanFault):
 
 
 def _with(taken: Delivery[MountedScan], scan: LaserScan) -> Delivery[MountedScan]:
-    """Return a delivery with another scan."""
     return replace(taken, message=MountedScan(scan, taken.message.mounting))
 
 

@@ -151,11 +151,7 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
 
 
 def refuse_unusable_planner(planner: str, scenario: Scenario) -> None:
-    """Make a planner once; the global random generators keep their state.
-
-    Raises:
-        SimError: as :func:`make_planner`.
-    """
+    """Make a planner once; the global random generators keep their state."""
     if planner:
         import_planner(planner)
         with seeded_generators(0):
@@ -165,11 +161,7 @@ def refuse_unusable_planner(planner: str, scenario: Scenario) -> None:
 def _arguments(
     planner: str, factory: PlannerFactory, available: Mapping[str, Any], robot: RobotProfile
 ) -> tuple[list[Any], dict[str, Any]]:
-    """Return the positional and keyword arguments that a signature asks for.
-
-    Raises:
-        SimError: it has another argument without a default, or not one that was given.
-    """
+    """Return the positional and keyword arguments that a signature asks for."""
     signature, settings = factory.signature, factory.settings
     positional: list[Any] = []
     keywords: dict[str, Any] = dict(settings)

@@ -242,7 +242,6 @@ def _change_glances(glances: dict[str, Any], values: Mapping[str, float]) -> Non
 
 
 def _possible_reactions(person: Mapping[str, Any]) -> list[str]:
-    """Return the reactions that the scenario allows the person."""
     return [name for name in _REACTIONS if person["reactions"][name] > 0.0]
 
 

@@ -42,12 +42,7 @@ def run_falsify(
     overwrite: bool,
     as_json: bool,
 ) -> int:
-    """Run the command, whose options these are, and return its exit status.
-
-    Raises:
-        SimError: an unusable option.
-        NavError: an unusable policy.
-    """
+    """Run the command, whose options these are, and return its exit status."""
     settings = FalsifySettings(
         **common_settings(experiment),
         episodes=episodes,
@@ -76,7 +71,6 @@ def run_falsify(
 
 
 def _next_command(found: Falsification, experiment: Experiment, other: str, out: Path) -> str:
-    """Return the command to run after the search."""
     if found.settings.unsafe_no_floor:
         return command_text(
             *("falsify", "--policy", experiment.one("policy"), *episode_words(experiment)),
@@ -208,9 +202,6 @@ def policy_against(given: str, settings: FalsifySettings) -> tuple[str, str] | N
 
     Returns:
         None if the floor is taken away, which leaves nothing to compare.
-
-    Raises:
-        NavError: an unusable policy.
     """
     if settings.unsafe_no_floor:
         return None

@@ -56,9 +56,6 @@ class ScenarioSpace:
         people: number of people that are varied, in the stage's order.
         asks: the robot asks for attention, so how the varied people answer is varied as well
             (:func:`hearing_parameters`).
-
-    Raises:
-        SimError: a scenario without people.
     """
 
     def __init__(self, template: ScenarioTemplate, people: int = 2, *, asks: bool = False) -> None:

@@ -92,11 +92,7 @@ class PolicySpace:
         return {key: each.clipped(self._base[key]) for key, each in self.ranges.items()}
 
     def policy(self, parameters: Mapping[str, float]) -> AwarenessPolicy:
-        """Return the policy at a point of the space.
-
-        Raises:
-            SimError: values that no policy may have.
-        """
+        """Return the policy at a point of the space."""
         data = dict(self._base)
         for key, value in parameters.items():
             for place in (key, *self.ranges[key].also):
@@ -132,11 +128,7 @@ def shipped_ranges() -> dict[str, PolicyRange]:
 
 
 def read_ranges(path: str | Path) -> dict[str, PolicyRange]:
-    """Return the ranges of a file.
-
-    Raises:
-        SimError: an unusable file; the message names it and the error.
-    """
+    """Return the ranges of a file."""
     return _parsed_ranges(read_yaml(Path(path), SimError), str(path))
 
 

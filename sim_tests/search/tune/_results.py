@@ -56,10 +56,6 @@ def run_tune(
     """Run the command, whose options these are, and return its exit status.
 
     The other options are fields of :class:`TuneSettings`, by their names.
-
-    Raises:
-        SimError: an unusable option.
-        NavError: an unusable policy.
     """
     common = common_settings(experiment)
     templates = [ScenarioTemplate.from_text(text) for text in common["scenarios"]]

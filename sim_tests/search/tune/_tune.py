@@ -103,9 +103,6 @@ class TuneSettings(SearchSettings):
         """Return the episodes of a policy: every seed in every one of some scenarios.
 
         Today's AMR has its laser scanners alone, where the robot has any.
-
-        Raises:
-            SimError: an episode that cannot be run.
         """
         perception = Perception.named(self.perception)
         sensors = perception.sensors
@@ -335,7 +332,6 @@ class _Race:
         return next((name for name, known in self.anchors.items() if known == policy), "")
 
     def _anchor(self, name: str) -> Candidate:
-        """Return the base policy or a preset as a candidate."""
         policy = self.anchors[name]
         return Candidate((name,), None, policy, self.tuned[name], self._held_out(name, policy))
 

@@ -46,11 +46,7 @@ _LINES: Final = {
 def frontier_command(
     folder: Path | None, experiment: Experiment, out: Path, *, as_json: bool, **running: Any
 ) -> int:
-    """Run the family unless a folder of episodes is given, and write what it shows.
-
-    Raises:
-        SimError: an unusable option or folder, or no episode to compare.
-    """
+    """Run the family unless a folder of episodes is given, and write what it shows."""
     failed = 0
     if folder is None:
         folder, records = out, _run(experiment, out, **running)

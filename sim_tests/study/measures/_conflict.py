@@ -80,9 +80,6 @@ class Outline:
             velocities_base_mps: (N, 2) constant velocities relative to the outline, which does not
                 turn.
             radius_m: radius of the discs, > 0.
-
-        Returns:
-            (N,) times.
         """
         to = centres_base_m[:, None, :] - self._corners
         velocity = velocities_base_mps[:, None, :]

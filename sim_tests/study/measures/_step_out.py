@@ -136,9 +136,6 @@ def step_out_impacts(
     the body circle of 0.30 m, if robot and person then close at more than 0.03 m/s: the base origin
     with the person's centre, plus what turning adds at the touching point. A path through a rack, a
     wall or a prop gives none.
-
-    Raises:
-        SimError: a result without frames, or with frames that do not hold all people.
     """
     trace = Trace.of(result) if trace is None else trace
     if not trace.anybody:

@@ -54,23 +54,9 @@ def compare_planners(
     the policy ``blind``, which times are compared with. An episode whose planner raises an error,
     returns no command or exceeds the time limit fails alone.
 
-    Args:
-        planners: ``"module:NAME"`` (a class, a function that returns a planner, or a planner, with
-            arguments as ``"module:NAME(gain=2.0)"``), ``"reference"``, ``"costmap"``,
-            ``"straight_on"``, or a class or function that can be imported by its name.
-        scenarios: templates, shipped names, YAML files, or ``"all"``.
-        out_dir: folder of the run (:class:`~sim_tests.study.runs.RunFiles`), with
-            ``report.html``.
-        policies: presets, YAML files, ``"oracle"``, or pairs of a name and a policy.
-        seeds: seeds of the episodes.
-        workers: number of processes; 1 runs in this process unless there is a time limit.
-        time_limit_s: wall-clock limit of an episode, which ends planners that hang.
-        resume: continue the comparison in the folder.
-        overwrite: replace the one in the folder.
-        progress: show progress on standard error.
-        about: further entries of ``run.json``.
-        conditions: ``perception`` (default ``"truth"``), ``sensors`` (one set), ``camera``,
-            ``robot`` and ``population``, as for :func:`~sim_tests.study.runs.plan_jobs`.
+    A planner is given as on the command line, or as a class or function that can be imported by its
+    name. ``conditions`` are those of :func:`~sim_tests.study.runs.plan_jobs`, with one set of
+    sensors and by default the truth; the rest is as for :func:`~sim_tests.study.runs.run_jobs`.
 
     Returns:
         The rows of all episodes, the failed ones included.
@@ -115,10 +101,6 @@ def plan_comparison(
 
     The reference planner and the policy ``blind`` are added where they are missing. The arguments
     are those of :func:`compare_planners`.
-
-    Raises:
-        SimError: an unusable argument, or a scenario that needs no planner.
-        NavError: an unknown preset or unusable policy file.
     """
     for name, given in (("seeds", seeds), ("scenarios", scenarios)):
         if not given:

@@ -60,9 +60,6 @@ class Workers(AbstractContextManager["Workers"]):
             ``workers`` processes on this computer; None works without Dask.
         own_process: a single worker has a process of its own, too.
         most: no more processes than this, such as the number of items; None for no bound.
-
-    Raises:
-        SimError: no workers.
     """
 
     def __init__(

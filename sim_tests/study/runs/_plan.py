@@ -291,9 +291,6 @@ def sample_jobs(jobs: Sequence[Job], count: int, seed: int = 0) -> tuple[Job, ..
     jobs of a fault, those come first whose scenario, then whose policy, planner and perception,
     were drawn least. Otherwise chance decides. A smaller sample with the same seed is part of a
     larger one.
-
-    Raises:
-        SimError: for a count that is no whole number of jobs of the plan, at least 1.
     """
     number = finite_number("sample", count, SimError, minimum=1, maximum=len(jobs))
     if number != int(number):

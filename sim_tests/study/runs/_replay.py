@@ -134,11 +134,7 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
 def replay_command(
     folder: Path, episode: str, *, out: Path | None, no_video: bool, view: bool
 ) -> int:
-    """Run an episode again, write its pictures or its page, and compare its row with the run's.
-
-    Raises:
-        SimError: the folder holds no run, or the run does not have the episode.
-    """
+    """Run an episode again, write its pictures or its page, and compare its row with the run's."""
     jobs, files, rows = read_jobs(folder), RunFiles(folder), read_rows(folder)
     every = episode == _EVERY
     numbers = range(len(jobs)) if every else [find_episode(jobs, episode)]
@@ -215,11 +211,7 @@ def box_scale_of(job: Job) -> float:
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:
-    """Return the number of an episode, given as number or SCENARIO:SEED:POLICY[:PLANNER][:FAULT].
-
-    Raises:
-        SimError: there is no such episode, or more than one.
-    """
+    """Return the number of an episode: a number, or SCENARIO:SEED:POLICY[:PLANNER][:FAULT]."""
     if episode.isdecimal():
         number = int(episode)
         if number >= len(jobs):

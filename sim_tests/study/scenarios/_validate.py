@@ -211,7 +211,6 @@ def check_attention(template: ScenarioTemplate, seeds: Iterable[int]) -> Attenti
 
 
 def _names(scenario: Scenario, measured: Sequence[MeasuredAttention]) -> list[str]:
-    """Return the names of all people: those of the scenario, then replayed people."""
     names = [person.name for person in scenario.people]
     everybody = max((len(each.could_look_s) for each in measured), default=0)
     return names + [f"recorded person {number}" for number in range(everybody - len(names))]

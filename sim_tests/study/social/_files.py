@@ -37,11 +37,7 @@ _MOVES_MPS: Final = 0.05
 
 
 def format_of(path: Path) -> str:
-    """Return the name of the format that a file has by the end of its name.
-
-    Raises:
-        SimError: no format has this end.
-    """
+    """Return the name of the format that a file has by the end of its name."""
     for name, suffix in FORMATS.items():
         if path.suffix.lower() == suffix:
             return name

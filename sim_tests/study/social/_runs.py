@@ -64,11 +64,7 @@ class EpisodeRecorder:
     def episode(
         self, result: CrossingResult, outcome: Outcome | None = None, name: str = ""
     ) -> SocialEpisode:
-        """Return the recorded episode.
-
-        Raises:
-            SimError: nothing was recorded.
-        """
+        """Return the recorded episode."""
         if self._task is None:
             raise SimError("an episode without a control cycle cannot be measured")
         states = [frame.robot_state for frame in result.frames]
@@ -103,11 +99,7 @@ def _course(motion: PersonMotion) -> tuple[float, ...]:
 
 
 def episode_of(job: Job) -> tuple[SocialEpisode, EpisodeRecord]:
-    """Run the episode of a job again; return its course and its row in the table.
-
-    Raises:
-        SimError: the job cannot be read, or its planner fails.
-    """
+    """Run the episode of a job again; return its course and its row in the table."""
     recorder = EpisodeRecorder()
     result, record = observed_episode(job, recorder)
     free = free_run_of(job)

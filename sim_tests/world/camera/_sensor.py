@@ -42,9 +42,6 @@ def expose(rgb: Any, config: SensorConfig, rng: np.random.Generator) -> NDArray[
     """Return an image (H, W, 3) uint8 sRGB as the sensor delivers it.
 
     Without noise it is a copy, and ``rng`` draws nothing.
-
-    Raises:
-        SimError: for an image of another shape or type.
     """
     image = np.asarray(rgb)
     if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:

@@ -202,11 +202,7 @@ _FOLDER: Final = resources.files(__package__) / "textures"
 
 @cache
 def scenery_texture(name: str) -> NDArray[np.uint8]:
-    """Return a texture (H, W, 3), its first row at v = 1; read-only, read once.
-
-    Raises:
-        SimError: for a name that is not in :data:`TEXTURE_NAMES`.
-    """
+    """Return a texture (H, W, 3), its first row at v = 1; read-only, read once."""
     if name not in TEXTURE_NAMES:
         raise SimError(not_one_of("texture", name, TEXTURE_NAMES))
     data = np.frombuffer((_FOLDER / f"{name}.webp").read_bytes(), dtype=np.uint8)

@@ -402,9 +402,6 @@ def scenery(layout: WarehouseLayout, variant: int = 0) -> tuple[SceneryChunk, ..
 
     Chunks that usually hide others come first, so a renderer with a depth buffer shades fewer
     pixels twice.
-
-    Raises:
-        SimError: for a variant that is not a whole number ≥ 0.
     """
     if isinstance(variant, bool) or not isinstance(variant, int) or variant < 0:
         raise SimError(f"variant must be a whole number of at least 0, got {variant!r}")

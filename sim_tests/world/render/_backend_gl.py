@@ -160,7 +160,6 @@ class GlBackend(RenderBackend):
             return _read(framebuffer, viewport)
 
     def _draw_bodies(self, clip_odom: FloatArray) -> None:
-        """Draw every body that is not hidden."""
         shown = [(number, body) for number, body in enumerate(self._bodies) if not body.hidden]
         if not shown:
             return
