@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, TypeVar, get_args
 
 from awarenav.errors import did_you_mean
 from awarenav.files import atomic_path
-from perception.installation import install_command
 
 from ...conditions import AXES, Conditions
-from ...world.errors import SimError
+from ...world.errors import SimError, needs
 from ._awareness import Awareness
 from ._metrics import COLUMNS
 from ._registry import Column, Kind
@@ -220,13 +219,8 @@ def write_records(path: Path | str, records: Iterable[EpisodeRecord]) -> None:
 
 def _parquet() -> Any:
     """Return the module that reads and writes Parquet."""
-    try:
+    with needs("Parquet", "pyarrow"):
         import pyarrow.parquet as pq  # noqa: PLC0415 - an optional dependency
-    except ImportError as cause:  # pragma: no cover - depends on the installation
-        raise SimError(
-            "Parquet needs pyarrow, which is not installed; it is part of the extra 'bench': "
-            + install_command("bench")
-        ) from cause
     return pq
 
 

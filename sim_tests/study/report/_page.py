@@ -9,9 +9,8 @@ from importlib import resources
 from pathlib import Path
 
 from awarenav.files import write_text
-from perception.installation import install_command
 
-from ...world.errors import SimError
+from ...world.errors import SimError, needs
 from ..measures import Interval, number_text
 
 
@@ -40,7 +39,7 @@ Row = Sequence[Cell | str]
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table whose columns sort."""
+    """A table whose columns sort, by heading and meaning; the first ``text_columns`` hold text."""
 
     columns: Mapping[str, str]
     rows: Sequence[Row]
@@ -110,14 +109,9 @@ def write_page(
     Raises:
         SimError: the page cannot be written, or the extra ``bench`` is missing.
     """
-    try:
+    with needs("a report", "jinja2"):
         from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - an optional dependency
         from markupsafe import Markup  # noqa: PLC0415
-    except ImportError as cause:  # pragma: no cover - depends on the installation
-        raise SimError(
-            "a report needs jinja2, which is not installed; it is part of the extra 'bench': "
-            + install_command("bench")
-        ) from cause
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -19,9 +19,8 @@ from typing import Any, Final, TypeVar
 from joblib.externals.loky import get_reusable_executor
 
 from perception.arrays import finite_number
-from perception.installation import install_command
 
-from ...world.errors import SimError
+from ...world.errors import SimError, needs
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -229,14 +228,9 @@ def _processes(count: int) -> Executor:
 @contextlib.contextmanager
 def _cluster(scheduler: str, workers: int) -> Iterator[Any]:
     """Yield a client of a Dask cluster; raise SimError if no scheduler answers."""
-    try:
+    with needs("a scheduler", "Dask"):
         import dask  # noqa: PLC0415 - an optional dependency
         from distributed import Client, LocalCluster  # noqa: PLC0415
-    except ImportError as cause:  # pragma: no cover - depends on the installation
-        raise SimError(
-            "a scheduler needs Dask, which is not installed; it is part of the extra 'bench': "
-            + install_command("bench")
-        ) from cause
     with contextlib.ExitStack() as cleanup:  # runs in the opposite order
         address: Any = scheduler
         try:

@@ -20,9 +20,8 @@ import numpy as np
 from awarenav.errors import MissingExtraError, not_one_of
 from awarenav.files import write_text
 from perception.arrays import FloatArray
-from perception.installation import install_command
 
-from ...world.errors import SimError
+from ...world.errors import SimError, needs
 from ._episode import SocialEpisode, wrapped
 
 #: The ends of the files of each format.
@@ -152,13 +151,8 @@ def _navwareset_text(episode: SocialEpisode) -> str:
 
 def import_pandas(what: str) -> Any:
     """Return pandas; raise MissingExtraError, which names what needs it, if it is missing."""
-    try:
+    with needs(what, "pandas", MissingExtraError):
         import pandas as pd  # noqa: PLC0415 - an optional dependency
-    except ImportError as cause:
-        raise MissingExtraError(
-            f"{what} needs pandas, which is not installed; it is part of the extra 'bench': "
-            + install_command("bench")
-        ) from cause
     return pd
 
 
