@@ -106,7 +106,10 @@ class SpeedGovernor:
             assert courses is not None
             known = known_now(self._policy, self._unaware_mps, each, person, now)
             own_mps, _ = lowest(known, courses, self._rules)
-            first_mps = own_mps if person.lost_limit_mps is None else person.lost_limit_mps
+            back_mps = math.inf if other is None else lowest(known, other, self._rules)[0]
+            first_mps = person.lost_limit_mps
+            if first_mps is None:  # a robot that stands may leave either way
+                first_mps = min(own_mps, back_mps)
             least_mps = self._lost.least_mps(first_mps, person.lost_for_s(now))
             if least_mps >= maximum_mps:
                 continue
@@ -114,9 +117,7 @@ class SpeedGovernor:
             if max(own_mps, least_mps) < lowest_mps:
                 lowest_mps = max(own_mps, least_mps)
                 reason, key = f"track {each}: {self._lost.name}", None
-            if other is not None:
-                back_mps, _ = lowest(known, other, self._rules, other_mps)
-                other_mps = min(other_mps, max(back_mps, least_mps))
+            other_mps = min(other_mps, max(back_mps, least_mps))
         if lowest_mps >= maximum_mps:
             reason, key = "robot maximum", None
         limit_mps = min(lowest_mps, maximum_mps)

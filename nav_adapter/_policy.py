@@ -83,8 +83,8 @@ class AwarenessPolicy(NavConfig):
             object.
         reach: how people change their motion and the robot its course.
         without: names of rules of the limit (:mod:`nav_adapter.rules`) that are left out. Without
-            ``reach``, ``walking on`` and ``first sight``, a robot knows no motion of people: it has
-            the protective field of a safety laser scanner alone.
+            ``reach``, ``walking on`` and ``first sight`` do not count either: a robot knows no
+            motion of people, and has the protective field of a safety laser scanner alone.
         noticed_counts_as: while ``PersonTrack.noticed`` is at least 0.5, the belief that a person
             who does not look now knows of the robot, the lower bound of α is at least this; None
             for nothing. It needs ``filter.noticed_memory_s`` and a laser scanner: with a camera
@@ -114,8 +114,13 @@ class AwarenessPolicy(NavConfig):
     filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=3.0)
 
     def applies(self, rule: str) -> bool:
-        """Return whether a rule of the limit (:mod:`nav_adapter.rules`) counts, given its name."""
-        return rule not in self.without
+        """Return whether a rule of the limit (:mod:`nav_adapter.rules`) counts, given its name.
+
+        Two rules lower the limit for people who are aware to what ``reach`` allows for others.
+        Alone, they would slow the robot down for those who have noticed it.
+        """
+        beside_reach = rule in ("walking on", "first sight") and "reach" in self.without
+        return rule not in self.without and not beside_reach
 
     @classmethod
     def preset(cls, name: str) -> AwarenessPolicy:

@@ -38,6 +38,7 @@ __all__ = [
     "in_the_path_mps",
     "limit_mps",
     "passing_radius_m",
+    "step_of_s",
     "stops_in_time",
 ]
 
@@ -49,8 +50,15 @@ FINEST: Final = 0.13
 PASSING_MPS: Final = 0.3
 # So many steps are first looked at as one.
 _STEPS_A_LOOK: Final = 6
+# A robot that brakes at once has no shorter steps: there would be too many in its reaction time.
+_SHORTEST_S: Final = 0.01
 # More than the rounding of any distance that matters.
 _ROUNDING_M: Final = 1e-9
+
+
+def step_of_s(maximum_mps: float, deceleration_mps2: float) -> float:
+    """Return the step of time of a robot, which depends on neither reaction time nor age."""
+    return max(maximum_mps / deceleration_mps2 / STEPS, _SHORTEST_S)
 
 
 def limit_mps(person: Reach, course: Course, at_most_mps: float = math.inf) -> float:
@@ -255,8 +263,7 @@ def _size_m(course: Course) -> float:
 
 
 def _step_s(course: Course) -> float:
-    """Return the step of time, which depends on neither reaction time nor age."""
-    return course.maximum_mps / ROOM / course.deceleration_mps2 / STEPS
+    return step_of_s(course.maximum_mps / ROOM, course.deceleration_mps2)
 
 
 def _later_s(t: float, step_s: float) -> float:

@@ -19,6 +19,7 @@ from sim_tests.study.measures import EpisodeRecord, read_records, write_records
 from sim_tests.study.runs import RunFiles, plan_jobs, run_jobs
 from sim_tests.world.errors import SimError
 
+from ._results import table
 from .parameters import CONTROLLERS, FACES
 
 _TIME_LIMIT_S: Final = 300.0
@@ -112,7 +113,11 @@ def main() -> int:
     parser.add_argument("--bare", action="store_true", help="no smoother, no collision monitor")
     parser.add_argument("--domain", default="77", help="ROS_DOMAIN_ID")
     parser.add_argument("--out", type=Path, default=Path("runs/nav2"), metavar="FOLDER")
+    parser.add_argument("--results", action="store_true", help="print the committed table; no run")
     options = parser.parse_args()
+    if options.results:
+        print(table())
+        return 0
     os.environ["ROS_DOMAIN_ID"] = options.domain
     options.out.mkdir(parents=True, exist_ok=True)
     try:

@@ -18,7 +18,7 @@ from perception.arrays import FloatArray
 from .._known import SpeedBasis
 from .._robot import RobotProfile
 from ..course import Course
-from ..limit import STEPS
+from ..limit import step_of_s
 from ..rules import Known
 from ._courses import NOWHERE_M, Pairs, Value, chosen_of, contacts_m, in_table, stopping_mps
 
@@ -108,7 +108,7 @@ class Reaches:
         vx, vy, U, tau, delay, elapsed, a0, a1, a2, body = np.ascontiguousarray(np.array(values).T)
         each_row = np.array(column_of)
         a, react = robot.max_deceleration_mps2, robot.reaction_time_s + elapsed
-        step_s = robot.max_speed_mps / a / STEPS * 2  # twice that of the limit
+        step_s = 2.0 * step_of_s(robot.max_speed_mps, a)  # twice that of the limit
         steps = math.ceil((react.max() + robot.max_speed_mps / a) / step_s + 1e-6)
         t = (step_s / _PARTS) * np.arange(_PARTS * steps + 1)[:, None]
         late = np.maximum(t - react, 0.0)

@@ -45,6 +45,8 @@ _TOUCH_WITHIN_M: Final = 0.8
 _BODY_UPDATE_HZ: Final = 60.0
 # A body that would move deeper than this into the robot in one update is held.
 _DEEPER_M: Final = 0.002
+# A touch ends when robot and person are that far apart.
+_APART_M: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -336,8 +338,11 @@ class Stage(AbstractContextManager["Stage"]):
         ``before`` are the motions of the robot before the last step but one, if it is known, and
         before the last step.
         """
-        if not self._held[index] and not self.amr.touches(self.workers[index].body):
-            self._touching[index] = None
+        body = self.workers[index].body
+        if not self._held[index] and not self.amr.touches(body):
+            # Two that press on each other come apart by less from step to step.
+            if self._touching[index] and not self.warehouse.nearest(self.amr.body, body, _APART_M):
+                self._touching[index] = None
             return
         approach = max(
             (self._approach(index, each) for each in before if each is not None),
@@ -347,8 +352,8 @@ class Stage(AbstractContextManager["Stage"]):
             # Only a person who walks into it moves a standing robot.
             approach = approach._replace(robot_mps=(0.0, 0.0))
         now, began = ContactEvent(self.t_s, index, approach), self._touching[index]
-        # A continuing touch is one contact, unless a robot that stood sets off into the person.
-        if began is None or (began.robot_speed_mps <= STANDING_SPEED_MPS and now.by == "robot"):
+        # A touch is one contact, unless the robot then moves into somebody who walked into it.
+        if began is None or (began.by == "person" and now.by == "robot"):
             self._touching[index] = now
             self.contacts.append(now)
         x, y = approach.towards_person

@@ -77,7 +77,7 @@ def policies(draw: st.DrawFn) -> AwarenessPolicy:
         inflation=draw(inflations()),
         speed=draw(human_speeds()),
         reach=draw(reach_rules()),
-        without=draw(st.sampled_from([(), (), (), SCANNER])),
+        without=draw(st.sampled_from([(), (), (), SCANNER, ("reach",), ("walking on",)])),
         noticed_counts_as=draw(st.none() | finite(0.0, 1.0)),
         margins=SafetyMargins(
             clearance_m=draw(finite(0.1, 0.5)),

@@ -84,6 +84,22 @@ def test_the_limit_rises_from_where_it_was_at_the_rate_of_the_policy() -> None:
     assert after[-1].limited_by == "robot maximum"
 
 
+@given(st.floats(1.0, 7.0), st.floats(-math.pi, math.pi))
+def test_no_limit_of_a_robot_that_stands_jumps_when_somebody_is_dropped(
+    away_m: float, bearing_rad: float
+) -> None:
+    nav = NavAdapter(POLICY, ROBOT)
+    place_m = away_m * np.array([math.cos(bearing_rad), math.sin(bearing_rad)])
+    lowest = []
+    for step in range(70):
+        now = step * PERIOD_S
+        tracks = [person(now, position=place_m)] if now < 1.0 else []
+        each = nav.update(tracks, robot_at(now), now, perception_stamp_s=now)
+        other_mps = min(each.other_way_limit_mps, MAXIMUM_MPS)
+        lowest.append(min(each.speed_limit_mps, other_mps))
+    assert max(b - a for a, b in pairwise(lowest[21:])) <= RISE_MPS2 * PERIOD_S + 1e-6
+
+
 def test_somebody_lost_at_stamp_0_lets_the_limit_rise_too() -> None:
     nav = NavAdapter(with_rise(0.5, hold_s=0.0), ROBOT)
     nav.update([person(position=(2.0, 0.0))], robot_at(), 0.0, perception_stamp_s=0.0)

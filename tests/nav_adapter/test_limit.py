@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -360,3 +361,15 @@ def test_beside_the_passing_radius_stands_the_nearest_person_who_lets_the_robot_
     radius_m = passing_radius_m(top_mps, rules, 0.1, ROBOT)
     assert lowest_mps(radius_m) >= 0.3
     assert lowest_mps(0.99 * radius_m) < 0.3
+
+
+@pytest.mark.parametrize(("top_mps", "brakes_mps2"), [(1e-6, 1.0), (0.01, 10.0)])
+def test_a_robot_that_brakes_at_once_takes_no_longer(top_mps: float, brakes_mps2: float) -> None:
+    """As many steps as there are in its reaction time, not in the time that it brakes."""
+    robot = replace(
+        ROBOT, max_speed_mps=top_mps, max_deceleration_mps2=brakes_mps2, reaction_time_s=5.0
+    )
+    before_s = time.process_time()
+    radius_m = passing_radius_m(1.5, AwarenessPolicy().reach, 0.1, robot)
+    assert time.process_time() - before_s < 2.0
+    assert radius_m > 5.0  # people walk on while it reacts

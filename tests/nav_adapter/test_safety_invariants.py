@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_policies import STEPS_S, Walk, driven, histories, policies, robots
-from nav_scenes import SCANNER, crowds, finite, moved_person, moved_robot, numbers, robot_at
+from nav_scenes import (
+    ROBOT,
+    SCANNER,
+    crowds,
+    finite,
+    moved_person,
+    moved_robot,
+    numbers,
+    person,
+    robot_at,
+)
 from shapely.geometry import Point
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile
@@ -90,6 +100,24 @@ def test_more_awareness_never_means_more_room_or_less_speed(
         for s, (*motion, people) in zip(share, walk, strict=True)
     ]
     _assert_ordered(run(policy, robot, lower), run(policy, robot, walk))
+
+
+@pytest.mark.parametrize("rule", ["reach", "walking on", "first sight", "unseen"])
+def test_whichever_rule_is_left_out_more_awareness_never_means_less_speed(rule: str) -> None:
+    policy = AwarenessPolicy(without=(rule,))
+    for velocity in ((0.0, 0.0), (-1.2, 0.0)):
+        adapters = [NavAdapter(policy, ROBOT) for _ in range(3)]
+        for now in np.arange(0.0, 1.0, 0.05):
+            place = (2.5 + velocity[0] * now, 0.6)
+            limits = [
+                adapter.update(
+                    [person(now, position=place, velocity=velocity, awareness_lower=lower)],
+                    robot_at(now, speed_mps=1.0),
+                    now,
+                ).speed_limit_mps
+                for adapter, lower in zip(adapters, (0.0, 0.5, 1.0), strict=True)
+            ]
+            assert limits == sorted(limits)
 
 
 def _assert_ordered(careful: list[NavConstraints], bold: list[NavConstraints]) -> None:

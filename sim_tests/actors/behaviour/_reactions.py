@@ -143,6 +143,8 @@ class ReactionModel:
             self._began_s, self._robot_waited_s = t_s, 0.0
             self._gave_up, self._course_rad = False, None
         line = self._line_beside(place, last_place, desired, robot)
+        if not conflict and not standing and _leaves(place, desired, robot):
+            return desired
         return self._carry_out(t_s, dt_s, place, desired, robot, line, standing)
 
     def _line_beside(
@@ -327,6 +329,13 @@ class _Line(NamedTuple):
 
 def _distance_m(place: tuple[float, float], robot: RobotBody) -> float:
     return math.hypot(place[0] - robot.x_m, place[1] - robot.y_m)
+
+
+def _leaves(place: tuple[float, float], desired: DesiredVelocity, robot: RobotBody) -> bool:
+    """Return whether the way of somebody leads away from the robot faster than it follows."""
+    vx = desired.speed_mps * desired.ux - robot.vx_mps
+    vy = desired.speed_mps * desired.uy - robot.vy_mps
+    return vx * (place[0] - robot.x_m) + vy * (place[1] - robot.y_m) > 0.0
 
 
 def _on_conflicting_course(

@@ -237,7 +237,7 @@ class Amr(Robot):
         # Of the last step. The wheels touch the floor, the body racks, walls and people alone.
         points = pybullet.getContactPoints(self.body, linkIndexA=-1, physicsClientId=self._client)
         obstacles = self._warehouse.obstacle_bodies
-        if any(point[2] in obstacles and point[8] <= 0.0 for point in points):
+        if any(point[2] in obstacles and _touch(point) for point in points):
             self._count_bump()
 
     @property
@@ -259,7 +259,7 @@ class Amr(Robot):
     def touches(self, body: int) -> bool:
         """Return whether another body touches the robot."""
         points = pybullet.getContactPoints(self.body, body, physicsClientId=self._client)
-        return any(point[8] <= 0.0 for point in points)
+        return any(_touch(point) for point in points)
 
     def _pose(self) -> tuple[FloatArray, Motion]:
         """Return pose and motion after the latest step; they are read once per step."""
@@ -456,6 +456,14 @@ def robot_of(
     if model is None or model.body == "nova_carter":
         return Amr(warehouse, position_odom_m, heading_odom_rad, camera_mount)
     return KinematicRobot(warehouse, model, position_odom_m, heading_odom_rad)
+
+
+def _touch(point: Sequence[Any]) -> bool:
+    """Return whether two bodies overlap at a contact point of PyBullet, or press on each other.
+
+    A collision may stop a body a hair's breadth before it overlaps the other.
+    """
+    return bool(point[8] <= 0.0 or point[9] > 0.0)
 
 
 def _ramped(now: float, target: float, rise: float, fall: float) -> float:

@@ -335,7 +335,7 @@ def awareness(log: Log) -> Awareness:
 
 @column
 def reaction(log: Log) -> str:
-    """Reaction of that person, see :class:`PersonOutcome`."""
+    """First reaction of that person, see :class:`PersonOutcome`."""
     if log.nearest_person is None:
         return ""
     _, person = log.nearest_person

@@ -141,6 +141,33 @@ def test_nobody_who_waits_steps_towards_the_path_of_the_robot(seed):
             assert off_m[step + 1] > off_m[step] - 0.002
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("yaw_rate", [-0.2, -0.06, 0.06, 0.2])
+def test_whoever_overtakes_a_robot_and_leaves_keeps_to_the_way(side, yaw_rate):
+    """A robot that creeps and turns a little drives an arc, which is not in their way."""
+    route = [{"x_m": x, "y_m": side * 0.85} for x in (-3.0, 14.0)]
+    habits = {"glances": {"watches": True}, "reactions": {"wait": 1.0}, "social": False}
+    spec = PersonSpec.model_validate(
+        {"name": "overtakes", "route": route, "speed_mps": 2.0, **habits}
+    )
+    person = Person(spec, np.random.default_rng(0), np.zeros((0, 4)))
+    robot, reacted = Motion(0.0, 0.0, 0.0, 1.0), False
+    for step in range(140):
+        if person.place_odom_m[0] > robot.x_m:
+            robot = robot._replace(forward_mps=0.1, yaw_rate_radps=yaw_rate)
+            if step % 20 < 10:
+                robot = robot._replace(yaw_rate_radps=-yaw_rate)
+        body = RobotBody(
+            *robot[:3], *robot.velocity_mps, 0.36, 0.25, (*robot[:2], 1.0), robot.yaw_rate_radps
+        )
+        person.step(step * DT_S, Surroundings(body, (), lambda: True))
+        reacted |= person.reaction == "wait"
+        assert side * person.place_odom_m[1] > 0.8
+        robot = robot.at(DT_S)
+    assert reacted
+    assert person.place_odom_m[0] > 6.0
+
+
 class _Turns:
     """A planner that drives ahead, and turns left by a right angle once it is past x."""
 

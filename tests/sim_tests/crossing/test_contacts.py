@@ -180,11 +180,18 @@ def test_nobody_is_driven_over(robot: str | None) -> None:
     result = drive(
         scene((2.5, 0.0), robot_model=robot), 0.6, *(0.0,) * (2 if robot == "omni" else 1)
     )
-    assert result.contact_by == "robot"
+    assert {contact.by for contact in result.contacts} == {"robot"}
     front_m = float(result.robot.footprint_m[:, 0].max())
     for frame in result.frames:
         gap_m = frame.truth[0].position_odom_m[0] - frame.robot_state.position_odom_m[0]
         assert gap_m > front_m
+
+
+@pytest.mark.parametrize("place_m", [1.5, 1.9, 2.2, 2.5])
+def test_the_first_contact_has_the_speed_before_the_collision(place_m: float) -> None:
+    """Physics stops the Carter a hair's breadth before it overlaps somebody."""
+    first = drive(scene((place_m, 0.0)), 0.8, 0.0).contacts[0]
+    assert (first.by, first.robot_speed_mps) == ("robot", pytest.approx(0.8, abs=0.01))
 
 
 @pytest.mark.parametrize("robot", [None, *KINEMATIC])

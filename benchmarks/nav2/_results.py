@@ -1,0 +1,69 @@
+"""The table of docs/test_your_nav2.md, from the committed rows of crossings under Nav2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from sim_tests.study.measures import EpisodeRecord, bootstrap_interval, paired, read_records
+
+#: The committed rows.
+ROWS: Final = Path(__file__).with_name("rows.csv")
+_TODAY: Final = "today"
+_FACES: Final = {
+    _TODAY: "today: scans alone",
+    "limit": "limit",
+    "grid": "limit and grid of people",
+    "mask": "limit and speed mask",
+}
+
+
+def table(path: Path = ROWS) -> str:
+    """Return the table as Markdown.
+
+    Times are sums over the episodes that both robots drove, with 95 % intervals by bootstrap over
+    episodes; an episode that never arrives counts with what it lasted.
+    """
+    groups: dict[tuple[str, str, str], list[EpisodeRecord]] = {}
+    for row in read_records(path):
+        controller, _, face = row.planner.partition(", ")
+        policy = "" if face == _TODAY else row.policy
+        groups.setdefault((controller, face, policy), []).append(row)
+    lines = [
+        "| stack | goals | time over today's | with attentive people | touched while moving | "
+        "step-out impacts, unaware; aware |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for (controller, face, policy), rows in groups.items():
+        today = groups[controller, _TODAY, ""]
+        attentive = [each for each in rows if each.attention == "attentive"]
+        touched = [each for each in rows if each.moving_contacts]
+        fastest = max((each.moving_contact_mps or 0.0 for each in touched), default=0.0)
+        impacts = (_mean(rows, name) for name in ("step_out_unaware", "step_out_aware"))
+        cells = (
+            f"{controller}, {_FACES[face]}{f', `{policy}`' if policy else ''}",
+            f"{sum(each.time_to_goal_s is not None for each in rows)} of {len(rows)}",
+            _times(today, rows) if policy else "1",
+            _times(today, attentive) if policy else "1",
+            f"{len(touched)}, {fastest:.2f} m/s" if touched else "0",
+            "; ".join(f"{each:.1f}" for each in impacts),
+        )
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _times(today: Sequence[EpisodeRecord], rows: Sequence[EpisodeRecord]) -> str:
+    pairs = [(first.lasted_s, second.lasted_s) for first, second in paired(today, rows)]
+    interval = bootstrap_interval(
+        [second for _, second in pairs],
+        np.random.default_rng(0),
+        over=[first for first, _ in pairs],
+    )
+    return interval.text(2)
+
+
+def _mean(rows: Sequence[EpisodeRecord], name: str) -> float:
+    return float(np.mean([getattr(each, name) or 0.0 for each in rows]))
