@@ -121,11 +121,7 @@ class Addressing:
         people, sound, moved_s = dict(people), history.sound, history.moved_s
         alerts: list[Alert] = []
         if self._policy.alerts is not None:
-            sigmas = self._policy.margins.uncertainty_sigmas
-            alerts, sound = _alerts_due(
-                *(self._policy.alerts, self._robot, people, robot_state, now),
-                *(sigmas, sound, self._prediction),
-            )
+            alerts, sound = self._warnings(self._policy.alerts, people, robot_state, now, sound)
         rules = self._policy.attention
         if rules is None:
             return Addressed(tuple(alerts), (), AddressHistory(sound), people)
@@ -156,6 +152,62 @@ class Addressing:
                         people[each.id] = each._replace(asked=asked)
         history = AddressHistory(sound, recent_s, moved_s)
         return Addressed(tuple(alerts), answers, history, people)
+
+    def _warnings(
+        self,
+        rules: AlertRules,
+        people: dict[int, Person],
+        robot_state: RobotState,
+        now: float,
+        sound: Sound,
+    ) -> tuple[list[Alert], Sound]:
+        """Return the warnings to give now, the most urgent first, and the latest sound with them.
+
+        Tentative tracks may be clutter and are not warned. Robot and people are predicted with
+        their present velocities, the robot straight ahead. The robot counts as its circumscribed
+        circle, and a body is enlarged by standard deviations of its position: the present one, or
+        with a prediction the one at the closest approach, at most 2 s ahead. Of ``people``, those
+        who are warned are replaced.
+        """
+        candidates: list[Alert] = []
+        sigmas = self._policy.margins.uncertainty_sigmas
+        # The robot's state is ``age_s`` old; it has driven straight on since.
+        age_s, position = now - robot_state.stamp_s, robot_state.position_odom_m.tolist()
+        reach_m = self._robot.circumscribed_radius_m + BODY_RADIUS_M
+        for each in people.values() if robot_state.travel_mps > STANDING_MPS else ():
+            if each.track.status == "tentative" or each.awareness_lower >= _UNAWARE_BELOW:
+                continue
+            time_s, gap_m = _closest_approach(
+                *(each, position, robot_state.velocity_odom_mps, age_s),
+                reach_m + sigmas * each.sigma_m,
+            )
+            if self._prediction is not None and math.isfinite(time_s):
+                horizon_s = np.array(
+                    [max(now - each.track.stamp_s, 0.0) + min(time_s, _PREDICTED_S)]
+                )
+                sigma_m = float(predicted_sigmas_m(each.track, horizon_s, self._prediction)[0])
+                gap_m = max(gap_m - sigmas * max(0.0, sigma_m - each.sigma_m), 0.0)
+            kind = _kind(rules, time_s) if gap_m <= rules.miss_within_m else None
+            if kind is not None:
+                reason = (
+                    f"track {each.id}: unaware (lower bound {each.awareness_lower:.2f}), "
+                    f"closest approach of {gap_m:.1f} m in {time_s:.1f} s"
+                )
+                candidates.append(Alert(each.id, kind, time_s, gap_m, reason))
+        candidates.sort(key=lambda alert: (alert.time_to_closest_s, alert.track_id))
+        alerts = []
+        for alert in candidates:
+            person = people[alert.track_id]
+            warned_s = dict(person.warned_s)
+            repeats = now - warned_s.get(alert.kind, -math.inf) < _REPEAT_AFTER_S
+            if repeats or sound.holds_back(alert.kind, now):
+                continue
+            if alert.kind in _LOUDNESS:
+                sound = Sound(now, _LOUDNESS[alert.kind])
+            warned_s[alert.kind] = now
+            people[person.id] = person._replace(warned_s=tuple(warned_s.items()))
+            alerts.append(alert)
+        return alerts, sound
 
     def _may_be_asked(
         self, person: Person, rules: AttentionRules, robot_state: RobotState, now: float
@@ -328,62 +380,6 @@ def _time_s(way_m: float, speed_mps: float) -> float:
     if way_m <= 0.0:
         return 0.0
     return min(way_m / speed_mps, _LONGEST_S) if speed_mps > 0.0 else _LONGEST_S
-
-
-def _alerts_due(
-    rules: AlertRules,
-    robot: RobotProfile,
-    people: dict[int, Person],
-    robot_state: RobotState,
-    now: float,
-    sigmas: float,
-    sound: Sound,
-    prediction: PredictionModel | None,
-) -> tuple[list[Alert], Sound]:
-    """Return the alerts to give now, the most urgent first, and the latest sound with them.
-
-    Tentative tracks may be clutter and are not warned. Robot and people are predicted with their
-    present velocities, the robot straight ahead. The robot counts as its circumscribed circle, and
-    a body is enlarged by ``sigmas`` standard deviations of its position: the present one, or with a
-    ``prediction`` the one at the closest approach, at most 2 s ahead. Of ``people``, those who are
-    warned are replaced.
-    """
-    candidates: list[Alert] = []
-    # The robot's state is ``age_s`` old; it has driven straight on since.
-    age_s, position = now - robot_state.stamp_s, robot_state.position_odom_m.tolist()
-    reach_m = robot.circumscribed_radius_m + BODY_RADIUS_M
-    for each in people.values() if robot_state.travel_mps > STANDING_MPS else ():
-        if each.track.status == "tentative" or each.awareness_lower >= _UNAWARE_BELOW:
-            continue
-        time_s, gap_m = _closest_approach(
-            *(each, position, robot_state.velocity_odom_mps, age_s),
-            reach_m + sigmas * each.sigma_m,
-        )
-        if prediction is not None and math.isfinite(time_s):
-            horizon_s = np.array([max(now - each.track.stamp_s, 0.0) + min(time_s, _PREDICTED_S)])
-            sigma_m = float(predicted_sigmas_m(each.track, horizon_s, prediction)[0])
-            gap_m = max(gap_m - sigmas * max(0.0, sigma_m - each.sigma_m), 0.0)
-        kind = _kind(rules, time_s) if gap_m <= rules.miss_within_m else None
-        if kind is not None:
-            reason = (
-                f"track {each.id}: unaware (lower bound {each.awareness_lower:.2f}), "
-                f"closest approach of {gap_m:.1f} m in {time_s:.1f} s"
-            )
-            candidates.append(Alert(each.id, kind, time_s, gap_m, reason))
-    candidates.sort(key=lambda alert: (alert.time_to_closest_s, alert.track_id))
-    alerts = []
-    for alert in candidates:
-        person = people[alert.track_id]
-        warned_s = dict(person.warned_s)
-        repeats = now - warned_s.get(alert.kind, -math.inf) < _REPEAT_AFTER_S
-        if repeats or sound.holds_back(alert.kind, now):
-            continue
-        if alert.kind in _LOUDNESS:
-            sound = Sound(now, _LOUDNESS[alert.kind])
-        warned_s[alert.kind] = now
-        people[person.id] = person._replace(warned_s=tuple(warned_s.items()))
-        alerts.append(alert)
-    return alerts, sound
 
 
 def _kind(rules: AlertRules, time_s: float) -> AlertKind | None:

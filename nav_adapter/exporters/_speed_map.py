@@ -74,7 +74,6 @@ class SpeedMap:
         size_m: float = 10.0,
         resolution_m: float = 0.05,
         times_s: Sequence[float] = (0.0,),
-        aware_for_s: float = math.inf,
     ) -> SpeedMap:
         """Return the map of a square around a point, people moving as predicted.
 
@@ -88,7 +87,6 @@ class SpeedMap:
             size_m: side of the square.
             resolution_m: side of a cell, at least 1 mm.
             times_s: seconds after the constraints' stamp, ≥ 0; the lowest limit of them counts.
-            aware_for_s: as for :func:`speed_limit_at`.
 
         Raises:
             NavError: for numbers that are not finite or out of bounds, more than four million
@@ -111,7 +109,7 @@ class SpeedMap:
         limits = np.full(side * side, robot.max_speed_mps)
         for time_s in times:
             at_time = limits_at(
-                *(constraints, positions, None, None, 0.0, np.array([time_s]), aware_for_s),
+                *(constraints, positions, None, None, 0.0, np.array([time_s]), math.inf),
                 reach_m=math.sqrt(0.5) * cell,
             )
             np.minimum(limits, at_time[:, 0], out=limits)

@@ -44,15 +44,10 @@ _UNITS: Final = {"mm/s": 1000.0, "cm/s": 100.0, "km/h": 3.6}
 
 
 class _Sample(NamedTuple):
-    """The pose of the odometry's child frame, and the motion since the first sample.
+    """The pose (2,), (3, 3) of the odometry's child frame in odom, and the motion since the first.
 
-    Attributes:
-        stamp_s: of the message.
-        position_m: (2,) in odom.
-        rotation: (3, 3) of the child frame in odom.
-        rates: (5,) x, y in odom; x, y as the twist has them; yaw rate.
-        driven: (5,) integral of the rates.
-        turned_rad: about z, of the poses.
+    The rates (5,) are x, y in odom; x, y as the twist has them; yaw rate. ``driven`` is their
+    integral; the poses have turned about z.
     """
 
     stamp_s: float

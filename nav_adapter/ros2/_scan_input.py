@@ -102,17 +102,14 @@ class PerceivedScan:
 class ScanPerception:
     """Finds people in the scans of all scanners. One thread at a time; others wait.
 
-    Args:
-        body_base_m: (M, 2) outline of the robot; returns on it are dropped.
-        inputs: the scanners.
-        make_detector: makes the detector that all share.
+    Returns on the outline (M, 2) of the robot's body are dropped.
     """
 
     def __init__(
         self,
         body_base_m: FloatArray,
         inputs: tuple[ScannerInput, ...],
-        make_detector: Callable[[], LegDetector] = LegDetector,
+        make_detector: Callable[[], LegDetector],
     ) -> None:
         self._body_base_m, self._inputs = body_base_m, inputs
         self._detector = make_detector()

@@ -24,12 +24,8 @@ class MessageThread:
     publishes on with older and older people until it stops the robot, and the next message is
     tried.
 
-    Args:
-        bridge: its :meth:`~AwarenessBridge.tick` is called by another thread.
-        clock: returns the present time, s.
-        name: of the thread.
-        most_waiting: number of messages of each kind that may wait, the most urgent kind first.
-            The oldest ones are dropped for new ones.
+    ``most_waiting`` messages of each kind may wait, the most urgent kind first. The oldest ones are
+    dropped for new ones.
     """
 
     def __init__(
