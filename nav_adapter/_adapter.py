@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from perception.arrays import finite_number
+import numpy as np
+
+from perception.arrays import FloatArray, finite_number
 from tracking import PersonTrack
 from tracking.clock import Entry, Gate
 from tracking.prediction import PredictionModel
 
 from ._asking import Addressed, AddressHistory, Addressing
 from ._checks import age_of_s, checked_tracks, goes_back, require_type
-from ._constraints import NavConstraints
+from ._constraints import NavConstraints, PersonObstacle
 from ._errors import NavError
 from ._governor import GovernedSpeed, SpeedGovernor
 from ._known import SpeedBasis
-from ._obstacles import obstacles_of
 from ._people import People, Person
 from ._policy import AwarenessPolicy
 from ._robot import LATERAL_NOISE_MPS, RobotProfile, RobotState
@@ -35,13 +36,9 @@ _MAX_PAUSE_S: Final = 10.0
 class _Memory:
     """The adapter's memory of its last update.
 
-    Attributes:
-        people: everybody, those who were dropped and still limit the speed included.
-        addressed: the latest warnings and requests.
-        constraints: the latest, or None before the first update.
-        given: the latest tracks, state of the robot, stamp of perception, and what was seen when.
-        ceiling_mps: ceiling of the limit during the recovery after stale data, or None.
-        silent: whether the people count as after a pause in the updates.
+    ``people`` are everybody, those who were dropped and still limit the speed included. ``given``
+    are tracks, state of the robot, stamp of perception, and what was seen when. The limit has a
+    ceiling during the recovery after stale data. If ``silent``, people count as after a pause.
     """
 
     people: tuple[Person, ...] = ()
@@ -299,8 +296,8 @@ class NavAdapter:
         for name, age_s in (("perception", perception_age_s), ("robot state", robot_age_s)):
             if age_s > timing.stop_after_s:
                 limit = limit.stopped(f"stale data: {name} is {age_s:.2f} s old")
-        if self._drives_sideways(robot_state):
-            limit = limit.stopped(self._drive_problem(robot_state))
+        if problem := self._drive_problem(robot_state):
+            limit = limit.stopped(problem)
         limit, ceiling_mps = self._limit_recovery(before, limit, robot_state, pause_s, stale)
         addressed = Addressed((), (), before.addressed, people)
         if addresses and not stale:
@@ -313,7 +310,7 @@ class NavAdapter:
         stands = stands_still(Motion.of(robot_state))
         constraints = NavConstraints(
             stamp_s=now,
-            obstacles=obstacles_of(people.values(), now),
+            obstacles=_obstacles_of(people.values(), now),
             speed_limit_mps=limit.limit_mps,
             limited_by=limit.limited_by,
             stale=stale,
@@ -366,23 +363,22 @@ class NavAdapter:
         done = ceiling_mps is None or ceiling_mps >= self._robot.max_speed_mps
         return limit, (None if done else ceiling_mps)
 
-    def _drives_sideways(self, robot_state: RobotState) -> bool:
-        """Return whether a robot moves sideways that cannot, according to its profile."""
-        lateral_mps = abs(robot_state.lateral_mps)
-        return self._robot.moves_sideways is False and lateral_mps > LATERAL_NOISE_MPS
-
     def _drive_problem(self, robot_state: RobotState) -> str:
+        """Return in words that a robot moves sideways that cannot, by its profile; else nothing."""
+        lateral_mps, robot = abs(robot_state.lateral_mps), self._robot
+        if robot.moves_sideways is not False or lateral_mps <= LATERAL_NOISE_MPS:
+            return ""
         return (
-            f"robot: moves sideways at {abs(robot_state.lateral_mps):.2f} m/s, but its profile "
-            f"says drive={self._robot.drive!r}"
+            f"robot: moves sideways at {lateral_mps:.2f} m/s, but its profile says "
+            f"drive={robot.drive!r}"
         )
 
     def _warn_of_drive(self, robot_state: RobotState) -> None:
         """Log lateral motion of a robot that has none, once until it ends."""
-        sideways = self._drives_sideways(robot_state)
-        if sideways and not self._warned_of_drive:
-            _LOG.warning("%s: the speed limit is 0", self._drive_problem(robot_state))
-        self._warned_of_drive = sideways
+        problem = self._drive_problem(robot_state)
+        if problem and not self._warned_of_drive:
+            _LOG.warning("%s: the speed limit is 0", problem)
+        self._warned_of_drive = bool(problem)
 
 
 def _latest_travel_mps(before: _Memory, robot_state: RobotState) -> float:
@@ -395,3 +391,42 @@ def _latest_travel_mps(before: _Memory, robot_state: RobotState) -> float:
     if robot_state.stamp_s > before.given[1].stamp_s:
         return robot_state.travel_mps
     return min(robot_state.travel_mps, before.constraints.reachable_speed_limit_mps)
+
+
+def _obstacles_of(people: Collection[Person], now: float) -> tuple[PersonObstacle, ...]:
+    """Return one obstacle per person, in the order of ``people``."""
+    if not people:
+        return ()
+    centers = np.array([person.position_odom_m for person in people])
+    # The rows become the obstacles' read-only centres.
+    centers.setflags(write=False)
+    obstacles = []
+    for person, center, covariance in zip(
+        people, centers, _covariances_at(people, now), strict=True
+    ):
+        # The adapter's own numbers need no checks, which take four times as long as the rest.
+        obstacle = object.__new__(PersonObstacle)
+        obstacle.__dict__.update(
+            track_id=person.id,
+            center_odom_m=center,
+            velocity_odom_mps=person.track.velocity_odom_mps,
+            radius_m=person.radius_m,
+            height_m=person.track.height_m,
+            awareness_lower=person.awareness_lower,
+            covariance_odom=covariance,
+        )
+        obstacles.append(obstacle)
+    return tuple(obstacles)
+
+
+def _covariances_at(people: Collection[Person], now: float) -> FloatArray:
+    """Return the covariances (N, 4, 4) of all tracks, predicted to ``now``; read-only."""
+    covariances = np.array([person.track.covariance_odom for person in people])
+    ages_s = [max(now - person.track.stamp_s, 0.0) for person in people]
+    if any(ages_s):
+        dt_s = np.array(ages_s)[:, None, None]
+        # F P Fᵀ by blocks, F = [[I, dt I], [0, I]].
+        covariances[:, :2] += dt_s * covariances[:, 2:]
+        covariances[:, :, :2] += dt_s * covariances[:, :, 2:]
+    covariances.setflags(write=False)
+    return covariances

@@ -1,4 +1,4 @@
-"""Choice of the person to ask for attention, with a limit on how often, and the answers."""
+"""Choice of the people to warn and of the one to ask for attention, and the answers."""
 
 from __future__ import annotations
 
@@ -17,16 +17,29 @@ from tracking.people import LOOKING_AWARENESS as _LOOKED
 from tracking.people import WALKING_MPS
 from tracking.prediction import PredictionModel
 
-from ._alerting import Sound, alerts_due, closest_approach
 from ._governor import GovernedSpeed, SpeedGovernor
-from ._people import LOOK_S, Asked, Person
+from ._people import LOOK_S, Asked, Person, Vector2
 from ._places import velocity_variance_m2ps2
 from ._policy import AwarenessPolicy
+from ._predicted import predicted_sigmas_m
 from ._robot import RobotProfile, RobotState
-from .alerts import Alert, AlertMeans, Answer
+from .alerts import Alert, AlertKind, AlertMeans, Answer
 from .limit import STANDING_MPS
-from .policies import AttentionRules
+from .policies import AlertRules, AttentionRules
 
+# Below this relative speed there is no closest approach.
+_SAME_VELOCITY_MPS: Final = 1e-3
+# Below this value of −(r · v), whether they approach is a matter of rounding.
+_CLOSING_M2PS: Final = 1e-9
+# The prediction is known to hold so far ahead.
+_PREDICTED_S: Final = 2.0
+# The lower bound of α below which a person is warned.
+_UNAWARE_BELOW: Final = 0.3
+# Shortest time until the same person gets the same alert again, and between a sound and another
+# that is no louder.
+_REPEAT_AFTER_S: Final = 3.0
+_QUIET_S: Final = 1.0
+_LOUDNESS: Final[dict[AlertKind, int]] = {"voice": 1, "horn": 2}
 # A look sooner after a request is by chance. The eyes need about 0.2 s to set out for a new target
 # (Saslow, Latency for saccadic eye movement, J. Opt. Soc. Am. 57, 1967), and the head follows.
 _REACTION_S: Final = 0.3 - 1e-9
@@ -42,6 +55,17 @@ _LONGEST_S: Final = 10.0
 _PARKED_AFTER_S: Final = 10.0
 # Budget, and how long people count as asked.
 _MINUTE_S: Final = 60.0
+
+
+class Sound(NamedTuple):
+    """The latest warning that sounded: its stamp, and how loud it was."""
+
+    stamp_s: float = -math.inf
+    loudness: int = 0
+
+    def holds_back(self, kind: AlertKind, now: float) -> bool:
+        """Return whether an alert of this kind has to wait, so that people can tell the two."""
+        return now - self.stamp_s < _QUIET_S and 0 < _LOUDNESS.get(kind, 0) <= self.loudness
 
 
 class AddressHistory(NamedTuple):
@@ -64,13 +88,8 @@ class Addressed(NamedTuple):
 class Addressing:
     """Warns people of collisions, and asks for attention.
 
-    A request or a warning changes no obstacle and no limit: only a look does, once measured.
-
-    Args:
-        policy: rules of warnings and requests.
-        robot: profile of the robot.
-        governor: gives the limits with and without a look.
-        prediction: of warnings.
+    A request or a warning changes no obstacle and no limit: only a look does, once measured. The
+    governor gives the limits with and without a look; the prediction is of warnings.
     """
 
     def __init__(
@@ -87,8 +106,7 @@ class Addressing:
         self._looked_lower = 1.0 if counts_as is None else counts_as
         if counts_as is not None:
             self._lasts_s += policy.filter.noticed_memory_s
-        nothing_known = estimate(PRIOR)
-        self._unseen_std = 0.5 * float(nothing_known.awareness_std)
+        self._unseen_std = 0.5 * float(estimate(PRIOR).awareness_std)
 
     def step(
         self,
@@ -103,16 +121,7 @@ class Addressing:
         people, sound, moved_s = dict(people), history.sound, history.moved_s
         alerts: list[Alert] = []
         if self._policy.alerts is not None:
-            alerts, sound = alerts_due(
-                self._policy.alerts,
-                self._robot,
-                people,
-                robot_state,
-                now,
-                self._policy.margins.uncertainty_sigmas,
-                sound,
-                self._prediction,
-            )
+            alerts, sound = self._warnings(self._policy.alerts, people, robot_state, now, sound)
         rules = self._policy.attention
         if rules is None:
             return Addressed(tuple(alerts), (), AddressHistory(sound), people)
@@ -143,6 +152,62 @@ class Addressing:
                         people[each.id] = each._replace(asked=asked)
         history = AddressHistory(sound, recent_s, moved_s)
         return Addressed(tuple(alerts), answers, history, people)
+
+    def _warnings(
+        self,
+        rules: AlertRules,
+        people: dict[int, Person],
+        robot_state: RobotState,
+        now: float,
+        sound: Sound,
+    ) -> tuple[list[Alert], Sound]:
+        """Return the warnings to give now, the most urgent first, and the latest sound with them.
+
+        Tentative tracks may be clutter and are not warned. Robot and people are predicted with
+        their present velocities, the robot straight ahead. The robot counts as its circumscribed
+        circle, and a body is enlarged by standard deviations of its position: the present one, or
+        with a prediction the one at the closest approach, at most 2 s ahead. Of ``people``, those
+        who are warned are replaced.
+        """
+        candidates: list[Alert] = []
+        sigmas = self._policy.margins.uncertainty_sigmas
+        # The robot's state is ``age_s`` old; it has driven straight on since.
+        age_s, position = now - robot_state.stamp_s, robot_state.position_odom_m.tolist()
+        reach_m = self._robot.circumscribed_radius_m + BODY_RADIUS_M
+        for each in people.values() if robot_state.travel_mps > STANDING_MPS else ():
+            if each.track.status == "tentative" or each.awareness_lower >= _UNAWARE_BELOW:
+                continue
+            time_s, gap_m = _closest_approach(
+                *(each, position, robot_state.velocity_odom_mps, age_s),
+                reach_m + sigmas * each.sigma_m,
+            )
+            if self._prediction is not None and math.isfinite(time_s):
+                horizon_s = np.array(
+                    [max(now - each.track.stamp_s, 0.0) + min(time_s, _PREDICTED_S)]
+                )
+                sigma_m = float(predicted_sigmas_m(each.track, horizon_s, self._prediction)[0])
+                gap_m = max(gap_m - sigmas * max(0.0, sigma_m - each.sigma_m), 0.0)
+            kind = _kind(rules, time_s) if gap_m <= rules.miss_within_m else None
+            if kind is not None:
+                reason = (
+                    f"track {each.id}: unaware (lower bound {each.awareness_lower:.2f}), "
+                    f"closest approach of {gap_m:.1f} m in {time_s:.1f} s"
+                )
+                candidates.append(Alert(each.id, kind, time_s, gap_m, reason))
+        candidates.sort(key=lambda alert: (alert.time_to_closest_s, alert.track_id))
+        alerts = []
+        for alert in candidates:
+            person = people[alert.track_id]
+            warned_s = dict(person.warned_s)
+            repeats = now - warned_s.get(alert.kind, -math.inf) < _REPEAT_AFTER_S
+            if repeats or sound.holds_back(alert.kind, now):
+                continue
+            if alert.kind in _LOUDNESS:
+                sound = Sound(now, _LOUDNESS[alert.kind])
+            warned_s[alert.kind] = now
+            people[person.id] = person._replace(warned_s=tuple(warned_s.items()))
+            alerts.append(alert)
+        return alerts, sound
 
     def _may_be_asked(
         self, person: Person, rules: AttentionRules, robot_state: RobotState, now: float
@@ -182,7 +247,8 @@ class Addressing:
         later = replace(
             robot_state, position_odom_m=np.array([x + _ANSWER_S * vx, y + _ANSWER_S * vy])
         )
-        straight, courses = self._governor.courses(later, robot_age_s)
+        courses = self._governor.courses(later, robot_age_s)
+        straight = courses.own
         vx, vy = person.velocity_odom_mps
         along_mps = straight.cos * vx + straight.sin * vy
         # Beside somebody who walks the same way, a look is forgotten before the robot has passed.
@@ -192,7 +258,7 @@ class Addressing:
         def lowest_mps(some: Iterable[Person], lowest_mps: float) -> float:
             for each in some:
                 moved = _moved(each, _ANSWER_S)
-                own_mps, _ = self._governor.person_mps(moved, straight, courses, now, lowest_mps)
+                own_mps = self._governor.person_mps(moved, courses, now, lowest_mps)
                 lowest_mps = min(lowest_mps, own_mps)
             return lowest_mps
 
@@ -221,7 +287,7 @@ class Addressing:
         robot_state: RobotState,
         now: float,
     ) -> Alert:
-        time_s, gap_m = closest_approach(
+        time_s, gap_m = _closest_approach(
             person,
             robot_state.position_odom_m.tolist(),
             robot_state.velocity_odom_mps,
@@ -314,3 +380,30 @@ def _time_s(way_m: float, speed_mps: float) -> float:
     if way_m <= 0.0:
         return 0.0
     return min(way_m / speed_mps, _LONGEST_S) if speed_mps > 0.0 else _LONGEST_S
+
+
+def _kind(rules: AlertRules, time_s: float) -> AlertKind | None:
+    """Return the loudest alert whose time is reached."""
+    if time_s < rules.horn_within_s:
+        return "horn"
+    if time_s < rules.voice_within_s:
+        return "voice"
+    return "light" if time_s < rules.light_within_s else None
+
+
+def _closest_approach(
+    memory: Person, robot_m: Vector2, robot_mps: Vector2, age_s: float, reach_m: float
+) -> tuple[float, float]:
+    """Return time (s) and gap (m) of the closest approach; the time is infinite if they move apart.
+
+    The robot was at ``robot_m`` ``age_s`` ago.
+    """
+    (x, y), (vx, vy) = memory.position_odom_m, memory.velocity_odom_mps
+    x, y = x - robot_m[0] - age_s * robot_mps[0], y - robot_m[1] - age_s * robot_mps[1]
+    vx, vy = vx - robot_mps[0], vy - robot_mps[1]
+    speed2 = vx * vx + vy * vy
+    closing = -(x * vx + y * vy)
+    if speed2 < _SAME_VELOCITY_MPS**2 or closing <= _CLOSING_M2PS:
+        return math.inf, max(math.hypot(x, y) - reach_m, 0.0)
+    time_s = closing / speed2
+    return time_s, max(math.hypot(x + time_s * vx, y + time_s * vy) - reach_m, 0.0)

@@ -1,11 +1,14 @@
-"""Checks of the adapter's input."""
+"""Checks of input."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from types import UnionType
-from typing import Final, get_args
+from typing import Any, Final, get_args
 
+import numpy as np
+
+from perception.arrays import FloatArray, finite_array, finite_number
 from tracking import PersonTrack
 
 from ._errors import NavError
@@ -14,6 +17,7 @@ from ._errors import NavError
 _MOST_S: Final = 1e12
 # Tolerated difference between the clocks of two computers, or of a camera and a control loop.
 _CLOCK_TOLERANCE_S: Final = 0.05
+_LARGEST_CELLS: Final = 4_000_000
 
 
 def age_of_s(name: str, stamp_s: float, now: float) -> float:
@@ -66,3 +70,22 @@ def require_type(name: str, value: object, kind: type | UnionType) -> None:
 def goes_back(now: float, last_s: float) -> str:
     """Return the message about a stamp that goes back."""
     return f"stamp_s must not go backward, got {now:.6f} s after {last_s:.6f} s"
+
+
+def checked_square(
+    what: str, center_odom_m: Any, size_m: float, resolution_m: float
+) -> tuple[FloatArray, float, int]:
+    """Return corner (2,), cell's side (m) and cells per side of a square around a point.
+
+    The corner is rounded to whole cells, so that people do not smear when the square moves.
+    """
+    center = finite_array("center_odom_m", center_odom_m, (2,), NavError)
+    size = finite_number("size_m", size_m, NavError, minimum=0.0, exclusive_minimum=True)
+    cell = finite_number("resolution_m", resolution_m, NavError, minimum=1e-3)
+    side = round(min(size / cell, 1e9))  # of a float, which may overflow
+    if not 0 < side * side <= _LARGEST_CELLS:
+        raise NavError(
+            f"a {what} must have 1 to {_LARGEST_CELLS} cells, got {side} x {side} "
+            f"(size_m {size:g}, resolution_m {cell:g})"
+        )
+    return (np.floor(center / cell) - side // 2) * cell, cell, side

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
-from typing import Any, cast
+from dataclasses import dataclass, field
+from typing import Any, Final
 
+import numpy as np
+import shapely
 from shapely.geometry import Polygon
 
 from perception.arrays import (
@@ -23,15 +24,14 @@ from ._known import SpeedBasis
 from ._robot import RobotProfile
 from .alerts import Alert, Answer
 
+_SIDES: Final = 24
+_ANGLES = np.arange(_SIDES) * (2.0 * math.pi / _SIDES)
+# Scaled so that the sides, not the corners, touch the circle: the polygon contains it.
+_UNIT_POLYGON = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1) / math.cos(math.pi / _SIDES)
 
-class _WithOutline:
-    """Has the rule for the polygon of an obstacle that nobody has asked for yet."""
 
-    __slots__ = ("_outline",)
-
-
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
-class PersonObstacle(_WithOutline):
+@dataclass(frozen=True, eq=False, repr=False)
+class PersonObstacle:
     """One person as an obstacle in the odom frame.
 
     Attributes:
@@ -83,32 +83,13 @@ class PersonObstacle(_WithOutline):
             set_fields(self, covariance_odom=covariance)
 
     def __getattr__(self, name: str) -> Any:
-        # Called for fields that are not set: the polygon of the adapter's obstacles, at first.
+        # Called for what is not set: the polygon of the adapter's obstacles, which many planners
+        # never ask for.
         if name != "polygon":
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        set_fields(self, polygon=self._outline())
-        return self.polygon
-
-
-_SET_OUTLINE = cast(Any, _WithOutline)._outline.__set__
-_SETTERS = [
-    cast(Any, getattr(PersonObstacle, each.name)).__set__
-    for each in fields(PersonObstacle)
-    if each.name != "polygon"
-]
-
-
-def trusted_obstacle(outline: Callable[[], Polygon], *values: Any) -> PersonObstacle:
-    """Make an obstacle of the values of its other fields, in their order, without checks.
-
-    For the adapter's own numbers only, with read-only arrays. It takes a fifth of the time of the
-    constructor. ``outline`` gives the polygon when it is first asked for: many planners never do.
-    """
-    obstacle = object.__new__(PersonObstacle)
-    for assign, value in zip(_SETTERS, values, strict=True):
-        assign(obstacle, value)
-    _SET_OUTLINE(obstacle, outline)
-    return obstacle
+        polygon = shapely.polygons(self.center_odom_m + self.radius_m * _UNIT_POLYGON)
+        set_fields(self, polygon=polygon)
+        return polygon
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

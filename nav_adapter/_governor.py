@@ -10,7 +10,7 @@ from ._known import known_now
 from ._people import Person, human_speed_mps
 from ._policy import AwarenessPolicy
 from ._robot import RobotProfile, RobotState
-from .course import Course, stands_still, travel_bearing_rad
+from .course import stands_still, travel_bearing_rad
 from .rigid import Motion
 from .rules import Courses, Lost, Sectors, Unseen, lowest, rules_of
 
@@ -52,12 +52,7 @@ class GovernedSpeed:
 
 
 class SpeedGovernor:
-    """Computes the speed limit for the people around the robot: the lowest of all people and rules.
-
-    Args:
-        policy: rules, margins and time behaviour.
-        robot: footprint, braking and reaction time.
-    """
+    """Computes the speed limit: the lowest of all people around the robot, and of all rules."""
 
     def __init__(self, policy: AwarenessPolicy, robot: RobotProfile) -> None:
         self._policy, self._robot = policy, robot
@@ -86,38 +81,38 @@ class SpeedGovernor:
         other_mps = math.inf if stands else 0.0
         courses = other = None
         if people or lost:
-            courses = Courses.of(self._policy, self._robot, motion, robot_age_s)
+            courses = self.courses(robot_state, robot_age_s)
             if stands:
                 other = Courses.of_starts(self._policy, self._robot, motion, robot_age_s)
         speed_mps = motion.travel_mps
-        for each, person in people.items():
+        for each, person in {**people, **lost}.items():
             assert courses is not None
             known = known_now(self._policy, self._unaware_mps, each, person, now)
             # A limit that is not the lowest counts only where it is below the speed.
-            own_mps, rule = lowest(known, courses, self._rules, max(lowest_mps, speed_mps))
-            if own_mps < lowest_mps:
-                lowest_mps, reason, key = own_mps, f"track {each}: {rule}", each
+            at_most_mps = math.inf if person.is_lost else max(lowest_mps, speed_mps)
+            own_mps, rule = lowest(known, courses, self._rules, at_most_mps)
+            back_mps, least_mps = math.inf, 0.0
             if other is not None:
-                other_mps = min(other_mps, lowest(known, other, self._rules, other_mps)[0])
-            # A robot within its limit has the whole reaction time left.
-            if own_mps < speed_mps and suffices and not stands:
-                suffices = all(rule.suffices(known, courses, speed_mps) for rule in self._rules)
-        for each, person in lost.items():
-            assert courses is not None
-            known = known_now(self._policy, self._unaware_mps, each, person, now)
-            own_mps, _ = lowest(known, courses, self._rules)
-            back_mps = math.inf if other is None else lowest(known, other, self._rules)[0]
-            first_mps = person.lost_limit_mps
-            if first_mps is None:  # a robot that stands may leave either way
-                first_mps = min(own_mps, back_mps)
-            least_mps = self._lost.least_mps(first_mps, person.lost_for_s(now))
-            if least_mps >= maximum_mps:
-                continue
-            kept[each] = person._replace(lost_limit_mps=first_mps)
-            if max(own_mps, least_mps) < lowest_mps:
-                lowest_mps = max(own_mps, least_mps)
-                reason, key = f"track {each}: {self._lost.name}", None
-            other_mps = min(other_mps, max(back_mps, least_mps))
+                at_most_mps = math.inf if person.is_lost else other_mps
+                back_mps, _ = lowest(known, other, self._rules, at_most_mps)
+            if person.is_lost:
+                first_mps = person.lost_limit_mps
+                if first_mps is None:  # a robot that stands may leave either way
+                    first_mps = min(own_mps, back_mps)
+                least_mps = self._lost.least_mps(first_mps, person.lost_for_s(now))
+                if least_mps >= maximum_mps:
+                    continue
+                kept[each] = person._replace(lost_limit_mps=first_mps)
+                rule = self._lost.name
+            elif own_mps < speed_mps and suffices and not stands:
+                # A robot within its limit has the whole reaction time left.
+                suffices = all(every.suffices(known, courses, speed_mps) for every in self._rules)
+            own_mps = max(own_mps, least_mps)
+            if own_mps < lowest_mps:
+                lowest_mps, reason = own_mps, f"track {each}: {rule}"
+                key = None if person.is_lost else each
+            if other is not None:
+                other_mps = min(other_mps, max(back_mps, least_mps))
         if lowest_mps >= maximum_mps:
             reason, key = "robot maximum", None
         limit_mps = min(lowest_mps, maximum_mps)
@@ -125,11 +120,7 @@ class SpeedGovernor:
         return self._seen(found, motion, seen_s, now), kept
 
     def _seen(
-        self,
-        found: GovernedSpeed,
-        motion: Motion,
-        seen_s: Sectors,
-        now: float,
+        self, found: GovernedSpeed, motion: Motion, seen_s: Sectors, now: float
     ) -> GovernedSpeed:
         """Return a limit under that of a direction of travel that no sensor has seen lately."""
         if not seen_s or not self._policy.applies(self._unseen.name):
@@ -143,19 +134,11 @@ class SpeedGovernor:
         where = f"{math.degrees(ahead_rad):.0f} degrees from ahead"
         return found.at_most(cap_mps, f"{self._unseen.name}: no sensor sees the way, {where}")
 
-    def courses(self, robot_state: RobotState, robot_age_s: float) -> tuple[Course, Courses]:
-        """Return the robot's own course, and all that the rules ask for."""
-        courses = Courses.of(self._policy, self._robot, Motion.of(robot_state), robot_age_s)
-        return courses.own, courses
+    def courses(self, robot_state: RobotState, robot_age_s: float) -> Courses:
+        """Return the robot's courses, its own and all that the rules ask for."""
+        return Courses.of(self._policy, self._robot, Motion.of(robot_state), robot_age_s)
 
-    def person_mps(
-        self,
-        person: Person,
-        _: Course,
-        courses: Courses,
-        now: float,
-        at_most_mps: float = math.inf,
-    ) -> tuple[float, str]:
-        """Return the limit that one person sets, infinite for none, and the rule."""
+    def person_mps(self, person: Person, courses: Courses, now: float, at_most_mps: float) -> float:
+        """Return the limit that one person sets, infinite for none."""
         known = known_now(self._policy, self._unaware_mps, person.id, person, now)
-        return lowest(known, courses, self._rules, at_most_mps)
+        return lowest(known, courses, self._rules, at_most_mps)[0]

@@ -143,9 +143,7 @@ class People:
     the person could not have reached belongs to a new, unaware person. The person who had it is
     kept under a negative id, as they would be without a track.
 
-    Args:
-        policy: radii, human speeds, margins and time behaviour.
-        robot: decides how large a circle must be for the limit beside it.
+    The robot decides how large a circle must be for the limit beside it.
 
     Raises:
         NavError: for a custom policy object whose values are not finite or grow with awareness.
@@ -190,13 +188,8 @@ class People:
         be there: at first sight again, but not forgotten. Each track stands for one person, and
         clutter for nobody.
 
-        Args:
-            people: of the update before.
-            tracks: the input.
-            now: stamp of the update.
-            before_s: stamp of the update before.
-            stale: whether the data are too old to trust.
-            silent: whether there was a pause in the updates.
+        The ``people`` are those of the update ``before_s``. Data are ``stale`` if they are too old
+        to trust, and ``silent`` says that there was a pause in the updates.
 
         Raises:
             NavError: for finite numbers that are too large for any person.

@@ -38,11 +38,7 @@ def checked_sigma_m(
 ) -> float:
     """Return :func:`position_sigma_m` of a person whose numbers are not too large for any person.
 
-    Args:
-        track: of the person.
-        place_m: predicted place, in odom.
-        velocity_mps: of the track.
-        ahead_s: as there.
+    The place is predicted, in odom, and the velocity is that of the track.
 
     Raises:
         NavError: for such a number.

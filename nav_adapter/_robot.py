@@ -211,22 +211,8 @@ class RobotState:
         return math.hypot(self.speed_mps, self.lateral_mps)
 
     @property
-    def travel_direction_odom(self) -> tuple[float, float]:
-        """Unit vector of the direction of travel; the heading for a robot that stands.
-
-        Lateral noise does not count.
-        """
-        forward, left = math.copysign(1.0, self.speed_mps), 0.0
-        if abs(self.lateral_mps) > LATERAL_NOISE_MPS:
-            travel_mps = self.travel_mps
-            forward, left = self.speed_mps / travel_mps, self.lateral_mps / travel_mps
-        return self._in_odom(forward, left)
-
-    @property
     def velocity_odom_mps(self) -> tuple[float, float]:
         """The velocity of the base in odom."""
-        return self._in_odom(self.speed_mps, self.lateral_mps)
-
-    def _in_odom(self, forward: float, left: float) -> tuple[float, float]:
         cos, sin = math.cos(self.heading_odom_rad), math.sin(self.heading_odom_rad)
+        forward, left = self.speed_mps, self.lateral_mps
         return forward * cos - left * sin, forward * sin + left * cos

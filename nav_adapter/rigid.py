@@ -10,6 +10,8 @@ from ._robot import RobotState
 
 # Places on an arc are given so many times while a body moves.
 _PLACES: Final = 24
+# Of a smaller turn, the bulge of an arc is rounding, and its radius may be infinite.
+_STRAIGHT_RAD: Final = 1e-12
 
 
 class Motion(NamedTuple):
@@ -102,7 +104,7 @@ class Motion(NamedTuple):
         straight line than by the second number, in metres.
         """
         points = list(points_m)
-        count = _PLACES if self.yaw_rate_radps else 1
+        count = _PLACES if abs(self.yaw_rate_radps) * until_s > _STRAIGHT_RAD else 1
         motions = [self.at(until_s * index / count) for index in range(count + 1)]
         places = [motion.point(*point) for motion in motions for point in points]
         if count == 1:

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 from ._cost import people_cost
 from ._costmap import CostmapPainter, paint_costmap
-from ._horizon import PredictedPeople, predicted_circles, predicted_people
+from ._horizon import predicted_circles
 from ._shapes import boxes, circles, points, polygons
 from ._speed_field import speed_limit_at, time_cost
 from ._speed_map import SpeedMap
-from ._velocity import half_planes, velocity_obstacles
+from ._velocity import half_planes
 
 __all__ = [
     "CostmapPainter",
-    "PredictedPeople",
     "SpeedMap",
     "boxes",
     "circles",
@@ -28,8 +27,6 @@ __all__ = [
     "points",
     "polygons",
     "predicted_circles",
-    "predicted_people",
     "speed_limit_at",
     "time_cost",
-    "velocity_obstacles",
 ]

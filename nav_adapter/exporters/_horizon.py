@@ -1,13 +1,13 @@
-"""People over the horizon of a planner: as circles, and as means with covariances."""
+"""People over the horizon of a planner."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from perception.arrays import FloatArray, finite_array, finite_number
-from tracking.prediction import FITTED, PredictionModel, predict_states
+from tracking.prediction import PredictionModel, predict_states
 
 from .._constraints import NavConstraints
 from .._errors import NavError
@@ -16,18 +16,6 @@ from ._shapes import circles
 
 # Distance of an empty slot from the robot: out of reach, but small enough for a solver's scaling.
 _FAR_M = 100.0
-
-
-class PredictedPeople(NamedTuple):
-    """Predicted positions of people, as normal distributions in the odom frame.
-
-    Attributes:
-        means_odom_m: (N, T, 2) positions.
-        covariances_odom_m2: (N, T, 2, 2) of those positions.
-    """
-
-    means_odom_m: FloatArray
-    covariances_odom_m2: FloatArray
 
 
 def predicted_circles(
@@ -67,7 +55,9 @@ def predicted_circles(
         NavError: for an argument that is not finite or out of bounds, and with a model for an
             obstacle without ``covariance_odom``.
     """
-    times = _checked_times(times_s)
+    times = finite_array("times_s", times_s, ("T",), NavError)
+    if bool((times < 0.0).any()):
+        raise NavError(f"times_s must not be negative, got {times.min():g} s")
     growth = finite_number("growth_mps", growth_mps, NavError, minimum=0.0)
     now = circles(constraints)
     out = np.repeat(now[:, None, :], len(times), axis=1)
@@ -90,38 +80,6 @@ def predicted_circles(
     return filled
 
 
-def predicted_people(
-    constraints: NavConstraints,
-    times_s: Any,
-    *,
-    model: PredictionModel | None = None,
-) -> PredictedPeople:
-    """Return the people at every time, with the uncertainty of their positions.
-
-    For planners with chance constraints, or with a cost in standard deviations. People keep their
-    present velocity. The covariance is that of :mod:`tracking.prediction`: on recorded and on
-    simulated people its region of two standard deviations holds 84 to 90 % of them, 86.5 % being
-    right, up to 2 s ahead.
-
-    The size of a person is not part of it: a body is a disc of 0.30 m around the position. The
-    ``radius_m`` of an obstacle already holds the uncertainty of the present.
-
-    Args:
-        constraints: the people, in the order of ``constraints.obstacles``.
-        times_s: (T,) seconds after ``constraints.stamp_s``, ≥ 0.
-        model: of the prediction, such as that of ``awarenav tracks calibrate``; None for the fitted
-            one.
-
-    Raises:
-        NavError: for an argument that is not finite or out of bounds, or an obstacle without
-            ``covariance_odom``.
-    """
-    times = _checked_times(times_s)
-    covariances = _covariances_of(constraints, "predicted_people")
-    now = circles(constraints)
-    return PredictedPeople(*predict_states(now[:, :4], covariances, times, model or FITTED))
-
-
 def _spread_m(
     constraints: NavConstraints,
     now: FloatArray,
@@ -131,27 +89,14 @@ def _spread_m(
 ) -> FloatArray:
     """Return by how much the radii (N, T) grow with the uncertainty of the positions."""
     count = finite_number("sigmas", sigmas, NavError, minimum=0.0)
-    covariances = _covariances_of(constraints, "predicted_circles with a model")
-    ahead = predict_states(now[:, :4], covariances, times, model).covariances_odom_m2
-    present_m = largest_sigmas_m(covariances[:, None, :2, :2])
-    return np.asarray(count * np.maximum(largest_sigmas_m(ahead) - present_m, 0.0))
-
-
-def _covariances_of(constraints: NavConstraints, name: str) -> FloatArray:
-    """Return the covariances (N, 4, 4) of all people."""
-    covariances = np.zeros((len(constraints.obstacles), 4, 4))
+    covariances = np.zeros((len(now), 4, 4))
     for index, obstacle in enumerate(constraints.obstacles):
         if obstacle.covariance_odom is None:
             raise NavError(
-                f"{name} needs the covariance of every person, as NavAdapter.update gives it; "
-                f"obstacles[{index}] has covariance_odom=None"
+                "predicted_circles with a model needs the covariance of every person, as "
+                f"NavAdapter.update gives it; obstacles[{index}] has covariance_odom=None"
             )
         covariances[index] = obstacle.covariance_odom
-    return covariances
-
-
-def _checked_times(times_s: Any) -> FloatArray:
-    times = finite_array("times_s", times_s, ("T",), NavError)
-    if bool((times < 0.0).any()):
-        raise NavError(f"times_s must not be negative, got {times.min():g} s")
-    return times
+    ahead = predict_states(now[:, :4], covariances, times, model).covariances_odom_m2
+    present_m = largest_sigmas_m(covariances[:, None, :2, :2])
+    return np.asarray(count * np.maximum(largest_sigmas_m(ahead) - present_m, 0.0))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,14 +35,12 @@ _SIMILAR_SIZE_RATIO: Final = 1.3
 _CELLS_PER_WINDOW: Final = 8000
 
 
-@dataclass(frozen=True, slots=True)
-class CostProfile:
+class CostProfile(NamedTuple):
     """The cost over distance from an obstacle; made by :func:`checked_profile`.
 
-    Attributes:
-        ring_m: ≥ 0, width of the zone with a cost beyond the obstacle (``inflation_radius``).
-        inscribed_radius_m: ≥ 0, of the robot; width of the zone with cost 253.
-        decay_per_m: > 0 (``cost_scaling_factor``).
+    ``ring_m`` ≥ 0 is the width of the zone with a cost beyond the obstacle (``inflation_radius``),
+    ``inscribed_radius_m`` ≥ 0 of the robot that of the zone with cost 253, and ``decay_per_m`` > 0
+    the ``cost_scaling_factor``.
     """
 
     ring_m: float

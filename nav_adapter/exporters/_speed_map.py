@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from perception.arrays import FloatArray, finite_array, finite_number, set_fields
 from perception.short_repr import short_repr
 
+from .._checks import checked_square
 from .._constraints import NavConstraints
 from .._errors import NavError
 from ._person_costs import checked_grid
 from ._speed_field import limits_at
-
-_LARGEST_CELLS: Final = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -75,7 +74,6 @@ class SpeedMap:
         size_m: float = 10.0,
         resolution_m: float = 0.05,
         times_s: Sequence[float] = (0.0,),
-        aware_for_s: float = math.inf,
     ) -> SpeedMap:
         """Return the map of a square around a point, people moving as predicted.
 
@@ -89,30 +87,20 @@ class SpeedMap:
             size_m: side of the square.
             resolution_m: side of a cell, at least 1 mm.
             times_s: seconds after the constraints' stamp, ≥ 0; the lowest limit of them counts.
-            aware_for_s: as for :func:`speed_limit_at`.
 
         Raises:
             NavError: for numbers that are not finite or out of bounds, more than four million
                 cells, or constraints that do not come from ``update``.
         """
-        center = finite_array("center_odom_m", center_odom_m, (2,), NavError)
-        size = finite_number("size_m", size_m, NavError, minimum=0.0, exclusive_minimum=True)
-        cell = finite_number("resolution_m", resolution_m, NavError, minimum=1e-3)
+        origin, cell, side = checked_square("map", center_odom_m, size_m, resolution_m)
         times = finite_array("times_s", times_s, ("T",), NavError)
         if not len(times) or bool((times < 0.0).any()):
             raise NavError(f"times_s must be one or more numbers >= 0, got {times_s!r:.80}")
-        side = round(size / cell)
-        if not 0 < side * side <= _LARGEST_CELLS:
-            raise NavError(
-                f"a map must have 1 to {_LARGEST_CELLS} cells, got {side} x {side} "
-                f"(size_m {size:g}, resolution_m {cell:g})"
-            )
         robot = constraints.robot
         if constraints.speed_basis is None or robot is None:
             raise NavError(
                 "constraints must come from NavAdapter.update, got some without speed_basis"
             )
-        origin = (np.floor(center / cell) - side // 2) * cell
         along = (np.arange(side) + 0.5) * cell
         positions = np.empty((side, side, 2))
         positions[:, :, 0] = origin[0] + along
@@ -121,7 +109,7 @@ class SpeedMap:
         limits = np.full(side * side, robot.max_speed_mps)
         for time_s in times:
             at_time = limits_at(
-                *(constraints, positions, None, None, 0.0, np.array([time_s]), aware_for_s),
+                *(constraints, positions, None, None, 0.0, np.array([time_s]), math.inf),
                 reach_m=math.sqrt(0.5) * cell,
             )
             np.minimum(limits, at_time[:, 0], out=limits)

@@ -1,4 +1,4 @@
-"""Velocities that lead into a person: half-planes and cones in velocity space."""
+"""Velocities that lead into a person: half-planes in velocity space."""
 
 from __future__ import annotations
 
@@ -95,38 +95,6 @@ def half_planes(
     change = np.where(on_cap, cap_change, leg_change)
     bound = normal @ velocity + taken * change
     return np.column_stack([normal, bound])
-
-
-def velocity_obstacles(
-    constraints: NavConstraints, position_odom_m: Any, robot_radius_m: float
-) -> FloatArray:
-    """Return (N, 6) cones of colliding velocities: apex vx, vy and the unit vectors of both legs.
-
-    The columns are apex (the person's velocity, m/s, odom), left leg x, y and right leg x, y. A
-    velocity leads into the person at some time if and only if it lies between the legs. For a robot
-    inside an obstacle, the legs are at right angles to the direction of its centre: velocities that
-    lead nearer to it lie between them (``docs/planners.md``, "Inside a circle").
-
-    Args:
-        constraints: the people.
-        position_odom_m: (2,) the robot's centre.
-        robot_radius_m: ≥ 0, of the disc around the robot.
-
-    Raises:
-        NavError: for an argument that is not finite or a negative radius.
-    """
-    position = finite_array("position_odom_m", position_odom_m, (2,), NavError)
-    robot_radius = finite_number("robot_radius_m", robot_radius_m, NavError, minimum=0.0)
-    rows = circles(constraints)
-    apart = rows[:, :2] - position
-    radius = rows[:, 4] + robot_radius
-    forward = _unit(apart, np.array([1.0, 0.0]))
-    sine = radius / np.maximum(np.hypot(apart[:, 0], apart[:, 1]), radius)
-    sine, cosine = sine[:, None], np.sqrt(1.0 - sine * sine)[:, None]
-    sideways = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
-    return np.hstack(
-        [rows[:, 2:4], cosine * forward + sine * sideways, cosine * forward - sine * sideways]
-    )
 
 
 def _unit(vectors: FloatArray, otherwise: FloatArray) -> FloatArray:

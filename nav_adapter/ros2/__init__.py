@@ -9,6 +9,7 @@ rclpy's messages are converted in :mod:`nav_adapter.ros2.conversions`.
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ._alerts import alerts
@@ -82,18 +83,11 @@ __all__ = [
 ]
 
 
+_NEED_EXTRA = {"decode": "_cdr", "encode": "_cdr", "DdsNode": "_dds", "McapRecorder": "_mcap"}
+
+
 def __getattr__(name: str) -> Any:
     """Load the names that need the extra ``ros2`` at first use."""
-    if name in ("decode", "encode"):
-        from . import _cdr  # noqa: PLC0415
-
-        return getattr(_cdr, name)
-    if name == "DdsNode":
-        from ._dds import DdsNode  # noqa: PLC0415
-
-        return DdsNode
-    if name == "McapRecorder":
-        from ._mcap import McapRecorder  # noqa: PLC0415
-
-        return McapRecorder
+    if name in _NEED_EXTRA:
+        return getattr(import_module(f"{__name__}.{_NEED_EXTRA[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

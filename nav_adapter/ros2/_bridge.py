@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain
+from typing import Any
 
 from perception import AwarenessPipeline, Camera, PerceptionError
 from perception.arrays import FloatArray
@@ -292,7 +293,10 @@ class AwarenessBridge:
                     constraints = stopped(now_s, "the clock went backward")
                 else:
                     self._poses.drop_future(time_s)
-                    constraints = explained(self._constraints(time_s), self._watch.blind_text)
+                    constraints = self._constraints(time_s)
+                    if constraints.stale and (blind := self._watch.blind_text):
+                        reason = f"{constraints.limited_by}; {blind}"
+                        constraints = replace(constraints, limited_by=reason)
                 tracks, state = self.tracks, self._poses.state
                 details = {name: str(count) for name, count in self.counts.items()}
                 if self.frame is not None:
@@ -413,16 +417,9 @@ def guarded_update(
     warn: Callable[[str], bool],
     seen_stamp_s: Callable[[float, float], float | None] | None = None,
 ) -> NavConstraints:
-    """Return the adapter's constraints, or a stop with the reason if it refuses or fails.
+    """Return :meth:`NavAdapter.update`, or a stop with the reason if it refuses or fails.
 
-    Args:
-        adapter: is updated.
-        tracks: the latest.
-        robot_state: the latest.
-        now_s: the present time.
-        perception_stamp_s: time from which perception is.
-        warn: called with the problem; returns whether it is a new one.
-        seen_stamp_s: as for :meth:`NavAdapter.update`.
+    ``warn`` is called with the problem, and returns whether it is a new one.
     """
     try:
         return adapter.update(
@@ -445,20 +442,8 @@ def guarded_update(
         older = adapter.watchdog(now_s)
     except Exception:
         return stopped(now_s, reason)
-    return replace(
-        older,
-        speed_limit_mps=0.0,
-        reachable_speed_limit_mps=0.0,
-        limited_by=reason,
-        stale=True,
-    )
-
-
-def explained(constraints: NavConstraints, blind: str) -> NavConstraints:
-    """Return constraints whose reason says which scanners are blind, where data are stale."""
-    if not blind or not constraints.stale:
-        return constraints
-    return replace(constraints, limited_by=f"{constraints.limited_by}; {blind}")
+    nothing: dict[str, Any] = {"speed_limit_mps": 0.0, "reachable_speed_limit_mps": 0.0}
+    return replace(older, **nothing, limited_by=reason, stale=True)
 
 
 def stopped(now_s: float, reason: str) -> NavConstraints:

@@ -12,12 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from perception import (
-    AwarenessPipeline,
-    Camera,
-    FloorPlane,
-    PersonObservation,
-)
+from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
 from perception.depth_image import MOST_APART_S
 from perception.errors import DepthImageError
@@ -51,9 +46,6 @@ class DepthInput(Input):
 
     Where one cannot be used, the picture is seen without. Only one that perception has used counts
     as heard.
-
-    Args:
-        shared: by the bridge's inputs.
     """
 
     def __init__(self, shared: Shared) -> None:
@@ -115,14 +107,8 @@ class ImageInput(Input):
 
     One thread at a time is in :meth:`read` or :meth:`calibrate`; others wait.
 
-    Args:
-        shared: by the bridge's inputs.
-        make_pipeline: makes the pipeline for a camera.
-        camera: calibration; None until :meth:`calibrate`.
-        rectified: whether the images are rectified: a calibration's P counts.
-        with_depth: whether there are depth images.
-
     Attributes:
+        camera: None while it is unknown. The pipeline exists as soon as it is known.
         frame: the latest, or None before the first.
         depth: the depth images; None if there are none.
     """
@@ -141,16 +127,11 @@ class ImageInput(Input):
         self.frame: PerceivedFrame | None = None
         self.depth = DepthInput(shared) if with_depth else None
         self._busy = threading.Lock()
-        self._camera: Camera | None = None
+        self.camera: Camera | None = None
         self._info: CameraInfo | None = None
         self._rectified = rectified
         if camera is not None:
             self._start(camera)
-
-    @property
-    def camera(self) -> Camera | None:
-        """The camera, or None while it is unknown. The pipeline exists as soon as it is known."""
-        return self._camera
 
     def calibrate(self, message: CameraInfo) -> None:
         """Make the pipeline from the first calibration; later ones are ignored.
@@ -159,7 +140,7 @@ class ImageInput(Input):
             NavError, PerceptionError: for a calibration or networks that cannot be used.
         """
         with self._busy:
-            if self._camera is None:
+            if self.camera is None:
                 self._start(camera_of(message, rectified=self._rectified))
                 self._info = message
 
@@ -177,7 +158,7 @@ class ImageInput(Input):
         shared = self._shared
         stamp_s, frame_id = to_seconds(message.header.stamp), message.header.frame_id
         with shared.lock:
-            if self._camera is None:
+            if self.camera is None:
                 raise NavError("no camera_info yet: the image cannot be used")
             shared.clock.check("images", stamp_s, now_s, "the image's")
             is_current = shared.still_current()
@@ -190,7 +171,7 @@ class ImageInput(Input):
             self.frame = frame
             self.used += 1
             T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
-            shared.watch.saw_image(stamp_s, self._camera, T_base_camera)
+            shared.watch.saw_image(stamp_s, self.camera, T_base_camera)
             if self.depth is not None and frame.depth is not None:
                 self.depth.note_used(frame.depth)
         if self.depth is not None and frame.depth_problem:
@@ -242,7 +223,7 @@ class ImageInput(Input):
         Raises:
             NavError: if the calibration is for other images.
         """
-        camera, size_px = self._camera, (width_px, height_px)
+        camera, size_px = self.camera, (width_px, height_px)
         assert camera is not None
         if (camera.width_px, camera.height_px) == size_px:
             return
@@ -258,7 +239,7 @@ class ImageInput(Input):
     def _start(self, camera: Camera) -> None:
         self._pipeline = self._make_pipeline(camera)
         self._shared.tracker.use_camera(camera)
-        self._camera = camera
+        self.camera = camera
 
 
 def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:

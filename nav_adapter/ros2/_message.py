@@ -7,6 +7,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Annotated, Any, Final, TypeVar, cast, get_args, get_origin, get_type_hints
 
+from typing_extensions import dataclass_transform
+
 # The second argument is the ROS name of the type.
 Bool = Annotated[bool, "bool"]
 # An octet: bytes of length one in rclpy.
@@ -31,9 +33,12 @@ _RULE: Final = "=" * 80
 _Made = TypeVar("_Made")
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass_transform(frozen_default=True)
 class Message:
-    """Base of the messages. The name of a message's module is its ROS package."""
+    """Base of the messages, frozen dataclasses. The name of their module is the ROS package."""
+
+    def __init_subclass__(cls) -> None:
+        dataclasses.dataclass(frozen=True)(cls)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +78,9 @@ def once_per_kind(make: Callable[[type[Message]], _Made]) -> Callable[[type[Mess
 def field_types(message: type[Message]) -> dict[str, FieldType]:
     """Return name and type of each field, in the order of the wire."""
     hints = get_type_hints(message, include_extras=True)
-    return {field.name: _field_type(hints[field.name]) for field in dataclasses.fields(message)}
+    # Its subclasses are dataclasses, which mypy does not tell of their base.
+    names = [field.name for field in dataclasses.fields(cast(Any, message))]
+    return {name: _field_type(hints[name]) for name in names}
 
 
 def definition(message: type[Message]) -> str:

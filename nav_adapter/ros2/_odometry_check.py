@@ -44,15 +44,10 @@ _UNITS: Final = {"mm/s": 1000.0, "cm/s": 100.0, "km/h": 3.6}
 
 
 class _Sample(NamedTuple):
-    """The pose of the odometry's child frame, and the motion since the first sample.
+    """The pose (2,), (3, 3) of the odometry's child frame in odom, and the motion since the first.
 
-    Attributes:
-        stamp_s: of the message.
-        position_m: (2,) in odom.
-        rotation: (3, 3) of the child frame in odom.
-        rates: (5,) x, y in odom; x, y as the twist has them; yaw rate.
-        driven: (5,) integral of the rates.
-        turned_rad: about z, of the poses.
+    The rates (5,) are x, y in odom; x, y as the twist has them; yaw rate. ``driven`` is their
+    integral; the poses have turned about z.
     """
 
     stamp_s: float
@@ -69,21 +64,16 @@ class OdometryCheck:
     A contradiction lasts until 2 s have passed without one, the next one until 4 s have, and so on
     up to 32 s.
 
-    Args:
-        frames: names of the frames.
+    Attributes:
+        problem: the contradiction in words, empty for none.
     """
 
     def __init__(self, frames: Frames) -> None:
         self._frames = frames
         self._samples: deque[_Sample] = deque()
-        self._problem, self._seen_s = "", -math.inf
+        self.problem, self._seen_s = "", -math.inf
         self._compared_s = -math.inf
         self._held_s = 0.0
-
-    @property
-    def problem(self) -> str:
-        """The contradiction in words, empty for none."""
-        return self._problem
 
     def add(
         self,
@@ -93,25 +83,15 @@ class OdometryCheck:
         turning_child_radps: FloatArray,
         child: str,
     ) -> None:
-        """Compare the twists of the last 2 s with the motion of the poses.
+        """Compare the twists (3,) of the last 2 s with the motion of the poses of a child frame.
 
-        Args:
-            stamp_s: of the message; a pause, or a clock that goes back, starts anew.
-            T_odom_child: (4, 4).
-            velocity_child_mps: (3,) as in the message.
-            turning_child_radps: (3,) as in the message.
-            child: name of the frame.
+        A pause, or a clock that goes back, starts anew.
         """
         if not 0.0 <= stamp_s - self._seen_s <= self._held_s:
-            self._problem = ""
+            self.problem = ""
         rotation = T_odom_child[:3, :3]
-        rates = np.array(
-            [
-                *(rotation @ velocity_child_mps)[:2],
-                *velocity_child_mps[:2],
-                (rotation @ turning_child_radps)[2],
-            ]
-        )
+        velocity, turning = rotation @ velocity_child_mps, rotation @ turning_child_radps
+        rates = np.array([*velocity[:2], *velocity_child_mps[:2], turning[2]])
         samples, driven, turned = self._samples, np.zeros(5), 0.0
         if samples and not 0.0 <= stamp_s - samples[-1].stamp_s <= _LONGEST_STEP_S:
             samples.clear()
@@ -134,13 +114,7 @@ class OdometryCheck:
     def compare(
         self, odometry: TransformBuffer, transforms: TransformBuffer, state: RobotState
     ) -> None:
-        """Compare the latest pose of odometry that tf has too.
-
-        Args:
-            odometry: the poses of the base frame in odom.
-            transforms: of tf.
-            state: the latest, for what the robot drives between two stamps.
-        """
+        """Compare the latest pose of odometry that tf has too, at the latest ``state``."""
         odom, base = self._frames.odom, self._frames.base
         if 0.0 <= state.stamp_s - self._compared_s < _COMPARED_EVERY_S:
             return
@@ -168,19 +142,15 @@ class OdometryCheck:
 
     def _report(self, stamp_s: float, problem: str) -> None:
         """Keep the words of the first sight, so that one contradiction is reported once."""
-        if not self._problem:
+        if not self.problem:
             self._held_s = min(max(2.0 * self._held_s, _HELD_S), _LONGEST_HELD_S)
-        self._problem, self._seen_s = self._problem or problem, stamp_s
+        self.problem, self._seen_s = self.problem or problem, stamp_s
 
 
 def _of_speed(moved_m: FloatArray, claimed: FloatArray, child: str, odom: str) -> str:
-    """Return how the speeds contradict the poses; empty if they do not.
+    """Return how the speeds contradict the poses, which moved by (2,); empty if they do not.
 
-    Args:
-        moved_m: (2,) motion of the poses.
-        claimed: (4 or more,) motion of the twists in the child frame, and in odom.
-        child: name of the frame of the twists.
-        odom: name of the fixed frame.
+    The twists of the child frame claim (4 or more,): in odom, and as they are.
     """
     way_m, claimed_m = math.hypot(*moved_m), math.hypot(*claimed[:2])
     most_m = _LEAST_M + _SHARE * way_m

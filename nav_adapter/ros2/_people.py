@@ -10,14 +10,13 @@ from typing import Any, Final
 import numpy as np
 
 from perception.anthropometry import BODY_RADIUS_M
-from perception.arrays import finite_array, finite_number
 from tracking import PersonTrack
 
+from .._checks import checked_square
 from .._constraints import NavConstraints
-from .._errors import NavError
 from .._robot import RobotState
 from ..exporters import boxes, paint_costmap
-from .conversions import header, to_time, yaw_quaternion
+from .conversions import grid_of, header, yaw_quaternion
 from .messages.builtin_interfaces import Duration
 from .messages.costmap_converter_msgs import ObstacleArrayMsg, ObstacleMsg
 from .messages.geometry_msgs import (
@@ -31,7 +30,7 @@ from .messages.geometry_msgs import (
     Vector3,
 )
 from .messages.nav2_msgs import CircleObject
-from .messages.nav_msgs import MapMetaData, OccupancyGrid
+from .messages.nav_msgs import OccupancyGrid
 from .messages.people_msgs import People, Person
 from .messages.std_msgs import ColorRGBA
 from .messages.unique_identifier_msgs import UUID
@@ -48,7 +47,6 @@ _OCCUPIED: Final = 100
 # Any fixed namespace, so that a track has the same UUID in every process.
 _NAMESPACE: Final = uuid.UUID("6f1b3f0a-6f53-4d5e-9c0e-5b2f3f8a7c11")
 _RELIABILITY: Final = {"confirmed": 1.0, "coasting": 0.5, "tentative": 0.25}
-_LARGEST_CELLS: Final = 4_000_000
 # A marker disappears from the display after this time without an update.
 _LIFETIME: Final = Duration(1, 0)
 _STANDING_MPS: Final = 0.1
@@ -189,29 +187,11 @@ def occupancy_grid(
     Raises:
         NavError: for numbers that are not finite or not positive, or over four million cells.
     """
-    center = finite_array("center_odom_m", center_odom_m, (2,), NavError)
-    size = finite_number("size_m", size_m, NavError, minimum=0.0, exclusive_minimum=True)
-    cell = finite_number("resolution_m", resolution_m, NavError, minimum=1e-3)
-    side = round(min(size / cell, 1e9))  # of a float, which may overflow
-    if not 0 < side * side <= _LARGEST_CELLS:
-        raise NavError(
-            f"a grid must have 1 to {_LARGEST_CELLS} cells, got {side} x {side} "
-            f"(size_m {size:g}, resolution_m {cell:g})"
-        )
-    origin = (np.floor(center / cell) - side // 2) * cell
+    origin, cell, side = checked_square("grid", center_odom_m, size_m, resolution_m)
     costs = np.zeros((side, side), dtype=np.uint8)
     paint_costmap(costs, origin, cell, constraints, ring_m=0.0)
-    return OccupancyGrid(
-        header(constraints.stamp_s, frame_id),
-        MapMetaData(
-            to_time(constraints.stamp_s),
-            cell,
-            side,
-            side,
-            Pose(Point(float(origin[0]), float(origin[1]), 0.0)),
-        ),
-        np.where(costs > 0, np.int8(_OCCUPIED), np.int8(0)).tobytes(),
-    )
+    cells = np.where(costs > 0, np.int8(_OCCUPIED), np.int8(0))
+    return grid_of(constraints.stamp_s, frame_id, origin, cell, cells)
 
 
 def markers(

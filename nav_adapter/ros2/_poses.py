@@ -69,15 +69,9 @@ class PoseSpread(NamedTuple):
 class RobotPoses:
     """The poses of robot and sensors over the last seconds, from odometry, tf and fixed mounts.
 
-    One thread at a time may use it.
-
-    Args:
-        frames: names of the frames.
-        T_base_camera: (4, 4) pose of a fixed camera; None to look it up in tf.
-        clock: of the bridge.
-        warn: called with each problem.
-        with_map: whether the pose of odom in a map is needed. Localisation stamps it ahead on
-            purpose; the latest one then holds until the next.
+    One thread at a time may use it. Without ``T_base_camera`` (4, 4) of a fixed camera, tf has it.
+    ``with_map`` says whether the pose of odom in a map is needed. Localisation stamps it ahead on
+    purpose; the latest one then holds until the next.
 
     Attributes:
         transforms: from tf.
@@ -109,13 +103,7 @@ class RobotPoses:
     def read_transforms(
         self, message: TFMessage, now_s: float | None, *, static: bool = False
     ) -> None:
-        """Store the transforms of /tf or /tf_static.
-
-        Args:
-            message: the transforms.
-            now_s: the present time; None to check no stamps.
-            static: whether they hold at all times; their stamps are then not looked at.
-        """
+        """Store the transforms of /tf or /tf_static, as the bridge does; None checks no stamps."""
         for each in message.transforms:
             to_odom = each.child_frame_id.lstrip("/") == self._frames.odom
             timeless = static or (to_odom and self._with_map)
@@ -127,12 +115,7 @@ class RobotPoses:
                 self._warn(f"tf: {problem}")
 
     def read_odometry(self, message: Odometry, now_s: float | None) -> None:
-        """Store the robot's state and pose.
-
-        Args:
-            message: in the odom frame.
-            now_s: the present time; None to check no stamp.
-        """
+        """Store the robot's state and pose in the odom frame; None checks no stamp."""
         if message.header.frame_id.lstrip("/") != self._frames.odom:
             self._warn(
                 f"odometry must be in frame {self._frames.odom!r}, got "
@@ -167,12 +150,9 @@ class RobotPoses:
         self._check = OdometryCheck(self._frames)
 
     def T_odom_camera(self, frame: str, stamp_s: float) -> FloatArray:  # noqa: N802 - frames in names
-        """Return the pose (4, 4) of the camera.
+        """Return the pose (4, 4) of the camera at the time of an image.
 
-        Args:
-            frame: of the image; not used if the camera's frame has a name in ``frames``, or its
-                pose is fixed.
-            stamp_s: of the image.
+        The image's ``frame`` is not used if the camera's has a name in ``frames``, or a fixed pose.
 
         Raises:
             NavError: for a pose that is not known at that time, or not of an optical frame.
@@ -226,11 +206,8 @@ class RobotPoses:
         """Return the error of the pose of the robot, or of its camera, at a time.
 
         There is none up to the newest odometry. A camera whose pose in odom comes from tf is held
-        where it was, so that the whole motion since then is its error.
-
-        Args:
-            stamp_s: the time.
-            camera: frame of the images; None for the robot's own pose.
+        where it was, so that the whole motion since then is its error. ``camera`` is the frame of
+        the images; None is for the robot's own pose.
         """
         state, share = self.state, _RATE_SHARE
         if state is None:

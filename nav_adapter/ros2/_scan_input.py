@@ -102,23 +102,19 @@ class PerceivedScan:
 class ScanPerception:
     """Finds people in the scans of all scanners. One thread at a time; others wait.
 
-    Args:
-        body_base_m: (M, 2) outline of the robot; returns on it are dropped.
-        inputs: the scanners.
-        make_detector: makes the detector that all share.
+    Returns on the outline (M, 2) of the robot's body are dropped.
     """
 
     def __init__(
         self,
         body_base_m: FloatArray,
         inputs: tuple[ScannerInput, ...],
-        make_detector: Callable[[], LegDetector] = LegDetector,
+        make_detector: Callable[[], LegDetector],
     ) -> None:
         self._body_base_m, self._inputs = body_base_m, inputs
         self._detector = make_detector()
-        self._found: list[tuple[float, tuple[PersonCandidate, ...]]] = [(-math.inf, ())] * len(
-            inputs
-        )
+        nothing: tuple[float, tuple[PersonCandidate, ...]] = (-math.inf, ())
+        self._found = [nothing] * len(inputs)
         self._placed: tuple[MapCells, FloatArray, FloatArray] | None = None
         self._busy = threading.Lock()
 
@@ -132,12 +128,7 @@ class ScanPerception:
     ) -> tuple[PerceivedScan, bool]:
         """Return the people in a scan, and whether it contradicts the map.
 
-        Args:
-            number: of the scanner.
-            scan: of this scanner, later than the one before.
-            T_base_scanner: (4, 4) pose of the scanner.
-            motion: of the robot during the scan.
-            static_map: what stands still, and the pose (4, 4) of the map in odom.
+        The scan is later than the one of this scanner before. The map has its pose (4, 4) in odom.
 
         Raises:
             NavError: for a scanner that is not level, or a field of view without rays.
@@ -219,12 +210,7 @@ class ScanPerception:
 
 
 class MapInput:
-    """The map of what stands still, and whether the scans agree with it. Each change is reported.
-
-    Args:
-        shared: by the bridge's inputs.
-        odom_frame: name of the fixed frame.
-    """
+    """The map of what stands still, and whether scans agree with it; each change is reported."""
 
     def __init__(self, shared: Shared, odom_frame: str) -> None:
         self._shared, self._odom_frame = shared, odom_frame
@@ -255,12 +241,7 @@ class MapInput:
         return cells, T
 
     def judge(self, contradicted: bool, stamp_s: float) -> None:
-        """Note whether a scan contradicts the map; after one that does, others must agree for 2 s.
-
-        Args:
-            contradicted: whether it does.
-            stamp_s: of the scan.
-        """
+        """Note whether a scan contradicts the map; then others must agree for 2 s."""
         if contradicted:
             self._contradicted_s = stamp_s
         if 0.0 <= stamp_s - self._contradicted_s <= _AGREES_AFTER_S:
@@ -280,13 +261,6 @@ class ScanInput(Input):
 
     After a scan that cannot be used, the next one is read as if it had not come. So it is, but for
     its stamp, after one that shows nothing: the scanner is blind.
-
-    Args:
-        shared: by the bridge's inputs.
-        number: of the scanner.
-        scanner: its name and mount.
-        perception: finds the people in the scans of all scanners.
-        static_map: what stands still.
     """
 
     def __init__(

@@ -54,11 +54,7 @@ class SensorWatch:
     see all of its field: the robot must not drive on with less in view than the camera alone would
     have. One thread at a time may use it.
 
-    Args:
-        scanners: names of the scanners.
-        with_camera: whether there is a camera.
-        lost_after_s: a sensor that is silent for longer is lost.
-        with_depth: whether the camera has depth images.
+    A sensor that is silent for longer than ``lost_after_s`` is lost.
 
     Raises:
         NavError: for a scanner with the name of another sensor.

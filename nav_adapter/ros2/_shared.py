@@ -27,13 +27,8 @@ _WARN_AGAIN_S: Final = 10.0
 class Shared:
     """The parts that the inputs of a bridge share.
 
-    Attributes:
-        clock: of the bridge; used under the lock.
-        poses: of robot and sensors; used under the lock.
-        watch: of the sensors; used under the lock.
-        tracker: takes the people of all sensors, and has a lock of its own.
-        lock: guards what is shared with other threads.
-        warn: called with each problem.
+    Clock, poses and watch are used under the lock; the tracker has a lock of its own. ``warn`` is
+    called with each problem.
     """
 
     clock: BridgeClock
@@ -52,13 +47,7 @@ class Shared:
 class Input(ABC):
     """The messages of one sensor: each is used, or refused, counted and reported once in 10 s.
 
-    Args:
-        shared: by the inputs.
-        what: such a message, in words.
-
-    Attributes:
-        used: number of messages that were used.
-        refused: number of those that were refused.
+    ``used`` and ``refused`` are their numbers; ``what`` is such a message in words.
     """
 
     def __init__(self, shared: Shared, what: str) -> None:

@@ -102,14 +102,8 @@ class SharedTracker:
     ) -> tuple[PersonTrack, ...] | None:
         """Return the tracks after a frame, or None if ``is_current`` says that it came too late.
 
-        Args:
-            observations: the people in the frame.
-            stamp_s: of the frame.
-            T_odom_sensor: (4, 4) pose of camera or scanner.
-            is_current: called once the tracker is free, and reset if that was wanted.
-            spread: of the robot's pose, which the people's places share.
-            scanner: number of the scanner; None for the camera.
-            view: of the scan.
+        It is asked once the tracker is free, and reset if that was wanted. The spread of the
+        robot's pose is in the places of all people. ``scanner`` is None for the camera.
 
         Raises:
             TrackingError: for a frame that the tracker refuses.

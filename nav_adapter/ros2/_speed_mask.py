@@ -15,11 +15,10 @@ from .._errors import NavError
 from .._robot import RobotState
 from ..exporters import SpeedMap
 from ._speed_limit import fastest_point_per_axis
-from .conversions import header, to_time
+from .conversions import grid_of
 from .messages import Message
-from .messages.geometry_msgs import Point, Pose
 from .messages.nav2_msgs import CostmapFilterInfo
-from .messages.nav_msgs import MapMetaData, OccupancyGrid
+from .messages.nav_msgs import OccupancyGrid
 
 # nav2_costmap_2d/costmap_filters/filter_values.hpp: SPEED_FILTER_PERCENT
 _PERCENT: Final = 1
@@ -43,21 +42,9 @@ def speed_mask(
         mask_topic: on which the mask is published.
         frame_id: of the map.
     """
-    rows, columns = speed_map.limits_mps.shape
-    x, y = speed_map.origin_odom_m.tolist()
-    top = header(speed_map.stamp_s, frame_id)
-    mask = OccupancyGrid(
-        top,
-        MapMetaData(
-            to_time(speed_map.stamp_s),
-            speed_map.resolution_m,
-            columns,
-            rows,
-            Pose(Point(x, y, 0.0)),
-        ),
-        speed_map.percent.tobytes(),
-    )
-    return mask, CostmapFilterInfo(top, _PERCENT, mask_topic, 0.0, 1.0)
+    stamp_s, cell_m = speed_map.stamp_s, speed_map.resolution_m
+    mask = grid_of(stamp_s, frame_id, speed_map.origin_odom_m, cell_m, speed_map.percent)
+    return mask, CostmapFilterInfo(mask.header, _PERCENT, mask_topic, 0.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +89,6 @@ class SpeedMaskStream:
     the first mask. A mask holds until the next one: the lower limit of its stamp and a period later
     counts. When constraints stop the robot for lack of data, the mask is a stop everywhere, at
     once.
-
-    Args:
-        settings: rate, size and topic.
-        frame_id: of the mask.
     """
 
     def __init__(self, settings: SpeedMaskSettings, frame_id: str) -> None:
@@ -121,10 +104,7 @@ class SpeedMaskStream:
     ) -> Iterator[tuple[str, Message]]:
         """Yield topic key (:data:`~nav_adapter.ros2.MASK_TOPICS`) and message, if they are due.
 
-        Args:
-            constraints: of this publication.
-            state: the robot that the mask is around; without it only a stop is sent.
-            wanted: whether messages of a key are wanted.
+        The mask is around the robot; without its state only a stop is sent.
         """
         if not wanted("speed_mask"):
             return
@@ -133,7 +113,12 @@ class SpeedMaskStream:
         )
         if not (stops and not self._is_stop) and not self._is_due(constraints.stamp_s):
             return
-        chart = self._stop_map(constraints.stamp_s) if stops else self._map_of(constraints, state)
+        chart = self._map  # a stop is where the latest mask is
+        if chart is not None and stops:
+            nothing = np.zeros_like(chart.limits_mps)
+            chart = replace(chart, stamp_s=constraints.stamp_s, limits_mps=nothing)
+        elif not stops:
+            chart = self._map_of(constraints, state)
         if chart is None:
             return
         self._map, self._is_stop = chart, stops
@@ -164,10 +149,3 @@ class SpeedMaskStream:
         limits = chart.limits_mps
         lower = limits / fastest_point_per_axis(constraints.robot)
         return replace(chart, limits_mps=np.where(limits < chart.max_speed_mps, lower, limits))
-
-    def _stop_map(self, stamp_s: float) -> SpeedMap | None:
-        """Return a stop where the latest mask is; None before the first mask."""
-        latest = self._map
-        if latest is None:
-            return None
-        return replace(latest, stamp_s=stamp_s, limits_mps=np.zeros_like(latest.limits_mps))

@@ -6,7 +6,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from .._errors import NavError
 from ._bridge import AwarenessBridge
@@ -24,12 +24,8 @@ class MessageThread:
     publishes on with older and older people until it stops the robot, and the next message is
     tried.
 
-    Args:
-        bridge: its :meth:`~AwarenessBridge.tick` is called by another thread.
-        clock: returns the present time, s.
-        name: of the thread.
-        most_waiting: number of messages of each kind that may wait, the most urgent kind first.
-            The oldest ones are dropped for new ones.
+    ``most_waiting`` messages of each kind may wait, the most urgent kind first. The oldest ones are
+    dropped for new ones.
     """
 
     def __init__(
@@ -66,18 +62,27 @@ class MessageThread:
             self._changed.notify()
         return is_full
 
-    def _next(self) -> Callable[[], None] | None:
-        """Remove the most urgent message and return what passes it on; None if there is none."""
-        found = next((waiting for waiting in self._waiting.values() if waiting), None)
-        return None if found is None else found.popleft()
+    def _use(
+        self,
+        message: Callable[[], Any],
+        use: Callable[[Any, float], object],
+        refuse: Callable[[str, float], None],
+    ) -> None:
+        """Pass a message on with the time, or why it cannot be decoded."""
+        try:
+            decoded = message()
+        except NavError as problem:
+            refuse(str(problem), self._clock())
+        else:
+            use(decoded, self._clock())
 
     def _run(self) -> None:
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._closing or any(self._waiting.values()))
-                pass_on = None if self._closing else self._next()
-            if pass_on is None:
-                return
+                if self._closing:
+                    return
+                pass_on = next(each for each in self._waiting.values() if each).popleft()
             try:
                 pass_on()
             except NavError as problem:
@@ -120,19 +125,12 @@ class PerceptionThread(MessageThread):
 
     def submit_depth(self, message: Callable[[], Image]) -> None:
         """Hand over a depth image; return at once."""
-        self._hand_over("depth", partial(self._pass_on_depth, message))
+        bridge = self._bridge
+        self._hand_over("depth", lambda: self._use(message, bridge.on_depth, bridge.refuse_depth))
 
     def _pass_on_image(self, message: Callable[[], AnyImage]) -> None:
         if self._bridge.on_image(message(), self._clock()):
             self._on_frame()
-
-    def _pass_on_depth(self, message: Callable[[], Image]) -> None:
-        try:
-            depth = message()
-        except NavError as problem:
-            self._bridge.refuse_depth(str(problem), self._clock())
-            return
-        self._bridge.on_depth(depth, self._clock())
 
 
 class ScanThread(MessageThread):
@@ -151,17 +149,11 @@ class ScanThread(MessageThread):
 
     def submit(self, number: int, message: Callable[[], LaserScan]) -> None:
         """Hand over a scan of a scanner, numbered from 0; return at once."""
-        if self._hand_over("scan", partial(self._pass_on_scan, number, message)):
-            self._bridge.scan_dropped()
+        bridge = self._bridge
+        use, refuse = partial(bridge.on_scan, number), partial(bridge.refuse_scan, number)
+        if self._hand_over("scan", lambda: self._use(message, use, refuse)):
+            bridge.scan_dropped()
 
     def submit_map(self, message: Callable[[], OccupancyGrid]) -> None:
         """Hand over a map, which replaces one that is still waiting; return at once."""
         self._hand_over("map", lambda: self._bridge.on_map(message()))
-
-    def _pass_on_scan(self, number: int, message: Callable[[], LaserScan]) -> None:
-        try:
-            scan = message()
-        except NavError as problem:
-            self._bridge.refuse_scan(number, str(problem), self._clock())
-            return
-        self._bridge.on_scan(number, scan, self._clock())

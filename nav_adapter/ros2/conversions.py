@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from perception.arrays import FloatArray, finite_number
@@ -16,7 +17,8 @@ from perception.arrays import FloatArray, finite_number
 from .._errors import NavError
 from ._message import FieldType, Message, field_types, ros_type
 from .messages.builtin_interfaces import Time
-from .messages.geometry_msgs import Quaternion
+from .messages.geometry_msgs import Point, Pose, Quaternion
+from .messages.nav_msgs import MapMetaData, OccupancyGrid
 from .messages.std_msgs import Header
 
 # builtin_interfaces/Time counts whole seconds in 32 bits.
@@ -48,6 +50,15 @@ def to_seconds(time: Time) -> float:
 def header(stamp_s: float, frame_id: str) -> Header:
     """Return a header with time and frame."""
     return Header(to_time(stamp_s), frame_id)
+
+
+def grid_of(
+    stamp_s: float, frame_id: str, origin_m: FloatArray, side_m: float, cells: NDArray[np.int8]
+) -> OccupancyGrid:
+    """Return cells (rows, columns) as a grid with its lower left corner at ``origin_m`` (2,)."""
+    (rows, columns), (x, y) = cells.shape, origin_m.tolist()
+    info = MapMetaData(to_time(stamp_s), side_m, columns, rows, Pose(Point(x, y, 0.0)))
+    return OccupancyGrid(header(stamp_s, frame_id), info, cells.tobytes())
 
 
 def yaw_quaternion(yaw_rad: float) -> Quaternion:

@@ -134,23 +134,32 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             warn=self.get_logger().warning,
             wanted=self._wanted,
         )
-        self._perception = PerceptionThread(self._bridge, self._now_s)
-        self._subscribe(READ["odom"], self._odometry)
-        self._subscribe(READ["tf"], lambda m: self._transforms(m, False))
-        self._subscribe(READ["tf_static"], lambda m: self._transforms(m, True))
+        bridge, now_s = self._bridge, self._now_s
+        self._perception = perception = PerceptionThread(bridge, now_s)
+        self._subscribe(READ["odom"], lambda m: bridge.on_odometry(from_ros(Odometry, m), now_s()))
+        self._subscribe(READ["tf"], partial(self._transforms, static=False))
+        self._subscribe(READ["tf_static"], partial(self._transforms, static=True))
         use_map = bool(scans) and self._parameter("use_map", False)
         if use_camera:
             self._subscribe(READ["camera_info"], self._calibration)
             kind: Any = CompressedImage if compressed else Image
-            self._subscribe(image, lambda m: self._image(kind, m))
+            self._subscribe(image, lambda m: perception.submit(lambda: from_ros(kind, m)))
         if use_depth:
-            self._subscribe(READ["depth"], self._depth_image)
-        self._scans = ScanThread(self._bridge, self._now_s) if scans else None
-        for number, topic in enumerate(scans):
-            self._subscribe(topic, partial(self._scan, number))
-        if use_map:
-            self._subscribe(READ["map"], self._map)
-        self.create_timer(1.0 / rate_hz, self._tick)
+            self._subscribe(
+                READ["depth"], lambda m: perception.submit_depth(lambda: from_ros(Image, m))
+            )
+        self._scans = thread = ScanThread(bridge, now_s) if scans else None
+        if thread is not None:
+            for number, topic in enumerate(scans):
+                self._subscribe(
+                    topic,
+                    lambda m, n=number: thread.submit(n, lambda: from_ros(LaserScan, m)),
+                )
+            if use_map:
+                self._subscribe(
+                    READ["map"], lambda m: thread.submit_map(lambda: from_ros(OccupancyGrid, m))
+                )
+        self.create_timer(1.0 / rate_hz, lambda: bridge.tick(now_s()))
 
     def stop(self) -> None:
         """Publish a stop and end perception, before the node ends."""
@@ -159,31 +168,11 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
             self._scans.close()
         self._perception.close()
 
-    def _tick(self) -> None:
-        self._bridge.tick(self._now_s())
-
-    def _image(self, kind: type[Image] | type[CompressedImage], message: Any) -> None:
-        self._perception.submit(lambda: from_ros(kind, message))
-
-    def _depth_image(self, message: Any) -> None:
-        self._perception.submit_depth(lambda: from_ros(Image, message))
-
     def _calibration(self, message: Any) -> None:
         if self._bridge.camera is None:
             self._perception.calibrate(lambda: from_ros(CameraInfo, message))
 
-    def _scan(self, number: int, message: Any) -> None:
-        assert self._scans is not None
-        self._scans.submit(number, lambda: from_ros(LaserScan, message))
-
-    def _map(self, message: Any) -> None:
-        assert self._scans is not None
-        self._scans.submit_map(lambda: from_ros(OccupancyGrid, message))
-
-    def _odometry(self, message: Any) -> None:
-        self._bridge.on_odometry(from_ros(Odometry, message), self._now_s())
-
-    def _transforms(self, message: Any, static: bool) -> None:
+    def _transforms(self, message: Any, *, static: bool) -> None:
         self._bridge.on_transforms(from_ros(TFMessage, message), self._now_s(), static=static)
 
     def _publish(self, key: str, message: Message) -> None:

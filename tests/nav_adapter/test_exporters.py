@@ -34,7 +34,7 @@ from nav_adapter import (
     points,
     polygons,
 )
-from nav_adapter.exporters import half_planes, people_cost, velocity_obstacles
+from nav_adapter.exporters import half_planes, people_cost
 from tracking import PersonTrack
 
 NOBODY = NavConstraints(0.0, (), 1.0, "robot maximum", False)
@@ -263,26 +263,9 @@ def test_half_planes_agree_with_the_authors_library() -> None:
         np.testing.assert_allclose(ours, [*normal, normal @ point], atol=2e-4)
 
 
-@given(circles=some_circles(1, 1), velocity=VELOCITIES)
-def test_a_velocity_between_the_legs_leads_into_the_person(
-    circles: list[Circle], velocity: tuple[float, float]
-) -> None:
-    assume(least_gap_m(circles[0], np.zeros(2), 0.0) > 0.01)
-    ((*apex, lx, ly, rx, ry),) = velocity_obstacles(
-        constraints_of(*circles), (0, 0), ROBOT_RADIUS_M
-    )
-    dx, dy = np.array(velocity) - apex
-    gap_m = least_gap_m(circles[0], np.array(velocity), 1e9)
-    assume(abs(gap_m) > 1e-6 and math.hypot(dx, dy) > 1e-6)
-    between = lx * dy - ly * dx <= 0.0 and rx * dy - ry * dx >= 0.0
-    assert between == (gap_m < 0.0)
-
-
 def test_no_people_and_a_person_at_the_robots_position() -> None:
     assert half_planes(constraints_of(), (0, 0), (1, 0), 0.4).shape == (0, 3)
-    assert velocity_obstacles(constraints_of(), (0, 0), 0.4).shape == (0, 6)
     same = constraints_of((0.0, 0.0, 0.0, 0.0, 0.5))
     rows = half_planes(same, (0, 0), (0, 0), 0.4, resolve_s=0.5)
     assert np.hypot(*rows[0, :2]) == pytest.approx(1.0)
     assert rows[0, 2] == pytest.approx(0.9 / 0.5)
-    assert np.isfinite(velocity_obstacles(same, (0, 0), 0.4)).all()

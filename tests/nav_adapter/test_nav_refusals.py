@@ -33,7 +33,6 @@ from nav_adapter.exporters import (
     half_planes,
     people_cost,
     predicted_circles,
-    predicted_people,
     speed_limit_at,
     time_cost,
 )
@@ -212,8 +211,10 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     ),
     (lambda: predicted_circles(ONE, [0.0], slots=2), "slots needs robot_position_odom_m"),
     (lambda: predicted_circles(SETTLED, [0.0], model=FITTED, sigmas=-1.0), "sigmas"),
-    (lambda: predicted_people(ONE, [0.0]), r"obstacles\[0\] has covariance_odom=None"),
-    (lambda: predicted_people(ALONE, [-0.1]), "times_s"),
+    (
+        lambda: predicted_circles(ONE, [0.0], model=FITTED),
+        r"obstacles\[0\] has covariance_odom=None",
+    ),
     (lambda: replace(CIRCLE, covariance_odom=-np.eye(4)), "covariance_odom"),
     (lambda: planes(position_odom_m=(0.0, math.nan)), "position_odom_m must be finite"),
     (lambda: planes(velocity_odom_mps=(0.0,)), r"velocity_odom_mps must have shape \(2,\)"),

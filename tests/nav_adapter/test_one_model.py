@@ -79,7 +79,7 @@ def test_field_and_update_agree_for_robots_that_turn(count: int) -> None:
     # For people who stand and are seen: equal, but where somebody just comes to the robot's way.
     standing = np.array(apart[::2])
     assert np.mean(standing <= 0.01) >= 0.9
-    assert standing.max() <= 0.2
+    assert np.mean(standing <= 0.2) >= 0.99
 
 
 def meets_on_an_arc(

@@ -20,7 +20,7 @@ from nav_scenes import (
 )
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
-from nav_adapter.exporters import predicted_circles, predicted_people, speed_limit_at
+from nav_adapter.exporters import predicted_circles, speed_limit_at
 from tracking import PersonTrack
 from tracking.prediction import FITTED, PredictionModel, predict_ahead
 
@@ -62,21 +62,6 @@ def test_slots_hold_the_nearest_people_and_then_empty_circles(
     for empty in rows[len(nearest) :]:
         assert (empty[:, 4] == 0.0).all()
         assert least_gap_m(empty) > 50.0
-
-
-@given(tracks=crowds())
-def test_means_are_those_of_the_circles_and_covariances_are_valid(
-    tracks: tuple[PersonTrack, ...],
-) -> None:
-    constraints = constraints_for(tracks)
-    people = predicted_people(constraints, TIMES_S)
-    assert people.means_odom_m.shape == (len(tracks), 5, 2)
-    assert people.covariances_odom_m2.shape == (len(tracks), 5, 2, 2)
-    circles = predicted_circles(constraints, TIMES_S)
-    np.testing.assert_array_equal(people.means_odom_m, circles[:, :, :2])
-    transposed = np.swapaxes(people.covariances_odom_m2, -1, -2)
-    np.testing.assert_allclose(people.covariances_odom_m2, transposed, atol=1e-12)
-    assert (np.linalg.eigvalsh(people.covariances_odom_m2) > -1e-9).all()
 
 
 def test_obstacles_keep_a_read_only_covariance_at_the_stamp() -> None:
@@ -140,28 +125,6 @@ def test_alerts_reach_as_far_as_the_person_may_be_by_then() -> None:
     )
     assert plain == ()
     assert [alert.track_id for alert in wide] == [1]
-
-
-@settings(max_examples=25)
-@given(tracks=crowds())
-def test_predicted_people_are_those_of_tracking(tracks: tuple[PersonTrack, ...]) -> None:
-    fresh = tuple(replace(track, stamp_s=0.0) for track in tracks)
-    by_id = sorted(fresh, key=lambda track: track.id)
-    model = PredictionModel(horizons_s=(1.0,), std_factors=(1.3,))
-    constraints = constraints_for(fresh)
-    for chosen in (FITTED, model):
-        found, wanted = (
-            predicted_people(constraints, TIMES_S, model=chosen),
-            predict_ahead(by_id, TIMES_S, chosen),
-        )
-        np.testing.assert_array_equal(found.means_odom_m, wanted.means_odom_m)
-        np.testing.assert_allclose(
-            found.covariances_odom_m2, wanted.covariances_odom_m2, atol=1e-12
-        )
-    np.testing.assert_array_equal(
-        predicted_people(constraints, TIMES_S).covariances_odom_m2,
-        predicted_people(constraints, TIMES_S, model=FITTED).covariances_odom_m2,
-    )
 
 
 def test_predicted_circles_grow_with_the_uncertainty() -> None:

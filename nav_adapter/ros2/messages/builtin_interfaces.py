@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Int32, Message, UInt32
 
 
-@dataclass(frozen=True)
 class Time(Message):
     """A time: seconds and nanoseconds since the epoch of the clock."""
 
@@ -15,7 +12,6 @@ class Time(Message):
     nanosec: UInt32 = 0
 
 
-@dataclass(frozen=True)
 class Duration(Message):
     """A duration; RViz reads 0 as infinite."""
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Float64, Int64, Message
 from .geometry_msgs import Polygon, Quaternion, TwistWithCovariance
 from .std_msgs import Header
 
 
-@dataclass(frozen=True)
 class ObstacleMsg(Message):
     """An obstacle: a polygon, or a circle if it has one point and a radius."""
 
@@ -21,7 +18,6 @@ class ObstacleMsg(Message):
     velocities: TwistWithCovariance = TwistWithCovariance()
 
 
-@dataclass(frozen=True)
 class ObstacleArrayMsg(Message):
     """All obstacles at one time."""
 

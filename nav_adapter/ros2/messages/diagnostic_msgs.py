@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from .._message import Byte, Message, String
 from .std_msgs import Header
 
 
-@dataclass(frozen=True)
 class KeyValue(Message):
     """A name and its value."""
 
@@ -17,7 +15,6 @@ class KeyValue(Message):
     value: String = ""
 
 
-@dataclass(frozen=True)
 class DiagnosticStatus(Message):
     """The status of one part of the robot."""
 
@@ -33,7 +30,6 @@ class DiagnosticStatus(Message):
     values: tuple[KeyValue, ...] = ()
 
 
-@dataclass(frozen=True)
 class DiagnosticArray(Message):
     """The status of several parts at one time."""
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Float32, Float64, Float64x36, Int64, Message, String
 from .std_msgs import Header
 
 
-@dataclass(frozen=True)
 class Point(Message):
     """A point in metres."""
 
@@ -17,7 +14,6 @@ class Point(Message):
     z: Float64 = 0.0
 
 
-@dataclass(frozen=True)
 class Point32(Message):
     """A point in metres, in single precision."""
 
@@ -26,7 +22,6 @@ class Point32(Message):
     z: Float32 = 0.0
 
 
-@dataclass(frozen=True)
 class Vector3(Message):
     """A direction, a size or a velocity."""
 
@@ -35,7 +30,6 @@ class Vector3(Message):
     z: Float64 = 0.0
 
 
-@dataclass(frozen=True)
 class Quaternion(Message):
     """A rotation; the default is the identity."""
 
@@ -45,7 +39,6 @@ class Quaternion(Message):
     w: Float64 = 1.0
 
 
-@dataclass(frozen=True)
 class Pose(Message):
     """A position and an orientation."""
 
@@ -53,7 +46,6 @@ class Pose(Message):
     orientation: Quaternion = Quaternion()
 
 
-@dataclass(frozen=True)
 class PoseStamped(Message):
     """A pose with time and frame."""
 
@@ -61,7 +53,6 @@ class PoseStamped(Message):
     pose: Pose = Pose()
 
 
-@dataclass(frozen=True)
 class PoseWithCovariance(Message):
     """A pose with covariance, row by row over x, y, z and rotations about X, Y, Z."""
 
@@ -69,7 +60,6 @@ class PoseWithCovariance(Message):
     covariance: Float64x36 = (0.0,) * 36
 
 
-@dataclass(frozen=True)
 class Twist(Message):
     """A velocity in m/s and rad/s."""
 
@@ -77,7 +67,6 @@ class Twist(Message):
     angular: Vector3 = Vector3()
 
 
-@dataclass(frozen=True)
 class TwistStamped(Message):
     """A velocity with time and frame."""
 
@@ -85,7 +74,6 @@ class TwistStamped(Message):
     twist: Twist = Twist()
 
 
-@dataclass(frozen=True)
 class TwistWithCovariance(Message):
     """A velocity with covariance, in the order of a pose."""
 
@@ -93,7 +81,6 @@ class TwistWithCovariance(Message):
     covariance: Float64x36 = (0.0,) * 36
 
 
-@dataclass(frozen=True)
 class Transform(Message):
     """The pose of a child frame in its parent."""
 
@@ -101,7 +88,6 @@ class Transform(Message):
     rotation: Quaternion = Quaternion()
 
 
-@dataclass(frozen=True)
 class TransformStamped(Message):
     """A transform whose parent is the frame of the header."""
 
@@ -110,14 +96,12 @@ class TransformStamped(Message):
     transform: Transform = Transform()
 
 
-@dataclass(frozen=True)
 class Polygon(Message):
     """The corners of a polygon; the last is joined to the first."""
 
     points: tuple[Point32, ...] = ()
 
 
-@dataclass(frozen=True)
 class PolygonStamped(Message):
     """A polygon with time and frame."""
 
@@ -125,7 +109,6 @@ class PolygonStamped(Message):
     polygon: Polygon = Polygon()
 
 
-@dataclass(frozen=True)
 class PolygonInstance(Message):
     """A polygon with an id."""
 
@@ -133,7 +116,6 @@ class PolygonInstance(Message):
     id: Int64 = 0
 
 
-@dataclass(frozen=True)
 class PolygonInstanceStamped(Message):
     """A polygon with id, time and frame."""
 

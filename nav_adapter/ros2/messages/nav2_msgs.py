@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Bool, Float32, Float64, Int8, Message, String, UInt8
 from .geometry_msgs import Point32
 from .std_msgs import Header
 from .unique_identifier_msgs import UUID
 
 
-@dataclass(frozen=True)
 class SpeedLimit(Message):
     """A limit in m/s or in per cent of the controller's maximum; 0.0 means no limit."""
 
@@ -19,7 +16,6 @@ class SpeedLimit(Message):
     speed_limit: Float64 = 0.0
 
 
-@dataclass(frozen=True)
 class CircleObject(Message):
     """A circle of the vector-object server (Nav2 Kilted and later)."""
 
@@ -31,7 +27,6 @@ class CircleObject(Message):
     value: Int8 = 0
 
 
-@dataclass(frozen=True)
 class CostmapFilterInfo(Message):
     """The meaning of a filter mask: base + multiplier × value; type 1 is a speed in per cent."""
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Float32, Int8s, Message, String, UInt32
 from .builtin_interfaces import Time
 from .geometry_msgs import Pose, PoseWithCovariance, TwistWithCovariance
 from .std_msgs import Header
 
 
-@dataclass(frozen=True)
 class MapMetaData(Message):
     """Size, resolution (m), and the pose of the lower left corner of cell (0, 0)."""
 
@@ -21,7 +18,6 @@ class MapMetaData(Message):
     origin: Pose = Pose()
 
 
-@dataclass(frozen=True)
 class OccupancyGrid(Message):
     """A grid, row by row from the lower left: 0 free to 100 occupied, −1 unknown."""
 
@@ -30,7 +26,6 @@ class OccupancyGrid(Message):
     data: Int8s = b""
 
 
-@dataclass(frozen=True)
 class Odometry(Message):
     """Pose in the header's frame, velocity in the child's."""
 

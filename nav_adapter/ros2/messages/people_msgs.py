@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Float64, Message, String
 from .geometry_msgs import Point
 from .std_msgs import Header
 
 
-@dataclass(frozen=True)
 class Person(Message):
     """A person; ``tagnames`` holds the names of ``tags``, and the velocity is a Point."""
 
@@ -21,7 +18,6 @@ class Person(Message):
     tags: tuple[String, ...] = ()
 
 
-@dataclass(frozen=True)
 class People(Message):
     """All people at one time."""
 

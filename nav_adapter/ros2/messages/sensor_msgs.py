@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import (
     Bool,
     Float32,
@@ -19,7 +17,6 @@ from .._message import (
 from .std_msgs import Header
 
 
-@dataclass(frozen=True)
 class Image(Message):
     """Raw pixels, with ``step`` bytes per row."""
 
@@ -32,7 +29,6 @@ class Image(Message):
     data: UInt8s = b""
 
 
-@dataclass(frozen=True)
 class CompressedImage(Message):
     """An image as the bytes of a JPEG or PNG file."""
 
@@ -41,7 +37,6 @@ class CompressedImage(Message):
     data: UInt8s = b""
 
 
-@dataclass(frozen=True)
 class RegionOfInterest(Message):
     """A part of an image; all zeros for the whole image."""
 
@@ -52,7 +47,6 @@ class RegionOfInterest(Message):
     do_rectify: Bool = False
 
 
-@dataclass(frozen=True)
 class CameraInfo(Message):
     """A calibration: k is the camera matrix, d the distortion."""
 
@@ -69,7 +63,6 @@ class CameraInfo(Message):
     roi: RegionOfInterest = RegionOfInterest()
 
 
-@dataclass(frozen=True)
 class LaserScan(Message):
     """One sweep of a laser scanner. The header's stamp is the time of the first ray."""
 

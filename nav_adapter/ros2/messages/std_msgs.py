@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Float32, Message, String
 from .builtin_interfaces import Time
 
 
-@dataclass(frozen=True)
 class Header(Message):
     """A time and a frame."""
 
@@ -16,7 +13,6 @@ class Header(Message):
     frame_id: String = ""
 
 
-@dataclass(frozen=True)
 class ColorRGBA(Message):
     """Red, green, blue and opacity in [0, 1]."""
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Message
 from .geometry_msgs import TransformStamped
 
 
-@dataclass(frozen=True)
 class TFMessage(Message):
     """Transforms of the topics /tf and /tf_static."""
 

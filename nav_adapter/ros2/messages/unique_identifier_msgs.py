@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Message, UInt8x16
 
 
-@dataclass(frozen=True)
 class UUID(Message):
     """A UUID of 16 bytes, after RFC 9562."""
 

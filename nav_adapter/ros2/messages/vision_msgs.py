@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .._message import Float64, Message, String
 from .geometry_msgs import Pose, PoseWithCovariance, Vector3
 from .std_msgs import Header
 
 
-@dataclass(frozen=True)
 class BoundingBox3D(Message):
     """A box: pose of the centre and lengths of the sides."""
 
@@ -17,7 +14,6 @@ class BoundingBox3D(Message):
     size: Vector3 = Vector3()
 
 
-@dataclass(frozen=True)
 class ObjectHypothesis(Message):
     """A class and its score."""
 
@@ -25,7 +21,6 @@ class ObjectHypothesis(Message):
     score: Float64 = 0.0
 
 
-@dataclass(frozen=True)
 class ObjectHypothesisWithPose(Message):
     """A class, its score and the pose of the object."""
 
@@ -33,7 +28,6 @@ class ObjectHypothesisWithPose(Message):
     pose: PoseWithCovariance = PoseWithCovariance()
 
 
-@dataclass(frozen=True)
 class Detection3D(Message):
     """One object; its id stays the same over time."""
 
@@ -43,7 +37,6 @@ class Detection3D(Message):
     id: String = ""
 
 
-@dataclass(frozen=True)
 class Detection3DArray(Message):
     """All objects at one time."""
 

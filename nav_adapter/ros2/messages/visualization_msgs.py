@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from .._message import Bool, Float32, Int32, Message, String, UInt8s
@@ -12,7 +11,6 @@ from .sensor_msgs import CompressedImage
 from .std_msgs import ColorRGBA, Header
 
 
-@dataclass(frozen=True)
 class UVCoordinate(Message):
     """A position in a texture."""
 
@@ -20,7 +18,6 @@ class UVCoordinate(Message):
     v: Float32 = 0.0
 
 
-@dataclass(frozen=True)
 class MeshFile(Message):
     """A mesh file."""
 
@@ -28,7 +25,6 @@ class MeshFile(Message):
     data: UInt8s = b""
 
 
-@dataclass(frozen=True)
 class Marker(Message):
     """One shape for RViz."""
 
@@ -61,7 +57,6 @@ class Marker(Message):
     mesh_use_embedded_materials: Bool = False
 
 
-@dataclass(frozen=True)
 class MarkerArray(Message):
     """The shapes at one time."""
 
