@@ -332,16 +332,17 @@ def test_the_protective_field_is_the_stopping_distance(gap_m: float) -> None:
     assert in_the_path_mps((math.nan, 0.0), 0.25, field) == 0.0
 
 
-@given(bearing=ANGLES, yaw_rate=st.floats(-4.0, 4.0))
-def test_a_robot_that_may_start_anywhere_has_one_protective_field_however_it_turns(
-    bearing: float, yaw_rate: float
+@pytest.mark.parametrize("yaw_rate_radps", [-6.0, -1.0, 0.0, 3.0])
+def test_a_robot_that_may_start_anywhere_has_a_round_protective_field(
+    yaw_rate_radps: float,
 ) -> None:
     omni = replace(ROBOT, drive="holonomic")
-    place_m = 1.4 * math.cos(bearing), 1.4 * math.sin(bearing)
-    still, turns = (starts_of(omni, state(0.0, rate), 0.0) for rate in (0.0, yaw_rate))
-    limit = in_the_path_mps(place_m, MARGIN_M, still)
-    assert 0.0 < limit < still.maximum_mps
-    assert in_the_path_mps(place_m, MARGIN_M, turns) == pytest.approx(limit)
+    field = starts_of(omni, state(0.0, yaw_rate_radps), 0.0)
+    gap_m = 2.0 - omni.circumscribed_radius_m - MARGIN_M
+    for bearing in np.linspace(-math.pi, math.pi, 25).tolist():
+        place_m = 2.0 * math.cos(bearing), 2.0 * math.sin(bearing)
+        limit = in_the_path_mps(place_m, MARGIN_M, field)
+        assert limit * 0.3 + limit**2 / 2.0 == pytest.approx(gap_m)
 
 
 @pytest.mark.parametrize("yaw_rate_radps", [0.3, -0.8, 2.0, 5.0])
