@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from nav_adapter.course import Course, contact_m, reach_at
+from nav_adapter.limit import in_the_path_mps
 from nav_adapter.reach import Reach
 
 GRID = 4001
@@ -62,6 +63,40 @@ def test_ways_are_those_of_all_courses(fan_rad: float) -> None:
         assert found[0] <= expected[0] + 1e-9
         met += np.isfinite(expected)
     assert met.min() > 30
+
+
+@pytest.mark.parametrize("fan_rad", [0.0, 0.2, 1.0])
+def test_the_protective_field_ends_at_the_first_body_on_any_course(fan_rad: float) -> None:
+    rng = np.random.default_rng(6)
+    outcomes = []
+    for _ in range(300):
+        field, age_s = some_course(rng, fan_rad), rng.choice([0.0, 0.2])
+        x, y, body_m = rng.uniform(-1.5, 3.0), rng.uniform(-2.0, 2.0), rng.uniform(0.1, 0.5)
+        place_m = (
+            field.x_m + field.cos * x - field.sin * y,
+            field.y_m + field.sin * x + field.cos * y,
+        )
+        found = in_the_path_mps(place_m, body_m, field, age_s)
+        near, past, behind = one_by_one(field, fan_rad, 0.0, x, abs(y), body_m)
+        if max(past, behind) == -math.inf:
+            expected = field.maximum_mps
+        elif behind >= 0.0 or near <= 0.0:
+            expected = 0.0
+        else:
+            # It drives on for the reaction time and the age of the data, and brakes with a = 1.
+            speeds = np.linspace(0.0, field.maximum_mps, 20_001)
+            way = speeds * (field.reaction_s + age_s) + speeds**2 / 2.0
+            expected = speeds[way <= near].max()
+        assert found == pytest.approx(expected, abs=0.02), (x, y, body_m, field)
+        outcomes.append(found)
+    assert {0.0, 2.0} < set(outcomes)
+
+
+def test_somebody_abreast_of_the_rear_edge_counts() -> None:
+    course = some_course(np.random.default_rng(0), 0.0)._replace(rear_m=0.0)
+    abreast = contact_m(course, 0.3, 0.0, 0.4, 0.16, 0.0)
+    assert abreast == pytest.approx(one_by_one(course, 0.0, 0.3, 0.0, 0.4, 0.0), abs=1e-9)
+    assert abreast[1] == 0.0
 
 
 def test_any_course_leads_straight_to_the_person() -> None:

@@ -128,6 +128,14 @@ def test_whatever_makes_people_or_the_robot_worse_lowers_the_limit(
     assert limit_mps(reach, course(turn, age_s=0.2, yaw_rate=yaw_rate)) <= limit + 1e-9
 
 
+@given(place=PLACES, walk=WALKS, turn=TURNS, at_most=st.floats(0.05, 2.0))
+def test_a_limit_that_is_asked_for_up_to_a_speed_is_the_same_up_to_it(
+    place: tuple[float, float], walk: tuple[float, float], turn: float, at_most: float
+) -> None:
+    reach, at = person(place, walk), course(turn)
+    assert limit_mps(reach, at, at_most) == min(limit_mps(reach, at), at_most)
+
+
 @given(place=PLACES, turn=TURNS, age=st.floats(0.0, 1.0))
 def test_an_older_place_of_somebody_who_stands_lowers_the_limit(
     place: tuple[float, float], turn: float, age: float
@@ -323,6 +331,19 @@ def test_the_protective_field_is_the_stopping_distance(gap_m: float) -> None:
     assert in_the_path_mps((course.rear_m - 0.26, 0.0), 0.25, field) == course.maximum_mps
     assert in_the_path_mps((course.rear_m - 0.24, 0.0), 0.25, field) == 0.0
     assert in_the_path_mps((math.nan, 0.0), 0.25, field) == 0.0
+
+
+@pytest.mark.parametrize("yaw_rate_radps", [-6.0, -1.0, 0.0, 3.0])
+def test_a_robot_that_may_start_anywhere_has_a_round_protective_field(
+    yaw_rate_radps: float,
+) -> None:
+    omni = replace(ROBOT, drive="holonomic")
+    field = starts_of(omni, state(0.0, yaw_rate_radps), 0.0)
+    gap_m = 2.0 - omni.circumscribed_radius_m - MARGIN_M
+    for bearing in np.linspace(-math.pi, math.pi, 25).tolist():
+        place_m = 2.0 * math.cos(bearing), 2.0 * math.sin(bearing)
+        limit = in_the_path_mps(place_m, MARGIN_M, field)
+        assert limit * 0.3 + limit**2 / 2.0 == pytest.approx(gap_m)
 
 
 @pytest.mark.parametrize("yaw_rate_radps", [0.3, -0.8, 2.0, 5.0])

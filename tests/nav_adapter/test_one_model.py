@@ -200,15 +200,22 @@ def test_a_robot_creeps_where_no_sensor_sees(speed: float, left: float, limit: f
             assert abs(clipped[0]) <= most + 1e-9
 
 
-def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen() -> None:
-    adapter, state = NavAdapter(POLICY, ROBOT), robot_at(speed_mps=1.0)
-    late = replace(state, stamp_s=POLICY.timing.stale_after_s + 0.1)
-    assert adapter.update((), state, 0.0, seen_stamp_s=ahead_alone).speed_limit_mps == 1.5
-    stale = adapter.update((), late, late.stamp_s, seen_stamp_s=ahead_alone)
+@pytest.mark.parametrize("clock_s", [0.0, 1000.0])
+def test_what_was_seen_too_long_ago_is_unseen_and_without_knowledge_all_is_seen(
+    clock_s: float,
+) -> None:
+    def seen(bearing_rad: float, half_rad: float) -> float | None:
+        return None if ahead_alone(bearing_rad, half_rad) is None else clock_s
+
+    adapter = NavAdapter(POLICY, ROBOT)
+    state = replace(robot_at(speed_mps=1.0), stamp_s=clock_s)
+    late = replace(state, stamp_s=clock_s + POLICY.timing.stale_after_s + 0.1)
+    assert adapter.update((), state, clock_s, seen_stamp_s=seen).speed_limit_mps == 1.5
+    stale = adapter.update((), late, late.stamp_s, seen_stamp_s=seen)
     assert stale.limited_by.startswith("unseen: ")
     left_out = POLICY.model_copy(update={"without": ("unseen",)})
     for policy, told in ((POLICY, None), (left_out, lambda *_: None)):
-        free = NavAdapter(policy, ROBOT).update((), state, 0.0, seen_stamp_s=told)
+        free = NavAdapter(policy, ROBOT).update((), state, clock_s, seen_stamp_s=told)
         assert free.speed_limit_mps == 1.5
 
 

@@ -84,6 +84,17 @@ def test_the_uncertainty_covers_place_and_velocity(seed: int, drift: float, sigm
     )
 
 
+@given(seed=st.integers(0, 999), ahead=st.floats(-1.0, 3.0))
+def test_a_spread_that_drifts_is_that_of_the_predicted_track(seed: int, ahead: float) -> None:
+    root = np.random.default_rng(seed).normal(0.0, 0.2, (4, 4))
+    F = np.eye(4) + ahead * np.eye(4, k=2)
+    predicted = F @ root @ root.T @ F.T
+    drifted = Spread.of((root @ root.T).tolist()).after(ahead)
+    np.testing.assert_allclose(drifted, Spread.of(predicted.tolist()), atol=1e-9)
+    largest = float(np.linalg.eigvalsh(predicted[:2, :2])[-1])
+    assert drifted.sigma_m == pytest.approx(math.sqrt(largest), abs=1e-9)
+
+
 RECORDINGS = sorted((SHARED / "data").glob("citr_*.csv"))
 FRAMES_PER_S = 29.97
 STILL_S, STILL_M = 0.5, 0.1

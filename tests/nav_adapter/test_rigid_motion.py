@@ -32,6 +32,19 @@ def test_each_point_moves_with_its_own_velocity(motion: Motion, ahead: float, le
     assert math.hypot(*motion.velocity_at(x, y)) <= fastest_mps + 1e-9
 
 
+@given(speeds, speeds, st.floats(0.1, 2.0), st.floats(0.0, 1.0))
+def test_in_its_stopping_time_a_body_moves_as_far_as_until_it_has_braked(
+    forward: float, rate: float, radius_m: float, reaction_s: float
+) -> None:
+    braking = reaction_s, 0.8, radius_m
+    driving, turning = Motion(0.0, 0.0, 0.0, forward), Motion(0.0, 0.0, yaw_rate_radps=rate)
+    for motion, fastest in ((driving, abs(forward)), (turning, abs(rate) * radius_m)):
+        way_m = fastest * reaction_s + fastest**2 / (2.0 * 0.8)
+        assert fastest * motion.stopping_s(*braking) == pytest.approx(way_m, abs=1e-9)
+    both_s = driving._replace(yaw_rate_radps=rate).stopping_s(*braking)
+    assert both_s == max(driving.stopping_s(*braking), turning.stopping_s(*braking))
+
+
 @given(motions, times, st.floats(-3.0, 3.0))
 def test_the_world_may_turn_and_be_mirrored(motion: Motion, time_s: float, turn: float) -> None:
     def turned(each: Motion) -> Motion:
