@@ -43,6 +43,8 @@ PLANNERS: Final = {
 _WIDTH_IN: Final = 7.2
 _HEIGHT_IN: Final = 2.7
 _COLOURS: Final = 64
+# Examples without a planner.
+_ROBOTS: Final = {"ros2_robot"}
 _SHOWN: Final = 7
 _ROBOT: Final = "#1f5f8b"
 _LIMIT: Final = "#b3261e"
@@ -177,8 +179,9 @@ def _colour(alpha: float) -> tuple[float, ...]:
 
 
 def example_names() -> tuple[str, ...]:
-    """Return the names of all examples, those with other projects' planners last."""
-    return (*sorted(path.stem for path in (ROOT / "examples").glob("*.py")), *PLANNERS)
+    """Return the names of all examples of a planner, those with other projects' planners last."""
+    own = {path.stem for path in (ROOT / "examples").glob("*.py")} - _ROBOTS
+    return (*sorted(own), *PLANNERS)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
