@@ -39,6 +39,7 @@ def known_now(
     first_mps = speed_mps
     if person.is_at_first_sight:
         first_mps = unaware_mps
+    within_m = margins.within_m(speed_mps, unaware_mps)
     walking_mps = math.hypot(*velocity)
     if walking_mps > unaware_mps > 0.0:
         # Faster people may stay so. In proportion, so that presets stay ordered.
@@ -58,6 +59,7 @@ def known_now(
         policy.reach.delay_s + unseen_s,
         min(max(now - track.stamp_s, 0.0), _OLDEST_S),
         margins.floor_m,
+        within_m,
         Spread.of(track.covariance_odom.tolist()).terms(sigmas),
     )
     return Known(key, reach, first_mps, BODY_RADIUS_M + sigmas * person.sigma_m)
@@ -171,14 +173,11 @@ class SpeedBasis:
             if not is_seen and now + time_s - seen_s > fresh_s:
                 sigmas = max(sigmas, margins.unseen_sigmas)
             a0, a1, a2 = reach.variances
-            speed_mps = reach.speed_mps
             if time_s > aware_for_s:
-                speed_mps = max(speed_mps, unaware_mps)
+                reach = reach.at_least(unaware_mps)
             rows.append(
                 known._replace(
-                    reach=reach._replace(
-                        speed_mps=speed_mps, variances=(max(a0, (sigmas * sigma_m) ** 2), a1, a2)
-                    ),
+                    reach=reach._replace(variances=(max(a0, (sigmas * sigma_m) ** 2), a1, a2)),
                     body_m=max(known.body_m, BODY_RADIUS_M + sigmas * sigma_m),
                 )
             )
@@ -196,10 +195,10 @@ class SpeedBasis:
         """Return what is known of a person at a time ahead if no later frame shows them."""
         track, policy, reach = person.track, self.policy, present.reach
         timing, margins = policy.timing, policy.margins
-        (vx, vy), speed_mps, delay_s = person.velocity_odom_mps, reach.speed_mps, reach.delay_s
+        (vx, vy), delay_s = person.velocity_odom_mps, reach.delay_s
         sigmas = margins.uncertainty_sigmas
         if self.stamp_s + time_s - seen_s > timing.fresh_within_s - _SAME_AGE_S:
-            speed_mps = max(human_speed_mps(policy, 0.0), math.hypot(vx, vy), speed_mps)
+            reach = reach.at_least(max(human_speed_mps(policy, 0.0), math.hypot(vx, vy)))
             sigmas = max(sigmas, margins.unseen_sigmas)
         spread = Spread.of(track.covariance_odom.tolist())
         variances = spread.terms(sigmas)
@@ -221,7 +220,6 @@ class SpeedBasis:
             reach=reach._replace(
                 x_m=reach.x_m + vx * moved_s,
                 y_m=reach.y_m + vy * moved_s,
-                speed_mps=speed_mps,
                 delay_s=delay_s,
                 elapsed_s=min(elapsed_s, _OLDEST_S),
                 variances=variances,

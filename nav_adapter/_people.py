@@ -151,6 +151,7 @@ class People:
 
     def __init__(self, policy: AwarenessPolicy, robot: RobotProfile) -> None:
         self._policy, self._timing, self._margins = policy, policy.timing, policy.margins
+        margins = policy.margins
         inflation, speed = policy.inflation, policy.speed
         self._radius_of = inflation.radius_m
         _require_non_increasing(self._policy_speed_mps, type(speed).__name__, "m/s")
@@ -165,8 +166,9 @@ class People:
         self._passing_speeds: list[float] = sorted(set(speeds))
         reach = policy.reach if policy.applies("reach") else None
         self._passing_radii = [
-            passing_radius_m(each, reach, self._margins.clearance_m, robot)
+            passing_radius_m(each, reach, margins.clearance_m, robot, within_m)
             for each in self._passing_speeds
+            for within_m in [margins.within_m(each, self._unaware_mps)]
         ]
         _require_non_increasing(self._policy_radius_m, type(inflation).__name__, "m")
         self._unaware_m = self._policy_radius_m(0.0)

@@ -68,6 +68,10 @@ class RobotProfile:
         min_turning_radius_m: > 0, up to 100 m, the tightest curve of the base origin, needed with
             ``"ackermann"`` and refused with any other drive: |ω| ≤ |v| / radius. It limits
             commands and changes no speed limit.
+        brakes_on_curve: True for a robot that keeps to its present curve until it stands, as one
+            does that follows a path and slows down on it: no planner turns it towards people beside
+            its path meanwhile. The limit then counts its own curve alone, not the courses turned
+            off it by up to the policy's ``turn_deg``.
 
     Raises:
         NavError: for a value out of these bounds, which no robot among people has: the message
@@ -83,6 +87,7 @@ class RobotProfile:
     max_yaw_rate_radps: float | None = None
     max_yaw_acceleration_radps2: float | None = None
     min_turning_radius_m: float | None = None
+    brakes_on_curve: bool = False
 
     def __post_init__(self) -> None:
         if self.drive is not None and self.drive not in get_args(Drive):
@@ -94,6 +99,10 @@ class RobotProfile:
             raise NavError(
                 "min_turning_radius_m must be given with drive='ackermann' and with no other "
                 f"drive, got {self.min_turning_radius_m!r:.80} with drive={self.drive!r}"
+            )
+        if not isinstance(self.brakes_on_curve, bool):
+            raise NavError(
+                f"brakes_on_curve must be True or False, got {self.brakes_on_curve!r:.80}"
             )
         footprint = finite_array("footprint_m", self.footprint_m, ("M", 2), NavError)
         if len(footprint) < 3:
@@ -144,6 +153,10 @@ class RobotProfile:
     def moves_sideways(self) -> bool | None:
         """True for a drive that can move sideways; None if it is not known."""
         return None if self.drive is None else self.drive == "holonomic"
+
+    def turn_rad(self, turn_deg: float) -> float:
+        """Return by how much it may turn off its curve while it stops, if others turn so far."""
+        return 0.0 if self.brakes_on_curve else math.radians(turn_deg)
 
     @cached_property
     def circumscribed_radius_m(self) -> float:

@@ -189,13 +189,13 @@ def driven_since_m(robot: RobotProfile, travel_mps: Any, age_s: float, xp: Any =
 
 def reach_at(
     person: Reach, course: Course, t0_s: float, t1_s: float
-) -> tuple[float, float, float, float]:
-    """Return the middle of the reach from t0 to t1, its squared distance, and its radius.
+) -> tuple[float, float, float, float, float]:
+    """Return the middle of the reach from t0 to t1, its squared distance, radius, and margin.
 
     The middle is given along and across the middle of the fan, as seen from the base.
     """
     # The formulas of Reach.
-    x_m, y_m, vx, vy, U, tau, delay_s, elapsed_s, _, (a0, a1, a2) = person
+    x_m, y_m, vx, vy, U, tau, delay_s, elapsed_s, margin, within, (a0, a1, a2) = person
     base_x, base_y, cos, sin = course[:4]
     m0 = tau * -_expm1(-(t0_s + elapsed_s) / tau)
     m1 = tau * -_expm1(-(t1_s + elapsed_s) / tau)
@@ -205,16 +205,17 @@ def reach_at(
     dy = y_m + vy * middle_s - base_y
     x, y = cos * dx + sin * dy, abs(cos * dy - sin * dx)
     reach = U * (since_s + tau * _expm1(-since_s / tau))
+    margin -= min(reach, within)
     reach += 0.5 * (m1 - m0) * _sqrt(vx * vx + vy * vy)
     # With a negative a1 it shrinks.
     variance = max(a0 + m1 * (a1 + m1 * a2), a0 + m0 * (a1 + m0 * a2))
     if not variance <= 0.0:
         reach += _sqrt(variance)
-    return x, y, x * x + y * y, reach
+    return x, y, x * x + y * y, reach, margin
 
 
 def contact_m(
-    course: Course, margin: float, x: float, y: float, distance2: float, reach: float
+    course: Course, x: float, y: float, distance2: float, reach: float, margin: float
 ) -> tuple[float, float, float]:
     """Return the ways on which the robot meets a reach at (x, y) along and across the fan's middle.
 

@@ -122,11 +122,11 @@ def _lowest_mps(
     need0 = a * (t0 - T) if t0 > T else 0.0  # a faster robot still moves at t0
     braked0_m = 0.5 * need0 * (t0 - T)
     braked1_m = 0.5 * a * (t1 - T) * (t1 - T) if t1 > T else 0.0
-    x, y, distance2, reach = reach_at(person, course, t0, t1)
-    apart_m = math.sqrt(distance2) - reach - person.margin_m - size_m - _ROUNDING_M
+    x, y, distance2, reach, margin = reach_at(person, course, t0, t1)
+    apart_m = math.sqrt(distance2) - reach - margin - size_m - _ROUNDING_M
     if apart_m > 0.0 and apart_m >= _way_m(maximum, a, T, t1):
         return math.inf
-    near, past, past_behind = contact_m(course, person.margin_m, x, y, distance2, reach)
+    near, past, past_behind = contact_m(course, x, y, distance2, reach, margin)
     if need0 * t0 - braked0_m <= past_behind:
         return need0
     if past == -math.inf:
@@ -161,7 +161,7 @@ def _apart(person: Reach, course: Course, speed_mps: float, t0: float, t1: float
     """
     T, a = person.elapsed_s, course.deceleration_mps2
     way0, way1 = _way_m(speed_mps, a, T, t0), _way_m(speed_mps, a, T, t1)
-    near, past, past_behind = contact_m(course, person.margin_m, *reach_at(person, course, t0, t1))
+    near, past, past_behind = contact_m(course, *reach_at(person, course, t0, t1))
     if way0 > past_behind and (way1 < near or way0 > past):
         return True
     if t1 - t0 <= FINEST * _step_s(course) or a * (t0 - T) >= speed_mps:
@@ -194,7 +194,7 @@ def in_the_path_mps(
     x, y = field.cos * dx + field.sin * dy, abs(field.cos * dy - field.sin * dx)
     if x > 0.0 and field.fan_cos * y - field.fan_sin * x > field.half_m + margin_m:
         return field.maximum_mps  # beside it
-    near, past, past_behind = contact_m(field, 0.0, x, y, dx * dx + dy * dy, margin_m)
+    near, past, past_behind = contact_m(field, x, y, dx * dx + dy * dy, margin_m, 0.0)
     if past_behind >= 0.0:
         return 0.0
     if past == -math.inf:
@@ -208,7 +208,11 @@ def in_the_path_mps(
 
 @lru_cache(maxsize=64)
 def passing_radius_m(
-    speed_mps: float, rules: ReachRules | None, clearance_m: float, robot: RobotProfile
+    speed_mps: float,
+    rules: ReachRules | None,
+    clearance_m: float,
+    robot: RobotProfile,
+    within_m: float = 0.0,
 ) -> float:
     """Return the smallest radius of a circle beside which the limit is at least ``PASSING_MPS``.
 
@@ -222,19 +226,20 @@ def passing_radius_m(
         rules: of the policy; None for the protective field alone.
         clearance_m: of the policy.
         robot: footprint, braking and reaction time.
+        within_m: as in :class:`~nav_adapter.reach.Reach`.
     """
     floor_m = BODY_RADIUS_M + clearance_m
     if rules is None:
         return floor_m
     passing_mps = min(PASSING_MPS, robot.max_speed_mps)
-    course = course_of(robot, Motion(0.0, 0.0, 0.0, passing_mps), math.radians(rules.turn_deg))
+    course = course_of(robot, Motion(0.0, 0.0, 0.0, passing_mps), robot.turn_rad(rules.turn_deg))
     motion = 0.0, 0.0, speed_mps, rules.time_constant_s, rules.delay_s
 
     def passes(radius_m: float) -> bool:
         beside_m = radius_m + course.half_m
         places = np.linspace(course.rear_m - radius_m, course.front_m + 3.0 * radius_m, 16)
         return all(
-            limit_mps(Reach(x_m, beside_m, *motion, margin_m=floor_m), course) >= passing_mps
+            limit_mps(Reach(x_m, beside_m, *motion, 0.0, floor_m, within_m), course) >= passing_mps
             for x_m in places.tolist()
         )
 

@@ -5,7 +5,10 @@ constant τ, after going unnoticed for δ. At time t they are within
 
     r(t) = U (t + δ − τ (1 − e^{−(t + δ)/τ}))   of   p + u τ (1 − e^{−t/τ}),
 
-plus the body and the uncertainty of place and velocity. τ = 0.54 s and U = 1.34 m/s fit recorded
+plus the body, the clearance C and the uncertainty of place and velocity. What people who have
+noticed the robot do at first, a lean or half a step, may lie within the clearance: with U as a share
+λ of that of unaware people, reach and clearance are max(C, r(t) + λ C) together, which is r + C for
+unaware people and grows with t, U, λ and C. τ = 0.54 s and U = 1.34 m/s fit recorded
 people who set off (``docs/people.md``). Somebody who stands needs time to start, somebody who walks
 away time to turn, and a brisk walker time to swerve: all three are this one statement.
 ``docs/safety.md`` derives it.
@@ -38,6 +41,7 @@ class Reach(NamedTuple):
         delay_s: δ ≥ 0, how long a change of velocity may have gone unnoticed.
         elapsed_s: ≥ 0, age of place and velocity.
         margin_m: body radius and clearance.
+        within_m: how much of r lies within the clearance, (1 − λ) C; 0 for unaware people.
         variances: a₀, a₁, a₂ of the variance a₀ + a₁ m + a₂ m² (m²) of the place after a drift of
             m = τ (1 − e^{−t/τ}) seconds, with the standard deviations that count already squared
             in.
@@ -52,6 +56,7 @@ class Reach(NamedTuple):
     delay_s: float
     elapsed_s: float = 0.0
     margin_m: float = BODY_RADIUS_M
+    within_m: float = 0.0
     variances: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     @property
@@ -59,6 +64,10 @@ class Reach(NamedTuple):
         """True if this person walks faster than U: walking on is not within the reach then."""
         walking_mps = math.hypot(self.velocity_x_mps, self.velocity_y_mps)
         return walking_mps > self.speed_mps + SAME_MPS
+
+    def at_least(self, unaware_mps: float) -> Reach:
+        """Return the reach of this person if they are unaware, with a U of at least this."""
+        return self._replace(speed_mps=max(self.speed_mps, unaware_mps), within_m=0.0)
 
     def walking_on(self) -> Reach:
         """Return the reach of this person if they walk straight on."""
@@ -80,6 +89,10 @@ class Reach(NamedTuple):
         """Return r, how far from that middle the body's centre line may be ``ahead_s`` from now."""
         tau, since_s = self.time_constant_s, ahead_s + self.elapsed_s + self.delay_s
         return self.speed_mps * (since_s + tau * math.expm1(-since_s / tau))
+
+    def margin_after_m(self, ahead_s: float) -> float:
+        """Return body and the clearance that r leaves: it falls with time, its sum with r rises."""
+        return self.margin_m - min(self.radius_m(ahead_s), self.within_m)
 
     def uncertainty_m(self, drift_s: float) -> float:
         """Return by how much the middle may be wrong after a drift."""

@@ -46,6 +46,13 @@ class Known(NamedTuple):
     body_m: float
     least_mps: float = -math.inf
 
+    @property
+    def at_first_sight(self) -> Reach:
+        """The reach of somebody unaware while awareness does not count yet, ``reach`` then."""
+        if self.first_sight_mps <= self.reach.speed_mps:
+            return self.reach
+        return self.reach.at_least(self.first_sight_mps)
+
 
 class Courses(NamedTuple):
     """The courses of a robot at one time.
@@ -53,7 +60,7 @@ class Courses(NamedTuple):
     Attributes:
         own: the curve that it drives.
         field: the same with the clearance of the protective field.
-        turned: all courses turned by up to ``turn_deg`` off its own.
+        turned: all courses turned by up to ``turn_deg`` off its own; its own, if it keeps to that.
     """
 
     own: Course
@@ -65,18 +72,18 @@ class Courses(NamedTuple):
         cls, policy: AwarenessPolicy, robot: RobotProfile, motion: Motion, age_s: float
     ) -> Courses:
         """Return the courses of a robot whose motion is ``age_s`` old."""
-        return cls._around(policy, course_of(robot, motion, 0.0, age_s))
+        return cls._around(policy, robot, course_of(robot, motion, 0.0, age_s))
 
     @classmethod
     def of_starts(
         cls, policy: AwarenessPolicy, robot: RobotProfile, motion: Motion, age_s: float
     ) -> Courses:
         """Return the courses on which a robot that stands may start otherwise than forwards."""
-        return cls._around(policy, starts_of(robot, motion, 0.0, age_s))
+        return cls._around(policy, robot, starts_of(robot, motion, 0.0, age_s))
 
     @classmethod
-    def _around(cls, policy: AwarenessPolicy, own: Course) -> Courses:
-        turned = own.turned(math.radians(policy.reach.turn_deg))
+    def _around(cls, policy: AwarenessPolicy, robot: RobotProfile, own: Course) -> Courses:
+        turned = own.turned(robot.turn_rad(policy.reach.turn_deg))
         return cls(own, own.grown(policy.margins.clearance_m), turned)
 
     def braking(self) -> Courses:
@@ -153,9 +160,8 @@ class FirstSight(_Reached):
 
     def meets(self, person: Known, courses: Courses) -> tuple[Reach, Course] | None:
         """Return the reach of somebody unaware, and the courses turned off the robot's own."""
-        if person.first_sight_mps <= person.reach.speed_mps:
-            return None
-        return person.reach._replace(speed_mps=person.first_sight_mps), courses.turned
+        met = person.at_first_sight
+        return None if met is person.reach else (met, courses.turned)
 
 
 class Path(Rule):

@@ -50,6 +50,7 @@ class Reaches:
         ahead_s: (J,) times ahead.
         drift_s: (J, rows) m of :class:`~nav_adapter.reach.Reach`.
         reach_m: (J, rows) r and the uncertainty; the body is not in it.
+        margin_m: (J, rows) body and the clearance that r leaves.
         around_m: (J, rows) farthest place of the body from the place now, until then.
         need_mps: (J, rows) a faster robot still moves.
         braked_m: (J, rows) way that braking has saved.
@@ -68,6 +69,7 @@ class Reaches:
     ahead_s: Any
     drift_s: Any
     reach_m: Any
+    margin_m: Any
     around_m: Any
     need_mps: Any
     braked_m: Any
@@ -84,14 +86,9 @@ class Reaches:
             # Most people differ in place alone from time to time.
             place = [(each.reach.x_m, each.reach.y_m, each.least_mps) for each in ahead]
             rest = [
-                (
-                    *each.reach[2:4],
-                    max(each.reach.speed_mps, each.first_sight_mps),
-                    *each.reach[5:8],
-                    *each.reach.variances,
-                    each.body_m,
-                )
+                (*reach[2:8], reach.within_m, *reach.variances, each.body_m)
                 for each in ahead
+                for reach in [each.at_first_sight]
             ]
             if rest.count(rest[0]) == len(rest):
                 rest = rest[:1]
@@ -105,7 +102,9 @@ class Reaches:
             places += place
             values += rest
         x, y, least = np.ascontiguousarray(np.array(places).T)
-        vx, vy, U, tau, delay, elapsed, a0, a1, a2, body = np.ascontiguousarray(np.array(values).T)
+        vx, vy, U, tau, delay, elapsed, within, a0, a1, a2, body = np.ascontiguousarray(
+            np.array(values).T
+        )
         each_row = np.array(column_of)
         a, react = robot.max_deceleration_mps2, robot.reaction_time_s + elapsed
         step_s = 2.0 * step_of_s(robot.max_speed_mps, a)  # twice that of the limit
@@ -116,6 +115,8 @@ class Reaches:
         m = tau * -np.expm1(-(t + elapsed) / tau)
         since = t + elapsed + delay
         r = U * (since + tau * np.expm1(-since / tau))
+        left = basis.policy.margins.floor_m - np.minimum(r, within)
+        left = left if within.any() else left[:, :1]
         variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
         r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))
         around = np.maximum.accumulate(r + (m + 0.5 * step_s) * walking, axis=0)
@@ -143,7 +144,13 @@ class Reaches:
             ),
             *(vy[each_row].astype(np.float32), (body + slack)[each_row].astype(np.float32), least),
             *(elapsed[each_row].astype(np.float32), table(react), t[:, 0].astype(np.float32)),
-            *(table(m), table(r + slack), table(around + 2.0 * slack), table(a * late)),
+            *(
+                table(m),
+                table(r + slack),
+                table(left),
+                table(around + 2.0 * slack),
+                table(a * late),
+            ),
             table(0.5 * a * late * late),
         )
 
@@ -173,7 +180,6 @@ class Field:
     ) -> None:
         self._reaches, self._times = reaches, times
         self._course, self._field = course, field
-        self._margin_m = np.float32(basis.policy.margins.floor_m)
         self._a = np.float32(robot.max_deceleration_mps2)
         self._reach_m = np.float32(reach_m)
         # No farther from the base is any part of robot or field, wherever they point.
@@ -398,11 +404,12 @@ class Field:
         vx, vy = pairs.velocity_x_mps, pairs.velocity_y_mps
         x, y = pairs.x_m + vx * middle, pairs.y_m + vy * middle
         reach = in_table(reaches.reach_m, later, row) + half * np.sqrt(vx * vx + vy * vy)
+        margin = in_table(reaches.margin_m, later, row)
         if pairs.fan_cos is None:
             past = behind = None
-            near = np.sqrt(x * x + y * y) - (pairs.radius_m + self._margin_m) - reach
+            near = np.sqrt(x * x + y * y) - (pairs.radius_m + margin) - reach
         else:
-            near, past, behind = contacts_m(x, y, pairs, reach, self._margin_m)
+            near, past, behind = contacts_m(x, y, pairs, reach, margin)
         own = np.maximum((near + braked1) / t1, need0)
         stops = np.flatnonzero(own < need1)
         if len(stops):

@@ -196,7 +196,7 @@ def limits_at(
     own = courses_at(robot, *told, basis.robot_age_s)
     turned = None
     if basis.policy.applies("reach"):
-        turned = own.turned(np.float32(math.radians(basis.policy.reach.turn_deg)), np)
+        turned = own.turned(np.float32(robot.turn_rad(basis.policy.reach.turn_deg)), np)
     field = (
         own.grown(basis.policy.margins.clearance_m) if basis.policy.applies("in the path") else None
     )

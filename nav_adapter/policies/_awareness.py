@@ -106,7 +106,7 @@ class InterpolatedHumanSpeed(_AwarenessRamp):
     """
 
     unaware_human_speed_mps: float = Field(default=1.5, ge=0.0, le=10.0)
-    aware_human_speed_mps: float = Field(default=0.0, ge=0.0, le=10.0)
+    aware_human_speed_mps: float = Field(default=0.24, ge=0.0, le=10.0)
 
     @model_validator(mode="after")
     def _check_speeds(self) -> InterpolatedHumanSpeed:

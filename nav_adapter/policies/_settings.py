@@ -18,7 +18,8 @@ class ReachRules(NavConfig):
         time_constant_s: τ, in which a person changes to another velocity. 0.54 s is the fit to
             recorded people who set off (docs/people.md).
         delay_s: δ, how long a person may have begun to do so before the sensors show it.
-        turn_deg: the robot may turn by this much off its course, either way, while it stops.
+        turn_deg: the robot may turn by this much off its course, either way, while it stops; 0
+            counts for a robot whose profile says ``brakes_on_curve``.
     """
 
     time_constant_s: float = Field(default=0.54, ge=0.05, le=5.0)
@@ -48,6 +49,13 @@ class SafetyMargins(NavConfig):
     def floor_m(self) -> float:
         """Smallest radius of any obstacle: body radius plus clearance."""
         return BODY_RADIUS_M + self.clearance_m
+
+    def within_m(self, speed_mps: float, unaware_mps: float) -> float:
+        """Return how much of the reach of somebody with this U lies within the clearance.
+
+        It is 0 at the U of unaware people, and the whole clearance at a U of 0.
+        """
+        return max(1.0 - speed_mps / unaware_mps, 0.0) * self.clearance_m if unaware_mps else 0.0
 
 
 class TimeBehaviour(NavConfig):

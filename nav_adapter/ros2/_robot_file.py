@@ -116,6 +116,8 @@ class RobotFile(NavConfig):
         max_yaw_acceleration_radps2: > 0, the fastest change of the yaw rate.
         min_turning_radius_m: > 0, the tightest curve of the base origin; needed with ``ackermann``
             and refused with another drive.
+        brakes_on_curve: true for a robot whose controller keeps to a path and slows down on it:
+            people beside the path limit it less (:class:`~nav_adapter.RobotProfile`).
         camera: mount of the camera; without it the pose is read from tf.
         scanners: mounts of the laser scanners, in the order of their topics; without it the poses
             are read from tf.
@@ -130,6 +132,7 @@ class RobotFile(NavConfig):
     max_yaw_rate_radps: float | None = Field(default=None, gt=0.0)
     max_yaw_acceleration_radps2: float | None = Field(default=None, gt=0.0)
     min_turning_radius_m: float | None = Field(default=None, gt=0.0)
+    brakes_on_curve: bool = False
     camera: CameraMount | None = None
     scanners: list[ScannerMount] | None = Field(default=None, min_length=1, max_length=2)
 

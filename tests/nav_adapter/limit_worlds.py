@@ -71,7 +71,8 @@ def _drawn(rng: np.random.Generator, worlds: int) -> _Worlds:
         where = (distance * math.cos(bearing), distance * math.sin(bearing))
         motion = (walk * math.cos(direction), walk * math.sin(direction))
         person = Reach(
-            *(*where, *motion, top, tau, delay), elapsed_s=age, margin_m=BODY_M + CLEARANCE_M
+            *(*where, *motion, top, tau, delay, age, BODY_M + CLEARANCE_M),
+            within_m=float(rng.choice([0.0, rng.uniform(0.0, CLEARANCE_M), CLEARANCE_M])),
         )
         rate = float(rng.choice([0.0, rng.uniform(-1.0, 1.0)]))
         speed = robot.max_speed_mps
@@ -183,6 +184,7 @@ def brute_force_mps(person: Reach, course: Course, speeds: int = 151, times: int
     m, s = tau * -np.expm1(-since / tau), since + person.delay_s
     a0, a1, a2 = person.variances
     reach = person.speed_mps * (s + tau * np.expm1(-s / tau))
+    margin = person.margin_m - np.minimum(reach, person.within_m)
     reach = reach + np.sqrt(np.maximum(a0 + m * (a1 + m * a2), 0.0))
     dx = person.x_m + person.velocity_x_mps * m - course.x_m
     dy = person.y_m + person.velocity_y_mps * m - course.y_m
@@ -191,10 +193,10 @@ def brute_force_mps(person: Reach, course: Course, speeds: int = 151, times: int
     for f in np.linspace(-fan, fan, 41):
         fx = math.cos(f) * x + math.sin(f) * y - way
         fy = np.abs(math.cos(f) * y - math.sin(f) * x) + 0.0 * fx
-        beside = np.maximum(fy - course.half_m - person.margin_m, 0.0)
+        beside = np.maximum(fy - course.half_m - margin, 0.0)
         behind = np.hypot(np.maximum(course.rear_m - fx, 0.0), beside)
         corner = np.hypot(np.maximum(fx - course.front_m, 0.0), np.maximum(fy - course.half_m, 0.0))
-        gap = np.where(fx > course.front_m, np.maximum(corner - person.margin_m, 0.0), behind)
+        gap = np.where(fx > course.front_m, np.maximum(corner - margin, 0.0), behind)
         met |= ((gap < reach + 1e-9) & moves).any(axis=1)
     found = np.flatnonzero(met)
     return course.maximum_mps if not len(found) else float(v[found[0] - 1, 0]) if found[0] else 0.0

@@ -111,6 +111,7 @@ def robots(draw: st.DrawFn) -> RobotProfile:
         max_acceleration_mps2=draw(finite(0.3, 2.0)),
         max_deceleration_mps2=draw(finite(0.3, 3.0)),
         reaction_time_s=draw(finite(0.0, 0.8)),
+        brakes_on_curve=draw(st.booleans()),
     )
 
 

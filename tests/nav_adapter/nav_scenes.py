@@ -70,11 +70,13 @@ def policy_radius_m(policy: AwarenessPolicy, alpha: float, robot: RobotProfile =
 
     It is that of the policy, or the one beside which a robot may pass at 0.3 m/s.
     """
+    speed_mps, unaware_mps = (policy.speed.human_speed_mps(each) for each in (alpha, 0.0))
     passing_m = passing_radius_m(
-        policy.speed.human_speed_mps(alpha),
+        speed_mps,
         policy.reach if policy.applies("reach") else None,
         policy.margins.clearance_m,
         robot,
+        policy.margins.within_m(speed_mps, unaware_mps),
     )
     return max(policy.inflation.radius_m(alpha), passing_m)
 

@@ -60,12 +60,12 @@ def settled(
     return result
 
 
-def expected_mps(distance_m: float, human_mps: float) -> float:
+def expected_mps(distance_m: float, human_mps: float, within_m: float = 0.0) -> float:
     """Return the limit for somebody who stands straight ahead, from reach and course alone."""
     rules = AwarenessPolicy().reach
     assert rules is not None
     times = rules.time_constant_s, rules.delay_s
-    standing = Reach(distance_m, 0.0, 0.0, 0.0, human_mps, *times, margin_m=FLOOR_M)
+    standing = Reach(distance_m, 0.0, 0.0, 0.0, human_mps, *times, 0.0, FLOOR_M, within_m)
     course = course_of(ROBOT, Motion.of(robot_at(speed_mps=0.1)), math.radians(30.0))
     return min(limit_mps(standing, course), ROBOT.max_speed_mps)
 
@@ -76,8 +76,8 @@ def test_one_person_straight_ahead(distance_m: float) -> None:
     (obstacle,) = aware.obstacles
     assert obstacle.radius_m == pytest.approx(policy_radius_m(AwarenessPolicy(), 1.0))
     assert (obstacle.awareness_lower, obstacle.height_m, aware.stale) == (1.0, 1.75, False)
-    # Somebody who keeps to their place is what a scanner stops for.
-    assert aware.speed_limit_mps == pytest.approx(expected_mps(distance_m, 0.0))
+    # What somebody aware does at first lies within the clearance: 0.10 m (1 − 0.24 / 1.5).
+    assert aware.speed_limit_mps == pytest.approx(expected_mps(distance_m, 0.24, 0.084))
     unaware = settled(0.0, position=(distance_m, 0.0))
     assert unaware.obstacles[0].radius_m == pytest.approx(policy_radius_m(AwarenessPolicy(), 0.0))
     assert unaware.speed_limit_mps == pytest.approx(expected_mps(distance_m, 1.5))

@@ -56,7 +56,7 @@ def test_ways_are_those_of_all_courses(fan_rad: float) -> None:
     for _ in range(300):
         course = some_course(rng, fan_rad)
         x, y, reach = rng.uniform(-2.0, 2.5), rng.uniform(0.0, 2.0), rng.uniform(0.0, 0.8)
-        found = contact_m(course, 0.3, x, y, x * x + y * y, reach)
+        found = contact_m(course, x, y, x * x + y * y, reach, 0.3)
         expected = one_by_one(course, fan_rad, 0.3, x, y, reach)
         assert found == pytest.approx(expected, abs=5e-3), (x, y, reach, course)
         # Never later than the first of the courses.
@@ -101,10 +101,10 @@ def test_somebody_abreast_of_the_rear_edge_counts() -> None:
 
 def test_any_course_leads_straight_to_the_person() -> None:
     course = some_course(np.random.default_rng(0), math.pi)._replace(circle_m=0.5, front_m=0.1)
-    assert contact_m(course, 0.3, 1.2, 1.6, 4.0, 0.4) == pytest.approx((0.7, math.inf, -math.inf))
+    assert contact_m(course, 1.2, 1.6, 4.0, 0.4, 0.3) == pytest.approx((0.7, math.inf, -math.inf))
     nowhere = (-math.inf, math.inf, math.inf)
-    assert contact_m(course, 0.3, 0.0, 0.0, 0.0, 0.4) == nowhere
-    assert contact_m(course, 0.3, 1.2, 1.6, 4.0, math.nan) == nowhere
+    assert contact_m(course, 0.0, 0.0, 0.0, 0.4, 0.3) == nowhere
+    assert contact_m(course, 1.2, 1.6, 4.0, math.nan, 0.3) == nowhere
 
 
 def test_the_reach_between_two_instants_is_the_later_one_about_the_way_between() -> None:
@@ -115,7 +115,7 @@ def test_the_reach_between_two_instants_is_the_later_one_about_the_way_between()
         person = Reach(
             *rng.uniform(-2.0, 2.0, 4),
             *rng.uniform(0.3, 1.6, 1),
-            *(0.54, 0.15, rng.uniform(0.0, 0.4), 0.3, terms),
+            *(0.54, 0.15, rng.uniform(0.0, 0.4), 0.4, rng.uniform(0.0, 0.1), terms),
         )
         t0, t1 = sorted(rng.uniform(0.0, 2.0, 2))
         m0, m1 = person.drift_s(t0), person.drift_s(t1)
@@ -126,5 +126,5 @@ def test_the_reach_between_two_instants_is_the_later_one_about_the_way_between()
         radius = person.radius_m(t1) + 0.5 * (m1 - m0) * np.linalg.norm(velocity) + uncertain
         along = middle @ [course.cos, course.sin]
         across = abs(middle @ [-course.sin, course.cos])
-        expected = (along, across, middle @ middle, radius)
+        expected = (along, across, middle @ middle, radius, person.margin_after_m(t1))
         assert reach_at(person, course, t0, t1) == pytest.approx(expected)

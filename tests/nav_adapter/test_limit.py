@@ -266,7 +266,8 @@ def someone(rng: np.random.Generator) -> Reach:
     return Reach(
         *rng.uniform((-1.5, -1.5), (3.5, 1.5)),
         *rng.uniform(-1.2, 1.2, 2),
-        *(rng.uniform(0.0, 0.5), 0.54, 0.1, rng.uniform(0.0, 0.5), 0.4, (0.01, 0.0, 0.0)),
+        *(rng.uniform(0.0, 0.5), 0.54, 0.1, rng.uniform(0.0, 0.5), 0.4),
+        *(rng.uniform(0.0, 0.1), (0.01, 0.0, 0.0)),
     )
 
 
@@ -277,7 +278,7 @@ def meets(reach: Reach, speed_mps: float, reaction_s: float, turn_rad: float) ->
     for t in TIMES[reaction_s + speed_mps / a > TIMES].tolist():
         braked_s = max(t - reaction_s, 0.0)
         way = speed_mps * t - 0.5 * a * braked_s**2
-        near, past, past_behind = contact_m(course, 0.4, *reach_at(reach, course, t, t))
+        near, past, past_behind = contact_m(course, *reach_at(reach, course, t, t))
         if near <= way <= past or way <= past_behind:
             return True
     return False

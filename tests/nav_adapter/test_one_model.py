@@ -96,6 +96,7 @@ def meets_on_an_arc(
     since = t + rules.delay_s
     top = POLICY.speed.human_speed_mps(track.awareness_lower)
     radius = top * (since + rules.time_constant_s * np.expm1(-since / rules.time_constant_s))
+    within_m = POLICY.margins.within_m(top, POLICY.speed.human_speed_mps(0.0))
     for turned_rad in np.radians(rules.turn_deg) * np.linspace(-1.0, 1.0, 9):
         heading = state.heading_odom_rad + turned_rad
         start = Motion(*state.position_odom_m, heading, state.speed_mps, 0.0, state.yaw_rate_radps)
@@ -111,7 +112,7 @@ def meets_on_an_arc(
             if x < rear:
                 continue
             gap = math.hypot(max(x - front, 0.0), max(abs(y) - half, 0.0))
-            if gap < reach_m + POLICY.margins.floor_m - 1e-6:
+            if gap < reach_m + POLICY.margins.floor_m - min(reach_m, within_m) - 1e-6:
                 return True
     return False
 

@@ -115,11 +115,13 @@ def reach(
     name: str, alpha: float, x_m: float = 0.0, y_m: float = 0.0, *, walks: float = 0.0
 ) -> Reach:
     policy = AwarenessPolicy.preset(name)
+    speed_mps, unaware_mps = (policy.speed.human_speed_mps(each) for each in (alpha, 0.0))
     return Reach(
-        *(x_m, y_m, walks, 0.0, policy.speed.human_speed_mps(alpha)),
+        *(x_m, y_m, walks, 0.0, speed_mps),
         policy.reach.time_constant_s,
         policy.reach.delay_s,
         margin_m=policy.margins.floor_m,
+        within_m=policy.margins.within_m(speed_mps, unaware_mps),
     )
 
 

@@ -81,6 +81,7 @@ class RobotModel(SimConfig):
         max_yaw_rate_radps: fastest turn.
         max_yaw_acceleration_radps2: fastest change of the yaw rate.
         min_turning_radius_m: tightest curve of the base origin, with ``"ackermann"`` only.
+        brakes_on_curve: whether it keeps to its curve until it stands, whatever planner drives it.
         body: ``"kinematic"``: the outline is moved within the limits; ``"nova_carter"``: the
             shipped robot with wheels and motors.
         height_m: height of the body, without a mast for the camera.
@@ -101,6 +102,7 @@ class RobotModel(SimConfig):
     max_yaw_rate_radps: float = Field(gt=0.0)
     max_yaw_acceleration_radps2: float = Field(gt=0.0)
     min_turning_radius_m: float | None = Field(default=None, gt=0.0)
+    brakes_on_curve: bool = False
     body: Literal["kinematic", "nova_carter"] = "kinematic"
     height_m: float = Field(default=0.5, gt=0.0, le=4.0)
     parts: tuple[BodyPart, ...] = ()
