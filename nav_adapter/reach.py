@@ -6,9 +6,9 @@ constant τ, after going unnoticed for δ. At time t they are within
     r(t) = U (t + δ − τ (1 − e^{−(t + δ)/τ}))   of   p + u τ (1 − e^{−t/τ}),
 
 plus the body, the clearance C and the uncertainty of place and velocity. What people who have
-noticed the robot do at first, a lean or half a step, may lie within the clearance: with U as a share
-λ of that of unaware people, reach and clearance are max(C, r(t) + λ C) together, which is r + C for
-unaware people and grows with t, U, λ and C. τ = 0.54 s and U = 1.34 m/s fit recorded
+noticed the robot do at first, a lean or half a step, may lie within the clearance: with λ, their U
+as a share of that of unaware people, reach and clearance are max(C, r(t) + λ C) together. That is
+r + C for unaware people, never less than r, and it grows with t, U and C. τ = 0.54 s and U = 1.34 m/s fit recorded
 people who set off (``docs/people.md``). Somebody who stands needs time to start, somebody who walks
 away time to turn, and a brisk walker time to swerve: all three are this one statement.
 ``docs/safety.md`` derives it.

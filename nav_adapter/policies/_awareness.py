@@ -101,12 +101,13 @@ class InterpolatedHumanSpeed(_AwarenessRamp):
     Attributes:
         unaware_human_speed_mps: for a person who has not noticed the robot. Recorded people who
             set off beside a robot reach 1.34 m/s (docs/people.md).
-        aware_human_speed_mps: for a person who has, at most the unaware value. At 0 they keep to
-            their present motion or stop, as today's robots assume of everybody.
+        aware_human_speed_mps: for a person who has, at most the unaware value. 0.23 m/s is a lean,
+            an arm or a step back: 0.08 m in 0.6 s, 0.33 m in 1.8 s. At 0 they keep to their present
+            motion or stop, as today's robots assume of everybody.
     """
 
     unaware_human_speed_mps: float = Field(default=1.5, ge=0.0, le=10.0)
-    aware_human_speed_mps: float = Field(default=0.24, ge=0.0, le=10.0)
+    aware_human_speed_mps: float = Field(default=0.23, ge=0.0, le=10.0)
 
     @model_validator(mode="after")
     def _check_speeds(self) -> InterpolatedHumanSpeed:

@@ -76,8 +76,10 @@ def test_one_person_straight_ahead(distance_m: float) -> None:
     (obstacle,) = aware.obstacles
     assert obstacle.radius_m == pytest.approx(policy_radius_m(AwarenessPolicy(), 1.0))
     assert (obstacle.awareness_lower, obstacle.height_m, aware.stale) == (1.0, 1.75, False)
-    # What somebody aware does at first lies within the clearance: 0.10 m (1 − 0.24 / 1.5).
-    assert aware.speed_limit_mps == pytest.approx(expected_mps(distance_m, 0.24, 0.084))
+    # What somebody aware does at first lies within the clearance: 0.10 m (1 − 0.23 / 1.5).
+    assert aware.speed_limit_mps == pytest.approx(
+        expected_mps(distance_m, 0.23, 0.1 * (1.0 - 0.23 / 1.5))
+    )
     unaware = settled(0.0, position=(distance_m, 0.0))
     assert unaware.obstacles[0].radius_m == pytest.approx(policy_radius_m(AwarenessPolicy(), 0.0))
     assert unaware.speed_limit_mps == pytest.approx(expected_mps(distance_m, 1.5))

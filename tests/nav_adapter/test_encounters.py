@@ -60,7 +60,11 @@ class Encounter:
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> Encounter:
         # The loop below acts within the shortest reaction time (assumption 3).
-        robot = replace(drawn_robot(rng), reaction_time_s=rng.uniform(0.15, 0.6))
+        robot = replace(
+            drawn_robot(rng),
+            reaction_time_s=rng.uniform(0.15, 0.6),
+            brakes_on_curve=rng.random() < 0.5,
+        )
         speed = rng.uniform(0.3, 1.0) * robot.max_speed_mps
         motion = Motion(0.0, 0.0, rng.uniform(-3.1, 3.1), speed, 0.0, rng.uniform(-1.0, 1.0))
         stop_s = robot.reaction_time_s + speed / robot.max_deceleration_mps2

@@ -59,11 +59,13 @@ def reach_figure() -> Figure:
     figure = new_figure(_WIDTH_IN, 7.1)
     panels = figure.subplots(2, 3, sharex=True, sharey=True)
     for (title, alpha), row in zip(_ROWS, panels, strict=True):
+        human_mps = policy.speed.human_speed_mps(alpha)
         person = Reach(
-            *(*_PLACE_M, 0.0, 0.0, policy.speed.human_speed_mps(alpha)),
+            *(*_PLACE_M, 0.0, 0.0, human_mps),
             policy.reach.time_constant_s,
             policy.reach.delay_s,
             margin_m=policy.margins.floor_m,
+            within_m=policy.margins.within_m(human_mps, policy.speed.human_speed_mps(0.0)),
         )
         speed_mps = min(limit_mps(person, course), robot.max_speed_mps)
         row[0].set_ylabel(f"{title}:\nlimit {speed_mps:.2f} m/s", fontsize=_TEXT_PT)
@@ -101,9 +103,10 @@ def _draw_reach(
         here = _swept(course, off_rad, way_m, way_m)
         axes.add_patch(Polygon(here, fill=False, ec=_ROBOT, lw=1.5))
     middle, grown_m = (person.x_m, person.y_m), person.radius_m(time_s)
-    for radius_m, style in ((grown_m + person.margin_m, "-"), (grown_m + BODY_RADIUS_M, ":")):
+    outer_m = grown_m + person.margin_after_m(time_s)
+    for radius_m, style in ((outer_m, "-"), (grown_m + BODY_RADIUS_M, ":")):
         axes.add_patch(Circle(middle, radius_m, fill=False, ec=colour, ls=style, lw=2.0))
-    axes.add_patch(Circle(middle, grown_m + person.margin_m, color=colour, alpha=0.15, lw=0))
+    axes.add_patch(Circle(middle, outer_m, color=colour, alpha=0.15, lw=0))
     axes.add_patch(Circle(middle, BODY_RADIUS_M, color=colour, lw=0))
     axes.set(xlim=(-0.9, 4.1), ylim=(-1.3, 3.7), aspect="equal", xticks=(0, 2, 4), yticks=(0, 2))
     axes.tick_params(labelsize=_SMALL_PT)
