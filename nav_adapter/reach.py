@@ -8,10 +8,10 @@ constant τ, after going unnoticed for δ. At time t they are within
 plus the body, the clearance C and the uncertainty of place and velocity. What people who have
 noticed the robot do at first, a lean or half a step, may lie within the clearance: with λ, their U
 as a share of that of unaware people, reach and clearance are max(C, r(t) + λ C) together. That is
-r + C for unaware people, never less than r, and it grows with t, U and C. τ = 0.54 s and U = 1.34 m/s fit recorded
-people who set off (``docs/people.md``). Somebody who stands needs time to start, somebody who walks
-away time to turn, and a brisk walker time to swerve: all three are this one statement.
-``docs/safety.md`` derives it.
+r + C for unaware people, never less than r, and it grows with t, U and C. τ = 0.54 s and
+U = 1.34 m/s fit recorded people who set off (``docs/people.md``). Somebody who stands needs time to
+start, somebody who walks away time to turn, and a brisk walker time to swerve: all three are this
+one statement. ``docs/safety.md`` derives it.
 """
 
 from __future__ import annotations
