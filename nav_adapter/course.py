@@ -205,7 +205,7 @@ def reach_at(
     dy = y_m + vy * middle_s - base_y
     x, y = cos * dx + sin * dy, abs(cos * dy - sin * dx)
     reach = U * (since_s + tau * _expm1(-since_s / tau))
-    margin -= min(reach, within)
+    margin -= within if reach > within else reach
     reach += 0.5 * (m1 - m0) * _sqrt(vx * vx + vy * vy)
     # With a negative a1 it shrinks.
     variance = max(a0 + m1 * (a1 + m1 * a2), a0 + m0 * (a1 + m0 * a2))
