@@ -160,6 +160,7 @@ CALLS: list[tuple[Callable[[], Any], str]] = [
     (lambda: replace(STEERS, min_turning_radius_m=None), "min_turning_radius_m must"),
     (lambda: replace(STEERS, drive="differential"), "min_turning_radius_m must"),
     (lambda: replace(STEERS, drive=None), "min_turning_radius_m must"),
+    (lambda: replace(STEERS, brakes_on_curve=1), "brakes_on_curve must be True or False"),
     (lambda: replace(STEERS, min_turning_radius_m=0.0), "min_turning_radius_m must"),
     (lambda: replace(STEERS, min_turning_radius_m=math.inf), "min_turning_radius_m must"),
     (

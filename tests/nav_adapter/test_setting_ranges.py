@@ -21,7 +21,7 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
         "unaware_below": (0.1, 0.0, 1.0),
         "aware_above": (0.6, 0.0, 1.0),
         "unaware_human_speed_mps": (1.5, 0.0, 10.0),
-        "aware_human_speed_mps": (0.0, 0.0, 10.0),
+        "aware_human_speed_mps": (0.23, 0.0, 10.0),
     },
     "reach": {
         "time_constant_s": (0.54, 0.05, 5.0),
