@@ -48,7 +48,8 @@ class Member:
 
     Attributes:
         kind: ``"blind"`` treats everybody as unaware. ``"aware"`` expects people who look to keep
-            to their motion. ``"memory"`` expects it for 3 s after their last look, too.
+            to their motion, as ``balanced`` does. ``"memory"`` expects it for 3 s after their last
+            look, too.
         speed_mps: U of unaware people.
     """
 
@@ -68,8 +69,9 @@ class Member:
         aware_m, unaware_m = inflation["aware_radius_m"], inflation["unaware_radius_m"]
         inflation["unaware_radius_m"] = aware_m + share * (unaware_m - aware_m)
         speed["unaware_human_speed_mps"] = self.speed_mps
-        speed["aware_human_speed_mps"] = self.speed_mps if self.kind == "blind" else 0.0
+        speed["aware_human_speed_mps"] *= share
         if self.kind == "blind":
+            speed["aware_human_speed_mps"] = self.speed_mps
             inflation["aware_radius_m"] = inflation["unaware_radius_m"]
         data["attention"] = None
         if self.kind != "memory":

@@ -59,7 +59,8 @@ def test_the_family_differs_in_the_speed_and_in_who_counts_as_aware():
     for each in members:
         policy = each.policy()
         assert policy.speed.human_speed_mps(0.0) == each.speed_mps
-        assert policy.speed.human_speed_mps(1.0) == (each.speed_mps if each.kind == "blind" else 0)
+        aware_mps = each.speed_mps * (1.0 if each.kind == "blind" else 0.23 / 1.5)
+        assert policy.speed.human_speed_mps(1.0) == pytest.approx(aware_mps)
         blind_radius = policy.inflation.radius_m(0.0) == policy.inflation.radius_m(1.0)
         assert blind_radius == (each.kind == "blind")
         assert (policy.noticed_counts_as is not None) == (each.kind == "memory")
