@@ -56,7 +56,7 @@ def test_the_robot_passes_whoever_has_noticed_it_with_the_clearance(
     clearance_m = AwarenessPolicy.preset(name).margins.clearance_m + 2.0 * sigma_m
     assert lowest_mps(name, clearance_m - 0.01, sigma_m) == 0.0
     assert lowest_mps(name, clearance_m + 0.002, sigma_m) >= 0.3
-    assert lowest_mps(name, 0.3, sigma_m) < FULL_MPS
+    assert lowest_mps(name, 0.2 + 2.0 * sigma_m, sigma_m) < FULL_MPS
     assert lowest_mps(name, 0.6, sigma_m) == FULL_MPS
 
 
@@ -92,8 +92,7 @@ def test_a_centimetre_more_room_is_worth_a_tenth_of_a_metre_per_second_at_most(
         -(T + rules.delay_s) / rules.time_constant_s
     )
     most_mps = 0.01 * ROBOT.max_deceleration_mps2 / grows_mps
-    assert most_mps < 0.1
-    assert -FINEST_MPS <= far - near <= most_mps + FINEST_MPS
+    assert -FINEST_MPS <= far - near <= min(most_mps + FINEST_MPS, 0.1)
 
 
 @settings(max_examples=40)
