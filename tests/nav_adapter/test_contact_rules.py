@@ -94,7 +94,7 @@ def test_the_protective_field_ends_at_the_first_body_on_any_course(fan_rad: floa
 
 def test_somebody_abreast_of_the_rear_edge_counts() -> None:
     course = some_course(np.random.default_rng(0), 0.0)._replace(rear_m=0.0)
-    abreast = contact_m(course, 0.3, 0.0, 0.4, 0.16, 0.0)
+    abreast = contact_m(course, 0.0, 0.4, 0.16, 0.0, 0.3)
     assert abreast == pytest.approx(one_by_one(course, 0.0, 0.3, 0.0, 0.4, 0.0), abs=1e-9)
     assert abreast[1] == 0.0
 
