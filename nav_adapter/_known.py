@@ -1,4 +1,4 @@
-"""What the adapter knows of each person, now and at times ahead, as the rules ask for it."""
+"""The adapter's knowledge of each person, now and at times ahead, as the rules ask for it."""
 
 from __future__ import annotations
 

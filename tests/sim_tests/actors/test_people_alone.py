@@ -1,4 +1,4 @@
-"""What the robot costs people: they are compared with themselves, the robot absent."""
+"""The cost of the robot to people: they are compared with themselves, the robot absent."""
 
 from __future__ import annotations
 

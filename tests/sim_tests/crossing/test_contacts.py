@@ -23,7 +23,7 @@ KINEMATIC = ("delivery", "omni", "forklift")
 
 
 def judge(half, twist, disc, velocity):
-    """Who strikes whom, by a rectangle and a disc that keep their motions; None for nobody.
+    """Return who strikes whom, by a rectangle and a disc that keep their motions; None for nobody.
 
     ``twist`` is the speed forward, to the left and the yaw rate of the rectangle, which starts at
     the origin. Returns the time, and the speed of the struck point of the rectangle towards the

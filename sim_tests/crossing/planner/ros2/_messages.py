@@ -1,4 +1,4 @@
-"""What the robot of a crossing publishes, as messages of ROS 2."""
+"""Messages of ROS 2 that the robot of a crossing publishes."""
 
 from __future__ import annotations
 
