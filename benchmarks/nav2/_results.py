@@ -19,6 +19,8 @@ _FACES: Final = {
     "grid": "limit and grid of people",
     "mask": "limit and speed mask",
 }
+#: Policies of the rows, in words.
+_POLICIES: Final = {"": "", "balanced_own_path": ", `balanced`, keeps its path"}
 
 
 def table(path: Path = ROWS) -> str:
@@ -44,7 +46,7 @@ def table(path: Path = ROWS) -> str:
         fastest = max((each.moving_contact_mps or 0.0 for each in touched), default=0.0)
         impacts = (_mean(rows, name) for name in ("step_out_unaware", "step_out_aware"))
         cells = (
-            f"{controller}, {_FACES[face]}{f', `{policy}`' if policy else ''}",
+            f"{controller}, {_FACES[face]}{_POLICIES.get(policy, f', `{policy}`')}",
             f"{sum(each.time_to_goal_s is not None for each in rows)} of {len(rows)}",
             _times(today, rows) if policy else "1",
             _times(today, attentive) if policy else "1",
