@@ -7,6 +7,7 @@ import os
 import random
 from typing import Any
 
+from local_dds import SETTINGS
 from nav_scenes import ROBOT, person, robot_at
 from paths import ROOT
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -90,13 +91,6 @@ def plain(value: Any) -> Any:
 
 def loopback_environment(domain: int | None = None) -> dict[str, str]:
     """Return an environment for processes on loopback only, in a domain of their own."""
-    interface = '<NetworkInterface name="lo" multicast="false"/>'
-    uri = (
-        f"<CycloneDDS><Domain><General><Interfaces>{interface}</Interfaces>"
-        "<AllowMulticast>false</AllowMulticast></General><Discovery>"
-        '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers>'
-        "</Discovery></Domain></CycloneDDS>"
-    )
     number = random.SystemRandom().randint(1, 200) if domain is None else domain
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
-    return {"CYCLONEDDS_URI": uri, "ROS_DOMAIN_ID": str(number), "PYTHONPATH": path}
+    return {"CYCLONEDDS_URI": SETTINGS, "ROS_DOMAIN_ID": str(number), "PYTHONPATH": path}

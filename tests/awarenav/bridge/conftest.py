@@ -1,10 +1,10 @@
 from __future__ import annotations
 
 import os
-import random
 from pathlib import Path
 
 import pytest
+from local_dds import own_domain
 from paths import ROOT
 
 from nav_adapter.ros2 import RobotFile
@@ -12,17 +12,9 @@ from nav_adapter.ros2 import RobotFile
 
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    interface = '<NetworkInterface name="lo" multicast="false"/>'
-    monkeypatch.setenv(
-        "CYCLONEDDS_URI",
-        f"<CycloneDDS><Domain><General><Interfaces>{interface}</Interfaces>"
-        "<AllowMulticast>false</AllowMulticast></General><Discovery>"
-        '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers>'
-        "</Discovery></Domain></CycloneDDS>",
-    )
     path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
     monkeypatch.setenv("PYTHONPATH", path)
-    return random.SystemRandom().randint(1, 200)
+    return own_domain(monkeypatch)
 
 
 @pytest.fixture

@@ -5,13 +5,13 @@ from __future__ import annotations
 import ast
 import math
 import os
-import random
 import subprocess
 import sys
 import time
 
 import numpy as np
 import pytest
+from local_dds import own_domain
 
 pytest.importorskip("pybullet", reason="the crossings need the extra sim")
 pytest.importorskip("cyclonedds", reason="the extra ros2 is not installed")
@@ -46,15 +46,7 @@ LOCKSTEP = "pace=20, command_hz=20"
 
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    interface = '<NetworkInterface name="lo" multicast="false"/>'
-    monkeypatch.setenv(
-        "CYCLONEDDS_URI",
-        f"<CycloneDDS><Domain><General><Interfaces>{interface}</Interfaces>"
-        "<AllowMulticast>false</AllowMulticast></General><Discovery>"
-        '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers>'
-        "</Discovery></Domain></CycloneDDS>",
-    )
-    return random.SystemRandom().randint(1, 200)
+    return own_domain(monkeypatch)
 
 
 def cross(domain: int, settings: str = LOCKSTEP, policy: str = "blind"):
