@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import csv
+import json
 import os
 import subprocess
 import sys
@@ -19,7 +21,7 @@ from sim_tests.study.measures import EpisodeRecord, read_records, write_records
 from sim_tests.study.runs import RunFiles, plan_jobs, run_jobs
 from sim_tests.world.errors import SimError
 
-from ._results import table
+from ._results import EXCESS_COLUMNS, table
 from .parameters import CONTROLLERS, FACES
 
 _TIME_LIMIT_S: Final = 300.0
@@ -84,15 +86,28 @@ def measure(
 
 
 def collect(out: Path) -> Path:
-    """Write the rows of all folders as one table, whose planners are controllers and faces."""
-    rows = []
+    """Write the rows of all folders as one table, whose planners are controllers and faces.
+
+    ``excess.csv`` beside it has how far the fastest point of the robot was above the limit.
+    """
+    rows, excess = [], []
     for path in sorted(out.glob("*/episodes.csv")):
         controller, _, face = path.parent.name.partition("_")
+        planner = f"{controller}, {face}"
         for record in read_records(path):
             values = {each.name: getattr(record, each.name) for each in fields(record)}
-            rows.append(EpisodeRecord(**{**values, "planner": f"{controller}, {face}"}))
+            rows.append(EpisodeRecord(**{**values, "planner": planner}))
+        for episode in sorted(path.parent.glob("episodes/*.json")):
+            stored = json.loads(episode.read_text(encoding="utf-8"))
+            record, conduct = stored["record"], stored["conduct"] or {}
+            value = conduct.get("fastest_point_excess_mps")
+            if value is not None:
+                keys = (record["policy"], record["scenario"], record["seed"])
+                excess.append((planner, *keys, round(value, 4)))
     table = out / "rows.csv"
     write_records(table, rows)
+    with (out / "excess.csv").open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([EXCESS_COLUMNS, *excess])
     return table
 
 

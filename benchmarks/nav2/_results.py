@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -12,6 +13,8 @@ from sim_tests.study.measures import EpisodeRecord, bootstrap_interval, paired, 
 
 #: The committed rows.
 ROWS: Final = Path(__file__).with_name("rows.csv")
+#: Columns of ``excess.csv`` beside them: by how much the fastest point was above the limit, m/s.
+EXCESS_COLUMNS: Final = ("planner", "policy", "scenario", "seed", "fastest_point_excess_mps")
 _TODAY: Final = "today"
 _FACES: Final = {
     _TODAY: "today: scans alone",
@@ -29,6 +32,10 @@ def table(path: Path = ROWS) -> str:
     Times are sums over the episodes that both robots drove, with 95 % intervals by bootstrap over
     episodes; an episode that never arrives counts with what it lasted.
     """
+    above_mps: dict[tuple[str, str], list[float]] = {}
+    with path.with_name("excess.csv").open(newline="", encoding="utf-8") as file:
+        for planner, policy, _, _, value in list(csv.reader(file))[1:]:
+            above_mps.setdefault((planner, policy), []).append(float(value))
     groups: dict[tuple[str, str, str], list[EpisodeRecord]] = {}
     for row in read_records(path):
         controller, _, face = row.planner.partition(", ")
@@ -36,8 +43,8 @@ def table(path: Path = ROWS) -> str:
         groups.setdefault((controller, face, policy), []).append(row)
     lines = [
         "| stack | goals | time over today's | with attentive people | touched while moving | "
-        "step-out impacts, unaware; aware |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "step-out impacts, unaware; aware | above the limit, m/s: median, worst |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for (controller, face, policy), rows in groups.items():
         today = groups[controller, _TODAY, ""]
@@ -52,6 +59,7 @@ def table(path: Path = ROWS) -> str:
             _times(today, attentive) if policy else "1",
             f"{len(touched)}, {fastest:.2f} m/s" if touched else "0",
             "; ".join(f"{each:.1f}" for each in impacts),
+            _excess(above_mps[f"{controller}, {face}", policy]) if policy else "",
         )
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -65,6 +73,10 @@ def _times(today: Sequence[EpisodeRecord], rows: Sequence[EpisodeRecord]) -> str
         over=[first for first, _ in pairs],
     )
     return interval.text(2)
+
+
+def _excess(values_mps: Sequence[float]) -> str:
+    return f"{max(float(np.median(values_mps)), 0.0):.2f}, {max(values_mps):.2f}"
 
 
 def _mean(rows: Sequence[EpisodeRecord], name: str) -> float:

@@ -52,7 +52,10 @@ def outgoing(
     """
     odom, base = frames.odom, frames.base
     if wanted("speed_limit"):
-        yield "speed_limit", speed_limit(constraints, robot.max_speed_mps, percentage=percentage)
+        yield (
+            "speed_limit",
+            speed_limit(constraints, robot.max_speed_mps, percentage=percentage, state=robot_state),
+        )
     if wanted("collision_polygons"):
         for polygon in collision_polygons(
             constraints, robot, robot_state, odom_frame=odom, base_frame=base

@@ -48,7 +48,7 @@ def collision_polygons(
     Args:
         constraints: people and limit.
         robot: the robot, for its footprint.
-        robot_state: to order people by distance; None keeps their order.
+        robot_state: to order people by distance, and for its curve (:func:`speed_limit`).
         odom_frame: frame of the people.
         base_frame: frame of the footprint.
     """
@@ -63,7 +63,7 @@ def collision_polygons(
         for each in obstacles
     ]
     corners = _within_footprint(robot)
-    if controller_limit_mps(constraints) >= SLOWEST_MPS:
+    if controller_limit_mps(constraints, robot_state) >= SLOWEST_MPS:
         corners = corners - np.array([_PARKED_M, 0.0])
     stop = _instance(Polygon(corners), STOP_POLYGON_ID, constraints.stamp_s, base_frame)
     return (*people, stop)

@@ -9,7 +9,7 @@ from perception.arrays import finite_number
 
 from .._constraints import NavConstraints
 from .._errors import NavError
-from .._robot import RobotProfile
+from .._robot import RobotProfile, RobotState
 from .conversions import header
 from .messages.nav2_msgs import SpeedLimit
 
@@ -19,9 +19,11 @@ SLOWEST_MPS: Final = 0.01
 _BELOW_MAXIMUM: Final = 0.999
 # Of a robot whose profile has none: the fastest default among Nav2's controllers (MPPI, wz_max).
 _YAW_RATE_RADPS: Final = 1.9
+# A slower robot has no curve that it keeps.
+_ON_A_CURVE_MPS: Final = 0.1
 
 
-def controller_limit_mps(constraints: NavConstraints) -> float:
+def controller_limit_mps(constraints: NavConstraints, state: RobotState | None = None) -> float:
     """Return the limit of the base, per axis, with which no point of the robot is too fast.
 
     It is the lower of the speed limit and of ``fastest_point_limit_mps`` divided by
@@ -30,22 +32,25 @@ def controller_limit_mps(constraints: NavConstraints) -> float:
     if constraints.robot is None:
         return constraints.speed_limit_mps
     assert constraints.fastest_point_limit_mps is not None
-    fastest_mps = constraints.fastest_point_limit_mps / fastest_point_per_axis(constraints.robot)
-    return min(constraints.speed_limit_mps, fastest_mps)
+    per_axis = fastest_point_per_axis(constraints.robot, state)
+    return min(constraints.speed_limit_mps, constraints.fastest_point_limit_mps / per_axis)
 
 
-def fastest_point_per_axis(robot: RobotProfile) -> float:
+def fastest_point_per_axis(robot: RobotProfile, state: RobotState | None = None) -> float:
     """Return how much faster than a limit per axis the fastest point of the robot can be, ≥ 1.
 
     Nav2's controllers keep a limit L for x and y each, and scale the yaw rate with it: on the
     diagonal √2 L + R ω L / v, with the circumscribed radius R, ω = ``max_yaw_rate_radps`` (1.9
     rad/s if it is not given) and v = ``max_speed_mps``. A robot whose ``drive`` cannot move
     sideways has L instead of √2 L, and one that steers at most L / ``min_turning_radius_m`` of yaw
-    rate.
+    rate. One that ``brakes_on_curve`` keeps the curve of its present motion ``state``, if that is
+    given, while it moves.
     """
     turning = (robot.max_yaw_rate_radps or _YAW_RATE_RADPS) / robot.max_speed_mps
     if robot.min_turning_radius_m is not None:
         turning = min(turning, 1.0 / robot.min_turning_radius_m)
+    if robot.brakes_on_curve and state is not None and state.travel_mps >= _ON_A_CURVE_MPS:
+        turning = min(turning, abs(state.yaw_rate_radps) / state.travel_mps)
     straight = 1.0 if robot.moves_sideways is False else math.sqrt(2.0)
     return straight + robot.circumscribed_radius_m * turning
 
@@ -56,6 +61,7 @@ def speed_limit(
     *,
     percentage: bool = False,
     frame_id: str = "",
+    state: RobotState | None = None,
 ) -> SpeedLimit:
     """Return ``nav2_msgs/SpeedLimit``, in m/s or in per cent.
 
@@ -74,6 +80,7 @@ def speed_limit(
             controller is configured with (``vx_max``, ``desired_linear_vel``, ``max_speed_xy``).
         percentage: send per cent of the maximum instead of m/s.
         frame_id: of the header; Nav2 does not use it.
+        state: the robot's, whose curve counts if it ``brakes_on_curve``.
 
     Raises:
         NavError: for a maximum that is not finite or at most 0.01 m/s.
@@ -81,7 +88,8 @@ def speed_limit(
     maximum = finite_number(
         "max_speed_mps", max_speed_mps, NavError, minimum=SLOWEST_MPS, exclusive_minimum=True
     )
-    limit = max(SLOWEST_MPS, min(controller_limit_mps(constraints), _BELOW_MAXIMUM * maximum))
+    highest = min(controller_limit_mps(constraints, state), _BELOW_MAXIMUM * maximum)
+    limit = max(SLOWEST_MPS, highest)
     return SpeedLimit(
         header(constraints.stamp_s, frame_id),
         percentage,

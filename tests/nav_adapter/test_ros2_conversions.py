@@ -21,6 +21,7 @@ from nav_adapter import (
     NavConstraints,
     NavError,
     RobotProfile,
+    RobotState,
     paint_costmap,
 )
 from nav_adapter.alerts import Answer
@@ -362,6 +363,27 @@ def test_where_nobody_is_the_robot_keeps_its_own_maximum(drive: str | None) -> N
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), robot)
     constraints = adapter.update([], robot_at(), 0.0)
     assert speed_limit(constraints, 1.5).speed_limit == pytest.approx(0.999 * 1.5)
+
+
+@given(st.floats(0.1, 1.5), st.floats(-1.5, 1.5), st.floats(0.05, 1.4), st.floats(0.0, 1.0))
+def test_on_its_curve_no_point_of_a_robot_that_keeps_it_is_faster_than_the_limit(
+    speed_mps: float, yaw_rate_radps: float, limit_mps: float, slower: float
+) -> None:
+    curve = replace(ROBOT, brakes_on_curve=True, drive="differential", max_yaw_rate_radps=1.5)
+    state = RobotState(5.0, [0.0, 0.0], 0.0, speed_mps, yaw_rate_radps)
+    constraints = replace(limited(limit_mps), robot=curve)
+    worst_mps = speed_limit(constraints, 1.5).speed_limit
+    sent_mps = speed_limit(constraints, 1.5, state=state).speed_limit
+    assert worst_mps <= sent_mps <= limit_mps
+    turning = min(abs(yaw_rate_radps) / speed_mps, 1.5 / curve.max_speed_mps)
+    driven_mps = (1.0 - slower) * sent_mps
+    assert driven_mps * (1.0 + curve.circumscribed_radius_m * turning) <= limit_mps + 1e-9
+    assert (
+        speed_limit(
+            replace(constraints, robot=replace(curve, brakes_on_curve=False)), 1.5, state=state
+        ).speed_limit
+        == worst_mps
+    )
 
 
 def test_a_limit_that_is_too_low_to_send_is_a_stop_on_every_topic() -> None:
