@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import random
 
 import pytest
+from paths import ROOT
 
 _INTERFACE = '<NetworkInterface name="lo" multicast="false"/>'
-#: Cyclone DDS on the loopback.
-SETTINGS = (
+_SETTINGS = (
     f"<CycloneDDS><Domain><General><Interfaces>{_INTERFACE}</Interfaces>"
     "<AllowMulticast>false</AllowMulticast></General><Discovery>"
     '<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="localhost"/></Peers>'
@@ -17,6 +18,10 @@ SETTINGS = (
 
 
 def own_domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    """Return a domain drawn at random, whose participants here speak on the loopback alone."""
-    monkeypatch.setenv("CYCLONEDDS_URI", SETTINGS)
-    return random.SystemRandom().randint(1, 200)
+    """Keep DDS here and in child processes on the loopback, in a random domain; return it."""
+    domain = random.SystemRandom().randint(1, 200)
+    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
+    monkeypatch.setenv("CYCLONEDDS_URI", _SETTINGS)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    monkeypatch.setenv("PYTHONPATH", path)
+    return domain

@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import json
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from awarenav.errors import AwarenavError
 from benchmarks._harness import count, make_parser
 from sim_tests.crossing.planner.ros2 import python_with_ros
-from sim_tests.study.measures import EpisodeRecord, read_records, write_records
-from sim_tests.study.runs import RunFiles, plan_jobs, run_jobs
+from sim_tests.study.measures import read_records, write_records
+from sim_tests.study.runs import RunFiles, plan_jobs, read_attempts, run_jobs
 from sim_tests.world.errors import SimError
 
-from ._results import EXCESS_COLUMNS, table
+from ._results import table, write_excess
 from .parameters import CONTROLLERS, FACES
 
 _TIME_LIMIT_S: Final = 300.0
@@ -90,24 +88,15 @@ def collect(out: Path) -> Path:
 
     ``excess.csv`` beside it has how far the fastest point of the robot was above the limit.
     """
-    rows, excess = [], []
+    rows, conducts = [], []
     for path in sorted(out.glob("*/episodes.csv")):
         controller, _, face = path.parent.name.partition("_")
-        planner = f"{controller}, {face}"
-        for record in read_records(path):
-            values = {each.name: getattr(record, each.name) for each in fields(record)}
-            rows.append(EpisodeRecord(**{**values, "planner": planner}))
-        for episode in sorted(path.parent.glob("episodes/*.json")):
-            stored = json.loads(episode.read_text(encoding="utf-8"))
-            record, conduct = stored["record"], stored["conduct"] or {}
-            value = conduct.get("fastest_point_excess_mps")
-            if value is not None:
-                keys = (record["policy"], record["scenario"], record["seed"])
-                excess.append((planner, *keys, round(value, 4)))
+        for attempt in read_attempts(path.parent).values():
+            rows.append(replace(attempt.record, planner=f"{controller}, {face}"))
+            conducts.append(attempt.conduct)
     table = out / "rows.csv"
     write_records(table, rows)
-    with (out / "excess.csv").open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([EXCESS_COLUMNS, *excess])
+    write_excess(table, rows, conducts)
     return table
 
 

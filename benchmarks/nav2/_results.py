@@ -9,12 +9,19 @@ from typing import Final
 
 import numpy as np
 
-from sim_tests.study.measures import EpisodeRecord, bootstrap_interval, paired, read_records
+from sim_tests.study.measures import (
+    Conduct,
+    EpisodeRecord,
+    bootstrap_interval,
+    paired,
+    read_records,
+)
 
 #: The committed rows.
 ROWS: Final = Path(__file__).with_name("rows.csv")
-#: Columns of ``excess.csv`` beside them: by how much the fastest point was above the limit, m/s.
-EXCESS_COLUMNS: Final = ("planner", "policy", "scenario", "seed", "fastest_point_excess_mps")
+# Beside them: by how much the fastest point of the robot was above the limit.
+_EXCESS: Final = "excess.csv"
+_EXCESS_COLUMNS: Final = ("planner", "policy", "scenario", "seed", "fastest_point_excess_mps")
 _TODAY: Final = "today"
 _FACES: Final = {
     _TODAY: "today: scans alone",
@@ -26,16 +33,35 @@ _FACES: Final = {
 _POLICIES: Final = {"": "", "balanced_own_path": ", `balanced`, keeps its path"}
 
 
+def write_excess(
+    path: Path, rows: Sequence[EpisodeRecord], conducts: Sequence[Conduct | None]
+) -> None:
+    """Write, beside the table ``path`` of rows, the excess over the limit where it is known."""
+    with path.with_name(_EXCESS).open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_EXCESS_COLUMNS)
+        for row, conduct in zip(rows, conducts, strict=True):
+            if conduct is not None and conduct.fastest_point_excess_mps is not None:
+                excess_mps = round(conduct.fastest_point_excess_mps, 4)
+                writer.writerow((row.planner, row.policy, row.scenario, row.seed, excess_mps))
+
+
+def _read_excess(path: Path) -> dict[tuple[str, str], list[float]]:
+    """Return the excesses (m/s) beside a table of rows, by planner and policy."""
+    found: dict[tuple[str, str], list[float]] = {}
+    with path.with_name(_EXCESS).open(newline="", encoding="utf-8") as file:
+        for planner, policy, _, _, value in list(csv.reader(file))[1:]:
+            found.setdefault((planner, policy), []).append(float(value))
+    return found
+
+
 def table(path: Path = ROWS) -> str:
     """Return the table as Markdown.
 
     Times are sums over the episodes that both robots drove, with 95 % intervals by bootstrap over
     episodes; an episode that never arrives counts with what it lasted.
     """
-    above_mps: dict[tuple[str, str], list[float]] = {}
-    with path.with_name("excess.csv").open(newline="", encoding="utf-8") as file:
-        for planner, policy, _, _, value in list(csv.reader(file))[1:]:
-            above_mps.setdefault((planner, policy), []).append(float(value))
+    above_mps = _read_excess(path)
     groups: dict[tuple[str, str, str], list[EpisodeRecord]] = {}
     for row in read_records(path):
         controller, _, face = row.planner.partition(", ")

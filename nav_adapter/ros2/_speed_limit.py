@@ -88,8 +88,8 @@ def speed_limit(
     maximum = finite_number(
         "max_speed_mps", max_speed_mps, NavError, minimum=SLOWEST_MPS, exclusive_minimum=True
     )
-    highest = min(controller_limit_mps(constraints, state), _BELOW_MAXIMUM * maximum)
-    limit = max(SLOWEST_MPS, highest)
+    highest_mps = _BELOW_MAXIMUM * maximum
+    limit = max(SLOWEST_MPS, min(controller_limit_mps(constraints, state), highest_mps))
     return SpeedLimit(
         header(constraints.stamp_s, frame_id),
         percentage,

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-import random
 from typing import Any
 
-from local_dds import SETTINGS
 from nav_scenes import ROBOT, person, robot_at
-from paths import ROOT
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints
@@ -87,10 +83,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(each) for each in value]
     return value
-
-
-def loopback_environment(domain: int | None = None) -> dict[str, str]:
-    """Return an environment for processes on loopback only, in a domain of their own."""
-    number = random.SystemRandom().randint(1, 200) if domain is None else domain
-    path = os.pathsep.join(part for part in (str(ROOT), os.environ.get("PYTHONPATH")) if part)
-    return {"CYCLONEDDS_URI": SETTINGS, "ROS_DOMAIN_ID": str(number), "PYTHONPATH": path}

@@ -14,8 +14,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from local_dds import own_domain
 from mcap.reader import make_reader
-from ros2_scenes import DEFINITIONS, STAMP_S, everything, loopback_environment, plain
+from ros2_scenes import DEFINITIONS, STAMP_S, everything, plain
 from rosbags.highlevel import AnyReader
 
 from nav_adapter import NavError
@@ -30,10 +31,7 @@ PATIENCE_S = 20.0
 
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    environment = loopback_environment()
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-    return int(environment["ROS_DOMAIN_ID"])
+    return own_domain(monkeypatch)
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from local_dds import own_domain
 
 TESTS = Path(__file__).resolve().parents[1]
 # The scenes of the bridge's own tests.
@@ -44,11 +45,8 @@ def _domain() -> Iterator[None]:
         warnings.simplefilter("ignore", DeprecationWarning)
         rclpy = pytest.importorskip("rclpy", reason="no rclpy: python -m tools.setup_ros2")
         import rosidl_generator_py  # noqa: F401, PLC0415 - its parser's old imports
-    from ros2_scenes import loopback_environment  # noqa: PLC0415 - needs the extra ros2
-
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in loopback_environment().items():
-            patch.setenv(name, value)
+        own_domain(patch)
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         rclpy.init()
         yield
