@@ -22,7 +22,7 @@ _SCENARIOS: Final = (
     *("robot_overtaking", "busy_in_aisle", "stops_midway", "turns_back", "reads_phone"),
     *("crowd_of_eight", "two_people_one_aware", "crossing_distracted"),
 )
-#: True α and lower bound from which somebody has looked.
+#: The lower bound of α from which a look counts as measured.
 LOOKED: Final = 0.5
 #: A look within this time after a request answers it.
 ANSWERED_WITHIN_S: Final = 2.5
@@ -69,7 +69,7 @@ def asked_people(result: CrossingResult) -> list[AskedPerson]:
 def _asked(
     frames: tuple[CrossingFrame, ...], since_s: FloatArray, person: int
 ) -> AskedPerson | None:
-    looks = np.array([frame.truth[person].awareness >= LOOKED for frame in frames])
+    looks = np.array([frame.truth[person].since_look_s <= 0.0 for frame in frames])
     lowers = np.array([_lower_of(frame, person) for frame in frames])
     if looks[(since_s >= -LOOKED_BEFORE_S) & (since_s <= 0.0)].any():
         return None

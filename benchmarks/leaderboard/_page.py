@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from sim_tests.study.measures import (
     NOTHING,
+    STEP_OUT_PEOPLE,
     EpisodeRecord,
     Interval,
     bootstrap_interval,
@@ -70,6 +72,12 @@ class Standing:
             np.random.default_rng(0),
             strata=[each.scenario for each in kept],
         )
+
+    def impacts(self, people: str) -> str:
+        """Return the mean step-out impacts with a group of people, and the fastest one."""
+        mean = self.mean(f"step_out_{people}")
+        worst = _worst(f"step_out_{people}_worst_mps")(self)
+        return f"{mean.value:.2f} ({worst} m/s)" if mean.known else NOTHING
 
     @property
     def rank_key(self) -> tuple[float, float, float, str]:
@@ -165,12 +173,13 @@ def leaderboard_tables(
         ),
         "step_out": table(
             ("row", _label),
-            ("unaware", mean("step_out_unaware")),
-            ("above 0.25 m/s", mean("step_out_unaware_fast")),
-            ("worst (m/s)", _worst("step_out_worst_mps")),
-            ("aware", mean("step_out_aware")),
-            ("faster starts: unaware", mean("step_out_stress_unaware")),
-            ("their worst (m/s)", _worst("step_out_stress_worst_mps")),
+            *(
+                (title, partial(Standing.impacts, people=people))
+                for people, (title, _) in STEP_OUT_PEOPLE.items()
+            ),
+            ("never noticed, above 0.25 m/s", mean("step_out_never_fast")),
+            ("all, above 0.25 m/s", mean("step_out_all_fast")),
+            ("never noticed, faster starts", mean("step_out_stress_never")),
         ),
         "parts": table(("row", _label), *((name, _part(name)) for name in _ATTENTIONS)),
     }

@@ -43,7 +43,7 @@ def headline(board: Board, folder: Path = RESULTS) -> str:
         f"  over that with a costmap:     {times(costmap, aware).text(2)}",
         f"what awareness saves:           {won.text(1)} s a crossing",
         f"  with attentive people:        {won_attentive.text(1)} s",
-        "step-out impacts of people who have not noticed, per 1 000 crossings; fastest:",
+        "step-out impacts per 1 000 crossings (fastest), never noticed; all people:",
     ]
     for name, row in (
         ("today's AMR", today),
@@ -51,11 +51,10 @@ def headline(board: Board, folder: Path = RESULTS) -> str:
         ("slow for everybody", blind),
         ("awarenav", aware),
     ):
-        worst = max((each.step_out_worst_mps or 0.0 for each in row.ran), default=0.0)
         hits = sum(each.moving_touched for each in row.ran)
         lines.append(
-            f"  {name:30s}{row.mean('step_out_unaware').value:5.2f}; {worst:.2f} m/s; contacts "
-            f"with the moving robot in {hits} of {len(row.ran)}"
+            f"  {name:30s}{row.impacts('never')}; {row.impacts('all')}; contacts with the moving "
+            f"robot in {hits} of {len(row.ran)}"
         )
     return "\n".join(lines)
 

@@ -62,6 +62,8 @@ class TrueView:
         could_look: the camera is in front of the person's body, at most 90° aside, and in their
             line of sight.
         away: the person is not there: out of every sensor's range, and in no figure.
+        since_look_s: time since the person last looked at the robot: 0 during a look, infinite
+            before the first. A head that faces the robot without a look does not count.
     """
 
     position_camera_m: FloatArray
@@ -71,6 +73,7 @@ class TrueView:
     velocity_odom_mps: FloatArray
     could_look: bool = True
     away: bool = False
+    since_look_s: float = math.inf
 
     @property
     def d_fwd_m(self) -> float:
@@ -209,7 +212,8 @@ class Stage(AbstractContextManager["Stage"]):
         rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
         camera: list[float] = origin.tolist()
         views = []
-        for worker, motion in zip(self.workers, self._motions, strict=True):
+        people = zip(self.people, self.workers, self._motions, strict=True)
+        for person, worker, motion in people:
             gaze = worker.gaze_odom
             alpha = cone.score_of(worker.eyes_odom_m.tolist(), gaze.tolist(), camera)
             in_front = _faces(motion, camera)
@@ -224,6 +228,7 @@ class Stage(AbstractContextManager["Stage"]):
                     motion.velocity_odom_mps,
                     in_front and sighted,
                     motion.away,
+                    person.since_look_s,
                 )
             )
         return tuple(views)

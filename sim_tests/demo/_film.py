@@ -106,9 +106,9 @@ class Passage:
 
 
 def unaware_person(result: CrossingResult) -> int:
-    """Return the number of the person who is least aware of the robot, by the true gaze."""
-    alpha = np.array([[view.awareness for view in frame.truth] for frame in result.frames])
-    return int(alpha.mean(axis=0).argmin())
+    """Return the number of the person who looks least at the robot."""
+    since_s = np.array([[view.since_look_s for view in frame.truth] for frame in result.frames])
+    return int((since_s <= 0.0).mean(axis=0).argmin())
 
 
 def passage(result: CrossingResult, person: int) -> Passage:

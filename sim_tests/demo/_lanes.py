@@ -16,6 +16,8 @@ from importlib import resources
 from statistics import median
 from typing import Any, Final
 
+import numpy as np
+
 import awarenav
 
 from ..crossing import CrossingResult, Observer, run_crossing
@@ -75,7 +77,9 @@ class LaneRow:
         nearest_mps: speed of the robot at that time.
         phone_mps: highest speed within 2 m of the one who steps out; None if never so near.
         watcher_mps: the same for the one who watches.
-        step_out_unaware: step-out impacts with unaware people per 1 000 crossings.
+        step_out_never: step-out impacts per 1 000 crossings, never noticed; None as the next where
+            rows of an earlier version do not have it.
+        step_out_all: all step-out impacts.
     """
 
     seed: int
@@ -88,7 +92,8 @@ class LaneRow:
     nearest_mps: float
     phone_mps: float | None
     watcher_mps: float | None
-    step_out_unaware: float
+    step_out_never: float | None
+    step_out_all: float | None
 
     @property
     def near_miss(self) -> bool:
@@ -130,7 +135,8 @@ def run_lane(lane: Lane, seed: int, observer: Observer | None = None) -> LaneRun
         near.speed_mps,
         _fastest_beside_mps(result, phone),
         _fastest_beside_mps(result, watcher),
-        record.step_out_unaware,
+        record.step_out_never,
+        record.step_out_all,
     )
     rounded: list[Any] = [
         round(each, _DECIMALS) if isinstance(each, float) else each for each in figures
@@ -181,7 +187,20 @@ def lanes_table(rows: Sequence[LaneRow]) -> str:
         own = [row for row in rows if row.lane == lane.name]
         if own:
             lines.append(f"{lane.label:21}{_cells(own)}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *_step_outs(rows)])
+
+
+def _step_outs(rows: Sequence[LaneRow]) -> list[str]:
+    """Return the mean step-out impacts of each robot, where all rows have them."""
+    if any(None in (row.step_out_never, row.step_out_all) for row in rows):
+        return []
+    lines = ["", "step-out impacts per 1 000 crossings: never noticed; all"]
+    for lane in LANES:
+        own = [(row.step_out_never, row.step_out_all) for row in rows if row.lane == lane.name]
+        if own:
+            means = np.array(own, dtype=np.float64).mean(axis=0)
+            lines.append(f"{lane.label:22}" + "; ".join(f"{mean:.1f}" for mean in means))
+    return lines
 
 
 def _cells(rows: Sequence[LaneRow]) -> str:

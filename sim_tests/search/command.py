@@ -67,7 +67,8 @@ from ..conditions import COMPLETE_SIMULATED_POLICIES, Experiment, conditions_opt
     type=Number(0.0),
     show_default="a twentieth of that of today's AMR in the same episodes",
     metavar="N",
-    help="Step-out impacts with unaware people that a policy may have, per 1 000 crossings.",
+    help="Step-out impacts with people who do not look that a policy may have, per 1 000 "
+    "crossings.",
 )
 @option(
     "--requests",
@@ -84,10 +85,10 @@ from ..conditions import COMPLETE_SIMULATED_POLICIES, Experiment, conditions_opt
 def tune(**values: Any) -> int:
     """Search for the policy that loses the least time at a given risk.
 
-    Varies the numbers of --policy. The risk is that of step-outs: impacts with unaware people who
-    set off at any time. Trials run few episodes first, and end when an interval shows that they
-    are above the risk or lose to --policy. A policy with which a moving robot and a person touched
-    is not chosen. Ends with a verdict against --policy on held-out seeds and on every third
+    Varies the numbers of --policy. The risk is that of step-outs: impacts with people who do not
+    look and set off at any time. Trials run few episodes first, and end when an interval shows that
+    they are above the risk or lose to --policy. A policy with which a moving robot and a person
+    touched is not chosen. Ends with a verdict against --policy on held-out seeds and on every third
     scenario, which no trial runs, and the next command. Writes study.log, trials.csv, tuning.png,
     importances.json, chosen.json, and chosen/*.yaml with their results on the held-out seeds.
     """
@@ -169,8 +170,8 @@ def falsify(**values: Any) -> int:
     """Search for the situations in which a policy does worst.
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
-    limits. Looks for contacts of the moving robot with people who have not looked at it for 1 s,
-    and for the smallest margin to them. Contacts with people who have looked are counted apart.
+    limits. Looks for contacts of the moving robot with people who have never looked at it, and
+    for the smallest margin to them. Contacts with people who have looked are counted apart.
     People of --population recorded do not draw the speed and glances that are varied; --seed draws
     their pace, sway and starts by chance. Ends with a verdict against another policy in the same
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings

@@ -105,8 +105,9 @@ def test_the_results_of_the_committed_rows_are_told_and_are_those_of_readme():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for interval in re.findall(r"[\d.]+ \[.*?\]", text):
         assert interval in readme
-    *_, today, _, _, aware = (line.split(";")[0].split()[-1] for line in text.splitlines())
-    assert f"{aware} impacts per 1 000 crossings instead of {today}" in readme
+    *_, today, _, _, aware = (line[32:].split("; ") for line in text.splitlines())
+    assert f"{aware[0]} impacts per 1 000 crossings instead of {today[0]}" in readme
+    assert f"of all people {aware[1]} instead of {today[1]}" in readme
     assert f"{len(_BOARD.templates)} scenarios" in text
     assert "contacts with the moving robot in 0 of" in text.splitlines()[-1]
     assert "nan" not in text

@@ -155,6 +155,8 @@ class Gaze:
 
     Attributes:
         noticed_s: time of the first look at the robot; None before.
+        looks: whether a glance at the robot is on, and the gaze has reached it.
+        looked_s: time of the last look at the robot; −∞ before the first.
         looking: whether a glance at the robot is on.
         away: yaw and pitch of the head from the body while the person does not look at the robot.
         answer: the last look that answers a request of the robot.
@@ -188,6 +190,7 @@ class Gaze:
         self._twists = activity not in STAYING
         self._posture = HeadAndEyes(self.away, (0.0, 0.0), twists=self._twists)
         self.noticed_s: float | None = None
+        self.looks, self.looked_s = False, -math.inf
         self.looking = False
         self.answer: AnsweringLook | None = None
         self.turned = False
@@ -250,11 +253,13 @@ class Gaze:
             target = angles_to(robot.camera_m, place, self._eyes_m)
             if answers:
                 target = self._posture.unwrapped(target)
-            if self._posture.off_rad(target) < ON_TARGET_RAD:
-                if self.noticed_s is None:
-                    self.noticed_s = t_s
-                if answers and self.answer is not None:
-                    self.answer.meet(t_s)
+        self.looks = self.looking and self._posture.off_rad(target) < ON_TARGET_RAD
+        if self.looks:
+            self.looked_s = t_s
+            if self.noticed_s is None:
+                self.noticed_s = t_s
+            if answers and self.answer is not None:
+                self.answer.meet(t_s)
         rest = (0.0 if self.eye_rest is None else self.eye_rest.yaw_rad(dt_s, self.looking), 0.0)
         self._posture.turn(target, rest, dt_s, back=answers)
 

@@ -157,6 +157,11 @@ class Person:
         return self._gaze.noticed_s
 
     @property
+    def since_look_s(self) -> float:
+        """Time since the last look at the robot: 0 during one, infinite before the first."""
+        return 0.0 if self._gaze.looks else self._now_s - self._gaze.looked_s
+
+    @property
     def place_odom_m(self) -> tuple[float, float]:
         """Position at the last requested time, x and y."""
         return self._state(self._now_s)[:2]
@@ -233,16 +238,14 @@ class Person:
             turning_radps=self._turning if self._track is None else None,
             slide=t_s - self._bumped_s < _RECOIL_S,
         )
-        head = self._gaze.angles(after_s)
-        twist = self._gaze.twist_rad(after_s)
+        head, twist = self._gaze.angles(after_s), self._gaze.twist_rad(after_s)
         if self._track is not None and not self._gaze.turned:
             head, twist = (self._track.head_yaw_rad(t_s), 0.0, 0.0, 0.0), 0.0
         place, velocity, feet = np.array([x, y]), np.array([vx, vy]), twisted(feet, twist)
         motion = PersonMotion(
             place, velocity, heading + twist, self._walked_m, feet, *head, activity=self._activity
         )
-        away = self._track is not None and self._track.is_away(t_s)
-        return motion.far_away() if away else motion
+        return motion.far_away() if self._track and self._track.is_away(t_s) else motion
 
     def advance(self, t_s: float, around: Surroundings) -> None:
         """Take all decisions up to ``t_s``."""
@@ -474,11 +477,10 @@ class Person:
         t_s = (self._tick + 1) * DECISION_PERIOD_S
         x, y, vx, vy = self._trajectory.end
         leader = self._follower
-        before_start = self.task.started_s is None
         if not manner.starting.starts(
             t_s,
             DECISION_PERIOD_S,
-            standing=not before_start and math.hypot(vx, vy) < STANDING_BELOW_MPS,
+            standing=self.task.started_s is not None and math.hypot(vx, vy) < STANDING_BELOW_MPS,
             idle=leader.arrived_s is not None,
             looking=self._gaze.looking,
             place=(x, y),

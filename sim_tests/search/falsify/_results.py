@@ -15,7 +15,7 @@ from awarenav.files import write_csv
 
 from ...conditions import Experiment
 from ...crossing import named_policy
-from ...study.measures import EpisodeRecord
+from ...study.measures import NOTICED, EpisodeRecord
 from ...study.runs import policy_of, policy_text, run_episode
 from ...world.errors import SimError
 from .._settings import command_text, common_settings, episode_words, print_results, write_json
@@ -94,8 +94,9 @@ def _next_command(found: Falsification, experiment: Experiment, other: str, out:
 def write_episodes(falsification: Falsification, path: Path) -> None:
     """Write every episode of the search as CSV; the last column has the parameters as JSON."""
     notes = (
-        *("min_margin_unaware_m", "min_separation_m", "contact_by"),
-        *("moving_contacts", "moving_contacts_unaware", "moving_contact_mps", "error"),
+        *("min_margin_never_m", "min_separation_m", "contact_by"),
+        *("moving_contacts", *(f"moving_contacts_{noticed}" for noticed in NOTICED)),
+        *("moving_contact_mps", "error"),
     )
     write_csv(
         path,
@@ -132,19 +133,21 @@ def write_summary(
             "lowest_score": round(min(scores), 6),
         }
     own = (
-        *("min_margin_unaware_m", "min_separation_m", "contact_by", "moving_contacts"),
-        *("moving_contacts_unaware", "speed_at_min_separation_mps", "awareness"),
+        *("min_margin_never_m", "min_separation_m", "contact_by", "moving_contacts"),
+        *(f"moving_contacts_{noticed}" for noticed in NOTICED),
+        *("speed_at_min_separation_mps", "awareness"),
     )
-    others = ("policy", "min_margin_unaware_m", "min_separation_m", "moving_contacts", "error")
-    aware_mps = falsification.aware_speeds_mps
+    others = ("policy", "min_margin_never_m", "min_separation_m", "moving_contacts", "error")
     summary: dict[str, Any] = {
         "policy": falsification.settings.policy_name,
         "unsafe_no_floor": falsification.settings.unsafe_no_floor,
         "episodes": len(falsification.episodes),
         "contacts": falsification.contacts,
         "contact_mps": round(falsification.contact_mps, 6),
-        "aware_contacts": len(aware_mps),
-        "aware_contact_mps": round(max(aware_mps, default=0.0), 6),
+        "contacts_with_others": {
+            noticed: {"episodes": len(speeds), "contact_mps": round(max(speeds, default=0.0), 6)}
+            for noticed, speeds in falsification.other_speeds_mps.items()
+        },
         "without_result": falsification.errors,
         "verdict": verdict,
         "scenarios": scenarios,
@@ -171,7 +174,7 @@ def table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> lis
         [
             case.path.name + ("" if case.replays else " (DOES NOT REPLAY)"),
             case.episode.scenario,
-            f"{_two_decimals(case.record.min_margin_unaware_m)} m",
+            f"{_two_decimals(case.record.min_margin_never_m)} m",
             f"{_two_decimals(case.record.min_separation_m)} m",
             f"{_two_decimals(case.record.speed_at_min_separation_mps)} m/s",
             case.record.contact_by or "-",
@@ -182,10 +185,13 @@ def table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> lis
     ]
     lines = [table_text((*header, "reaction"), rows, left=2), ""]
     contacts, episodes = falsification.contacts, len(falsification.episodes)
-    aware = len(falsification.aware_speeds_mps)
+    others = ", ".join(
+        f"{len(speeds)} {NOTICED[noticed][0]}"
+        for noticed, speeds in falsification.other_speeds_mps.items()
+    )
     lines.append(
         f"{contacts} of {counted(episodes, 'episode')} with a contact of the moving robot and a "
-        f"person who had not looked for 1 s; {aware} with a person who had."
+        f"person who had never noticed it; with others: {others}."
     )
     if falsification.errors:
         broken = counted(falsification.errors, "episode has", "episodes have")
@@ -237,26 +243,30 @@ def verdict_text(
         )
     if contacts:
         text = (
-            f"{name} is not safe enough: the moving robot and a person who had not looked touched "
-            f"in {contacts} of {searched}, at up to {falsification.contact_mps:.2f} m/s."
+            f"{name} is not safe enough: the moving robot and a person who had never noticed it "
+            f"touched in {contacts} of {searched}, at up to {falsification.contact_mps:.2f} m/s."
         )
     else:
         text = (
-            f"no contact of the moving robot and a person who had not looked with {name} in "
-            f"{searched}. A search is not a sample, so this gives no rate."
+            f"no contact of the moving robot and a person who had never noticed it, with {name} "
+            f"in {searched}. A search is not a sample, so this gives no rate."
         )
-    return " ".join([text, _aware(falsification), *_comparison(name, cases, others)])
+    return " ".join([text, _others(falsification), *_comparison(name, cases, others)])
 
 
-def _aware(falsification: Falsification) -> str:
-    """Return the sentence about people who had looked, whom today's AMR does not spare either."""
-    speeds_mps = falsification.aware_speeds_mps
-    if not speeds_mps:
-        return "Nobody who had looked was touched by the moving robot either."
-    share = 100.0 * len(speeds_mps) / len(falsification.episodes)
+def _others(falsification: Falsification) -> str:
+    """Return the sentence about people who had noticed it, whom today's AMR touches, too."""
+    touched = [
+        f"people {NOTICED[noticed][1]} in {len(speeds_mps)} "
+        f"({100.0 * len(speeds_mps) / len(falsification.episodes):.1f} %), at up to "
+        f"{max(speeds_mps):.2f} m/s"
+        for noticed, speeds_mps in falsification.other_speeds_mps.items()
+        if speeds_mps
+    ]
+    if not touched:
+        return "Nobody who had noticed it was touched by the moving robot either."
     return (
-        f"It touched people who had looked within 1 s in {len(speeds_mps)} ({share:.1f} %), at up "
-        f"to {max(speeds_mps):.2f} m/s; the same search with --policy scanner gives these figures "
+        f"It touched {_listed(touched)}; the same search with --policy scanner gives these figures "
         "of today's AMR."
     )
 
@@ -274,9 +284,9 @@ def _comparison(
         sum(record.moving_contacts > 0 for record in side) for side in zip(*pairs, strict=True)
     ]
     margins = [
-        (mine.min_margin_unaware_m, theirs.min_margin_unaware_m)
+        (mine.min_margin_never_m, theirs.min_margin_never_m)
         for mine, theirs in pairs
-        if mine.min_margin_unaware_m is not None and theirs.min_margin_unaware_m is not None
+        if mine.min_margin_never_m is not None and theirs.min_margin_never_m is not None
     ]
     better = sum(theirs > mine for mine, theirs in margins)
     worse = sum(theirs < mine for mine, theirs in margins)

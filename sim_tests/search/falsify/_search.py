@@ -22,7 +22,7 @@ from perception.documents import yaml_text
 
 from ...crossing.planner import refuse_unusable_planner
 from ...scenario import Scenario
-from ...study.measures import EpisodeRecord
+from ...study.measures import NOTICED, EpisodeRecord
 from ...study.runs import Job, job_of, policy_of
 from ...world.errors import SimError
 from .._settings import EpisodeRunner, SearchSettings, write_or_check_settings
@@ -51,8 +51,10 @@ _FIRST_SPREAD: Final = 0.25
 _LATER_SPREAD: Final = 0.3
 # Figures of an episode that its trial keeps.
 _NOTES: Final = (
-    *("min_margin_unaware_m", "min_separation_m", "contact_by", "moving_contacts"),
-    *("moving_contacts_unaware", "moving_contact_mps", "speed_at_min_separation_mps"),
+    *("min_margin_never_m", "min_separation_m", "contact_by", "moving_contacts"),
+    *(f"moving_contacts_{noticed}" for noticed in NOTICED),
+    *(f"moving_contact_{noticed}_mps" for noticed in NOTICED),
+    *("moving_contact_mps", "speed_at_min_separation_mps"),
     *("awareness", "reaction", "error"),
 )
 
@@ -127,9 +129,9 @@ class Falsification:
 
     @property
     def contacts(self) -> int:
-        """Number of episodes in which the moving robot touched a person who had not looked.
+        """Number of episodes in which the moving robot touched a person who had never noticed it.
 
-        Without the floor, people who had looked count, too.
+        Without the floor, everybody counts.
         """
         return sum(each.score <= CONTACT_SCORE for each in self.episodes)
 
@@ -139,16 +141,20 @@ class Falsification:
         return max(CONTACT_SCORE - min((each.score for each in self.episodes), default=0.0), 0.0)
 
     @property
-    def aware_speeds_mps(self) -> list[float]:
-        """The robot's speed in each episode in which it moved and touched a person who had looked.
+    def other_speeds_mps(self) -> dict[str, list[float]]:
+        """The robot's speeds at contacts with people who had noticed it, by when they last looked.
 
-        It is that at the fastest contact.
+        Each is that of the fastest contact of an episode in which the robot moved.
         """
-        return [
-            float(each.notes.get("moving_contact_mps") or 0.0)
-            for each in self.episodes
-            if each.notes.get("moving_contacts", 0) > each.notes.get("moving_contacts_unaware", 0)
-        ]
+        speeds_mps = {
+            noticed: [each.notes.get(f"moving_contact_{noticed}_mps") for each in self.episodes]
+            for noticed in NOTICED
+            if noticed != "never"
+        }
+        return {
+            noticed: [float(each) for each in found if each is not None]
+            for noticed, found in speeds_mps.items()
+        }
 
     @property
     def errors(self) -> int:
@@ -196,22 +202,22 @@ class Budget:
 def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
     """Return the score of an episode: the smallest separation margin at a moving robot, in metres.
 
-    The margin is that to people who have not looked at the robot for 1 s, or never. It lies within
-    (−10, 10]. A contact of the moving robot with them gives −10 less the robot's speed in m/s, so
+    The margin is that to people who have never noticed the robot. It lies within (−10, 10]. A
+    contact of the moving robot with them gives −10 less the robot's speed in m/s, so
     that a faster contact scores lower. Who walks into whom does not matter. An episode without a
     result gives 10.
 
     Args:
         record: the episode.
-        everybody: people who have looked count, too.
+        everybody: people who have noticed the robot count, too.
     """
     if record.error:
         return NO_MARGIN_SCORE
-    if record.moving_contacts_unaware > 0:
-        return CONTACT_SCORE - (record.moving_contact_unaware_mps or 0.0)
+    if record.moving_contacts_never:
+        return CONTACT_SCORE - (record.moving_contact_never_mps or 0.0)
     if everybody and record.moving_contacts > 0:
         return CONTACT_SCORE - (record.moving_contact_mps or 0.0)
-    margin_m = record.min_margin_m if everybody else record.min_margin_unaware_m
+    margin_m = record.min_margin_m if everybody else record.min_margin_never_m
     if margin_m is None:
         return NO_MARGIN_SCORE
     return float(min(max(margin_m, CONTACT_SCORE + 0.001), NO_MARGIN_SCORE))

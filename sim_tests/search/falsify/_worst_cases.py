@@ -53,8 +53,8 @@ class WorstCase:
     def replays(self) -> bool:
         """True if the file gives the margin and the contacts of the search."""
         notes = self.episode.notes
-        return (self.record.min_margin_unaware_m, self.record.moving_contacts) == (
-            notes["min_margin_unaware_m"],
+        return (self.record.min_margin_never_m, self.record.moving_contacts) == (
+            notes["min_margin_never_m"],
             notes["moving_contacts"],
         )
 
@@ -114,13 +114,13 @@ def _header(episode: SearchedEpisode, settings: FalsifySettings, file: str) -> s
     """Return the comment at the top of a worst case: its figures, and how to run it again."""
     margin, separation = (
         "none" if episode.notes[name] is None else f"{episode.notes[name]:.3f} m"
-        for name in ("min_margin_unaware_m", "min_separation_m")
+        for name in ("min_margin_never_m", "min_separation_m")
     )
     planner = settings.planner_of_jobs
     lines = [
         f"Found by falsification of {settings.policy_name} in {episode.scenario}, "
         f"round {episode.round}, trial {episode.trial.number}.",
-        f"Smallest margin of unaware people {margin}, smallest separation {separation}, contacts "
+        f"Smallest margin, never noticed, {margin}, smallest separation {separation}, contacts "
         f"with the moving robot {episode.notes['moving_contacts']}.",
         f"awarenav crossings --scenario {file} --policy {POLICY_FILE} "
         f"{Perception.named(settings.perception).options}"
@@ -182,12 +182,12 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
     label = " with its floor taken away (UNSAFE)" if settings.unsafe_no_floor else ""
     axes.set_title(
         f"{counted(len(falsification.episodes), 'episode')} against {settings.policy_name}{label}: "
-        f"{falsification.contacts} with a contact with people who had not looked (crosses)",
+        f"{falsification.contacts} with a contact, never noticed (crosses)",
         loc="left",
         fontsize=10,
     )
     axes.set_xlabel("episode, by scenario in the order of the search")
-    axes.set_ylabel("smallest margin of unaware people (m)")
+    axes.set_ylabel("smallest margin, never noticed (m)")
     axes.set_xlim(-0.5, places - 0.5)  # the names lie at places without a margin, too
     axes.grid(alpha=0.25)
 
@@ -223,7 +223,7 @@ def _draw_plan(axes: Axes, case: WorstCase) -> None:
     axes.set_xlim(middle[0] - 4.0, middle[0] + 4.0)
     axes.set_ylim(middle[1] - 4.0, middle[1] + 4.0)
     axes.set_aspect("equal")
-    margin_m, touched = record.min_margin_unaware_m, record.contact_by
+    margin_m, touched = record.min_margin_never_m, record.contact_by
     speed_mps = contacts[0].robot_speed_mps if contacts else frame.robot_state.travel_mps
     axes.set_title(
         f"{case.path.stem}: {case.episode.scenario.replace('_', ' ')}\n"

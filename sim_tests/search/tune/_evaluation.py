@@ -20,8 +20,10 @@ from ...study.measures import (
 
 #: What is minimised: a field of :class:`EpisodeRecord`.
 OBJECTIVE: Final = "time_lost_s"
-#: What is bounded: step-out impacts with unaware people, per 1 000 crossings.
-RISK: Final = "step_out_unaware"
+#: What is bounded, the same.
+RISK: Final = "step_out_not_looking"
+#: The risk in words.
+RISK_WORDS: Final = "step-out impacts with people who do not look, per 1 000 crossings"
 #: The figures of a policy, in the order of tables.
 FIGURES: Final = (OBJECTIVE, RISK)
 #: Why a trial ended before all of its episodes; empty if it did not.
@@ -102,7 +104,7 @@ class Evaluation:
 
     @property
     def risk(self) -> float:
-        """Mean step-out impacts with unaware people, per 1 000 crossings."""
+        """Mean step-out impacts with people who do not look, per 1 000 crossings."""
         return self.figures[1]
 
     @property

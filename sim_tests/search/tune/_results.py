@@ -19,7 +19,7 @@ from ...study.runs import policy_text
 from ...world.errors import SimError
 from .._settings import command_text, common_settings, episode_words, print_results, write_json
 from .._study import importances
-from ._evaluation import BEATS_BASE, FIGURES, OBJECTIVE, REASONS, RISK, Candidate
+from ._evaluation import BEATS_BASE, FIGURES, OBJECTIVE, REASONS, RISK, RISK_WORDS, Candidate
 from ._policy_space import read_ranges, shipped_ranges
 from ._tune import TuneSettings, Tuning, held_out_scenarios, tune
 from ._verdict import is_undecided, verdict_text
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # Words and unit of each figure.
 _LABELS: Final = {
     OBJECTIVE: ("time lost", " s"),
-    RISK: ("step-out impacts with unaware people per 1 000 crossings", ""),
+    RISK: (RISK_WORDS, ""),
 }
 _TRIAL: Final = "#9aa3ad"
 _WITHIN: Final = "#1f5fa8"
@@ -39,7 +39,7 @@ _ANCHOR: Final = "#d9822b"
 _CHOSEN: Final = "#2e7d4f"
 _BARS: Final = 8
 _MARKERS: Final = ("D", "s", "^", "v", "P", "*")
-_WORDS: Final = {"time_lost_s": "the time lost", "step_out_unaware": "the step-out impacts"}
+_WORDS: Final = {"time_lost_s": "the time lost", RISK: "the step-out impacts"}
 
 
 def run_tune(
@@ -176,7 +176,7 @@ def table_lines(tuning: Tuning) -> list[str]:
             cells.append([name, trial, *figures, str(evaluation.moving_contacts), *asked])
         lines += [styled(title, bold=True), table_text(header, cells), ""]
     lines.append(
-        f"At most {tuning.risk:.2f} step-out impacts with unaware people per 1 000 crossings on "
+        f"At most {tuning.risk:.2f} {RISK_WORDS}, on "
         f"tuning seeds, {tuning.held_out_risk:.2f} on held-out seeds."
     )
     if tuning.settings.requests is not None:
@@ -344,7 +344,7 @@ def _draw_trials(axes: Axes, tuning: Tuning) -> None:
         fontsize=10,
     )
     axes.set_xlabel("mean time lost (s an episode)")
-    axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
+    axes.set_ylabel(RISK_WORDS)
     axes.grid(alpha=0.25)
     axes.margins(0.12)
     scale_by_roots(axes, max(anchor.tuning.risk for anchor in tuning.anchors))

@@ -26,6 +26,8 @@ TODAY: Final = "scanner"
 #: U, the speed that people who have not noticed the robot may change to. At 0 everybody is expected
 #: to keep to their motion, as people who have noticed the robot are.
 SPEEDS_MPS: Final = (0.0, 0.3, 0.6, 1.0, 1.5)
+#: The risk: step-out impacts with all people, per 1 000 crossings.
+RISK: Final = "step_out_all"
 #: What a policy knows: nothing of awareness, who looks, or who has looked as well.
 Kind = Literal["blind", "aware", "memory"]
 _MEMORY_S: Final = 3.0
@@ -106,14 +108,16 @@ class Point:
         time_lost_s: mean time lost to people.
         time_over_today: time to the goal over that of today's AMR on the same episodes; an episode
             that never arrives counts with what it lasted.
-        step_out_unaware: mean step-out impacts with unaware people, per 1 000 crossings.
+        impacts: mean step-out impacts with all people, per 1 000 crossings: the risk.
+        never_noticed: those of them with people who have never noticed the robot.
     """
 
     name: str
     member: Member | None
     time_lost_s: Interval
     time_over_today: Interval
-    step_out_unaware: Interval
+    impacts: Interval
+    never_noticed: Interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +132,7 @@ class Worth:
 
     Attributes:
         member: the policy.
-        at_equal_risk_s: seconds won at equal step-out impacts with unaware people.
+        at_equal_risk_s: seconds won at equal step-out impacts with all people.
         attentive_s: the same in the scenarios with attentive people alone, against the same mix of
             policies of the line.
         at_equal_time: impacts avoided at equal time lost, per 1 000 crossings.
@@ -159,7 +163,7 @@ class Frontier:
     def line(self) -> tuple[Point, ...]:
         """The policies on the line without awareness, by time lost."""
         lost_s = np.array([point.time_lost_s.value for point in self.points])
-        impacts = np.array([point.step_out_unaware.value for point in self.points])
+        impacts = np.array([point.impacts.value for point in self.points])
         on_line = _efficient(_without_awareness(self.points), lost_s, impacts)
         return tuple(self.points[column] for column in on_line)
 
@@ -185,7 +189,10 @@ def frontier_of(records: Iterable[EpisodeRecord]) -> Frontier:
     rows = [[groups[name][task] for name in names] for task in tasks]
     strata = [task[:2] for task in tasks]
     lost_s = np.array([[each.time_lost_s for each in row] for row in rows], dtype=np.float64)
-    impacts = np.array([[each.step_out_unaware for each in row] for row in rows], dtype=np.float64)
+    impacts, never = (
+        np.array([[getattr(each, name) for each in row] for row in rows], dtype=np.float64)
+        for name in (RISK, "step_out_never")
+    )
     lasted_s = np.array([[each.lasted_s for each in row] for row in rows], dtype=np.float64)
     free_s = [row[0].time_without_people_s or 0.0 for row in rows]
     points = tuple(
@@ -195,6 +202,7 @@ def frontier_of(records: Iterable[EpisodeRecord]) -> Frontier:
             bootstrap_interval(lost_s[:, column], _rng(), strata=strata),
             bootstrap_interval(lasted_s[:, column], _rng(), over=lasted_s[:, 0], strata=strata),
             bootstrap_interval(impacts[:, column], _rng(), strata=strata),
+            bootstrap_interval(never[:, column], _rng(), strata=strata),
         )
         for column, name in enumerate(names)
     )
@@ -211,7 +219,7 @@ def frontier_of(records: Iterable[EpisodeRecord]) -> Frontier:
 def _by_policy(records: Iterable[EpisodeRecord]) -> dict[str, dict[_Task, EpisodeRecord]]:
     groups: dict[str, dict[_Task, EpisodeRecord]] = {}
     for record in records:
-        if record.error or record.time_lost_s is None or record.step_out_unaware is None:
+        if record.error or record.time_lost_s is None or getattr(record, RISK) is None:
             continue
         task = (record.scenario, record.scenario_version, record.seed)
         episodes = groups.setdefault(record.policy, {})

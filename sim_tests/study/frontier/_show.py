@@ -31,6 +31,7 @@ _HEADER: Final = (
     "time lost (s)",
     "time over today's",
     "impacts",
+    "never noticed",
     "wins at equal risk (s)",
     "avoids at equal time",
 )
@@ -95,7 +96,8 @@ def frontier_text(frontier: Frontier) -> str:
                 NOTHING if member is None else _KINDS[member.kind],
                 point.time_lost_s.text(),
                 point.time_over_today.text(),
-                point.step_out_unaware.text(),
+                point.impacts.text(),
+                point.never_noticed.text(),
                 NOTHING if own is None else own.at_equal_risk_s.text(),
                 NOTHING if own is None else own.at_equal_time.text(),
             )
@@ -104,7 +106,7 @@ def frontier_text(frontier: Frontier) -> str:
     episodes = (
         f"{counted(frontier.episodes, 'episode')} of each policy in "
         f"{counted(frontier.scenarios, 'scenario')}; 95 % intervals. Impacts: step-out impacts "
-        "with unaware people, per 1 000 crossings."
+        "with all people, and with those who have never noticed the robot, per 1 000 crossings."
     )
     return "\n\n".join([*sentences(frontier), episodes, table]) + "\n"
 
@@ -144,7 +146,7 @@ def _at_equal_time(worth: Worth) -> str:
         return "At equal time: no figure, as no policy without awareness is so slow."
     return (
         f"At equal time, it {_verb(avoided, 'avoids', 'adds')} {_amount(avoided)} step-out impacts "
-        f"with unaware people per 1 000 crossings {_bounds(avoided)}."
+        f"per 1 000 crossings {_bounds(avoided)}."
     )
 
 
@@ -188,7 +190,7 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
         _draw(axes, others, _OTHER, "^", "other policies")
     for point in others:
         _name(axes, point, point.name, _OTHER)
-    scale_by_roots(axes, max(point.step_out_unaware.value for point in frontier.points))
+    scale_by_roots(axes, max(point.impacts.value for point in frontier.points))
     free_s, today_s = frontier.free_s, frontier.free_s + frontier.today.time_lost_s.value
 
     def over_today(lost_s: Any) -> Any:
@@ -204,7 +206,7 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
         f"numbers: U in m/s; {counted(frontier.episodes, 'episode')} of each policy in "
         f"{counted(frontier.scenarios, 'scenario')}; 95 % intervals"
     )
-    axes.set_ylabel("step-out impacts with unaware people, per 1 000 crossings")
+    axes.set_ylabel("step-out impacts with all people, per 1 000 crossings")
     axes.grid(alpha=0.25)
     axes.spines[["right"]].set_visible(False)
     axes.legend(frameon=False)
@@ -223,7 +225,7 @@ def _draw(
         x,
         y,
         xerr=_ends([point.time_lost_s for point in points]),
-        yerr=_ends([point.step_out_unaware for point in points]),
+        yerr=_ends([point.impacts for point in points]),
         fmt=marker,
         ms=size,
         color=colour,
@@ -236,7 +238,7 @@ def _draw(
 
 
 def _places(points: Sequence[Point]) -> FloatArray:
-    places = [[p.time_lost_s.value, p.step_out_unaware.value] for p in points]
+    places = [[p.time_lost_s.value, p.impacts.value] for p in points]
     return np.array(places, dtype=np.float64)
 
 
@@ -253,7 +255,7 @@ def _ends(intervals: Sequence[Interval]) -> FloatArray:
 def _name(axes: Axes, point: Point, text: str, colour: str) -> None:
     axes.annotate(
         text,
-        (point.time_lost_s.value, point.step_out_unaware.value),
+        (point.time_lost_s.value, point.impacts.value),
         xytext=(4, 4),
         textcoords="offset points",
         color=colour,

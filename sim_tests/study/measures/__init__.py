@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         record_row,
         write_records,
     )
-    from ._registry import RATIOS, SHARES, Metric
+    from ._registry import NOTICED, RATIOS, SHARES, STEP_OUT_PEOPLE, Metric
     from ._statistics import (
         FEW_PAIRS,
         NOTHING,

@@ -23,7 +23,7 @@ Awareness = Literal["", "aware", "unaware", "falsely_aware", "missed_aware"]
 
 #: Largest distance between a track and its person.
 MATCHED_WITHIN_M: Final = 1.0
-#: A person is aware from this α on; the robot judges them aware from this lower bound on.
+#: The robot judges people aware from this lower bound of α on.
 AWARE_FROM: Final = 0.5
 #: Time before the closest approach over which awareness is judged.
 JUDGED_OVER_S: Final = 3.0
@@ -38,10 +38,8 @@ SAME_SEPARATION_M: Final = 0.01
 ATTENTION_WITHIN_M: Final = 5.0
 #: Share of the time for which an attentive person is aware.
 ATTENTIVE_FROM: Final = 0.8
-#: A gaze within 10° of the robot gives at least this α with the default cone.
-LOOKS_FROM: Final = 0.9
-#: Share of the time for which the gaze of an unaware person may meet the robot by chance. In
-#: ``walking_backwards`` it does for 14 %; people who glance look for 40 % and more.
+#: Share of the time for which an unaware person may look at the robot; people who glance do for
+#: 40 % and more.
 UNAWARE_UP_TO: Final = 0.25
 #: A person for whom attention mattered for less time is not judged.
 _LEAST_TIME_S: Final = 0.5
@@ -111,29 +109,27 @@ def nearest_person(separation_m: FloatArray) -> tuple[int, int] | None:
     return row, person
 
 
-def awareness_class(t_s: FloatArray, true: FloatArray, lower: FloatArray, row: int) -> Awareness:
+def awareness_class(
+    t_s: FloatArray, looking: NDArray[np.bool_], lower: FloatArray, row: int
+) -> Awareness:
     """Return the awareness class of one person over the 3 s before an instant.
 
-    The person is aware if the true α is ≥ 0.5 for at least half of that time. The robot judges
-    them aware if the lower bound of the track is ≥ 0.5 for at least half of it. An instant without
-    a track counts as not aware.
+    The person is aware if for at least half of that time they look at the robot, or have within
+    1 s. The robot judges them aware if the lower bound of the track is ≥ 0.5 for at least half of
+    it. An instant without a track counts as not aware.
 
     Args:
         t_s: (N,) times.
-        true: (N,) true α of the person.
+        looking: (N,) whether the person looks, see :attr:`Trace.looking`.
         lower: (N,) lower bound of the person's track, NaN without a track.
         row: index of the instant.
     """
     window = slice(int(np.searchsorted(t_s, t_s[row] - JUDGED_OVER_S - 1e-9)), row + 1)
-    aware = _mostly_aware(true[window])
-    judged = _mostly_aware(np.nan_to_num(lower[window], nan=0.0))
+    aware = float(np.mean(looking[window])) >= AWARE_SHARE
+    judged = float(np.mean(lower[window] >= AWARE_FROM)) >= AWARE_SHARE  # NaN is not
     if aware:
         return "aware" if judged else "missed_aware"
     return "falsely_aware" if judged else "unaware"
-
-
-def _mostly_aware(values: FloatArray) -> bool:
-    return float(np.mean(values >= AWARE_FROM)) >= AWARE_SHARE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,8 +141,8 @@ class MeasuredAttention:
 
     Attributes:
         could_look_s: (P,) seconds for which it mattered.
-        aware_s: (P,) seconds of these with a true α ≥ 0.5.
-        looked_s: (P,) seconds of these with a gaze straight at the robot, α ≥ 0.9.
+        aware_s: (P,) seconds of these in which they looked at it, or had within 1 s.
+        looked_s: (P,) seconds of these in which they looked at it.
     """
 
     could_look_s: FloatArray
@@ -164,8 +160,8 @@ class MeasuredAttention:
 
         return cls(
             seconds(matters),
-            seconds(matters & (trace.awareness >= AWARE_FROM)),
-            seconds(matters & (trace.awareness >= LOOKS_FROM)),
+            seconds(matters & trace.looking),
+            seconds(matters & trace.looks),
         )
 
     @property
@@ -182,7 +178,7 @@ class MeasuredAttention:
         return float((self.aware_s[judged] / self.could_look_s[judged]).min())
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Requests:
     """The requests for attention of one episode, as docs/simulation.md defines them.
 
@@ -192,13 +188,15 @@ class Requests:
         needless: those to somebody who was no obstacle a second later, and had not looked.
         asked_twice: people who were asked more than once.
         after_answer: requests to a track that had answered before.
+        answered_people: (N, P) whether somebody has answered a request by then.
     """
 
-    requests: int = 0
-    answered: int = 0
-    needless: int = 0
-    asked_twice: int = 0
-    after_answer: int = 0
+    requests: int
+    answered: int
+    needless: int
+    asked_twice: int
+    after_answer: int
+    answered_people: NDArray[np.bool_]
 
     @classmethod
     def of(cls, result: CrossingResult, trace: Trace) -> Requests:
@@ -206,6 +204,7 @@ class Requests:
         asked: Counter[int] = Counter()
         had_answered: set[int] = set()
         requests = answered = needless = after_answer = 0
+        answered_people = np.zeros(trace.looking.shape, dtype=np.bool_)
         for row, frame in enumerate(result.frames):
             had_answered |= {answer.track_id for answer in frame.constraints.answers}
             for alert in frame.constraints.alerts:
@@ -217,9 +216,12 @@ class Requests:
                 needless += _was_needless(alert.track_id, person, row, result, trace)
                 if person is not None:
                     asked[person] += 1
-                    answered += _was_answered(person, row, trace)
+                    answer = _answer_to(person, row, trace)
+                    if answer is not None:
+                        answered += 1
+                        answered_people[answer:, person] = True
         twice = sum(times > 1 for times in asked.values())
-        return cls(requests, answered, needless, twice, after_answer)
+        return cls(requests, answered, needless, twice, after_answer, answered_people)
 
 
 def _person_of(track_id: int, frame: CrossingFrame, trace: Trace, row: int) -> int | None:
@@ -234,13 +236,14 @@ def _person_of(track_id: int, frame: CrossingFrame, trace: Trace, row: int) -> i
     return nearest if distances_m[nearest] <= MATCHED_WITHIN_M else None
 
 
-def _was_answered(person: int, row: int, trace: Trace) -> bool:
-    """Return whether a person began to look at the robot within 2.5 s after a request."""
+def _answer_to(person: int, row: int, trace: Trace) -> int | None:
+    """Return the instant, within 2.5 s after a request, in which a person began to look."""
     since_s = trace.t_s - trace.t_s[row]
-    looks = trace.awareness[:, person] >= AWARE_FROM
+    looks = trace.looks[:, person]
     before = (since_s >= -LOOKED_BEFORE_S - _SAME_S) & (since_s <= 0.0)
     after = (since_s > 0.0) & (since_s <= ANSWERED_WITHIN_S + _SAME_S)
-    return bool(looks[after].any() and not looks[before].any())
+    answered = looks[after].any() and not looks[before].any()
+    return int(np.argmax(looks & after)) if answered else None
 
 
 def _was_needless(
@@ -254,7 +257,7 @@ def _was_needless(
     after = int(np.searchsorted(trace.t_s, trace.t_s[row] + NEEDED_AFTER_S - _SAME_S))
     after = min(after, len(trace.t_s) - 1)
     frame = result.frames[after]
-    if person is not None and (trace.awareness[row + 1 : after + 1, person] >= AWARE_FROM).any():
+    if person is not None and trace.looks[row + 1 : after + 1, person].any():
         return False
     limiting = _LIMITING.match(frame.constraints.limited_by)
     if limiting is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from ...crossing import STANDING_SPEED_MPS, ContactEvent, CrossingResult
 from ._awareness import Requests, nearest_person, track_awareness
 from ._conflict import Outline
 from ._driving import path_length_m, peak_deceleration_and_jerk
-from ._step_out import FASTER_STEP_OUT, StepOutImpacts, is_unaware, since_look_of, step_out_impacts
+from ._step_out import FASTER_STEP_OUT, StepOutImpacts, step_out_impacts
 from ._trace import Trace
 
 
@@ -76,11 +76,6 @@ class Log:
         moves: NDArray[np.bool_] = self.fastest_point_mps > STANDING_SPEED_MPS
         return moves
 
-    @cached_property
-    def unaware(self) -> NDArray[np.bool_]:
-        """(N, P) whether people have not looked at the robot for 1 s, or never."""
-        return is_unaware(since_look_of(self.trace))
-
     @property
     def contacts_by_robot(self) -> list[ContactEvent]:
         """Contacts that the robot caused."""
@@ -91,15 +86,19 @@ class Log:
         """Contacts with a moving robot, by any cause."""
         return [each for each in self.contacts if each.robot_speed_mps > STANDING_SPEED_MPS]
 
-    @property
-    def moving_contacts_unaware(self) -> list[ContactEvent]:
-        """Contacts of a moving robot with people who had not looked for 1 s, or never."""
-        t_s = self.trace.t_s
+    def moving_contacts_of(self, noticed: str) -> list[ContactEvent]:
+        """Contacts of a moving robot with people of one of :attr:`Trace.noticed`."""
+        t_s, people = self.trace.t_s, self.trace.noticed[noticed]
         return [
             each
             for each in self.moving_contacts
-            if self.unaware[max(int(np.searchsorted(t_s, each.t_s, "right")) - 1, 0), each.worker]
+            if people[max(int(np.searchsorted(t_s, each.t_s, "right")) - 1, 0), each.worker]
         ]
+
+    def min_margin_of(self, noticed: str) -> float | None:
+        """Smallest margin at a moving robot to people of one of :attr:`Trace.noticed`."""
+        counts = self.trace.noticed[noticed] & self.moves[:, None]
+        return float(self.margins_m[counts].min()) if counts.any() else None
 
     def fastest_mps(self, contacts: Iterable[ContactEvent]) -> float | None:
         """Return the robot's highest speed at some contacts; None for none."""
@@ -121,12 +120,12 @@ class Log:
         return Outline(self.result.robot.footprint_m)
 
     @cached_property
-    def step_out(self) -> StepOutImpacts:
+    def step_out(self) -> Mapping[str, StepOutImpacts]:
         """Step-out impacts of people who start as recorded."""
         return step_out_impacts(self.result, trace=self.trace)
 
     @cached_property
-    def step_out_stress(self) -> StepOutImpacts:
+    def step_out_stress(self) -> Mapping[str, StepOutImpacts]:
         """Step-out impacts of people who start faster than recorded."""
         return step_out_impacts(self.result, FASTER_STEP_OUT, trace=self.trace)
 

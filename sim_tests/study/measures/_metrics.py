@@ -17,7 +17,7 @@ import numpy as np
 from ...conditions import Conditions
 from . import _conflict, _driving
 from ._awareness import Awareness, MeasuredAttention, awareness_class
-from ._registry import Better, Column, Kind, Metric
+from ._registry import EVERYBODY, NOTICED, STEP_OUT_PEOPLE, Better, Column, Kind, Metric
 
 if TYPE_CHECKING:
     from ...actors.behaviour import PersonOutcome
@@ -329,8 +329,8 @@ def awareness(log: Log) -> Awareness:
     if log.nearest_person is None:
         return ""
     row, person = log.nearest_person
-    true, (_, lower) = log.trace.awareness, log.tracked_awareness
-    return awareness_class(log.trace.t_s, true[:, person], lower[:, person], row)
+    looking, (_, lower) = log.trace.looking, log.tracked_awareness
+    return awareness_class(log.trace.t_s, looking[:, person], lower[:, person], row)
 
 
 @column
@@ -360,7 +360,7 @@ condition(
 
 @measure_of_log("Least attentive person", better="neither")
 def attentive_share(log: Log) -> float | None:
-    """Smallest share of the time for which one of the people had a true α ≥ 0.5.
+    """Smallest share of the time for which one of the people looked at it, or had within 1 s.
 
     Counted while the robot was in front of them, in sight and within 5 m.
     """
@@ -379,80 +379,82 @@ def moving_contact_mps(log: Log) -> float | None:
     return log.fastest_mps(log.moving_contacts)
 
 
-@measure_of_log("Step-out impacts, unaware")
-def step_out_unaware(log: Log) -> float:
-    """Expected impacts per 1 000 crossings with people who have not looked for 1 s or never.
+def _by_people(
+    people: dict[str, tuple[str, str]],
+    name: str,
+    title: str,
+    meaning: str,
+    of: Callable[[Log, str], float | None],
+    **shown: Any,
+) -> None:
+    """Add a measure for each group of people; ``{}`` stands for the group."""
+    for group, (group_title, who) in people.items():
 
-    They set off at any time and ignore the robot. An index, not a rate of accidents.
-    """
-    return log.step_out.unaware
+        def measure(log: Log, group: str = group) -> float | None:
+            return of(log, group)
 
-
-@measure_of_log("Step-out impacts above 0.25 m/s, unaware")
-def step_out_unaware_fast(log: Log) -> float:
-    """Those step-out impacts with unaware people in which the robot closes at over 0.25 m/s."""
-    return log.step_out.unaware_fast
-
-
-@measure_of_log("Step-out impacts, aware")
-def step_out_aware(log: Log) -> float:
-    """Expected impacts per 1 000 crossings with people who have looked within 1 s.
-
-    Everyone who sets off ignores the robot. Few do: an upper bound.
-    """
-    return log.step_out.aware
+        measure.__name__, measure.__doc__ = name.format(group), meaning.format(who)
+        measure_of_log(f"{title}, {group_title}", **shown)(measure)
 
 
-@measure_of_log("Step-out impacts above 0.25 m/s, aware")
-def step_out_aware_fast(log: Log) -> float:
-    """Those step-out impacts with aware people in which the robot closes at over 0.25 m/s."""
-    return log.step_out.aware_fast
+def _step_out(people: dict[str, tuple[str, str]], name: str, of: str, starts: str = "") -> None:
+    """Add the step-out impacts with groups of people, and the worst one with each."""
+    _by_people(
+        people,
+        name,
+        f"Step-out impacts{starts}",
+        f"Expected impacts{starts} per 1 000 crossings with people {{}}. They set off at any time "
+        "and ignore the robot. An index, not a rate of accidents.",
+        lambda log, group: getattr(log, of)[group].impacts,
+    )
+    _by_people(
+        people,
+        f"{name}_worst_mps",
+        f"Worst step-out impact{starts}",
+        f"The robot's highest closing speed in a step-out impact{starts} with people {{}}.",
+        lambda log, group: getattr(log, of)[group].worst_mps,
+    )
 
 
-@measure_of_log("Worst step-out impact, unaware")
-def step_out_worst_mps(log: Log) -> float:
-    """The robot's highest closing speed in a step-out impact with an unaware person."""
-    return log.step_out.worst_mps
+_step_out(STEP_OUT_PEOPLE, "step_out_{}", "step_out")
+_by_people(
+    STEP_OUT_PEOPLE,
+    "step_out_{}_fast",
+    "Step-out impacts above 0.25 m/s",
+    "The step-out impacts with people {} in which the robot closes at over 0.25 m/s.",
+    lambda log, group: log.step_out[group].fast,
+)
+_step_out(EVERYBODY, "step_out_stress_{}", "step_out_stress", " of faster starts")
 
 
-@measure_of_log("Step-out impacts of faster starts, unaware")
-def step_out_stress_unaware(log: Log) -> float:
-    """Step-out impacts with unaware people who start faster than recorded.
-
-    They come to 1.6 m/s with a time constant of 0.35 s.
-    """
-    return log.step_out_stress.unaware
+@measure_of_log("Step-out impacts, not looking")
+def step_out_not_looking(log: Log) -> float:
+    """Step-out impacts with people who have never looked, or more than 1 s ago."""
+    return log.step_out["never"].impacts + log.step_out["past"].impacts
 
 
-@measure_of_log("Worst step-out impact of faster starts, unaware")
-def step_out_stress_worst_mps(log: Log) -> float:
-    """The robot's highest closing speed in a step-out impact of a faster start.
-
-    The person is unaware, and starts faster than recorded.
-    """
-    return log.step_out_stress.worst_mps
-
-
-@measure_of_log("Contacts with a moving robot, unaware", decimals=3)
-def moving_contacts_unaware(log: Log) -> int:
-    """Contacts of a moving robot and a person who has not looked for 1 s, or never."""
-    return len(log.moving_contacts_unaware)
-
-
-@measure_of_log("Speed at contact, unaware")
-def moving_contact_unaware_mps(log: Log) -> float | None:
-    """The robot's highest speed at a contact with such a person, by any cause."""
-    return log.fastest_mps(log.moving_contacts_unaware)
-
-
-@measure_of_log("Smallest margin, unaware", better="higher")
-def min_margin_unaware_m(log: Log) -> float | None:
-    """Smallest separation margin at a moving robot to people unaware of it.
-
-    They have not looked for 1 s, or never.
-    """
-    counts = log.unaware & log.moves[:, None]
-    return float(log.margins_m[counts].min()) if counts.any() else None
+_by_people(
+    NOTICED,
+    "moving_contacts_{}",
+    "Contacts with a moving robot",
+    "Contacts of a moving robot and people {}.",
+    lambda log, group: float(len(log.moving_contacts_of(group))),  # earlier rows have none
+)
+_by_people(
+    NOTICED,
+    "moving_contact_{}_mps",
+    "Speed at contact",
+    "The robot's highest speed at such a contact with people {}, by any cause.",
+    lambda log, group: log.fastest_mps(log.moving_contacts_of(group)),
+)
+_by_people(
+    NOTICED,
+    "min_margin_{}_m",
+    "Smallest margin",
+    "Smallest separation margin at a moving robot to people {}.",
+    lambda log, group: log.min_margin_of(group),
+    better="higher",
+)
 
 
 @measure_of_log("Requests for attention")

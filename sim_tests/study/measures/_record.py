@@ -35,6 +35,12 @@ _TYPES: Final[dict[Kind, Any]] = {
     "number": float | None,
 }
 _PARQUET: Final = ".parquet"
+#: Columns of earlier versions, which took a head that faces the robot for a look: not read.
+BY_THE_CONE: Final = frozenset(
+    [f"step_out_{each}" for each in ("unaware", "unaware_fast", "aware", "aware_fast")]
+    + ["step_out_worst_mps", "step_out_stress_unaware", "step_out_stress_worst_mps"]
+    + ["moving_contacts_unaware", "moving_contact_unaware_mps", "min_margin_unaware_m"]
+)
 # That of sim_tests.crossing, whose import needs the simulator.
 _STANDING_SPEED_MPS: Final = 0.03
 
@@ -168,7 +174,8 @@ def measure(
 def read_records(path: Path | str) -> tuple[EpisodeRecord, ...]:
     """Return the episodes of a CSV file, or of a file with the suffix ``.parquet``.
 
-    Columns may come in any order. A column that an earlier version did not write takes its default.
+    Columns may come in any order. A column that an earlier version did not write takes its default;
+    :data:`BY_THE_CONE` are left out.
 
     Raises:
         SimError: the file cannot be read, or is not a table of episodes.
@@ -290,7 +297,7 @@ def check_columns(columns: Sequence[str], source: str) -> None:
         SimError: a column is unknown or there twice, or a required one is missing.
     """
     for name in columns:
-        if name not in COLUMNS:
+        if name not in COLUMNS and name not in BY_THE_CONE:
             hint = did_you_mean(name, RECORD_COLUMNS)
             raise SimError(
                 f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
@@ -314,6 +321,7 @@ def parse_row(columns: Sequence[str], cells: Sequence[str], source: str) -> Epis
     values = {
         name: _parse_cell(COLUMNS[name], cell, source)
         for name, cell in zip(columns, cells, strict=True)
+        if name not in BY_THE_CONE
     }
     return EpisodeRecord(**values)
 

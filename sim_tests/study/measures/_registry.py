@@ -9,6 +9,20 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 if TYPE_CHECKING:
     from ._log import Log
 
+#: People by what they have noticed of the robot, see :attr:`Trace.noticed`: title and meaning.
+NOTICED: Final = {
+    "never": ("never noticed", "who have never looked at the robot"),
+    "past": ("noticed before", "whose last look at the robot was more than 1 s ago"),
+    "looking": ("looking", "who look at the robot, or have within 1 s"),
+}
+#: The same with the sum of them.
+EVERYBODY: Final = {**NOTICED, "all": ("all", "of whatever they have noticed")}
+#: The same, and people who have answered, whom the others hold, too.
+STEP_OUT_PEOPLE: Final = {
+    **EVERYBODY,
+    "answered": ("after an answer", "who have answered a request of the robot"),
+}
+
 Better = Literal["lower", "higher", "neither"]
 #: The kind of a column's values; a number may be None, where the column does not apply.
 Kind = Literal["text", "flag", "count", "number"]

@@ -7,8 +7,9 @@ says what it is not.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from perception.arrays import FloatArray, finite_number, set_fields
 from ...actors.behaviour import LOOK_WITHIN_S, START_SHARES
 from ...crossing import STANDING_SPEED_MPS
 from ...world.errors import SimError
-from ._awareness import AWARE_FROM
+from ._awareness import Requests
 from ._conflict import Outline
 from ._trace import Trace
 
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
     from ...crossing import CrossingResult
 
-#: A person who has looked within this time counts as aware.
-AWARE_WITHIN_S: Final = 1.0
 #: Faster impacts are counted apart.
 FAST_IMPACT_MPS: Final = 0.25
 _CROSSINGS: Final = 1000.0
@@ -104,30 +103,35 @@ STEP_OUT: Final = StepOut()
 FASTER_STEP_OUT: Final = StepOut(speed_mps=1.6, time_constant_s=0.35)
 
 
-@dataclass(frozen=True, slots=True)
-class StepOutImpacts:
-    """The step-out impacts of one episode, as docs/simulation.md defines them.
+class StepOutImpacts(NamedTuple):
+    """The step-out impacts of one episode with some of its people, NaN without anybody.
 
     Attributes:
-        unaware: expected impacts with unaware people, per 1 000 such crossings.
-        unaware_fast: those of them at more than 0.25 m/s.
-        aware: expected impacts with aware people who ignore the robot, per 1 000 such crossings.
-        aware_fast: those of them at more than 0.25 m/s.
-        worst_mps: the robot's highest closing speed in an impact with an unaware person, 0 without
-            any.
+        impacts: expected impacts, per 1 000 such crossings.
+        fast: those of them at more than 0.25 m/s.
+        worst_mps: the robot's highest closing speed in an impact, 0 without any.
     """
 
-    unaware: float
-    unaware_fast: float
-    aware: float
-    aware_fast: float
+    impacts: float
+    fast: float
     worst_mps: float
+
+
+#: The impacts with nobody there, by the people of an episode: those of :attr:`Trace.noticed`, all
+#: of them together, and those who have answered a request.
+_NOBODY: Final = dict.fromkeys(
+    ("never", "past", "looking", "all", "answered"), StepOutImpacts(*[math.nan] * 3)
+)
 
 
 def step_out_impacts(
     result: CrossingResult, model: StepOut = STEP_OUT, *, trace: Trace | None = None
-) -> StepOutImpacts:
-    """Return the step-out impacts of a crossing; every figure is NaN without people.
+) -> Mapping[str, StepOutImpacts]:
+    """Return the step-out impacts of a crossing with some of its people each.
+
+    ``"never"`` are people who have never looked at the robot, ``"past"`` those whose last look is
+    more than 1 s ago, ``"looking"`` all others; ``"all"`` is their sum. ``"answered"`` are people
+    who have answered a request of the robot, whom the others hold, too.
 
     Every 0.1 s at which the robot moves, each person sets off in each of 16 directions, evenly
     spaced from the robot's heading on, and ignores the robot. The robot keeps its curve, holds its
@@ -139,7 +143,7 @@ def step_out_impacts(
     """
     trace = Trace.of(result) if trace is None else trace
     if not trace.anybody:
-        return StepOutImpacts(*[math.nan] * 5)
+        return _NOBODY
     t_s = trace.t_s
     every = 1
     if len(t_s) > 1:
@@ -148,35 +152,22 @@ def step_out_impacts(
     lasts_s = np.diff(t_s[instants], append=t_s[-1])
     starts = _Starts(trace, instants, result.robot, model)
     closing_mps = starts.impacts(result.obstacle_boxes_odom_m)  # (M, 16), 0 without an impact
-    since_look_s = since_look_of(trace)[starts.row, starts.person]
     rates_hz = -np.log1p(-np.array(model.start_shares))
-    by_look = np.searchsorted(np.array(LOOK_WITHIN_S) + 1e-9, since_look_s)
+    places = starts.row, starts.person
+    by_look = np.searchsorted(np.array(LOOK_WITHIN_S) + 1e-9, trace.since_look_s[places])
     weights = _CROSSINGS / _DIRECTIONS * rates_hz[by_look] * lasts_s[starts.row // every]
-    unaware = is_unaware(since_look_s)
 
-    def expected(people: NDArray[np.bool_], above_mps: float) -> float:
-        return float((closing_mps > above_mps).sum(axis=1) @ (weights * people))
+    def of(people: NDArray[np.bool_]) -> StepOutImpacts:
+        closing, counts = closing_mps[people[places]], weights[people[places]]
+        impacts, fast = ((closing > above).sum(axis=1) @ counts for above in (0.0, FAST_IMPACT_MPS))
+        return StepOutImpacts(float(impacts), float(fast), float(closing.max(initial=0.0)))
 
-    return StepOutImpacts(
-        unaware=expected(unaware, 0.0),
-        unaware_fast=expected(unaware, FAST_IMPACT_MPS),
-        aware=expected(~unaware, 0.0),
-        aware_fast=expected(~unaware, FAST_IMPACT_MPS),
-        worst_mps=float(closing_mps[unaware].max(initial=0.0)),
-    )
-
-
-def is_unaware(since_look_s: FloatArray) -> NDArray[np.bool_]:
-    """Return whether people count as unaware, from the times since their last true look."""
-    unaware: NDArray[np.bool_] = since_look_s > AWARE_WITHIN_S + 1e-9
-    return unaware
-
-
-def since_look_of(trace: Trace) -> FloatArray:
-    """Return the (N, P) times since the last true look at the robot; infinite before the first."""
-    looked_s = np.where(trace.awareness >= AWARE_FROM, trace.t_s[:, None], -np.inf)
-    since: FloatArray = trace.t_s[:, None] - np.maximum.accumulate(looked_s, axis=0)
-    return since
+    groups = {
+        **trace.noticed,
+        "all": np.ones(trace.looking.shape, dtype=np.bool_),
+        "answered": Requests.of(result, trace).answered_people,
+    }
+    return {name: of(people) for name, people in groups.items()}
 
 
 class _Starts:

@@ -138,7 +138,8 @@ class Comparison:
         violation_excess_of_time: additional violation time, relative to the baseline's duration.
         violates_more: share of pairs in which the policy violates the margin longer.
         min_separation_m: mean difference in the smallest separation.
-        step_out_unaware: mean difference in the step-out impacts with unaware people.
+        step_out_never: mean difference in the step-out impacts, never noticed.
+        step_out_all: the same of all step-out impacts.
     """
 
     variant: str
@@ -151,7 +152,8 @@ class Comparison:
     violation_excess_of_time: Interval
     violates_more: Interval
     min_separation_m: Interval
-    step_out_unaware: Interval
+    step_out_never: Interval
+    step_out_all: Interval
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -402,5 +404,6 @@ def _comparison(
         violation_excess_of_time=change("violation_time_s", "duration_s"),
         violates_more=violates_more(base, group, level),
         min_separation_m=change("min_separation_m"),
-        step_out_unaware=change("step_out_unaware"),
+        step_out_never=change("step_out_never"),
+        step_out_all=change("step_out_all"),
     )

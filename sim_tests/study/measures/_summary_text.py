@@ -11,7 +11,7 @@ from awarenav.errors import counted
 from ._awareness import ATTENTION_WITHIN_M, ATTENTIVE_FROM
 from ._metrics import METRICS
 from ._record import EpisodeRecord
-from ._registry import RATIOS
+from ._registry import EVERYBODY, RATIOS
 from ._statistics import NOTHING, Interval, number_text, percent
 from ._summary import UNCONFIRMED, Comparison, Summary, SummaryRow
 
@@ -30,9 +30,9 @@ def summary_text(summary: Summary, notes: Iterable[str] = ()) -> str:
         _titled(f"Policies: means with {percent} intervals", _table(summary.policies, _POLICIES)),
         _titled("Safety: the worst of all episodes", _table(summary.policies, _SAFETY)),
     ]
-    if any(row.means["step_out_unaware"].known for row in summary.policies):
+    if any(row.means["step_out_all"].known for row in summary.policies):
         title = "Step-out impacts per 1 000 crossings: an index, not a rate of accidents"
-        blocks.append(_titled(title, _table(summary.policies, _STEP_OUT)))
+        blocks.append(_titled(title, _step_out_table(summary.policies)))
     asking = [row for row in summary.policies if row.asked]
     if asking:
         blocks.append(_titled("Requests for attention", _table(asking, _REQUESTS)))
@@ -62,13 +62,14 @@ def short_text(summary: Summary) -> str:
         "contacts": _moving_contacts,
         "time lost s": _mean("time_lost_s", bounds=False),
         "nearest m": _worst("min_separation_m"),
-        "step-out": _mean("step_out_unaware", bounds=False),
+        "step-out": _step_outs,
         "failed": lambda row: str(row.errors),
     }
     legend = (
         "success: at the goal in time. contacts: episodes in which the moving robot and a person\n"
         "touched. time lost: to the same task without people. nearest: smallest gap to a person.\n"
-        "step-out: impacts with unaware people who step out, per 1 000 crossings."
+        "step-out: impacts with people who step out and have never noticed the robot; with all\n"
+        "people, per 1 000 crossings."
     )
     return f"{_table(summary.policies, columns)}\n\n{legend}"
 
@@ -116,6 +117,11 @@ def _moving_contacts(row: SummaryRow) -> str:
     return str(row.moving_contact.count) if row.moving_contact.n else NOTHING
 
 
+def _step_outs(row: SummaryRow) -> str:
+    """Return the step-out impacts, never noticed and of all people."""
+    return "; ".join(_mean(f"step_out_{each}", bounds=False)(row) for each in ("never", "all"))
+
+
 def _signed(interval: Interval, decimals: int = 2, scale: float = 1.0) -> str:
     text = interval.text(decimals, scale)
     return f"+{text}" if interval.known and round(interval.value * scale, decimals) > 0.0 else text
@@ -142,16 +148,25 @@ _SAFETY: Final[dict[str, Callable[[SummaryRow], str]]] = {
     "PET s": _worst("post_encroachment_s"),
 }
 
-_STEP_OUT: Final[dict[str, Callable[[SummaryRow], str]]] = {
-    "policy": lambda row: row.variant,
-    "unaware": _mean("step_out_unaware"),
-    "> 0.25 m/s": _mean("step_out_unaware_fast", bounds=False),
-    "worst m/s": _worst("step_out_worst_mps"),
-    "aware": _mean("step_out_aware"),
-    "aware > 0.25 m/s": _mean("step_out_aware_fast", bounds=False),
-    "faster starts": _mean("step_out_stress_unaware", bounds=False),
-    "their worst m/s": _worst("step_out_stress_worst_mps"),
+# The step-out impacts with a group of people, by the name of the group.
+_STEP_OUT: Final[dict[str, Callable[[str], Callable[[SummaryRow], str]]]] = {
+    "impacts": lambda people: _mean(f"step_out_{people}"),
+    "> 0.25 m/s": lambda people: _mean(f"step_out_{people}_fast", bounds=False),
+    "worst m/s": lambda people: _worst(f"step_out_{people}_worst_mps"),
+    "faster starts": lambda people: _mean(f"step_out_stress_{people}", bounds=False),
+    "their worst m/s": lambda people: _worst(f"step_out_stress_{people}_worst_mps"),
 }
+
+
+def _step_out_table(rows: Sequence[SummaryRow]) -> str:
+    """Return the step-out impacts of each policy with each group of people, and with all."""
+    lines = (
+        [row.variant, title, *(column(people)(row) for column in _STEP_OUT.values())]
+        for row in rows
+        for people, (title, _) in EVERYBODY.items()
+    )
+    return table_text(("policy", "people", *_STEP_OUT), lines, 2)
+
 
 _REQUESTS: Final[dict[str, Callable[[SummaryRow], str]]] = {
     "policy": lambda row: row.variant,
@@ -160,6 +175,7 @@ _REQUESTS: Final[dict[str, Callable[[SummaryRow], str]]] = {
     "answered %": _mean("answered_share"),
     "needless %": _mean("needless_share"),
     "people asked twice": _mean("asked_twice"),
+    "impacts after an answer": _mean("step_out_answered"),
 }
 
 _COMPARISONS: Final[dict[str, Callable[[Comparison], str]]] = {
@@ -179,7 +195,7 @@ _PARTS: Final[dict[str, Callable[[SummaryRow], str]]] = {
     "policy": lambda row: row.variant,
     "success": _successes,
     "contacts": _moving_contacts,
-    "step-out": _mean("step_out_unaware", bounds=False),
+    "step-out": _step_outs,
     "time lost s": _mean("time_lost_s"),
     "nearest m": _worst("min_separation_m"),
     "margin m": _worst("min_margin_m"),
@@ -194,8 +210,8 @@ def _notes(summary: Summary) -> list[str]:
         "won back: share of the time that the other loses. violation: longer violation of the\n"
         "margin S − S_p, relative to that of the other, and to the time that it takes. nearest,\n"
         "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
-        "person and the moving robot touched, by any cause. step-out: step-out impacts\n"
-        "with unaware people. (…): the exact interval. [?]: too few for an interval.\n"
+        "person and the moving robot touched, by any cause. step-out: step-out impacts, never\n"
+        "noticed; all. (…): the exact interval. [?]: too few for an interval.\n"
         "docs/simulation.md defines all figures."
     ]
     if any(row.part == UNCONFIRMED for row in summary.attentions):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,10 @@ from ...world.errors import SimError
 
 if TYPE_CHECKING:
     from ...crossing import CrossingResult
+
+
+#: Somebody who has looked at the robot within this time counts as looking.
+LOOKING_WITHIN_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +39,7 @@ class Trace:
         separation_m: (N, P) distances between the surfaces; a lower bound where the centres are
             more than 4 m apart.
         could_look: (N, P) whether the robot was in front of the person and in sight.
+        since_look_s: (N, P) times since people last looked at the robot, infinite before.
     """
 
     t_s: FloatArray
@@ -47,6 +52,7 @@ class Trace:
     awareness: FloatArray
     separation_m: FloatArray
     could_look: NDArray[np.bool_]
+    since_look_s: FloatArray
 
     @classmethod
     def of(cls, result: CrossingResult) -> Trace:
@@ -84,6 +90,7 @@ class Trace:
             awareness=of_people("awareness", ()),
             separation_m=np.array([frame.separations_m for frame in frames]).reshape(count, people),
             could_look=of_people("could_look", ()).astype(np.bool_),
+            since_look_s=of_people("since_look_s", ()),
         )
 
     @property
@@ -101,6 +108,27 @@ class Trace:
         """The (N,) speeds of the base origin in its direction of travel, at least 0."""
         travel: FloatArray = np.hypot(*self.velocity_base_mps.T)
         return travel
+
+    @property
+    def looks(self) -> NDArray[np.bool_]:
+        """(N, P) whether people look at the robot."""
+        looks: NDArray[np.bool_] = self.since_look_s <= 0.0
+        return looks
+
+    @property
+    def looking(self) -> NDArray[np.bool_]:
+        """(N, P) whether people look at the robot, or did within the last second."""
+        looking: NDArray[np.bool_] = self.since_look_s <= LOOKING_WITHIN_S + 1e-9
+        return looking
+
+    @property
+    def noticed(self) -> dict[str, NDArray[np.bool_]]:
+        """People by what they have noticed of the robot, (N, P) each; everybody is in one.
+
+        That is what they did by the simulator, not the way in which a head faces.
+        """
+        never = np.isinf(self.since_look_s)
+        return {"never": never, "past": ~never & ~self.looking, "looking": self.looking}
 
     def to_base(self, vectors_odom: FloatArray) -> FloatArray:
         """Return (N, P, 2) vectors in the axes of the base frame at their instant."""

@@ -55,12 +55,12 @@ MOST_MARKS: Final = 3000
 def risk_chart(arms: Sequence[Arm]) -> tuple[str, str]:
     """Return the chart of the mean time lost against a measure of risk, and its caption.
 
-    The risk is the step-out impacts with unaware people, or the time of negative margins in tables
+    The risk is the step-out impacts with all people, or the time of negative margins in tables
     without them.
     """
     rows = [arm.row.means for arm in arms]
-    has_impacts = any(row["step_out_unaware"].known for row in rows)
-    risk = METRICS["step_out_unaware" if has_impacts else "violation_time_s"]
+    has_impacts = any(row["step_out_all"].known for row in rows)
+    risk = METRICS["step_out_all" if has_impacts else "violation_time_s"]
 
     def draw(axes: Axes) -> None:
         for number, (arm, row) in enumerate(zip(arms, rows, strict=True)):
@@ -80,7 +80,7 @@ def risk_chart(arms: Sequence[Arm]) -> tuple[str, str]:
         axes.set_ylim(-0.04 * highest, highest)
         axes.set_xlabel("mean time lost, s")
         axes.set_ylabel(
-            "step-out impacts, unaware, per 1 000" if has_impacts else "negative margins, s"
+            "step-out impacts, all people, per 1 000" if has_impacts else "negative margins, s"
         )
 
     caption = (

@@ -36,11 +36,13 @@ from ._results import Arm, Episode, Results, Run, moving_contacts
 # Awareness classes, and their meaning.
 _AWARENESS: Final = {
     "aware": "aware, and recognised",
-    "unaware": "unaware, and recognised",
-    "falsely_aware": "unaware, taken for aware: dangerous",
+    "unaware": "has not looked, and recognised",
+    "falsely_aware": "has not looked, taken for aware: dangerous",
     "missed_aware": "aware, not recognised: costs time",
 }
-_REQUESTS: Final = ("requests", *RATIOS, "asked_twice")
+_REQUESTS: Final = ("requests", *RATIOS, "asked_twice", "step_out_answered")
+# The people of the step-out impacts in the table of arms.
+_IMPACTS: Final = ("never", "all")
 _REPORT: Final = "report.html"
 #: Paths or distances that differ by less count as the same.
 SAME_PATH_M: Final = 0.01
@@ -119,8 +121,11 @@ def arms_section(results: Results) -> Section:
             "Time lost, s": METRICS["time_lost_s"].meaning,
             "Negative margin, s": METRICS["violation_time_s"].meaning,
             "Least margin, m": "the worst episode",
-            "Step-out impacts, unaware": METRICS["step_out_unaware"].meaning,
-            "Worst, m/s": METRICS["step_out_worst_mps"].meaning,
+            **{
+                METRICS[name].title: METRICS[name].meaning
+                for group in _IMPACTS
+                for name in (f"step_out_{group}", f"step_out_{group}_worst_mps")
+            },
         },
         [_arm_row(arm) for arm in results.arms],
         caption="Means and shares with 95 % intervals. Step-out impacts: per 1 000 crossings, an "
@@ -135,7 +140,8 @@ def arms_section(results: Results) -> Section:
             interval_cell(against.won_back, 0, 100.0),
             interval_cell(against.time_lost_s, 1),
             interval_cell(against.violation_excess, 0, 100.0),
-            interval_cell(against.step_out_unaware, 1),
+            interval_cell(against.step_out_never, 1),
+            interval_cell(against.step_out_all, 1),
             interval_cell(against.min_separation_m),
         ]
         for arm in results.arms
@@ -149,7 +155,7 @@ def arms_section(results: Results) -> Section:
         "Time won back, %": "Σ (time lost by blind − by the arm) / Σ time lost by blind",
         "Time lost, s": "mean difference; less is faster",
         "Negative margins, %": "Σ (time of the arm − of blind) / Σ of blind",
-        "Step-out impacts": "mean difference, unaware people, per 1 000 crossings",
+        **{METRICS[f"step_out_{group}"].title: "mean difference" for group in _IMPACTS},
         "Separation, m": "mean difference of the smallest separation",
     }
     paired = Table(columns, differences, 2, "Differences to blind with the same planner and seeds.")
@@ -166,8 +172,14 @@ def _arm_row(arm: Arm) -> Row:
         interval_cell(row.means["time_lost_s"], 1),
         interval_cell(row.means["violation_time_s"]),
         _worst(row, "min_margin_m"),
-        interval_cell(row.means["step_out_unaware"], 1),
-        _worst(row, "step_out_worst_mps"),
+        *(
+            cell
+            for group in _IMPACTS
+            for cell in (
+                interval_cell(row.means[f"step_out_{group}"], 1),
+                _worst(row, f"step_out_{group}_worst_mps"),
+            )
+        ),
     ]
 
 

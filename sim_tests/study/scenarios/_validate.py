@@ -112,8 +112,8 @@ class PersonAttention:
     Attributes:
         name: name of the person.
         could_look_s: seconds with the robot in front, in sight and within 5 m.
-        aware_share: share of these with a true α ≥ 0.5.
-        looked_share: share of these with a gaze straight at the robot, α ≥ 0.9.
+        aware_share: share of these in which they looked at it, or had within 1 s.
+        looked_share: share of these in which they looked at it.
     """
 
     name: str
@@ -142,7 +142,7 @@ class AttentionCheck:
         """One sentence for each person who contradicts the label."""
         if self.label == "attentive":
             return tuple(
-                f"attention: attentive, but {each.name} was aware of the robot (α ≥ 0.5) for "
+                f"attention: attentive, but {each.name} had looked at the robot within 1 s for "
                 f"{each.aware_share:.0%} of {each.could_look_s:.1f} s; attentive people are for at "
                 f"least {ATTENTIVE_FROM:.0%}"
                 for each in self.people
@@ -150,7 +150,7 @@ class AttentionCheck:
             )
         if self.label == "unaware":
             return tuple(
-                f"attention: unaware, but {each.name} looked straight at the robot (α ≥ 0.9) for "
+                f"attention: unaware, but {each.name} looked at the robot for "
                 f"{each.looked_share:.0%} of {each.could_look_s:.1f} s; unaware people do for at "
                 f"most {UNAWARE_UP_TO:.0%}"
                 for each in self.people
@@ -168,8 +168,8 @@ class AttentionCheck:
                 f"{ATTENTION_WITHIN_M:g} m: the attention could not be measured",
             )
         shares = "; ".join(
-            f"{each.name} aware (α ≥ 0.5) for {each.aware_share:.0%}, looking straight at it for "
-            f"{each.looked_share:.0%} of {each.could_look_s:.1f} s"
+            f"{each.name} looking at it for {each.looked_share:.0%}, or within 1 s for "
+            f"{each.aware_share:.0%} of {each.could_look_s:.1f} s"
             for each in self.people
         )
         found = [
@@ -181,13 +181,6 @@ class AttentionCheck:
                 found.append("everybody watches the robot: its attention could be attentive")
             elif max(each.aware_share for each in self.people) <= _NEVER:
                 found.append("nobody is aware of the robot: its attention could be unaware")
-        if self.label == "unaware":
-            found += [
-                f"{each.name} does not watch the robot, but has it in the attention cone for "
-                f"{each.aware_share:.0%} of the time: it may take them for aware"
-                for each in self.people
-                if each.looked_share <= UNAWARE_UP_TO < each.aware_share
-            ]
         return tuple(found)
 
 

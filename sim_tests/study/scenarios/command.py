@@ -98,8 +98,8 @@ def validate(files: tuple[str, ...], *, episodes: int) -> int:
     """Check scenario files: keys, values over many draws, and that nobody stands in a rack.
 
     Runs a few crossings with perfect perception and checks `attention` against what people look
-    at while the robot is in front of them within 5 m: `attentive` people are aware of it (α ≥ 0.5)
-    for at least 80 % of that time, `unaware` people look straight at it (α ≥ 0.9) for at most 25 %.
+    at while the robot is in front of them within 5 m: `attentive` people have looked at it within
+    1 s for at least 80 % of that time, `unaware` people look at it for at most 25 %.
     Also warns if robot and people would hardly ever meet if nobody reacted.
     """
     from ._validate import validate_command  # noqa: PLC0415 - help needs no scenarios

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from sim_tests import SimError
 from sim_tests.actors.behaviour import (
@@ -17,6 +20,7 @@ from sim_tests.actors.behaviour import (
     Surroundings,
 )
 from sim_tests.actors.behaviour._gaze import Gaze, LogNormalDuration
+from sim_tests.actors.behaviour._habits import CLASSIC, RECORDED
 
 
 def robot_at(x: float, y: float, height_m: float = 1.4) -> RobotBody:
@@ -131,3 +135,48 @@ def test_a_planned_gaze_turns_through_the_front_and_no_farther_than_a_head():
     yaw = np.degrees([each.head_yaw_rad for each in planned(keys, robot_at(3.0, 0.0), 4.0)])
     assert (yaw[0], yaw[-1]) == pytest.approx((80.0, -80.0), abs=0.1)
     assert np.diff(yaw).max() <= 1e-9
+
+
+# Whole numbers: none lies on the edge of the field of view.
+angles_deg = st.integers(-180, 180)
+glances = st.builds(
+    Glances,
+    notices_within_m=st.sampled_from([0.0, 12.0]),
+    watches=st.booleans(),
+    away_yaw_deg=st.integers(-80, 80),
+    away_pitch_deg=st.integers(-40, 40),
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(glances, angles_deg, st.integers(-3, 3), st.sampled_from([CLASSIC, RECORDED]), angles_deg)
+def test_a_look_is_a_glance_that_has_met_the_robot_in_any_world(
+    glances, heading_deg, y_m, habits, turned_deg
+):
+    """Whoever never notices the robot never looks, whatever way head and body face."""
+
+    def looks(turn_deg: float) -> list[float]:
+        turn = math.radians(turn_deg)
+        spec = PersonSpec(
+            name="p",
+            route=({"x_m": 0.0, "y_m": 0.0},),
+            heading_deg=math.degrees(math.radians(heading_deg + 0.37) + turn),
+            glances=glances,
+        )
+        person = Person(spec, np.random.default_rng(0), np.zeros((0, 4)), habits=habits)
+        since_s = []
+        for tick in range(80):
+            x, y = 4.03 - 0.1 * tick, y_m + 0.52
+            x, y = math.cos(turn) * x - math.sin(turn) * y, math.sin(turn) * x + math.cos(turn) * y
+            robot = replace(robot_at(x, y), heading_rad=turn)
+            person.step(0.05 * tick, Surroundings(robot, (), lambda: True))
+            since_s.append(person.since_look_s)
+            noticed = person.noticed_s is not None
+            assert noticed == math.isfinite(since_s[-1])
+        return since_s
+
+    here = looks(0.0)
+    if habits is CLASSIC:  # recorded people sway and set off by chance along the axes
+        assert looks(turned_deg) == pytest.approx(here)
+    if glances.notices_within_m == 0.0:
+        assert set(here) == {math.inf}

@@ -160,7 +160,7 @@ def test_a_robot_that_turns_on_the_spot_strikes_with_its_corner() -> None:
     first = result.contacts[0]
     # A point of a body that turns at 1.5 rad/s has a speed of at most 1.5 R.
     assert 0.3 < first.robot_speed_mps <= 1.5 * result.robot.circumscribed_radius_m + 0.01
-    assert row.min_margin_m < 0.0 < row.step_out_unaware
+    assert row.min_margin_m < 0.0 < row.step_out_never
     assert row.violation_time_s > 0.0
     assert 0.3 < row.max_speed_within_2m_mps <= 0.67
     assert row.stops == 0
@@ -217,4 +217,30 @@ def test_people_who_are_away_change_no_row(tmp_path) -> None:
         measure(run_crossing(each, policy="balanced")) for each in (late, scene(duration_s=14.0))
     )
     assert found == alone
-    assert found.min_separation_m is found.step_out_unaware is None
+    assert found.min_separation_m is found.step_out_never is None
+
+
+@pytest.mark.parametrize("perception", ["truth", "scanner"])
+def test_somebody_with_a_phone_is_touched_before_they_notice_whatever_the_cone_says(
+    perception: str,
+) -> None:
+    """They never look by themselves; the cone has them aware as the robot drives before them."""
+    result = run_crossing(
+        "steps_out_near",
+        policy="scanner",
+        perception=perception,
+        seed=3001,
+        population="answers=0,startles=0",
+    )
+    row = measure(result)
+    assert max(view.awareness for frame in result.frames for view in frame.truth) > 0.5
+    assert row.moving_contacts == row.moving_contacts_never == 1
+    assert row.moving_contact_never_mps == row.moving_contact_mps > 0.25
+    assert row.moving_contacts_past == row.moving_contacts_looking == 0
+    before = result.contacts[0].t_s
+    assert all(
+        math.isinf(view.since_look_s)
+        for frame in result.frames
+        if frame.t_s < before
+        for view in frame.truth
+    )

@@ -23,7 +23,7 @@ from sim_tests.demo._lanes import (
 )
 from sim_tests.scenario import ScenarioTemplate
 
-ROW = LaneRow(0, "awarenav", 12.0, 2.0, None, False, 0.80, 0.10, 0.90, 1.40, 0.0)
+ROW = LaneRow(0, "awarenav", 12.0, 2.0, None, False, 0.80, 0.10, 0.90, 1.40, None, None)
 
 
 def of_seeds(lost_s: list[float]) -> list[LaneRow]:
@@ -76,6 +76,12 @@ def test_the_table_fits_80_columns_and_shows_medians_and_counts() -> None:
         *("–", "21.0", "–", "0", "0.80", "0.10", "0.90", "–")
     ]
     assert lanes_table([late]).splitlines()[-1].split()[1:4] == ["–", "40.0", "–"]
+
+
+def test_the_table_ends_with_impacts_never_noticed_and_of_all_people() -> None:
+    rows = [replace(ROW, seed=seed, step_out_never=1.0, step_out_all=3.0 + seed) for seed in (0, 1)]
+    assert lanes_table(rows).splitlines()[-1].split() == ["awarenav", "1.0;", "3.5"]
+    assert "impacts" not in lanes_table([*rows, ROW])
 
 
 @pytest.mark.slow

@@ -124,7 +124,7 @@ def test_a_tuning_writes_policies_above_the_floor_and_goes_on_on_request_only(
     first, printed = results(out), capsys.readouterr().out
     for name in (*PRESETS, "scanner", "least_time_lost", "step-out"):
         assert name in printed
-    assert "At most 0.50 step-out impacts with unaware people per 1 000 crossings" in printed
+    assert "At most 0.50 step-out impacts with people who do not look, per 1 000" in printed
     assert "\nVerdict: keep balanced. " in printed
     assert "\nNext: awarenav tune --policy balanced " in printed
     chosen = json.loads(first["chosen.json"])
@@ -216,23 +216,23 @@ def record(policy="p", **values) -> EpisodeRecord:
 
 
 def touched(speed_mps):
-    """The figures of a contact with a moving robot of a person who had not looked."""
+    """The figures of a contact with a moving robot of a person who had never noticed it."""
     return {
-        **dict.fromkeys(("moving_contacts", "moving_contacts_unaware"), 1),
-        **dict.fromkeys(("moving_contact_mps", "moving_contact_unaware_mps"), speed_mps),
+        **dict.fromkeys(("moving_contacts", "moving_contacts_never"), 1),
+        **dict.fromkeys(("moving_contact_mps", "moving_contact_never_mps"), speed_mps),
     }
 
 
 def test_worse_episodes_have_lower_scores():
     aware = {"robot_contacts": 1, "moving_contacts": 1, "moving_contact_mps": 1.4}
     ordered = [
-        record(**touched(1.2), min_margin_unaware_m=0.3),
-        record(**touched(0.1), min_margin_unaware_m=-2.0),
-        record(min_margin_unaware_m=-12.0),
+        record(**touched(1.2), min_margin_never_m=0.3),
+        record(**touched(0.1), min_margin_never_m=-2.0),
+        record(min_margin_never_m=-12.0),
         # Somebody who had looked was touched: the margin counts.
-        record(min_margin_unaware_m=-1.0, **aware),
-        record(min_margin_unaware_m=-0.5, person_contacts=1),
-        record(min_margin_unaware_m=0.5),
+        record(min_margin_never_m=-1.0, **aware),
+        record(min_margin_never_m=-0.5, person_contacts=1),
+        record(min_margin_never_m=0.5),
         record(),
     ]
     scores = [score(each) for each in ordered]
@@ -325,36 +325,37 @@ def cases(*records: EpisodeRecord) -> list[WorstCase]:
 def test_a_falsified_policy_is_compared_in_the_same_situations():
     mine = [(-1.2, 1), (-0.4, 0), (-0.1, 0)]
     others = {
-        f"worst_00{row}.yaml": record("balanced", min_margin_unaware_m=margin_m)
+        f"worst_00{row}.yaml": record("balanced", min_margin_never_m=margin_m)
         for row, margin_m in enumerate((-0.3, -0.5, -0.1), start=1)
     }
-    found = cases(*(record(min_margin_unaware_m=m, moving_contacts=n) for m, n in mine))
+    found = cases(*(record(min_margin_never_m=m, moving_contacts=n) for m, n in mine))
     text = verdict_text(falsified(-10.4, -0.4, 0.2), found, others)
     assert text.startswith(
-        "mine is not safe enough: the moving robot and a person who had not looked touched in 1 of "
-        "3 episodes, at up to 0.40 m/s. Nobody who had looked was touched by the moving robot "
+        "mine is not safe enough: the moving robot and a person who had never noticed it touched "
+        "in 1 of 3 episodes, at up to 0.40 m/s. Nobody who had noticed it was touched by the "
     )
     assert "balanced touches a person while it moves in 0 (mine in 1)" in text
     assert "keeps more margin in 1 and less in 1" in text
     assert "falls to -0.50 m at worst (mine to -1.20 m)" in text
     quiet = verdict_text(falsified(-0.4, 0.2), [], {})
-    assert quiet.startswith("no contact of the moving robot and a person who had not looked with")
+    assert quiet.startswith("no contact of the moving robot and a person who had never noticed")
     failed = {"worst_001.yaml": record("balanced", error="died")}
     assert "balanced" not in verdict_text(falsified(-0.4), found[:1], failed)
 
 
-def test_contacts_with_people_who_had_looked_are_told_apart():
-    names = ("moving_contacts", "moving_contacts_unaware", "moving_contact_mps")
-    rows = [(1, 0, 0.9), (0, 0, None), (2, 1, 1.1), (1, 1, 0.2)]
+def test_contacts_with_people_who_had_noticed_are_told_apart():
+    names = [f"moving_contact_{each}_mps" for each in ("never", "past", "looking")]
+    rows = [(None, 0.9, None), (None, None, None), (0.7, 1.1, 0.3), (0.2, None, None)]
     notes = [dict(zip(names, row, strict=True)) for row in rows]
     found = falsified(-0.4, -0.3, -10.7, 0.2, notes=notes)
-    assert (found.contacts, found.aware_speeds_mps) == (1, [0.9, 1.1])
-    assert found.contact_mps == pytest.approx(0.7)
+    assert (found.contacts, found.contact_mps) == (1, pytest.approx(0.7))
+    assert found.other_speeds_mps == {"past": [0.9, 1.1], "looking": [0.3]}
     text = verdict_text(found, [], {})
     assert "touched in 1 of 4 episodes, at up to 0.70 m/s." in text
-    assert "who had looked within 1 s in 2 (50.0 %), at up to 1.10 m/s" in text
+    assert "was more than 1 s ago in 2 (50.0 %), at up to 1.10 m/s" in text
+    assert "have within 1 s in 1 (25.0 %), at up to 0.30 m/s" in text
     assert "--policy scanner" in text
-    # Nobody who had not looked was touched, and the search found no case against it.
+    # All who were touched had noticed the robot, and the search found no case against it.
     only_aware = verdict_text(replace(found, episodes=found.episodes[:2]), [], {})
     assert only_aware.startswith("no contact of the moving robot and a person")
 

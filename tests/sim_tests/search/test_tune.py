@@ -136,7 +136,7 @@ def evaluation(time_s=5.0, risk=0.0, *, tasks=TASKS, contacts=0, spread=0.3, nam
             EpisodeRecord(
                 *(scenario, seed, name, "q", "truth"),
                 time_lost_s=time_s + 2.0 * chance + spread * own,
-                step_out_unaware=risk,
+                step_out_not_looking=risk,
                 moving_contacts=int(row < contacts),
                 requests=requests,
             )
@@ -147,9 +147,9 @@ def evaluation(time_s=5.0, risk=0.0, *, tasks=TASKS, contacts=0, spread=0.3, nam
 def test_an_evaluation_counts_contacts_and_errors_and_means():
     walked_into = {"contact": True, "contact_by": "person", "moving_contacts": 1}
     rows = [
-        (2, {"time_lost_s": 3.0, "step_out_unaware": 0.5, "person_contacts": 1, **walked_into}),
+        (2, {"time_lost_s": 3.0, "step_out_not_looking": 0.5, "person_contacts": 1, **walked_into}),
         (0, {"error": "no"}),
-        (1, {"time_lost_s": 1.0, "step_out_unaware": 0.0, "time_to_goal_s": 9.0}),
+        (1, {"time_lost_s": 1.0, "step_out_not_looking": 0.0, "time_to_goal_s": 9.0}),
     ]
     records = [EpisodeRecord("s", seed, "p", "q", "truth", **values) for seed, values in rows]
     found = Evaluation.of(records)

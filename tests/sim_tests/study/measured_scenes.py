@@ -50,6 +50,7 @@ def crossing(
     walks=(),
     *,
     awareness=None,
+    looks=None,
     tracked=None,
     contacts=(),
     reached=True,
@@ -62,10 +63,10 @@ def crossing(
 
     ``robot(t)`` gives x, y, heading, forward speed, and perhaps the speed to the left and the yaw
     rate; each of ``walks``, of t, gives x, y, vx, vy, or None while away; ``awareness(t, person)``
-    the truth, ``tracked(t, person)`` α and lower bound or None; ``constraints(t)`` fields of the
-    constraints.
+    the true α, ``looks(t, person)`` whether they look at the robot, ``tracked(t, person)`` α and
+    lower bound or None; ``constraints(t)`` fields of the constraints.
     """
-    frames = []
+    frames, looked_s = [], {}
     for t in np.asarray(times).tolist():
         x, y, heading, *velocity = robot(t)
         speed, yaw_rate = velocity[0], velocity.pop() if len(velocity) == 3 else 0.0
@@ -82,6 +83,8 @@ def crossing(
         for index, person in enumerate(walks):
             away = (now := person(t)) is None
             px, py, vx, vy = FAR if away else now
+            if looks is not None and not away and looks(t, index):
+                looked_s[index] = t
             true = 0.0 if awareness is None or away else awareness(t, index)
             views.append(
                 TrueView(
@@ -92,6 +95,7 @@ def crossing(
                     np.array([vx, vy]),
                     not away,
                     away,
+                    t - looked_s.get(index, -math.inf),
                 )
             )
             said = None if tracked is None or away else tracked(t, index)
@@ -185,4 +189,5 @@ def trace(times, robot, people):
         awareness=nothing,
         separation_m=nothing,
         could_look=nothing > 0.0,
+        since_look_s=nothing + np.inf,
     )

@@ -38,7 +38,8 @@ def rows(policies, *, seeds=6, spread=0.0, free_s=10.0, attentive_s=0.0):
                         time_without_people_s=free_s,
                         time_to_goal_s=free_s + own_s,
                         time_lost_s=own_s,
-                        step_out_unaware=impacts,
+                        step_out_all=impacts,
+                        step_out_never=0.5 * impacts,
                     )
                 )
     return found
@@ -208,7 +209,7 @@ def test_the_family_runs_in_two_scenarios_and_a_resumed_run_only_draws(tmp_path,
     # Whoever assumes faster people loses more time and leaves less to luck.
     slow, fast = points["blind_u0"], points["blind_u1.5"]
     assert slow.time_lost_s.value < fast.time_lost_s.value
-    assert slow.step_out_unaware.value > fast.step_out_unaware.value
+    assert slow.impacts.value > fast.impacts.value
     for member in family(memory=False):
         path = tmp_path / "out" / "policies" / f"{member.name}.yaml"
         assert AwarenessPolicy.from_yaml(path) == member.policy()

@@ -79,32 +79,39 @@ def test_contacts_are_split_and_a_contact_is_no_separation():
     assert walked_into.moving_contact_mps is None
 
 
-def test_contacts_with_people_who_have_not_looked_for_a_second_are_counted_apart():
-    """The person looks from 2 s to 3 s."""
-
-    def looks(t, person):
-        return 0.9 if 2.0 <= t <= 3.0 else 0.1
-
-    def always(t, person):
-        return 0.9
+def test_contacts_and_margins_are_counted_by_what_people_have_noticed():
+    """The person looks from 2 s to 3 s, and faces the robot all the time."""
 
     def record(*touches):
-        people = [walking((20.0, 0.0), (0.0, 0.0))]
-        return measure(crossing(T_S, straight(1.0), people, awareness=looks, contacts=touches))
+        result = crossing(
+            T_S,
+            straight(1.0),
+            [walking((20.0, 0.0), (0.0, 0.0))],
+            awareness=lambda t, person: 0.9,
+            looks=lambda t, person: 2.0 <= t <= 3.0,
+            contacts=touches,
+        )
+        return measure(result)
+
+    def counts(record):
+        return tuple(
+            (
+                getattr(record, f"moving_contacts_{each}"),
+                getattr(record, f"moving_contact_{each}_mps"),
+            )
+            for each in ("never", "past", "looking")
+        )
 
     before, looking = contact(1.0, 0, "person", 0.9), contact(2.5, 0, "robot", 1.2)
     shortly, later = contact(4.0, 0, "robot", 0.7), contact(4.2, 0, "robot", 0.3)
     found = record(before, looking, shortly, later)
-    assert (found.moving_contacts, found.moving_contacts_unaware) == (4, 2)
-    assert (found.moving_contact_mps, found.moving_contact_unaware_mps) == (1.2, 0.9)
-    assert record(looking, shortly).moving_contacts_unaware == 0
-    assert record(looking, shortly).moving_contact_unaware_mps is None
-    # The robot comes nearer all the time, to somebody who is unaware again at the end.
-    assert found.min_margin_unaware_m == record().min_margin_m < record().min_separation_m
-    aware = crossing(T_S, straight(1.0), [walking((20.0, 0.0), (0.0, 0.0))], awareness=always)
-    assert measure(aware).min_margin_unaware_m is None
+    assert (found.moving_contacts, found.moving_contact_mps) == (4, 1.2)
+    assert counts(found) == ((1.0, 0.9), (1.0, 0.3), (2.0, 1.2))
+    # The robot comes nearer all the time.
+    assert found.min_margin_past_m == found.min_margin_m < found.min_margin_looking_m
+    assert found.min_margin_looking_m < found.min_margin_never_m
     # A standing robot has stopped for everybody.
-    assert record(contact(1.0, 0, "person", 0.02)).moving_contacts_unaware == 0
+    assert counts(record(contact(1.0, 0, "person", 0.02))) == ((0.0, None),) * 3
 
 
 def test_warnings_are_counted_as_they_are_asked_for():
@@ -177,29 +184,29 @@ def test_tracks_go_to_people_within_a_metre_by_the_least_sum():
 
 
 @pytest.mark.parametrize(
-    ("true", "lower", "expected"),
+    ("looking", "lower", "expected"),
     [
-        (0.8, 0.6, "aware"),
-        (0.8, 0.3, "missed_aware"),
-        (0.8, math.nan, "missed_aware"),
-        (0.2, 0.6, "falsely_aware"),
-        (0.2, 0.1, "unaware"),
-        (0.2, math.nan, "unaware"),
-        (0.5, 0.5, "aware"),
+        (True, 0.6, "aware"),
+        (True, 0.3, "missed_aware"),
+        (True, math.nan, "missed_aware"),
+        (False, 0.6, "falsely_aware"),
+        (False, 0.1, "unaware"),
+        (False, math.nan, "unaware"),
+        (True, 0.5, "aware"),
     ],
 )
-def test_four_classes_of_awareness(true, lower, expected):
-    full = np.full(len(T_S), 1.0)
-    assert awareness_class(T_S, true * full, lower * full, 100) == expected
+def test_four_classes_of_awareness(looking, lower, expected):
+    looks, lowers = np.full(len(T_S), looking), np.full(len(T_S), lower)
+    assert awareness_class(T_S, looks, lowers, 100) == expected
 
 
 def test_only_the_last_three_seconds_count_and_half_of_them_suffices():
     row = 120  # t = 6 s: the window has 61 instants from 3 s on
-    true = np.where(T_S > 4.5 - 1e-9, 1.0, 0.0)  # 31 of them
-    assert awareness_class(T_S, true, np.zeros(len(T_S)), row) == "missed_aware"
-    later = np.where(T_S > 4.55 - 1e-9, 1.0, 0.0)  # 30 of them
+    looks = T_S > 4.5 - 1e-9  # 31 of them
+    assert awareness_class(T_S, looks, np.zeros(len(T_S)), row) == "missed_aware"
+    later = T_S > 4.55 - 1e-9  # 30 of them
     assert awareness_class(T_S, later, np.zeros(len(T_S)), row) == "unaware"
-    before = np.where(T_S < 3.0 - 1e-9, 1.0, 0.0)
+    before = T_S < 3.0 - 1e-9
     assert awareness_class(T_S, before, before, row) == "unaware"
     assert awareness_class(T_S, before, before, 20) == "aware"  # all there is
 

@@ -51,15 +51,15 @@ def measured(asked, *, looks=(), tracks=None, limits=(), answers=(), people=(AHE
             "answers": tuple(Answer(ident, 0.5) for at, ident in answers if at == t),
         }
 
-    def awareness(t, person):
-        return 0.9 if any(a <= t <= b and person == who for a, b, who in looks) else 0.0
+    def looking(t, person):
+        return any(a <= t <= b and person == who for a, b, who in looks)
 
     found = measure(
         crossing(
             T_S[until >= T_S],
             straight(0.4),
             [walking(place, (0.0, 0.0)) for place in people],
-            awareness=awareness,
+            looks=looking,
             constraints=constraints,
         )
     )

@@ -114,7 +114,7 @@ def test_no_measure_depends_on_the_way_in_which_a_square_robot_faces():
     assert obeys.limit_excess_mps == pytest.approx(obeys_aside.limit_excess_mps, abs=1e-9)
     assert facing.min_margin_m is not None
     assert facing.min_time_to_collision_s is not None
-    assert facing.step_out_unaware > 0.0
+    assert facing.step_out_never > 0.0
     for name in facing.__dataclass_fields__:
         mine, yours = getattr(facing, name), getattr(aside, name)
         assert mine == (pytest.approx(yours, abs=3e-6) if isinstance(mine, float) else yours), name

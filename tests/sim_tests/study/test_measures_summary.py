@@ -36,13 +36,12 @@ def episode(scenario, seed, policy, **values):
         "duration_s": 10.0 + lost,
         "attention": ATTENTION[scenario],
         "awareness": "aware" if ATTENTION[scenario] == "attentive" else "unaware",
-        "step_out_unaware": 10.0 * lost,
-        "step_out_unaware_fast": 5.0 * lost,
-        "step_out_aware": 100.0,
-        "step_out_aware_fast": 50.0,
-        "step_out_worst_mps": 0.1 * lost,
-        "step_out_stress_unaware": 20.0 * lost,
-        "step_out_stress_worst_mps": 0.2 * lost,
+        "step_out_never": 10.0 * lost,
+        "step_out_never_fast": 5.0 * lost,
+        "step_out_never_worst_mps": 0.1 * lost,
+        "step_out_looking": 100.0,
+        "step_out_all": 100.0 + 10.0 * lost,
+        "step_out_stress_never": 20.0 * lost,
         "attentive_share": 0.9 if ATTENTION[scenario] == "attentive" else 0.0,
         **values,
     }
@@ -85,7 +84,7 @@ def test_every_policy_is_compared_with_the_baseline():
     assert (every.baseline, every.pairs) == ("blind", 10)
     assert every.won_back.value == pytest.approx(3.0 / 6.2)
     assert every.time_lost_s.value == pytest.approx(-3.0)
-    assert every.step_out_unaware.value == pytest.approx(-30.0)
+    assert every.step_out_never.value == pytest.approx(-30.0)
     assert only(summary.comparisons, variant="oracle", part="attentive").pairs == 5
     assert only(summary.scenario_comparisons, variant="oracle", part="late_glance").pairs == 5
     other = summarise(RECORDS, baseline="balanced")

@@ -57,7 +57,7 @@ def row(robot, walks, world=(0.0, 0.0, 0.0, False), away=0):
         T_S,
         drives,
         [*moved, *[lambda t: None] * away],
-        awareness=lambda t, person: 0.9 if 0.5 * person < t % 2.0 < 1.0 else 0.2,
+        looks=lambda t, person: 0.5 * person < t % 2.0 < 1.0,
         tracked=lambda t, person: (0.6, 0.5),
         contacts=contacts,
     )
@@ -92,5 +92,5 @@ def test_somebody_who_leaves_counts_while_there() -> None:
     left, stayed = (measure(crossing(T_S, straight(0.5), [person])) for person in (leaves, stays))
     assert left.min_separation_m == pytest.approx(2.0 - 0.5 * 0.95 - 0.3625 - 0.3)
     assert stayed.min_separation_m < left.min_separation_m
-    assert 0.0 < left.step_out_unaware < stayed.step_out_unaware
+    assert 0.0 < left.step_out_never < stayed.step_out_never
     assert left.personal_s < stayed.personal_s
