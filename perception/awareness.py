@@ -20,11 +20,12 @@ _Vector = Sequence[float]
 
 #: Half of θ_FOV = 120°, the horizontal field of view that head orientation alone supports.
 DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)
-#: How far the robot may lie above the head's axis: α falls from the first angle on and is 0 at the
+#: How far the head may be lowered below the robot: α falls from the first angle on and is 0 at the
 #: second. Eyes like to look down in the head, by 29° with a deviation of 12° (Kroemer and Hill
 #: 1986, doi:10.1080/00140138608967228), so they are hardly raised by more than the first. Heads are
 #: lowered by 31° to read a phone while walking and by 39° to write, and by −1° without one (Han and
-#: Shin 2019, doi:10.1016/j.apergo.2019.102884); a robot 3 m away is then raised by 13° to 21°.
+#: Shin 2019, doi:10.1016/j.apergo.2019.102884); the line to a robot 3 m away falls by about
+#: 15°.
 DEFAULT_RAISED_RAD: Final = (math.radians(8.0), math.radians(22.0))
 
 
@@ -36,10 +37,10 @@ class AttentionCone:
     d is the distance along the gaze and d⊥ the distance from its axis. The paper gives the cone's
     radius as d · tan θ_FOV but calls θ_FOV/2 its half-angle; here one half-angle replaces both.
 
-    With ``up`` the score is lower for a head that is lowered: it is multiplied by 1 where the
-    target lies up to ``raised_rad[0]`` above the plane through gaze and ears, by 0 from
-    ``raised_rad[1]`` on, and by a straight line between. Whoever reads or works with a lowered head
-    looks at something nearer than the target.
+    With ``up`` the score is lower for a head that is lowered. It is multiplied by 1 if the head
+    would have to rise (about the ears) by up to ``raised_rad[0]`` until the target is neither above
+    nor below it, by 0 from ``raised_rad[1]`` on, and by a straight line between. Whoever reads or
+    works with a lowered head looks at something nearer than the target.
 
     Attributes:
         half_angle_rad: half-angle of the cone, in (0, π/2).
@@ -131,8 +132,7 @@ class AttentionCone:
         scores = np.where(inside, 1.0 - ratio, 0.0)
         if up is not None and self.raised_rad is not None:
             above = _dot(offset, _unit("up", up - _dot(up, unit)[..., None] * unit))
-            distance = np.maximum(np.hypot(axial, perpendicular), 1e-12)
-            scores = scores * self.shares(above / distance)
+            scores = scores * self.shares(axial, above)
         return np.asarray(scores, dtype=np.float64)
 
     def score_of(
@@ -161,18 +161,16 @@ class AttentionCone:
         length = math.sqrt(ux * ux + uz * uz + uy * uy)
         if not length > 0.0:
             raise PerceptionError("up must have a direction off the gaze, got none")
-        above = (x * ux + z * uz + y * uy) / (length * math.hypot(axial, perpendicular))
         first, second = self.raised_rad
-        raised = math.asin(min(1.0, max(-1.0, above)))
+        raised = math.atan2((x * ux + z * uz + y * uy) / length, axial)
         return score * min(1.0, max(0.0, (second - raised) / (second - first)))
 
-    def shares(self, sines: FloatArray) -> FloatArray:
-        """Return what is left of α where the target's elevation above the gaze has these sines."""
+    def shares(self, ahead: FloatArray, above: FloatArray) -> FloatArray:
+        """Return what a lowered head leaves of α for a target so far ahead and above the gaze."""
         if self.raised_rad is None:
-            return np.ones_like(sines)
+            return np.ones_like(above)
         first, second = self.raised_rad
-        raised = np.arcsin(np.minimum(np.maximum(sines, -1.0), 1.0))
-        share = (second - raised) / (second - first)
+        share = (second - np.arctan2(above, ahead)) / (second - first)
         return np.asarray(np.minimum(np.maximum(share, 0.0), 1.0))
 
 
@@ -274,12 +272,12 @@ def estimate_awareness(
 
 
 def cone_scores(cone: AttentionCone, cosines: FloatArray, sines: FloatArray) -> FloatArray:
-    """Return α from cosines of the angles off the gaze and sines of the elevations above it."""
+    """Return α of unit vectors to the robot, whose parts along gaze and up are given."""
     edge = math.cos(cone.half_angle_rad)
     inside = np.minimum(np.maximum(cosines, edge), 1.0)
     tangent = np.sqrt(1.0 - inside * inside) / inside
     scores = np.maximum(1.0 - tangent / math.tan(cone.half_angle_rad), 0.0)
-    return np.asarray(scores * cone.shares(sines))
+    return np.asarray(scores * cone.shares(cosines, sines))
 
 
 class _LinesOfSight:
@@ -310,7 +308,7 @@ class _LinesOfSight:
         #: (N, M) cosines of the angles between gazes and lines of sight
         self.cosines = (sight @ gaze[:, :, None])[..., 0]
         up = -self._rotation[:, :, :1]
-        #: (N, M) sines of the elevations of the lines of sight above the gazes
+        #: (N, M) components of the lines of sight along the heads' up direction
         self.sines = (sight @ up)[..., 0]
         rows, best = np.arange(len(heads)), self.cosines.argmax(axis=1)
         self._distance = np.maximum(distance[rows, best], _MIN_DISTANCE_M)
