@@ -68,6 +68,7 @@ class PersonKeypoints:
             found none then.
         scale_relative_std: relative standard deviation of the size of the whole skeleton from the
             estimator's noise, beyond the spread of statures and limbs of adults.
+        eyes_open: False if lids cover the irises: the eyes blink or look down.
     """
 
     keypoints_px: FloatArray
@@ -77,6 +78,7 @@ class PersonKeypoints:
     lifted: bool = True
     face_evidence: bool = True
     scale_relative_std: float = 0.0
+    eyes_open: bool = True
 
     def __post_init__(self) -> None:
         count = keypoint_count(self.layout)
@@ -95,6 +97,7 @@ class PersonKeypoints:
             scale_relative_std=finite_number(
                 "scale_relative_std", self.scale_relative_std, minimum=0.0
             ),
+            eyes_open=bool(self.eyes_open),
         )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ._stages import HeadPose
 from .anthropometry import EYES_HEAD_M
-from .arrays import FloatArray, finite_number, set_fields
+from .arrays import FloatArray, finite_array, finite_number, set_fields
 from .errors import PerceptionError
 from .eyes import EyeGaze
 
@@ -20,6 +20,13 @@ _Vector = Sequence[float]
 
 #: Half of θ_FOV = 120°, the horizontal field of view that head orientation alone supports.
 DEFAULT_HALF_ANGLE_RAD: Final = math.radians(60.0)
+#: How far the head may be lowered below the robot: α falls from the first angle on and is 0 at the
+#: second. Eyes like to look down in the head, by 29° with a deviation of 12° (Kroemer and Hill
+#: 1986, doi:10.1080/00140138608967228), so they are hardly raised by more than the first. Heads are
+#: lowered by 31° to read a phone while walking and by 39° to write, and by −1° without one (Han and
+#: Shin 2019, doi:10.1016/j.apergo.2019.102884); the line to a robot 3 m away falls by about
+#: 15°.
+DEFAULT_RAISED_RAD: Final = (math.radians(8.0), math.radians(22.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,11 +37,23 @@ class AttentionCone:
     d is the distance along the gaze and d⊥ the distance from its axis. The paper gives the cone's
     radius as d · tan θ_FOV but calls θ_FOV/2 its half-angle; here one half-angle replaces both.
 
+    With ``up`` the score is lower for a head that is lowered. It is multiplied by 1 if the head
+    would have to rise (about the ears) by up to ``raised_rad[0]`` until the target is neither above
+    nor below it, by 0 from ``raised_rad[1]`` on, and by a straight line between. Whoever reads or
+    works with a lowered head looks at something nearer than the target.
+
     Attributes:
         half_angle_rad: half-angle of the cone, in (0, π/2).
+        raised_rad: the two angles, 0 ≤ first < second ≤ π/2; None for the printed cone.
     """
 
     half_angle_rad: float = DEFAULT_HALF_ANGLE_RAD
+    raised_rad: tuple[float, float] | None = DEFAULT_RAISED_RAD
+
+    @classmethod
+    def printed(cls, half_angle_rad: float = DEFAULT_HALF_ANGLE_RAD) -> AttentionCone:
+        """Return the cone as the paper prints it, in which up and down count as left and right."""
+        return cls(half_angle_rad, None)
 
     def __post_init__(self) -> None:
         angle = finite_number(
@@ -42,9 +61,19 @@ class AttentionCone:
         )
         if angle >= 0.5 * math.pi:
             raise PerceptionError(f"half_angle_rad must lie in (0, pi/2), got {angle:g} rad")
-        set_fields(self, half_angle_rad=angle)
+        raised = self.raised_rad
+        if raised is not None:
+            first, second = finite_array("raised_rad", raised, (2,)).tolist()
+            if not 0.0 <= first < second <= 0.5 * math.pi:
+                raise PerceptionError(
+                    f"raised_rad must be two rising angles in [0, pi/2], got {raised!r}"
+                )
+            raised = first, second
+        set_fields(self, half_angle_rad=angle, raised_rad=raised)
 
-    def score(self, apex_m: ArrayLike, gaze: ArrayLike, target_m: ArrayLike) -> Any:
+    def score(
+        self, apex_m: ArrayLike, gaze: ArrayLike, target_m: ArrayLike, up: ArrayLike | None = None
+    ) -> Any:
         """Return α in [0, 1].
 
         Args:
@@ -53,50 +82,62 @@ class AttentionCone:
             target_m: for one gaze (3,), or (M, 3) points of one target, of which the highest score
                 counts: a person who sees any part of the robot sees the robot. For N gazes (3,), or
                 (N, 3) with one target per gaze. All vectors are in the same frame.
+            up: (3,), or (N, 3) for N gazes: vectors from the head to its crown, of any length;
+                None for eq. (3) alone.
 
         Returns:
             A float for one gaze, (N,) for N gazes.
 
         Raises:
-            PerceptionError: for another shape, a non-finite number or a gaze of length 0.
+            PerceptionError: for another shape, a non-finite number, a gaze of length 0 or one
+                along ``up``.
         """
-        apex, direction, target = (
-            np.asarray(value, dtype=np.float64) for value in (apex_m, gaze, target_m)
-        )
-        for name, array in (("apex_m", apex), ("gaze", direction), ("target_m", target)):
+        given = {"apex_m": apex_m, "gaze": gaze, "target_m": target_m}
+        if up is not None:
+            given["up"] = up
+        arrays = {name: np.asarray(value, dtype=np.float64) for name, value in given.items()}
+        for name, array in arrays.items():
             if array.ndim not in (1, 2) or array.shape[-1] != 3:
                 raise PerceptionError(f"{name} must have shape (3,) or (N, 3), got {array.shape}")
             if not np.isfinite(array).all():
                 raise PerceptionError(f"{name} must be finite, got {array.tolist()!r:.120}")
-        one_gaze = apex.ndim == 1 and direction.ndim == 1
+        one_gaze = arrays["apex_m"].ndim == 1 and arrays["gaze"].ndim == 1
         try:
-            scores = self.scores(apex, direction, target)
+            scores = self.scores(*arrays.values())
         except ValueError as cause:
             if isinstance(cause, PerceptionError):
                 raise
             raise PerceptionError(
-                "apex_m, gaze and target_m must have equal lengths N where they are (N, 3), got "
-                f"{apex.shape}, {direction.shape} and {target.shape}"
+                f"{', '.join(arrays)} must have equal lengths N where they are (N, 3), got "
+                f"{', '.join(str(array.shape) for array in arrays.values())}"
             ) from cause
         return float(np.max(scores, initial=0.0)) if one_gaze else scores
 
-    def scores(self, apex_m: FloatArray, gaze: FloatArray, target_m: FloatArray) -> FloatArray:
+    def scores(
+        self,
+        apex_m: FloatArray,
+        gaze: FloatArray,
+        target_m: FloatArray,
+        up: FloatArray | None = None,
+    ) -> FloatArray:
         """Return α (…,) of (…, 3) arrays under NumPy broadcasting, without checks of the input."""
-        length = np.sqrt(_dot(gaze, gaze))
-        if not np.all(length > 0.0):
-            raise PerceptionError("gaze must have a direction, got a vector of length 0")
-        unit = gaze / length[..., None]
+        unit = _unit("gaze", gaze)
         offset = target_m - apex_m
         axial = _dot(offset, unit)
         across = offset - axial[..., None] * unit
         perpendicular = np.sqrt(_dot(across, across))
         radius = axial * math.tan(self.half_angle_rad)
-        ahead = axial > 0.0
-        inside = ahead & (perpendicular <= radius)
+        inside = (axial > 0.0) & (perpendicular <= radius)
         ratio = np.divide(perpendicular, radius, out=np.ones_like(radius), where=inside)
-        return np.asarray(np.where(inside, 1.0 - ratio, 0.0), dtype=np.float64)
+        scores = np.where(inside, 1.0 - ratio, 0.0)
+        if up is not None and self.raised_rad is not None:
+            above = _dot(offset, _unit("up", up - _dot(up, unit)[..., None] * unit))
+            scores = scores * self.shares(axial, above)
+        return np.asarray(scores, dtype=np.float64)
 
-    def score_of(self, apex_m: _Vector, gaze: _Vector, target_m: _Vector) -> float:
+    def score_of(
+        self, apex_m: _Vector, gaze: _Vector, target_m: _Vector, up: _Vector | None = None
+    ) -> float:
         """Return :meth:`scores` of one gaze in plain floats, which take a tenth of the time."""
         # The sums are in the order of einsum, so that both give the same digits.
         gx, gy, gz = gaze
@@ -111,7 +152,34 @@ class AttentionCone:
         x, y, z = x - axial * gx, y - axial * gy, z - axial * gz
         perpendicular = math.sqrt(x * x + z * z + y * y)
         radius = axial * math.tan(self.half_angle_rad)
-        return 1.0 - perpendicular / radius if perpendicular <= radius else 0.0
+        score = 1.0 - perpendicular / radius if perpendicular <= radius else 0.0
+        if up is None or self.raised_rad is None or score == 0.0:
+            return score
+        ux, uy, uz = up
+        along = ux * gx + uz * gz + uy * gy
+        ux, uy, uz = ux - along * gx, uy - along * gy, uz - along * gz
+        length = math.sqrt(ux * ux + uz * uz + uy * uy)
+        if not length > 0.0:
+            raise PerceptionError("up must have a direction off the gaze, got none")
+        first, second = self.raised_rad
+        raised = math.atan2((x * ux + z * uz + y * uy) / length, axial)
+        return score * min(1.0, max(0.0, (second - raised) / (second - first)))
+
+    def shares(self, ahead: FloatArray, above: FloatArray) -> FloatArray:
+        """Return what a lowered head leaves of α for a target so far ahead and above the gaze."""
+        if self.raised_rad is None:
+            return np.ones_like(above)
+        first, second = self.raised_rad
+        share = (second - np.arctan2(above, ahead)) / (second - first)
+        return np.asarray(np.minimum(np.maximum(share, 0.0), 1.0))
+
+
+def _unit(name: str, vectors: FloatArray) -> FloatArray:
+    """Return unit vectors (…, 3); PerceptionError for one without a direction."""
+    length = np.sqrt(_dot(vectors, vectors))
+    if not np.all(length > 0.0):
+        raise PerceptionError(f"{name} must have a direction, got a vector of length 0")
+    return np.asarray(vectors / length[..., None])
 
 
 def _dot(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -161,8 +229,9 @@ def estimate_awareness(
 ) -> tuple[AwarenessEstimate, ...]:
     """Return the awareness of each of N people.
 
-    * α is the score of the head's direction, or the expected score over the errors of the head pose
-      if that is lower (near the axis). So uncertainty lowers α and never raises it.
+    * α is the score of the head's direction and of how far it is lowered, or the expected score
+      over the errors of the head pose if that is lower (near the axis). So uncertainty lowers α and
+      never raises it.
     * The standard deviation is the root mean square difference between α and the person's true
       score, over the errors of the head pose and over the directions of the eyes in the head.
     * Where the eyes are measured, they are combined with how eyes turn in heads. The gaze is then
@@ -186,7 +255,7 @@ def estimate_awareness(
         return ()
     measured = [row for row, each in enumerate(eyes) if each is not None]
     lines = _LinesOfSight(tuple(heads), robot_points_camera_m, eyes)
-    nominal = cone_scores(cone, lines.cosines.max(axis=1))
+    nominal = cone_scores(cone, lines.cosines, lines.sines).max(axis=1)
     head_covariance = lines.pose_covariance() + (extra_std_rad**2)[:, None, None] * np.eye(2)
     gaze_covariance = head_covariance + lines.eye_covariance(eye_in_head_std_rad)
     if measured:
@@ -202,12 +271,13 @@ def estimate_awareness(
     )
 
 
-def cone_scores(cone: AttentionCone, cosines: FloatArray) -> FloatArray:
-    """Return α from cosines of the angle between gaze and robot: eq. (3) as a function of it."""
+def cone_scores(cone: AttentionCone, cosines: FloatArray, sines: FloatArray) -> FloatArray:
+    """Return α of unit vectors to the robot, whose parts along gaze and up are given."""
     edge = math.cos(cone.half_angle_rad)
     inside = np.minimum(np.maximum(cosines, edge), 1.0)
     tangent = np.sqrt(1.0 - inside * inside) / inside
-    return np.asarray(np.maximum(1.0 - tangent / math.tan(cone.half_angle_rad), 0.0))
+    scores = np.maximum(1.0 - tangent / math.tan(cone.half_angle_rad), 0.0)
+    return np.asarray(scores * cone.shares(cosines, sines))
 
 
 class _LinesOfSight:
@@ -237,6 +307,9 @@ class _LinesOfSight:
         sight = offset / distance[..., None]
         #: (N, M) cosines of the angles between gazes and lines of sight
         self.cosines = (sight @ gaze[:, :, None])[..., 0]
+        up = -self._rotation[:, :, :1]
+        #: (N, M) components of the lines of sight along the heads' up direction
+        self.sines = (sight @ up)[..., 0]
         rows, best = np.arange(len(heads)), self.cosines.argmax(axis=1)
         self._distance = np.maximum(distance[rows, best], _MIN_DISTANCE_M)
         nearest = sight[rows, best]
@@ -248,6 +321,8 @@ class _LinesOfSight:
         #: (N, 2, 3) ``normal`` and ``across``
         self._axes = np.empty((len(heads), 2, 3))
         self._axes[:, 0], self._axes[:, 1] = normal, _cross(normal, gaze)
+        #: (N, 2) components of the heads' up direction along ``normal`` and ``across``
+        self.up = (self._axes @ up)[..., 0]
         self._sight_axes = np.empty_like(self._axes)
         self._sight_axes[:, 0], self._sight_axes[:, 1] = normal, _cross(normal, nearest)
         #: (N, 2, 3) derivatives of the gaze along ``normal`` and ``across`` with respect to a small
@@ -303,12 +378,16 @@ def _moments(
     out = first[..., None] * _NODES[0]
     within = shared[..., None] * _NODES[0] + second[..., None] * _NODES[1]
     angle = np.maximum(np.sqrt(out * out + within * within), 1e-12)
-    cosine, slope = np.cos(angle), np.sin(angle) / angle
-    highest = None
+    cosine, sine = np.cos(angle), np.sin(angle)
+    out, within = out / angle, within / angle
+    # The gaze turns towards (out, within), and the head's up direction turns with it.
+    lean = out * lines.up[:, :1] + within * lines.up[:, 1:]
+    highest = np.zeros_like(out)
     for point in range(lines.cosines.shape[1]):
         aside = lines.components[:, :, point, None]
-        towards = cosine * lines.cosines[:, point, None]
-        towards += slope * (out * aside[:, 0] + within * aside[:, 1])
-        highest = towards if highest is None else np.maximum(highest, towards)
-    scores = cone_scores(cone, highest) if highest is not None else np.zeros_like(out)
-    return scores @ _WEIGHTS, (scores * scores) @ _WEIGHTS
+        straight = lines.cosines[:, point, None]
+        there = out * aside[:, 0] + within * aside[:, 1]
+        above = lines.sines[:, point, None] - lean * ((1.0 - cosine) * there + sine * straight)
+        scores = cone_scores(cone, cosine * straight + sine * there, above)
+        highest = np.maximum(highest, scores)
+    return highest @ _WEIGHTS, (highest * highest) @ _WEIGHTS

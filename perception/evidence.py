@@ -24,6 +24,7 @@ AwarenessReason = Literal[
     "no face found",
     "face cut by the border",
     "no keypoint of the head",
+    "eyes covered by lids",
     "head direction unknown",
 ]
 AWARENESS_REASONS: Final[tuple[AwarenessReason, ...]] = get_args(AwarenessReason)
@@ -105,9 +106,9 @@ def judge_face(
       there is no evidence.
 
     There is also no evidence if no keypoint of the head is seen and ``head.face_seen`` is None, if
-    the head is larger than the body can carry, or if nose or eyes are missing from a head at the
-    border of the image: what the border cuts off is missing from the pose too, and so the pose may
-    be far off.
+    lids cover the irises (``person.eyes_open`` False), if the head is larger than the body can
+    carry, or if nose or eyes are missing from a head at the border of the image: what the border
+    cuts off is missing from the pose too, and so the pose may be far off.
 
     The direction is unknown if a network that gives ``head.face_seen`` is unsure of it by more than
     15°: of a head that is blurred, dark or small. Then there is no evidence, unless a face is seen
@@ -122,7 +123,7 @@ def judge_face(
     """
     depth = max(float(head.position_camera_m[2]), 0.05)
     width_px = HEAD_WIDTH_M * math.sqrt(camera.fx_px * camera.fy_px) / depth
-    if reason := _too_small(person, head, width_px):
+    if reason := _unseen(person, head, width_px):
         return reason
     if head.face_seen is None and _is_cut(camera, person, width_px, min_score):
         return "face cut by the border"
@@ -155,13 +156,13 @@ def judge_face(
     return FaceEvidence(seen, width_px, extra, known)
 
 
-def _too_small(person: PersonKeypoints, head: HeadPose, width_px: float) -> AwarenessReason | None:
-    """Return why a face of this width (px) is too small to be judged; None if it is not."""
+def _unseen(person: PersonKeypoints, head: HeadPose, width_px: float) -> AwarenessReason | None:
+    """Return why a face of this width (px) shows no eyes that could be judged; None if it may."""
     if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
         return "face too small"
     if head.face_seen is None and not person.face_evidence and width_px < _FACE_TO_FIND_PX:
         return "no face found"
-    return None
+    return None if person.eyes_open else "eyes covered by lids"
 
 
 def _is_too_large(person: PersonKeypoints, width_px: float, min_score: float) -> bool:

@@ -215,7 +215,8 @@ class Stage(AbstractContextManager["Stage"]):
         people = zip(self.people, self.workers, self._motions, strict=True)
         for person, worker, motion in people:
             gaze = worker.gaze_odom
-            alpha = cone.score_of(worker.eyes_odom_m.tolist(), gaze.tolist(), camera)
+            up = (-worker.rotation_odom_head[:, 0]).tolist()
+            alpha = cone.score_of(worker.eyes_odom_m.tolist(), gaze.tolist(), camera, up)
             in_front = _faces(motion, camera)
             sighted = not motion.away and (in_front or alpha > 0.0) and self._sight.seen_by(worker)
             views.append(

@@ -108,7 +108,8 @@ def _geometry(
     pixels = camera.project(points)
     seen = keypoints_in_front(points, pixels, view.depth_m)
     gaze = worker.gaze_odom
-    awareness = float(AttentionCone().scores(worker.eyes_odom_m, gaze, origin))
+    up = -worker.rotation_odom_head[:, 0]
+    awareness = float(AttentionCone().scores(worker.eyes_odom_m, gaze, origin, up))
     if awareness > 0.0 and not sees(worker, origin):
         awareness = 0.0
     return {

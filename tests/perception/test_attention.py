@@ -30,11 +30,14 @@ def test_score_is_the_papers_equations(apex, gaze, target, angle):
     assert AttentionCone(angle).score(apex, gaze, target) == pytest.approx(expected, abs=1e-9)
 
 
-@given(point, direction, point, half_angle)
-def test_one_gaze_in_plain_floats_has_the_same_score(apex, gaze, target, angle):
+@given(point, direction, point, half_angle, st.none() | direction)
+def test_one_gaze_in_plain_floats_has_the_same_score(apex, gaze, target, angle, up):
+    assume(np.linalg.norm(target - apex) > 1e-2)
+    assume(up is None or np.linalg.norm(np.cross(gaze, up)) > 1e-3)
     cone = AttentionCone(angle)
-    in_floats = cone.score_of(apex.tolist(), gaze.tolist(), target.tolist())
-    assert in_floats == pytest.approx(float(cone.scores(apex, gaze, target)), abs=1e-12)
+    crown = None if up is None else up.tolist()
+    in_floats = cone.score_of(apex.tolist(), gaze.tolist(), target.tolist(), crown)
+    assert in_floats == pytest.approx(float(cone.scores(apex, gaze, target, up)), abs=1e-9)
 
 
 def test_one_gaze_in_plain_floats_needs_a_direction():
@@ -100,3 +103,81 @@ def test_the_highest_score_of_several_points_of_the_robot_counts():
     parts = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     assert cone.score([0, 0, 0], [0, 1, 0], parts) == 1.0
     assert cone.score([0, 0, 0], [0, 0, 1], parts) == 0.0
+
+
+def lowered(down_rad: float, yaw_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return gaze and up of a head that is turned by yaw and then lowered."""
+    turn = Rotation.from_euler("ZY", [yaw_rad, down_rad])
+    return turn.apply([1.0, 0.0, 0.0]), turn.apply([0.0, 0.0, 1.0])
+
+
+@given(
+    point,
+    direction,
+    direction,
+    point,
+    half_angle,
+    st.floats(0.1, 10.0),
+    st.booleans(),
+    st.integers(0, 2**31),
+)
+def test_a_lowered_head_only_lowers_the_score_however_the_world_lies(
+    apex, gaze, up, target, angle, factor, mirrored, seed
+):
+    assume(np.linalg.norm(target - apex) > 1e-2)
+    assume(np.linalg.norm(np.cross(gaze, up)) > 1e-2)
+    cone = AttentionCone(angle)
+    alpha = cone.score(apex, gaze, target, up)
+    assert 0.0 <= alpha <= cone.score(apex, gaze, target)
+    assert AttentionCone.printed(angle).score(apex, gaze, target, up) == cone.score(
+        apex, gaze, target
+    )
+    turn = factor * Rotation.random(random_state=seed).as_matrix()
+    if mirrored:
+        turn = turn @ np.diag([1.0, -1.0, 1.0])
+    moved = cone.score(turn @ apex + 3.0, turn @ gaze, turn @ target + 3.0, turn @ up)
+    assert moved == pytest.approx(alpha, abs=1e-6)
+
+
+@given(st.floats(0.0, 1.5), st.floats(0.0, 1.5), st.floats(-1.5, 1.5), st.floats(-0.6, 0.0))
+def test_the_score_falls_steadily_as_a_head_is_lowered_below_the_line_to_the_robot(
+    first, second, yaw, line
+):
+    """``line`` is the elevation of the robot from the eyes; the head starts level with it."""
+    target = [math.cos(line), 0.0, math.sin(line)]
+    level_rad = math.atan2(-target[2], target[0] * math.cos(yaw))
+
+    def at(below_rad: float) -> float:
+        gaze, up = lowered(level_rad + below_rad, yaw)
+        return AttentionCone().score(np.zeros(3), gaze, target, up)
+
+    less, more = sorted((first, second))
+    assert at(more) <= at(less) + 1e-9
+    # No step: α changes by no more than the two slopes allow.
+    assert at(less) - at(more) <= 8.0 * (more - less) + 1e-9
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 25.0, -40.0])
+def test_somebody_who_reads_a_phone_does_not_see_a_robot_3_m_away_but_a_level_head_does(yaw_deg):
+    robot_m = [3.0, 0.0, -0.7]  # from the eyes
+    cone, yaw = AttentionCone(), math.radians(yaw_deg)
+
+    def at(down_deg: float, **by: AttentionCone) -> float:
+        gaze, up = lowered(math.radians(down_deg), yaw)
+        return by.get("cone", cone).score(np.zeros(3), gaze, robot_m, up)
+
+    assert at(38.5) < 0.05
+    level = at(0.0)
+    assert level == at(0.0, cone=AttentionCone.printed())
+    assert at(-15.0) < level  # a raised head looks elsewhere too
+
+
+@pytest.mark.parametrize("raised", [(0.3, 0.2), (-0.1, 0.3), (0.1, 1.6), (0.1, math.nan)])
+def test_angles_of_a_lowered_head_must_rise(raised):
+    with pytest.raises(PerceptionError, match="raised_rad"):
+        AttentionCone(raised_rad=raised)
+
+
+def test_up_needs_a_direction_off_the_gaze():
+    with pytest.raises(PerceptionError, match="up"):
+        AttentionCone().score([0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0])

@@ -28,9 +28,10 @@ def some_head(rng: np.random.Generator) -> HeadPose:
     return HeadPose(position, rotation, root @ root.T / 3.0, 0.0)
 
 
-def scores(apex: FloatArray, gaze: FloatArray, points: FloatArray) -> FloatArray:
+def scores(apex: FloatArray, turn: Rotation, axes: FloatArray, points: FloatArray) -> FloatArray:
     """Return the score of each draw, for the point of the robot with the highest one."""
-    return np.max([CONE.scores(apex, gaze, point) for point in points], axis=0)
+    gaze, up = turn.apply(axes[:, 1]), turn.apply(-axes[:, 0])
+    return np.max([CONE.scores(apex, gaze, point, up) for point in points], axis=0)
 
 
 def by_drawing(
@@ -53,14 +54,16 @@ def by_drawing(
         known = yaw[:, None] * -axes[:, 0] + pitch[:, None] * axes[:, 2]
         small = small * Rotation.from_rotvec(known)
     more = Rotation.from_rotvec(extra_std_rad * rng.normal(size=(DRAWS, 2)) @ axes[:, ::2].T)
-    measured = scores(apex, (more * small).apply(axes[:, 1]), points)
+    measured = scores(apex, more * small, axes, points)
     true = measured
     if eyes is None:
         turned = rng.normal(size=(DRAWS, 2)) * EYE_STD_RAD @ axes[:, ::2].T
-        gaze = (more * small * Rotation.from_rotvec(turned)).apply(axes[:, 1])
-        true = scores(apex, gaze, points)
+        true = scores(apex, more * small * Rotation.from_rotvec(turned), axes, points)
     nominal = scores(
-        head.position_camera_m + head.rotation_camera_head @ EYES_HEAD_M, axes[:, 1], points
+        head.position_camera_m + head.rotation_camera_head @ EYES_HEAD_M,
+        Rotation.identity(),
+        axes,
+        points,
     )
     alpha = seen * min(float(nominal), measured.mean())
     return alpha, float(np.sqrt(seen * np.mean((true - alpha) ** 2) + (1.0 - seen) * alpha**2))
@@ -104,6 +107,8 @@ def test_errors_that_turn_head_and_place_together_about_the_robot_cost_nothing()
         turn = np.concatenate([axis, np.cross(axis, place)])
         covariance = 0.05**2 * np.outer(turn, turn) + 1e-12 * np.eye(6)
         alpha, std = awareness_of(HeadPose(place, rotation, covariance, 0.0))
-        nominal = CONE.score(place + rotation @ EYES_HEAD_M, rotation[:, 1], np.zeros(3))
+        nominal = CONE.score(
+            place + rotation @ EYES_HEAD_M, rotation[:, 1], np.zeros(3), -rotation[:, 0]
+        )
         assert alpha == pytest.approx(nominal, abs=1e-3)
         assert std < 2e-3

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from perception import PerceptionError
-from perception.networks.faces import FaceMesh, iris_offset
+from perception import Camera, HeadPose, PerceptionError, PersonDetection, PersonKeypoints
+from perception.evidence import judge_face
+from perception.networks.faces import FaceMesh, FaceMeshPoseEstimator, iris_offset
 from perception.networks.faces import _face_scores as face_scores
 
 
@@ -49,6 +50,38 @@ def test_the_offset_is_the_mean_of_both_irises_and_closed_eyes_say_nothing():
     assert found == pytest.approx([0.015, 0.001])
     for marks in (landmarks(opening=0.01), landmarks(opening=math.nan), landmarks(opening=0.0)):
         assert iris_offset(marks) is None
+
+
+class Face:
+    """A mesh that finds one face, a head's width across."""
+
+    def __init__(self, opening: float) -> None:
+        self._marks = np.column_stack([200.0 * landmarks(opening=opening), np.zeros(478)])
+
+    def find(self, *_):
+        return self._marks
+
+
+class Body:
+    """A pose network that sees one whole body."""
+
+    def estimate(self, _, detections):
+        points = np.random.default_rng(0).uniform(50.0, 150.0, (17, 2))
+        person = PersonKeypoints(points, np.zeros((17, 3)), np.ones(17), "coco", lifted=False)
+        return (person,) * len(detections)
+
+
+@pytest.mark.parametrize(("opening", "reason"), [(0.03, None), (0.01, "eyes covered by lids")])
+def test_lids_over_the_irises_leave_no_evidence_of_awareness(opening, reason):
+    poses = FaceMeshPoseEstimator(Body(), Face(opening))
+    box = PersonDetection([50.0, 50.0, 150.0, 150.0], 1.0)
+    (person,) = poses.estimate(np.zeros((480, 640, 3), np.uint8), (box,))
+    assert person.face_evidence
+    assert person.eyes_open == (reason is None)
+    head = HeadPose([0.0, 0.0, 2.0], np.eye(3), 1e-4 * np.eye(6), 0.0)
+    camera = Camera.from_fov(640, 480, math.radians(60.0))
+    judged = judge_face(camera, person, head, 0.3)
+    assert (judged if isinstance(judged, str) else None) == reason
 
 
 def test_another_file_than_the_bundle_of_faces_is_refused():

@@ -106,12 +106,19 @@ def test_the_truth_is_consistent_and_matches_the_images(rendered: Path) -> None:
 def test_a_person_who_looks_away_is_unaware(rendered: Path) -> None:
     people = [p for r in read_records(rendered / "truth.jsonl") for p in r["people"]]
     for person in people:
-        nose = np.array(person["keypoints_camera_m"]["nose"])
-        angle = np.arccos(-nose @ person["gaze_camera"] / np.linalg.norm(nose))
+        points = {name: np.array(at) for name, at in person["keypoints_camera_m"].items()}
+        gaze, eyes = (
+            np.array(person["gaze_camera"]),
+            0.5 * (points["left_eye"] + points["right_eye"]),
+        )
+        angle = np.arccos(-eyes @ gaze / np.linalg.norm(eyes))
+        up = np.cross(points["right_ear"] - points["left_ear"], gaze)
+        lowered = np.arctan2(-eyes @ up / np.linalg.norm(up), -eyes @ gaze)
         if angle > np.radians(62.0):
             assert person["awareness"] == 0.0
         elif person["awareness"] > 0.0:
             expected = 1.0 - np.tan(angle) / np.tan(np.radians(60.0))
+            expected *= np.interp(np.degrees(lowered), (8.0, 22.0), (1.0, 0.0))
             assert person["awareness"] == pytest.approx(expected, abs=0.12)
 
 
