@@ -139,7 +139,7 @@ def test_the_robot_keeps_its_curve_and_its_drift():
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.6, 1.5), st.floats(-math.pi, math.pi), st.floats(0.05, 0.6))
-@example(1.4375, 1.484375, 0.125)  # one direction grazes
+@example(1.4375, 1.484375, 0.125)  # somebody is grazed, and touched later
 def test_a_robot_that_turns_on_the_spot_strikes_as_in_a_fine_simulation(turn, where, gap_m):
     """Written out anew: corners whose speeds are taken from their places, one after the other."""
     radius_m, a = NOVA_CARTER.circumscribed_radius_m, NOVA_CARTER.max_deceleration_mps2
@@ -148,30 +148,34 @@ def test_a_robot_that_turns_on_the_spot_strikes_as_in_a_fine_simulation(turn, wh
     found, dt_s = found_of(result), 0.004
     brakes_s = turn * radius_m / a
 
-    def hits(touch_m):
-        for angle in np.arange(16) * math.tau / 16.0:
-            heading = 0.0
-            for t in np.arange(0.0, HOLDS_S + brakes_s, dt_s):
-                lag_s = 0.54 * (1.0 - math.exp(-t / 0.54))
-                way_m = 1.34 * (t - lag_s)
-                x, y = place + way_m * np.array([math.cos(angle), math.sin(angle)])
-                rate = turn * (1.0 - max(t - HOLDS_S, 0.0) / brakes_s)
-                ahead = math.cos(heading) * x + math.sin(heading) * y
-                aside = math.cos(heading) * y - math.sin(heading) * x
-                near = np.clip([ahead, aside], [-ALONG_M, -ACROSS_M], [ALONG_M, ACROSS_M])
-                gap = np.array([ahead, aside]) - near
-                if math.hypot(*gap) <= touch_m:
-                    yield rate * (near[0] * gap[1] - near[1] * gap[0]) / math.hypot(*gap)
-                    break
-                heading += rate * dt_s
+    def closing_mps(angle, touch_m):
+        heading = 0.0
+        for t in np.arange(0.0, HOLDS_S + brakes_s, dt_s):
+            lag_s = 0.54 * (1.0 - math.exp(-t / 0.54))
+            way_m = 1.34 * (t - lag_s)
+            x, y = place + way_m * np.array([math.cos(angle), math.sin(angle)])
+            rate = turn * (1.0 - max(t - HOLDS_S, 0.0) / brakes_s)
+            ahead = math.cos(heading) * x + math.sin(heading) * y
+            aside = math.cos(heading) * y - math.sin(heading) * x
+            near = np.clip([ahead, aside], [-ALONG_M, -ACROSS_M], [ALONG_M, ACROSS_M])
+            gap = np.array([ahead, aside]) - near
+            if math.hypot(*gap) <= touch_m:
+                return rate * (near[0] * gap[1] - near[1] * gap[0]) / math.hypot(*gap)
+            heading += rate * dt_s
+        return 0.0
 
-    # Touches are looked for every 0.05 s, in which somebody who grazes the robot goes 4 mm deep; a
-    # speed near the least that counts may be found on either side of it.
-    deep, all_of_them = (list(hits(BODY_RADIUS_M + edge)) for edge in (-0.01, 0.01))
-    least, most = sum(each > 0.04 for each in deep), sum(each > 0.02 for each in all_of_them)
+    # Touches are looked for every 0.05 s, in which somebody who grazes the robot goes 4 mm deep:
+    # the first touch may be either of these. A speed near the least that counts is unclear as well.
+    radii_m = (BODY_RADIUS_M - 0.01, BODY_RADIUS_M + 0.01)
+    touches = [
+        sorted(closing_mps(angle, each) for each in radii_m)
+        for angle in np.arange(16) * math.tau / 16.0
+    ]
+    least, most = sum(low > 0.04 for low, _ in touches), sum(high > 0.02 for _, high in touches)
     one = 1000.0 / 16.0 * RATES_HZ[3] * LASTS_S
     assert least * one - 1e-6 <= found.impacts <= most * one + 1e-6
-    assert max([*deep, 0.0]) - 0.03 <= found.worst_mps <= max([*all_of_them, 0.0]) + 0.03
+    assert max(low for low, _ in touches) - 0.03 <= found.worst_mps
+    assert found.worst_mps <= max(high for _, high in touches) + 0.03
 
 
 def test_racks_block_and_the_box_that_somebody_stands_in_does_not():
