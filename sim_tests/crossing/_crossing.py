@@ -88,11 +88,11 @@ class Crossing(AbstractContextManager["Crossing"]):
         """True once all control cycles of the scenario have run."""
         return self._tick >= self._ticks
 
-    def sense(self) -> CrossingFrame:
+    def sense(self, seat: SeatedPlanner | None = None) -> CrossingFrame:
         """Observe the separations, take images and scans, update the constraints.
 
-        The frame has no command yet. Call it once per control cycle. After the last one no
-        separations are observed any more.
+        The frame has no command yet, and the constraints that a seated planner is told. Call it
+        once per control cycle. After the last one no separations are observed any more.
         """
         t_s = self.t_s
         separations = self._separations
@@ -112,6 +112,9 @@ class Crossing(AbstractContextManager["Crossing"]):
             perception_stamp_s=sensed.stamp_s,
             seen_stamp_s=sensed.seen_stamp_s,
         )
+        tracks = sensed.tracks
+        if seat is not None:
+            constraints, tracks = seat.told(constraints, tracks)
         self._ask(constraints, sensed)
         observed = sensed.observed
         return CrossingFrame(
@@ -122,7 +125,7 @@ class Crossing(AbstractContextManager["Crossing"]):
             truth=truth,
             observations=tuple(observation for observation, _ in observed),
             observed_workers=tuple(worker for _, worker in observed),
-            tracks=sensed.tracks,
+            tracks=tracks,
             constraints=constraints,
             separations=separations,
             at_goal=_at_goal(self.scenario, state, self.goal_odom_m),
@@ -245,7 +248,7 @@ def _driven(setup: Setup, observer: Observer | None) -> CrossingResult:
         if clocked is not None:
             seat.enter_context(clocked.seated(crossing.stage))
         while not crossing.time_is_up:
-            now = crossing.sense()
+            now = crossing.sense(clocked)
             asked_s = process_time()
             returned = driver.plan(
                 now.known_state, crossing.goal_odom_m, now.constraints, crossing.dt_s

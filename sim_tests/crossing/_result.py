@@ -34,7 +34,7 @@ class CrossingFrame:
         observed_workers: ``observed_workers[i]`` is the worker that ``observations[i]`` shows, −1
             for none.
         tracks: tracks of the people.
-        constraints: constraints from the adapter.
+        constraints: constraints from the adapter; for a stack outside, those that it is told.
         separations: separations of the people, as last observed, which is in every frame up to 20 a
             second.
         at_goal: the robot stands at its goal.

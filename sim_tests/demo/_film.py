@@ -219,9 +219,9 @@ def draw_lane(row: ComparisonRow, free: CrossingResult, person: int, t_s: float 
     if not end:
         _write_right(image, _TEXT, f"{t_s:.1f} s", 0, _QUIET)
     elif lost is None:
-        _write_right(image, _TITLE, "never arrives", 0, _BAD)
+        _write_right(image, _TITLE, "no goal", 0, _BAD)
     else:
-        _write_right(image, _TITLE, f"{lost:.1f} s lost", 0, WHITE)
+        _write_right(image, _TITLE, f"{round(lost, 1) + 0.0:.1f} s lost", 0, WHITE)
     image[_LINE_PX : _LINE_PX + _MAP_PX[1]] = draw_map(row, t_s)
     bottom = _LINE_PX + _MAP_PX[1]
     if t_s is not None and t_s < near.t_s:

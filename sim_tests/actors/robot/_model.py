@@ -31,6 +31,7 @@ NOVA_CARTER: Final = RobotProfile(
     max_acceleration_mps2=1.0,
     max_deceleration_mps2=1.0,
     reaction_time_s=0.3,
+    drive="differential",
     max_yaw_rate_radps=1.5,
     max_yaw_acceleration_radps2=3.0,
 )

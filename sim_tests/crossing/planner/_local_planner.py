@@ -17,6 +17,8 @@ from ._config import PlannerConfig
 from ._sampling_planner import SamplingPlanner
 
 if TYPE_CHECKING:
+    from tracking import PersonTrack
+
     from .._stage import Stage
 
 # A planner that stops at the goal brakes at this rate, and stands this near to it.
@@ -60,6 +62,12 @@ class SeatedPlanner(LocalPlanner, Protocol):
     """
 
     late_s: float
+
+    def told(
+        self, constraints: NavConstraints, tracks: tuple[PersonTrack, ...]
+    ) -> tuple[NavConstraints, tuple[PersonTrack, ...]]:
+        """Return the constraints that it is given, and their tracks, from those of the policy."""
+        ...
 
     def seated(self, stage: Stage) -> AbstractContextManager[None]:
         """Return the time in which it has the robot of a stage."""

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 import shapely
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from paths import ROOT
 from pydantic import ValidationError
 
 from nav_adapter import RobotProfile
+from nav_adapter.ros2 import CameraMount
 from sim_tests import NOVA_CARTER, SimError, Warehouse, Worker
 from sim_tests.actors.robot import (
     KinematicRobot,
@@ -49,6 +53,23 @@ def test_a_robot_survives_yaml_and_sees_around_itself(name: str, tmp_path) -> No
         seen |= (directions - low) % 360 <= high - low
     assert seen.all()
     assert body.covers(shapely.Point(model.camera_m[:2]))
+
+
+@pytest.mark.parametrize("page", ["nav2/robot.yaml", "nav2.md", "tutorials/nav2-*.md"])
+def test_the_robot_of_the_documents_is_the_simulated_one(page: str) -> None:
+    (path,) = (ROOT / "docs").glob(page)
+    text = path.read_text()
+    blocks = re.findall(r"^```yaml\n(.*?)^```", text, re.M | re.S) or [text]
+    (robot,) = [each for block in blocks if "scanners" in (each := yaml.safe_load(block))]
+    own = RobotModel.shipped("nova_carter")
+    mounts = [(*each.pop("position_base_m"), each.pop("yaw_deg")) for each in robot["scanners"]]
+    assert mounts == [(each.x_m, each.y_m, each.z_m, each.yaw_deg) for each in own.scanners]
+    assert not any(each.get("upside_down") for each in robot["scanners"])
+    if "camera" in robot:
+        mount = CameraMount.model_validate(robot["camera"])
+        assert mount == CameraMount(position_base_m=list(own.camera_m))
+    for name in robot.keys() - {"scanners", "camera"}:
+        assert np.array_equal(robot[name], getattr(own.profile, name)), name
 
 
 def test_unusable_robots_are_refused_with_a_reason() -> None:

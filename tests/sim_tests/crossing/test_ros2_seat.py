@@ -8,6 +8,8 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -25,8 +27,9 @@ from nav_adapter.ros2.conversions import pose_matrix
 from nav_adapter.ros2.messages.geometry_msgs import Twist, TwistStamped
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing.planner import is_outside, make_planner, planner_label
-from sim_tests.study.measures import measure, nondeterminism_notes
+from sim_tests.study.measures import Conduct, measure, nondeterminism_notes
 from sim_tests.study.runs import plan_jobs, run_jobs
+from sim_tests.world.scanner import DIAGONAL_SCANNERS
 
 WAY_M = 5.0
 WATCHED = Scenario.model_validate(
@@ -81,6 +84,61 @@ def test_a_stack_that_is_not_told_of_people_is_faster(domain, limit) -> None:
     # A robot that meets nobody has its own maximum; DWB ignores a limit that is not below it.
     assert set(heard) == ({0.999 * 1.5} if limit == "nobody" else set())
     assert untold.time_to_goal_s < told.time_to_goal_s - 0.5
+
+
+@contextmanager
+def bridge_outside(domain: int) -> Iterator[None]:
+    """A bridge with the robot of the docs, which reads the scans; in a process of its own."""
+    words = ["--robot", str(ROOT / "docs/nav2/robot.yaml"), "--no-camera", "--domain", str(domain)]
+    words += ["--scan", "scan", "--scan", "scan_2", "--map", "map"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "awarenav", "bridge", *words], stderr=subprocess.PIPE, text=True
+    )
+    try:
+        for line in process.stderr:
+            if "limit" in line:
+                break
+        yield
+    finally:
+        process.terminate()
+        process.communicate()
+    assert process.returncode == 0
+
+
+def test_an_adapter_outside_slows_the_robot_and_the_frames_have_what_it_says(domain) -> None:
+    scenario = WATCHED.model_copy(update={"scanners": DIAGONAL_SCANNERS})
+    settings = f"ros2(domain={domain}, limit="
+    with Peer(domain) as peer:
+        with bridge_outside(domain):
+            # No policy inside says so, and the truth about people is not used.
+            outside = run_crossing(scenario, policy="scanner", planner=f"{settings}'outside')")
+        heard = tuple(peer.limits_mps)
+        alone = run_crossing(scenario, policy="blind", planner=f"{settings}'nobody')")
+    assert outside.time_to_goal_s > alone.time_to_goal_s + 0.5
+    limits = np.array([each.constraints.speed_limit_mps for each in outside.frames])
+    assert set(limits) <= {*heard, 1.5}
+    beside = [abs(each.robot_state.position_odom_m[0] - 4.0) < 1.0 for each in outside.frames]
+    assert limits[beside].max() < 0.6 * limits.max()
+    conduct = Conduct.of(outside)
+    assert -0.2 < conduct.limit_excess_mps < 0.1
+    assert conduct.fastest_point_excess_mps is None
+    # The bridge saw the bystander's legs, and no face.
+    seen = [each for frame in outside.frames for each in frame.constraints.obstacles]
+    at_m = np.array([each.center_odom_m for each in seen])
+    assert (np.hypot(*(at_m - (4.5, 2.4)).T) < 0.3).mean() > 0.8
+    assert {each.awareness_lower for each in seen} == {0.0}
+    assert {each.id for frame in outside.frames for each in frame.tracks}
+    # Who is told of nobody knows of nobody.
+    assert not any(frame.constraints.obstacles or frame.tracks for frame in alone.frames)
+
+
+def test_a_stack_that_is_told_of_nobody_asks_nobody_to_look(domain) -> None:
+    busy = "busy_in_aisle"
+    assert any(each.constraints.alerts for each in run_crossing(busy, policy="balanced").frames)
+    with Peer(domain):
+        planner = f"ros2(domain={domain}, {LOCKSTEP}, limit='nobody')"
+        result = run_crossing(busy, policy="balanced", planner=planner)
+    assert not any(each.constraints.alerts for each in result.frames)
 
 
 def test_in_lockstep_the_same_stack_gives_the_same_commands(domain) -> None:

@@ -9,6 +9,8 @@ from typing import Final
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, DdsNode, Topic, renamed
 from nav_adapter.ros2.messages import Message
 from nav_adapter.ros2.messages.geometry_msgs import PoseStamped, Twist, TwistStamped
+from nav_adapter.ros2.messages.nav2_msgs import SpeedLimit
+from nav_adapter.ros2.messages.people_msgs import People
 from nav_adapter.ros2.messages.rosgraph_msgs import Clock
 
 _CLOCK: Final = Topic("clock", Clock)
@@ -18,6 +20,8 @@ _COMMANDS: Final = (Topic("cmd_vel", Twist), Topic("cmd_vel", TwistStamped))
 _ROBOT: Final = {
     name: Topic(READ[name].name, READ[name].message, depth=10) for name in ("odom", "tf")
 }
+# Of an adapter outside.
+_HEARD: Final = (PUBLISHED["speed_limit"], PUBLISHED["people"])
 _AS_READ: Final = {name: READ[name] for name in ("map", "tf_static", "image", "camera_info")}
 
 
@@ -28,12 +32,16 @@ class Link:
         domain: ``ROS_DOMAIN_ID``.
         scans: names of the topics of scans.
 
+    Attributes:
+        latest_s: the latest stamp of the domain's clock, which may run ahead of the computer's and
+            never goes back.
+
     Raises:
         NavError: no cyclonedds, a domain that cannot be joined, or a name that ROS refuses.
     """
 
     def __init__(self, domain: int, scans: Sequence[str]) -> None:
-        self.domain = domain
+        self.domain, self.latest_s = domain, 0.0
         own = {"clock": _CLOCK, "goal_pose": _GOAL, **_ROBOT, **_AS_READ}
         laser = Topic("scan", READ["scan"].message, depth=5)
         own |= {f"scan {number}": renamed(laser, name) for number, name in enumerate(scans)}
@@ -66,6 +74,14 @@ class Link:
             for message in node.take(topic):
                 newest = message.twist if isinstance(message, TwistStamped) else message  # type: ignore[assignment]
         return newest
+
+    def heard(self) -> tuple[SpeedLimit | None, People | None]:
+        """Return the newest limit and people since the last call, of an adapter outside."""
+        node = self._nodes[1]
+        for topic in _HEARD:
+            node.subscribe(topic, wakes=False)
+        limit, people = (next(iter(node.take(topic)[::-1]), None) for topic in _HEARD)
+        return limit, people  # type: ignore[return-value]
 
 
 @lru_cache(maxsize=4)

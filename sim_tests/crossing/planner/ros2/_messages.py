@@ -8,9 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+from shapely.geometry import Point as Point2d
 
-from nav_adapter import RobotState
-from nav_adapter.ros2.conversions import header, to_time, yaw_quaternion
+from nav_adapter import PersonObstacle, RobotState
+from nav_adapter.ros2.conversions import header, to_seconds, to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
     Pose,
@@ -24,10 +25,13 @@ from nav_adapter.ros2.messages.geometry_msgs import (
     Vector3,
 )
 from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid, Odometry
+from nav_adapter.ros2.messages.people_msgs import People
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import Camera, laser
+from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray, ImageRgb
+from tracking import PersonTrack
 
 #: Frames by their usual names (REP-105).
 MAP: Final = "map"
@@ -132,3 +136,41 @@ def goal_pose(stamp_s: float, goal_m: Sequence[float], yaw_rad: float) -> PoseSt
     """Return a goal in the map."""
     x, y = goal_m
     return PoseStamped(header(stamp_s, MAP), Pose(Point(x, y, 0.0), yaw_quaternion(yaw_rad)))
+
+
+def people_of(
+    message: People,
+) -> tuple[tuple[PersonObstacle, ...], tuple[PersonTrack, ...]]:
+    """Return the people of an adapter outside as its obstacles, and as tracks where it has one.
+
+    Their covariances are not in the message, and 0 in the tracks.
+    """
+    obstacles, tracks = [], []
+    for person in message.people:
+        tags: dict[str, str] = dict(zip(person.tagnames, person.tags, strict=True))
+        who, lower = int(person.name), float(tags["awareness_lower"])
+        place, velocity = (
+            np.array([each.x, each.y]) for each in (person.position, person.velocity)
+        )
+        radius_m = float(tags["radius_m"])
+        circle = Point2d(place).buffer(radius_m)
+        obstacles.append(
+            PersonObstacle(who, place, velocity, radius_m, MEAN_STATURE_M, lower, circle)
+        )
+        if "awareness" in tags:
+            tracks.append(
+                PersonTrack(
+                    who,
+                    to_seconds(message.header.stamp),
+                    tags["status"],  # type: ignore[arg-type]
+                    place,
+                    velocity,
+                    np.zeros((4, 4)),
+                    float(tags["awareness"]),
+                    float(tags["awareness_std"]),
+                    lower,
+                    MEAN_STATURE_M,
+                    float(tags["time_since_seen_s"]),
+                )
+            )
+    return tuple(obstacles), tuple(tracks)

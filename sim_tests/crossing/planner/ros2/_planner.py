@@ -15,12 +15,13 @@ from typing import ClassVar, Final
 import numpy as np
 from filelock import FileLock, Timeout
 
-from nav_adapter import NavConstraints, RobotProfile, RobotState
+from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
 from nav_adapter.ros2 import Frames, SpeedMaskSettings, SpeedMaskStream, outgoing
 from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages.geometry_msgs import Twist
 from nav_adapter.ros2.messages.rosgraph_msgs import Clock
 from perception.arrays import FloatArray, finite_number
+from tracking import PersonTrack
 
 from ....world.camera import CameraTiming, CoarseSceneryRenderer, FrameClock
 from ....world.errors import SimError
@@ -36,6 +37,7 @@ from ._messages import (
     goal_pose,
     map_message,
     odometry,
+    people_of,
     picture_messages,
     scan_message,
     static_transforms,
@@ -52,6 +54,9 @@ _FOUND_S: Final = 3.0
 _SILENT_S: Final = 0.5
 # After everybody is there, costmaps get scans for so long before the goal.
 _SETTLES_S: Final = 1.5
+# An adapter outside takes a robot that was silent for so long for one that begins anew; one that
+# jumps back to the start has odometry that contradicts itself.
+_PUT_BACK_S: Final = 2.0
 _WAITING_PERIOD_S: Final = 0.05
 # A stack that is asked to drive and sends no command for so long does not drive.
 _FIRST_COMMAND_S: Final = 15.0
@@ -82,7 +87,9 @@ class Ros2Planner:
             topic where somebody reads it, else ``"follow_path"``.
         limit: ``"policy"`` publishes the constraints; ``"nobody"`` those of a robot that meets
             nobody, with which the stack drives as without this library; ``"outside"`` none, for
-            something else that does, such as ``awarenav bridge``.
+            something else that does, such as ``awarenav bridge``. Frames have what the stack is
+            told: with ``"outside"``, limit and people as they are heard on ``/speed_limit`` and
+            ``/people``.
         pace: simulated seconds per second; 1 is real time. Another pace needs ``use_sim_time``.
         command_hz: rate at which the stack sends commands, in simulated time: the clock then waits
             for each of them (lockstep), but goes no faster than the pace; 0 does not wait.
@@ -100,7 +107,6 @@ class Ros2Planner:
 
     #: The same episode differs from run to run, and one stack drives one robot at a time.
     outside: ClassVar = True
-    _latest_s: ClassVar = 0.0
 
     def __init__(
         self,
@@ -140,6 +146,8 @@ class Ros2Planner:
         self._publish_robot: Callable[[RobotState, float], None] | None = None
         self._command, self._command_s = _STILL, -math.inf
         self._driven = False
+        self._told: tuple[NavConstraints, tuple[PersonTrack, ...]]
+        self._told = self._constraints(robot.max_speed_mps), ()
         self._actions: Actions | None = None
 
     @contextlib.contextmanager
@@ -157,6 +165,9 @@ class Ros2Planner:
             )
         with self._alone_with_the_stack():
             self._link = link = link_to(self._domain, self._scans[:count])
+            if self._limit == LIMITS[2]:
+                silent_s = time.time() - link.latest_s
+                time.sleep(min(max(_PUT_BACK_S - silent_s, 0.0), _PUT_BACK_S))
             self._publish_robot = self._robots_publisher(stage, link)
             self._mask = SpeedMaskStream(SpeedMaskSettings(), ODOM)
             self._next_publication_s = 0.0
@@ -186,6 +197,38 @@ class Ros2Planner:
         finally:
             lock.release()
 
+    def told(
+        self, constraints: NavConstraints, tracks: tuple[PersonTrack, ...]
+    ) -> tuple[NavConstraints, tuple[PersonTrack, ...]]:
+        """Return what the stack is told of limit and people, by the setting ``limit``."""
+        if self._limit == LIMITS[0]:
+            return constraints, tracks
+        self._hear()
+        own, tracks = self._told
+        return replace(own, stamp_s=constraints.stamp_s), tracks
+
+    def _hear(self) -> None:
+        """Take what an adapter outside says; a controller keeps the last limit."""
+        if self._limit != LIMITS[2]:
+            return
+        (before, tracks), (limit, people) = self._told, self._link.heard()
+        obstacles, limit_mps = before.obstacles, before.speed_limit_mps
+        maximum_mps = self._robot.max_speed_mps
+        if limit is not None:
+            value_mps = limit.speed_limit * (maximum_mps / 100.0 if limit.percentage else 1.0)
+            limit_mps = min(value_mps or maximum_mps, maximum_mps)  # 0 removes all limits
+        if people is not None:
+            obstacles, tracks = people_of(people)
+        self._told = self._constraints(limit_mps, obstacles), tracks
+
+    def _constraints(
+        self, limit_mps: float, obstacles: tuple[PersonObstacle, ...] = ()
+    ) -> NavConstraints:
+        """Return constraints for the base; they have no limit of the fastest point."""
+        return NavConstraints(
+            0.0, obstacles, limit_mps, self._limit, False, fastest_point_limit_mps=math.inf
+        )
+
     def plan(
         self,
         robot_state: RobotState,
@@ -212,7 +255,7 @@ class Ros2Planner:
             self._next_publication_s += 1.0 / _PUBLISHED_HZ
             self._publish_constraints(constraints, robot_state)
         self._publish_robot(robot_state, self._start_s)
-        Ros2Planner._latest_s = self._start_s + t_s
+        self._link.latest_s = self._start_s + t_s
         self._await_command(t_s, dt_s)
         if not self._driven and t_s > _FIRST_COMMAND_S:
             refused = self._actions.refused if self._actions is not None else ""
@@ -259,8 +302,6 @@ class Ros2Planner:
         """Publish what the bridge does, on topics that somebody reads."""
         stamp_s = self._start_s + constraints.stamp_s
         stamped = replace(constraints, stamp_s=stamp_s)
-        if self._limit == LIMITS[1]:
-            stamped = NavConstraints(stamp_s, (), self._robot.max_speed_mps, "nobody", False)
         state = replace(state, stamp_s=self._start_s + state.stamp_s)
         read_by = self._link.read_by
         for messages in (
@@ -278,6 +319,7 @@ class Ros2Planner:
         while not settled or time.monotonic() < settled:
             self._publish_robot(stage.amr.state(0.0), self._stamp())
             link.command()  # those of the goal before
+            self._hear()
             time.sleep(_WAITING_PERIOD_S)
             waited_s = time.monotonic() - began
             missing = [] if link.is_driven else ["nobody publishes cmd_vel"]
@@ -322,8 +364,8 @@ class Ros2Planner:
 
     def _stamp(self) -> float:
         """Return the time on the clock of the topics: the computer's, and it never goes back."""
-        Ros2Planner._latest_s = max(Ros2Planner._latest_s + 1e-3, time.time())
-        return Ros2Planner._latest_s
+        self._link.latest_s = max(self._link.latest_s + 1e-3, time.time())
+        return self._link.latest_s
 
     def _robots_publisher(self, stage: Stage, link: Link) -> Callable[[RobotState, float], None]:
         """Publish map and mounts; return what publishes the robot's state and scans."""
