@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,6 +30,8 @@ SERVERS: Final = {
 }
 #: Those that filter the commands of the others.
 FILTERS: Final = ("velocity_smoother", "collision_monitor")
+#: Those that only behaviours need.
+BEHAVING: Final = ("behavior_server",)
 # As in nav2_bringup.
 _REMAPPED: Final = ("controller_server", "velocity_smoother", "behavior_server")
 _REMAPPING: Final = ("-r", "cmd_vel:=cmd_vel_nav")
@@ -49,7 +52,7 @@ _ALLOWED_S: Final = 60
 Processes = dict[str, "subprocess.Popen[bytes]"]
 
 
-def start(settings: dict[str, Any], log: Path, *, bare: bool) -> Processes:
+def start(settings: dict[str, Any], log: Path, *, without: Sequence[str]) -> Processes:
     """Start the servers with these parameters, and return their processes by name."""
     prefix = Path(os.environ.get("OVERLAY") or f"/opt/ros/{os.environ.get('ROS_DISTRO', 'jazzy')}")
     file = log.with_suffix(".yaml")
@@ -64,12 +67,10 @@ def start(settings: dict[str, Any], log: Path, *, bare: bool) -> Processes:
         environment["LD_PRELOAD"] = str(found)
     output = log.open("wb")
     started = {}
-    for name in SERVERS:
-        if bare and name in FILTERS:
-            continue
+    for name in [each for each in SERVERS if each not in without]:
         program = prefix / "lib" / SERVERS[name] / name
         words = [str(program), "--ros-args", "--params-file", str(file)]
-        words += () if bare or name not in _REMAPPED else _REMAPPING
+        words += _REMAPPING if name in _REMAPPED and FILTERS[0] not in without else ()
         started[name] = subprocess.Popen(
             words, env=environment, stdout=output, stderr=subprocess.STDOUT
         )
@@ -179,6 +180,7 @@ def main() -> int:
     parser.add_argument(
         "--set",
         nargs="*",
+        action="extend",
         default=[],
         metavar="SERVER.PARAMETER=VALUE",
         help="parameters that differ, such as behavior_server.max_rotational_vel=1.0",
@@ -197,7 +199,8 @@ def main() -> int:
             values = values[group]
             values = values.get("ros__parameters", values)
         values[last] = json.loads(value)
-    processes = start(settings, options.log, bare=options.bare)
+    without = [*(FILTERS if options.bare else ()), *(() if options.behaviour else BEHAVING)]
+    processes = start(settings, options.log, without=without)
     try:
         rclpy.init()
         node = rclpy.create_node("nav2_launch")
