@@ -15,9 +15,9 @@ _BLIND: Final = ("--set", "behavior_server.simulate_ahead_time=0.0")
 #: What is there to stop a behaviour, and the arguments of :mod:`benchmarks.nav2.launch` for it.
 GUARDS: Final = {
     "nothing": ("--bare", *_BLIND),
-    "looks ahead in the costmap of the scans": ("--bare",),
-    "and of `people_layer`": ("--face", "grid", "--bare"),
-    "collision monitor, stop zone": _BLIND,
+    "look-ahead, scans": ("--bare",),
+    "look-ahead, `people_layer`": ("--face", "grid", "--bare"),
+    "collision monitor": _BLIND,
 }
 _PROGRESS: Final = "controller_server.progress_checker.movement_time_allowance"
 

@@ -87,8 +87,8 @@ class SpeedMaskStream:
 
     Nav2's filter subscribes to the mask at a filter info, and anew at every further one: the info
     is sent once, whether or not somebody reads the mask yet. A mask holds until the next one: the
-    lower limit of its stamp and a period later counts. When constraints stop the robot for lack of data, the mask is a stop everywhere, at
-    once.
+    lower limit of its stamp and a period later counts. When constraints stop the robot for lack of
+    data, the mask is a stop everywhere, at once.
     """
 
     def __init__(self, settings: SpeedMaskSettings, frame_id: str) -> None:
