@@ -4,44 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import os
-import subprocess
 import sys
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from awarenav.errors import AwarenavError
 from benchmarks._harness import count, make_parser
-from sim_tests.crossing.planner.ros2 import python_with_ros
 from sim_tests.study.measures import read_records, write_records
 from sim_tests.study.runs import RunFiles, plan_jobs, read_attempts, run_jobs
-from sim_tests.world.errors import SimError
 
+from . import behaviours
 from ._results import table, write_excess
+from ._stack import nav2
 from .parameters import CONTROLLERS, FACES
 
 _TIME_LIMIT_S: Final = 300.0
-
-
-@contextlib.contextmanager
-def nav2(controller: str, face: str, log: Path, *, bare: bool) -> Iterator[None]:
-    """Have a Nav2 in the domain of this process until the block ends; it goes on by itself."""
-    words = [python_with_ros(), "-m", "benchmarks.nav2.launch", controller, "--face", face]
-    words += ["--log", str(log), *(["--bare"] if bare else [])]
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True)
-    try:
-        time.sleep(1.0)
-        if process.poll() is not None:
-            raise SimError(f"Nav2 did not start; see above, and {log}")
-        yield
-    finally:
-        process.terminate()
-        try:
-            process.wait(15.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
 
 
 def measure(
@@ -72,7 +51,8 @@ def measure(
     with contextlib.suppress(AwarenavError, OSError):
         if len(read_records(files.episodes)) == len(jobs):
             return
-    with nav2(controller, face, out / f"{folder.name}.log", bare=bare):
+    words = ["--face", face, *(["--bare"] if bare else [])]
+    with nav2(controller, *words, log=out / f"{folder.name}.log"):
         run_jobs(
             jobs,
             folder,
@@ -117,6 +97,9 @@ def main() -> int:
     parser.add_argument("--bare", action="store_true", help="no smoother, no collision monitor")
     parser.add_argument("--domain", default="77", help="ROS_DOMAIN_ID")
     parser.add_argument("--out", type=Path, default=Path("runs/nav2"), metavar="FOLDER")
+    parser.add_argument(
+        "--behaviours", action="store_true", help="beside somebody who stands; no crossings"
+    )
     parser.add_argument("--results", action="store_true", help="print the committed table; no run")
     options = parser.parse_args()
     if options.results:
@@ -125,6 +108,9 @@ def main() -> int:
     os.environ["ROS_DOMAIN_ID"] = options.domain
     options.out.mkdir(parents=True, exist_ok=True)
     try:
+        if options.behaviours:
+            print(behaviours.table(options.out / "behaviours.log"))
+            return 0
         for controller in options.controller:
             for face in options.face:
                 measure(

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -25,24 +26,37 @@ SERVERS: Final = {
     "planner_server": "nav2_planner",
     "velocity_smoother": "nav2_velocity_smoother",
     "collision_monitor": "nav2_collision_monitor",
+    "behavior_server": "nav2_behaviors",
 }
-#: Those that plan; the others filter the commands.
-BARE: Final = ("controller_server", "planner_server")
+#: Those that filter the commands of the others.
+FILTERS: Final = ("velocity_smoother", "collision_monitor")
+#: Those that only behaviours need.
+BEHAVING: Final = ("behavior_server",)
 # As in nav2_bringup.
-_REMAPPED: Final = ("controller_server", "velocity_smoother")
+_REMAPPED: Final = ("controller_server", "velocity_smoother", "behavior_server")
 _REMAPPING: Final = ("-r", "cmd_vel:=cmd_vel_nav")
 # No limit, in a message of Nav2's.
 _NONE: Final = 0.0
+#: Actions that a goal pose can start, and their types.
+BEHAVIOURS: Final = {
+    "spin": "Spin",
+    "backup": "BackUp",
+    "drive_on_heading": "DriveOnHeading",
+    "follow_path": "FollowPath",
+}
+_TURN_RAD: Final = 3.1
+_WAY_M: Final = 1.5
+_ALLOWED_S: Final = 60
 
 
 Processes = dict[str, "subprocess.Popen[bytes]"]
 
 
-def start(controller: str, face: str, log: Path, *, bare: bool) -> Processes:
-    """Start the servers, and return their processes by name."""
+def start(settings: dict[str, Any], log: Path, *, without: Sequence[str]) -> Processes:
+    """Start the servers with these parameters, and return their processes by name."""
     prefix = Path(os.environ.get("OVERLAY") or f"/opt/ros/{os.environ.get('ROS_DISTRO', 'jazzy')}")
-    settings = log.with_suffix(".yaml")
-    settings.write_text(json.dumps(parameters(controller, face)))  # JSON is YAML
+    file = log.with_suffix(".yaml")
+    file.write_text(json.dumps(settings))  # JSON is YAML
     environment = dict(os.environ)
     if "OVERLAY" in os.environ:
         # ROS from wheels leaves the symbols of Python to the program.
@@ -53,10 +67,10 @@ def start(controller: str, face: str, log: Path, *, bare: bool) -> Processes:
         environment["LD_PRELOAD"] = str(found)
     output = log.open("wb")
     started = {}
-    for name in BARE if bare else SERVERS:
+    for name in [each for each in SERVERS if each not in without]:
         program = prefix / "lib" / SERVERS[name] / name
-        words = [str(program), "--ros-args", "--params-file", str(settings)]
-        words += () if bare or name not in _REMAPPED else _REMAPPING
+        words = [str(program), "--ros-args", "--params-file", str(file)]
+        words += _REMAPPING if name in _REMAPPED and FILTERS[0] not in without else ()
         started[name] = subprocess.Popen(
             words, env=environment, stdout=output, stderr=subprocess.STDOUT
         )
@@ -115,6 +129,44 @@ def keep_lower(node: Any) -> None:
         node.create_subscription(SpeedLimit, topic, lambda m, t=topic: take(t, m), 10)
 
 
+def behave(node: Any, name: str, speed_mps: float) -> None:
+    """Do one behaviour at the first goal pose, in place of a navigator, and print how it ended."""
+    from geometry_msgs.msg import PoseStamped  # noqa: PLC0415
+    from nav2_msgs import action  # noqa: PLC0415
+    from rclpy.action import ActionClient  # noqa: PLC0415
+
+    kind = getattr(action, BEHAVIOURS[name])
+    client = ActionClient(node, kind, name)
+    began: list[float] = []
+
+    def begin(pose: Any) -> None:
+        if began:
+            return
+        began.append(time.monotonic())
+        goal = kind.Goal()
+        if name == "follow_path":
+            goal.path.header = pose.header
+            for x_m in range(int(pose.pose.position.x) + 1):
+                goal.path.poses.append(PoseStamped(header=pose.header))
+                goal.path.poses[-1].pose.position.x = float(x_m)
+        else:
+            goal.time_allowance.sec = _ALLOWED_S
+            if name == "spin":
+                goal.target_yaw = _TURN_RAD
+            else:
+                goal.target.x, goal.speed = _WAY_M, speed_mps
+        client.send_goal_async(goal).add_done_callback(
+            lambda sent: sent.result().get_result_async().add_done_callback(end)
+        )
+
+    def end(future: Any) -> None:
+        found, after_s = future.result(), time.monotonic() - began[0]
+        said = {"status": found.status, "error": found.result.error_code, "after_s": after_s}
+        print(json.dumps(said), flush=True)
+
+    node.create_subscription(PoseStamped, "goal_pose", begin, 1)
+
+
 def main() -> int:
     """Run until it is ended."""
     import rclpy  # noqa: PLC0415
@@ -125,16 +177,38 @@ def main() -> int:
     parser.add_argument(
         "--bare", action="store_true", help="no velocity smoother and no collision monitor"
     )
+    parser.add_argument(
+        "--set",
+        nargs="*",
+        action="extend",
+        default=[],
+        metavar="SERVER.PARAMETER=VALUE",
+        help="parameters that differ, such as behavior_server.max_rotational_vel=1.0",
+    )
+    parser.add_argument("--behaviour", choices=BEHAVIOURS, help="do it at the first goal_pose")
+    parser.add_argument("--speed", type=float, default=0.25, help="of BackUp and DriveOnHeading")
     parser.add_argument("--log", type=Path, default=Path(tempfile.gettempdir()) / "nav2.log")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    processes = start(options.controller, options.face, options.log, bare=options.bare)
+    settings = parameters(options.controller, options.face)
+    for each in options.set:
+        name, _, value = each.partition("=")
+        *groups, last = name.split(".")
+        values = settings
+        for group in groups:
+            values = values[group]
+            values = values.get("ros__parameters", values)
+        values[last] = json.loads(value)
+    without = [*(FILTERS if options.bare else ()), *(() if options.behaviour else BEHAVING)]
+    processes = start(settings, options.log, without=without)
     try:
         rclpy.init()
         node = rclpy.create_node("nav2_launch")
         if options.face == "mask":
             keep_lower(node)
         bring_up(node, processes)
+        if options.behaviour:
+            behave(node, options.behaviour, options.speed)
         print(f"{options.controller} with {options.face} is active", flush=True)
         while True:
             rclpy.spin_once(node, timeout_sec=0.2)

@@ -223,6 +223,21 @@ def parameters(controller: str, face: str) -> dict[str, Any]:
             max_decel=[-_ACCELERATION_MPS2, 0.0, -3.0],
             velocity_timeout=1.0,
         ),
+        "behavior_server": _node(
+            local_frame="odom",
+            global_frame="map",
+            robot_base_frame="base_link",
+            transform_tolerance=0.3,
+            behavior_plugins=["spin", "backup", "drive_on_heading"],
+            spin={"plugin": "nav2_behaviors::Spin"},
+            backup={"plugin": "nav2_behaviors::BackUp"},
+            drive_on_heading={"plugin": "nav2_behaviors::DriveOnHeading"},
+            # As docs/nav2/nav2_params.yaml.
+            max_rotational_vel=0.55,
+            min_rotational_vel=0.2,
+            rotational_acc_lim=3.0,
+            simulate_ahead_time=2.0,
+        ),
         "collision_monitor": _node(**_monitor(people=face != "today")),
     }
 

@@ -85,10 +85,10 @@ class SpeedMaskSettings:
 class SpeedMaskStream:
     """Makes the messages of a speed mask, publication by publication.
 
-    Nav2's filter subscribes to the mask anew at every filter info, so the info is sent once, before
-    the first mask. A mask holds until the next one: the lower limit of its stamp and a period later
-    counts. When constraints stop the robot for lack of data, the mask is a stop everywhere, at
-    once.
+    Nav2's filter subscribes to the mask at a filter info, and anew at every further one: the info
+    is sent once, whether or not somebody reads the mask yet. A mask holds until the next one: the
+    lower limit of its stamp and a period later counts. When constraints stop the robot for lack of
+    data, the mask is a stop everywhere, at once.
     """
 
     def __init__(self, settings: SpeedMaskSettings, frame_id: str) -> None:
@@ -106,7 +106,7 @@ class SpeedMaskStream:
 
         The mask is around the robot; without its state only a stop is sent.
         """
-        if not wanted("speed_mask"):
+        if not (wanted("speed_mask") or wanted("speed_mask_info")):
             return
         stops = constraints.speed_basis is None or (
             constraints.stale and constraints.speed_limit_mps == 0.0
@@ -126,7 +126,8 @@ class SpeedMaskStream:
         if not self._info_sent and wanted("speed_mask_info"):
             self._info_sent = True
             yield "speed_mask_info", info
-        yield "speed_mask", mask
+        if wanted("speed_mask"):
+            yield "speed_mask", mask
 
     def _is_due(self, stamp_s: float) -> bool:
         if self._map is None:
