@@ -31,6 +31,7 @@ def measure(
     scenarios: Sequence[str],
     seeds: int,
     policies: Sequence[str],
+    robot: str,
     perception: str,
     settings: str,
     bare: bool,
@@ -45,8 +46,11 @@ def measure(
         planners=[f"ros2(goal='follow_path'{alone}{settings})"],
         perception=perception.removesuffix("+scanner"),
         sensors=["camera+scanner" if perception.endswith("+scanner") else "camera"],
+        robot=robot,
     )
-    folder = out / f"{controller}_{face}{'_bare' if bare else ''}"
+    folder = out / "_".join(
+        [controller, face, *(["bare"] if bare else []), *([Path(robot).stem] if robot else [])]
+    )
     files = RunFiles(folder)
     with contextlib.suppress(AwarenavError, OSError):
         if len(read_records(files.episodes)) == len(jobs):
@@ -70,7 +74,7 @@ def collect(out: Path) -> Path:
     """
     rows, conducts = [], []
     for path in sorted(out.glob("*/episodes.csv")):
-        controller, _, face = path.parent.name.partition("_")
+        controller, face, *_ = path.parent.name.split("_")
         for attempt in read_attempts(path.parent).values():
             rows.append(replace(attempt.record, planner=f"{controller}, {face}"))
             conducts.append(attempt.conduct)
@@ -91,6 +95,7 @@ def main() -> int:
     parser.add_argument("--face", nargs="+", choices=FACES, default=list(FACES))
     parser.add_argument("--scenario", nargs="+", default=["all"], metavar="NAME")
     parser.add_argument("--policy", nargs="+", default=["balanced", "blind"], metavar="NAME")
+    parser.add_argument("--robot", default="", metavar="NAME|FILE", help="another robot")
     parser.add_argument("--seeds", type=count, default=3, metavar="N")
     parser.add_argument("--perception", default="truth", metavar="NAME")
     parser.add_argument("--settings", default="", help="of the planner, such as ', pace=2'")
@@ -120,6 +125,7 @@ def main() -> int:
                     scenarios=options.scenario,
                     seeds=options.seeds,
                     policies=options.policy,
+                    robot=options.robot,
                     perception=options.perception,
                     settings=options.settings,
                     bare=options.bare,

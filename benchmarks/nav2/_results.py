@@ -18,11 +18,16 @@ from sim_tests.study.measures import (
     read_records,
 )
 
+#: A robot whose controller keeps its path while it slows down.
+ON_ITS_CURVE: Final = Path(__file__).with_name("on_its_curve.yaml")
 #: The committed rows.
 ROWS: Final = Path(__file__).with_name("rows.csv")
 # Beside them: by how much the fastest point of the robot was above the limit.
 _EXCESS: Final = "excess.csv"
-_EXCESS_COLUMNS: Final = ("planner", "policy", "scenario", "seed", "fastest_point_excess_mps")
+_EXCESS_COLUMNS: Final = (
+    *("planner", "policy", "robot", "scenario", "seed"),
+    "fastest_point_excess_mps",
+)
 # Two columns of impacts in words. Rows from before looks were what people do have the second.
 _IMPACTS: Final = {
     "never noticed; all": ("step_out_never", "step_out_all"),
@@ -35,8 +40,8 @@ _FACES: Final = {
     "grid": "limit and grid of people",
     "mask": "limit and speed mask",
 }
-#: Policies of the rows, in words.
-_POLICIES: Final = {"": "", "balanced_own_path": ", `balanced`, keeps its path"}
+#: Robots of the rows, in words.
+_ROBOTS: Final = {"": "", ON_ITS_CURVE.stem: ", keeps its path"}
 
 
 def write_excess(
@@ -49,15 +54,21 @@ def write_excess(
         for row, conduct in zip(rows, conducts, strict=True):
             if conduct is not None and conduct.fastest_point_excess_mps is not None:
                 excess_mps = round(conduct.fastest_point_excess_mps, 4)
-                writer.writerow((row.planner, row.policy, row.scenario, row.seed, excess_mps))
+                writer.writerow((*_keys(row), row.scenario, row.seed, excess_mps))
 
 
-def _read_excess(path: Path) -> dict[tuple[str, str], list[float]]:
-    """Return the excesses (m/s) beside a table of rows, by planner and policy."""
-    found: dict[tuple[str, str], list[float]] = {}
+def _keys(row: EpisodeRecord) -> tuple[str, str, str]:
+    """Return the stack and the robot of a row. Alone, no policy reaches the stack."""
+    policy = "" if row.planner.endswith(f", {_TODAY}") else row.policy
+    return row.planner, policy, row.robot or ""
+
+
+def _read_excess(path: Path) -> dict[tuple[str, str, str], list[float]]:
+    """Return the excesses (m/s) beside a table of rows, by stack and robot."""
+    found: dict[tuple[str, str, str], list[float]] = {}
     with path.with_name(_EXCESS).open(newline="", encoding="utf-8") as file:
-        for planner, policy, _, _, value in list(csv.reader(file))[1:]:
-            found.setdefault((planner, policy), []).append(float(value))
+        for planner, policy, robot, _, _, value in list(csv.reader(file))[1:]:
+            found.setdefault((planner, policy, robot), []).append(float(value))
     return found
 
 
@@ -75,28 +86,27 @@ def table(path: Path = ROWS) -> str:
     people, names = next(each for each in _IMPACTS.items() if each[1][0] in cells[0])
     for row, cell in zip(read_records(path), cells, strict=True):
         impacts_of[row.conditions] = [float(cell[name] or 0.0) for name in names]
-        controller, _, face = row.planner.partition(", ")
-        policy = "" if face == _TODAY else row.policy
-        groups.setdefault((controller, face, policy), []).append(row)
+        groups.setdefault(_keys(row), []).append(row)
     lines = [
         "| stack | goals | time over today's | with attentive people | touched while moving | "
         f"step-out impacts, {people} | above the limit, m/s: median, worst |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for (controller, face, policy), rows in groups.items():
-        today = groups[controller, _TODAY, ""]
+    for (stack, policy, robot), rows in groups.items():
+        controller, _, face = stack.partition(", ")
+        today = groups[f"{controller}, {_TODAY}", "", ""]
         attentive = [each for each in rows if each.attention == "attentive"]
         touched = [each for each in rows if each.moving_contacts]
         fastest = max((each.moving_contact_mps or 0.0 for each in touched), default=0.0)
         impacts = np.mean([impacts_of[each.conditions] for each in rows], axis=0)
         cells = (
-            f"{controller}, {_FACES[face]}{_POLICIES.get(policy, f', `{policy}`')}",
+            f"{controller}, {_FACES[face]}{policy and f', `{policy}`'}{_ROBOTS[robot]}",
             f"{sum(each.time_to_goal_s is not None for each in rows)} of {len(rows)}",
             _times(today, rows) if policy else "1",
             _times(today, attentive) if policy else "1",
             f"{len(touched)}, {fastest:.2f} m/s" if touched else "0",
             "; ".join(f"{each:.1f}" for each in impacts),
-            _excess(above_mps[f"{controller}, {face}", policy]) if policy else "",
+            _excess(above_mps[stack, policy, robot]) if policy else "",
         )
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
