@@ -182,7 +182,7 @@ def test_the_same_people_stand_in_the_base_frame_however_the_camera_is_rolled(
 
 @pytest.mark.parametrize("quarters", [0, 1, 2, 3])
 def test_views_of_a_panorama_that_is_rolled_are_turned_too(quarters):
-    view = Camera.from_fov(320, 320, math.radians(80.0))
+    view = Camera(320, 320, 190.0, 190.0, 159.5, 159.5)
     rng = np.random.default_rng(2)
     networks = Marks(person_at((0.2, 0.3, 3.0)).keypoints(view, 0.0, rng))
 
