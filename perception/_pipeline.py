@@ -21,6 +21,7 @@ from ._stages import (
     HeadPose,
     HeadPoseEstimator,
     PersonDetector,
+    PersonKeypoints,
     PoseEstimator,
     check_count,
 )
@@ -181,8 +182,8 @@ class AwarenessPipeline:
         self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator
         if eye_estimator is not None and not isinstance(eye_estimator, EyeEstimator):
             raise PerceptionError(
-                "eye_estimator must have the method estimate(image_rgb, camera, heads), got "
-                f"{type(eye_estimator).__name__}"
+                "eye_estimator must have the method estimate(image_rgb, camera, heads, people), "
+                f"got {type(eye_estimator).__name__}"
             )
         self._eye_estimator = eye_estimator
         self._turned: dict[QuarterTurn, AwarenessPipeline] = {}
@@ -299,7 +300,7 @@ class AwarenessPipeline:
             check_count("head_pose_estimator", len(heads), len(people))
             found, heads = own_heads(self.camera, found, heads, self._min_score)
             people = tuple(one.keypoints for one in found)
-            eyes = self._eyes(image_rgb, heads)
+            eyes = self._eyes(image_rgb, heads, people)
             places = place_people(
                 self.camera,
                 tuple(one.detection for one in found),
@@ -349,12 +350,15 @@ class AwarenessPipeline:
         }
 
     def _eyes(
-        self, image_rgb: ImageRgb, heads: tuple[HeadPose | None, ...]
+        self,
+        image_rgb: ImageRgb,
+        heads: tuple[HeadPose | None, ...],
+        people: tuple[PersonKeypoints, ...],
     ) -> tuple[EyeGaze | None, ...]:
         """Return the eyes in each head, combined with how eyes turn; None where not known."""
         if self._eye_estimator is None:
             return (None,) * len(heads)
-        measured = tuple(self._eye_estimator.estimate(image_rgb, self.camera, heads))
+        measured = tuple(self._eye_estimator.estimate(image_rgb, self.camera, heads, people))
         check_count("eye_estimator", len(measured), len(heads))
         return known_eyes(measured, self._eye_std_rad)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -39,6 +39,10 @@ Placement = tuple[FloatArray, FloatArray]
 # Probability that each cue is an outlier. "Bottom" is the lower edge of the box.
 _BODY_OUTLIER, _BOX_OUTLIER, _HEAD_OUTLIER = 0.03, 0.05, 0.05
 _FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
+# Of somebody whom the lower border cuts: networks know whole people, and fit one into the part that
+# is seen, knees and feet included. Then the skeleton is less sure, too.
+_CUT_BODY_OUTLIER, _CUT_LEGS_OUTLIER = 0.30, 0.80
+_CUT_BODY_STD: Final = 0.15
 # A surface on the chest's place is that of something else only if it hides the chest, which its
 # keypoints then seldom survive.
 _CHEST_OUTLIER: Final = 0.005
@@ -242,6 +246,9 @@ def _range_cues(
     along = math.sqrt(max(float(position @ covariance @ position), 1e-9)) / squared
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
     outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
+    cut = bool(cut_by_border(camera, seen.detection.box_xyxy_px[None])[1][0])
+    if body is not None and cut:
+        along, outlier = math.hypot(along, _CUT_BODY_STD), _CUT_BODY_OUTLIER
     stature = min(stature, STATURE_RELATIVE_STD, 0.99 * along)
     cues = [DepthCue(0.0, along, stature, outlier, *_UNUSUAL, 0.5, HIDDEN_OFFSET * (body is None))]
     if (cue := _head_cue(position, seen, body, floor)) is not None:
@@ -256,6 +263,9 @@ def _range_cues(
         else:
             cue = _bottom_cue(camera, seen.detection, position, floor)
         if cue is not None:
+            if cut:
+                least = max(cue.outlier_probability, _CUT_LEGS_OUTLIER)
+                cue = replace(cue, outlier_probability=least)
             cues.append(cue)
     return cues
 

@@ -115,6 +115,7 @@ def _turned_keypoints(person: PersonKeypoints, back: FloatArray, corner: FloatAr
         person,
         keypoints_px=person.keypoints_px @ back[:2, :2].T + corner,
         keypoints_root_m=person.keypoints_root_m @ back.T,
+        irises_px=None if person.irises_px is None else back[:2, :2] @ person.irises_px,
     )
 
 

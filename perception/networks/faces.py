@@ -78,6 +78,9 @@ _MIN_SIDE_PX: Final = 8.0
 # Mesh points whose mean is nose, left eye, right eye, left ear and right ear. The mesh's tragions
 # are higher than the template's ears and would lower level heads by 5° (13 rendered workers); with
 # the points below them it is 1°.
+# Their ears are 140 mm apart, and the template's 156: a head by these points seems 11 % farther
+# than it is (84 rendered faces at 0.8 to 7 m, 7 % of spread).
+_FACE_SCALE: Final = 0.9
 _HEAD_POINTS: Final = ((1, 1), (263, 362), (33, 133), (454, 323), (234, 93))
 # Angles off the camera between which an ear goes out of sight behind the cheek, and an eye behind
 # the nose.
@@ -219,7 +222,13 @@ class FaceMeshPoseEstimator:
         points = np.array([marks[list(rows)].mean(axis=0) for rows in _HEAD_POINTS])
         pixels[kp.HEAD], scores[kp.HEAD] = points[:, :2], _face_scores(points)
         return replace(
-            person, keypoints_px=pixels, scores=scores, face_evidence=True, eyes_open=eyes_open
+            person,
+            keypoints_px=pixels,
+            scores=scores,
+            face_evidence=True,
+            face_scale=_FACE_SCALE,
+            eyes_open=eyes_open,
+            irises_px=iris_offset(marks[:, :2]),
         )
 
 
@@ -227,11 +236,8 @@ class FaceMeshPoseEstimator:
 _IRISES: Final = (473, 468)
 _CORNERS: Final = ((362, 263), (133, 33))
 _LIDS: Final = ((386, 374), (159, 145))
-# Side of the square about the head, and how far from its middle the face may lie.
-_CROP_M: Final = 0.45
-_OFF_M: Final = 0.12
 _MIN_DEPTH_M: Final = 0.1
-# Smaller irises (diameter) show no direction; the network does not run.
+# Smaller irises (diameter) show no direction.
 _IRIS_M: Final = 0.0117
 _MIN_IRIS_PX: Final = 2.5
 # Farther from the camera, the far eye hides behind the nose and the mesh slips.
@@ -246,59 +252,50 @@ _IRIS_STD_M: Final = (4e-4, 1.5e-3)
 
 
 class FaceMeshEyeEstimator:
-    """Rotation of the eyes of near people, from the irises of :class:`FaceMesh`.
+    """Rotation of the eyes of near people, from the irises of :class:`FaceMeshPoseEstimator`.
 
-    There is no result, and no run of the network, for an iris of less than 2.5 pixels across (2.6 m
-    at 640 pixels and 60°) or a head that is turned more than 50° away from the camera; and none
-    where no face is found or the eyes are closed.
-
-    Args:
-        mesh: finds the faces.
+    There is no result for an iris of less than 2.5 pixels across (2.6 m at 640 pixels and 60°) or a
+    head that is turned more than 50° away from the camera; and none where no face is found or the
+    eyes are closed.
     """
 
-    def __init__(self, mesh: FaceMesh) -> None:
-        self._mesh = mesh
-
     def estimate(
-        self, image_rgb: ImageRgb, camera: Camera, heads: tuple[HeadPose | None, ...]
+        self,
+        image_rgb: ImageRgb,
+        camera: Camera,
+        heads: tuple[HeadPose | None, ...],
+        people: tuple[PersonKeypoints, ...],
     ) -> tuple[EyeGaze | None, ...]:
         """Return the rotation of each person's eyes in the head; None where it is not known.
 
         Args:
-            image_rgb: (H, W, 3) uint8.
+            image_rgb: not used; may be None.
             camera: camera of the image.
             heads: head pose of each person.
-
-        Raises:
-            PerceptionError: for an image of another type or shape, and when a network fails.
+            people: the persons, with their irises.
         """
-        image = rgb_image(image_rgb)
-        return tuple(None if head is None else self._eyes(image, camera, head) for head in heads)
+        return tuple(
+            None
+            if head is None or person.irises_px is None
+            else _eyes(camera, head, person.irises_px)
+            for head, person in zip(heads, people, strict=True)
+        )
 
-    def _eyes(self, image: ImageRgb, camera: Camera, head: HeadPose) -> EyeGaze | None:
-        centre_m, eyes_m = (
-            head.position_camera_m + head.rotation_camera_head @ place
-            for place in (HEAD_CENTRE_HEAD_M, EYES_HEAD_M)
-        )
-        if centre_m[2] < _MIN_DEPTH_M or not _faces_camera(head):
-            return None
-        focal_px = ray_focal_px(camera)
-        px_per_m = focal_px / float(np.linalg.norm(eyes_m))
-        if px_per_m * _IRIS_M < _MIN_IRIS_PX:
-            return None
-        centre_px = camera.project(centre_m[None])
-        if not np.isfinite(centre_px).all():
-            return None
-        axes, stretch = looking_at(camera, centre_px)
-        marks = self._mesh.find(image, centre_px[0], _CROP_M * px_per_m, _OFF_M * px_per_m)
-        offset_px = (
-            None if marks is None else iris_offset(marks[:, :2] @ np.linalg.inv(stretch[0]).T)
-        )
-        if offset_px is None:
-            return None
-        return eyes_from_irises(
-            offset_px / px_per_m, axes[0], head, iris_std_m=iris_std_m(px_per_m)
-        )
+
+def _eyes(camera: Camera, head: HeadPose, irises_px: FloatArray) -> EyeGaze | None:
+    centre_m, eyes_m = (
+        head.position_camera_m + head.rotation_camera_head @ place
+        for place in (HEAD_CENTRE_HEAD_M, EYES_HEAD_M)
+    )
+    if centre_m[2] < _MIN_DEPTH_M or head.off_camera_rad > _MAX_HEAD_ANGLE_RAD:
+        return None
+    px_per_m = ray_focal_px(camera) / float(np.linalg.norm(eyes_m))
+    centre_px = camera.project(centre_m[None])
+    if px_per_m * _IRIS_M < _MIN_IRIS_PX or not np.isfinite(centre_px).all():
+        return None
+    axes, stretch = looking_at(camera, centre_px)
+    offset_px = np.linalg.inv(stretch[0]) @ irises_px
+    return eyes_from_irises(offset_px / px_per_m, axes[0], head, iris_std_m=iris_std_m(px_per_m))
 
 
 def iris_std_m(px_per_m: float) -> tuple[float, float]:
@@ -327,13 +324,6 @@ def _openings(points: FloatArray) -> FloatArray:
     width = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
     opening = np.linalg.norm(lids[:, 0] - lids[:, 1], axis=1)
     return np.asarray(opening / np.maximum(width, 1e-9))
-
-
-def _faces_camera(head: HeadPose) -> bool:
-    """Return True for a head that is turned less than 50° away from the camera."""
-    away = float(head.gaze_camera @ head.position_camera_m)
-    range_m = float(np.linalg.norm(head.position_camera_m))
-    return -away > math.cos(_MAX_HEAD_ANGLE_RAD) * range_m
 
 
 def _body_size_px(keypoints_px: FloatArray) -> float:
