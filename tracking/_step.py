@@ -21,7 +21,7 @@ from .awareness_filter import EVIDENCE_GAP_S, drift, drift_unseen, forget, measu
 # wrong match would otherwise reverse both velocities.
 _AMBIGUOUS_NOISE: Final = 2.0
 # Networks of faces lose a small face for a few frames while the head keeps looking here. For this
-# long after the last face, the belief drifts as between two faces.
+# long after the last face, the belief stays as it is.
 _MISSED_FACE_S: Final = 0.5
 
 
@@ -177,7 +177,7 @@ def _drift(
         # Two faces count for the time between them, missed frames included, unless it is long.
         track.belief = drift(track.belief, dt_s, config.evidence_time_constant_s, config)
     elif seen and missed and stamp - track.face_s <= _MISSED_FACE_S:
-        track.belief = drift(track.belief, dt_s, config.evidence_time_constant_s, config)
+        pass  # the belief stays as it is
     elif seen and not face:
         no_face_s = max(config.no_face_time_constant_s, config.memory_s)
         track.belief = drift(track.belief, dt_s, no_face_s, config)
