@@ -39,10 +39,11 @@ Placement = tuple[FloatArray, FloatArray]
 # Probability that each cue is an outlier. "Bottom" is the lower edge of the box.
 _BODY_OUTLIER, _BOX_OUTLIER, _HEAD_OUTLIER = 0.03, 0.05, 0.05
 _FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
-# Of somebody whom the lower border cuts: networks know whole people, and fit one into the part that
-# is seen, knees and feet included. Then the skeleton is less sure, too.
+# Pose networks know whole people, and fit one into the part that is seen of somebody whom the lower
+# border cuts, knees and feet included: relative standard deviation of a range by either, and the
+# probabilities of both to be outliers where the head tells the range.
+_CUT_STD: Final = 0.15
 _CUT_BODY_OUTLIER, _CUT_LEGS_OUTLIER = 0.30, 0.80
-_CUT_BODY_STD: Final = 0.15
 # A surface on the chest's place is that of something else only if it hides the chest, which its
 # keypoints then seldom survive.
 _CHEST_OUTLIER: Final = 0.005
@@ -245,14 +246,17 @@ def _range_cues(
     squared = x * x + y * y + z * z
     along = math.sqrt(max(float(position @ covariance @ position), 1e-9)) / squared
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
-    outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
-    cut = bool(cut_by_border(camera, seen.detection.box_xyxy_px[None])[1][0])
-    if body is not None and cut:
-        along, outlier = math.hypot(along, _CUT_BODY_STD), _CUT_BODY_OUTLIER
+    outlier, legs_outlier, cut_std = _BOX_OUTLIER if body is None else _BODY_OUTLIER, 0.0, 0.0
+    head = _head_cue(position, seen, body, floor)
+    if body is not None and cut_by_border(camera, seen.detection.box_xyxy_px[None])[1][0]:
+        cut_std = _CUT_STD
+        along = math.hypot(along, cut_std)
+        if head is not None:
+            outlier, legs_outlier = _CUT_BODY_OUTLIER, _CUT_LEGS_OUTLIER
     stature = min(stature, STATURE_RELATIVE_STD, 0.99 * along)
     cues = [DepthCue(0.0, along, stature, outlier, *_UNUSUAL, 0.5, HIDDEN_OFFSET * (body is None))]
-    if (cue := _head_cue(position, seen, body, floor)) is not None:
-        cues.append(cue)
+    if head is not None:
+        cues.append(head)
     if floor is not None:
         shown = seen.keypoints.scores[kp.BODY] >= min_score
         if body is not None and seen.feet is not None:
@@ -263,10 +267,9 @@ def _range_cues(
         else:
             cue = _bottom_cue(camera, seen.detection, position, floor)
         if cue is not None:
-            if cut:
-                least = max(cue.outlier_probability, _CUT_LEGS_OUTLIER)
-                cue = replace(cue, outlier_probability=least)
-            cues.append(cue)
+            least = max(cue.outlier_probability, legs_outlier)
+            std = math.hypot(cue.log_std, cut_std)
+            cues.append(replace(cue, outlier_probability=least, log_std=std))
     return cues
 
 

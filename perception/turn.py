@@ -86,8 +86,9 @@ class QuarterTurn:
                 if max(pair) < distortion.size:
                     distortion[list(pair)] = distortion[list(pair)] @ back[:2, :2]
             if distortion.size > _TILT.start:
-                distortion[_TILT] = _turned_tilt(*distortion[_TILT].tolist(), back)
-        return Camera(*size, *focal, *(centre @ back[:2, :2]).tolist(), distortion)
+                distortion[_TILT] = _turned_tilt(distortion[_TILT], back)
+        (width, height), (fx, fy), (cx, cy) = size, focal, (centre @ back[:2, :2]).tolist()
+        return Camera(width, height, fx, fy, cx, cy, distortion)
 
     def in_camera(self, observation: PersonObservation, camera: Camera) -> PersonObservation:
         """Return an observation of the turned picture in the frame and the picture of a camera."""
@@ -119,8 +120,9 @@ def _turned_keypoints(person: PersonKeypoints, back: FloatArray, corner: FloatAr
     )
 
 
-def _turned_tilt(about_x_rad: float, about_y_rad: float, back: FloatArray) -> tuple[float, float]:
-    """Return the angles of a tilted sensor in the turned picture."""
+def _turned_tilt(angles_rad: FloatArray, back: FloatArray) -> tuple[float, float]:
+    """Return the angles of a tilted sensor about x and y in the turned picture."""
+    about_x_rad, about_y_rad = angles_rad.tolist()
     # The sensor's normal turns; what remains is a turn within it, of the second order.
     x, y = math.sin(about_y_rad), -math.cos(about_y_rad) * math.sin(about_x_rad)
     z = math.cos(about_y_rad) * math.cos(about_x_rad)
