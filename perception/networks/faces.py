@@ -75,6 +75,12 @@ _MESH_SIDES: Final = 1.5
 _HEAD_SIDES: Final = 2.0
 _FARTHEST: Final = 0.4
 _MIN_SIDE_PX: Final = 8.0
+# The mesh may lay a face that looks here over a profile. Then its nose lies elsewhere, from the
+# middle of the ears, than that of the pose network: by 0.4 to 1.5 sizes of the face on renders that
+# are turned by 70 to 100°, and up to 0.36 of faces that look here. The size is the distance of the
+# ears, or so many times that of eyes and nose.
+_NOSE_APART: Final = 0.4
+_NOSE_SIZES: Final = 3.3
 # Mesh points whose mean is nose, left eye, right eye, left ear and right ear. The mesh's tragions
 # are higher than the template's ears and would lower level heads by 5° (13 rendered workers); with
 # the points below them it is 1°.
@@ -187,7 +193,7 @@ class FaceMeshPoseEstimator:
     """A pose estimator whose people get the faces of :class:`FaceMesh`.
 
     ``face_evidence`` of a person is True where a face was found; nose, eyes and ears then come from
-    it. It is False where none was found.
+    it. It is False where none was found, or one that is turned elsewhere than the head.
 
     Args:
         pose_estimator: finds the bodies.
@@ -218,8 +224,10 @@ class FaceMeshPoseEstimator:
         marks = self._mesh.find(image, centre, _HEAD_SIDES * size_px, _FARTHEST * size_px)
         if marks is None:
             return replace(person, face_evidence=False)
-        eyes_open = bool(_openings(marks[:, :2]).mean() > _MIN_OPENING)
         points = np.array([marks[list(rows)].mean(axis=0) for rows in _HEAD_POINTS])
+        if not _agree(pixels[kp.HEAD], points[:, :2]):
+            return replace(person, face_evidence=False)
+        eyes_open = bool(_openings(marks[:, :2]).mean() > _MIN_OPENING)
         pixels[kp.HEAD], scores[kp.HEAD] = points[:, :2], _face_scores(points)
         return replace(
             person,
@@ -346,6 +354,16 @@ def _face_scores(points: FloatArray) -> FloatArray:
     eyes = 1.0 - np.interp(turned, _EYE_HIDES_RAD, (0.0, 1.0))
     ears = 1.0 - np.interp(turned, _EAR_HIDES_RAD, (0.0, 1.0))
     return np.array([1.0, *eyes, *ears])
+
+
+def _agree(before_px: FloatArray, face_px: FloatArray) -> bool:
+    """Return whether the nose of a face points where that of the pose network did."""
+    size_px = max(
+        float(np.linalg.norm(face_px[kp.LEFT_EAR] - face_px[kp.RIGHT_EAR])),
+        _NOSE_SIZES * float(np.linalg.norm(face_px[1:3].mean(axis=0) - face_px[kp.NOSE])),
+    )
+    before, face = (each[kp.NOSE] - each[3:].mean(axis=0) for each in (before_px, face_px))
+    return float(np.linalg.norm(before - face)) <= _NOSE_APART * size_px
 
 
 def _square(
