@@ -37,10 +37,8 @@ class Mesh:
             self.marks[list(rows), :2] = point
         for corner, side in ((362, 4.0), (263, -4.0), (133, 4.0), (33, -4.0)):
             self.marks[corner, 0] += side
-        for (row, down), eye in zip(
-            LIDS, (points[1], points[1], points[2], points[2]), strict=True
-        ):
-            self.marks[row, :2] = eye + (0.0, down)
+        for (row, down), eye in zip(LIDS, points[[1, 1, 2, 2]], strict=True):
+            self.marks[row, :2] = eye[0], eye[1] + down
 
     def find(self, image_rgb, centre_px, side_px, farthest_px):
         return self.marks
