@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from ._stages import PersonKeypoints
 from .arrays import (
     FloatArray,
     covariance_matrix,
@@ -43,6 +44,8 @@ class PersonObservation:
             out; None if and only if ``size_range_m`` is None.
         eyes_seen: True if gaze and awareness contain a measurement of the eyes in the head. False:
             the eyes may look elsewhere than the head, and ``awareness_std`` says how far.
+        keypoints: in the image, those of a head that is not their own with score 0; None if none
+            are the person's.
     """
 
     stamp_s: float
@@ -58,6 +61,7 @@ class PersonObservation:
     size_range_m: float | None = None
     size_range_relative_std: float | None = None
     eyes_seen: bool = False
+    keypoints: PersonKeypoints | None = None
 
     def __post_init__(self) -> None:
         if (self.awareness is None) != (self.awareness_std is None):
@@ -106,6 +110,20 @@ class PersonObservation:
             eyes_seen=bool(self.eyes_seen),
         )
 
+    def rotated(self, rotation: FloatArray) -> PersonObservation:
+        """Return the observation in another frame with the same origin; pixels stay as they are.
+
+        Args:
+            rotation: (3, 3) from this frame to the other.
+        """
+        covariance = rotation @ self.position_covariance_m2 @ rotation.T
+        return replace(
+            self,
+            position_camera_m=rotation @ self.position_camera_m,
+            position_covariance_m2=0.5 * (covariance + covariance.T),
+            gaze_camera=None if self.gaze_camera is None else rotation @ self.gaze_camera,
+        )
+
     @classmethod
     def true(
         cls,
@@ -137,5 +155,6 @@ class PersonObservation:
             size_range_m=None,
             size_range_relative_std=None,
             eyes_seen=False,
+            keypoints=None,
         )
         return observation

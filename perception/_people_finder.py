@@ -116,9 +116,9 @@ class CarriedBoxes:
         self._gap_s = np.inf
         self._carrying = False
 
-    def unused(self) -> CarriedBoxes:
-        """Return carried boxes of the same detector that have seen no image yet."""
-        return CarriedBoxes(self._detector, self._every_s, self._min_score)
+    def unused(self, detector: PersonDetector) -> CarriedBoxes:
+        """Return carried boxes of a detector that have seen no image yet."""
+        return CarriedBoxes(detector, self._every_s, self._min_score)
 
     def detections(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[PersonDetection, ...]:
         """Return the boxes of the people in an image: carried, or detected."""
@@ -321,11 +321,18 @@ class PeopleFinder:
         if detect_every_s > 0.0:
             self._carrier = CarriedBoxes(detector, detect_every_s, min_score)
 
-    def for_another_view(self) -> PeopleFinder:
-        """Return a finder with the same networks and settings that has seen no image yet."""
+    def for_another_view(
+        self, camera: Camera | None = None, detector: PersonDetector | None = None
+    ) -> PeopleFinder:
+        """Return a finder with the same settings that has seen no image yet.
+
+        Camera and detector, and always the pose estimator, are the same ones where none is given.
+        """
         other = copy.copy(self)
+        other._camera = self._camera if camera is None else camera
+        other._detector = self._detector if detector is None else detector
         if self._carrier is not None:
-            other._carrier = self._carrier.unused()
+            other._carrier = self._carrier.unused(other._detector)
         return other
 
     def find(self, image_rgb: ImageRgb, stamp_s: float) -> tuple[FoundPerson, ...]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -19,8 +20,8 @@ from ._stages import (
     DEFAULT_SCORE_THRESHOLD,
     HeadPose,
     HeadPoseEstimator,
-    PersonDetection,
     PersonDetector,
+    PersonKeypoints,
     PoseEstimator,
     check_count,
 )
@@ -32,6 +33,7 @@ from .arrays import (
     finite_array,
     finite_number,
     rotation_matrix,
+    unit_vector,
 )
 from .awareness import AttentionCone, AwarenessEstimate, estimate_awareness
 from .body import DEFAULT_MIN_SCORE
@@ -41,8 +43,9 @@ from .errors import PerceptionError
 from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
 from .networks import OnnxSettings
-from .ownership import FoundPerson, own_heads
+from .ownership import DISOWNED, FoundPerson, own_heads
 from .shipped import shipped_detector, shipped_head_pose_estimator, shipped_pose_estimator
+from .turn import QuarterTurn
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
 #: Standard deviations of the eyes in the head, sideways and up and down. Sideways as recorded of
@@ -81,7 +84,7 @@ class AwarenessPipeline:
 
     Args:
         camera: the robot's camera.
-        detector: finds people; default the shipped network.
+        detector: finds people, or makes what finds them for a camera; default the shipped network.
         pose_estimator: finds their keypoints; default the shipped network.
         head_pose_estimator: finds their head poses; default the shipped network if the pose
             estimator is the shipped one too, else :class:`PnpHeadPoseEstimator`. The shipped
@@ -120,7 +123,7 @@ class AwarenessPipeline:
     def __init__(
         self,
         camera: Camera,
-        detector: PersonDetector | None = None,
+        detector: PersonDetector | Callable[[Camera], PersonDetector] | None = None,
         pose_estimator: PoseEstimator | None = None,
         head_pose_estimator: HeadPoseEstimator | None = None,
         cone: AttentionCone | None = None,
@@ -160,7 +163,8 @@ class AwarenessPipeline:
             threshold = DEFAULT_SCORE_THRESHOLD
             if confirmation is not None:
                 threshold = confirmation.detector_threshold
-            detector = shipped_detector(onnx_settings, camera, score_threshold=threshold)
+            detector = partial(shipped_detector, onnx_settings, score_threshold=threshold)
+        self._make_detector = None if isinstance(detector, PersonDetector) else detector
         if pose_estimator is None:
             pose_estimator = shipped_pose_estimator(onnx_settings)
         if head_pose_estimator is None:
@@ -169,7 +173,7 @@ class AwarenessPipeline:
                 head_pose_estimator = shipped_head_pose_estimator(onnx_settings)
         self._people = PeopleFinder(
             camera,
-            detector,
+            detector if isinstance(detector, PersonDetector) else detector(camera),
             pose_estimator,
             self._min_score,
             confirmation,
@@ -178,10 +182,11 @@ class AwarenessPipeline:
         self._head_pose_estimator: HeadPoseEstimator = head_pose_estimator
         if eye_estimator is not None and not isinstance(eye_estimator, EyeEstimator):
             raise PerceptionError(
-                "eye_estimator must have the method estimate(image_rgb, camera, heads), got "
-                f"{type(eye_estimator).__name__}"
+                "eye_estimator must have the method estimate(image_rgb, camera, heads, people), "
+                f"got {type(eye_estimator).__name__}"
             )
         self._eye_estimator = eye_estimator
+        self._turned: dict[QuarterTurn, AwarenessPipeline] = {}
 
     def for_another_view(self, rotation_camera_view: Any | None = None) -> AwarenessPipeline:
         """Return a pipeline with the same camera, networks and settings that has seen no image.
@@ -194,13 +199,30 @@ class AwarenessPipeline:
             rotation_camera_view: (3, 3) from the frame of the view to the camera's, in which the
                 points of the robot and the constant floor are given; None for the same frame.
         """
-        other = copy.copy(self)
-        other._people = self._people.for_another_view()
+        R = np.eye(3)
         if rotation_camera_view is not None:
             R = rotation_matrix("rotation_camera_view", rotation_camera_view)
-            other._robot_points = self._robot_points @ R
-            other._floor = None if self._floor is None else self._floor.in_view(R)
+        return self._for_view(self.camera, R)
+
+    def _for_view(self, camera: Camera, R: FloatArray) -> AwarenessPipeline:
+        other = copy.copy(self)
+        detector = None
+        if camera is not self.camera and self._make_detector is not None:
+            detector = self._make_detector(camera)
+        other.camera, other._people = camera, self._people.for_another_view(camera, detector)
+        other._robot_points = self._robot_points @ R
+        other._floor = None if self._floor is None else self._floor.in_view(R)
+        other._turned = {}
         return other
+
+    def _turned_by(self, turn: QuarterTurn) -> AwarenessPipeline:
+        """Return the pipeline of the turned picture."""
+        if not turn.quarters:
+            return self
+        if turn not in self._turned:
+            camera = turn.camera(self.camera)
+            self._turned[turn] = self._for_view(camera, turn.rotation_camera_view)
+        return self._turned[turn]
 
     def process(
         self,
@@ -210,8 +232,12 @@ class AwarenessPipeline:
         *,
         depth_m: Any | None = None,
         depth_stamp_s: float | None = None,
+        up_camera: Any | None = None,
     ) -> tuple[PersonObservation, ...]:
         """Return one observation per detected person.
+
+        The picture of a camera that is rolled is turned to the nearest quarter turn, since networks
+        know upright people. Observations are of the camera as it is.
 
         If the keypoints do not determine the position, it comes from the box, with a larger
         covariance. A person without a usable head pose has awareness None. Somebody who turns the
@@ -228,6 +254,8 @@ class AwarenessPipeline:
                 infinity are holes. It improves the range of people, of children and seated people
                 above all.
             depth_stamp_s: time of the depth image, within 0.05 s; default that of the image.
+            up_camera: (3,) direction up in the camera frame; default that of the floor. Where
+                neither is known, the picture counts as upright.
 
         Raises:
             DepthImageError: for a depth image of another size, type, unit or time; no network has
@@ -243,6 +271,27 @@ class AwarenessPipeline:
             depth_m = checked_depth(depth_m, shape, stamp_s, depth_stamp_s)
         elif depth_stamp_s is not None:
             raise PerceptionError("depth_stamp_s needs depth_m, got None")
+        if up_camera is not None:
+            up_camera = unit_vector("up_camera", up_camera)
+        elif floor is not None:
+            up_camera = floor.normal_camera
+        turn = QuarterTurn.upright(up_camera)
+        observations = self._turned_by(turn)._seen_upright(
+            turn.picture(image_rgb),
+            stamp_s,
+            None if floor is None else floor.in_view(turn.rotation_camera_view),
+            None if depth_m is None else turn.picture(depth_m),
+        )
+        return tuple(turn.in_camera(each, self.camera) for each in observations)
+
+    def _seen_upright(
+        self,
+        image_rgb: ImageRgb,
+        stamp_s: float,
+        floor: FloorPlane | None,
+        depth_m: FloatArray | None,
+    ) -> tuple[PersonObservation, ...]:
+        """Return the people of a picture that is about upright."""
         found = self._people.find(image_rgb, stamp_s)
         observations: tuple[PersonObservation, ...] = ()
         if found:
@@ -251,7 +300,7 @@ class AwarenessPipeline:
             check_count("head_pose_estimator", len(heads), len(people))
             found, heads = own_heads(self.camera, found, heads, self._min_score)
             people = tuple(one.keypoints for one in found)
-            eyes = self._eyes(image_rgb, heads)
+            eyes = self._eyes(image_rgb, heads, people)
             places = place_people(
                 self.camera,
                 tuple(one.detection for one in found),
@@ -265,16 +314,16 @@ class AwarenessPipeline:
             )
             looks = self._looks(found, heads, eyes)
             observations = tuple(
-                self._observation(stamp_s, one.detection, place, look)
+                self._observation(stamp_s, one, place, look)
                 for one, place, look in zip(found, places, looks, strict=True)
                 if place is not None
             )
         return observations
 
     def _observation(
-        self, stamp_s: float, detection: PersonDetection, place: PersonPlace, look: _Look
+        self, stamp_s: float, one: FoundPerson, place: PersonPlace, look: _Look
     ) -> PersonObservation:
-        estimate = look.estimate
+        detection, estimate = one.detection, look.estimate
         return PersonObservation(
             stamp_s=stamp_s,
             position_camera_m=place.position_camera_m,
@@ -287,6 +336,7 @@ class AwarenessPipeline:
             awareness_reason=look.missing,
             **self._sizes(place),
             eyes_seen=look.eyes_seen,
+            keypoints=one.keypoints if one.disowned in (None, DISOWNED[-1]) else None,
         )
 
     def _sizes(self, place: PersonPlace) -> dict[str, Any]:
@@ -300,12 +350,15 @@ class AwarenessPipeline:
         }
 
     def _eyes(
-        self, image_rgb: ImageRgb, heads: tuple[HeadPose | None, ...]
+        self,
+        image_rgb: ImageRgb,
+        heads: tuple[HeadPose | None, ...],
+        people: tuple[PersonKeypoints, ...],
     ) -> tuple[EyeGaze | None, ...]:
         """Return the eyes in each head, combined with how eyes turn; None where not known."""
         if self._eye_estimator is None:
             return (None,) * len(heads)
-        measured = tuple(self._eye_estimator.estimate(image_rgb, self.camera, heads))
+        measured = tuple(self._eye_estimator.estimate(image_rgb, self.camera, heads, people))
         check_count("eye_estimator", len(measured), len(heads))
         return known_eyes(measured, self._eye_std_rad)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -39,6 +39,11 @@ Placement = tuple[FloatArray, FloatArray]
 # Probability that each cue is an outlier. "Bottom" is the lower edge of the box.
 _BODY_OUTLIER, _BOX_OUTLIER, _HEAD_OUTLIER = 0.03, 0.05, 0.05
 _FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
+# Pose networks know whole people, and fit one into the part that is seen of somebody whom the lower
+# border cuts, knees and feet included: relative standard deviation of a range by either, and the
+# probabilities of both to be outliers where the head tells the range.
+_CUT_STD: Final = 0.15
+_CUT_BODY_OUTLIER, _CUT_LEGS_OUTLIER = 0.30, 0.80
 # A surface on the chest's place is that of something else only if it hides the chest, which its
 # keypoints then seldom survive.
 _CHEST_OUTLIER: Final = 0.005
@@ -241,11 +246,17 @@ def _range_cues(
     squared = x * x + y * y + z * z
     along = math.sqrt(max(float(position @ covariance @ position), 1e-9)) / squared
     stature = STATURE_RELATIVE_STD if body is None else body.scale_relative_std
-    outlier = _BOX_OUTLIER if body is None else _BODY_OUTLIER
+    outlier, legs_outlier, cut_std = _BOX_OUTLIER if body is None else _BODY_OUTLIER, 0.0, 0.0
+    head = _head_cue(position, seen, body, floor)
+    if body is not None and cut_by_border(camera, seen.detection.box_xyxy_px[None])[1][0]:
+        cut_std = _CUT_STD
+        along = math.hypot(along, cut_std)
+        if head is not None:
+            outlier, legs_outlier = _CUT_BODY_OUTLIER, _CUT_LEGS_OUTLIER
     stature = min(stature, STATURE_RELATIVE_STD, 0.99 * along)
     cues = [DepthCue(0.0, along, stature, outlier, *_UNUSUAL, 0.5, HIDDEN_OFFSET * (body is None))]
-    if (cue := _head_cue(position, seen, body, floor)) is not None:
-        cues.append(cue)
+    if head is not None:
+        cues.append(head)
     if floor is not None:
         shown = seen.keypoints.scores[kp.BODY] >= min_score
         if body is not None and seen.feet is not None:
@@ -256,7 +267,9 @@ def _range_cues(
         else:
             cue = _bottom_cue(camera, seen.detection, position, floor)
         if cue is not None:
-            cues.append(cue)
+            least = max(cue.outlier_probability, legs_outlier)
+            std = math.hypot(cue.log_std, cut_std)
+            cues.append(replace(cue, outlier_probability=least, log_std=std))
     return cues
 
 

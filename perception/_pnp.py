@@ -58,6 +58,8 @@ _MODE_CUTOFF_CHI2: Final = 16.0
 # Local optima closer than 8° to each other count as one.
 _SAME_MODE_COSINE: Final = math.cos(math.radians(8.0))
 _MAX_ROTATION_STD_RAD: Final = math.radians(100.0)
+# Relative standard deviation of a range by the size of a face, of heads and of the mesh together.
+_FACE_SIZE_STD: Final = 0.07
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +74,7 @@ class _Head:
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
         prior: prior from the body, or None.
+        face_scale: of the keypoints; None where they do not tell the range.
     """
 
     row: int
@@ -81,6 +84,7 @@ class _Head:
     rotations: FloatArray
     translations_m: FloatArray
     prior: HeadPrior | None
+    face_scale: float | None
 
 
 class PnpHeadPoseEstimator:
@@ -177,7 +181,8 @@ class PnpHeadPoseEstimator:
         if not found:
             return None
         rotations, translations = (np.concatenate(each) for each in zip(*found, strict=True))
-        return _Head(row, model, rays, seen, rotations, translations, prior)
+        scale = person.face_scale if whole else None
+        return _Head(row, model, rays, seen, rotations, translations, prior, scale)
 
     def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
         """Refine the starting poses of several heads at once and return their head poses."""
@@ -200,9 +205,7 @@ class PnpHeadPoseEstimator:
             own = [poses[start] for start in np.flatnonzero(owner == index)]
             rows = np.flatnonzero(head.seen)
             costs = _costs(own, head.model[rows], head.seen, without_body=head.prior is None)
-            results.append(
-                self._finish(costs, len(rows), head.prior is not None) if costs else None
-            )
+            results.append(self._finish(costs, len(rows), head) if costs else None)
         return results
 
     def _model(self, person: PersonKeypoints, seen: Any) -> FloatArray | None:
@@ -221,7 +224,7 @@ class PnpHeadPoseEstimator:
             return None
 
     def _finish(
-        self, costs: list[tuple[float, RefinedPose]], points: int, with_prior: bool
+        self, costs: list[tuple[float, RefinedPose]], points: int, head: _Head
     ) -> HeadPose | None:
         """Return the best pose with its covariance; None if its rotation is too uncertain."""
         pose = costs[0][1]
@@ -231,18 +234,22 @@ class PnpHeadPoseEstimator:
             return None
         squared = pose.fit_chi2
         # Of few points a prior determines what they do not.
-        degrees = 2 * points - (0 if with_prior and points < 4 else 6)
+        degrees = 2 * points - (0 if head.prior is not None and points < 4 else 6)
         if degrees > 0 and squared > _FIT_QUANTILE[min(degrees, 6)]:
             covariance = covariance * (squared / degrees)
         covariance = 0.5 * (covariance + covariance.T) + _spread_of_modes(costs)
         largest = float(np.linalg.eigvalsh(covariance[:3, :3])[-1])
         if not np.isfinite(covariance).all() or largest > _MAX_ROTATION_STD_RAD**2:
             return None
+        position_m, range_std = pose.translation_m, None
+        if head.face_scale is not None:
+            position_m, range_std = head.face_scale * position_m, _FACE_SIZE_STD
         return HeadPose(
-            pose.translation_m,
+            position_m,
             pose.rotation,
             covariance,
             float(np.sqrt(np.sum(pose.reprojection_px**2) / points)),
+            range_relative_std=range_std,
         )
 
 

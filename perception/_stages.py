@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, Protocol, runtime_checkable
 
@@ -69,6 +70,11 @@ class PersonKeypoints:
         scale_relative_std: relative standard deviation of the size of the whole skeleton from the
             estimator's noise, beyond the spread of statures and limbs of adults.
         eyes_open: False if lids cover the irises: the eyes blink or look down.
+        face_scale: size of the head whose nose, eyes and ears a network of faces has placed, as a
+            share of the template's (:data:`~perception.anthropometry.HEAD_TEMPLATE_M`); then the
+            head tells the range. None without such a network, or a face.
+        irises_px: (2,) mean offset of both irises from the midpoints of the corners of their eyes;
+            None if no network has placed them, or lids cover one.
     """
 
     keypoints_px: FloatArray
@@ -79,6 +85,8 @@ class PersonKeypoints:
     face_evidence: bool = True
     scale_relative_std: float = 0.0
     eyes_open: bool = True
+    face_scale: float | None = None
+    irises_px: FloatArray | None = None
 
     def __post_init__(self) -> None:
         count = keypoint_count(self.layout)
@@ -98,6 +106,10 @@ class PersonKeypoints:
                 "scale_relative_std", self.scale_relative_std, minimum=0.0
             ),
             eyes_open=bool(self.eyes_open),
+            face_scale=given(
+                finite_number, "face_scale", self.face_scale, minimum=0.0, exclusive_minimum=True
+            ),
+            irises_px=given(finite_array, "irises_px", self.irises_px, (2,)),
         )
 
 
@@ -152,6 +164,13 @@ class HeadPose:
     def gaze_camera(self) -> FloatArray:
         """Unit vector (3,) along the head's forward axis, in the camera frame."""
         return self.rotation_camera_head[:, 1]
+
+    @property
+    def off_camera_rad(self) -> float:
+        """Angle between the gaze and the direction to the camera, in [0, π]."""
+        x, y, z = self.position_camera_m.tolist()
+        along = float(self.gaze_camera @ self.position_camera_m)
+        return math.acos(min(max(-along / max(math.hypot(x, y, z), 1e-9), -1.0), 1.0))
 
 
 @runtime_checkable

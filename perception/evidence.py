@@ -22,6 +22,7 @@ AwarenessReason = Literal[
     "no head pose",
     "face too small",
     "no face found",
+    "face missed",
     "face cut by the border",
     "no keypoint of the head",
     "eyes covered by lids",
@@ -57,6 +58,8 @@ _UNKNOWN: Final = 0.5
 # with fewer pixels of width it misses more, so that nothing follows.
 _NO_FACE_FOUND: Final = 0.2
 _FACE_TO_FIND_PX: Final = 20.0
+# Of a head that is turned less than this away from the camera, it should have found one.
+_FACE_TO_FIND_RAD: Final = math.radians(50.0)
 _MIN_SCORE_SCALE: Final = 0.05
 # Generous bound on the shift of a point near the image's border by lens distortion.
 _MAX_DISTORTION_PX: Final = 200.0
@@ -93,12 +96,12 @@ def judge_face(
 
     * Two of nose and eyes are seen, according to ``head.face_seen``, or else to the scores of the
       keypoints (probability 0 at half of ``min_score``, 1 at one and a half). If these scores are
-      no evidence of a face (``face_evidence`` False), the probability is 0.2; below 20 pixels of
-      width there is no evidence then. Of a skeleton without depth, one of nose and eyes alone
-      counts half: sunglasses, a hand or a cup may cover the others of a face that looks here. A
-      nose or an eye outside the image counts as seen with a probability of at least 0.5: it is cut
-      off, not turned away. If two of them are outside, a lower ``head.face_seen`` also counts as
-      0.5.
+      no evidence of a face (``face_evidence`` False), the probability is 0.2. There is no evidence
+      then for a head that faces the camera by its keypoints, and below 20 pixels of width. Of a
+      skeleton without depth, one of nose and eyes alone counts half: sunglasses, a hand or a cup
+      may cover the others of a face that looks here. A nose or an eye outside the image counts as
+      seen with a probability of at least 0.5: it is cut off, not turned away. If two of them are
+      outside, a lower ``head.face_seen`` also counts as 0.5.
     * Nose, eyes and ears lie where a head in this pose has them. A root mean square error of more
       than 3.5 standard deviations of the noise together with 5 % of the face's width (the head's
       own shape), or of more than 15 % of the width, lowers the probability.
@@ -160,8 +163,12 @@ def _unseen(person: PersonKeypoints, head: HeadPose, width_px: float) -> Awarene
     """Return why a face of this width (px) shows no eyes that could be judged; None if it may."""
     if width_px < _MIN_FACE_PX or head.position_camera_m[2] <= 0.0:
         return "face too small"
-    if head.face_seen is None and not person.face_evidence and width_px < _FACE_TO_FIND_PX:
-        return "no face found"
+    if head.face_seen is None and not person.face_evidence:
+        # The keypoints and the network of faces contradict each other.
+        if head.off_camera_rad <= _FACE_TO_FIND_RAD:
+            return "face missed"
+        if width_px < _FACE_TO_FIND_PX:
+            return "no face found"
     return None if person.eyes_open else "eyes covered by lids"
 
 

@@ -15,7 +15,7 @@ from typing import Final, Protocol, runtime_checkable
 import numpy as np
 
 from ._camera import Camera
-from ._stages import HeadPose
+from ._stages import HeadPose, PersonKeypoints
 from .arrays import FloatArray, ImageRgb, covariance_matrix, finite_array, set_fields
 from .errors import PerceptionError
 from .matrices import CHI2_999, mahalanobis2
@@ -72,9 +72,13 @@ class EyeEstimator(Protocol):
     """Interface: finds how the eyes of people with known head poses are turned in the head."""
 
     def estimate(
-        self, image_rgb: ImageRgb, camera: Camera, heads: tuple[HeadPose | None, ...]
+        self,
+        image_rgb: ImageRgb,
+        camera: Camera,
+        heads: tuple[HeadPose | None, ...],
+        people: tuple[PersonKeypoints, ...],
     ) -> tuple[EyeGaze | None, ...]:
-        """Return one measurement per head, in the same order; None where eyes are not seen."""
+        """Return one measurement per head and person, in order; None where eyes are not seen."""
         ...
 
 

@@ -121,6 +121,10 @@ _UP_CAMERA: Final = np.array([0.0, -1.0, 0.0])
 _MOST_NECK_TURN_RAD: Final = math.radians(95.0)
 _SHOULDERS_M, _HIPS_M = 0.36, 0.16
 _FACE_FROM_NECK_M: Final = 0.28
+# How many times nearer than its shoulders a head may seem, and how far its middle may lie outside
+# the box of its body, as a share of the box's smaller side.
+_NEARER: Final = 1.5
+_HEAD_OUTSIDE: Final = 0.05
 # Shoulders with this share of the score of seen points still tell whose head it is.
 _SHOULDERS_SHARE: Final = 0.5
 
@@ -183,10 +187,11 @@ def own_heads(
     """Return people and heads without the heads that look here and are not the person's own.
 
     A pose network puts nose and eyes on the best face that it sees: of a neighbour, or on a
-    photograph. Such a head often lies farther than 0.28 m from the middle of the shoulders, or
-    looks at the camera over a trunk that turns its back: left shoulder and hip at the image's left.
-    Nobody turns the head by more than 95° from the trunk. A head that looks away is left as it is:
-    whoever it belongs to, it is unaware. Without both shoulders nothing tells.
+    photograph. Such a head often lies outside the box of the body, farther than 0.28 m from the
+    middle of the shoulders, or looks at the camera over a trunk that turns its back: left shoulder
+    and hip at the image's left. Nobody turns the head by more than 95° from the trunk. A head that
+    looks away is left as it is: whoever it belongs to, it is unaware. Without both shoulders only
+    the box tells.
 
     Args:
         camera: camera of the image.
@@ -198,28 +203,41 @@ def own_heads(
     for row, (one, head) in enumerate(zip(found, heads, strict=True)):
         if head is None or one.disowned is not None:
             continue
-        if _is_anothers(camera, one.keypoints, head, min_score):
+        if _is_anothers(camera, one, head, min_score):
             keypoints = without_disowned(one.keypoints, DISOWNED[-1])
             people[row] = one._replace(keypoints=keypoints, disowned=DISOWNED[-1])
             own[row] = None
     return tuple(people), tuple(own)
 
 
-def _is_anothers(camera: Camera, person: PersonKeypoints, head: HeadPose, min_score: float) -> bool:
-    """Return whether a head looks towards the camera that these shoulders cannot carry."""
+def _is_anothers(camera: Camera, one: FoundPerson, head: HeadPose, min_score: float) -> bool:
+    """Return whether a head looks towards the camera that this body cannot carry."""
+    person, box = one.keypoints, one.detection.box_xyxy_px
+    shown = person.scores[kp.HEAD] >= min_score
+    away = float(head.gaze_camera @ head.position_camera_m)
+    if away >= 0.0:
+        return False
+    if shown.any():
+        middle = person.keypoints_px[kp.HEAD][shown].mean(axis=0)
+        outside = np.maximum(box[:2] - middle, middle - box[2:]).max()
+        if outside > _HEAD_OUTSIDE * float((box[2:] - box[:2]).min()):
+            return True
     seen = person.scores[kp.BODY] >= min_score
     seen[kp.SHOULDERS] = person.scores[kp.SHOULDERS] >= _SHOULDERS_SHARE * min_score
-    away = float(head.gaze_camera @ head.position_camera_m)
-    if not seen[kp.SHOULDERS].all() or away >= 0.0:
+    if not seen[kp.SHOULDERS].all():
         return False
     rays = _unit_rays(camera, person.keypoints_px[None, kp.BODY])
     (scales,) = _scales(rays, seen[None])
     rays, scale = rays[0], max(scales)
     neck = rays[kp.SHOULDERS].mean(axis=0)
-    shown = seen[kp.HEAD]
     if shown.any():
         off = rays[kp.HEAD][shown].mean(axis=0) - neck
-        if float(np.linalg.norm(off)) > _FACE_FROM_NECK_M * scale:
+        near = scale
+        if head.range_relative_std is not None:
+            # Pose networks put the shoulders of near people low and their bodies too far away.
+            measured = 1.0 / float(np.linalg.norm(head.position_camera_m))
+            near = max(scale, min(measured, _NEARER * scale))
+        if float(np.linalg.norm(off)) > _FACE_FROM_NECK_M * near:
             return True
     up, left, wide_m = _UP_CAMERA, rays[kp.LEFT_SHOULDER] - rays[kp.RIGHT_SHOULDER], _SHOULDERS_M
     if seen[kp.HIPS].all():
@@ -228,8 +246,7 @@ def _is_anothers(camera: Camera, person: PersonKeypoints, head: HeadPose, min_sc
     right = np.cross(neck, up)
     across = float(left @ right) / max(float(np.linalg.norm(right)) * scale, 1e-9)
     torso_rad = math.acos(min(max(across / wide_m, -1.0), 1.0))
-    head_rad = math.acos(min(-away / float(np.linalg.norm(head.position_camera_m)), 1.0))
-    return torso_rad - head_rad > _MOST_NECK_TURN_RAD
+    return torso_rad - head.off_camera_rad > _MOST_NECK_TURN_RAD
 
 
 def without_disowned(person: PersonKeypoints, reason: AwarenessReason | None) -> PersonKeypoints:

@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 from perception import PersonObservation
 from perception.arrays import FloatArray
+from perception.evidence import AwarenessReason
 
 from ._errors import TrackingError
 from ._views import View
@@ -34,6 +35,7 @@ _NOISE_FLOOR_M: Final = 0.05
 # starts one, and is no evidence of awareness. The shipped detector reports none unless its
 # ``score_threshold`` is lowered.
 _WEAK_SCORE: Final = 0.25
+_FACE_MISSED: Final[AwarenessReason] = "face missed"
 
 
 @dataclass(slots=True)
@@ -91,6 +93,7 @@ class Measurement:
             ``noise_m2`` (``_size``).
         size_log: ln of the range by an adult's size over the range; None where unknown.
         size_variance: of it, but for the size of the person.
+        face_missed: whether the head is turned here, and the network of faces finds no face.
     """
 
     x: float
@@ -101,6 +104,7 @@ class Measurement:
     lasting_std: float = 0.0
     size_log: float | None = None
     size_variance: float = 0.0
+    face_missed: bool = False
 
 
 class Frame(NamedTuple):
@@ -210,6 +214,7 @@ def _measurement(
         evidence(one.awareness, trusted_std(one.awareness_std)),
         one.score < _WEAK_SCORE,
         lasting,
+        face_missed=one.awareness_reason == _FACE_MISSED,
     )
     if one.size_range_m is not None and one.size_range_relative_std is not None:
         size_log = math.log(one.size_range_m) - math.log(max(range_m, _LEAST_RANGE_M))

@@ -20,6 +20,9 @@ from .awareness_filter import EVIDENCE_GAP_S, drift, drift_unseen, forget, measu
 # Factor on the variance of a place whose match is ambiguous. When two people pass each other, a
 # wrong match would otherwise reverse both velocities.
 _AMBIGUOUS_NOISE: Final = 2.0
+# Networks of faces lose a small face for a few frames while the head keeps looking here. For this
+# long after the last face, the belief stays as it is.
+_MISSED_FACE_S: Final = 0.5
 
 
 def advance(state: State, frame: Frame, sensors: Sensors) -> State:
@@ -143,7 +146,8 @@ def _see_face(track: Track, sight: Sight | None, step: Step) -> None:
             evidence = None
         previous_s = step.earlier.faces.stamp_s
         if previous_s is not None and stamp > previous_s:
-            _drift(track, previous_s, seen, evidence is not None, step)
+            missed = sight is not None and sight.given.face_missed and not sight.by_ray
+            _drift(track, previous_s, seen, evidence is not None, step, missed=missed)
         if evidence is not None:
             interval_s = evidence_interval_s(track, stamp, step.clock, step.sensors)
             belief = measure(track.belief, evidence, interval_s, config)
@@ -160,13 +164,20 @@ def _see_face(track: Track, sight: Sight | None, step: Step) -> None:
         track.face_s = -math.inf
 
 
-def _drift(track: Track, previous_s: float, seen: bool, face: bool, step: Step) -> None:
-    """Let a belief drift to the frame, from the one before that could have shown a face."""
+def _drift(
+    track: Track, previous_s: float, seen: bool, face: bool, step: Step, *, missed: bool
+) -> None:
+    """Let a belief drift to the frame, from the one before that could have shown a face.
+
+    ``missed``: the head is still turned here, and the network of faces has not found its face.
+    """
     config, stamp = step.config.awareness, step.frame.stamp_s
     dt_s = stamp - previous_s
     if face and stamp - track.face_s <= EVIDENCE_GAP_S:
         # Two faces count for the time between them, missed frames included, unless it is long.
         track.belief = drift(track.belief, dt_s, config.evidence_time_constant_s, config)
+    elif seen and missed and stamp - track.face_s <= _MISSED_FACE_S:
+        pass  # the belief stays as it is
     elif seen and not face:
         no_face_s = max(config.no_face_time_constant_s, config.memory_s)
         track.belief = drift(track.belief, dt_s, no_face_s, config)

@@ -15,7 +15,6 @@ from perception.installation import install_command
 
 from ..drawing import awareness_colour
 from ..errors import AwarenavError, MissingExtraError
-from ..estimate import RecordingPoseEstimator
 
 try:
     import rerun as rr
@@ -39,22 +38,18 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
 
     Args:
         path: of the file; an existing one is replaced.
-        pose_estimator: has the keypoints of the latest frame.
         half_angle_rad: of the attention cone.
 
     Raises:
         AwarenavError: for a path in a folder that does not exist.
     """
 
-    def __init__(
-        self, path: Path, pose_estimator: RecordingPoseEstimator, half_angle_rad: float
-    ) -> None:
+    def __init__(self, path: Path, half_angle_rad: float) -> None:
         if not path.parent.is_dir():
             raise AwarenavError(f"cannot write {path}: there is no folder {path.parent}")
         self._stream = rr.RecordingStream("awarenav")
         self._stream.save(path)
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self._pose_estimator = pose_estimator
         self._half_angle_rad = half_angle_rad
 
     def draw(self, bridge: AwarenessBridge, constraints: NavConstraints) -> None:
@@ -83,10 +78,7 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
         self._stream.disconnect()
 
     def draw_frame(self, bridge: AwarenessBridge) -> None:
-        """Record the latest image with keypoints, cones and tracks, at the image's stamp.
-
-        The pose estimator must not have gone on to another image.
-        """
+        """Record the latest image with keypoints, cones and tracks, at the image's stamp."""
         frame, camera = bridge.frame, bridge.camera
         if frame is None or camera is None:
             return
@@ -105,7 +97,7 @@ class RerunRecorder(AbstractContextManager["RerunRecorder"]):
         keypoints: list[FloatArray] = []
         cones: list[FloatArray] = []
         for seen in frame.observations:
-            person = self._pose_estimator.keypoints_of(seen)
+            person = seen.keypoints
             if person is not None:
                 keypoints.append(np.asarray(person.keypoints_px)[person.scores >= _SEEN_SCORE])
             if seen.gaze_camera is not None:

@@ -35,7 +35,6 @@ from ..errors import AwarenavError, counted
 from ..estimate import (
     NetworkChoice,
     Networks,
-    RecordingPoseEstimator,
     admit_networks,
     choose_networks,
     running_options,
@@ -77,7 +76,6 @@ def bridge_command(options: Any) -> int:
 
     from nav_adapter.ros2 import DdsNode, McapRecorder  # noqa: PLC0415 - needs the extra ros2
 
-    pose_estimator = RecordingPoseEstimator(networks.pose_estimator)
     with ExitStack() as stack:
         recorder = None
         if options.record is not None:
@@ -87,7 +85,7 @@ def bridge_command(options: Any) -> int:
             from ._rerun import RerunRecorder  # noqa: PLC0415 - needs the extra viz
 
             half_angle_rad = AttentionCone().half_angle_rad
-            viewer = RerunRecorder(options.rerun, pose_estimator, half_angle_rad)
+            viewer = RerunRecorder(options.rerun, half_angle_rad)
             stack.enter_context(viewer)
         if unfit:
             _log(f"{simulator_networks_warning(unfit)}: trust no awareness that comes from them")
@@ -118,7 +116,7 @@ def bridge_command(options: Any) -> int:
             speed_mask=mask,
             warn=_log,
             wanted=publisher.wants,
-            make_pipeline=lambda camera: networks.pipeline(camera, pose_estimator),
+            make_pipeline=networks.pipeline,
         )
         if map_cells is not None:
             bridge.on_map(map_cells)

@@ -16,6 +16,7 @@ Subject = Literal[
     "odometry",
     "scanners",
     "images",
+    "mount",
     "calibration",
     "frame rate",
     "exposure",

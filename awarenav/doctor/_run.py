@@ -6,8 +6,9 @@ import contextlib
 import math
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +17,7 @@ import numpy as np
 from perception import AttentionCone, Camera, PerceptionError
 from perception.evidence import AwarenessReason
 from perception.shipped import simulator_networks, simulator_networks_warning
+from perception.turn import QuarterTurn
 
 from ..errors import AwarenavError, counted
 from ..estimate import (
@@ -53,6 +55,16 @@ _UNKNOWN: Final[AwarenessReason] = "head direction unknown"
 _UNKNOWN_SHARE: Final = 0.2
 # A principal point farther from the middle, as a share of the width, is unusual.
 _OFF_CENTRE: Final = 0.1
+# Images that are looked at in all turns, and how many times the people of the picture as it is, and
+# how many more, a turned one must show.
+_TURNED_IMAGES: Final = 8
+_TURNED_TIMES, _TURNED_MORE = 1.5, 1
+_TURN_WORDS: Final = (
+    "",
+    "by 90 degrees counter-clockwise",
+    "upside down",
+    "by 90 degrees clockwise",
+)
 _REMEDY_NETWORKS: Final = "awarenav models fetch real"
 
 
@@ -67,6 +79,9 @@ class _Examined:
     without_evidence: Counter[AwarenessReason | None] = field(default_factory=Counter)
     problems: list[str] = field(default_factory=list)
     best: FrameEstimate | None = None
+    #: People found in some of the images, by the quarter turns of the picture.
+    by_turn: Counter[QuarterTurn] = field(default_factory=Counter)
+    turned: int = 0
 
 
 def doctor_command(options: Any) -> int:
@@ -114,8 +129,8 @@ def _image_findings(options: Any) -> list[Finding]:
         networks = choose_networks(**choice.model_dump(), **running_options(options))
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)
-        estimator = PeopleEstimator(networks, cameras, unfit=unfit)
-        seen = _examine(source, estimator, options.frames)
+        look = partial(PeopleEstimator, networks, cameras, unfit=unfit)
+        seen = _examine(source, look, options.frames)
         findings = [
             _domain_finding(unfit, networks.training_domains, choice, rendered=source.rendered),
             *(Finding.error("images", note) for note in source.notes),
@@ -128,6 +143,7 @@ def _image_findings(options: Any) -> list[Finding]:
             return findings
         findings += [
             _calibration_finding(seen.best.camera if cameras.calibrated else None, options, source),
+            *_mount_findings(source, seen),
             *_rate_findings(source, seen),
             *picture_findings(seen.figures),
             _resolution_finding(seen.best.camera, choice),
@@ -139,9 +155,19 @@ def _image_findings(options: Any) -> list[Finding]:
         return findings
 
 
-def _examine(source: ImageSource, estimator: PeopleEstimator, most: int) -> _Examined:
-    """Look at some images, evenly chosen where all are there."""
+def _examine(
+    source: ImageSource, make_estimator: Callable[..., PeopleEstimator], most: int
+) -> _Examined:
+    """Look at some images, evenly chosen where all are there.
+
+    Where nothing says which way is up, the first of them are looked at in all four turns.
+    """
     seen, before = _Examined(), None
+    estimator = make_estimator(up_camera=source.up_camera)
+    others = {}
+    if source.up_camera is None:
+        turns = map(QuarterTurn, range(1, 4))
+        others = {turn: make_estimator(up_camera=turn.up_camera) for turn in turns}
     for frame in _chosen(source, most):
         if frame.image_rgb is None:
             seen.problems.append(frame.problem)
@@ -157,6 +183,11 @@ def _examine(source: ImageSource, estimator: PeopleEstimator, most: int) -> _Exa
         seen.figures.append(picture_figures(frame.image_rgb, before))
         before = frame.image_rgb
         people = estimate.observations
+        if frame.T_odom_camera is None and seen.turned < _TURNED_IMAGES:
+            seen.turned += bool(others)
+            seen.by_turn[QuarterTurn(0)] += len(people)
+            for turn, other in others.items():
+                seen.by_turn[turn] += len(other.estimate(frame).observations)
         if seen.best is None or len(people) > len(seen.best.observations):
             seen.best = estimate
         seen.people.append(len(people))
@@ -204,6 +235,28 @@ def _domain_finding(
             "'training_domain' in its metadata",
         )
     return Finding.fine("networks", f"trained on: {told}; the images are {kind}")
+
+
+def _mount_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
+    """Return that the camera is rolled: by what the source says, or else by the people found."""
+    if source.up_camera is not None:
+        turn = QuarterTurn.upright(source.up_camera)
+        text = f"by tf the camera is rolled: pictures are turned {_TURN_WORDS[turn.quarters]}"
+        return [Finding.fine("mount", text)] if turn.quarters else []
+    upright = seen.by_turn[QuarterTurn(0)]
+    for turn, people in seen.by_turn.most_common(1):
+        if people > _TURNED_TIMES * upright + _TURNED_MORE:
+            return [
+                Finding.error(
+                    "mount",
+                    f"turned {_TURN_WORDS[turn.quarters]}, {counted(seen.turned, 'picture')} show "
+                    f"{counted(people, 'person', 'people')}, and as they are {upright or 'none'}: "
+                    "the camera is rolled, and nothing says so",
+                    "tf of the optical frame, or roll_deg: "
+                    f"{turn.roll_deg} of the camera in robot.yaml; files need turned pictures",
+                )
+            ]
+    return []
 
 
 def _calibration_finding(camera: Camera | None, options: Any, source: ImageSource) -> Finding:

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
         FrameEstimate,
         Networks,
         PeopleEstimator,
-        RecordingPoseEstimator,
         ids_of_tracks,
     )
     from ._networks import NetworkChoice, admit_networks, choose_networks, running_options
@@ -30,7 +29,6 @@ __all__ = [
     "Networks",
     "OverlayWriter",
     "PeopleEstimator",
-    "RecordingPoseEstimator",
     "SourceFrame",
     "admit_networks",
     "choose_networks",

@@ -245,7 +245,7 @@ class BagSource(ImageSource):
                 self._camera: Camera | AwarenavError | None = self._read_camera(shown)
             except AwarenavError as refusal:  # only if nobody gives another calibration
                 self._camera = refusal
-            self.notes = tuple(filter(None, [self._frame_note(shown)]))
+            self._read_mount(shown)
         except BaseException:
             self._bag.close()
             raise
@@ -325,8 +325,8 @@ class BagSource(ImageSource):
                 raise AwarenavError(f"{topic}: {cause}") from cause
         return None
 
-    def _frame_note(self, shown: Any) -> str:
-        """Return why the frame of the images is not optical by the transforms, if so.
+    def _read_mount(self, shown: Any) -> None:
+        """Take from the transforms which way is up, or note that the frame is not optical.
 
         Mounts are in /tf_static, those of ROS 1 in /tf, and both may have a namespace.
         """
@@ -342,8 +342,12 @@ class BagSource(ImageSource):
                     for each in from_ros(TFMessage, message).transforms:
                         transforms.add_message(each, static=True)
                 if (root := transforms.root(frame)) != frame:
-                    return optical_problem(transforms.lookup(root, frame, 0.0), frame, root)
-        return ""
+                    T_root_camera = transforms.lookup(root, frame, 0.0)
+                    if problem := optical_problem(T_root_camera, frame, root):
+                        self.notes = (problem,)
+                    else:
+                        self.up_camera = T_root_camera[2, :3]
+                    return
 
 
 def _is_zero(info: Any, names: str) -> bool:

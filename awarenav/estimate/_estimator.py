@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from perception import (
@@ -17,9 +17,7 @@ from perception import (
     Camera,
     FloorPlane,
     HeadPoseEstimator,
-    PersonDetection,
     PersonDetector,
-    PersonKeypoints,
     PersonObservation,
     PoseEstimator,
 )
@@ -27,8 +25,8 @@ from perception.arrays import FloatArray
 from perception.errors import DepthImageError
 from perception.networks.detectors import for_wide_view
 from perception.no_view import LastFrames, NoView, why_no_view
-from perception.ownership import DISOWNED, without_disowned
 from perception.shipped import TrainingDomain
+from perception.turn import QuarterTurn
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
 from ..errors import AwarenavError
@@ -63,58 +61,14 @@ class Networks:
     settings: dict[str, Any] = field(default_factory=dict)
     training_domains: dict[str, TrainingDomain | None] = field(default_factory=dict)
 
-    def pipeline(self, camera: Camera, pose_estimator: PoseEstimator) -> AwarenessPipeline:
-        """Return a pipeline for a camera, with a pose estimator around that of the networks."""
+    def pipeline(self, camera: Camera) -> AwarenessPipeline:
+        """Return a pipeline for a camera."""
         detector = self.detector
+        if isinstance(detector, PersonDetector):
+            detector = partial(for_wide_view, detector)
         return AwarenessPipeline(
-            camera,
-            for_wide_view(detector, camera)
-            if isinstance(detector, PersonDetector)
-            else detector(camera),
-            pose_estimator,
-            self.head_pose_estimator,
-            **self.settings,
+            camera, detector, self.pose_estimator, self.head_pose_estimator, **self.settings
         )
-
-
-class RecordingPoseEstimator:
-    """A :class:`~perception.PoseEstimator` that keeps the latest keypoints of another one.
-
-    The keypoints can then be drawn and written.
-
-    Args:
-        estimator: the other pose estimator.
-    """
-
-    def __init__(self, estimator: PoseEstimator) -> None:
-        self._estimator = estimator
-        self._last: dict[bytes, PersonKeypoints] = {}
-        # A pipeline looks again at boxes that have grown, and keeps those that have not.
-        self._before: dict[bytes, PersonKeypoints] = {}
-
-    def estimate(
-        self, image_rgb: NDArray[np.uint8], detections: tuple[PersonDetection, ...]
-    ) -> tuple[PersonKeypoints, ...]:
-        """Return the keypoints from the other estimator."""
-        people = tuple(self._estimator.estimate(image_rgb, detections))
-        self._before = self._last
-        self._last = {
-            detection.box_xyxy_px.tobytes(): person
-            for detection, person in zip(detections, people, strict=False)
-        }
-        return people
-
-    def forget(self) -> None:
-        """Forget the last image; without a detection, :meth:`estimate` is not called for it."""
-        self._last, self._before = {}, {}
-
-    def keypoints_of(self, observation: PersonObservation) -> PersonKeypoints | None:
-        """Return the keypoints of an observation in the last image, found by its box."""
-        box = observation.box_xyxy_px
-        if box is None:
-            return None
-        key = box.tobytes()
-        return self._last.get(key) or self._before.get(key)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,7 +80,6 @@ class FrameEstimate:
         camera: of the image.
         T_odom_camera: (4, 4) pose that was used; None if none was needed.
         observations: one per person.
-        keypoints: of each observation; None where they are not known.
         tracks: all tracks; None without a tracker.
         track_ids: of each observation, the id of its track; None without a tracker.
         unfit: roles of the networks that have seen renders only, unless the image is one.
@@ -137,7 +90,6 @@ class FrameEstimate:
     camera: Camera
     T_odom_camera: FloatArray | None
     observations: tuple[PersonObservation, ...]
-    keypoints: tuple[PersonKeypoints | None, ...]
     tracks: tuple[PersonTrack, ...] | None
     track_ids: tuple[int | None, ...]
     unfit: tuple[str, ...] = ()
@@ -152,6 +104,8 @@ class PeopleEstimator:
         cameras: give the camera of images of any size.
         fixed_pose_odom_camera: (4, 4) T_odom_camera of a fixed camera of known height, for images
             without a pose; it gives the floor.
+        up_camera: (3,) direction up in the camera frame, for images without a pose; None where it
+            is not known.
         track: tracks people from frame to frame. Images without a pose then count as those of a
             fixed camera.
         depth: the depth images of the frames; None without any.
@@ -164,14 +118,14 @@ class PeopleEstimator:
         cameras: CameraChoice,
         *,
         fixed_pose_odom_camera: FloatArray | None = None,
+        up_camera: FloatArray | None = None,
         track: bool = False,
         depth: DepthFiles | None = None,
         unfit: tuple[str, ...] = (),
     ) -> None:
         self._networks = networks
         self._cameras = cameras
-        self._fixed_pose = fixed_pose_odom_camera
-        self._pose_estimator = RecordingPoseEstimator(networks.pose_estimator)
+        self._fixed_pose, self._up_camera = fixed_pose_odom_camera, up_camera
         self._pipelines: dict[Camera, AwarenessPipeline] = {}
         self._track, self._unfit, self._depth = track, unfit, depth
         self._tracker: PersonTracker | None = None
@@ -191,13 +145,15 @@ class PeopleEstimator:
         self._require_known_turn(frame)
         camera = self._cameras.of_size(width, height)
         pose = self._fixed_pose if frame.T_odom_camera is None else frame.T_odom_camera
-        self._pose_estimator.forget()
         no_view = why_no_view(frame.image_rgb, self._last)
-        observations = self._process(camera, frame)
+        up_camera = self._up_camera if pose is None else pose[2, :3]
+        observations = self._process(camera, frame, up_camera)
         tracks: tuple[PersonTrack, ...] | None = None
         track_ids: tuple[int | None, ...] = (None,) * len(observations)
         if self._track:
-            pose = fixed_camera_pose() if pose is None else pose
+            if pose is None:
+                pose = fixed_camera_pose()
+                pose[:3, :3] @= QuarterTurn.upright(up_camera).rotation_camera_view.T
             if self._tracker is None:
                 # An assumed field of view would drop or keep people wrongly.
                 view = CameraView(camera) if self._cameras.known else None
@@ -214,7 +170,6 @@ class PeopleEstimator:
             camera,
             pose,
             observations,
-            tuple(self._keypoints_of(each) for each in observations),
             tracks,
             track_ids,
             self._unfit,
@@ -247,26 +202,23 @@ class PeopleEstimator:
             "orientation in the file, or give --fov-deg and no --depth"
         )
 
-    def _keypoints_of(self, observation: PersonObservation) -> PersonKeypoints | None:
-        """Return the keypoints of an observation; None where they are not the person's."""
-        keypoints = self._pose_estimator.keypoints_of(observation)
-        reason = observation.awareness_reason
-        if keypoints is None or reason not in DISOWNED:
-            return keypoints
-        return without_disowned(keypoints, reason) if reason == DISOWNED[-1] else None
-
-    def _process(self, camera: Camera, frame: SourceFrame) -> tuple[PersonObservation, ...]:
+    def _process(
+        self, camera: Camera, frame: SourceFrame, up_camera: FloatArray | None
+    ) -> tuple[PersonObservation, ...]:
         pipeline = self._pipelines.get(camera)
         if pipeline is None:
-            pipeline = self._networks.pipeline(camera, self._pose_estimator)
+            pipeline = self._networks.pipeline(camera)
             self._pipelines[camera] = pipeline
         assert frame.image_rgb is not None
         floor = self._floor(frame)
+        seen = partial(
+            pipeline.process, frame.image_rgb, frame.stamp_s, floor=floor, up_camera=up_camera
+        )
         if self._depth is None:
-            return pipeline.process(frame.image_rgb, frame.stamp_s, floor=floor)
+            return seen()
         path, depth_m = self._depth.of(frame.name)
         try:
-            return pipeline.process(frame.image_rgb, frame.stamp_s, floor=floor, depth_m=depth_m)
+            return seen(depth_m=depth_m)
         except DepthImageError as cause:
             raise AwarenavError(f"{path}: {cause}") from cause
 

@@ -233,7 +233,7 @@ def choose_networks(
         pose_used = FaceMeshPoseEstimator(pose_used, mesh)
         domains["face"] = "photographs"
         if eyes == "auto":
-            options["eye_estimator"] = FaceMeshEyeEstimator(mesh)
+            options["eye_estimator"] = FaceMeshEyeEstimator()
     head_used, head_domain = _head(head, settings)
     if head != _WITHOUT_NETWORK:
         domains["head"] = head_domain

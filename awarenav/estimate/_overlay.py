@@ -38,10 +38,8 @@ def draw_overlay(estimate: FrameEstimate, cone: AttentionCone) -> ImageRgb:
     assert estimate.frame.image_rgb is not None
     tracks = {track.id: track for track in estimate.tracks or ()}
     people = [
-        OverlaidPerson(observation, keypoints, None if track_id is None else tracks.get(track_id))
-        for observation, keypoints, track_id in zip(
-            estimate.observations, estimate.keypoints, estimate.track_ids, strict=True
-        )
+        OverlaidPerson(seen, seen.keypoints, None if track_id is None else tracks.get(track_id))
+        for seen, track_id in zip(estimate.observations, estimate.track_ids, strict=True)
     ]
     caption = f"{estimate.frame.stamp_s:.2f} s · {_counted(len(people))}"
     if estimate.unfit:

@@ -40,10 +40,8 @@ def estimate_record(estimate: FrameEstimate, settings: str) -> Record:
         if estimate.T_odom_camera is None
         else _rounded_list(estimate.T_odom_camera),
         "people": [
-            _person_record(observation, keypoints, track_id)
-            for observation, keypoints, track_id in zip(
-                estimate.observations, estimate.keypoints, estimate.track_ids, strict=True
-            )
+            _person_record(observation, track_id)
+            for observation, track_id in zip(estimate.observations, estimate.track_ids, strict=True)
         ],
         "settings": settings,
     }
@@ -56,10 +54,9 @@ def estimate_record(estimate: FrameEstimate, settings: str) -> Record:
     return record
 
 
-def _person_record(
-    observation: PersonObservation, keypoints: PersonKeypoints | None, track_id: int | None
-) -> dict[str, Any]:
+def _person_record(observation: PersonObservation, track_id: int | None) -> dict[str, Any]:
     box, gaze = observation.box_xyxy_px, observation.gaze_camera
+    keypoints = observation.keypoints
     record = {
         "id": track_id,
         "box_xyxy_px": None if box is None else _rounded_list(box),

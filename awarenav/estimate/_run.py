@@ -232,6 +232,7 @@ def _estimator(
         networks,
         cameras,
         fixed_pose_odom_camera=pose,
+        up_camera=source.up_camera,
         track=options.tracks,
         depth=depth,
         unfit=unfit,

@@ -72,6 +72,7 @@ class ImageSource(ABC):
         rate_hz: frames per second, if the source has a rate.
         live: whether frames come in real time; a frame that is not taken in time is lost.
         rendered: whether all frames are renders of this package.
+        up_camera: (3,) direction up in the camera frame; None if the source does not know it.
     """
 
     rectified = False
@@ -80,6 +81,7 @@ class ImageSource(ABC):
     rate_hz: float | None = None
     live = False
     rendered = False
+    up_camera: FloatArray | None = None
 
     @property
     def camera(self) -> Camera | None:

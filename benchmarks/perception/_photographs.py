@@ -29,9 +29,7 @@ from awarenav.estimate import NetworkChoice, choose_networks
 from perception import (
     AwarenessPipeline,
     Camera,
-    PersonDetection,
     PersonKeypoints,
-    PoseEstimator,
 )
 from perception import layouts as kp
 
@@ -169,19 +167,14 @@ def measure(
         # The field of view belongs to the longer side, also of an upright photograph.
         focal = 0.5 * max(height, width) / math.tan(0.5 * fov_rad)
         camera = Camera(width, height, focal, focal, 0.5 * width, 0.5 * height)
-        recorder = None if chosen is None else _Recorder(chosen.pose_estimator)
-        if chosen is None or recorder is None:
-            pipeline = pipeline_of(camera, networks)
-        else:
-            pipeline = chosen.pipeline(camera, recorder)
-        _count(figures, pipeline, recorder, rgb, people)
+        pipeline = pipeline_of(camera, networks) if chosen is None else chosen.pipeline(camera)
+        _count(figures, pipeline, rgb, people)
     return figures
 
 
 def _count(
     figures: Figures,
     pipeline: AwarenessPipeline,
-    recorder: _Recorder | None,
     rgb: NDArray[np.uint8],
     people: list[Label],
 ) -> None:
@@ -208,29 +201,10 @@ def _count(
         seen = observations[partner[row]]
         if label.facing is not None:
             (figures.facing if label.facing else figures.away).append(seen.awareness)
-        person = None if recorder is None else recorder.people[boxes[partner[row]].tobytes()]
+        person = seen.keypoints
         similarity = None if person is None else label.similarity(person)
         if person is not None and similarity is not None and person.scores.any():
             figures.similarities.append(similarity)
-
-
-class _Recorder:
-    """A pose estimator that keeps its results by the person's box."""
-
-    def __init__(self, pose_estimator: PoseEstimator) -> None:
-        self._pose_estimator = pose_estimator
-        self.people: dict[bytes, PersonKeypoints] = {}
-
-    def estimate(
-        self, image_rgb: Any, detections: tuple[PersonDetection, ...]
-    ) -> tuple[PersonKeypoints, ...]:
-        """Return the results of the pose estimator."""
-        people = self._pose_estimator.estimate(image_rgb, detections)
-        self.people |= {
-            each.box_xyxy_px.tobytes(): person
-            for each, person in zip(detections, people, strict=True)
-        }
-        return people
 
 
 def read_rgb(path: Path) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -201,15 +202,24 @@ class ImageInput(Input):
             if no_view := why_no_view(image, self._last):
                 hint = _NEEDS_NOISE if no_view == FROZEN else ""
                 raise NavError(f"the picture is no view: it is {no_view}{hint}")
-            floor, problem = _floor(T_odom_camera), ""
+            problem, seen = (
+                "",
+                partial(
+                    self._pipeline.process,
+                    image,
+                    stamp_s,
+                    _floor(T_odom_camera),
+                    up_camera=T_odom_camera[2, :3],
+                ),
+            )
             try:
                 given: dict[str, Any] = {}
                 if depth is not None:
                     given = {"depth_m": depth.depth, "depth_stamp_s": depth.stamp_s}
-                observations = self._pipeline.process(image, stamp_s, floor=floor, **given)
+                observations = seen(**given)
             except DepthImageError as cause:  # before any network has run
                 depth, problem = None, str(cause)
-                observations = self._pipeline.process(image, stamp_s, floor=floor)
+                observations = seen()
             tracks = self._shared.tracker.update(
                 observations, stamp_s, T_odom_camera, is_current, spread
             )

@@ -328,7 +328,7 @@ def _optical(T: FloatArray, frame: str, level_frame: str) -> FloatArray:
 def optical_problem(T_level_camera: FloatArray, frame: str, level_frame: str) -> str:
     """Return why a frame cannot be the optical frame of images; empty if it can.
 
-    Cameras that are upside down or rolled by a quarter turn are in order.
+    Cameras that are upside down or rolled are in order: perception turns their pictures.
 
     Args:
         T_level_camera: (4, 4) pose of the frame in one whose z axis points up.

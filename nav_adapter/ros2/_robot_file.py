@@ -40,15 +40,19 @@ class CameraMount(NavConfig):
             lies on the floor.
         yaw_deg: angle to the left of straight ahead.
         pitch_down_deg: angle below the horizontal.
+        roll_deg: angle clockwise as seen from behind the camera: 90 for one on its right side, 180
+            for one upside down. Pictures are turned to the nearest quarter turn.
     """
 
     position_base_m: _Position
     yaw_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
     pitch_down_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
+    roll_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
 
     def T_base_camera(self) -> FloatArray:  # noqa: N802 - frames in names
         """(4, 4) pose of the optical frame (x right, y down, z forward) in the base frame."""
-        turn = Rotation.from_euler("ZY", (self.yaw_deg, self.pitch_down_deg), degrees=True)
+        angles = self.yaw_deg, self.pitch_down_deg, self.roll_deg
+        turn = Rotation.from_euler("ZYX", angles, degrees=True)
         T = np.eye(4)
         T[:3, :3] = turn.as_matrix() @ [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
         T[:3, 3] = self.position_base_m

@@ -75,9 +75,18 @@ _MESH_SIDES: Final = 1.5
 _HEAD_SIDES: Final = 2.0
 _FARTHEST: Final = 0.4
 _MIN_SIDE_PX: Final = 8.0
+# The mesh may lay a face that looks here over a profile. Then its nose lies elsewhere, from the
+# middle of the ears, than that of the pose network: by 0.4 to 1.5 sizes of the face on renders that
+# are turned by 70 to 100°, and up to 0.36 of faces that look here. The size is the distance of the
+# ears, or so many times that of eyes and nose.
+_NOSE_APART: Final = 0.4
+_NOSE_SIZES: Final = 3.3
 # Mesh points whose mean is nose, left eye, right eye, left ear and right ear. The mesh's tragions
 # are higher than the template's ears and would lower level heads by 5° (13 rendered workers); with
 # the points below them it is 1°.
+# Their ears are 140 mm apart, and the template's 156: a head by these points seems 11 % farther
+# than it is (84 rendered faces at 0.8 to 7 m, 7 % of spread).
+_FACE_SCALE: Final = 0.9
 _HEAD_POINTS: Final = ((1, 1), (263, 362), (33, 133), (454, 323), (234, 93))
 # Angles off the camera between which an ear goes out of sight behind the cheek, and an eye behind
 # the nose.
@@ -184,7 +193,7 @@ class FaceMeshPoseEstimator:
     """A pose estimator whose people get the faces of :class:`FaceMesh`.
 
     ``face_evidence`` of a person is True where a face was found; nose, eyes and ears then come from
-    it. It is False where none was found.
+    it. It is False where none was found, or one that is turned elsewhere than the head.
 
     Args:
         pose_estimator: finds the bodies.
@@ -215,11 +224,19 @@ class FaceMeshPoseEstimator:
         marks = self._mesh.find(image, centre, _HEAD_SIDES * size_px, _FARTHEST * size_px)
         if marks is None:
             return replace(person, face_evidence=False)
-        eyes_open = bool(_openings(marks[:, :2]).mean() > _MIN_OPENING)
         points = np.array([marks[list(rows)].mean(axis=0) for rows in _HEAD_POINTS])
+        if not _agree(pixels[kp.HEAD], points[:, :2]):
+            return replace(person, face_evidence=False)
+        eyes_open = bool(_openings(marks[:, :2]).mean() > _MIN_OPENING)
         pixels[kp.HEAD], scores[kp.HEAD] = points[:, :2], _face_scores(points)
         return replace(
-            person, keypoints_px=pixels, scores=scores, face_evidence=True, eyes_open=eyes_open
+            person,
+            keypoints_px=pixels,
+            scores=scores,
+            face_evidence=True,
+            face_scale=_FACE_SCALE,
+            eyes_open=eyes_open,
+            irises_px=iris_offset(marks[:, :2]),
         )
 
 
@@ -227,11 +244,8 @@ class FaceMeshPoseEstimator:
 _IRISES: Final = (473, 468)
 _CORNERS: Final = ((362, 263), (133, 33))
 _LIDS: Final = ((386, 374), (159, 145))
-# Side of the square about the head, and how far from its middle the face may lie.
-_CROP_M: Final = 0.45
-_OFF_M: Final = 0.12
 _MIN_DEPTH_M: Final = 0.1
-# Smaller irises (diameter) show no direction; the network does not run.
+# Smaller irises (diameter) show no direction.
 _IRIS_M: Final = 0.0117
 _MIN_IRIS_PX: Final = 2.5
 # Farther from the camera, the far eye hides behind the nose and the mesh slips.
@@ -246,59 +260,50 @@ _IRIS_STD_M: Final = (4e-4, 1.5e-3)
 
 
 class FaceMeshEyeEstimator:
-    """Rotation of the eyes of near people, from the irises of :class:`FaceMesh`.
+    """Rotation of the eyes of near people, from the irises of :class:`FaceMeshPoseEstimator`.
 
-    There is no result, and no run of the network, for an iris of less than 2.5 pixels across (2.6 m
-    at 640 pixels and 60°) or a head that is turned more than 50° away from the camera; and none
-    where no face is found or the eyes are closed.
-
-    Args:
-        mesh: finds the faces.
+    There is no result for an iris of less than 2.5 pixels across (2.6 m at 640 pixels and 60°) or a
+    head that is turned more than 50° away from the camera; and none where no face is found or the
+    eyes are closed.
     """
 
-    def __init__(self, mesh: FaceMesh) -> None:
-        self._mesh = mesh
-
     def estimate(
-        self, image_rgb: ImageRgb, camera: Camera, heads: tuple[HeadPose | None, ...]
+        self,
+        image_rgb: ImageRgb,
+        camera: Camera,
+        heads: tuple[HeadPose | None, ...],
+        people: tuple[PersonKeypoints, ...],
     ) -> tuple[EyeGaze | None, ...]:
         """Return the rotation of each person's eyes in the head; None where it is not known.
 
         Args:
-            image_rgb: (H, W, 3) uint8.
+            image_rgb: not used; may be None.
             camera: camera of the image.
             heads: head pose of each person.
-
-        Raises:
-            PerceptionError: for an image of another type or shape, and when a network fails.
+            people: the persons, with their irises.
         """
-        image = rgb_image(image_rgb)
-        return tuple(None if head is None else self._eyes(image, camera, head) for head in heads)
+        return tuple(
+            None
+            if head is None or person.irises_px is None
+            else _eyes(camera, head, person.irises_px)
+            for head, person in zip(heads, people, strict=True)
+        )
 
-    def _eyes(self, image: ImageRgb, camera: Camera, head: HeadPose) -> EyeGaze | None:
-        centre_m, eyes_m = (
-            head.position_camera_m + head.rotation_camera_head @ place
-            for place in (HEAD_CENTRE_HEAD_M, EYES_HEAD_M)
-        )
-        if centre_m[2] < _MIN_DEPTH_M or not _faces_camera(head):
-            return None
-        focal_px = ray_focal_px(camera)
-        px_per_m = focal_px / float(np.linalg.norm(eyes_m))
-        if px_per_m * _IRIS_M < _MIN_IRIS_PX:
-            return None
-        centre_px = camera.project(centre_m[None])
-        if not np.isfinite(centre_px).all():
-            return None
-        axes, stretch = looking_at(camera, centre_px)
-        marks = self._mesh.find(image, centre_px[0], _CROP_M * px_per_m, _OFF_M * px_per_m)
-        offset_px = (
-            None if marks is None else iris_offset(marks[:, :2] @ np.linalg.inv(stretch[0]).T)
-        )
-        if offset_px is None:
-            return None
-        return eyes_from_irises(
-            offset_px / px_per_m, axes[0], head, iris_std_m=iris_std_m(px_per_m)
-        )
+
+def _eyes(camera: Camera, head: HeadPose, irises_px: FloatArray) -> EyeGaze | None:
+    centre_m, eyes_m = (
+        head.position_camera_m + head.rotation_camera_head @ place
+        for place in (HEAD_CENTRE_HEAD_M, EYES_HEAD_M)
+    )
+    if centre_m[2] < _MIN_DEPTH_M or head.off_camera_rad > _MAX_HEAD_ANGLE_RAD:
+        return None
+    px_per_m = ray_focal_px(camera) / float(np.linalg.norm(eyes_m))
+    centre_px = camera.project(centre_m[None])
+    if px_per_m * _IRIS_M < _MIN_IRIS_PX or not np.isfinite(centre_px).all():
+        return None
+    axes, stretch = looking_at(camera, centre_px)
+    offset_px = np.linalg.inv(stretch[0]) @ irises_px
+    return eyes_from_irises(offset_px / px_per_m, axes[0], head, iris_std_m=iris_std_m(px_per_m))
 
 
 def iris_std_m(px_per_m: float) -> tuple[float, float]:
@@ -329,13 +334,6 @@ def _openings(points: FloatArray) -> FloatArray:
     return np.asarray(opening / np.maximum(width, 1e-9))
 
 
-def _faces_camera(head: HeadPose) -> bool:
-    """Return True for a head that is turned less than 50° away from the camera."""
-    away = float(head.gaze_camera @ head.position_camera_m)
-    range_m = float(np.linalg.norm(head.position_camera_m))
-    return -away > math.cos(_MAX_HEAD_ANGLE_RAD) * range_m
-
-
 def _body_size_px(keypoints_px: FloatArray) -> float:
     """Return about the shoulder width in pixels, also for a person seen from the side."""
     left, right = keypoints_px[kp.LEFT_SHOULDER], keypoints_px[kp.RIGHT_SHOULDER]
@@ -356,6 +354,16 @@ def _face_scores(points: FloatArray) -> FloatArray:
     eyes = 1.0 - np.interp(turned, _EYE_HIDES_RAD, (0.0, 1.0))
     ears = 1.0 - np.interp(turned, _EAR_HIDES_RAD, (0.0, 1.0))
     return np.array([1.0, *eyes, *ears])
+
+
+def _agree(before_px: FloatArray, face_px: FloatArray) -> bool:
+    """Return whether the nose of a face points where that of the pose network did."""
+    size_px = max(
+        float(np.linalg.norm(face_px[kp.LEFT_EAR] - face_px[kp.RIGHT_EAR])),
+        _NOSE_SIZES * float(np.linalg.norm(face_px[1:3].mean(axis=0) - face_px[kp.NOSE])),
+    )
+    before, face = (each[kp.NOSE] - each[3:].mean(axis=0) for each in (before_px, face_px))
+    return float(np.linalg.norm(before - face)) <= _NOSE_APART * size_px
 
 
 def _square(

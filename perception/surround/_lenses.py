@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, Protocol
@@ -208,16 +208,8 @@ class FlatView:
         return transform
 
     def in_camera(self, observation: PersonObservation) -> PersonObservation:
-        """Return the observation in the camera frame; its box stays in pixels of the view."""
-        R = self.rotation_camera_view
-        gaze = observation.gaze_camera
-        covariance = R @ observation.position_covariance_m2 @ R.T
-        return replace(
-            observation,
-            position_camera_m=R @ observation.position_camera_m,
-            position_covariance_m2=0.5 * (covariance + covariance.T),
-            gaze_camera=None if gaze is None else R @ gaze,
-        )
+        """Return the observation in the camera frame; its pixels stay those of the view."""
+        return observation.rotated(self.rotation_camera_view)
 
     def sampling_maps(self, lens: WideLens) -> tuple[FloatArray, FloatArray]:
         """Return the maps u, v (H, W), float32, of the view's pixels in the lens's image."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ from .._camera import Camera
 from .._floor import FloorPlane
 from .._observation import PersonObservation
 from .._pipeline import AwarenessPipeline
-from ..arrays import ImageRgb, check_image
+from ..arrays import FloatArray, ImageRgb, check_image, unit_vector
 from ..errors import PerceptionError
 from ..matrices import CHI2_999, mahalanobis2
 from ._lenses import FlatView, PanoramaLens, WideLens
@@ -24,6 +24,8 @@ from ._lenses import FlatView, PanoramaLens, WideLens
 _SAME_WITHIN_M: Final = 1.0
 # Standard deviation to add, because the border of a view cuts bodies off.
 _CUT_OFF_STD_M: Final = 0.1
+_UP_CAMERA: Final = np.array([0.0, -1.0, 0.0])
+_LEAST_AHEAD: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +44,9 @@ class SeenInView:
 
 
 def merge_views(
-    views: Sequence[FlatView], seen: Sequence[Sequence[PersonObservation]]
+    views: Sequence[FlatView],
+    seen: Sequence[Sequence[PersonObservation]],
+    up_camera: FloatArray = _UP_CAMERA,
 ) -> tuple[SeenInView, ...]:
     """Merge the observations of several views of one instant, so that each person occurs once.
 
@@ -56,6 +60,7 @@ def merge_views(
     Args:
         views: V views of one camera.
         seen: observations of each view, in the view's optical frame.
+        up_camera: (3,) direction up in the camera frame; default against its y axis.
 
     Returns:
         The merged observations in the camera frame.
@@ -67,6 +72,7 @@ def merge_views(
         raise PerceptionError(
             f"seen must hold one list of observations per view ({len(views)}), got {len(seen)}"
         )
+    level = _level_axes(up_camera)
     entries = [
         SeenInView(view.in_camera(observation), number, row)
         for number, (view, rows) in enumerate(zip(views, seen, strict=True))
@@ -77,7 +83,9 @@ def merge_views(
         for one, first in enumerate(entries)
         for other in range(one + 1, len(entries))
         if first.view != entries[other].view
-        and (distance_m := _distance_if_same_m(first.observation, entries[other].observation))
+        and (
+            distance_m := _distance_if_same_m(first.observation, entries[other].observation, level)
+        )
         is not None
     )
     dropped: set[int] = set()
@@ -88,27 +96,43 @@ def merge_views(
         if taken or one in dropped or other in dropped:
             continue
         paired |= {(one, second.view), (other, first.view)}
-        off_rad = [_off_axis_rad(seen[entry.view][entry.row]) for entry in (first, second)]
+        off_rad = [
+            _off_axis_rad(entry.observation, views[entry.view], level) for entry in (first, second)
+        ]
         dropped.add(other if off_rad[0] <= off_rad[1] else one)
     return tuple(entry for index, entry in enumerate(entries) if index not in dropped)
 
 
-def _distance_if_same_m(first: PersonObservation, second: PersonObservation) -> float | None:
+def _level_axes(up_camera: FloatArray) -> FloatArray:
+    """Return two axes (2, 3) across the direction up; x and z of a level camera."""
+    ahead = np.array([0.0, 0.0, 1.0]) - up_camera[2] * up_camera
+    if (length := float(np.linalg.norm(ahead))) < _LEAST_AHEAD:  # the camera looks up or down
+        ahead, length = np.array([0.0, -1.0, 0.0]) + up_camera[1] * up_camera, 1.0
+    ahead = ahead / length
+    return np.array([np.cross(ahead, up_camera), ahead])
+
+
+def _distance_if_same_m(
+    first: PersonObservation, second: PersonObservation, level: FloatArray
+) -> float | None:
     """Return the horizontal distance of two observations; None if they are of two people."""
-    difference = (second.position_camera_m - first.position_camera_m)[[0, 2]]
+    difference = level @ (second.position_camera_m - first.position_camera_m)
     distance_m = float(np.hypot(*difference))
     if distance_m > _SAME_WITHIN_M:
         return None
     both = first.position_covariance_m2 + second.position_covariance_m2
-    spread = both[np.ix_([0, 2], [0, 2])] + _CUT_OFF_STD_M**2 * np.eye(2)
+    spread = level @ both @ level.T + _CUT_OFF_STD_M**2 * np.eye(2)
     chi2 = float(mahalanobis2(difference, spread))
     return distance_m if chi2 <= CHI2_999 else None
 
 
-def _off_axis_rad(observation: PersonObservation) -> float:
-    """Return the horizontal angle between the axis of the view and the observation."""
-    x, _, z = observation.position_camera_m.tolist()
-    return abs(math.atan2(x, z))
+def _off_axis_rad(observation: PersonObservation, view: FlatView, level: FloatArray) -> float:
+    """Return the horizontal angle between the axis of the view and an observation."""
+    (x, z), (right, ahead) = (
+        (level @ each).tolist()
+        for each in (observation.position_camera_m, view.rotation_camera_view[:, 2])
+    )
+    return abs(math.atan2(x * ahead - z * right, x * right + z * ahead))
 
 
 class SurroundPipeline:
@@ -163,34 +187,47 @@ class SurroundPipeline:
         )
 
     def process(
-        self, image_rgb: ImageRgb, stamp_s: float, floor: FloorPlane | None = None
+        self,
+        image_rgb: ImageRgb,
+        stamp_s: float,
+        floor: FloorPlane | None = None,
+        *,
+        up_camera: Any | None = None,
     ) -> tuple[PersonObservation, ...]:
-        """Return one observation per person, in the camera frame.
+        """Return one observation per person, in the camera frame, without keypoints.
 
         Boxes are in pixels of the lens's image. The box is None for a person across the seam of a
-        panorama.
+        panorama. Each view is turned upright as :meth:`AwarenessPipeline.process` does it.
 
         Args:
             image_rgb: (H, W, 3) uint8 of the lens's size.
             stamp_s: time of the frame.
             floor: the floor in the camera frame, if it is known.
+            up_camera: direction up in the camera frame, if the floor is not known.
 
         Raises:
             PerceptionError: as :meth:`AwarenessPipeline.process`.
         """
+        up = None if floor is None else floor.normal_camera
+        if up_camera is not None:
+            up = unit_vector("up_camera", up_camera)
         seen = [
             pipeline.process(
-                flat, stamp_s, None if floor is None else floor.in_view(view.rotation_camera_view)
+                flat,
+                stamp_s,
+                None if floor is None else floor.in_view(view.rotation_camera_view),
+                up_camera=None if up is None else up @ view.rotation_camera_view,
             )
             for flat, pipeline, view in zip(
                 self.flat_pictures(image_rgb), self._pipelines, self.views, strict=True
             )
         ]
-        return tuple(self._with_lens_box(each) for each in merge_views(self.views, seen))
+        merged = merge_views(self.views, seen, _UP_CAMERA if up is None else up)
+        return tuple(self._with_lens_box(each) for each in merged)
 
     def _with_lens_box(self, seen: SeenInView) -> PersonObservation:
         """Return the observation with its box in pixels of the lens's image."""
         box = seen.observation.box_xyxy_px
-        if box is None:
-            return seen.observation
-        return replace(seen.observation, box_xyxy_px=self.views[seen.view].box_in(self.lens, box))
+        if box is not None:
+            box = self.views[seen.view].box_in(self.lens, box)
+        return replace(seen.observation, box_xyxy_px=box, keypoints=None)

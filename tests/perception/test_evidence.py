@@ -135,15 +135,23 @@ def test_a_tilt_about_the_gaze_is_no_uncertainty_of_the_direction(yaw_deg, axis)
     assert (judged == "head direction unknown") == (axis != 1)
 
 
-def test_where_no_face_was_found_one_is_unlikely_but_possible():
+@given(st.floats(0.0, 180.0), st.floats(0.6, 5.0))
+def test_where_no_face_was_found_one_is_unlikely_but_possible(yaw_deg, distance_m):
     unfound = with_scores(1, 1, 1, 1, 1, face_evidence=False)
-    assert judge_face(CAMERA, unfound, head_at(), 0.3).seen == 0.2
-    alpha, std = awareness_with_evidence(head_at(), unfound)
-    assert alpha - 1.28 * std < 0.1
-    # A small one may have been missed.
-    far = head_at(distance_m=5.0)
-    assert judge_face(CAMERA, unfound, far, 0.3) == "no face found"
-    assert judge_face(CAMERA, ALL, far, 0.3).seen == 1.0
+    head = head_at(yaw_deg, distance_m)
+    judged = judge_face(CAMERA, unfound, head, 0.3)
+    if abs(math.degrees(head.off_camera_rad) - 50.0) < 1e-3:
+        return
+    if head.off_camera_rad < math.radians(50.0):
+        # Keypoints and the network of faces contradict each other: that is no evidence.
+        assert judged == "face missed"
+    elif 0.156 * CAMERA.fx_px / head.position_camera_m[2] < 20.0:
+        assert judged == "no face found"  # a small one may have been missed
+    else:
+        assert judged.seen == 0.2
+        alpha, std = awareness_with_evidence(head, unfound)
+        assert alpha - 1.28 * std < 0.1
+    assert judge_face(CAMERA, ALL, head, 0.3).seen == 1.0
 
 
 @given(st.floats(0.0, 60.0), st.floats(0.0, 60.0))

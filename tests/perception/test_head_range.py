@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from synthetic_people import Given, person_at
 
 from perception import (
     AwarenessPipeline,
     Camera,
     HeadPose,
+    PersonDetection,
     PersonKeypoints,
     PersonObservation,
+    PnpHeadPoseEstimator,
 )
 from perception.anthropometry import (
     HEAD_CENTRE_HEAD_M,
@@ -73,7 +78,7 @@ def mixture_std(own: tuple[float, float], stature_stds: tuple[float, float]) -> 
     return math.sqrt(sum((off**2 + var) * weight for off, var, weight in found) / total)
 
 
-@pytest.mark.parametrize(("range_m", "head_std"), [(2.0, 0.05), (5.0, 0.10)])
+@pytest.mark.parametrize(("range_m", "head_std"), [(2.5, 0.05), (5.0, 0.10)])
 def test_the_range_is_that_of_cues_that_err_together(range_m: float, head_std: float) -> None:
     truth = person_at((0.2, 0.1, range_m), stature_m=1.74)
     person = truth.keypoints(CAMERA, 0.0, np.random.default_rng(0))
@@ -98,3 +103,44 @@ def test_the_range_is_that_of_cues_that_err_together(range_m: float, head_std: f
         (own, measured_std**2 - head_stature_std**2), (stature_std, head_stature_std)
     )
     assert range_std(both) == pytest.approx(expected, rel=2e-3)
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(0.8, 1.6), st.floats(1.25, 2.2), st.floats(-0.3, 0.3))
+def test_of_people_whom_the_border_cuts_the_face_tells_the_range(range_m, times, aside) -> None:
+    """A pose network fits a whole body into the part that is seen: a small one, far away."""
+    truth = person_at((aside * range_m, 0.35, range_m), stature_m=1.74)
+    whole = truth.keypoints(CAMERA, 0.0, np.random.default_rng(0))
+    neck_px = whole.keypoints_px[5:7].mean(axis=0)
+    pixels = neck_px + (whole.keypoints_px - neck_px) / times
+    scores = (pixels[:, 1] < CAMERA.height_px).astype(float)
+    person = replace(whole, keypoints_px=pixels, scores=scores)
+    head = HeadPose(
+        truth.points_camera_m[0],
+        truth.rotation_camera_head,
+        1e-4 * np.eye(6),
+        0.0,
+        range_relative_std=0.07,
+    )
+    box = np.r_[whole.keypoints_px.min(axis=0), whole.keypoints_px[:, 0].max(), 480.0]
+    networks = Given([person], [PersonDetection(box, 0.9)], [head])
+    (seen,) = AwarenessPipeline(CAMERA, networks, networks, networks).process(IMAGE, 0.0)
+    found_m = float(np.linalg.norm(seen.position_camera_m))
+    true_m = float(np.linalg.norm(truth.chest_camera_m))
+    assert found_m < 1.25 * true_m
+    assert abs(found_m - true_m) < 2.0 * range_std(seen) * found_m
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(1.0, 4.0), st.floats(0.7, 1.2), st.floats(-0.5, 0.5))
+def test_the_range_by_a_face_is_in_proportion_to_the_size_of_its_head(range_m, scale, yaw) -> None:
+    person = person_at((0.1, 0.3, range_m), head_yaw_rad=yaw).keypoints(
+        CAMERA, 0.0, np.random.default_rng(0)
+    )
+    estimator = PnpHeadPoseEstimator()
+    (unmeasured,) = estimator.estimate(None, CAMERA, (person,))
+    (measured,) = estimator.estimate(None, CAMERA, (replace(person, face_scale=scale),))
+    assert unmeasured.range_relative_std is None
+    assert measured.range_relative_std > 0.0
+    np.testing.assert_allclose(measured.position_camera_m, scale * unmeasured.position_camera_m)
+    np.testing.assert_array_equal(measured.rotation_camera_head, unmeasured.rotation_camera_head)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -261,6 +262,46 @@ def test_a_face_away_from_the_neck_is_anothers(away_m, direction_rad, depth_m):
     # The head's own place is about 0.2 m above the neck.
     across, up = away_m * math.cos(direction_rad), away_m * math.sin(direction_rad) - 0.2
     assert reason_of(moved_head(one, across, up, depth_m), head) == SHARED_HEAD
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.floats(0.22, 0.3), st.floats(-0.9, 0.9), st.floats(1.4, 1.5), st.floats(1.2, 3.0))
+def test_a_head_that_leans_over_a_body_that_seems_far_is_its_own(neck_m, lean_rad, times, depth_m):
+    """Pose networks make bodies of near people small: the face knows better how near they are."""
+    one, head = with_head(depth_m=depth_m, camera=WIDE)
+    pixels = one.keypoints.keypoints_px.copy()
+    neck = pixels[5:7].mean(axis=0)
+    pixels = neck + (pixels - neck) / times
+    up = neck_m * np.array([math.sin(lean_rad), -math.cos(lean_rad)])
+    pixels[HEAD] += neck + up * WIDE.fx_px / depth_m - pixels[HEAD].mean(axis=0)
+    box = np.r_[pixels.min(axis=0), pixels.max(axis=0)]
+    leaning = one._replace(
+        keypoints=changed(one.keypoints, pixels), detection=PersonDetection(box, 0.9)
+    )
+    measured = replace(head, range_relative_std=0.07)
+    assert reason_of(leaning, measured, WIDE) is None
+    # The head of somebody beside them is not.
+    moved = pixels.copy()
+    moved[HEAD, 0] += 0.6 * WIDE.fx_px / depth_m
+    beside = leaning._replace(keypoints=changed(one.keypoints, moved))
+    assert reason_of(beside, measured, WIDE) == SHARED_HEAD
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(-0.1, 0.1), st.floats(2.0, 6.0), st.booleans())
+def test_a_face_outside_the_box_is_anothers(across_m, depth_m, with_shoulders):
+    """A second box over somebody bent begins below the face of somebody behind them."""
+    one, head = with_head(depth_m=depth_m)
+    one = moved_head(one, across_m, 0.0, depth_m)
+    assert reason_of(one, head) is None
+    box = one.detection.box_xyxy_px.copy()
+    box[1] = one.keypoints.keypoints_px[5:7, 1].mean() - 0.02 * CAMERA.fx_px / depth_m
+    scores = one.keypoints.scores.copy()
+    scores[5] *= with_shoulders
+    second = one._replace(
+        detection=PersonDetection(box, 0.9), keypoints=changed(one.keypoints, scores=scores)
+    )
+    assert reason_of(second, head) == SHARED_HEAD
 
 
 def test_a_head_that_looks_away_is_left():

@@ -136,7 +136,7 @@ class KnownEyes:
     def __init__(self, eyes):
         self.eyes = eyes
 
-    def estimate(self, image_rgb, camera, heads):
+    def estimate(self, image_rgb, camera, heads, people):
         self.heads = heads
         return (self.eyes,) * len(heads)
 
@@ -175,7 +175,7 @@ def test_an_eye_estimator_gets_one_head_per_person_and_returns_as_many():
     assert all(isinstance(head, HeadPose) for head in estimator.heads)
 
     class TooFew(KnownEyes):
-        def estimate(self, image_rgb, camera, heads):
+        def estimate(self, image_rgb, camera, heads, people):
             return ()
 
     with pytest.raises(PerceptionError, match=r"eye_estimator must return one result per person"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerC
 
 PRIOR = 0.05
 AWARE_ABOVE = 0.5
-# Content of a frame: an α, None for a person without a face, "unseen" for no person.
+# Content of a frame: an α, None for a person without a face, "missed" for one whose head looks here
+# and whose face is not found, "unseen" for no person.
 Shown = float | str | None
 
 
@@ -39,10 +41,12 @@ def lower_bounds(
         if alpha != "unseen":
             measured = (
                 None
-                if alpha is None
+                if alpha in (None, "missed")
                 else float(np.clip(float(alpha) + rng.normal(0.0, noise_std), 0.0, 1.0))
             )
-            frame = [observe((3.0, 0.0), now, awareness=measured, awareness_std=alpha_std)]
+            one = observe((3.0, 0.0), now, awareness=measured, awareness_std=alpha_std)
+            reason = "face missed" if alpha == "missed" else None
+            frame = [replace(one, awareness_reason=reason)]
         tracks = tracker.update(frame, now, CAMERA)
         bounds.append(tracks[0].awareness_lower if tracks else 0.0)
     return np.array(bounds)
@@ -72,6 +76,30 @@ def test_awareness_falls_within_0_35_s(lost: Shown, period_s: float, alpha_std: 
         released.append(int(np.argmax(bounds[before:] < 0.5 * AWARE_ABOVE) + 1) * period_s)
         assert bounds[-1] < 0.5 * AWARE_ABOVE
     assert np.percentile(released, 95) <= 0.35
+
+
+@pytest.mark.parametrize("period_s", [0.033, 0.05, 0.1])
+@pytest.mark.parametrize("gap_s", [0.2, 0.45])
+def test_a_gap_of_the_network_of_faces_leaves_somebody_aware(gap_s: float, period_s: float) -> None:
+    before, gap, after = (round(each / period_s) for each in (1.5, gap_s, 0.5))
+    for seed in range(5):
+        bounds = lower_bounds(
+            [1.0] * before + ["missed"] * gap + [1.0] * after, seed=seed, period_s=period_s
+        )
+        assert (bounds[before - 1 :] > AWARE_ABOVE).all()
+        assert np.ptp(bounds[before - 1 : before + gap]) == 0.0
+        # Of a head that has turned, a gap costs all.
+        turned = lower_bounds([1.0] * before + [None] * gap, seed=seed, period_s=period_s)
+        assert turned[-1] < bounds[before + gap - 1]
+
+
+@pytest.mark.parametrize("period_s", [0.033, 0.05, 0.1])
+def test_a_face_that_is_missed_for_longer_ends_awareness(period_s: float) -> None:
+    before, held, after = (round(each / period_s) for each in (1.5, 0.5, 0.35))
+    bounds = lower_bounds([1.0] * before + ["missed"] * (held + after + 1), period_s=period_s)
+    assert bounds[-1] < 0.5 * AWARE_ABOVE
+    assert (lower_bounds(["missed"] * 60, period_s=period_s) == 0.0).all()
+    assert lower_bounds([0.0] * 20 + ["missed"] * 20, period_s=period_s).max() < 0.1
 
 
 def test_a_person_unseen_for_0_3_s_is_not_aware() -> None:

@@ -94,7 +94,7 @@ def _shared_pipeline(
         return AwarenessPipeline(camera, onnx_settings=_ONE_CORE, **settings)
     own = load_networks(networks)
     own = replace(own, settings={**own.settings, **settings})
-    return own.pipeline(camera, own.pose_estimator)
+    return own.pipeline(camera)
 
 
 def _pixel_eyes(

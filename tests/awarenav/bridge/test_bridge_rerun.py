@@ -13,10 +13,9 @@ from rendered_image import odometry, rendered
 
 from awarenav.bridge._rerun import RerunRecorder, cone_lines
 from awarenav.errors import AwarenavError
-from awarenav.estimate import RecordingPoseEstimator
 from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import AwarenessBridge, RobotFile
-from perception import AttentionCone, AwarenessPipeline, shipped
+from perception import AttentionCone
 
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
 
@@ -24,17 +23,14 @@ ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
 def test_a_rerun_recording_has_inputs_and_outputs_of_the_bridge(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     scene = rendered(tmp_path / "render")
-    pose_estimator = RecordingPoseEstimator(shipped.shipped_pose_estimator(None))
-    head = shipped.shipped_head_pose_estimator(None)
     bridge = AwarenessBridge(
         AwarenessPolicy.preset("balanced"),
         RobotFile.from_yaml(ROBOT).profile(),
         lambda key, message: None,
         T_base_camera=scene.T_base_camera,
         camera=scene.camera,
-        make_pipeline=lambda camera: AwarenessPipeline(camera, None, pose_estimator, head),
     )
-    with RerunRecorder(path, pose_estimator, AttentionCone().half_angle_rad) as recorder:
+    with RerunRecorder(path, AttentionCone().half_angle_rad) as recorder:
         for tick in range(4):
             now = 1000.0 + 0.1 * tick
             bridge.on_odometry(odometry(now))
@@ -65,6 +61,5 @@ def test_a_cone_is_drawn_about_the_gaze_with_its_half_angle() -> None:
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    pose_estimator = RecordingPoseEstimator(shipped.shipped_pose_estimator(None))
     with pytest.raises(AwarenavError, match="there is no folder"):
-        RerunRecorder(tmp_path / "nowhere" / "run.rrd", pose_estimator, 1.0)
+        RerunRecorder(tmp_path / "nowhere" / "run.rrd", 1.0)

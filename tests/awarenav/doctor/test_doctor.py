@@ -189,3 +189,18 @@ def test_the_width_of_edges_grows_with_blur_and_not_with_contrast(sigma_px, cont
     assert sharp < blurred < more
     full = picture_figures(cv2.GaussianBlur(SCENE, (0, 0), sigma_px)).edge_px
     assert blurred == pytest.approx(full, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("quarters", "roll_deg"), [(1, 90), (2, 180), (3, -90)], ids=["right", "upside down", "left"]
+)
+def test_a_camera_that_is_rolled_is_told_by_the_people_it_shows(
+    capsys, renders, tmp_path, quarters, roll_deg
+):
+    """Of pictures turned counter-clockwise, the camera was rolled clockwise."""
+    folder = copied(renders, tmp_path / "set", lambda image: np.rot90(image, quarters))
+    found = findings(capsys, folder, "--out", "none", "--fov-deg", 60)
+    assert severities(found, "mount") == {"error"}
+    assert f"roll_deg: {roll_deg} " in found["mount"][0].remedy
+    upright = copied(renders, tmp_path / "upright", lambda image: image)
+    assert "mount" not in findings(capsys, upright, "--out", "none", "--fov-deg", 60)

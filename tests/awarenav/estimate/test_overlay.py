@@ -42,14 +42,17 @@ def observed(x_m=0.0, z_m=3.0, *, alpha=0.7, std=0.1, gaze=(0.0, 0.0, -1.0), box
     )
 
 
+def with_keypoints(observation, person):
+    return replace(observation, keypoints=person)
+
+
 def estimate(*observations, keypoints=None, image=GREY, camera=CAMERA, tracks=None):
     count = len(observations)
     return FrameEstimate(
         SourceFrame("000000", 1.25, image),
         camera,
         None,
-        observations,
-        (None,) * count if keypoints is None else keypoints,
+        tuple(map(with_keypoints, observations, keypoints or (None,) * count)),
         tracks,
         (None,) * count if tracks is None else tuple(track.id for track in tracks),
     )

@@ -53,7 +53,7 @@ def estimates() -> list[FrameEstimate]:
                 )
             )
         frame = SourceFrame(f"{index:06d}", stamp_s, np.zeros((480, 640, 3), np.uint8), T)
-        frames.append(FrameEstimate(frame, CAMERA, T, tuple(people), (None, None), None, (0, 1)))
+        frames.append(FrameEstimate(frame, CAMERA, T, tuple(people), None, (0, 1)))
     return frames
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,14 @@ from paths import SHARED
 from awarenav.errors import AwarenavError
 from awarenav.estimate import choose_networks
 from awarenav.models import ModelStore
-from perception import Camera, HeadPose, PerceptionError, PersonDetection
+from perception import (
+    AwarenessPipeline,
+    Camera,
+    HeadPose,
+    PerceptionError,
+    PersonDetection,
+    PersonKeypoints,
+)
 from perception.eyes import EyeEstimator
 from perception.networks import BlazePoseEstimator, EfficientDetPersonDetector, TfliteModel
 from perception.networks.faces import FaceMesh, FaceMeshEyeEstimator, FaceMeshPoseEstimator
@@ -43,7 +51,27 @@ def files(tmp_path_factory):
 def pipeline(files):
     detector, pose, face = map(str, files)
     networks = choose_networks(detector, pose, "pnp", face)
-    return networks.pipeline(CAMERA, networks.pose_estimator)
+    return networks.pipeline(CAMERA)
+
+
+class Given:
+    """A detector and pose estimator of one person with known keypoints (17, 2)."""
+
+    def __init__(self, keypoints_px):
+        low, high = keypoints_px.min(axis=0), keypoints_px.max(axis=0)
+        box = np.clip(np.concatenate([low - 10.0, high + 10.0]), 0.0, np.tile((640.0, 480.0), 2))
+        self.box = PersonDetection(box, 0.9)
+        flat = np.column_stack([keypoints_px - keypoints_px[11:13].mean(axis=0), np.zeros(17)])
+        scores = ((keypoints_px > 0.0) & (keypoints_px < (640.0, 480.0))).all(axis=1).astype(float)
+        self.person = PersonKeypoints(
+            keypoints_px, flat, scores, "coco", lifted=False, face_evidence=False
+        )
+
+    def detect(self, image_rgb):
+        return (self.box,)
+
+    def estimate(self, image_rgb, detections):
+        return (self.person,)
 
 
 class Scene:
@@ -166,25 +194,43 @@ def test_a_network_in_the_place_of_another_is_refused_with_what_it_is(files):
 
 
 def test_eyes_of_a_near_worker_are_measured(files, scene):
-    eyes = FaceMeshEyeEstimator(FaceMesh(files[2]))
+    mesh, eyes = FaceMesh(files[2]), FaceMeshEyeEstimator()
     assert isinstance(eyes, EyeEstimator)
     turns, found = np.radians([-16.0, 0.0, 16.0]), []
     for turn in turns:
-        image, _, head = scene.shown(1.2, 0.0, eye_yaw_rad=float(turn))
-        (seen,) = eyes.estimate(image, CAMERA, (head,))
+        image, person, head = scene.shown(1.2, 0.0, eye_yaw_rad=float(turn))
+        (shown,) = FaceMeshPoseEstimator(Given(person), mesh).estimate(image, ())
+        (seen,) = eyes.estimate(image, CAMERA, (head,), (shown,))
         assert seen is not None
         found.append(seen.angles_rad[0])
         assert (found[-1] - turn) ** 2 < 9.0 * seen.covariance_rad2[0, 0]
     assert 0.5 < np.polyfit(turns, found, 1)[0] < 1.5
 
 
-def test_far_and_turned_heads_cost_no_run_of_the_network(files, monkeypatch):
-    mesh = FaceMesh(files[2])
-    monkeypatch.setattr(mesh, "find", None)
+def test_the_networks_of_faces_run_once_for_a_face_and_its_eyes(files, scene, monkeypatch):
+    mesh, runs = FaceMesh(files[2]), []
+    image, person, _ = scene.shown(1.2, 0.0)
+    pose = FaceMeshPoseEstimator(Given(person), mesh)
+    find = mesh.find
+    monkeypatch.setattr(mesh, "find", lambda *given: runs.append(given) or find(*given))
+    pipeline = AwarenessPipeline(CAMERA, Given(person), pose, eye_estimator=FaceMeshEyeEstimator())
+    (seen,) = pipeline.process(image, 0.0)
+    assert (seen.eyes_seen, len(runs)) == (True, 1)
+    assert np.linalg.norm(seen.position_camera_m) == pytest.approx(1.2, rel=0.15)
+
+
+def test_eyes_of_far_and_turned_heads_say_nothing():
     turn = np.array([[0.5, 0.0, 0.866], [0.0, 1.0, 0.0], [-0.866, 0.0, 0.5]])
     far = HeadPose([0.0, 0.0, 3.0], FACING, 1e-3 * np.eye(6), 0.5)
     turned = HeadPose([0.0, 0.0, 1.5], turn @ FACING, 1e-3 * np.eye(6), 0.5)
-    assert FaceMeshEyeEstimator(mesh).estimate(FRAME, CAMERA, (far, turned, None)) == (None,) * 3
+    near = HeadPose([0.0, 0.0, 1.5], FACING, 1e-3 * np.eye(6), 0.5)
+    person = PersonKeypoints(
+        np.zeros((17, 2)), np.zeros((17, 3)), np.ones(17), "coco", irises_px=[0.1, 0.0]
+    )
+    blind = replace(person, irises_px=None)
+    heads, people = (far, turned, None, near, near), (*[person] * 3, blind, person)
+    eyes = FaceMeshEyeEstimator().estimate(None, CAMERA, heads, people)
+    assert [each is not None for each in eyes] == [False] * 4 + [True]
 
 
 @pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="the photographs of ../shared are not here")
