@@ -129,7 +129,7 @@ class AttentionRules(NavConfig):
             is left out for somebody who looks far past the robot (an α of at most 0.1).
     """
 
-    min_gain_s: float = Field(default=0.5, ge=0.0, le=10.0)
+    min_gain_s: float = Field(default=2.0, ge=0.0, le=10.0)
     pause_s: float = Field(default=2.0, ge=1.0, le=60.0)
     per_minute: int = Field(default=6, ge=1, le=60)
     within_m: float = Field(default=8.0, gt=0.0, le=30.0)

@@ -48,7 +48,7 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
         "horn_within_s": (2.0, 0.0, 30.0),
     },
     "attention": {
-        "min_gain_s": (0.5, 0.0, 10.0),
+        "min_gain_s": (2.0, 0.0, 10.0),
         "pause_s": (2.0, 1.0, 60.0),
         "per_minute": (6, 1, 60),
         "within_m": (8.0, 0.0, 30.0),
