@@ -158,7 +158,7 @@ class Sums:
     def seconds_per_impact(self, before: Sums) -> float:
         """Return the seconds won over other crossings for each impact added; inf for none added."""
         won_s, added = before.time_s - self.time_s, self.all_impacts - before.all_impacts
-        return won_s / added if added > 0.0 else float("inf") if won_s > 0.0 else float("-inf")
+        return won_s / added if added > 0.0 else float("nan") if won_s <= 0.0 else float("inf")
 
 
 def main() -> None:

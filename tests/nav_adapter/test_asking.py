@@ -19,7 +19,7 @@ from tracking import PersonTrack
 DT_S = 0.1
 #: Beside the lane of a robot at 1 m/s, where only an unaware person limits it.
 BESIDE = (3.5, 1.3)
-SILENT = AwarenessPolicy(attention=None)
+SILENT = AwarenessPolicy()
 Scene = Callable[[float], Sequence[PersonTrack]]
 
 

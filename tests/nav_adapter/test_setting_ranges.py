@@ -8,6 +8,7 @@ import pytest
 from pydantic import BaseModel
 
 from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import AttentionRules
 
 #: Default, lowest and highest value; those in OPEN are just out of range.
 RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
@@ -70,7 +71,7 @@ KEYS = ("minimum", "maximum")
 
 @pytest.mark.parametrize("part", RANGES)
 def test_defaults_and_ranges(part: str) -> None:
-    settings: BaseModel = getattr(AwarenessPolicy(), part)
+    settings: BaseModel = getattr(AwarenessPolicy(attention=AttentionRules()), part)
     found = {}
     for name, schema in type(settings).model_json_schema()["properties"].items():
         one: dict[str, Any] = {**schema, **schema.get("anyOf", [{}])[0]}
