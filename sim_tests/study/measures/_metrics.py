@@ -16,8 +16,9 @@ import numpy as np
 
 from ...conditions import Conditions
 from . import _conflict, _driving
+from . import _registry as people_of
 from ._awareness import Awareness, MeasuredAttention, awareness_class
-from ._registry import EVERYBODY, NOTICED, STEP_OUT_PEOPLE, Better, Column, Kind, Metric
+from ._registry import Better, Column, Kind, Metric
 
 if TYPE_CHECKING:
     from ...actors.behaviour import PersonOutcome
@@ -416,15 +417,15 @@ def _step_out(people: dict[str, tuple[str, str]], name: str, of: str, starts: st
     )
 
 
-_step_out(STEP_OUT_PEOPLE, "step_out_{}", "step_out")
+_step_out(people_of.STEP_OUT_PEOPLE, "step_out_{}", "step_out")
 _by_people(
-    STEP_OUT_PEOPLE,
+    people_of.STEP_OUT_PEOPLE,
     "step_out_{}_fast",
     "Step-out impacts above 0.25 m/s",
     "The step-out impacts with people {} in which the robot closes at over 0.25 m/s.",
     lambda log, group: log.step_out[group].fast,
 )
-_step_out(EVERYBODY, "step_out_stress_{}", "step_out_stress", " of faster starts")
+_step_out(people_of.EVERYBODY, "step_out_stress_{}", "step_out_stress", " of faster starts")
 
 
 @measure_of_log("Step-out impacts, not looking")
@@ -434,21 +435,32 @@ def step_out_not_looking(log: Log) -> float:
 
 
 _by_people(
-    NOTICED,
+    people_of.CONTACT_PEOPLE,
     "moving_contacts_{}",
     "Contacts with a moving robot",
     "Contacts of a moving robot and people {}.",
     lambda log, group: float(len(log.moving_contacts_of(group))),  # earlier rows have none
 )
 _by_people(
-    NOTICED,
+    people_of.CONTACT_PEOPLE,
     "moving_contact_{}_mps",
     "Speed at contact",
     "The robot's highest speed at such a contact with people {}, by any cause.",
     lambda log, group: log.fastest_mps(log.moving_contacts_of(group)),
 )
+
+
+@measure_of_log("Inevitable contacts with a moving robot", decimals=3)
+def moving_contacts_inevitable(log: Log) -> float:
+    """Contacts of a moving robot that no braking could have prevented at its speed.
+
+    Braking begins once the motion that led to the contact could be seen at all.
+    """
+    return float(len(log.inevitable_contacts))
+
+
 _by_people(
-    NOTICED,
+    people_of.NOTICED,
     "min_margin_{}_m",
     "Smallest margin",
     "Smallest separation margin at a moving robot to people {}.",

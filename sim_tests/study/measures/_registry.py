@@ -15,7 +15,12 @@ NOTICED: Final = {
     "past": ("noticed before", "whose last look at the robot was more than 1 s ago"),
     "looking": ("looking", "who look at the robot, or have within 1 s"),
 }
-#: The same with the sum of them.
+#: The same, and people whom the others hold, too: whose first look was an answer.
+CONTACT_PEOPLE: Final = {
+    **NOTICED,
+    "asked": ("noticed when asked", "who looked at the robot only once it had asked them to"),
+}
+#: The first with the sum of them.
 EVERYBODY: Final = {**NOTICED, "all": ("all", "of whatever they have noticed")}
 #: The same, and people who have answered, whom the others hold, too.
 STEP_OUT_PEOPLE: Final = {
