@@ -172,8 +172,8 @@ def falsify(**values: Any) -> int:
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
     limits. Looks for contacts of the moving robot with people who have never looked at it, or only
     when it asked them to, and for the smallest margin to those who never looked. Contacts with
-    people who looked of their own accord are counted apart. A contact is inevitable if no braking
-    could have prevented it from when its cause could first be seen.
+    people who looked of their own accord are counted apart. A contact is inevitable if not even
+    a robot at 0.25 m/s could have stopped, from when its cause could first be seen.
     People of --population recorded do not draw the speed and glances that are varied; --seed draws
     their pace, sway and starts by chance. Ends with a verdict against another policy in the same
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings

@@ -88,7 +88,7 @@ def _next_command(found: Falsification, experiment: Experiment, other: str, out:
     if found.contacts:
         # The file has the camera, the robot and the population.
         case = (str(out / "worst_001.yaml"),)
-        of_case = experiment.replaced(scenario=case, **dict.fromkeys(experiment.changes, ""))
+        of_case = experiment.replaced(scenario=case, **dict.fromkeys(experiment.changes))
         return command_text(
             *("crossings", *episode_words(of_case), "--policy", own, other),
             *("--seed", experiment["seed"], "--episodes", 1, "--out", out / "worst"),
@@ -104,7 +104,7 @@ def write_episodes(falsification: Falsification, path: Path) -> None:
     notes = (
         *("min_margin_never_m", "min_separation_m", "contact_by"),
         *("moving_contacts", *(f"moving_contacts_{noticed}" for noticed in NOTICED)),
-        *("moving_contacts_asked", "moving_contacts_inevitable", "moving_contact_mps", "error"),
+        *("moving_contacts_asked", "moving_contact_stoppable_mps", "moving_contact_mps", "error"),
     )
     write_csv(
         path,
@@ -143,7 +143,8 @@ def write_summary(
     own = (
         *("min_margin_never_m", "min_separation_m", "contact_by", "moving_contacts"),
         *(f"moving_contacts_{noticed}" for noticed in NOTICED),
-        *("moving_contacts_asked", "speed_at_min_separation_mps", "awareness"),
+        *("moving_contacts_asked", "moving_contact_stoppable_mps"),
+        *("speed_at_min_separation_mps", "awareness"),
     )
     others = ("policy", "min_margin_never_m", "min_separation_m", "moving_contacts", "error")
     summary: dict[str, Any] = {
@@ -259,8 +260,8 @@ def verdict_text(
         )
         if falsification.inevitable:
             text += (
-                f" In {falsification.inevitable} of them no brake could have prevented it at the "
-                "robot's speed."
+                f" {falsification.inevitable} of them are inevitable: a robot at 0.25 m/s could "
+                "not have stopped either."
             )
     else:
         text = (

@@ -22,7 +22,7 @@ from perception.documents import yaml_text
 
 from ...crossing.planner import refuse_unusable_planner
 from ...scenario import Scenario
-from ...study.measures import NOTICED, EpisodeRecord
+from ...study.measures import FAST_IMPACT_MPS, NOTICED, EpisodeRecord
 from ...study.runs import Job, job_of, policy_of, terminated_as_interrupted
 from ...world.errors import SimError
 from .._settings import EpisodeRunner, SearchSettings, write_or_check_settings
@@ -54,7 +54,7 @@ _NOTES: Final = (
     *("min_margin_never_m", "min_separation_m", "contact_by", "moving_contacts"),
     *(f"moving_contacts_{noticed}" for noticed in NOTICED),
     *(f"moving_contact_{noticed}_mps" for noticed in NOTICED),
-    *("moving_contacts_asked", "moving_contacts_inevitable"),
+    *("moving_contacts_asked", "moving_contact_asked_mps", "moving_contact_stoppable_mps"),
     *("moving_contact_mps", "speed_at_min_separation_mps"),
     *("awareness", "reaction", "error"),
 )
@@ -120,9 +120,9 @@ class SearchedEpisode:
 
     @property
     def inevitable(self) -> bool:
-        """True if no braking could have prevented any of its contacts with the moving robot."""
-        number = self.notes.get("moving_contacts_inevitable", 0)  # searches before had none
-        return self.touches and number == self.notes.get("moving_contacts")
+        """True for contacts before which no robot could have stopped that did more than creep."""
+        found = self.notes.get("moving_contact_stoppable_mps")
+        return self.touches and found is not None and found < FAST_IMPACT_MPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +152,7 @@ class Falsification:
 
     @property
     def inevitable(self) -> int:
-        """Number of these in which no braking could have prevented it."""
+        """Number of these that are inevitable."""
         return sum(each.inevitable for each in self.episodes)
 
     @property

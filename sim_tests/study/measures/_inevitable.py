@@ -1,11 +1,10 @@
-"""The warning before a contact: from when on anybody could have seen it come, and stopped.
+"""The speed from which a robot could have stopped before a contact that anybody saw come.
 
 A bound from geometry and braking alone. It knows neither policy nor perception.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ...world import crosses_boxes
+from ...world.floor_plan import crosses_boxes
 from ._conflict import Outline
 from ._step_out import STEP_OUT
 from ._trace import Trace
@@ -32,53 +31,28 @@ _WINDOW_S: Final = 0.2
 _TAIL_S: Final = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class Warned:
-    """The warning before one contact.
+def stoppable_mps(
+    result: CrossingResult, trace: Trace, outline: Outline, contact: ContactEvent
+) -> float:
+    """Return the highest speed from which a robot could have stood before a contact, ≥ 0.
 
-    Attributes:
-        warning_s: ≥ 0, time until the contact from when the motion that led to it could first be
-            seen: the person had begun it, and a straight line from the robot's outline to their
-            body crossed no rack, wall or prop on the floor plan.
-        robot_mps: speed of the robot's fastest point then.
-        needs_s: time that a robot of that speed needs until it stands: 0.2 s until a start is
-            seen, its reaction time, and braking.
+    The robot has from when the motion that led to the contact could first be seen: the person had
+    begun it, and a straight line from the robot's outline to their body crossed no rack, wall or
+    prop on the floor plan. It takes 0.2 s until a start is seen, then its reaction time, and then
+    brakes.
+
+    The motion begins with the last change of the person's velocity without which they would not
+    have come to where the robot is at the contact. Who never changed it was on the way from the
+    beginning. Motion that varies all the time begins early, which blames the robot.
     """
-
-    warning_s: float
-    robot_mps: float
-    needs_s: float
-
-    @property
-    def inevitable(self) -> bool:
-        """True if no robot that drove as fast could have stood before the contact."""
-        return self.needs_s > self.warning_s
-
-    @classmethod
-    def of(
-        cls,
-        result: CrossingResult,
-        trace: Trace,
-        fastest_mps: FloatArray,
-        outline: Outline,
-        contact: ContactEvent,
-    ) -> Warned:
-        """Return the warning before a contact; ``fastest_mps`` (N,) is the robot's fastest point.
-
-        The motion begins with the last change of the person's velocity without which they would
-        not have come to where the robot is at the contact. Who never changed it was on the way
-        from the beginning. Motion that varies all the time begins early, which blames the robot.
-        """
-        t_s = trace.t_s
-        end = max(int(np.searchsorted(t_s, contact.t_s, "right")) - 1, 0)
-        begun = _begun(trace, outline, end, contact.worker)
-        row = begun
-        while row < end and not _in_sight(trace, result, row, contact.worker):
-            row += 1
-        robot, speed = result.robot, float(fastest_mps[row])
-        needs_s = robot.reaction_time_s + STEP_OUT.noticed_after_s
-        needs_s += speed / robot.max_deceleration_mps2
-        return cls(max(contact.t_s - float(t_s[row]), 0.0), speed, needs_s)
+    t_s = trace.t_s
+    end = max(int(np.searchsorted(t_s, contact.t_s, "right")) - 1, 0)
+    row = _begun(trace, outline, end, contact.worker)
+    while row < end and not _in_sight(trace, result, row, contact.worker):
+        row += 1
+    braking_s = contact.t_s - float(t_s[row]) - STEP_OUT.noticed_after_s
+    braking_s -= result.robot.reaction_time_s
+    return max(braking_s, 0.0) * result.robot.max_deceleration_mps2
 
 
 def _begun(trace: Trace, outline: Outline, end: int, person: int) -> int:

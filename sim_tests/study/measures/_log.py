@@ -15,7 +15,7 @@ from ...crossing import STANDING_SPEED_MPS, ContactEvent, CrossingResult
 from ._awareness import Requests, nearest_person, track_awareness
 from ._conflict import Outline
 from ._driving import path_length_m, peak_deceleration_and_jerk
-from ._inevitable import Warned
+from ._inevitable import stoppable_mps
 from ._step_out import FASTER_STEP_OUT, StepOutImpacts, step_out_impacts
 from ._trace import Trace
 
@@ -97,11 +97,11 @@ class Log:
             if people[max(int(np.searchsorted(t_s, each.t_s, "right")) - 1, 0), each.worker]
         ]
 
-    @cached_property
-    def inevitable_contacts(self) -> list[ContactEvent]:
-        """Contacts of a moving robot that nobody could have prevented at its speed."""
-        of = self.result, self.trace, self.fastest_point_mps, self.outline
-        return [each for each in self.moving_contacts if Warned.of(*of, each).inevitable]
+    @property
+    def stoppable_mps(self) -> list[float]:
+        """The speeds from which a robot could have stopped before each moving contact."""
+        of = self.result, self.trace, self.outline
+        return [stoppable_mps(*of, each) for each in self.moving_contacts]
 
     def min_margin_of(self, noticed: str) -> float | None:
         """Smallest margin at a moving robot to people of one of :attr:`Trace.noticed`."""

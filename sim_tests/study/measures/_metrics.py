@@ -450,13 +450,13 @@ _by_people(
 )
 
 
-@measure_of_log("Inevitable contacts with a moving robot", decimals=3)
-def moving_contacts_inevitable(log: Log) -> float:
-    """Contacts of a moving robot that no braking could have prevented at its speed.
+@measure_of_log("Speed that could have stopped", better="neither")
+def moving_contact_stoppable_mps(log: Log) -> float | None:
+    """Highest speed from which a robot could have stood before such a contact, by any cause.
 
-    Braking begins once the motion that led to the contact could be seen at all.
+    It brakes once the motion that led to the contact could be seen; below 0.25, it is inevitable.
     """
-    return float(len(log.inevitable_contacts))
+    return max(log.stoppable_mps, default=None)
 
 
 _by_people(

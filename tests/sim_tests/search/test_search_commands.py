@@ -352,12 +352,11 @@ def test_an_interrupted_search_writes_its_summary(tmp_path, scenario, number):
 
 
 def test_a_contact_that_counts_is_marked_inevitable_or_not():
-    met = {"moving_contacts": 1}
-    notes = [{**met, "moving_contacts_inevitable": each} for each in (1.0, 0.0, 1.0)]
+    notes = [{"moving_contact_stoppable_mps": each} for each in (0.1, 0.3, 0.1)]
     found = falsified(-11.0, -10.5, 0.4, notes=notes)
     assert [each.inevitable for each in found.episodes] == [True, False, False]
     assert (found.contacts, found.inevitable) == (2, 1)
-    assert "In 1 of them no brake" in verdict_text(found, [], {})
+    assert "1 of them are inevitable" in verdict_text(found, [], {})
 
 
 def cases(*records: EpisodeRecord) -> list[WorstCase]:
