@@ -266,7 +266,7 @@ class Addressing:
                 way_m += BODY_RADIUS_M - own.rear_m
                 if way_m <= 0.0:
                     return at_s
-                passes_mps = limit_mps - own.cos * vx - own.sin * vy
+                passes_mps: float = limit_mps - own.cos * vx - own.sin * vy
                 if way_m <= passes_mps * _STEP_S:
                     return at_s + way_m / passes_mps
                 here = here + _STEP_S * limit_mps * np.array([own.cos, own.sin])
