@@ -31,6 +31,17 @@ STEP_OUT_PEOPLE: Final = {
 Better = Literal["lower", "higher", "neither"]
 #: The kind of a column's values; a number may be None, where the column does not apply.
 Kind = Literal["text", "flag", "count", "number"]
+#: By what a measure returns, and what an episode without a log has.
+KINDS: Final[dict[str, Kind]] = {
+    "str": "text",
+    "Awareness": "text",
+    "bool": "flag",
+    "int": "count",
+    "float": "number",
+    "float | None": "number",
+}
+DEFAULTS: Final[dict[Kind, Any]] = {"text": "", "flag": False, "count": 0, "number": None}
+UNITS: Final = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³"}
 
 
 @dataclass(frozen=True, slots=True)
