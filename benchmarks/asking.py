@@ -1,27 +1,27 @@
-"""True looks after requests, and how soon they are measured: ``python -m benchmarks.asking``.
+"""Whether asking pays: ``python -m benchmarks.asking``.
 
-Each true look after a request for attention is compared with what the adapter made of it.
+The same crossings are driven without requests and with them, for several shares of people who
+answer. Each true look after a request is also compared with what the adapter made of it.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import AttentionRules
 from perception.arrays import FloatArray
-from sim_tests.crossing import CrossingFrame, CrossingResult, run_crossing
-from sim_tests.scenario import ScenarioTemplate
+from sim_tests.crossing import CrossingFrame, CrossingResult, named_policy
+from sim_tests.study.measures import EpisodeRecord
+from sim_tests.study.runs import job_of, named_templates, observed_episode, policy_text
 
 #: A look that is measured later than this came too late for its request.
 SOON_S: Final = 1.0
-# Scenarios with people who limit the robot and do not look by themselves.
-_SCENARIOS: Final = (
-    *("robot_overtaking", "busy_in_aisle", "stops_midway", "turns_back", "reads_phone"),
-    *("crowd_of_eight", "two_people_one_aware", "crossing_distracted"),
-)
 #: The lower bound of α from which a look counts as measured.
 LOOKED: Final = 0.5
 #: A look within this time after a request answers it.
@@ -113,47 +113,137 @@ def _lower_of(frame: CrossingFrame, person: int) -> float:
     return lower if away_m <= SAME_PLACE_M else 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Sums:
+    """The sums over the crossings of a policy.
+
+    Attributes:
+        crossings: their number.
+        time_s: time until the goal, or of the whole episode without one.
+        impacts: step-out impacts per 1 000 crossings, summed: ``"never"``, ``"past"``,
+            ``"looking"`` and ``"answered"``, of which the others hold the last.
+        requests: requests for attention.
+        touched: contacts of a moving robot.
+        people: what came of the requests.
+    """
+
+    crossings: int
+    time_s: float
+    impacts: dict[str, float]
+    requests: int
+    touched: int
+    people: tuple[AskedPerson, ...] = ()
+
+    @classmethod
+    def of(cls, episodes: Iterable[tuple[CrossingResult, EpisodeRecord]]) -> Sums:
+        """Return the sums over some episodes."""
+        results, records = zip(*episodes, strict=True)
+        return cls(
+            len(records),
+            sum(each.time_to_goal_s or each.duration_s for each in records),
+            {
+                who: float(np.nansum([getattr(each, f"step_out_{who}") for each in records]))
+                for who in ("never", "past", "looking", "answered")
+            },
+            sum(each.requests for each in records),
+            sum(each.moving_contacts for each in records),
+            tuple(person for each in results for person in asked_people(each)),
+        )
+
+    @property
+    def all_impacts(self) -> float:
+        """The sum of the impacts, whatever people have noticed."""
+        return sum(self.impacts[who] for who in ("never", "past", "looking"))
+
+    def seconds_per_impact(self, before: Sums) -> float:
+        """Return the seconds won over other crossings for each impact added; inf for none added."""
+        won_s, added = before.time_s - self.time_s, self.all_impacts - before.all_impacts
+        return won_s / added if added > 0.0 else float("nan") if won_s <= 0.0 else float("inf")
+
+
 def main() -> None:
-    """Print how many true answers were measured, how soon, and how many looks were none."""
+    """Print seconds won and impacts added by asking, per crossing and per request.
+
+    Without requests, a bolder policy wins time for impacts, too: asking pays if it wins more
+    seconds for each impact. The row of that policy is the exchange to beat.
+    """
     parser = argparse.ArgumentParser(prog="python -m benchmarks.asking", description=main.__doc__)
-    parser.add_argument("--perception", nargs="+", default=["keypoints+scanner", "truth"])
-    parser.add_argument("--scenario", nargs="+", default=list(_SCENARIOS))
+    parser.add_argument("--perception", default="truth", help="as for awarenav crossings")
+    parser.add_argument("--scenario", nargs="+", default=["all", "step_out"])
     parser.add_argument("--seeds", type=int, default=3, help="seeds per scenario (default 3)")
     parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--population", default="answers=0.8", help="as for awarenav crossings")
+    parser.add_argument("--answers", nargs="+", type=float, default=[0.0, 0.5, 1.0])
+    parser.add_argument("--population", default="classic")
     parser.add_argument("--policy", default="balanced")
+    parser.add_argument("--bolder", default="assertive", help="the policy of the exchange to beat")
+    parser.add_argument("--min-gain", type=float, default=AttentionRules().min_gain_s)
     options = parser.parse_args()
-    print(
-        "| perception | requests | true answers | measured within 1 s | median delay | counts for"
-    )
-    print("| --- | --- | --- | --- | --- | ---")
-    for perception in options.perception:
-        people: list[AskedPerson] = []
-        for name in options.scenario:
-            template = ScenarioTemplate.named(name).with_population(options.population)
-            for seed in range(options.first_seed, options.first_seed + options.seeds):
-                result = run_crossing(
-                    template.for_seed(seed),
-                    policy=options.policy,
-                    perception=perception,
+
+    def sums(policy: AwarenessPolicy, population: str) -> Sums:
+        seeds = range(options.first_seed, options.first_seed + options.seeds)
+        return Sums.of(
+            observed_episode(
+                job_of(
+                    template.to_text(),
+                    (options.policy, policy_text(policy)),
+                    "",
                     seed=seed,
+                    perception=options.perception,
                 )
-                people += asked_people(result)
-        print(_row(perception, people), flush=True)
+            )
+            for template in named_templates(options.scenario, population=population)
+            for seed in seeds
+        )
+
+    base, bolder = (
+        named_policy(name)[1].model_copy(update={"attention": None})
+        for name in (options.policy, options.bolder)
+    )
+    asks = base.model_copy(update={"attention": AttentionRules(min_gain_s=options.min_gain)})
+    silent = sums(base, options.population)
+    print(
+        "| | time, s | never | past | looking | answered | sum | s won a crossing; a request | "
+        "impacts added a crossing; a request | s an impact | requests | touched | measured looks\n"
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | ---"
+    )
+    print(_row("nobody is asked", silent, silent))
+    print(_row(f"nobody is asked, {options.bolder}", sums(bolder, options.population), silent))
+    for share in options.answers:
+        asking = sums(asks, f"{options.population},answers={share:g}")
+        print(_row(f"{share:g} answer", asking, silent), flush=True)
 
 
-def _row(perception: str, people: list[AskedPerson]) -> str:
-    answers = [each for each in people if each.look_s is not None]
-    others = [each for each in people if each.look_s is None]
-    delays_s = [each.measured_s for each in answers if each.measured_s is not None]
-    soon = sum(delay_s <= SOON_S + 1e-9 for delay_s in delays_s)
-    counted_s = [each.counted_s for each in answers if each.measured_s is not None]
-    false = sum(each.measured_s is not None for each in others)
-    delay_s = float(np.median(delays_s)) if delays_s else float("nan")
-    lasts_s = float(np.median(counted_s)) if counted_s else float("nan")
+def _row(name: str, these: Sums, silent: Sums) -> str:
+    """Return a row of the table: figures per crossing, and per request where there are some."""
+    count, impacts = these.crossings, these.impacts
+    won_s, added = silent.time_s - these.time_s, these.all_impacts - silent.all_impacts
+
+    def both(total: float) -> str:
+        a_request = f"; {total / these.requests:.2f}" if these.requests else ""
+        return f"{total / count:.2f}{a_request}"
+
+    exchange = "" if these is silent else f"{1000.0 * these.seconds_per_impact(silent):.0f}"
     return (
-        f"| {perception} | {len(people)} | {len(answers)} | {soon} of {len(answers)} | "
-        f"{delay_s:.2f} s | {lasts_s:.1f} s (false: {false} of {len(others)})"
+        f"| {name} | {these.time_s / count:.2f} | "
+        + " | ".join(f"{each / count:.2f}" for each in (*impacts.values(), these.all_impacts))
+        + f" | {both(won_s)} | {both(added)} | {exchange} | {these.requests / count:.2f} | "
+        f"{these.touched} | {_measured(these.people)}"
+    )
+
+
+def _measured(people: Sequence[AskedPerson]) -> str:
+    """Return how many true looks were measured, how soon, and how many that were none."""
+    answers = [each for each in people if each.look_s is not None]
+    delays_s = [each.measured_s for each in answers if each.measured_s is not None]
+    if not delays_s:
+        return f"0 of {len(answers)}"
+    soon = sum(delay_s <= SOON_S + 1e-9 for delay_s in delays_s)
+    lasts_s = float(np.median([each.counted_s for each in answers if each.measured_s is not None]))
+    others = [each for each in people if each.look_s is None]
+    false = sum(each.measured_s is not None for each in others)
+    return (
+        f"{soon} of {len(answers)} within 1 s, median {float(np.median(delays_s)):.2f} s, for "
+        f"{lasts_s:.1f} s; false: {false} of {len(others)}"
     )
 
 

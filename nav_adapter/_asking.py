@@ -14,12 +14,10 @@ from tracking import PersonTrack
 from tracking.awareness_filter import PRIOR, estimate
 from tracking.people import AVERTED_AWARENESS as _AVERTED
 from tracking.people import LOOKING_AWARENESS as _LOOKED
-from tracking.people import WALKING_MPS
 from tracking.prediction import PredictionModel
 
 from ._governor import GovernedSpeed, SpeedGovernor
-from ._people import LOOK_S, Asked, Person, Vector2
-from ._places import velocity_variance_m2ps2
+from ._people import Asked, Person, Vector2
 from ._policy import AwarenessPolicy
 from ._predicted import predicted_sigmas_m
 from ._robot import RobotProfile, RobotState
@@ -49,8 +47,11 @@ _KNOWN_S: Final = 1.0 - 1e-9
 _ANSWER_S: Final = 1.0
 # People so near to the one who is asked are asked too.
 _GROUP_M: Final = 1.5
-# Neither way is expected to take longer than this.
+# A look lasts about so long, and what is remembered of it comes on top.
+_LOOK_S: Final = 1.0
+# No way past somebody is expected to take longer than this; it is driven in steps.
 _LONGEST_S: Final = 10.0
+_STEP_S: Final = 0.5
 # A robot that has stood for so long is not on its way, and asks nobody.
 _PARKED_AFTER_S: Final = 10.0
 # Budget, and how long people count as asked.
@@ -102,7 +103,7 @@ class Addressing:
         self._policy, self._robot = policy, robot
         self._governor, self._prediction = governor, prediction
         # A look, and what it leaves behind.
-        counts_as, self._lasts_s = policy.noticed_counts_as, LOOK_S
+        counts_as, self._lasts_s = policy.noticed_counts_as, _LOOK_S
         self._looked_lower = 1.0 if counts_as is None else counts_as
         if counts_as is not None:
             self._lasts_s += policy.filter.noticed_memory_s
@@ -240,43 +241,38 @@ class Addressing:
     ) -> float:
         """Return the time that a look of the group would win on the way past the person.
 
-        That is at the limits a second from now, if robot and people go straight on until then.
+        It is the time behind the limit until the robot has passed them if nobody looks, less the
+        same if the group looks for as long as a look counts. Both begin a second from now. Robot
+        and people go straight on, and no way takes more than 10 s: so long waits a robot that
+        stands for somebody who stands for it, and so long it follows somebody who walks ahead.
         """
-        x, y = robot_state.position_odom_m.tolist()
-        vx, vy = robot_state.velocity_odom_mps
-        later = replace(
-            robot_state, position_odom_m=np.array([x + _ANSWER_S * vx, y + _ANSWER_S * vy])
-        )
-        courses = self._governor.courses(later, robot_age_s)
-        straight = courses.own
-        vx, vy = person.velocity_odom_mps
-        along_mps = straight.cos * vx + straight.sin * vy
-        # Beside somebody who walks the same way, a look is forgotten before the robot has passed.
-        if along_mps + math.sqrt(velocity_variance_m2ps2(person.track)) >= WALKING_MPS:
-            return 0.0
+        ids, (vx, vy) = {each.id for each in group}, person.velocity_odom_mps
 
-        def lowest_mps(some: Iterable[Person], lowest_mps: float) -> float:
-            for each in some:
-                moved = _moved(each, _ANSWER_S)
-                own_mps = self._governor.person_mps(moved, courses, now, lowest_mps)
-                lowest_mps = min(lowest_mps, own_mps)
-            return lowest_mps
+        def passing_s(looking_s: float) -> float:
+            here = robot_state.position_odom_m + _ANSWER_S * np.array(robot_state.velocity_odom_mps)
+            for step in range(round(_LONGEST_S / _STEP_S)):
+                at_s, limit_mps = step * _STEP_S, self._robot.max_speed_mps
+                state = replace(robot_state, position_odom_m=here)
+                courses = self._governor.courses(state, robot_age_s)
+                lower = self._looked_lower if at_s < looking_s else 0.0
+                for each in people.values():
+                    then = _moved(each, _ANSWER_S + at_s)
+                    if each.id in ids:
+                        then = then._replace(awareness_lower=max(each.awareness_lower, lower))
+                    own_mps = self._governor.person_mps(then, courses, now, limit_mps)
+                    limit_mps = min(limit_mps, own_mps)
+                own, (x, y) = courses.own, _moved(person, _ANSWER_S + at_s).position_odom_m
+                way_m: float = own.cos * (x - own.x_m) + own.sin * (y - own.y_m)
+                way_m += BODY_RADIUS_M - own.rear_m
+                if way_m <= 0.0:
+                    return at_s
+                passes_mps: float = limit_mps - own.cos * vx - own.sin * vy
+                if way_m <= passes_mps * _STEP_S:
+                    return at_s + way_m / passes_mps
+                here = here + _STEP_S * limit_mps * np.array([own.cos, own.sin])
+            return _LONGEST_S
 
-        ids = {each.id for each in group}
-        others = (each for each in people.values() if each.id not in ids)
-        others_mps = lowest_mps(others, self._robot.max_speed_mps)
-        lower = self._looked_lower
-        looking = (
-            each._replace(awareness_lower=max(each.awareness_lower, lower)) for each in group
-        )
-        now_mps, then_mps = lowest_mps(group, others_mps), lowest_mps(looking, others_mps)
-        x, y = _moved(person, _ANSWER_S).position_odom_m
-        way_m = straight.cos * (x - straight.x_m) + straight.sin * (y - straight.y_m)
-        way_m += BODY_RADIUS_M - straight.rear_m
-        passing_s = _time_s(way_m, then_mps - along_mps)
-        if passing_s > self._lasts_s:
-            return 0.0  # the look would be forgotten: ask later
-        return _time_s(way_m, now_mps - along_mps) - passing_s
+        return passing_s(0.0) - passing_s(self._lasts_s)
 
     def _request(
         self,
@@ -373,13 +369,6 @@ def _moved(person: Person, ahead_s: float) -> Person:
         position_odom_m=(x + ahead_s * vx, y + ahead_s * vy),
         track_position_odom_m=(track_x + ahead_s * vx, track_y + ahead_s * vy),
     )
-
-
-def _time_s(way_m: float, speed_mps: float) -> float:
-    """Return the time for a way, 10 s at most; 0 for one that lies behind."""
-    if way_m <= 0.0:
-        return 0.0
-    return min(way_m / speed_mps, _LONGEST_S) if speed_mps > 0.0 else _LONGEST_S
 
 
 def _kind(rules: AlertRules, time_s: float) -> AlertKind | None:

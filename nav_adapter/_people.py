@@ -31,8 +31,6 @@ _WALKER_MPS: Final = 1.6
 _EXPLAINED_SIGMAS: Final = 4.0
 # Places closer than this are the same, also for a tracker that reports no uncertainty.
 _SAME_PLACE_M: Final = 0.05
-#: A look lasts about so long, and what is remembered of it comes on top.
-LOOK_S: Final = 1.0
 # Stamps closer than this are equal: the stamp of a sighting is a difference of floats, computed
 # anew for every frame.
 _SAME_STAMP_S: Final = 1e-6
@@ -158,9 +156,6 @@ class People:
         self._unaware_mps = self._policy_speed_mps(0.0)
         # People walk even where their speed does not count.
         self._jump_mps = max(self._unaware_mps, _WALKER_MPS)
-        # An answer may be remembered for as long after the request.
-        self._answer_s = LOOK_S + policy.filter.noticed_memory_s
-        self._answer_s += 0.0 if policy.attention is None else policy.attention.pause_s
         # A circle that is too small leads a planner to where the robot may hardly move.
         speeds = np.linspace(self._policy_speed_mps(1.0), self._unaware_mps, 5).tolist()
         self._passing_speeds: list[float] = sorted(set(speeds))
@@ -293,18 +288,15 @@ class People:
         """Return the lower bound of α that counts, or the one that stands for having noticed.
 
         It is 0 with stale data, for clutter, and for people out of sight. Without a new frame there
-        is no new evidence, whatever the track says. A look at a robot that has just asked for it is
-        no chance look: the belief counts until it ends.
+        is no new evidence, whatever the track says. Whoever answers a request is somebody who
+        looks, like anybody else: people look before they set off, and no request makes them stay.
         """
         seen_stamp_s, status = track.stamp_s - track.time_since_seen_s, track.status
         if stale or status == "tentative" or now - seen_stamp_s > self._timing.fresh_within_s:
             return 0.0
         lower, counts_as = track.awareness_lower, self._policy.noticed_counts_as
-        if counts_as is not None and track.noticed > 0.0 and status == "confirmed":
-            asked = None if before is None else before.asked
-            answered = asked and asked.answered and now - asked.stamp_s <= self._answer_s
-            if answered or track.noticed >= _NOTICED:
-                lower = max(lower, counts_as)
+        if counts_as is not None and track.noticed >= _NOTICED and status == "confirmed":
+            lower = max(lower, counts_as)
         if before is not None and seen_stamp_s - before.seen_stamp_s <= _SAME_STAMP_S:
             return min(lower, before.awareness_lower)
         return lower

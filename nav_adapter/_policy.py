@@ -90,7 +90,8 @@ class AwarenessPolicy(NavConfig):
             for nothing. It needs ``filter.noticed_memory_s`` and a laser scanner: with a camera
             alone it changes nothing.
         alerts: rules for warnings of collisions, or None.
-        attention: rules for requests to look at the robot, or None.
+        attention: rules for requests to look at the robot; None asks nobody. In all presets, since
+            requests win less time than they cost in impacts (docs/what_it_wins.md).
         margins: distances that hold for every α.
         timing: how fast obstacles may shrink and how long data may be trusted.
         filter: settings of the tracker's awareness filter. They belong to the policy because they
@@ -108,7 +109,7 @@ class AwarenessPolicy(NavConfig):
     without: tuple[Literal["reach", "walking on", "first sight", "unseen"], ...] = ()
     noticed_counts_as: float | None = Field(default=0.6, ge=0.0, le=1.0)
     alerts: AlertRules | None = AlertRules()
-    attention: AttentionRules | None = AttentionRules()
+    attention: AttentionRules | None = None
     margins: SafetyMargins = SafetyMargins()
     timing: TimeBehaviour = TimeBehaviour()
     filter: AwarenessFilterConfig = AwarenessFilterConfig(noticed_memory_s=3.0)

@@ -290,6 +290,7 @@ class Conditions:
         default=None,
         show_default="each scenario's own",
         metavar="NAME|KEY=VALUE,...",
+        several={"note": " Several are compared."},
     )
     fault: str = _axis(
         "Name of the fault, empty for none.",
@@ -445,13 +446,13 @@ class Experiment:
         value = self[name]
         if not isinstance(value, tuple):
             return value
-        (only,) = value
+        (only,) = value or (None,)
         return only
 
     @property
     def changes(self) -> dict[str, Any]:
         """The values of the axes that change scenarios; empty ones keep the scenario's own."""
-        return {name: self[name] or "" for name in _CHANGES}
+        return {name: self.one(name) or "" for name in _CHANGES}
 
     def settings(self, **more: Any) -> dict[str, Any]:
         """Return the values as they are given on the command line.
@@ -465,7 +466,7 @@ class Experiment:
         return {
             name: list(value) if isinstance(value, tuple) else value
             for name, value in found.items()
-            if value not in (None, "")
+            if value not in (None, "", ())
         }
 
 

@@ -336,15 +336,12 @@ class Upgrade:
         if "alerts" in self._old and self._old["alerts"] is None:
             self.policy["alerts"] = None
             self._say("kept", "alerts", "null")
-            self.policy["attention"] = None
-            self._say("added", "attention", "null, since the robot gives no alerts")
             return
         given = self._section("alerts", *ALERTS)
         self._keep("alerts", given)
         for key, fixed in ALERTS.items():
             if key in given:
                 self._say("dropped", f"alerts.{key}", f"it is {fixed} always")
-        self._say("added", "attention", "the default: the robot asks people to look; or null")
 
     def _filter(self) -> None:
         if "filter" not in self._old:

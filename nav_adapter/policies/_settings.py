@@ -115,13 +115,15 @@ class AlertRules(NavConfig):
 class AttentionRules(NavConfig):
     """Rules for requests for attention: whom to ask to look at the robot, and how often at most.
 
-    A person is asked who sets the speed limit and has not noticed the robot, if the robot would
-    drive faster once they have. People close together are asked once. A request that is not
-    answered doubles the pause until the next one to the same person, which uses the next louder
-    means. Only a look that perception measures raises a limit, never a request.
+    A person is asked who sets the speed limit and has not noticed the robot, if their look would
+    win ``min_gain_s`` or end a wait of both. People close together are asked once. A request that
+    is not answered doubles the pause until the next one to the same person, which uses the next
+    louder means. Only a look that perception measures raises a limit, never a request.
 
     Attributes:
-        min_gain_s: the time that the robot would win must be at least this.
+        min_gain_s: the time that the robot would win must be at least this: the time behind the
+            limit on its way past the person if they do not look, less the same if they do. Each is
+            10 s at most, also for a robot and a person who stand and wait for each other.
         pause_s: time between the first two requests to the same person.
         per_minute: the robot makes at most so many requests in any minute.
         within_m: distance from the robot's base within which people are asked.
@@ -129,7 +131,7 @@ class AttentionRules(NavConfig):
             is left out for somebody who looks far past the robot (an α of at most 0.1).
     """
 
-    min_gain_s: float = Field(default=0.5, ge=0.0, le=10.0)
+    min_gain_s: float = Field(default=2.0, ge=0.0, le=10.0)
     pause_s: float = Field(default=2.0, ge=1.0, le=60.0)
     per_minute: int = Field(default=6, ge=1, le=60)
     within_m: float = Field(default=8.0, gt=0.0, le=30.0)

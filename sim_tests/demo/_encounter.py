@@ -17,7 +17,6 @@ from awarenav.drawing import DARK, WHITE, Font, awareness_colour
 from awarenav.figures import Axes, new_figure
 from awarenav.files import csv_number, write_csv
 from awarenav.video import VideoWriter
-from nav_adapter import AwarenessPolicy
 from perception import Camera, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 
@@ -182,11 +181,9 @@ def run_encounter(
 ) -> CrossingResult:
     """Run the encounter and write its table, plot and video."""
     scenario = Scenario.shipped("paper_encounter")
-    # The robot of the paper asks nobody, and the worker looks as planned.
-    policy = AwarenessPolicy.preset("balanced").model_copy(update={"attention": None})
     with _Recorder(scenario, out / "encounter.mp4" if video else None) as recorder:
         result = run_crossing(
-            scenario, policy=policy, perception=perception, seed=seed, observer=recorder
+            scenario, policy="balanced", perception=perception, seed=seed, observer=recorder
         )
     _write_table(out / "encounter.csv", result)
     plot_encounter(out / "encounter.png", result, recorder.images)

@@ -105,10 +105,10 @@ def tune(**values: Any) -> int:
         "awarenav crossings --scenario worst/worst_001.yaml --policy mine.yaml",
     ],
     exit_status={
-        0: "The moving robot touched nobody who had not looked.",
-        1: "It touched somebody who had not looked for 1 s, or never.",
+        0: "The moving robot touched nobody who had never looked, or only when it asked them to.",
+        1: "It touched somebody like that, inevitably or not.",
         2: "Bad input.",
-        130: "Interrupted; the episodes so far are kept.",
+        130: "Interrupted; summary.json and episodes.csv are those of the episodes so far.",
     },
     epilog="A killed or interrupted search continues with the same command and --resume, and ends "
     "with the same result, whatever --workers is. --episodes may be raised then. Needs the extra "
@@ -170,8 +170,10 @@ def falsify(**values: Any) -> int:
     """Search for the situations in which a policy does worst.
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
-    limits. Looks for contacts of the moving robot with people who have never looked at it, and
-    for the smallest margin to them. Contacts with people who have looked are counted apart.
+    limits. Looks for contacts of the moving robot with people who have never looked at it, or only
+    when it asked them to, and for the smallest margin to those who never looked. Contacts with
+    people who looked of their own accord are counted apart. A contact is inevitable if not even
+    a robot at 0.25 m/s could have stopped, from when its cause could first be seen.
     People of --population recorded do not draw the speed and glances that are varied; --seed draws
     their pace, sway and starts by chance. Ends with a verdict against another policy in the same
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings

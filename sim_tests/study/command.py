@@ -38,6 +38,7 @@ _EPISODE = (
         "awarenav crossings --scenario blind_corner --policy blind balanced",
         "awarenav crossings --policy mine.yaml blind --episodes 20 --out run",
         "awarenav crossings --planner my_planners:Dwa reference --fault none ghosts",
+        "awarenav crossings --population classic recorded --perception truth --out people",
         "awarenav crossings --robot forklift --scenario blind_corner head_on_in_aisle",
         "awarenav crossings --fault 'scanner_*' --sample 50",
     ],
@@ -51,7 +52,7 @@ _EPISODE = (
     "replay DIR N` films episode N; `awarenav compare DIR` prints more tables.",
 )
 @conditions_options(
-    many=("scenario", "policy", "planner", "sensors", "fault"),
+    many=("scenario", "policy", "planner", "sensors", "population", "fault"),
     policy={"default": ["scanner", "blind", "balanced"]},
     sensors=USUAL_SENSORS,
     seed=_FIRST_SEED,
@@ -86,7 +87,7 @@ _EPISODE = (
 @option("--no-report", is_flag=True, help="Write no report.")
 @options.as_json()
 def crossings(**values: Any) -> int:
-    """Run every scenario with every policy, planner and fault on the same seeds, in closed loop.
+    """Run every scenario, policy, planner, population and fault on the same seeds, in closed loop.
 
     Every episode that ends writes a file into DIR/episodes. At the end, and when the run is
     interrupted, their table episodes.csv is written, and at the end the report. The row of a failed

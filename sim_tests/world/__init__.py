@@ -11,11 +11,11 @@ if TYPE_CHECKING:
         FACE_DEPTH_M,
         FACE_KEYPOINTS,
         JOINT_DEPTH_M,
-        crosses_boxes,
         first_body_before,
         keypoints_in_front,
         sees,
     )
     from ._warehouse import GRAVITY_MPS2, PERSON_GROUP, RAY_GROUP, ROBOT_GROUP, Nearest, Warehouse
+    from .floor_plan import crosses_boxes
 
 __getattr__ = lazy_page(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Visibility of points: on the floor plan, by a ray through the physics world, in a depth image.
+"""Visibility of points: by a ray through the physics world, and in a depth image.
 
 :mod:`sim_tests.world.sightlines` tests lines of sight against the rendered surfaces instead.
 """
@@ -22,8 +22,6 @@ FACE_DEPTH_M: Final = 0.04
 #: The first keypoints are those of the face.
 FACE_KEYPOINTS: Final = 5
 
-# Smallest component of a direction, so that nothing is divided by 0.
-_TINY_M: Final = 1e-9
 # A line of sight starts at this distance from the eyes, outside the head.
 _HEAD_M: Final = 0.16
 # A keypoint nearer to the camera plane than this is never visible.
@@ -40,24 +38,6 @@ class Viewer(Protocol):
     def eyes_odom_m(self) -> FloatArray:
         """The midpoint of the eyes, (3,)."""
         ...
-
-
-def crosses_boxes(boxes_odom_m: FloatArray, start_m: Any, ends_m: Any) -> NDArray[np.bool_]:
-    """Return (K,) whether the lines from ``start_m`` to ``ends_m`` cross any box on the floor plan.
-
-    Args:
-        boxes_odom_m: (N, 4) x_min, y_min, x_max, y_max.
-        start_m: (2,).
-        ends_m: (K, 2).
-    """
-    origin = np.asarray(start_m, dtype=np.float64)
-    along = np.asarray(ends_m, dtype=np.float64).reshape(-1, 2) - origin
-    safe = np.where(np.abs(along) < _TINY_M, _TINY_M, along)[:, None]
-    first = (boxes_odom_m[:, :2] - origin) / safe
-    second = (boxes_odom_m[:, 2:] - origin) / safe
-    enter = np.minimum(first, second).max(axis=2)
-    leave = np.maximum(first, second).min(axis=2)
-    return np.asarray(((enter < leave) & (leave > 0.0) & (enter < 1.0)).any(axis=1))
 
 
 def sees(viewer: Viewer, target_odom_m: FloatArray, through: frozenset[int] = frozenset()) -> bool:

@@ -162,7 +162,7 @@ class Listener:
         self.heard = defaultdict(list)
         self.warnings: list[str] = []
         self.bridge = AwarenessBridge(
-            AwarenessPolicy.preset("balanced"),
+            settings.pop("policy", AwarenessPolicy.preset("balanced")),
             ROBOT,
             lambda key, message: self.heard[key].append(message),
             warn=self.warnings.append,

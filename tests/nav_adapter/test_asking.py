@@ -19,6 +19,7 @@ from tracking import PersonTrack
 DT_S = 0.1
 #: Beside the lane of a robot at 1 m/s, where only an unaware person limits it.
 BESIDE = (3.5, 1.3)
+SILENT = AwarenessPolicy()
 Scene = Callable[[float], Sequence[PersonTrack]]
 
 
@@ -93,18 +94,34 @@ def test_who_limits_the_robot_and_has_not_looked_is_asked_the_quietest_means_fir
         assert alert.wins_s >= AttentionRules().min_gain_s
 
 
-def test_the_gain_is_the_time_for_the_way_past_the_person_at_the_limits_a_second_later() -> None:
+def test_the_gain_is_the_time_behind_the_limit_less_the_same_with_a_look() -> None:
+    """From a second after the request on: the robot is a metre further on."""
     ((_, alert),) = requests(driven(standing(BESIDE), 1.0))
 
-    def later_mps(awareness_lower: float) -> float:
-        """The limit a second from now: the robot is a metre further on."""
-        scene = standing((BESIDE[0] - 1.0, BESIDE[1]), awareness_lower=awareness_lower)
-        return driven(scene, 1.0, policy=AwarenessPolicy(attention=None))[-1].speed_limit_mps
+    def passing_s(look_s: float) -> float:
+        x_m, t_s, step_s = 1.0, 0.0, 0.5
+        while True:
+            lower = 0.6 if t_s < look_s else 0.0
+            there = standing((BESIDE[0] - x_m, BESIDE[1]), awareness_lower=lower)
+            limit_mps = driven(there, 1.0, policy=SILENT)[-1].speed_limit_mps
+            left_m = BESIDE[0] - x_m + 0.3625 + 0.30  # until they are side by side no more
+            if left_m <= limit_mps * step_s:
+                return t_s + left_m / limit_mps
+            x_m, t_s = x_m + limit_mps * step_s, t_s + step_s
 
-    way_m = BESIDE[0] - 1.0 + 0.3625 + 0.30  # to where robot and body are side by side no more
-    gain_s = way_m / later_mps(0.0) - way_m / later_mps(0.6)
+    gain_s = passing_s(0.0) - passing_s(4.0)
     assert alert.wins_s == pytest.approx(gain_s, rel=1e-6)
     assert requests(driven(standing(BESIDE), 1.0, policy=policy_of(min_gain_s=gain_s + 0.01))) == []
+
+
+def test_a_wait_of_both_is_worth_the_longest_time_less_the_way_past() -> None:
+    """A robot that must stand beside somebody who stands would wait for ever."""
+    beside = standing((0.0, 0.9))
+    assert driven(beside, 1.0, policy=SILENT, speed_mps=0.0)[-1].speed_limit_mps < 0.3
+    adapter = NavAdapter(policy_of(min_gain_s=5.0), ROBOT)
+    driven(standing((20.0, 0.0)), 1.0, adapter=adapter)
+    asked = requests(driven(beside, 2.0, speed_mps=0.0, from_s=2.0, adapter=adapter))
+    assert asked[0][1].wins_s > 5.0
 
 
 @pytest.mark.parametrize(
@@ -116,7 +133,7 @@ def test_the_gain_is_the_time_for_the_way_past_the_person_at_the_limits_a_second
         (standing((3.5, 5.0)), {}),
         (standing((-2.0, 0.8)), {}),
         (standing((1.6, 0.0)), {}),
-        (standing(BESIDE), {"policy": AwarenessPolicy(attention=None)}),
+        (standing(BESIDE), {"policy": SILENT}),
         (standing(BESIDE), {"policy": policy_of(within_m=3.0)}),
         (standing(BESIDE), {"policy": AwarenessPolicy.preset("blind")}),
         (standing(BESIDE), {"speed_mps": 0.0}),
@@ -221,21 +238,18 @@ def test_scans_show_nobody_look(picture_s: float | None, answers: int) -> None:
     assert sum(len(result.answers) for result in results) == answers
 
 
-def test_an_answer_is_remembered_until_the_belief_ends() -> None:
-    """A look leaves a belief of 0.3, too weak to count by itself, for 2 s."""
+@pytest.mark.parametrize("noticed", [0.3, 0.6])
+def test_an_answer_allows_no_more_than_any_other_look(noticed: float) -> None:
+    """People look before they set off, so nobody who answers is expected to stay."""
 
     def looks(t_s: float) -> list[PersonTrack]:
         lower = 0.7 if 0.95 < t_s < 1.45 else 0.0
         (track,) = standing(BESIDE, awareness_lower=lower)(t_s)
-        return [replace(track, noticed=0.3 if 0.95 < t_s < 3.45 else 0.0)]
+        return [replace(track, noticed=noticed if 0.95 < t_s < 3.45 else 0.0)]
 
-    def lowers(policy: AwarenessPolicy) -> list[float]:
-        results = driven(looks, 6.0, policy=policy)
-        return [result.obstacles[0].awareness_lower for result in results[15:]]
-
-    counts_as = AwarenessPolicy().noticed_counts_as
-    assert lowers(policy_of()) == [counts_as] * 20 + [0.0] * 25
-    assert lowers(AwarenessPolicy(attention=None)) == [0.0] * 45
+    asked, unasked = (driven(looks, 6.0, policy=each) for each in (policy_of(), SILENT))
+    assert [len(each.answers) for each in asked].count(1) == 1
+    assert [numbers(each) for each in asked] == [numbers(each) for each in unasked]
 
 
 def test_nothing_is_remembered_of_somebody_who_did_not_look() -> None:
@@ -282,7 +296,7 @@ def test_warnings_of_collisions_stay_as_they_are_and_come_first() -> None:
         crossing = person(t_s, position=(3.5, 2.0 - 0.8 * t_s), velocity=(0.0, -0.8))
         return [crossing, person(t_s, track_id=2, position=(3.0, -1.2))]
 
-    silent = driven(towards, 3.0, policy=AwarenessPolicy(attention=None))
+    silent = driven(towards, 3.0, policy=SILENT)
     asking = driven(towards, 3.0)
     for without, with_requests in zip(silent, asking, strict=True):
         warnings = [alert for alert in with_requests.alerts if alert.kind != "attention"]
@@ -297,13 +311,19 @@ def histories(draw: st.DrawFn) -> list[tuple[float, float, tuple[PersonTrack, ..
     """Time steps, speeds of the robot, and the same few people, who look now and then."""
     people = [replace(each, stamp_s=0.0, status="confirmed") for each in draw(crowds(max_size=3))]
     steps = draw(st.lists(st.sampled_from([0.1, 0.2, 1.0]), min_size=4, max_size=25))
-    looks = st.sampled_from([0.0, 0.0, 0.0, 0.4, 0.8])
+    looks, beliefs = st.sampled_from([0.0, 0.0, 0.0, 0.4, 0.8]), st.sampled_from([0.0, 0.3, 0.7])
     return [
         (
             dt,
             draw(st.sampled_from([1.0, 1.0, 0.4, 0.0, -0.5])),
             tuple(
-                replace(each, awareness_lower=draw(looks), time_since_seen_s=0.0) for each in people
+                replace(
+                    each,
+                    awareness_lower=draw(looks),
+                    noticed=draw(beliefs),
+                    time_since_seen_s=0.0,
+                )
+                for each in people
             ),
         )
         for dt in steps
@@ -320,7 +340,7 @@ def test_requests_change_no_limit_and_keep_to_their_budget(
 ) -> None:
     rules = AttentionRules(min_gain_s=gain_s, per_minute=per_minute)
     asks = NavAdapter(AwarenessPolicy(attention=rules), robot)
-    silent = NavAdapter(AwarenessPolicy(attention=None), robot)
+    silent = NavAdapter(SILENT, robot)
     now = 0.0
     made: list[tuple[float, int]] = []
     for dt, speed_mps, people in walk:

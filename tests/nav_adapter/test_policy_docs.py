@@ -15,6 +15,7 @@ from paths import ROOT
 
 from awarenav.cli import main
 from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import AttentionRules
 from nav_adapter.reach import Reach
 from nav_adapter.rules import RULES, rules_of
 from perception.anthropometry import BODY_RADIUS_M
@@ -83,6 +84,11 @@ def test_the_robot_is_at_full_speed_beyond_the_distance_shown(column: int, name:
 def test_the_file_shown_is_the_default_policy_with_every_setting() -> None:
     (block,) = re.findall(r"```yaml\n(.*?)```", TEXT, flags=re.DOTALL)
     data = yaml.safe_load(block)
+    asks = yaml.safe_load(
+        re.sub(r"attention: null.*\n", "attention:\n", block).replace("\n#", "\n")
+    )
+    assert AttentionRules(**asks["attention"]) == AttentionRules()
+    assert asks["attention"].keys() == AttentionRules.model_fields.keys()
     policy = AwarenessPolicy.model_validate(data)
     assert policy == AwarenessPolicy() == AwarenessPolicy.preset("balanced")
     whole = policy.model_dump(mode="json")

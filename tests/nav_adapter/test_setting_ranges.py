@@ -8,6 +8,7 @@ import pytest
 from pydantic import BaseModel
 
 from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import AttentionRules
 
 #: Default, lowest and highest value; those in OPEN are just out of range.
 RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
@@ -48,7 +49,7 @@ RANGES: dict[str, dict[str, tuple[float, float, float]]] = {
         "horn_within_s": (2.0, 0.0, 30.0),
     },
     "attention": {
-        "min_gain_s": (0.5, 0.0, 10.0),
+        "min_gain_s": (2.0, 0.0, 10.0),
         "pause_s": (2.0, 1.0, 60.0),
         "per_minute": (6, 1, 60),
         "within_m": (8.0, 0.0, 30.0),
@@ -70,7 +71,7 @@ KEYS = ("minimum", "maximum")
 
 @pytest.mark.parametrize("part", RANGES)
 def test_defaults_and_ranges(part: str) -> None:
-    settings: BaseModel = getattr(AwarenessPolicy(), part)
+    settings: BaseModel = getattr(AwarenessPolicy(attention=AttentionRules()), part)
     found = {}
     for name, schema in type(settings).model_json_schema()["properties"].items():
         one: dict[str, Any] = {**schema, **schema.get("anyOf", [{}])[0]}

@@ -23,6 +23,8 @@ import matplotlib as mpl
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import AttentionRules
 from perception import AttentionCone
 from sim_tests import CrossingFrame, CrossingResult, Scenario, run_crossing, shipped_scenarios
 from sim_tests.crossing import Stage, TopView
@@ -172,7 +174,7 @@ def _film_asking() -> None:
         film = Film()
         run_crossing(
             scenario.model_copy(update={"people": (worker,), "hearing": hearing}),
-            policy="balanced",
+            policy=AwarenessPolicy(attention=AttentionRules()),
             perception="keypoints+scanner",
             seed=_ASKING_SEED,
             observer=film,

@@ -22,6 +22,8 @@ from .._settings import command_text, common_settings, episode_words, print_resu
 from ._search import CONTACT_SCORE, Falsification, FalsifySettings, falsify
 from ._worst_cases import POLICY_FILE, WorstCase, draw_falsification, write_worst
 
+# The people whom the moving robot must not touch.
+_COUNTS: Final = "who had never noticed it, or only when it asked them to"
 #: Default of ``--against``, and the other policy for that one itself.
 _BASE: Final = "balanced"
 _BASE_OF_BASE: Final = "blind"
@@ -58,6 +60,12 @@ def run_falsify(
     other = policy_against(against, settings)
     found = falsify(settings, out, workers=workers, resume=resume, overwrite=overwrite)
     write_episodes(found, out / "episodes.csv")
+    # Worst cases run again, and a system that shuts down waits for nobody.
+    text = verdict_text(found, [], {})
+    write_summary(found, [], out / "summary.json", verdict=text, against={})
+    if found.interrupted:
+        print(f"So far, in {out / 'summary.json'}: {text}", file=sys.stderr)
+        raise KeyboardInterrupt
     cases = write_worst(found, out, worst)
     others = records_against(cases, other, settings)
     text = verdict_text(found, cases, others)
@@ -80,7 +88,7 @@ def _next_command(found: Falsification, experiment: Experiment, other: str, out:
     if found.contacts:
         # The file has the camera, the robot and the population.
         case = (str(out / "worst_001.yaml"),)
-        of_case = experiment.replaced(scenario=case, **dict.fromkeys(experiment.changes, ""))
+        of_case = experiment.replaced(scenario=case, **dict.fromkeys(experiment.changes))
         return command_text(
             *("crossings", *episode_words(of_case), "--policy", own, other),
             *("--seed", experiment["seed"], "--episodes", 1, "--out", out / "worst"),
@@ -96,7 +104,7 @@ def write_episodes(falsification: Falsification, path: Path) -> None:
     notes = (
         *("min_margin_never_m", "min_separation_m", "contact_by"),
         *("moving_contacts", *(f"moving_contacts_{noticed}" for noticed in NOTICED)),
-        *("moving_contact_mps", "error"),
+        *("moving_contacts_asked", "moving_contact_stoppable_mps", "moving_contact_mps", "error"),
     )
     write_csv(
         path,
@@ -130,11 +138,12 @@ def write_summary(
             "episodes": len(scores),
             "contacts": len(contacts),
             "first_contact_at": contacts[0] + 1 if contacts else None,
-            "lowest_score": round(min(scores), 6),
+            "lowest_score": round(min(scores), 6) if scores else None,
         }
     own = (
         *("min_margin_never_m", "min_separation_m", "contact_by", "moving_contacts"),
         *(f"moving_contacts_{noticed}" for noticed in NOTICED),
+        *("moving_contacts_asked", "moving_contact_stoppable_mps"),
         *("speed_at_min_separation_mps", "awareness"),
     )
     others = ("policy", "min_margin_never_m", "min_separation_m", "moving_contacts", "error")
@@ -142,7 +151,9 @@ def write_summary(
         "policy": falsification.settings.policy_name,
         "unsafe_no_floor": falsification.settings.unsafe_no_floor,
         "episodes": len(falsification.episodes),
+        "interrupted": falsification.interrupted,
         "contacts": falsification.contacts,
+        "inevitable": falsification.inevitable,
         "contact_mps": round(falsification.contact_mps, 6),
         "contacts_with_others": {
             noticed: {"episodes": len(speeds), "contact_mps": round(max(speeds, default=0.0), 6)}
@@ -157,6 +168,7 @@ def write_summary(
                 "scenario": case.episode.scenario,
                 **{name: getattr(case.record, name) for name in own},
                 "replays": case.replays,
+                "inevitable": case.episode.inevitable,
                 "against": None
                 if (other := against.get(case.path.name)) is None
                 else {name: getattr(other, name) for name in others},
@@ -177,7 +189,7 @@ def table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> lis
             f"{_two_decimals(case.record.min_margin_never_m)} m",
             f"{_two_decimals(case.record.min_separation_m)} m",
             f"{_two_decimals(case.record.speed_at_min_separation_mps)} m/s",
-            case.record.contact_by or "-",
+            (case.record.contact_by or "-") + (", inevitable" if case.episode.inevitable else ""),
             case.record.awareness or "-",
             case.record.reaction or "-",
         ]
@@ -191,7 +203,7 @@ def table_lines(falsification: Falsification, cases: Sequence[WorstCase]) -> lis
     )
     lines.append(
         f"{contacts} of {counted(episodes, 'episode')} with a contact of the moving robot and a "
-        f"person who had never noticed it; with others: {others}."
+        f"person {_COUNTS}, {falsification.inevitable} of them inevitable; with others: {others}."
     )
     if falsification.errors:
         broken = counted(falsification.errors, "episode has", "episodes have")
@@ -243,12 +255,17 @@ def verdict_text(
         )
     if contacts:
         text = (
-            f"{name} is not safe enough: the moving robot and a person who had never noticed it "
-            f"touched in {contacts} of {searched}, at up to {falsification.contact_mps:.2f} m/s."
+            f"{name} is not safe enough: the moving robot and a person {_COUNTS}, touched in "
+            f"{contacts} of {searched}, at up to {falsification.contact_mps:.2f} m/s."
         )
+        if falsification.inevitable:
+            text += (
+                f" {falsification.inevitable} of them are inevitable: a robot at 0.25 m/s could "
+                "not have stopped either."
+            )
     else:
         text = (
-            f"no contact of the moving robot and a person who had never noticed it, with {name} "
+            f"no contact of the moving robot and a person {_COUNTS}, with {name} "
             f"in {searched}. A search is not a sample, so this gives no rate."
         )
     return " ".join([text, _others(falsification), *_comparison(name, cases, others)])

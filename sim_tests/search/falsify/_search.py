@@ -22,8 +22,8 @@ from perception.documents import yaml_text
 
 from ...crossing.planner import refuse_unusable_planner
 from ...scenario import Scenario
-from ...study.measures import NOTICED, EpisodeRecord
-from ...study.runs import Job, job_of, policy_of
+from ...study.measures import FAST_IMPACT_MPS, NOTICED, EpisodeRecord
+from ...study.runs import Job, job_of, policy_of, terminated_as_interrupted
 from ...world.errors import SimError
 from .._settings import EpisodeRunner, SearchSettings, write_or_check_settings
 from .._study import Optimizer, Outcome, ParameterValues, Range, SharedStudy, Trial
@@ -54,6 +54,7 @@ _NOTES: Final = (
     *("min_margin_never_m", "min_separation_m", "contact_by", "moving_contacts"),
     *(f"moving_contacts_{noticed}" for noticed in NOTICED),
     *(f"moving_contact_{noticed}_mps" for noticed in NOTICED),
+    *("moving_contacts_asked", "moving_contact_asked_mps", "moving_contact_stoppable_mps"),
     *("moving_contact_mps", "speed_at_min_separation_mps"),
     *("awareness", "reaction", "error"),
 )
@@ -112,6 +113,17 @@ class SearchedEpisode:
         """Other figures of the episode."""
         return self.trial.outcome.notes
 
+    @property
+    def touches(self) -> bool:
+        """True for a contact that counts, see :func:`score`."""
+        return self.score <= CONTACT_SCORE
+
+    @property
+    def inevitable(self) -> bool:
+        """True for contacts before which no robot could have stopped that did more than creep."""
+        found = self.notes.get("moving_contact_stoppable_mps")
+        return self.touches and found is not None and found < FAST_IMPACT_MPS
+
 
 @dataclass(frozen=True, slots=True)
 class Falsification:
@@ -121,19 +133,27 @@ class Falsification:
         settings: its settings.
         spaces: search spaces by scenario.
         episodes: every episode, by scenario, in the order in which they were proposed.
+        interrupted: the search ended before all episodes had run.
     """
 
     settings: FalsifySettings
     spaces: dict[str, ScenarioSpace]
     episodes: tuple[SearchedEpisode, ...]
+    interrupted: bool = False
 
     @property
     def contacts(self) -> int:
-        """Number of episodes in which the moving robot touched a person who had never noticed it.
+        """Number of episodes in which the moving robot touched a person who counts.
 
-        Without the floor, everybody counts.
+        They are people who have never noticed it, or only when it asked them to. Without the floor,
+        everybody counts.
         """
-        return sum(each.score <= CONTACT_SCORE for each in self.episodes)
+        return sum(each.touches for each in self.episodes)
+
+    @property
+    def inevitable(self) -> int:
+        """Number of these that are inevitable."""
+        return sum(each.inevitable for each in self.episodes)
 
     @property
     def contact_mps(self) -> float:
@@ -203,9 +223,9 @@ def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
     """Return the score of an episode: the smallest separation margin at a moving robot, in metres.
 
     The margin is that to people who have never noticed the robot. It lies within (−10, 10]. A
-    contact of the moving robot with them gives −10 less the robot's speed in m/s, so
-    that a faster contact scores lower. Who walks into whom does not matter. An episode without a
-    result gives 10.
+    contact of the moving robot with them, or with somebody who noticed it only when it asked them
+    to, gives −10 less the robot's speed in m/s, so that a faster contact scores lower. Who walks
+    into whom does not matter. An episode without a result gives 10.
 
     Args:
         record: the episode.
@@ -213,8 +233,9 @@ def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
     """
     if record.error:
         return NO_MARGIN_SCORE
-    if record.moving_contacts_never:
-        return CONTACT_SCORE - (record.moving_contact_never_mps or 0.0)
+    if record.moving_contacts_never or record.moving_contacts_asked:
+        speeds_mps = record.moving_contact_never_mps, record.moving_contact_asked_mps
+        return CONTACT_SCORE - max(each or 0.0 for each in speeds_mps)
     if everybody and record.moving_contacts > 0:
         return CONTACT_SCORE - (record.moving_contact_mps or 0.0)
     margin_m = record.min_margin_m if everybody else record.min_margin_never_m
@@ -226,7 +247,7 @@ def score(record: EpisodeRecord, *, everybody: bool = False) -> float:
 def falsify(
     settings: FalsifySettings, folder: Path, *, workers: int, resume: bool, overwrite: bool = False
 ) -> Falsification:
-    """Search until all episodes have run.
+    """Search until all episodes have run, or an interruption (Ctrl-C, SIGTERM).
 
     The folder is made when missing. The result does not depend on the number of workers.
 
@@ -273,11 +294,13 @@ def _search(
     runner: EpisodeRunner,
 ) -> Falsification:
     """Search in all scenarios, then further in the worst of them."""
-    found: dict[str, list[SearchedEpisode]] = {}
+    found: dict[str, list[SearchedEpisode]] = {name: [] for name in spaces}
 
     def search_up_to(total: int, names: Sequence[str]) -> None:
         for name in names:
-            found[name] = search(
+            found[name] = []
+            search(
+                found[name],
                 name,
                 spaces[name].ranges,
                 spaces[name].neutral,
@@ -291,10 +314,16 @@ def _search(
             if runner.bar.n < done:  # episodes of an earlier process
                 runner.bar.update(done - runner.bar.n)
 
-    search_up_to(budget.first, list(spaces))
-    by_score = sorted(spaces, key=lambda name: min(each.score for each in found[name]))
-    search_up_to(budget.total_if_worst, by_score[: budget.worst])
-    return Falsification(settings, spaces, tuple(each for name in spaces for each in found[name]))
+    interrupted = False
+    try:
+        with terminated_as_interrupted():
+            search_up_to(budget.first, list(spaces))
+            by_score = sorted(spaces, key=lambda name: min(each.score for each in found[name]))
+            search_up_to(budget.total_if_worst, by_score[: budget.worst])
+    except KeyboardInterrupt:
+        interrupted = True
+    episodes = tuple(each for name in spaces for each in found[name])
+    return Falsification(settings, spaces, episodes, interrupted)
 
 
 def _evaluated(
@@ -316,6 +345,7 @@ def _evaluated(
 
 
 def search(
+    found: list[SearchedEpisode],
     name: str,
     ranges: Mapping[str, Range],
     neutral: ParameterValues,
@@ -325,16 +355,14 @@ def search(
     seed: int,
     generation: int,
     total: int,
-) -> list[SearchedEpisode]:
+) -> None:
     """Search one scenario for the smallest score, or continue, up to a number of episodes.
 
     The first round starts at ``neutral``, the scenario as written; later ones at points drawn from
-    the seed. Each has a study in the folder. ``total`` is a multiple of the generation.
-
-    Returns:
-        All episodes so far, in the order in which they were proposed.
+    the seed. Each has a study in the folder. ``total`` is a multiple of the generation. All
+    episodes, also those of earlier searches, are added to the empty list ``found`` in the order in
+    which they were proposed; an exception such as an interruption leaves those so far there.
     """
-    found: list[SearchedEpisode] = []
     round_ = 0
     while len(found) < total:
         rng = np.random.default_rng([seed, zlib.crc32(name.encode()), round_])
@@ -355,11 +383,12 @@ def search(
         )
         most = total - len(found)
         study = SharedStudy(folder / "studies" / f"{name}-{round_:02d}.log", optimizer, most)
-        while len(trials := study.trials()) < most and not _has_converged(trials, generation):
-            study.evaluate(generation, evaluate)
-        found += [SearchedEpisode(name, round_, trial) for trial in trials]
+        try:
+            while len(trials := study.trials()) < most and not _has_converged(trials, generation):
+                study.evaluate(generation, evaluate)
+        finally:
+            found += [SearchedEpisode(name, round_, trial) for trial in study.trials()]
         round_ += 1
-    return found
 
 
 def _has_converged(trials: Sequence[Trial], generation: int) -> bool:

@@ -64,7 +64,7 @@ class Member:
         return f"{self.kind}_u{self.speed_mps:g}"
 
     def policy(self) -> AwarenessPolicy:
-        """Return the policy: ``balanced`` with these settings, which asks nobody."""
+        """Return the policy: ``balanced`` with these settings."""
         data = AwarenessPolicy.preset("balanced").model_dump(mode="json")
         inflation, speed = data["inflation"], data["speed"]
         share = self.speed_mps / speed["unaware_human_speed_mps"]
@@ -75,7 +75,6 @@ class Member:
         if self.kind == "blind":
             speed["aware_human_speed_mps"] = self.speed_mps
             inflation["aware_radius_m"] = inflation["unaware_radius_m"]
-        data["attention"] = None
         if self.kind != "memory":
             data["noticed_counts_as"] = None
         data["filter"]["noticed_memory_s"] = _MEMORY_S if self.kind == "memory" else 0.0

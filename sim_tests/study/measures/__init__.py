@@ -47,7 +47,7 @@ if TYPE_CHECKING:
         violates_more,
         zero_of_n_upper,
     )
-    from ._step_out import StepOut, step_out_impacts
+    from ._step_out import FAST_IMPACT_MPS, StepOut, step_out_impacts
     from ._summary import (
         BASELINE,
         UNCONFIRMED,

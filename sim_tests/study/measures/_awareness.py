@@ -189,6 +189,7 @@ class Requests:
         asked_twice: people who were asked more than once.
         after_answer: requests to a track that had answered before.
         answered_people: (N, P) whether somebody has answered a request by then.
+        noticed_when_asked: (N, P) the same of people who had never looked at the robot before.
     """
 
     requests: int
@@ -197,6 +198,7 @@ class Requests:
     asked_twice: int
     after_answer: int
     answered_people: NDArray[np.bool_]
+    noticed_when_asked: NDArray[np.bool_]
 
     @classmethod
     def of(cls, result: CrossingResult, trace: Trace) -> Requests:
@@ -204,7 +206,7 @@ class Requests:
         asked: Counter[int] = Counter()
         had_answered: set[int] = set()
         requests = answered = needless = after_answer = 0
-        answered_people = np.zeros(trace.looking.shape, dtype=np.bool_)
+        answered_people, when_asked = np.zeros((2, *trace.looking.shape), dtype=np.bool_)
         for row, frame in enumerate(result.frames):
             had_answered |= {answer.track_id for answer in frame.constraints.answers}
             for alert in frame.constraints.alerts:
@@ -220,8 +222,10 @@ class Requests:
                     if answer is not None:
                         answered += 1
                         answered_people[answer:, person] = True
+                        if np.isinf(trace.since_look_s[answer - 1, person]):
+                            when_asked[answer:, person] = True
         twice = sum(times > 1 for times in asked.values())
-        return cls(requests, answered, needless, twice, after_answer, answered_people)
+        return cls(requests, answered, needless, twice, after_answer, answered_people, when_asked)
 
 
 def _person_of(track_id: int, frame: CrossingFrame, trace: Trace, row: int) -> int | None:

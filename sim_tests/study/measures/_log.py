@@ -15,6 +15,7 @@ from ...crossing import STANDING_SPEED_MPS, ContactEvent, CrossingResult
 from ._awareness import Requests, nearest_person, track_awareness
 from ._conflict import Outline
 from ._driving import path_length_m, peak_deceleration_and_jerk
+from ._inevitable import stoppable_mps
 from ._step_out import FASTER_STEP_OUT, StepOutImpacts, step_out_impacts
 from ._trace import Trace
 
@@ -87,13 +88,20 @@ class Log:
         return [each for each in self.contacts if each.robot_speed_mps > STANDING_SPEED_MPS]
 
     def moving_contacts_of(self, noticed: str) -> list[ContactEvent]:
-        """Contacts of a moving robot with people of one of :attr:`Trace.noticed`."""
-        t_s, people = self.trace.t_s, self.trace.noticed[noticed]
+        """Contacts of a moving robot with people of one of :data:`CONTACT_PEOPLE`."""
+        t_s, asked = self.trace.t_s, {"asked": self.requests.noticed_when_asked}
+        people = (self.trace.noticed | asked)[noticed]
         return [
             each
             for each in self.moving_contacts
             if people[max(int(np.searchsorted(t_s, each.t_s, "right")) - 1, 0), each.worker]
         ]
+
+    @property
+    def stoppable_mps(self) -> list[float]:
+        """The speeds from which a robot could have stopped before each moving contact."""
+        of = self.result, self.trace, self.outline
+        return [stoppable_mps(*of, each) for each in self.moving_contacts]
 
     def min_margin_of(self, noticed: str) -> float | None:
         """Smallest margin at a moving robot to people of one of :attr:`Trace.noticed`."""

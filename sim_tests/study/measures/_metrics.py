@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ...conditions import Conditions
-from . import _conflict, _driving
+from . import _conflict, _driving, _registry
 from ._awareness import Awareness, MeasuredAttention, awareness_class
-from ._registry import EVERYBODY, NOTICED, STEP_OUT_PEOPLE, Better, Column, Kind, Metric
+from ._registry import Better, Column, Kind, Metric
 
 if TYPE_CHECKING:
     from ...actors.behaviour import PersonOutcome
@@ -28,18 +28,6 @@ INTIMATE_M: Final = 0.45
 PERSONAL_M: Final = 1.2
 #: A control cycle in real time that begins later than this is late.
 LATE_S: Final = 0.01
-# By what a measure returns, and what an episode without a log has.
-_KINDS: Final[dict[str, Kind]] = {
-    "str": "text",
-    "Awareness": "text",
-    "bool": "flag",
-    "int": "count",
-    "float": "number",
-    "float | None": "number",
-}
-_DEFAULTS: Final[dict[Kind, Any]] = {"text": "", "flag": False, "count": 0, "number": None}
-_UNITS: Final = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³"}
-
 #: The columns of ``episodes.csv`` by name, in their order.
 COLUMNS: Final[dict[str, Column]] = {}
 #: The measures, which are averaged over episodes, by name.
@@ -51,9 +39,9 @@ _Measure = Callable[["Log"], Any]
 def column(function: _Measure) -> _Measure:
     """Make a function of the log a column that is no number to average."""
     name = function.__name__
-    kind = _KINDS[function.__annotations__["return"]]
+    kind = _registry.KINDS[function.__annotations__["return"]]
     meaning = " ".join((inspect.getdoc(function) or "").split())
-    COLUMNS[name] = Column(name, kind, meaning, function, _DEFAULTS[kind])
+    COLUMNS[name] = Column(name, kind, meaning, function, _registry.DEFAULTS[kind])
     return function
 
 
@@ -65,7 +53,7 @@ def measure_of_log(
     def register(function: _Measure) -> _Measure:
         name = function.__name__
         meaning = COLUMNS[column(function).__name__].meaning
-        unit = _UNITS.get(name.rpartition("_")[2], "")
+        unit = _registry.UNITS.get(name.rpartition("_")[2], "")
         METRICS[name] = Metric(name, title, unit, better, meaning, decimals)
         return function
 
@@ -81,7 +69,7 @@ def _conditions(*, required: bool) -> None:
     """Add the columns of the conditions: those that every table has, or those that may be empty."""
     for axis in fields(Conditions):
         if (axis.default is MISSING) == required:
-            kind = _KINDS[str(axis.type)]
+            kind = _registry.KINDS[str(axis.type)]
             condition(axis.name, kind, axis.metadata["meaning"], None if required else axis.default)
 
 
@@ -416,15 +404,15 @@ def _step_out(people: dict[str, tuple[str, str]], name: str, of: str, starts: st
     )
 
 
-_step_out(STEP_OUT_PEOPLE, "step_out_{}", "step_out")
+_step_out(_registry.STEP_OUT_PEOPLE, "step_out_{}", "step_out")
 _by_people(
-    STEP_OUT_PEOPLE,
+    _registry.STEP_OUT_PEOPLE,
     "step_out_{}_fast",
     "Step-out impacts above 0.25 m/s",
     "The step-out impacts with people {} in which the robot closes at over 0.25 m/s.",
     lambda log, group: log.step_out[group].fast,
 )
-_step_out(EVERYBODY, "step_out_stress_{}", "step_out_stress", " of faster starts")
+_step_out(_registry.EVERYBODY, "step_out_stress_{}", "step_out_stress", " of faster starts")
 
 
 @measure_of_log("Step-out impacts, not looking")
@@ -434,21 +422,32 @@ def step_out_not_looking(log: Log) -> float:
 
 
 _by_people(
-    NOTICED,
+    _registry.CONTACT_PEOPLE,
     "moving_contacts_{}",
     "Contacts with a moving robot",
     "Contacts of a moving robot and people {}.",
     lambda log, group: float(len(log.moving_contacts_of(group))),  # earlier rows have none
 )
 _by_people(
-    NOTICED,
+    _registry.CONTACT_PEOPLE,
     "moving_contact_{}_mps",
     "Speed at contact",
     "The robot's highest speed at such a contact with people {}, by any cause.",
     lambda log, group: log.fastest_mps(log.moving_contacts_of(group)),
 )
+
+
+@measure_of_log("Speed that could have stopped", better="neither")
+def moving_contact_stoppable_mps(log: Log) -> float | None:
+    """Highest speed from which a robot could have stood before such a contact, by any cause.
+
+    It brakes once the motion that led to the contact could be seen; below 0.25, it is inevitable.
+    """
+    return max(log.stoppable_mps, default=None)
+
+
 _by_people(
-    NOTICED,
+    _registry.NOTICED,
     "min_margin_{}_m",
     "Smallest margin",
     "Smallest separation margin at a moving robot to people {}.",

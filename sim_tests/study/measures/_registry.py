@@ -15,7 +15,12 @@ NOTICED: Final = {
     "past": ("noticed before", "whose last look at the robot was more than 1 s ago"),
     "looking": ("looking", "who look at the robot, or have within 1 s"),
 }
-#: The same with the sum of them.
+#: The same, and people whom the others hold, too: whose first look was an answer.
+CONTACT_PEOPLE: Final = {
+    **NOTICED,
+    "asked": ("noticed when asked", "who looked at the robot only once it had asked them to"),
+}
+#: The first with the sum of them.
 EVERYBODY: Final = {**NOTICED, "all": ("all", "of whatever they have noticed")}
 #: The same, and people who have answered, whom the others hold, too.
 STEP_OUT_PEOPLE: Final = {
@@ -26,6 +31,17 @@ STEP_OUT_PEOPLE: Final = {
 Better = Literal["lower", "higher", "neither"]
 #: The kind of a column's values; a number may be None, where the column does not apply.
 Kind = Literal["text", "flag", "count", "number"]
+#: By what a measure returns, and what an episode without a log has.
+KINDS: Final[dict[str, Kind]] = {
+    "str": "text",
+    "Awareness": "text",
+    "bool": "flag",
+    "int": "count",
+    "float": "number",
+    "float | None": "number",
+}
+DEFAULTS: Final[dict[Kind, Any]] = {"text": "", "flag": False, "count": 0, "number": None}
+UNITS: Final = {"s": "s", "m": "m", "mps": "m/s", "mps2": "m/s²", "mps3": "m/s³"}
 
 
 @dataclass(frozen=True, slots=True)

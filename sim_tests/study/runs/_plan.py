@@ -128,15 +128,19 @@ def experiment_jobs(
 ) -> tuple[Job, ...]:
     """Return the episodes of a command; :func:`plan_jobs` names the errors."""
     first = experiment["seed"]
-    return plan_jobs(
-        experiment["scenario"],
-        experiment["policy"] if policies is None else policies,
-        range(first, first + experiment.episodes),
-        planners=experiment["planner"],
-        perception=experiment["perception"],
-        sensors=experiment["sensors"],
-        faults=experiment["fault"],
-        **experiment.changes,
+    return tuple(
+        job
+        for population in dict.fromkeys(experiment["population"] or ("",))
+        for job in plan_jobs(
+            experiment["scenario"],
+            experiment["policy"] if policies is None else policies,
+            range(first, first + experiment.episodes),
+            planners=experiment["planner"],
+            perception=experiment["perception"],
+            sensors=experiment["sensors"],
+            faults=experiment["fault"],
+            **experiment.replaced(population=(population,)).changes,
+        )
     )
 
 

@@ -114,7 +114,7 @@ def run_jobs(
         resume=resume,
         overwrite=overwrite,
     )
-    with folder, _terminated_as_interrupted():
+    with folder, terminated_as_interrupted():
         remaining = [number for number in range(len(jobs)) if number not in folder.done]
         some = Workers(
             workers, scheduler=scheduler, own_process=limit_s is not None, most=len(remaining)
@@ -182,7 +182,7 @@ def _died(item: _Item, reason: str) -> Attempt:
 
 
 @contextlib.contextmanager
-def _terminated_as_interrupted() -> Iterator[None]:
+def terminated_as_interrupted() -> Iterator[None]:
     """Let SIGTERM interrupt the block as Ctrl-C does."""
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -222,10 +222,11 @@ def answering_note(about: Any) -> str:
     settings = about.get("settings") if isinstance(about, Mapping) else None
     if not isinstance(settings, Mapping):
         return ""
-    population = str(settings.get("population") or "")
-    found = _ANSWERS.search(population)
-    if found is not None:
-        share, source = found[1], f"population {population}"
+    given = settings.get("population") or ""
+    population = given if isinstance(given, str) else ", ".join(map(str, given))
+    found = _ANSWERS.findall(population)
+    if found:
+        share, source = ", ".join(found), f"population {population}"
     else:
         share, source = f"{DEFAULT_ANSWERS:g}", "the default, unless a scenario has its own"
     return f"Simulated people answer a request that they hear with probability {share}\n({source})."

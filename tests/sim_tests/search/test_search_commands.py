@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 import shlex
+import signal
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -239,6 +245,9 @@ def test_worse_episodes_have_lower_scores():
     assert scores == sorted(set(scores))
     assert scores[1] <= CONTACT_SCORE < scores[2]
     assert score(record(error="died", **touched(1.0))) == NO_MARGIN_SCORE == scores[-1]
+    # Whoever looked only because the robot asked is no excuse.
+    asked = {**aware, "moving_contacts_asked": 1, "moving_contact_asked_mps": 0.4}
+    assert score(record(min_margin_never_m=2.0, **asked)) == CONTACT_SCORE - 0.4
     # Without its floor, a robot must keep clear of everybody.
     assert score(ordered[3], everybody=True) == CONTACT_SCORE - 1.4
 
@@ -274,10 +283,12 @@ def planted_search(folder, total, calls=None):
             yield Outcome(min(0.3 + wide, -1.0 + 4.0 * deep), notes={"n": 1})
 
     middle = dict.fromkeys(PLANTED, 0.5)
-    return search(
-        *("planted", PLANTED_SPACE, middle, evaluate, folder),
+    found = []
+    search(
+        *(found, "planted", PLANTED_SPACE, middle, evaluate, folder),
         **{"seed": 1, "generation": 6, "total": total},
     )
+    return found
 
 
 def test_a_search_finds_the_deep_valley_restarts_and_goes_on(tmp_path):
@@ -315,6 +326,39 @@ def falsified(*scores: float, notes=({},) * 9) -> Falsification:
     return Falsification(SETTINGS, {}, tuple(SearchedEpisode("s", 0, each) for each in trials))
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_search_writes_its_summary(tmp_path, scenario, number):
+    out = tmp_path / "out"
+    words = f"falsify --perception truth --episodes 4000 --generation 2 {scenario}"
+    command = [sys.executable, "-m", "awarenav", *words.split(), "--out", str(out)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        finished = re.compile(r'"op_code":6.*"state":1')  # of the journal: a trial is complete
+        until_s = time.monotonic() + 120.0
+        while process.poll() is None and time.monotonic() < until_s:
+            journals = [path.read_text() for path in out.glob("studies/*.log")]
+            if sum(len(finished.findall(text)) for text in journals) >= 4:
+                break
+            time.sleep(0.05)
+        process.send_signal(number)
+        _, said = process.communicate(timeout=60.0)
+    assert process.returncode == 130, said
+    summary = json.loads((out / "summary.json").read_text())
+    rows = list(csv.DictReader((out / "episodes.csv").read_text().splitlines()))
+    assert summary["interrupted"]
+    assert len(rows) == summary["episodes"] >= 4
+    assert summary["contacts"] == sum(float(row["score"]) <= CONTACT_SCORE for row in rows)
+    assert f"in {summary['episodes']} episodes" in said
+    assert "--resume" in said
+
+
+def test_a_contact_that_counts_is_marked_inevitable_or_not():
+    notes = [{"moving_contact_stoppable_mps": each} for each in (0.1, 0.3, 0.1)]
+    found = falsified(-11.0, -10.5, 0.4, notes=notes)
+    assert [each.inevitable for each in found.episodes] == [True, False, False]
+    assert (found.contacts, found.inevitable) == (2, 1)
+    assert "1 of them are inevitable" in verdict_text(found, [], {})
+
+
 def cases(*records: EpisodeRecord) -> list[WorstCase]:
     return [
         WorstCase(None, Path(f"worst_{row:03d}.yaml"), None, None, each)
@@ -331,7 +375,8 @@ def test_a_falsified_policy_is_compared_in_the_same_situations():
     found = cases(*(record(min_margin_never_m=m, moving_contacts=n) for m, n in mine))
     text = verdict_text(falsified(-10.4, -0.4, 0.2), found, others)
     assert text.startswith(
-        "mine is not safe enough: the moving robot and a person who had never noticed it touched "
+        "mine is not safe enough: the moving robot and a person who had never noticed it, or only "
+        "when it asked them to, touched "
         "in 1 of 3 episodes, at up to 0.40 m/s. Nobody who had noticed it was touched by the "
     )
     assert "balanced touches a person while it moves in 0 (mine in 1)" in text

@@ -66,7 +66,7 @@ def test_every_point_of_the_space_is_a_policy_that_keeps_the_floor(name, share):
     [
         (AwarenessPolicy.preset("blind"), "attention", "reach"),
         (named_policy("scanner")[1], "reach", "timing"),
-        (AwarenessPolicy(attention=None, without=["reach"]), "attention", "filter"),
+        (AwarenessPolicy(without=["reach"]), "attention", "filter"),
     ],
 )
 def test_a_part_that_is_turned_off_is_not_searched_and_stays_off(base, part, searched_with):
@@ -83,9 +83,9 @@ def test_a_part_that_is_turned_off_is_not_searched_and_stays_off(base, part, sea
 def test_a_parameter_sets_its_key_and_the_others_that_it_names_and_the_rest_is_the_base():
     space = SPACES["balanced"]
     assert space.policy(space.base_parameters()) == AwarenessPolicy.preset("balanced")
-    changes = {"attention.min_gain_s": 2.0, "speed.aware_above": 0.77}
+    changes = {"timing.hold_s": 1.5, "speed.aware_above": 0.77}
     policy = space.policy({**space.base_parameters(), **changes})
-    assert policy.attention.min_gain_s == 2.0
+    assert policy.timing.hold_s == 1.5
     assert policy.inflation.aware_above == policy.speed.aware_above == 0.77
 
 

@@ -74,7 +74,9 @@ VALUES = {
     "camera": st.one_of(st.just(""), NAMES),
     "networks": st.one_of(st.just(""), NAMES),
     "robot": st.one_of(st.just(""), NAMES),
-    "population": st.sampled_from([None, "classic", "recorded,answers=0.25"]),
+    "population": st.sampled_from(
+        [(), ("classic",), ("recorded,answers=0.25",), ("classic", "recorded")]
+    ),
     "fault": st.lists(NAMES, min_size=1, max_size=2).map(tuple),
 }
 
@@ -227,3 +229,16 @@ def test_a_new_axis_is_one_field_and_its_meaning(tmp_path):
     about = json.loads((out / "run.json").read_text())
     assert about["settings"]["lasts"] == "0.5"
     assert "--lasts 0.5" in about["command"]
+
+
+def test_several_populations_are_compared_on_the_same_scenarios_and_seeds():
+    asked = ("recorded", "classic", "recorded")
+    jobs = experiment_jobs(
+        Experiment({"scenario": ("late_glance",), "population": asked, "perception": "truth"}, 2)
+    )
+    assert [(job.population, job.seed) for job in jobs] == [
+        (name, seed) for name in asked[:2] for seed in (0, 1)
+    ]
+    for job in jobs:
+        drawn = ScenarioTemplate.from_text(job.scenario_text).for_seed(job.seed)
+        assert drawn.population == job.population

@@ -66,9 +66,8 @@ def test_the_family_differs_in_the_speed_and_in_who_counts_as_aware():
         assert blind_radius == (each.kind == "blind")
         assert (policy.noticed_counts_as is not None) == (each.kind == "memory")
         assert policy.filter.noticed_memory_s == (3.0 if each.kind == "memory" else 0.0)
-    # The default policy is one of them, but that these ask nobody.
-    balanced, remembers = AwarenessPolicy.preset("balanced"), Member("memory", 1.5).policy()
-    assert remembers.model_dump() == {**balanced.model_dump(), "attention": None}
+    # The default policy is one of them.
+    assert Member("memory", 1.5).policy() == AwarenessPolicy.preset("balanced")
 
 
 def test_awareness_wins_the_distance_to_the_line_at_equal_risk_and_at_equal_time():
