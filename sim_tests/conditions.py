@@ -221,7 +221,8 @@ class Conditions:
     )
     planner: str = _axis(
         "Name of the planner.",
-        help="Local planner: 'reference', 'costmap' (that of today's AMR), 'straight_on', 'ros2' "
+        help="Local planner: 'reference', 'ahead' (it plans with the limit there and then), "
+        "'costmap' (that of today's AMR), 'straight_on', 'ros2' "
         "(a stack outside, such as your Nav2), or a class of your own, which gets the robot's "
         "profile, and static_boxes_odom_m if it accepts it.",
         default=REFERENCE_PLANNER,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ._ahead import AheadPlanner
 from ._choice import (
     KNOWN_PLANNERS,
     import_planner,

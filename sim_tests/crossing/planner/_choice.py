@@ -23,6 +23,7 @@ from perception.arrays import FloatArray
 from ...conditions import REFERENCE_PLANNER
 from ...scenario import Scenario
 from ...world.errors import SimError
+from ._ahead import AheadPlanner
 from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
 from ._sampling_planner import SamplingPlanner
 
@@ -67,7 +68,12 @@ def ros2_stack(
 
 #: Planners that have a name without a module, beside the reference planner.
 KNOWN_PLANNERS: Final[Mapping[str, Callable[..., LocalPlanner]]] = MappingProxyType(
-    {"costmap": CostmapPlanner, "straight_on": straight_to_goal, "ros2": ros2_stack}
+    {
+        "ahead": AheadPlanner,
+        "costmap": CostmapPlanner,
+        "straight_on": straight_to_goal,
+        "ros2": ros2_stack,
+    }
 )
 
 

@@ -1,0 +1,283 @@
+"""A planner that looks ahead: it takes the way that the limit, there and then, lets end soonest."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from nav_adapter import NavConstraints, RobotProfile, RobotState
+from nav_adapter.exporters import speed_limit_at
+from perception.anthropometry import BODY_RADIUS_M
+from perception.arrays import FloatArray, finite_array, finite_number
+
+from ...world.errors import SimError
+from ._drives import Tick, TwistLimits
+from ._geometry import Poses, box_gap_m
+from ._sampling_planner import SamplingPlanner, within_next_limits
+from ._scene import Aim, Scene
+
+# Ways are offsets to the left of the straight line to the goal.
+_OFFSETS_M: Final[FloatArray] = np.array(
+    [0.0, -0.3, 0.3, -0.6, 0.6, -0.9, 0.9, -1.2, 1.2, -1.4, 1.4]
+)
+# A way is taken as fast as the limit lets it, or with at most a speed for a time at first: so the
+# robot lets somebody pass.
+_FREE: Final = (math.inf, 0.0)
+_SLOWER: Final = tuple((speed, hold) for speed in (0.0, 0.4, 0.8) for hold in (1.5, 3.0, 5.0))
+# So many of the ways are tried with all of these.
+_BEST: Final = 3
+# A plan holds for this time.
+_EVERY_S: Final = 0.2
+# The limit is computed so far ahead, at places and times so far apart.
+_AHEAD_M: Final = 9.0
+_PLACES_M: Final = 0.3
+_AHEAD_S: Final = 8.0
+_TIMES_S: Final = 0.4
+# Ways are driven through for so long, in steps.
+_DRIVE_S: Final = 12.0
+_STEP_S: Final = 0.25
+# Length of a change of offset: so many times the offset, and at least so long; and that of the way
+# back to the line before the goal.
+_CHANGE: Final = 2.2
+_SHORTEST_M: Final = 1.2
+_BACK_M: Final = 2.5
+# Seconds that a way costs beside its time: for a metre of offset, another offset than before, one
+# to the left, a way that begins slowly, a place without room, and a limit that falls too fast.
+_OFFSET_S: Final = 0.08
+_OTHER_S: Final = 0.15
+_LEFT_S: Final = 0.02
+_SLOW_S: Final = 0.1
+_NO_ROOM_S: Final = 3.0
+_TOO_FAST_S: Final = 0.5
+# The robot heads for the way so far ahead, and by this time at its speed farther.
+_HEAD_M: Final = 1.0
+_HEAD_S: Final = 0.6
+# Nearer to the goal, the reference planner arrives.
+_ARRIVING_M: Final = 1.0
+# The limit keeps the robot clear of people; for the window they are bodies and some room.
+_ROOM_M: Final = BODY_RADIUS_M + 0.12
+
+
+class _Line(NamedTuple):
+    """The straight line to the goal, from where the robot first heard of it."""
+
+    start_odom_m: FloatArray
+    along: FloatArray
+    left: FloatArray
+    length_m: float
+
+
+class AheadPlanner(SamplingPlanner):
+    """A planner that compares ways past people for twelve seconds ahead, under the limit there.
+
+    Ways lead beside the straight line to the goal, at up to 1.4 m on either side, and begin at once
+    or after waiting. The robot drives each of them as fast as
+    :func:`~nav_adapter.exporters.speed_limit_at` says for these places and times, while people keep
+    to their motion. It follows the one that ends soonest, with the dynamic window of the reference
+    planner. So it uses the room of an aisle before it needs it, passes people who walk ahead, and
+    goes first only where the limit lets it.
+
+    Args:
+        robot: footprint and limits, as for :class:`SamplingPlanner`.
+        static_boxes_odom_m: (N, 4) fixed obstacles x_min, y_min, x_max, y_max; None for none.
+
+    Raises:
+        SimError: if the boxes are not finite or a minimum is not below its maximum.
+    """
+
+    def __init__(self, robot: RobotProfile, static_boxes_odom_m: ArrayLike | None = None) -> None:
+        super().__init__(robot, static_boxes_odom_m)
+        self._line: _Line | None = None
+        self._goal_odom_m = np.full(2, math.nan)
+        self._plan_stamp_s = -math.inf
+        self._offset_m, self._cap_mps, self._holds_s = 0.0, *_FREE
+
+    def plan(
+        self,
+        robot_state: RobotState,
+        goal_odom_m: ArrayLike,
+        constraints: NavConstraints,
+        dt_s: float,
+    ) -> tuple[float, ...]:
+        """Choose the command for the next tick; see the base class."""
+        goal_odom_m = finite_array("goal_odom_m", goal_odom_m, (2,), SimError)
+        dt_s = finite_number("dt_s", dt_s, SimError, minimum=0.0, exclusive_minimum=True)
+        goal = Aim.at(goal_odom_m, robot_state)
+        limits = TwistLimits.of(self.robot, self.config, constraints)
+        if constraints.speed_basis is None or not constraints.obstacles:
+            return super().plan(robot_state, goal_odom_m, constraints, dt_s)
+        if goal.distance_m < _ARRIVING_M or limits.speed_mps <= 0.0:
+            return super().plan(robot_state, goal_odom_m, constraints, dt_s)
+        if self._line is None or not np.array_equal(goal_odom_m, self._goal_odom_m):
+            self._begin(robot_state, goal_odom_m)
+        assert self._line is not None
+        line = self._line
+        from_start = robot_state.position_odom_m - line.start_odom_m
+        s_m, d_m = float(from_start @ line.along), float(from_start @ line.left)
+        now = constraints.stamp_s
+        if not self._plan_stamp_s <= now < self._plan_stamp_s + _EVERY_S - 1e-9:
+            self._plan_stamp_s = now
+            self._choose_way(robot_state, constraints, s_m, d_m)
+        gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
+        top_mps = min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal.distance_m))
+        if now - self._plan_stamp_s < self._holds_s:
+            top_mps = min(top_mps, self._cap_mps)
+        ahead_m = s_m + min(_HEAD_M + _HEAD_S * robot_state.travel_mps, line.length_m - s_m)
+        offset_m, _ = self._offsets(np.array([ahead_m]), s_m, d_m, np.array([self._offset_m]))
+        place = line.start_odom_m + ahead_m * line.along + float(offset_m[0]) * line.left
+        # As far as the goal, so that the way there is worth full speed.
+        aim = Aim(goal.distance_m, Aim.at(place, robot_state).bearing_rad)
+        bodies = tuple(
+            replace(each, radius_m=min(each.radius_m, _ROOM_M)) for each in constraints.obstacles
+        )
+        scene = Scene.around(
+            robot_state, replace(constraints, obstacles=bodies), self._boxes_odom_m
+        )
+        command = self._command(Tick(robot_state, limits, top_mps, aim, dt_s, scene), goal)
+        return within_next_limits(command, robot_state, constraints, dt_s)
+
+    def _begin(self, state: RobotState, goal_odom_m: FloatArray) -> None:
+        """Lay the line to a new goal."""
+        to_goal = goal_odom_m - state.position_odom_m
+        length_m = float(np.hypot(*to_goal))
+        along = to_goal / length_m
+        left = np.array([-along[1], along[0]])
+        self._line = _Line(np.array(state.position_odom_m), along, left, length_m)
+        self._goal_odom_m = np.array(goal_odom_m)
+        self._plan_stamp_s = -math.inf
+        self._offset_m, self._cap_mps, self._holds_s = 0.0, *_FREE
+
+    def _offsets(
+        self, s_m: FloatArray, from_s_m: float, from_d_m: float, offset_m: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return offset and slope of ways at places along the line, which change from the robot."""
+        assert self._line is not None
+        length_m = np.maximum(_SHORTEST_M, _CHANGE * np.abs(offset_m - from_d_m))
+        share = np.clip((s_m - from_s_m) / length_m, 0.0, 1.0)
+        back = np.clip((self._line.length_m - s_m) / _BACK_M, 0.0, 1.0)
+        go_m = from_d_m + (offset_m - from_d_m) * _smooth(share)
+        slope = (offset_m - from_d_m) * _smooth_slope(share) / length_m * _smooth(back)
+        slope = slope - go_m * _smooth_slope(back) / _BACK_M
+        return go_m * _smooth(back), slope
+
+    def _choose_way(
+        self, state: RobotState, constraints: NavConstraints, s_m: float, d_m: float
+    ) -> None:
+        """Choose offset and first speed of the way that ends soonest."""
+        assert self._line is not None
+        line = self._line
+        reach_m = min(_AHEAD_M, max(line.length_m - s_m, _PLACES_M))
+        places_m = s_m + np.arange(0.0, reach_m + _PLACES_M, _PLACES_M)
+        offsets_m, slopes = self._offsets(places_m, s_m, d_m, _OFFSETS_M[:, None])  # (ways, places)
+        positions = (
+            line.start_odom_m + places_m[:, None] * line.along + offsets_m[:, :, None] * line.left
+        )
+        headings = math.atan2(line.along[1], line.along[0]) + np.arctan(slopes)
+        times_s = np.arange(0.0, _AHEAD_S + 1e-9, _TIMES_S)
+        poses = positions.reshape(-1, 1, 2).repeat(len(times_s), axis=1)
+        limits_mps = speed_limit_at(
+            constraints,
+            poses,
+            headings.reshape(-1, 1).repeat(len(times_s), axis=1),
+            dt_s=_TIMES_S,
+        ).reshape(*headings.shape, len(times_s))
+        outline = self._footprint.at(
+            Poses(positions[..., 0], positions[..., 1], np.cos(headings), np.sin(headings))
+        )
+        room = box_gap_m(outline, self._boxes_odom_m) >= self.config.clearance_m
+        stretch = np.hypot(1.0, slopes)
+        field = _Field(limits_mps, room, stretch, reach_m)
+        price_s = _OFFSET_S * np.abs(_OFFSETS_M) + _LEFT_S * (_OFFSETS_M > 0.0)
+        price_s = price_s + _OTHER_S * (np.abs(_OFFSETS_M - self._offset_m) > 1e-6)
+        speed_mps, rest_m = max(state.travel_mps, 0.0), line.length_m - s_m
+        every = np.arange(len(_OFFSETS_M))
+        first = field.drive_s(self.robot, every, *_FREE, speed_mps, rest_m) + price_s
+        best = np.argsort(first, kind="stable")[:_BEST]
+        ways = np.repeat(best, len(_SLOWER))
+        caps, holds = (np.tile(each, _BEST) for each in np.array(_SLOWER).T)
+        slower = field.drive_s(self.robot, ways, caps, holds, speed_mps, rest_m)
+        slower = slower + price_s[ways] + _SLOW_S
+        if first[best[0]] <= slower.min():
+            chosen, (self._cap_mps, self._holds_s) = best[0], _FREE
+        else:
+            index = int(np.argmin(slower))
+            chosen = ways[index]
+            self._cap_mps, self._holds_s = float(caps[index]), float(holds[index])
+        self._offset_m = float(_OFFSETS_M[chosen])
+
+
+class _Field(NamedTuple):
+    """What holds along ways.
+
+    Attributes:
+        limits_mps: (ways, places, times).
+        room: (ways, places), whether the robot has room between boxes.
+        stretch: (ways, places), length of a way over that of the line.
+        reach_m: of the places along the line.
+    """
+
+    limits_mps: FloatArray
+    room: NDArray[np.bool_]
+    stretch: FloatArray
+    reach_m: float
+
+    def drive_s(
+        self,
+        robot: RobotProfile,
+        way: NDArray[np.intp],
+        cap_mps: FloatArray | float,
+        hold_s: FloatArray | float,
+        speed_mps: float,
+        rest_m: float,
+    ) -> FloatArray:
+        """Return the seconds (n,) in which a robot drives ways (n,) to their end, and penalties."""
+        brakes, gains = robot.max_deceleration_mps2, robot.max_acceleration_mps2
+        fastest_mps = robot.max_speed_mps
+        s_m, v = np.zeros(len(way)), np.full(len(way), speed_mps)
+        arrives_s, penalty_s = np.full(len(way), math.inf), np.zeros(len(way))
+        _, places, times = self.limits_mps.shape
+        for step in range(round(_DRIVE_S / _STEP_S)):
+            t_s = step * _STEP_S
+            place = np.minimum(s_m / _PLACES_M, places - 1.001)
+            index = place.astype(np.intp)
+            share = place - index
+            column = min(t_s / _TIMES_S, times - 1.001)
+            early = int(column)
+            late_share = column - early
+            limit = (1.0 - share) * (
+                (1.0 - late_share) * self.limits_mps[way, index, early]
+                + late_share * self.limits_mps[way, index, early + 1]
+            ) + share * (
+                (1.0 - late_share) * self.limits_mps[way, index + 1, early]
+                + late_share * self.limits_mps[way, index + 1, early + 1]
+            )
+            limit = np.where(s_m > self.reach_m, fastest_mps, limit)
+            left_m = np.maximum(rest_m - s_m, 0.0)
+            moves = (v > 0.05) & np.isinf(arrives_s)
+            penalty_s += np.where(moves & ~self.room[way, index], _NO_ROOM_S * _STEP_S, 0.0)
+            too_fast = v - limit - 1.2 * brakes * _STEP_S
+            penalty_s += np.where(moves & (too_fast > 0.0), _TOO_FAST_S * (v - limit), 0.0)
+            wanted = np.minimum(limit, np.where(t_s < hold_s, cap_mps, fastest_mps))
+            wanted = np.minimum(wanted, np.sqrt(1.2 * brakes * left_m))
+            after = np.clip(wanted, v - brakes * _STEP_S, v + gains * _STEP_S)
+            after = np.maximum(after, 0.0)
+            s_m = s_m + 0.5 * (v + after) * _STEP_S / self.stretch[way, index]
+            v = after
+            arrived = (rest_m - s_m < 0.12) & np.isinf(arrives_s)
+            arrives_s = np.where(arrived, t_s + _STEP_S, arrives_s)
+        left_m = np.maximum(rest_m - s_m, 0.0)
+        later_s = _DRIVE_S + left_m / fastest_mps + 0.5 * (fastest_mps - v) / gains
+        return np.asarray(np.where(np.isinf(arrives_s), later_s, arrives_s) + penalty_s)
+
+
+def _smooth(share: FloatArray) -> FloatArray:
+    """Return a step from 0 to 1 with level ends."""
+    return share * share * (3.0 - 2.0 * share)
+
+
+def _smooth_slope(share: FloatArray) -> FloatArray:
+    return 6.0 * share * (1.0 - share)
