@@ -267,7 +267,8 @@ class Addressing:
         others_mps = lowest_mps(others, self._robot.max_speed_mps)
         lower = self._looked_lower
         looking = (
-            each._replace(awareness_lower=max(each.awareness_lower, lower)) for each in group
+            each._replace(awareness_lower=max(each.awareness_lower, lower), aware_for_s=math.inf)
+            for each in group
         )
         now_mps, then_mps = lowest_mps(group, others_mps), lowest_mps(looking, others_mps)
         x, y = _moved(person, _ANSWER_S).position_odom_m
