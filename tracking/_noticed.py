@@ -17,8 +17,8 @@ theirs at once (:func:`departed_mps`). Two things end the belief, until there ar
   somebody has looked who looks still.
 
 Nothing else ends it at once: :func:`aware_for_s` says for how long it lasts at least, which falls
-by a second per second. It is over ``noticed_memory_s`` after the last look, and sooner after a face
-that looks away, in more than one frame, of somebody who does not walk.
+by a second per second. It is over ``noticed_memory_s`` after the last look, and 1.5 s after a face
+that looks away, in more than one frame: who passes a robot looks ahead.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ._sensors import Sensors
 from ._state import State, Step, absence_s, face_period_s
 from .awareness_filter import EVIDENCE_GAP_S, grace_s, logit
 from .clock import GAP_PERIODS, FrameClock
-from .people import AVERTED_AWARENESS, WALKING_MPS
+from .people import AVERTED_AWARENESS
 
 # Half a second of certain looks gives a belief of a half.
 _LOOKING_S: Final = 0.5 / math.log(2.0)
@@ -132,7 +132,7 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     since_s = stamp - track.look_s
     if looking:
         track.averted_s = 0.0
-    elif sees_faces and _looks_away(track, sight, step):
+    elif sees_faces and _looks_away(sight):
         track.averted_s += dt_s
     doubtful = sight is not None and sight.jumped
     averted = track.averted_s > _AVERTED_S
@@ -205,17 +205,12 @@ def _look(track: Track, sight: Sight | None, step: Step) -> float:
     return certainty if certainty >= _LOOK else 0.0
 
 
-def _looks_away(track: Track, sight: Sight | None, step: Step) -> bool:
-    """Return whether the frame shows a face that looks away, of somebody who does not walk.
-
-    Whoever walks looks where they go, and passes a robot without a further look.
-    """
+def _looks_away(sight: Sight | None) -> bool:
+    """Return whether the frame shows a face that looks away."""
     if sight is None or sight.evidence is None:
         return False
     mean, variance = sight.evidence
-    if mean > _AVERTED_LOGIT or mean > _AVERTED_SIGMAS * math.sqrt(variance):
-        return False
-    return track.speed_mps < WALKING_MPS
+    return mean <= _AVERTED_LOGIT and mean <= _AVERTED_SIGMAS * math.sqrt(variance)
 
 
 def _is_interrupted(
