@@ -100,9 +100,10 @@ def test_more_memory_is_never_slower_and_none_is_no_awareness(
     assert none - SLACK_MPS <= some <= more + SLACK_MPS <= for_good + 2.0 * SLACK_MPS
 
 
-def known(left_s: float = math.inf, **changes: float) -> PersonTrack:
+def known(left_s: float = math.inf, departed_mps: float = 0.0) -> PersonTrack:
     """Return a track of somebody ahead who looks at the robot."""
-    return replace(person(position=(2.2, 0.3), awareness_lower=0.9), aware_for_s=left_s, **changes)
+    ahead = person(position=(2.2, 0.3), awareness_lower=0.9)
+    return replace(ahead, aware_for_s=left_s, departed_mps=departed_mps)
 
 
 def limit_with(track: PersonTrack) -> float:
@@ -131,10 +132,8 @@ def test_whoever_departs_from_their_motion_is_as_fast_as_that() -> None:
 def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
     now = settled_update([known(left_s)], policy=POLICY)
     ahead_s = [0.0, 0.3, 0.8, 2.5]
-    poses = np.zeros((1, 1, 2))
-    state = robot_at(0.0)
-    told = {"dt_s": 0.1, "speeds_mps": [[state.speed_mps]]}
+    here, speeds = np.zeros((1, 1, 2)), [[robot_at(0.0).speed_mps]]
     for each in ahead_s:
-        found = speed_limit_at(now, poses, [[0.0]], first_s=each, **told)[0, 0]
+        field = speed_limit_at(now, here, [[0.0]], first_s=each, dt_s=0.1, speeds_mps=speeds)
         then = limit_with(known(max(left_s - each, 0.0)))
-        assert then - 0.02 <= found <= then + 1e-3
+        assert then - 0.02 <= field[0, 0] <= then + 1e-3
