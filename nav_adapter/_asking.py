@@ -254,11 +254,14 @@ class Addressing:
                 at_s, limit_mps = step * _STEP_S, self._robot.max_speed_mps
                 state = replace(robot_state, position_odom_m=here)
                 courses = self._governor.courses(state, robot_age_s)
-                lower = self._looked_lower if at_s < looking_s else 0.0
+                left_s = looking_s - at_s
                 for each in people.values():
                     then = _moved(each, _ANSWER_S + at_s)
-                    if each.id in ids:
-                        then = then._replace(awareness_lower=max(each.awareness_lower, lower))
+                    if each.id in ids and left_s > 0.0:
+                        then = then._replace(
+                            awareness_lower=max(each.awareness_lower, self._looked_lower),
+                            aware_for_s=max(each.aware_for_s, left_s),
+                        )
                     own_mps = self._governor.person_mps(then, courses, now, limit_mps)
                     limit_mps = min(limit_mps, own_mps)
                 own, (x, y) = courses.own, _moved(person, _ANSWER_S + at_s).position_odom_m

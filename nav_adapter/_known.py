@@ -36,6 +36,9 @@ def known_now(
     speed_mps = unaware_mps
     if person.awareness_lower > 0.0:
         speed_mps = human_speed_mps(policy, person.awareness_lower)
+        # At least what they show, whatever they have noticed.
+        speed_mps = min(max(speed_mps, track.departed_mps), max(speed_mps, unaware_mps))
+    later_mps = unaware_mps
     first_mps = speed_mps
     if person.is_at_first_sight:
         first_mps = unaware_mps
@@ -44,6 +47,7 @@ def known_now(
     if walking_mps > unaware_mps > 0.0:
         # Faster people may stay so. In proportion, so that presets stay ordered.
         speed_mps *= walking_mps / unaware_mps
+        later_mps = walking_mps
         first_mps *= walking_mps / unaware_mps
     # Between the frame that showed the person and the track's stamp nobody looked. The covariance
     # grows with it; what they began in the last moments it does not know.
@@ -61,6 +65,8 @@ def known_now(
         margins.floor_m,
         within_m,
         Spread.of(track.covariance_odom.tolist()).terms(sigmas),
+        person.aware_for_s,
+        later_mps,
     )
     return Known(key, reach, first_mps, BODY_RADIUS_M + sigmas * person.sigma_m)
 
@@ -151,10 +157,14 @@ class SpeedBasis:
         is_seen = is_shown and track.status != "coasting" and now - seen_s <= fresh_s
         if is_seen:
             ahead = [present] * len(times)
-            if vx or vy:
+            if vx or vy or reach.until_s < math.inf:
                 ahead = [
                     present._replace(
-                        reach=reach._replace(x_m=reach.x_m + vx * t, y_m=reach.y_m + vy * t)
+                        reach=reach._replace(
+                            x_m=reach.x_m + vx * t,
+                            y_m=reach.y_m + vy * t,
+                            until_s=max(reach.until_s - t, 0.0),
+                        )
                     )
                     for t in times
                 ]
@@ -221,6 +231,7 @@ class SpeedBasis:
                 x_m=reach.x_m + vx * moved_s,
                 y_m=reach.y_m + vy * moved_s,
                 delay_s=delay_s,
+                until_s=max(reach.until_s - moved_s, 0.0),
                 elapsed_s=min(elapsed_s, _OLDEST_S),
                 variances=variances,
             ),

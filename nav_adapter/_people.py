@@ -64,6 +64,8 @@ class Person(NamedTuple):
         velocity_odom_mps: velocity of the track.
         seen_stamp_s: stamp of the latest frame that showed the person.
         awareness_lower: the lower bound of α that was used.
+        aware_for_s: for how long that holds from the stamp of the track on, if they keep to their
+            motion.
         radius_m: radius of the obstacle.
         sigma_m: standard deviation of the position along its most uncertain direction.
         known_s: time for which frames have shown the person.
@@ -82,6 +84,7 @@ class Person(NamedTuple):
     velocity_odom_mps: Vector2
     seen_stamp_s: float
     awareness_lower: float
+    aware_for_s: float
     radius_m: float
     sigma_m: float
     known_s: float
@@ -341,6 +344,7 @@ class People:
             (vx, vy),
             seen_stamp_s,
             lower,
+            track.aware_for_s,
             radius_m,
             sigma_m,
             known_s,

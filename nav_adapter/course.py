@@ -195,7 +195,8 @@ def reach_at(
     The middle is given along and across the middle of the fan, as seen from the base.
     """
     # The formulas of Reach.
-    x_m, y_m, vx, vy, U, tau, delay_s, elapsed_s, margin, within, (a0, a1, a2) = person
+    x_m, y_m, vx, vy, U, tau, delay_s, elapsed_s, margin, within, terms, until_s, later = person
+    a0, a1, a2 = terms
     base_x, base_y, cos, sin = course[:4]
     m0 = tau * -_expm1(-(t0_s + elapsed_s) / tau)
     m1 = tau * -_expm1(-(t1_s + elapsed_s) / tau)
@@ -205,7 +206,13 @@ def reach_at(
     dy = y_m + vy * middle_s - base_y
     x, y = cos * dx + sin * dy, abs(cos * dy - sin * dx)
     reach = U * (since_s + tau * _expm1(-since_s / tau))
-    margin -= within if reach > within else reach
+    if since_s > until_s:
+        aware = U * (until_s + tau * _expm1(-until_s / tau))
+        margin -= within if aware > within else aware
+        late_s = since_s - until_s
+        reach += max(later - U, 0.0) * (late_s + tau * _expm1(-late_s / tau))
+    else:
+        margin -= within if reach > within else reach
     reach += 0.5 * (m1 - m0) * _sqrt(vx * vx + vy * vy)
     # With a negative a1 it shrinks.
     variance = max(a0 + m1 * (a1 + m1 * a2), a0 + m0 * (a1 + m0 * a2))

@@ -11,13 +11,21 @@ as a share of that of unaware people, reach and clearance are max(C, r(t) + λ C
 r + C for unaware people, never less than r, and it grows with t, U and C. τ = 0.54 s and
 U = 1.34 m/s fit recorded people who set off (``docs/people.md``). Somebody who stands needs time to
 start, somebody who walks away time to turn, and a brisk walker time to swerve: all three are this
-one statement. ``docs/safety.md`` derives it.
+one statement.
+
+What somebody knows of the robot lasts until a time s from now. From then on they may change to the
+velocities of unaware people, so r has a knee: beyond s − δ it grows by the rest of U,
+
+    r(t) + (U′ − U) (t′ − τ (1 − e^{−t′/τ})),   t′ = t + δ − s ≥ 0,   U′ that of unaware people,
+
+and only what was reached before s lies within the clearance. At s = 0 that is the reach of unaware
+people, and with s → ∞ that of aware ones. ``docs/safety.md`` derives it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from perception.anthropometry import BODY_RADIUS_M
 from perception.matrices import larger_eigenvalue
@@ -45,6 +53,8 @@ class Reach(NamedTuple):
         variances: a₀, a₁, a₂ of the variance a₀ + a₁ m + a₂ m² (m²) of the place after a drift of
             m = τ (1 − e^{−t/τ}) seconds, with the standard deviations that count already squared
             in.
+        until_s: s ≥ 0, until when ``speed_mps`` holds, from the time of place and velocity on.
+        later_mps: U′ ≥ U, the highest speed that they may change to after that.
     """
 
     x_m: float
@@ -58,6 +68,8 @@ class Reach(NamedTuple):
     margin_m: float = BODY_RADIUS_M
     within_m: float = 0.0
     variances: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    until_s: float = math.inf
+    later_mps: float = 0.0
 
     @property
     def walks_faster(self) -> bool:
@@ -67,7 +79,9 @@ class Reach(NamedTuple):
 
     def at_least(self, unaware_mps: float) -> Reach:
         """Return the reach of this person if they are unaware, with a U of at least this."""
-        return self._replace(speed_mps=max(self.speed_mps, unaware_mps), within_m=0.0)
+        return self._replace(
+            speed_mps=max(self.speed_mps, unaware_mps), until_s=math.inf, within_m=0.0
+        )
 
     def walking_on(self) -> Reach:
         """Return the reach of this person if they walk straight on."""
@@ -75,6 +89,7 @@ class Reach(NamedTuple):
         a0, a1, _ = self.variances
         return self._replace(
             speed_mps=0.0,
+            until_s=math.inf,
             delay_s=0.0,
             time_constant_s=WALKING_ON_S,
             variances=(a0 if a1 >= 0.0 else 0.0, 0.0, 0.0),
@@ -87,12 +102,17 @@ class Reach(NamedTuple):
 
     def radius_m(self, ahead_s: float) -> float:
         """Return r, how far from that middle the body's centre line may be ``ahead_s`` from now."""
-        tau, since_s = self.time_constant_s, ahead_s + self.elapsed_s + self.delay_s
-        return self.speed_mps * (since_s + tau * math.expm1(-since_s / tau))
+        since_s = ahead_s + self.elapsed_s + self.delay_s
+        late_s = max(since_s - self.until_s, 0.0)
+        rest_mps = max(self.later_mps - self.speed_mps, 0.0)
+        tau = self.time_constant_s
+        return float(self.speed_mps * changed_s(tau, since_s) + rest_mps * changed_s(tau, late_s))
 
     def margin_after_m(self, ahead_s: float) -> float:
         """Return body and the clearance that r leaves: it falls with time, its sum with r rises."""
-        return self.margin_m - min(self.radius_m(ahead_s), self.within_m)
+        since_s = min(ahead_s + self.elapsed_s + self.delay_s, self.until_s)
+        aware_m = self.speed_mps * changed_s(self.time_constant_s, since_s)
+        return float(self.margin_m - min(aware_m, self.within_m))
 
     def uncertainty_m(self, drift_s: float) -> float:
         """Return by how much the middle may be wrong after a drift."""
@@ -105,6 +125,11 @@ class Reach(NamedTuple):
         walked_m = drift_s * math.hypot(self.velocity_x_mps, self.velocity_y_mps)
         uncertainty_m = max(self.uncertainty_m(drift_s), self.uncertainty_m(0.0))
         return self.radius_m(ahead_s) + walked_m + uncertainty_m
+
+
+def changed_s(tau: Any, since_s: Any, xp: Any = math) -> Any:
+    """Return t − τ (1 − e^{−t/τ}), r over U, for floats or arrays (``xp``: NumPy)."""
+    return since_s + tau * xp.expm1(-since_s / tau)
 
 
 class Spread(NamedTuple):

@@ -6,16 +6,19 @@ where looks is the time in which the person has looked, each frame with a weight
 is that α is at least a half. While frames show the person without a look, looks decays. A further
 look never lowers the belief.
 
-A look is no promise: people often look before they set off. Three things end the belief, until
-there are new looks:
+A look is no promise: people often look before they set off. The belief predicts that they keep to
+the motion that they had as they looked, or slow down. The speed by which they depart from that is
+theirs at once (:func:`departed_mps`). Two things end the belief, until there are new looks:
 
 - doubt whether this is the person who looked: an ambiguous match, unless the rival has noticed the
   robot as well; a place that jumps; a gap in what the other sensors see, once no look is recent;
-- setting off: somebody who stood since the last look and moves, or who comes faster towards the
-  robot than on the course that they had then, at the least speed since then;
-- that it is over: a face that looks away, in more than one frame, of somebody who does not walk
-  away; ``noticed_memory_s`` after the last look; cameras that have fallen silent, since nobody
-  would see a face that looks away.
+  cameras that have fallen silent, since nobody would see a face that looks away;
+- setting off: a departure beyond the bound of what the belief predicts. It allows more the longer
+  somebody has looked who looks still.
+
+Nothing else ends it at once: :func:`aware_for_s` says for how long it lasts at least, which falls
+by a second per second. It is over ``noticed_memory_s`` after the last look, and 1.5 s after a face
+that looks away, in more than one frame: who passes a robot looks ahead.
 """
 
 from __future__ import annotations
@@ -29,12 +32,17 @@ from ._sensors import Sensors
 from ._state import State, Step, absence_s, face_period_s
 from .awareness_filter import EVIDENCE_GAP_S, grace_s, logit
 from .clock import GAP_PERIODS, FrameClock
-from .people import AVERTED_AWARENESS, WALKING_MPS
+from .people import AVERTED_AWARENESS
 
 # Half a second of certain looks gives a belief of a half.
 _LOOKING_S: Final = 0.5 / math.log(2.0)
 # Time constant with which looks decay while the person is seen without a look.
 _FORGETTING_S: Final = 3.0
+# A belief of a half rests on so many looks.
+_HALF_S: Final = 0.5
+# A belief ends at the latest so long after a face has looked away. Robots stop within that, so the
+# limit need not fall faster than they brake.
+_AVERTED_LEFT_S: Final = 1.5
 # A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
 _LOOK: Final = 0.5
 # α of a face that looks away is low, and below a half by one standard deviation.
@@ -42,9 +50,12 @@ _AVERTED_SIGMAS: Final = -1.0
 _AVERTED_LOGIT: Final = logit(AVERTED_AWARENESS)
 # One frame may be wrong about a face, and two are not both by chance.
 _AVERTED_S: Final = 0.09
-# A person who stood has begun to move at this speed, if it is not 0 by 99.7 % (χ², two degrees).
-_STARTED_MPS: Final = 0.25
-_STARTED_CHI2: Final = 11.6
+# Somebody departs from their motion beyond 99 % (χ², two degrees). People who keep to it sway:
+# 0.15 m/s is the bound of that.
+_DEPARTED_CHI2: Final = 9.21
+_SWAY_STD_MPS: Final = 0.15 / math.sqrt(_DEPARTED_CHI2)
+# Time constant with which the motion of somebody who looks becomes the one that they keep to.
+_KEEPING_S: Final = 2.0
 
 
 def remembers(sensors: Sensors) -> bool:
@@ -80,6 +91,27 @@ def noticed(track: Track, stamp_s: float, state: State, sensors: Sensors) -> flo
     return -math.expm1(-track.looked_s / _LOOKING_S)
 
 
+def aware_for_s(track: Track, stamp_s: float, state: State, sensors: Sensors) -> float:
+    """Return for how long a belief of a half lasts at least, if the person keeps to their motion.
+
+    It is infinite where nothing is remembered: awareness is then what the latest frames show.
+    """
+    if not remembers(sensors):
+        return math.inf
+    if noticed(track, stamp_s, state, sensors) < 0.5:
+        return 0.0
+    left_s = sensors.config.awareness.noticed_memory_s - (stamp_s - track.look_s)
+    return min(left_s, _FORGETTING_S * math.log(max(track.looked_s / _HALF_S, 1.0)))
+
+
+def departed_mps(track: Track) -> float:
+    """Return the speed by which a person departs from keeping to their motion or slowing down."""
+    if track.looked_s <= 0.0:
+        return 0.0
+    x, y = _nearest_kept(track)
+    return math.hypot(track.vx - x, track.vy - y)
+
+
 def remember_looks(tracks: list[Track], match: Match, step: Step) -> None:
     """Take a frame into the looks of the tracks: new tracks last, with the frame's measurements."""
     shared = _shared_with_rivals(tracks, match)
@@ -100,35 +132,38 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     since_s = stamp - track.look_s
     if looking:
         track.averted_s = 0.0
-    elif sees_faces and _looks_away(track, sight, step):
+    elif sees_faces and _looks_away(sight):
         track.averted_s += dt_s
     doubtful = sight is not None and sight.jumped
     averted = track.averted_s > _AVERTED_S
     if (
         doubtful
-        or averted
         or since_s > config.noticed_memory_s
         or _cameras_are_silent(stamp, faces)
         or _is_interrupted(track, sight, period_s, looking, step)
-        or (not looking and _sets_off(track, step))
+        or _sets_off(track, since_s)
     ):
         track.looked_s = 0.0
-    track.look_speed_mps = min(track.look_speed_mps, track.speed_mps)
-    track.look_standing = track.look_standing or track.standing
+    if averted and track.looked_s > 0.0:
+        track.look_s = min(track.look_s, stamp - config.noticed_memory_s + _AVERTED_LEFT_S)
+    _slow_down(track)
     if not sees_faces or sight is None:
         return
     if not looking:
         track.looked_s *= math.exp(-dt_s / _FORGETTING_S)
         return
-    if not (doubtful or averted or sight.ambiguous):
+    if track.looked_s <= 0.0:
+        track.kept_mps = (track.vx, track.vy)
+    if not (doubtful or sight.ambiguous):
         # A look after a pause stands for one frame, not for the pause. Of two cameras, it stands
         # for the time since the last look of either.
         follows = since_s <= EVIDENCE_GAP_S
         stands_for_s = min(sight.stands_for_s, EVIDENCE_GAP_S)
         track.looked_s += look * min(stands_for_s, since_s if follows else period_s)
     track.look_s = stamp
-    track.look_velocity_mps = (track.vx, track.vy)
-    track.look_speed_mps, track.look_standing = track.speed_mps, track.standing
+    share = -math.expm1(-dt_s / _KEEPING_S)
+    x, y = track.kept_mps
+    track.kept_mps = (x + share * (track.vx - x), y + share * (track.vy - y))
 
 
 def _cameras_are_silent(stamp_s: float, faces: FrameClock) -> bool:
@@ -170,18 +205,12 @@ def _look(track: Track, sight: Sight | None, step: Step) -> float:
     return certainty if certainty >= _LOOK else 0.0
 
 
-def _looks_away(track: Track, sight: Sight | None, step: Step) -> bool:
-    """Return whether the frame shows a face that looks away, of somebody who does not walk away.
-
-    Whoever walks away looks where they go, and has to turn round first.
-    """
+def _looks_away(sight: Sight | None) -> bool:
+    """Return whether the frame shows a face that looks away."""
     if sight is None or sight.evidence is None:
         return False
     mean, variance = sight.evidence
-    if mean > _AVERTED_LOGIT or mean > _AVERTED_SIGMAS * math.sqrt(variance):
-        return False
-    x, y = _towards(track, step)
-    return x * track.vx + y * track.vy >= 0.0 or track.speed_mps < WALKING_MPS
+    return mean <= _AVERTED_LOGIT and mean <= _AVERTED_SIGMAS * math.sqrt(variance)
 
 
 def _is_interrupted(
@@ -203,23 +232,26 @@ def _is_interrupted(
     return not held(track, step.frame.stamp_s, step.state.clocks, step.sensors)
 
 
-def _towards(track: Track, step: Step) -> tuple[float, float]:
-    """Return the unit vector from a person to the robot."""
-    x, y, _ = step.place_m
-    x, y = x - track.x, y - track.y
-    distance = max(math.hypot(x, y), 1e-9)
-    return x / distance, y / distance
+def _nearest_kept(track: Track) -> tuple[float, float]:
+    """Return the velocity nearest to a person's among those from the one they keep to down to 0."""
+    x, y = track.kept_mps
+    share = (x * track.vx + y * track.vy) / max(x * x + y * y, 1e-9)
+    share = min(max(share, 0.0), 1.0)
+    return share * x, share * y
 
 
-def _sets_off(track: Track, step: Step) -> bool:
-    """Return whether a person has begun to move, or comes faster than before."""
-    x, y = _towards(track, step)
-    before_x, before_y = track.look_velocity_mps
-    # On the same course the speed towards the robot changes while both move.
-    expected_mps = max(x * before_x + y * before_y, 0.0)
-    expected_mps *= min(track.look_speed_mps / max(math.hypot(before_x, before_y), 1e-9), 1.0)
-    # Speed and separation takes the measured speed towards the robot in any case.
-    if x * track.vx + y * track.vy > expected_mps + WALKING_MPS:
-        return True
-    started = track.look_standing and track.speed_mps > _STARTED_MPS
-    return started and track.velocity_chi2() > _STARTED_CHI2
+def _sets_off(track: Track, since_s: float) -> bool:
+    """Return whether a person departs from their motion by more than a belief in looks allows."""
+    looks = track.looked_s / _LOOKING_S if since_s <= EVIDENCE_GAP_S else 0.0
+    sway_mps = _SWAY_STD_MPS * (1.0 + looks)
+    return track.velocity_chi2(_nearest_kept(track), sway_mps) > _DEPARTED_CHI2
+
+
+def _slow_down(track: Track) -> None:
+    """Lower the speed that a person keeps to where theirs is surely lower: they may have halted."""
+    x, y = track.kept_mps
+    kept_mps = math.hypot(x, y)
+    most_mps = track.speed_mps + 2.0 * math.sqrt(max(track.p22, track.p33))
+    if kept_mps > most_mps:
+        share = most_mps / kept_mps
+        track.kept_mps = (share * x, share * y)

@@ -53,9 +53,7 @@ class Track:
         face_s: stamp of the latest evidence of awareness that was used; −∞ for none.
         looked_s: for how long the person has looked at the robot lately (``_noticed``).
         look_s: stamp of the latest look; −∞ for none.
-        look_velocity_mps: velocity at that time.
-        look_speed_mps: least speed since then.
-        look_standing: whether the person has stood since then.
+        kept_mps: the velocity to which the person keeps, by their looks.
         averted_s: for how long frames since then have shown a face that looks away.
         lasting_std: relative standard deviation of the range from the camera that lasts; it is not
             in the covariance (``_size``).
@@ -82,9 +80,7 @@ class Track:
         self.face_s = -math.inf
         self.looked_s = 0.0
         self.look_s = -math.inf
-        self.look_velocity_mps = (0.0, 0.0)
-        self.look_speed_mps = 0.0
-        self.look_standing = False
+        self.kept_mps = (0.0, 0.0)
         self.averted_s = 0.0
         self.lasting_std = measured.lasting_std
         self.size_log = 0.0
@@ -117,9 +113,10 @@ class Track:
         """Speed over the floor."""
         return math.hypot(self.vx, self.vy)
 
-    def velocity_chi2(self) -> float:
-        """Return how far the velocity is from 0: χ² with two degrees of freedom."""
-        return Spread(self.p22, self.p23, self.p33).distance2_and_log_det(self.vx, self.vy)[0]
+    def velocity_chi2(self, from_mps: tuple[float, float] = (0.0, 0.0), std: float = 0.0) -> float:
+        """Return how far the velocity is from one that is known by ``std``: χ², two degrees."""
+        spread = Spread(self.p22 + std * std, self.p23, self.p33 + std * std)
+        return spread.distance2_and_log_det(self.vx - from_mps[0], self.vy - from_mps[1])[0]
 
     def predict(self, from_s: float, to_s: float, q: float) -> None:
         """Move on from one stamp to a later one, under white acceleration of density q.

@@ -12,7 +12,7 @@ from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray, covariance_matrix, finite_array, finite_number, set_fields
 
 from ._errors import TrackingError
-from ._noticed import noticed
+from ._noticed import aware_for_s, departed_mps, noticed
 from ._person import Track
 from ._presence import is_over, shown_empty
 from ._sensors import Sensors
@@ -50,6 +50,10 @@ class PersonTrack:
             by the looks of the last seconds; 0 unless ``noticed_memory_s`` is set.
         time_since_face_s: ≥ 0, time since the latest picture whose view of the face α rests on;
             infinite if there is none, and None from a tracker that does not say.
+        aware_for_s: ≥ 0, for how long what is known of their awareness lasts at least, if they keep
+            to their motion and do not look again; infinite where the tracker does not say.
+        departed_mps: ≥ 0, speed by which their motion departs from that which they had as they
+            looked, or from slowing down; 0 for somebody who has not noticed the robot.
     """
 
     id: int
@@ -66,6 +70,8 @@ class PersonTrack:
     place_empty: bool = False
     noticed: float = 0.0
     time_since_face_s: float | None = None
+    aware_for_s: float = math.inf
+    departed_mps: float = 0.0
 
     def __post_init__(self) -> None:
         if self.status not in get_args(TrackStatus):
@@ -102,7 +108,10 @@ class PersonTrack:
             time_since_seen_s=number("time_since_seen_s", 0.0),
             place_empty=bool(self.place_empty),
             noticed=number("noticed", 0.0, 1.0),
+            departed_mps=number("departed_mps", 0.0),
         )
+        if self.aware_for_s != math.inf:
+            set_fields(self, aware_for_s=number("aware_for_s", 0.0))
         if self.time_since_face_s not in (None, math.inf):
             set_fields(self, time_since_face_s=number("time_since_face_s", 0.0))
 
@@ -175,6 +184,8 @@ def _snapshot(
         shown_empty(track, state, sensors.config),
         noticed(track, stamp_s, state, sensors),
         stamp_s - track.face_s,
+        aware_for_s(track, stamp_s, state, sensors),
+        departed_mps(track),
     )
     for assign, value in zip(_SETTERS, values, strict=True):
         assign(made, value)

@@ -19,6 +19,7 @@ from .._known import SpeedBasis
 from .._robot import RobotProfile
 from ..course import Course
 from ..limit import step_of_s
+from ..reach import changed_s
 from ..rules import Known
 from ._courses import NOWHERE_M, Pairs, Value, chosen_of, contacts_m, in_table, stopping_mps
 
@@ -86,7 +87,7 @@ class Reaches:
             # Most people differ in place alone from time to time.
             place = [(each.reach.x_m, each.reach.y_m, each.least_mps) for each in ahead]
             rest = [
-                (*reach[2:8], reach.within_m, *reach.variances, each.body_m)
+                (*reach[2:8], reach.within_m, *reach[11:], *reach.variances, each.body_m)
                 for each in ahead
                 for reach in [each.at_first_sight]
             ]
@@ -102,8 +103,8 @@ class Reaches:
             places += place
             values += rest
         x, y, least = np.ascontiguousarray(np.array(places).T)
-        vx, vy, U, tau, delay, elapsed, within, a0, a1, a2, body = np.ascontiguousarray(
-            np.array(values).T
+        vx, vy, U, tau, delay, elapsed, within, until, later, a0, a1, a2, body = (
+            np.ascontiguousarray(np.array(values).T)
         )
         each_row = np.array(column_of)
         a, react = robot.max_deceleration_mps2, robot.reaction_time_s + elapsed
@@ -114,8 +115,10 @@ class Reaches:
         walking = np.hypot(vx, vy)
         m = tau * -np.expm1(-(t + elapsed) / tau)
         since = t + elapsed + delay
-        r = U * (since + tau * np.expm1(-since / tau))
-        left = basis.policy.margins.floor_m - np.minimum(r, within)
+        late_s = np.maximum(since - until, 0.0)
+        r = U * changed_s(tau, since, np) + np.maximum(later - U, 0.0) * changed_s(tau, late_s, np)
+        aware_m = U * changed_s(tau, np.minimum(since, until), np)
+        left = basis.policy.margins.floor_m - np.minimum(aware_m, within)
         left = left if within.any() else left[:, :1]
         variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
         r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))

@@ -41,7 +41,8 @@ def speed_limit_at(
     The bound holds if
 
     * people keep the velocity of their track, and those whom the latest frames show are seen as
-      now: with the same covariance, the same age of the data and the same awareness;
+      now: with the same covariance, the same age of the data, and the same awareness for as long
+      as the track says;
     * people out of sight, and missing ones, are not seen again; the uncertainty of a track that
       coasts grows with its velocity's;
     * the tracker reports at least once per ``fresh_within_s``, and the adapter is updated as often;

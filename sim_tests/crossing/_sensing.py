@@ -12,7 +12,14 @@ from nav_adapter import AwarenessPolicy, RobotState
 from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import FloatArray
 from perception.laser import AHEAD_RAD, SeenDirections, camera_field
-from tracking import CameraView, PersonTrack, PersonTracker, SurroundView, TrackerConfig
+from tracking import (
+    CameraView,
+    PersonTrack,
+    PersonTracker,
+    SensorConfig,
+    SurroundView,
+    TrackerConfig,
+)
 
 from ..conditions import ORACLE, Perception
 from ..world.camera import CameraTiming, FrameQueue
@@ -38,6 +45,8 @@ from .faults import EpisodeFaults, Fault
 #: Random streams of an episode: one that is spare, of the camera's noise, its losses and delays,
 #: and the people.
 STREAMS: Final = 4
+# The true places, without faces.
+_PLACES: Final = "places"
 # Age of perception before the first image has arrived: older than any policy accepts.
 _NEVER_S: Final = 1.0e6
 # An image without a person is no evidence about people farther away than this.
@@ -147,6 +156,13 @@ class Sensing:
                 sensor=sighting.sensor,
                 view=sighting.view,
             )
+            if self._sees_all:
+                tracks = self._tracker.update(
+                    [observation for observation, _ in sighting.observations],
+                    sighting.stamp_s,
+                    sighting.T_odom_camera,
+                    sensor=_PLACES,
+                )
             if sighting.sight is not None:
                 self._seen.note(sighting.sight, sighting.stamp_s)
             else:
@@ -234,10 +250,12 @@ def _make_tracker(
     perception: Perception, policy: AwarenessPolicy, stage: Stage, camera: Camera
 ) -> PersonTracker:
     config = TrackerConfig.for_policy(policy)
-    if perception.kind == "truth":  # no limits of range or field of view
-        return PersonTracker(config)
-    if perception.kind == ORACLE:
-        return PersonTracker(config, view=MapView.of(stage.warehouse))
+    if perception.kind in ("truth", ORACLE):
+        # The truth has no limits of range or field of view. It remembers who has noticed the robot,
+        # as robots with scanners do.
+        sight = None if perception.kind == "truth" else MapView.of(stage.warehouse)
+        places = SensorConfig(view=sight, measures_range=False, alignment_std_rad=0.0)
+        return PersonTracker(config, view=sight, sensors={_PLACES: places})
     views = stage.scenario.camera.flat_views(camera)
     flat = CameraView(camera, max_range_m=_DETECTION_RANGE_M)
     view = SurroundView((flat,) * len(views), tuple(each.rotation_camera_view for each in views))

@@ -46,6 +46,25 @@ def test_people_who_change_their_velocity_stay_within_reach(
     assert np.linalg.norm(added) <= reach.radius_m(ahead) + 1e-9
 
 
+@given(until=TIMES, aware=st.floats(0.0, 1.0), ahead=TIMES)
+def test_who_forgets_the_robot_sets_off_then(until: float, aware: float, ahead: float) -> None:
+    reach = person(top=aware, until_s=until, later_mps=1.5, within_m=0.05)
+    since = ahead + reach.delay_s
+    times = np.linspace(0.0, since, 4001)
+    # The same direction all the time, at the speed that is wanted; the body follows by τ.
+    wanted = np.where(times < until, aware, 1.5)
+    lag = np.exp(-(since - times) / reach.time_constant_s)
+    integrand = wanted * (1.0 - lag)
+    way = float(np.sum(0.5 * (integrand[1:] + integrand[:-1]) * np.diff(times)))
+    assert reach.radius_m(ahead) == pytest.approx(way, abs=2e-3)
+    unaware = person(top=1.5)
+    assert aware * since - 1e-9 <= reach.radius_m(ahead) + aware * reach.time_constant_s
+    assert reach.radius_m(ahead) <= unaware.radius_m(ahead) + 1e-9
+    gone = reach.radius_m(ahead) + reach.margin_after_m(ahead)
+    assert gone <= unaware.radius_m(ahead) + unaware.margin_after_m(ahead) + 1e-9
+    assert gone <= reach.radius_m(ahead + 0.1) + reach.margin_after_m(ahead + 0.1) + 1e-9
+
+
 @pytest.mark.parametrize("ahead", [0.0, 0.5, 1.5])
 def test_somebody_who_sets_off_at_once_reaches_the_edge(ahead: float) -> None:
     reach = person(top=1.2)

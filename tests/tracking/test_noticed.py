@@ -26,6 +26,7 @@ from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerC
 MEMORY_S = 4.0
 REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=MEMORY_S))
 CAMERA_S, LASER_S = 0.1, 0.04
+OF_LOOKS = ("noticed", "aware_for_s", "departed_mps")
 
 
 class Scene:
@@ -126,13 +127,16 @@ def test_a_new_look_after_the_memory_counts_from_the_start() -> None:
 def test_it_is_off_by_default_and_then_changes_nothing() -> None:
     rig = Rig([lambda _now: (3.0, 0.5)], faces=lambda _person, _now: 0.9)
     off, on = both(), both(REMEMBERS)
-    own = tuple(PersonTrack.__slots__).index("noticed")
+    own = [tuple(PersonTrack.__slots__).index(each) for each in OF_LOOKS]
     for event in rig.events(2.0):
         without, with_memory = play(off, [event]), play(on, [event])
         assert [track.noticed for track in without] == [0.0] * len(without)
-        assert [row[:own] + row[own + 1 :] for row in as_bytes(without)] == [
-            row[:own] + row[own + 1 :] for row in as_bytes(with_memory)
+        rest = [
+            [[each for at, each in enumerate(row) if at not in own] for row in as_bytes(tracks)]
+            for tracks in (without, with_memory)
         ]
+        assert rest[0] == rest[1]
+        assert all(track.aware_for_s == math.inf for track in without)
     assert with_memory[0].noticed > 0.5
 
 
@@ -157,29 +161,89 @@ def test_a_camera_alone_has_no_memory() -> None:
         assert track.awareness_lower == other.awareness_lower
 
 
-def test_a_face_that_looks_away_ends_it_at_once() -> None:
-    scene = attentive()
-    scene.run(0.1, alpha=0.05)
-    assert scene.track.noticed == 0.0
-    assert scene.run(1.0).noticed == 0.0
+def test_what_is_known_lasts_for_as_long_as_was_said() -> None:
+    """It grows with looks from 0 on, and falls by a second per second: no belief ends in a step."""
+    scene = Scene()
+    assert scene.run(1.0).aware_for_s == 0.0
+    before, said_s = 0.0, []
+    for _ in range(16):
+        track = scene.run(0.1, alpha=0.9)
+        assert (track.aware_for_s > 0.0) is (track.noticed > 0.5)
+        assert track.aware_for_s >= before
+        before = track.aware_for_s
+    for alpha in [None, 0.05, *[None] * 40]:
+        said_s.append(scene.run(0.1, alpha=alpha).aware_for_s)
+        assert (said_s[-1] > 0.0) is (scene.track.noticed >= 0.5)
+    assert said_s[0] > 2.5
+    # But for the face that looked away, after which it lasts for a second and a half.
+    falls = -np.diff(said_s)[1:]
+    assert falls.max() <= 0.1 + 1e-6
+    assert said_s[-1] == 0.0
 
 
-def test_a_face_of_another_range_that_looks_away_ends_it_too() -> None:
-    scene = attentive()
-    now = scene.now + CAMERA_S
-    seen = seen_by_camera(scene.place, now, ratio=1.6, awareness=0.05)
-    (track,) = scene.tracker.update([seen], now, camera_at())
-    assert track.noticed == 0.0
+@pytest.mark.parametrize("ratio", [1.0, 1.6], ids=["same_range", "other_range"])
+@pytest.mark.parametrize("velocity", [(0.0, 0.0), (0.8, 0.0)], ids=["stands", "walks"])
+def test_a_face_that_looks_away_leaves_a_second_and_a_half(
+    ratio: float, velocity: tuple[float, float]
+) -> None:
+    scene = Scene()
+    scene.run(1.0, velocity=velocity)
+    assert scene.run(1.6, alpha=0.9, velocity=velocity).aware_for_s > 2.5
+    seen = seen_by_camera(scene.place, scene.now + CAMERA_S, ratio=ratio, awareness=0.05)
+    copied = copy.deepcopy(scene.tracker)
+    scan = [seen_by_laser(scene.place, scene.now + 0.06)]
+    copied.update(scan, scene.now + 0.06, laser_at(), sensor=LASER)
+    (track,) = copied.update([seen], scene.now + CAMERA_S, camera_at())
+    assert 1.4 <= track.aware_for_s <= 1.5
+    assert scene.run(1.3, alpha=0.05, velocity=velocity).noticed > 0.5
+    assert scene.run(0.4, alpha=0.05, velocity=velocity).noticed == 0.0
 
 
 @pytest.mark.parametrize(("alphas", "kept"), [((0.0,), True), ((0.0, 0.0), False)])
-def test_one_frame_of_a_fast_camera_does_not_end_it(alphas: tuple[float, ...], kept: bool) -> None:
-    scene = attentive()
+def test_one_frame_of_a_fast_camera_may_be_wrong(alphas: tuple[float, ...], kept: bool) -> None:
+    scene = attentive(1.6)
     for number, alpha in enumerate(alphas):
         now = scene.now + 0.05 * (number + 1)
         seen = seen_by_camera(scene.place, now, awareness=alpha)
         (track,) = scene.tracker.update([seen], now, camera_at())
-    assert (track.noticed > 0.4) is kept
+    assert (track.aware_for_s > 1.5) is kept
+
+
+def test_who_yields_with_a_step_and_looks_on_is_still_believed() -> None:
+    """A step of 0.6 m/s counts as that until it is over."""
+    scene = attentive(2.0)
+    scene.run(0.2, alpha=0.9)
+    departed = []
+    for _ in range(6):
+        track = scene.run(0.1, alpha=0.9, velocity=(0.0, 0.6))
+        departed.append(track.departed_mps)
+        assert track.noticed > 0.5
+    assert 0.4 < max(departed) < 0.75
+    assert scene.run(2.0, alpha=0.9).departed_mps < 0.25
+
+
+def test_who_looks_and_sets_off_is_as_fast_as_they_show() -> None:
+    scene = attentive(2.0)
+    scene.run(0.2, alpha=0.9)
+    fastest = 0.0
+    for _ in range(10):
+        track = scene.run(0.1, alpha=0.9, velocity=(0.0, 1.4))
+        if track.noticed < 0.5:
+            break
+        fastest = max(fastest, track.departed_mps)
+    assert track.noticed < 0.5
+    assert fastest > 0.5
+
+
+def test_who_halts_keeps_to_their_motion() -> None:
+    scene = Scene()
+    scene.place = np.array([6.0, -2.0])
+    scene.run(1.0, velocity=(-1.0, 0.3))
+    scene.run(1.0, alpha=0.9, velocity=(-1.0, 0.3))
+    for _ in range(9):
+        track = scene.run(0.1, camera=False)
+        assert track.noticed > 0.5
+        assert track.departed_mps < 0.3
 
 
 def test_a_face_in_the_corner_of_whose_eye_the_robot_is_ends_nothing() -> None:

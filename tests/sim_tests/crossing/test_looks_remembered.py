@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import pytest
 
+from sim_tests import run_crossing
 from sim_tests.crossing import RequestMemory
 
 
@@ -37,3 +39,11 @@ def test_what_alpha_says_itself_is_no_memory(lower, own, noticed):
     now = frame(1.0, 0.8, own, noticed)
     memory.take(now)
     assert memory.noticed_s(obstacle(lower), now) is None
+
+
+@pytest.mark.parametrize(("policy", "remembers"), [("balanced", True), ("conservative", False)])
+def test_a_robot_that_knows_the_truth_remembers_as_its_policy_says(policy, remembers):
+    result = run_crossing("crossing_attentive", policy=policy, perception="truth", seed=0)
+    tracks = [track for frame in result.frames for track in frame.tracks]
+    assert any(track.noticed > 0.5 for track in tracks) is remembers
+    assert all((track.aware_for_s < math.inf) is remembers for track in tracks)

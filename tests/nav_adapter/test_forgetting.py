@@ -1,0 +1,139 @@
+"""Awareness that lasts for a while: the limit knows when it ends, and falls as the robot brakes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_scenes import ROBOT, person, robot_at, settled_update
+
+from nav_adapter import AwarenessPolicy
+from nav_adapter.course import course_of
+from nav_adapter.exporters import speed_limit_at
+from nav_adapter.limit import FINEST, limit_mps, step_of_s
+from nav_adapter.reach import Reach
+from nav_adapter.rigid import Motion
+from tracking import PersonTrack
+
+POLICY = AwarenessPolicy.preset("balanced")
+AWARE_MPS, UNAWARE_MPS = (POLICY.speed.human_speed_mps(each) for each in (1.0, 0.0))
+CYCLE_S = 0.05
+BRAKING_MPS2 = ROBOT.max_deceleration_mps2
+# A limit lies below the exact one by the last, finest step of time.
+SLACK_MPS = FINEST * BRAKING_MPS2 * step_of_s(ROBOT.max_speed_mps, BRAKING_MPS2) + 0.005
+LEFT_S = st.floats(0.0, 3.5)
+
+
+def knowing(x: float, y: float, left_s: float, *velocity: float, top: float = AWARE_MPS) -> Reach:
+    """Return somebody who knows of the robot for so long, at a place before its base."""
+    u, v = velocity or (0.0, 0.0)
+    return Reach(
+        *(x, y, u, v, top, POLICY.reach.time_constant_s, POLICY.reach.delay_s),
+        margin_m=POLICY.margins.floor_m,
+        within_m=POLICY.margins.within_m(top, UNAWARE_MPS),
+        variances=(0.003, 0.0, 0.0),
+        until_s=left_s,
+        later_mps=UNAWARE_MPS,
+    )
+
+
+def limit_of(reach: Reach, turn_rad: float = 0.0) -> float:
+    """Return the limit of the reach, and of walking on, for a robot at the origin."""
+    motion = Motion(0.0, 0.0, 0.0, 1.0)
+    lowest = min(limit_mps(reach, course_of(ROBOT, motion, turn_rad)), ROBOT.max_speed_mps)
+    if reach.walks_faster:
+        lowest = min(lowest, limit_mps(reach.walking_on(), course_of(ROBOT, motion, 0.0)))
+    return lowest
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    place=st.tuples(st.floats(0.3, 5.0), st.floats(-2.0, 2.0)),
+    walk=st.tuples(st.sampled_from([0.0, 0.0, 0.5, 1.0, 1.4]), st.floats(-math.pi, math.pi)),
+    left_s=LEFT_S,
+    share=st.one_of(st.just(1.0), st.floats(0.2, 1.0)),
+    turn_rad=st.sampled_from([0.0, 0.52]),
+)
+def test_who_keeps_to_their_motion_never_makes_a_robot_brake_harder_than_it_can(
+    place: tuple[float, float],
+    walk: tuple[float, float],
+    left_s: float,
+    share: float,
+    turn_rad: float,
+) -> None:
+    """A robot at its limit, or at a share of it, brakes in time while memory runs out."""
+    velocity = walk[0] * math.cos(walk[1]), walk[0] * math.sin(walk[1])
+    now = knowing(*place, left_s, *velocity)
+    before = limit_of(now, turn_rad)
+    later = now._replace(
+        x_m=now.x_m + (velocity[0] - share * before) * CYCLE_S,
+        y_m=now.y_m + velocity[1] * CYCLE_S,
+        until_s=max(left_s - CYCLE_S, 0.0),
+    )
+    # Who walks past its side comes into the fan of courses, whatever they know.
+    if walk[0] > 0.0 and min(now.x_m, later.x_m) < 0.6:
+        return
+    assert limit_of(later, turn_rad) >= share * before - BRAKING_MPS2 * CYCLE_S - SLACK_MPS
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    place=st.tuples(st.floats(-1.0, 5.0), st.floats(-2.0, 2.0)),
+    velocity=st.tuples(st.floats(-1.4, 1.4), st.floats(-1.4, 1.4)),
+    left_s=st.tuples(LEFT_S, LEFT_S),
+)
+def test_more_memory_is_never_slower_and_none_is_no_awareness(
+    place: tuple[float, float], velocity: tuple[float, float], left_s: tuple[float, float]
+) -> None:
+    some, more = (limit_of(knowing(*place, each, *velocity)) for each in sorted(left_s))
+    none = limit_of(knowing(*place, 0.0, *velocity).at_least(UNAWARE_MPS))
+    for_good = limit_of(knowing(*place, math.inf, *velocity)._replace(later_mps=0.0))
+    course = course_of(ROBOT, Motion(0.0, 0.0, 0.0, 1.0), 0.0)
+    forgotten = knowing(*place, 0.0, *velocity)
+    assert limit_mps(forgotten, course) == pytest.approx(
+        limit_mps(forgotten.at_least(UNAWARE_MPS), course), abs=1e-9
+    )
+    assert none - SLACK_MPS <= some <= more + SLACK_MPS <= for_good + 2.0 * SLACK_MPS
+
+
+def known(left_s: float = math.inf, departed_mps: float = 0.0) -> PersonTrack:
+    """Return a track of somebody ahead who looks at the robot."""
+    ahead = person(position=(2.2, 0.3), awareness_lower=0.9)
+    return replace(ahead, aware_for_s=left_s, departed_mps=departed_mps)
+
+
+def limit_with(track: PersonTrack) -> float:
+    return settled_update([track], policy=POLICY).speed_limit_mps
+
+
+def test_an_update_takes_the_memory_of_the_track() -> None:
+    unaware = limit_with(replace(known(), awareness_lower=0.0))
+    limits = [limit_with(known(each)) for each in (0.0, 0.3, 0.6, 1.0, 1.5, 3.0, math.inf)]
+    assert limits == sorted(limits)
+    assert limits[0] == pytest.approx(unaware, abs=1e-9)
+    assert limits[1] > unaware
+    assert limits[-1] == limits[-2] > unaware + 0.3
+
+
+def test_whoever_departs_from_their_motion_is_as_fast_as_that() -> None:
+    limits = [limit_with(known(departed_mps=each)) for each in (0.0, 0.2, 0.4, 0.8, 1.5, 4.0)]
+    assert limits == sorted(limits, reverse=True)
+    assert limits[0] == limits[1] > limits[2] > limits[3]
+    stranger = replace(known(), awareness_lower=0.0)
+    assert limits[-1] == pytest.approx(limit_with(stranger), abs=1e-9)
+    assert limit_with(replace(stranger, departed_mps=4.0)) == limit_with(stranger)
+
+
+@pytest.mark.parametrize("left_s", [0.4, 1.0, 2.0])
+def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
+    now = settled_update([known(left_s)], policy=POLICY)
+    ahead_s = [0.0, 0.3, 0.8, 2.5]
+    here, speeds = np.zeros((1, 1, 2)), [[robot_at(0.0).speed_mps]]
+    for each in ahead_s:
+        field = speed_limit_at(now, here, [[0.0]], first_s=each, dt_s=0.1, speeds_mps=speeds)
+        then = limit_with(known(max(left_s - each, 0.0)))
+        assert then - 0.02 <= field[0, 0] <= then + 1e-3
