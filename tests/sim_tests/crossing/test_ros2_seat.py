@@ -22,6 +22,8 @@ from paths import ROOT
 from ros2_peer import Peer
 
 from awarenav.errors import AwarenavError
+from nav_adapter import AwarenessPolicy
+from nav_adapter.policies import AttentionRules
 from nav_adapter.ros2 import camera_of, picture_of
 from nav_adapter.ros2.conversions import pose_matrix
 from nav_adapter.ros2.messages.geometry_msgs import Twist, TwistStamped
@@ -134,10 +136,11 @@ def test_an_adapter_outside_slows_the_robot_and_the_frames_have_what_it_says(dom
 
 def test_a_stack_that_is_told_of_nobody_asks_nobody_to_look(domain) -> None:
     busy = "busy_in_aisle"
-    assert any(each.constraints.alerts for each in run_crossing(busy, policy="balanced").frames)
+    asking = AwarenessPolicy.preset("balanced").model_copy(update={"attention": AttentionRules()})
+    assert any(each.constraints.alerts for each in run_crossing(busy, policy=asking).frames)
     with Peer(domain):
         planner = f"ros2(domain={domain}, {LOCKSTEP}, limit='nobody')"
-        result = run_crossing(busy, policy="balanced", planner=planner)
+        result = run_crossing(busy, policy=asking, planner=planner)
     assert not any(each.constraints.alerts for each in result.frames)
 
 
