@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -152,6 +152,15 @@ class ScanPoints:
     ranges_m: FloatArray
     usable: NDArray[np.bool_]
     angle_increment_rad: float
+
+    def without(self, own: NDArray[np.bool_]) -> ScanPoints:
+        """Return the points without those of some rays (N,): they met the robot's own body."""
+        arrays = {
+            name: np.where(own[:, None] if values.ndim > 1 else own, np.nan, values)
+            for name in ("points_base_m", "points_odom_m", "ranges_m")
+            for values in [getattr(self, name)]
+        }
+        return replace(self, **arrays, usable=self.usable & ~own)
 
 
 def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanPoints:
