@@ -52,14 +52,26 @@ class DepthInput(Input):
     def __init__(self, shared: Shared) -> None:
         super().__init__(shared, "depth image")
         self._kept: deque[StampedDepth] = deque(maxlen=_KEPT)
+        self._refuses = False
 
     def nearest(self, stamp_s: float) -> StampedDepth | None:
         """Return the depth image of a picture; None if none is near enough in time."""
         with self._shared.lock:
             found = min(self._kept, key=lambda each: abs(each.stamp_s - stamp_s), default=None)
-        if found is None or abs(found.stamp_s - stamp_s) > MOST_APART_S:
-            return None
-        return found
+            if found is None or abs(apart_s := found.stamp_s - stamp_s) <= MOST_APART_S:
+                return found
+            self._shared.watch.depth_unused(
+                "they are refused"
+                if self._refuses
+                else f"none that has come is within {MOST_APART_S:g} s of its picture, the nearest is "
+                f"{abs(apart_s):.3f} s {'before' if apart_s < 0.0 else 'after'} it; the driver "
+                "must send both at one rate and of one time (enable_sync or the like)"
+            )
+        return None
+
+    def refuse(self, problem: str, now_s: float) -> None:
+        self._refuses = True
+        super().refuse(problem, now_s)
 
     def note_used(self, depth: StampedDepth) -> None:
         """Note a depth image that perception has used; called with the lock."""
@@ -77,6 +89,7 @@ class DepthInput(Input):
             if self._last.repeats(depth):
                 raise NavError(f"it is the same depth image as before{_NEEDS_NOISE}")
             self._kept.append(StampedDepth(stamp_s, depth))
+            self._refuses = False
         return True
 
 
@@ -165,7 +178,8 @@ class ImageInput(Input):
             is_current = shared.still_current()
             T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
             spread = shared.poses.spread(stamp_s, frame_id)
-        frame = self._process(message, stamp_s, T_odom_camera, is_current, spread)
+        depth = None if self.depth is None else self.depth.nearest(stamp_s)
+        frame = self._process(message, stamp_s, T_odom_camera, is_current, spread, depth)
         with shared.lock:
             if frame is None or not is_current():
                 return False
@@ -186,6 +200,7 @@ class ImageInput(Input):
         T_odom_camera: FloatArray,
         is_current: Callable[[], bool],
         spread: PoseSpread,
+        depth: StampedDepth | None,
     ) -> PerceivedFrame | None:
         """Return the frame of an image, or None if ``is_current`` says that it came too late.
 
@@ -195,7 +210,6 @@ class ImageInput(Input):
             NavError, PerceptionError, TrackingError: for an image that cannot be used, or shows
                 nothing (:func:`~perception.no_view.why_no_view`).
         """
-        depth = None if self.depth is None else self.depth.nearest(stamp_s)
         with self._busy:
             image = picture_of(message)
             self._fit(image.shape[1], image.shape[0])

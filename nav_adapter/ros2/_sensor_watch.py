@@ -38,12 +38,9 @@ class Sensor:
     trouble: str = ""
 
     @property
-    def nothing_yet(self) -> str:
-        """In words, that nothing has come from it yet; empty if something has."""
-        if self.stamp_s > -math.inf:
-            return ""
-        words = {CAMERA: "no camera frame yet", DEPTH: "no depth image yet"}
-        return words.get(self.name, f"no scan yet from {self.name!r}")
+    def heard(self) -> bool:
+        """Whether anything has come from it."""
+        return self.stamp_s > -math.inf
 
 
 class SensorWatch:
@@ -77,11 +74,13 @@ class SensorWatch:
             )
         self._scanners, self._lost_after_s = tuple(scanners), lost_after_s
         self._sensors = {name: Sensor(name) for name in names}
+        self._first_image_s, self._depth_unused = math.inf, ""
         self._field = (0.0, AHEAD_RAD)
         self.seen = SeenDirections()
 
     def saw_image(self, stamp_s: float, camera: Camera, T_base_camera: FloatArray | None) -> None:
         """Note an image, and the camera's pose (4, 4); None leaves its field as it was."""
+        self._first_image_s = min(self._first_image_s, stamp_s)
         self._saw(CAMERA, stamp_s)
         if T_base_camera is not None:
             self._field = camera_field(camera, T_base_camera)
@@ -90,6 +89,11 @@ class SensorWatch:
     def saw_depth(self, stamp_s: float) -> None:
         """Note a depth image that was used."""
         self._saw(DEPTH, stamp_s)
+        self._depth_unused = ""
+
+    def depth_unused(self, why: str) -> None:
+        """Note why the latest depth images cannot be used."""
+        self._depth_unused = why
 
     def saw_scan(self, number: int, stamp_s: float, sight: ScannerSight) -> None:
         """Note a scan of a scanner, and where it shows what is there."""
@@ -111,8 +115,15 @@ class SensorWatch:
 
     @property
     def missing_text(self) -> str:
-        """The first sensor that nothing has come from yet, in words; empty if there is none."""
-        return next(filter(None, (each.nothing_yet for each in self._sensors.values())), "")
+        """The first sensor that nothing has come from yet, in words; empty if there is none.
+
+        Depth images are not waited for: the camera goes on without them.
+        """
+        for each in self._sensors.values():
+            if not each.heard and each.name != DEPTH:
+                camera = each.name == CAMERA
+                return "no camera frame yet" if camera else f"no scan yet from {each.name!r}"
+        return ""
 
     @property
     def blind_text(self) -> str:
@@ -133,7 +144,7 @@ class SensorWatch:
         """Return a line for every sensor that has been lost, or has come back, since last asked.
 
         So is one that has become blind, in a sector or all of it. A sensor that has never been
-        heard is no news.
+        heard is no news, but for depth images, once the camera has been at work for so long.
         """
         lost, lines, back = set(self.lost(now_s)), [], []
         for name, sensor in self._sensors.items():
@@ -142,18 +153,23 @@ class SensorWatch:
             if sensor.blind and (name in lost or blind_s > self._lost_after_s):
                 trouble = "all blind" if name in lost else "blind"
                 what = f"{name}: {sensor.blind}"
-            elif name in lost and not sensor.nothing_yet:
+            elif name in lost and sensor.heard:
                 trouble = "silent"
-                what = f"{name} has been silent for {now_s - sensor.stamp_s:.1f} s"
+                have = "have" if name == DEPTH else "has"
+                what = f"{name} {have} been silent for {now_s - sensor.stamp_s:.1f} s"
+            late = now_s - self._first_image_s > self._lost_after_s
+            if name == DEPTH and name in lost and late and (self._depth_unused or not what):
+                trouble, what = "silent", f"{name}: {self._depth_unused or 'none has come'}"
             if trouble and trouble != sensor.trouble:
                 lines.append(f"{what}: {self._consequence(lost, now_s)}")
             elif sensor.trouble and not trouble:
-                back.append(f"{name} is back")
+                back.append(f"{name} {'are' if name == DEPTH else 'is'} back")
             self._sensors[name] = replace(sensor, trouble=trouble)
         return lines + back
 
     def forget(self) -> None:
         """Forget all that was seen."""
+        self._first_image_s, self._depth_unused = math.inf, ""
         self._sensors = {name: Sensor(name) for name in self._sensors}
         self.seen = SeenDirections()
 
