@@ -60,13 +60,13 @@ class DepthInput(Input):
             found = min(self._kept, key=lambda each: abs(each.stamp_s - stamp_s), default=None)
             if found is None or abs(apart_s := found.stamp_s - stamp_s) <= MOST_APART_S:
                 return found
-            self._shared.watch.depth_unused(
-                "they are refused"
-                if self._refuses
-                else f"none that has come is within {MOST_APART_S:g} s of its picture, the nearest is "
-                f"{abs(apart_s):.3f} s {'before' if apart_s < 0.0 else 'after'} it; the driver "
-                "must send both at one rate and of one time (enable_sync or the like)"
+            side = "before" if apart_s < 0.0 else "after"
+            apart = (
+                f"none that has come is within {MOST_APART_S:g} s of its picture, the nearest is "
+                f"{abs(apart_s):.3f} s {side} it; the driver must send both at one rate and of one "
+                "time (enable_sync or the like)"
             )
+            self._shared.watch.depth_unused("they are refused" if self._refuses else apart)
         return None
 
     def refuse(self, problem: str, now_s: float) -> None:
