@@ -128,7 +128,8 @@ def _image_findings(options: Any) -> list[Finding]:
         choice = NetworkChoice.of_options(options, rendered=source.rendered)
         networks = choose_networks(**choice.model_dump(), **running_options(options))
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
-        cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)
+        said: list[str] = []
+        cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, said.append)
         look = partial(PeopleEstimator, networks, cameras, unfit=unfit)
         seen = _examine(source, look, options.frames)
         findings = [
@@ -142,7 +143,9 @@ def _image_findings(options: Any) -> list[Finding]:
         if seen.best is None:
             return findings
         findings += [
-            _calibration_finding(seen.best.camera if cameras.calibrated else None, options, source),
+            _calibration_finding(
+                seen.best.camera if cameras.calibrated else None, options, source, said
+            ),
             *_mount_findings(source, seen),
             *_rate_findings(source, seen),
             *picture_findings(seen.figures),
@@ -259,13 +262,14 @@ def _mount_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
     return []
 
 
-def _calibration_finding(camera: Camera | None, options: Any, source: ImageSource) -> Finding:
+def _calibration_finding(
+    camera: Camera | None, options: Any, source: ImageSource, said: list[str]
+) -> Finding:
     fov_deg = options.fov_deg
     if camera is None and fov_deg is None:
         return Finding.error(
             "calibration",
-            "there is none; a horizontal field of view of 60 degrees is assumed, and distances are "
-            "as wrong as that assumption",
+            said[0].partition("; give")[0],
             "--camera camera.yaml (ROS camera_calibration makes it), or at least --fov-deg",
         )
     if camera is None:

@@ -20,6 +20,7 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
+from ..rules import Unseen
 from ._alerts import sensor_status
 from ._clock import BridgeClock
 from ._image_input import ImageInput, PerceivedFrame
@@ -131,7 +132,10 @@ class AwarenessBridge:
             self._clock, self._poses, self._watch, self._tracker, self._lock, self._warn
         )
         self._images = ImageInput(
-            shared, make_pipeline, camera, rectified=rectified, with_depth=with_depth
+            *(shared, make_pipeline, camera),
+            rectified=rectified,
+            with_depth=with_depth,
+            creeps=policy.applies(Unseen.name) and not scanners,
         )
         self._map = MapInput(shared, self.frames.odom)
         self._scans: tuple[ScanInput, ...] = ()

@@ -72,11 +72,13 @@ class SensorWatch:
                 f"each scanner must have a name of its own, other than {CAMERA!r} and {DEPTH!r}, "
                 f"got {taken[0]!r} again: rename its topic"
             )
-        self._scanners, self._lost_after_s = tuple(scanners), lost_after_s
+        self._scanners, self.lost_after_s = tuple(scanners), lost_after_s
         self._sensors = {name: Sensor(name) for name in names}
         self._first_image_s, self._depth_unused = math.inf, ""
         self._field = (0.0, AHEAD_RAD)
         self.seen = SeenDirections()
+        # With the pictures of a camera that may be frozen.
+        self._maybe = SeenDirections()
 
     def saw_image(self, stamp_s: float, camera: Camera, T_base_camera: FloatArray | None) -> None:
         """Note an image, and the camera's pose (4, 4); None leaves its field as it was."""
@@ -85,6 +87,17 @@ class SensorWatch:
         if T_base_camera is not None:
             self._field = camera_field(camera, T_base_camera)
         self.seen.note_field(*self._field, stamp_s)
+        self._maybe.note_field(*self._field, stamp_s)
+
+    def saw_same_image(self, stamp_s: float) -> None:
+        """Note a picture that repeats the one before, of a robot that has not moved since.
+
+        It may be of a simulated camera without noise, before which nothing moves. The robot may
+        creep then, as where no sensor sees: the first step shows whether the camera lives.
+        """
+        if self._sensors[CAMERA].heard:
+            self._saw(CAMERA, stamp_s)
+            self._maybe.note_field(*self._field, stamp_s)
 
     def saw_depth(self, stamp_s: float) -> None:
         """Note a depth image that was used."""
@@ -103,6 +116,7 @@ class SensorWatch:
         if not sight.nothing:
             self._saw(name, stamp_s)
             self.seen.note(sight, stamp_s)
+            self._maybe.note(sight, stamp_s)
 
     @property
     def stamp_s(self) -> float | None:
@@ -111,7 +125,7 @@ class SensorWatch:
         Without a camera the field is 60° to either side of straight ahead. None if nothing has seen
         the field.
         """
-        return self.seen.stamp_s(*self._field)
+        return self._maybe.stamp_s(*self._field)
 
     @property
     def missing_text(self) -> str:
@@ -138,7 +152,7 @@ class SensorWatch:
     def lost(self, now_s: float) -> tuple[str, ...]:
         """Return the sensors that have been silent for too long."""
         ages_s = self.ages_s(now_s).items()
-        return tuple(name for name, age_s in ages_s if age_s > self._lost_after_s)
+        return tuple(name for name, age_s in ages_s if age_s > self.lost_after_s)
 
     def news(self, now_s: float) -> list[str]:
         """Return a line for every sensor that has been lost, or has come back, since last asked.
@@ -150,14 +164,14 @@ class SensorWatch:
         for name, sensor in self._sensors.items():
             trouble, what = "", ""
             blind_s = now_s - sensor.blind_since_s
-            if sensor.blind and (name in lost or blind_s > self._lost_after_s):
+            if sensor.blind and (name in lost or blind_s > self.lost_after_s):
                 trouble = "all blind" if name in lost else "blind"
                 what = f"{name}: {sensor.blind}"
             elif name in lost and sensor.heard:
                 trouble = "silent"
                 have = "have" if name == DEPTH else "has"
                 what = f"{name} {have} been silent for {now_s - sensor.stamp_s:.1f} s"
-            late = now_s - self._first_image_s > self._lost_after_s
+            late = now_s - self._first_image_s > self.lost_after_s
             if name == DEPTH and name in lost and late and (self._depth_unused or not what):
                 trouble, what = "silent", f"{name}: {self._depth_unused or 'none has come'}"
             if trouble and trouble != sensor.trouble:
@@ -171,7 +185,7 @@ class SensorWatch:
         """Forget all that was seen."""
         self._first_image_s, self._depth_unused = math.inf, ""
         self._sensors = {name: Sensor(name) for name in self._sensors}
-        self.seen = SeenDirections()
+        self.seen, self._maybe = SeenDirections(), SeenDirections()
 
     def _saw(self, name: str, stamp_s: float) -> None:
         sensor = self._sensors[name]
@@ -180,7 +194,7 @@ class SensorWatch:
     def _consequence(self, lost: set[str], now_s: float) -> str:
         left = [name for name in self._sensors if name not in lost and name != DEPTH]
         seen_s = self.stamp_s
-        if not left or seen_s is None or now_s - seen_s > self._lost_after_s:
+        if not left or seen_s is None or now_s - seen_s > self.lost_after_s:
             return "the robot stops"
         goes_on = f"{' and '.join(left)} {'goes' if len(left) == 1 else 'go'} on"
         if CAMERA in lost:
