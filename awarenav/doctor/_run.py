@@ -16,6 +16,7 @@ import numpy as np
 
 from perception import AttentionCone, Camera, PerceptionError
 from perception.evidence import AwarenessReason
+from perception.picture_notes import picture_notes
 from perception.shipped import simulator_networks, simulator_networks_warning
 from perception.turn import QuarterTurn
 
@@ -149,6 +150,7 @@ def _image_findings(options: Any) -> list[Finding]:
             *_mount_findings(source, seen),
             *_rate_findings(source, seen),
             *picture_findings(seen.figures),
+            *(Finding.warning("images", note) for note in _notes(seen.best, source)),
             _resolution_finding(seen.best.camera, choice),
             *_people_findings(seen),
         ]
@@ -156,6 +158,11 @@ def _image_findings(options: Any) -> list[Finding]:
             _draw(options.out, seen.best)
             findings.append(Finding.fine("people", f"test picture: {options.out}"))
         return findings
+
+
+def _notes(best: FrameEstimate, source: ImageSource) -> tuple[str, ...]:
+    image = best.frame.image_rgb
+    return () if source.rendered or image is None else picture_notes(image)
 
 
 def _examine(

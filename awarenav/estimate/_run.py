@@ -19,6 +19,7 @@ from typing import Any, Final
 from tqdm import tqdm
 
 from perception import AttentionCone, PersonObservation
+from perception.picture_notes import picture_notes
 from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError, counted
@@ -185,6 +186,9 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
             estimate = _estimate(frame, estimator, summary)
             if estimate is None:
                 continue
+            if not summary.frames and not source.rendered and frame.image_rgb is not None:
+                for note in picture_notes(frame.image_rgb):
+                    _log(note)
             results.add(estimate_record(estimate, settings))
             summary.add(estimate)
             if overlay is not None:  # one is drawn while the next is estimated

@@ -139,9 +139,10 @@ class AwarenessBridge:
         )
         self._map = MapInput(shared, self.frames.odom)
         self._scans: tuple[ScanInput, ...] = ()
+        self._legs: ScanPerception | None = None
         self._scans_dropped = 0
         if inputs := tuple(scanners):
-            legs = ScanPerception(robot.footprint_m, inputs, make_detector)
+            legs = self._legs = ScanPerception(robot.footprint_m, inputs, make_detector)
             self._scans = tuple(
                 ScanInput(shared, number, each, legs, self._map)
                 for number, each in enumerate(inputs)
@@ -199,6 +200,18 @@ class AwarenessBridge:
     def camera(self) -> Camera | None:
         """The camera, or None while it is unknown."""
         return self._images.camera
+
+    def use_robot(self, robot: RobotProfile) -> None:
+        """Go on with another profile, as :meth:`NavAdapter.use_robot`, in the scans too.
+
+        Raises:
+            NavError: for anything else.
+        """
+        with self._sending, self._lock:
+            self._adapter.use_robot(robot)
+            self._robot = robot
+            if self._legs is not None:
+                self._legs.body_base_m = robot.footprint_m
 
     def on_camera_info(self, message: CameraInfo) -> None:
         """Make the pipeline from the first calibration; later ones are ignored."""

@@ -18,6 +18,7 @@ from perception.arrays import FloatArray
 from perception.depth_image import MOST_APART_S
 from perception.errors import DepthImageError
 from perception.no_view import FROZEN, LastFrames, why_no_view
+from perception.picture_notes import picture_notes
 from tracking import PersonTrack
 
 from .._errors import NavError
@@ -203,6 +204,9 @@ class ImageInput(Input):
                 return False
             self.used += 1
             self._live_s = stamp_s
+            if self.used == 1:
+                for note in picture_notes(frame.image):
+                    shared.warn(f"image: {note}")
             T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
             shared.watch.saw_image(stamp_s, self.camera, T_base_camera)
             if self.depth is not None and frame.depth is not None:

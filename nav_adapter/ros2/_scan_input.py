@@ -114,7 +114,7 @@ class ScanPerception:
         inputs: tuple[ScannerInput, ...],
         make_detector: Callable[[], LegDetector],
     ) -> None:
-        self._body_base_m, self._inputs = body_base_m, inputs
+        self.body_base_m, self._inputs = body_base_m, inputs
         self._detector = make_detector()
         nothing: tuple[float, tuple[PersonCandidate, ...]] = (-math.inf, ())
         self._found = [nothing] * len(inputs)
@@ -145,7 +145,7 @@ class ScanPerception:
             )
         mount = self._inputs[number].mount
         limits = (-2.0 * math.pi, 2.0 * math.pi) if mount is None else mount.field_of_view_rad
-        scanner = Scanner(T_base_scanner, limits, self._body_base_m)
+        scanner = Scanner(T_base_scanner, limits, self.body_base_m)
         angles = scan.angles_rad[scanner.sees(scan)]
         if not len(angles):
             raise NavError(
