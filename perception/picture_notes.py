@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from .arrays import ImageRgb
+from .no_view import why_no_view
 
 # Two views of a stereo camera are compared at this width each, without what is smooth, shifted by
 # up to this share of it. Of 28 photographs no two halves are so alike (0.66 at most).
@@ -30,11 +31,13 @@ _DOTTED_SHARE: Final = 0.7
 def picture_notes(image_rgb: ImageRgb) -> tuple[str, ...]:
     """Return in words why people may be missed, or seen twice, in a camera's pictures.
 
-    One picture of a camera is enough. There are none for an ordinary one.
+    One picture of a camera is enough. There are none for an ordinary one, or one that shows nothing.
 
     Args:
         image_rgb: (H, W, 3) uint8.
     """
+    if why_no_view(image_rgb):
+        return ()
     notes = []
     grey = np.asarray(cv2.cvtColor(np.ascontiguousarray(image_rgb), cv2.COLOR_RGB2GRAY), np.uint8)
     for axis, words in ((1, "side by side"), (0, "one above the other")):
