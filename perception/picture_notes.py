@@ -31,7 +31,8 @@ _DOTTED_SHARE: Final = 0.7
 def picture_notes(image_rgb: ImageRgb) -> tuple[str, ...]:
     """Return in words why people may be missed, or seen twice, in a camera's pictures.
 
-    One picture of a camera is enough. There are none for an ordinary one, or one that shows nothing.
+    One picture of a camera is enough. There are none for an ordinary one, nor for one that shows
+    nothing.
 
     Args:
         image_rgb: (H, W, 3) uint8.

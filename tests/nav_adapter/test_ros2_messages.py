@@ -20,8 +20,8 @@ from nav_adapter.ros2._message import FieldType, field_types
 from nav_adapter.ros2.messages import Message, definition, ros_type
 from nav_adapter.ros2.messages.builtin_interfaces import Time
 from nav_adapter.ros2.messages.nav2_msgs import CircleObject, SpeedLimit
-from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
+from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.unique_identifier_msgs import UUID
 
