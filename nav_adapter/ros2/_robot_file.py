@@ -156,7 +156,7 @@ class RobotFile(NavConfig):
 
     @model_validator(mode="before")
     @classmethod
-    def _check_keys(cls, data: Any) -> Any:
+    def _check_nav2(cls, data: Any) -> Any:
         for key in data if isinstance(data, dict) else ():
             if key in _OF_NAV2:
                 raise ValueError(f"unknown key {key!r} in {cls.__name__}: {_OF_NAV2[key]}")
@@ -166,7 +166,7 @@ class RobotFile(NavConfig):
                 f"footprint_m must be a list of corners, got the text {corners!r:.60}: leave out "
                 "its quotation marks"
             )
-        return super()._check_keys(data)
+        return data
 
     @model_validator(mode="after")
     def _has_a_profile(self) -> RobotFile:

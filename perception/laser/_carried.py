@@ -46,8 +46,16 @@ class CarriedThings:
     surroundings passed by. Nobody does that: of two feet that walk, one stands on the floor.
     """
 
+    # By ray: the range that is kept, for how many scans, for how many it was not, and whether the
+    # robot carries what is there.
+    _range_m: FloatArray
+    _scans: NDArray[np.int64]
+    _missed: NDArray[np.int64]
+    _own: NDArray[np.bool_]
+    # The latest scan while the robot stood, and the robot's pose (4, 4) then.
+    _stood: tuple[ScanPoints, FloatArray] | None
+
     def __init__(self) -> None:
-        self._rays = 0
         self._forget(0)
 
     def note(self, scan: LaserScan, points: ScanPoints, motion: RobotMotion) -> NDArray[np.bool_]:
@@ -89,14 +97,11 @@ class CarriedThings:
 
     def _forget(self, rays: int) -> None:
         self._rays = rays
-        # By ray: the range that is kept, for how many scans, for how many it was not, and whether
-        # the robot carries what is there.
         self._range_m = np.full(rays, np.nan)
         self._scans = np.zeros(rays, dtype=np.int64)
         self._missed = np.zeros(rays, dtype=np.int64)
         self._own = np.zeros(rays, dtype=bool)
-        # The latest scan while the robot stood, and the robot's pose (4, 4) then.
-        self._stood: tuple[ScanPoints, FloatArray] | None = None
+        self._stood = None
 
     def _learn(
         self,
@@ -126,7 +131,7 @@ class CarriedThings:
                 beside = np.where(np.roll(own, shift), np.roll(ranges, shift), np.nan)
                 with np.errstate(invalid="ignore"):
                     wider |= np.abs(ranges - beside) <= _BROKEN_M
-        return wider
+        return np.asarray(wider)
 
 
 def _surroundings_pass(points: ScanPoints, stood: ScanPoints) -> bool:

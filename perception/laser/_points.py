@@ -155,12 +155,13 @@ class ScanPoints:
 
     def without(self, own: NDArray[np.bool_]) -> ScanPoints:
         """Return the points without those of some rays (N,): they met the robot's own body."""
-        arrays = {
-            name: np.where(own[:, None] if values.ndim > 1 else own, np.nan, values)
-            for name in ("points_base_m", "points_odom_m", "ranges_m")
-            for values in [getattr(self, name)]
-        }
-        return replace(self, **arrays, usable=self.usable & ~own)
+        return replace(
+            self,
+            points_base_m=np.where(own[:, None], np.nan, self.points_base_m),
+            points_odom_m=np.where(own[:, None], np.nan, self.points_odom_m),
+            ranges_m=np.where(own, np.nan, self.ranges_m),
+            usable=self.usable & ~own,
+        )
 
 
 def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanPoints:
