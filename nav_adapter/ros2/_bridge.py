@@ -109,6 +109,7 @@ class AwarenessBridge:
         self._mask = None if speed_mask is None else SpeedMaskStream(speed_mask, self.frames.odom)
         self._with_camera, self._wanted = with_camera, wanted
         self._warn_user, self._warned = warn, ""
+        self._calibration = "no camera_info yet"
         if not with_camera and not scanners:
             raise NavError("with_camera must be True, or scanners must name one or two, got none")
         self._adapter = NavAdapter(policy, robot, prediction=prediction)
@@ -219,6 +220,7 @@ class AwarenessBridge:
             if self._with_camera:
                 self._images.calibrate(message)
         except (NavError, PerceptionError) as problem:
+            self._calibration = "the camera_info that comes cannot be used"
             self._warn(str(problem))
 
     def on_transforms(
@@ -386,7 +388,7 @@ class AwarenessBridge:
         if self._poses.state is None:
             return "no odometry yet"
         if self._with_camera and self._images.camera is None:
-            return "no camera_info yet"
+            return self._calibration
         return self._watch.missing_text
 
     def _restart(self) -> None:

@@ -394,3 +394,14 @@ def test_16_bit_counts_that_use_little_of_their_range_are_refused_with_the_cure(
 def test_raw_counts_under_the_encoding_of_depth_get_the_hint() -> None:
     with pytest.raises(NavError, match="scale these to mono8"):
         picture_of(Image(Header(), 2, 2, "16UC1", 0, 4, bytes(8)))
+
+
+def test_a_robot_whose_calibration_is_that_of_no_lens_stands_and_says_so() -> None:
+    nav = Listener()
+    nav.bridge.on_odometry(odometry(START_S))
+    assert nav.bridge.tick(START_S).limited_by == "no camera_info yet"
+    nav.bridge.on_camera_info(replace(INFO, distortion_model="plumb_bob", d=(-3.0, 0, 0, 0, 0)))
+    assert "is that of no lens" in nav.warnings[-1]
+    assert nav.bridge.tick(START_S).limited_by == "the camera_info that comes cannot be used"
+    nav.bridge.on_camera_info(INFO)
+    assert nav.bridge.camera is not None
