@@ -365,7 +365,7 @@ class BagSource(ImageSource):
                 if (root := transforms.root(frame)) != frame:
                     T_root_camera = transforms.lookup(root, frame, 0.0)
                     if problem := optical_problem(T_root_camera, frame, root):
-                        self.notes = (problem,)
+                        self.notes += (problem,)
                     else:
                         self.up_camera = T_root_camera[2, :3]
                     return
