@@ -161,7 +161,7 @@ class Fixed:
     def __init__(self, motion: Motion, person_odom_m: tuple[float, float]) -> None:
         self.motion, self.person = motion, np.array([*person_odom_m, 1.0, 1.0])
 
-    def process(self, image_rgb, stamp_s, *, floor=None):
+    def process(self, image_rgb, stamp_s, floor=None, *, up_camera=None):
         T_odom_camera = pose_of(self.motion.at(stamp_s - START_S)) @ MOUNT
         place = (np.linalg.inv(T_odom_camera) @ self.person)[:3]
         return (seen(stamp_s=stamp_s, position_camera_m=place),)
