@@ -111,11 +111,8 @@ class NavAdapter:
         require_type("robot", robot, RobotProfile)
         require_type("prediction", prediction, PredictionModel | None)
         self._policy = policy
-        self._robot = robot
         self._prediction = prediction
-        self._people = People(policy, robot)
-        self._governor = SpeedGovernor(policy, robot)
-        self._addressing = Addressing(policy, robot, self._governor, prediction)
+        self.use_robot(robot)
         self._memory = _Memory()
         # As of the latest watchdog since then. No update knows of it.
         self._watched: _Memory | None = None
@@ -138,6 +135,20 @@ class NavAdapter:
         ceiling_mps = self._memory.ceiling_mps if latest is None else latest.speed_limit_mps
         self._memory, self._watched = _Memory(ceiling_mps=ceiling_mps), None
         self._gate.forget()
+
+    def use_robot(self, robot: RobotProfile) -> None:
+        """Go on with another profile, as of a robot that takes or leaves a load; people are kept.
+
+        The next update has its limit. A footprint that grows must be given before the robot moves.
+
+        Raises:
+            NavError: for anything else.
+        """
+        require_type("robot", robot, RobotProfile)
+        self._robot = robot
+        self._people = People(self._policy, robot)
+        self._governor = SpeedGovernor(self._policy, robot)
+        self._addressing = Addressing(self._policy, robot, self._governor, self._prediction)
 
     def update(
         self,

@@ -49,7 +49,7 @@ class RobotProfile:
     Attributes:
         footprint_m: (M, 2), M ≥ 3, corners in the base frame (x forward, y left), clockwise or
             counter-clockwise. The convex hull counts: at least 0.002 m², within 10 m of the base
-            origin.
+            origin, and not wholly to one side of it.
         max_speed_mps: > 0, up to 15 m/s.
         max_acceleration_mps2: > 0, up to 10 m/s².
         max_deceleration_mps2: > 0, up to 10 m/s², a deceleration that the brakes always reach.
@@ -119,6 +119,7 @@ class RobotProfile:
                 f"footprint_m must lie within {_LARGEST_REACH_M:g} m of the base origin, got a "
                 f"corner at {reach_m:g} m; are the corners in millimetres or centimetres?"
             )
+        _refuse_beside_origin(footprint)
         given = [
             name
             for name in _LARGEST
@@ -167,6 +168,20 @@ class RobotProfile:
     def half_width_m(self) -> float:
         """Farthest part of the footprint to either side of the base."""
         return float(np.abs(self.footprint_m[:, 1]).max())
+
+
+def _refuse_beside_origin(footprint: FloatArray) -> None:
+    """Raise NavError for an outline that lies wholly to one side of the base origin."""
+    below, above = ("behind", "to the right of"), ("ahead of", "to the left of")
+    for axis in (0, 1):
+        low, high = footprint[:, axis].min(), footprint[:, axis].max()
+        if low > 0.0 or high < 0.0:
+            side = above[axis] if low > 0.0 else below[axis]
+            raise NavError(
+                f"footprint_m must lie around the base origin, got one wholly {side} it, "
+                f"{low:g} to {high:g} m; are its corners in the frame of a sensor, or counted from "
+                "a corner of the robot?"
+            )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,12 @@ from .arrays import FloatArray, finite_array, finite_number, pixel_count, set_fi
 from .errors import PerceptionError
 
 _WIDEST_RAD: Final = math.radians(89.9)
+# No lens brings the picture further in, as a share of the angle, nor further out where a lens that
+# projects at f sin θ would not: none bends more outwards than that one, but for calibration.
+_MOST_BENT: Final = 1.0 / 3.0
+_CALIBRATED: Final = 1.15
+# The bend is looked at in so many rays on the way to each corner and the middle of each side.
+_ALONG: Final = 128
 _SAMPLES: Final = 2048
 _ITERATIONS: Final = 6
 _EXACT_PX: Final = 1e-6
@@ -51,6 +57,23 @@ class LensModel:
         count = int(turns[0]) + 1 if len(turns) else _SAMPLES
         self._radii, self._image = radii[:count], image[:count]
         self.end = float(self._radii[-1])
+
+    def no_lens(self, width_px: int, height_px: int) -> tuple[float, float] | None:
+        """Return :func:`bent_too_far` of the rays in a picture of this size."""
+        radii = self._radii[1 :: len(self._radii) // _ALONG + 1]
+        if not len(radii):  # the model ends at its axis
+            return 0.0, 0.0
+        radii = np.concatenate((radii[0] * np.geomspace(1e-6, 0.5, _ALONG // 8), radii))
+        sides = np.array(
+            [[x, y] for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0) if x * y != 0.25]
+        )
+        across = (sides * (width_px, height_px) - self._matrix[:2, 2]) / self._matrix.diagonal()[:2]
+        across /= np.hypot(*across.T)[:, None] + 1e-12
+        rays = (radii[:, None, None] * across).reshape(-1, 2)
+        pixels, _ = self.project(rays)
+        inside = ((pixels >= -0.5) & (pixels <= (width_px - 0.5, height_px - 0.5))).all(axis=1)
+        reach = np.hypot(*((pixels - self._matrix[:2, 2]) / self._matrix.diagonal()[:2]).T)
+        return bent_too_far(np.arctan(np.hypot(*rays.T))[inside], reach[inside])
 
     def project(self, rays: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the pixels (N, 2) of rays (N, 2), and their derivatives (N, 2, 2)."""
@@ -90,6 +113,26 @@ class LensModel:
         return np.asarray(rays, dtype=np.float64)
 
 
+def bent_too_far(angle_rad: FloatArray, reach: FloatArray) -> tuple[float, float] | None:
+    """Return the worst ray that no lens bends so; None if a lens may bend all of them so.
+
+    Args:
+        angle_rad: (N,) angles of rays from the axis, in the picture.
+        reach: (N,) how far from the principal point they fall, in focal lengths.
+
+    Returns:
+        The angle of the ray, and the one at which a pinhole would have seen its pixel, rad.
+    """
+    pinhole = np.arctan(reach)
+    share = angle_rad / np.maximum(pinhole, 1e-12)
+    outermost = _CALIBRATED * np.arcsin(np.minimum(reach, 1.0))
+    wrong = (share < 1.0 - _MOST_BENT) | ((share > 1.0 + _MOST_BENT) & (angle_rad > outermost))
+    if not wrong.any():
+        return None
+    worst = int(np.argmax(np.where(wrong, np.abs(np.log(np.maximum(share, 1e-12))), -1.0)))
+    return float(angle_rad[worst]), float(pinhole[worst])
+
+
 # Numbers of coefficients that OpenCV accepts: plumb_bob has 5, rational_polynomial 8.
 _DISTORTION_SIZES: Final = (4, 5, 8, 12, 14)
 # Intrinsics beyond these are errors of whoever sent them, and products with them may overflow.
@@ -112,6 +155,11 @@ class Camera:
         cx_px: principal point, u, −1e9 to 1e9.
         cy_px: principal point, v, likewise.
         distortion: OpenCV's coefficients k1, k2, p1, p2, k3, … (4, 5, 8, 12 or 14), or None.
+
+    Raises:
+        PerceptionError: for values out of these bounds, and a distortion that no lens has: one
+            that bends the field by more than a third inside the picture. Outwards, lenses bend up
+            to f sin θ, however much that is.
     """
 
     width_px: int
@@ -147,6 +195,16 @@ class Camera:
                 for name in names
             },
         )
+        if self._lens and (wrong := self._lens.no_lens(self.width_px, self.height_px)):
+            seen_deg, pinhole_deg = np.degrees(wrong).tolist()
+            assert distortion is not None
+            raise PerceptionError(
+                f"the distortion {distortion.tolist()} is that of no lens: a ray {seen_deg:.1f} "
+                f"degrees off the axis would fall on the pixel that has {pinhole_deg:.1f} without "
+                "it, and no lens bends more than a third so. Often a driver sends the first five "
+                "coefficients of a model with eight (rational_polynomial), or those of another "
+                "model: calibrate with camera_calibration, or use rectified images (image_rect)"
+            )
 
     @classmethod
     def from_fov(cls, width_px: int, height_px: int, horizontal_fov_rad: float) -> Camera:

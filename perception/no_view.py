@@ -37,6 +37,28 @@ _COLOUR_LEVELS: Final = 3
 _SEEN_SHARE: Final = 0.01
 
 
+# A camera that counts in 16 bits, and uses few of them, such as a thermal one, shows less than this
+# many levels in 8 bits, without its hundred brightest and darkest in ten thousand.
+_FEWEST_LEVELS: Final = 12.0
+_WITHOUT: Final = (0.01, 99.99)
+
+
+def eight_bits(samples: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """Return 16-bit values scaled to 8 bits over their full range.
+
+    Raises:
+        PerceptionError: for values that use so little of it that nothing would be left to see.
+    """
+    low, high = np.percentile(samples[::3, ::3], _WITHOUT).tolist()
+    if (high - low) * 255.0 / 65535.0 < _FEWEST_LEVELS:
+        raise PerceptionError(
+            f"its 16-bit values lie between {low:.0f} and {high:.0f}, {(high - low) / 655.35:.1f} "
+            "% of their range: scale them to 8 bits first, as thermal and infrared cameras need "
+            "it, or is the lens covered?"
+        )
+    return np.asarray(cv2.convertScaleAbs(samples, alpha=255.0 / 65535.0), dtype=np.uint8)
+
+
 class LastFrames:
     """The last 32 different frames of one sensor, by which it is seen whether it is frozen.
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from perception import AttentionCone, Camera, PerceptionError
 from perception.evidence import AwarenessReason
+from perception.picture_notes import picture_notes
 from perception.shipped import simulator_networks, simulator_networks_warning
 from perception.turn import QuarterTurn
 
@@ -128,7 +129,8 @@ def _image_findings(options: Any) -> list[Finding]:
         choice = NetworkChoice.of_options(options, rendered=source.rendered)
         networks = choose_networks(**choice.model_dump(), **running_options(options))
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
-        cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, lambda _: None)
+        said: list[str] = []
+        cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, said.append)
         look = partial(PeopleEstimator, networks, cameras, unfit=unfit)
         seen = _examine(source, look, options.frames)
         findings = [
@@ -142,10 +144,13 @@ def _image_findings(options: Any) -> list[Finding]:
         if seen.best is None:
             return findings
         findings += [
-            _calibration_finding(seen.best.camera if cameras.calibrated else None, options, source),
+            _calibration_finding(
+                seen.best.camera if cameras.calibrated else None, options, source, said
+            ),
             *_mount_findings(source, seen),
             *_rate_findings(source, seen),
             *picture_findings(seen.figures),
+            *(Finding.warning("images", note) for note in _notes(seen.best, source)),
             _resolution_finding(seen.best.camera, choice),
             *_people_findings(seen),
         ]
@@ -153,6 +158,11 @@ def _image_findings(options: Any) -> list[Finding]:
             _draw(options.out, seen.best)
             findings.append(Finding.fine("people", f"test picture: {options.out}"))
         return findings
+
+
+def _notes(best: FrameEstimate, source: ImageSource) -> tuple[str, ...]:
+    image = best.frame.image_rgb
+    return () if source.rendered or image is None else picture_notes(image)
 
 
 def _examine(
@@ -259,13 +269,14 @@ def _mount_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
     return []
 
 
-def _calibration_finding(camera: Camera | None, options: Any, source: ImageSource) -> Finding:
+def _calibration_finding(
+    camera: Camera | None, options: Any, source: ImageSource, said: list[str]
+) -> Finding:
     fov_deg = options.fov_deg
     if camera is None and fov_deg is None:
         return Finding.error(
             "calibration",
-            "there is none; a horizontal field of view of 60 degrees is assumed, and distances are "
-            "as wrong as that assumption",
+            said[0].partition("; give")[0],
             "--camera camera.yaml (ROS camera_calibration makes it), or at least --fov-deg",
         )
     if camera is None:

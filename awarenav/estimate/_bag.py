@@ -313,7 +313,10 @@ class BagSource(ImageSource):
         topics = [
             "/".join(parts[:length]) + "/camera_info" for length in range(len(parts) - 1, 0, -1)
         ]
-        for topic in topics[:2]:  # beside image_raw, or beside the parent of image_raw/compressed
+        near = topics[:2]  # beside image_raw, or beside the parent of image_raw/compressed
+        others = sorted({name for name, kind in self._bag.topics if kind == _INFO} - set(near))
+        near += self._under_another_name(others, shown)
+        for topic in near:
             info = self._bag.first([_INFO], topic)
             if info is None:
                 continue
@@ -323,7 +326,25 @@ class BagSource(ImageSource):
                 return camera_of(info, rectified=self.rectified, image_size_px=size_px)
             except NavError as cause:
                 raise AwarenavError(f"{topic}: {cause}") from cause
+        if others:
+            self.notes = (
+                f"no camera_info lies beside {self._topic}, and calibrations are in "
+                f"{', '.join(others)}: write that of this camera into a file and give --camera",
+            )
         return None
+
+    def _under_another_name(self, infos: list[str], shown: Any) -> list[str]:
+        """Return the only calibration beside the images that is of their frame, or none.
+
+        Drivers call it ``camera_info_rect`` or ``info``, too.
+        """
+        namespace = self._topic.removesuffix("/compressed").rpartition("/")[0]
+        found = []
+        for name in infos:
+            info = self._bag.first([_INFO], name) if name.rpartition("/")[0] == namespace else None
+            if info is not None and shown is not None:
+                found += [name] * (info.header.frame_id == shown.header.frame_id)
+        return found if len(found) == 1 else []
 
     def _read_mount(self, shown: Any) -> None:
         """Take from the transforms which way is up, or note that the frame is not optical.
@@ -344,7 +365,7 @@ class BagSource(ImageSource):
                 if (root := transforms.root(frame)) != frame:
                     T_root_camera = transforms.lookup(root, frame, 0.0)
                     if problem := optical_problem(T_root_camera, frame, root):
-                        self.notes = (problem,)
+                        self.notes += (problem,)
                     else:
                         self.up_camera = T_root_camera[2, :3]
                     return

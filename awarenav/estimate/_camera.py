@@ -15,7 +15,7 @@ from perception.arrays import FloatArray, finite_number
 from ..errors import AwarenavError
 from ._sources import ImageSource
 
-#: Assumed without a calibration; webcams and phones have 55 to 75 degrees.
+#: Assumed without a calibration, across the longer side; webcams and phones have 55 to 75 degrees.
 ASSUMED_FOV_DEG: Final = 60.0
 
 # Optical axes (right, down, forward) of a level camera in axes of the robot (forward, left, up).
@@ -59,8 +59,8 @@ class CameraChoice:
     Args:
         calibrated: a calibration, or the path of its file; an image of its aspect ratio in another
             size counts as scaled.
-        fov_deg: horizontal field of view without a calibration; None assumes
-            :data:`ASSUMED_FOV_DEG`.
+        fov_deg: horizontal field of view without a calibration; None takes that of the image's
+            EXIF data, or assumes :data:`ASSUMED_FOV_DEG`.
         log: gets one message about every assumption.
         rectified: whether the images are rectified: P of the file counts.
 
@@ -81,7 +81,8 @@ class CameraChoice:
         self._calibrated, self._rectified = calibrated, rectified
         self._fov_deg = fov_deg
         self._log = log
-        self._cameras: dict[tuple[int, int], Camera] = {}
+        self._cameras: dict[tuple[int, int, float | None], Camera] = {}
+        self._said: set[str] = set()
 
     @classmethod
     def of_options(
@@ -111,30 +112,39 @@ class CameraChoice:
         """True if there is a calibration, which is for pixels where the camera has them."""
         return self._calibrated is not None
 
-    def of_size(self, width_px: int, height_px: int) -> Camera:
+    def of_size(self, width_px: int, height_px: int, focal_px: float | None = None) -> Camera:
         """Return the camera of images of this size.
+
+        ``focal_px`` is their focal length by EXIF, which counts without a calibration.
 
         Raises:
             AwarenavError: if the calibrated camera cannot have taken them.
         """
-        size = (width_px, height_px)
-        if size not in self._cameras:
-            self._cameras[size] = self._make(width_px, height_px)
-        return self._cameras[size]
+        key = (width_px, height_px, None if self.known else focal_px)
+        if key not in self._cameras:
+            self._cameras[key] = self._make(*key)
+        return self._cameras[key]
 
-    def _make(self, width_px: int, height_px: int) -> Camera:
+    def _make(self, width_px: int, height_px: int, focal_px: float | None) -> Camera:
         """Make the camera of images of this size; log what is assumed."""
         camera = self._calibrated
         if camera is None:
-            fov_deg = self._fov_deg
-            if fov_deg is None:
-                fov_deg = ASSUMED_FOV_DEG
-                if not self._cameras:
-                    self._log(
-                        f"no calibration: a horizontal field of view of {fov_deg:g} degrees is "
-                        "assumed, and distances may be wrong; give --camera or --fov-deg"
-                    )
-            return Camera.from_fov(width_px, height_px, math.radians(fov_deg))
+            if self._fov_deg is not None:
+                return Camera.from_fov(width_px, height_px, math.radians(self._fov_deg))
+            longer, words = max(width_px, height_px), "by its EXIF data"
+            if focal_px is None:
+                half_rad = 0.5 * math.radians(ASSUMED_FOV_DEG)
+                focal_px, words = 0.5 * longer / math.tan(half_rad), "assumed"
+            across_deg = math.degrees(2.0 * math.atan(0.5 * longer / focal_px))
+            text = (
+                f"no calibration: {across_deg:.0f} degrees across the longer side are {words}, and "
+                "distances may be wrong; give --camera or --fov-deg"
+            )
+            if text not in self._said:
+                self._said.add(text)
+                self._log(text)
+            middle = 0.5 * width_px, 0.5 * height_px
+            return Camera(width_px, height_px, focal_px, focal_px, *middle)
         if isinstance(camera, Path):
             size_px = (width_px, height_px)
             camera = Camera.from_yaml(camera, rectified=self._rectified, image_size_px=size_px)

@@ -143,7 +143,7 @@ class PeopleEstimator:
         assert frame.image_rgb is not None
         height, width = frame.image_rgb.shape[:2]
         self._require_known_turn(frame)
-        camera = self._cameras.of_size(width, height)
+        camera = self._cameras.of_size(width, height, frame.focal_px)
         pose = self._fixed_pose if frame.T_odom_camera is None else frame.T_odom_camera
         no_view = why_no_view(frame.image_rgb, self._last)
         up_camera = self._up_camera if pose is None else pose[2, :3]

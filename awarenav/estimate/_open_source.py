@@ -19,16 +19,19 @@ _HEIF: Final = (".heic", ".heif")
 _STREAM: Final = re.compile(r"^[a-z][a-z0-9+.-]*://")
 
 
-def open_source(text: str, *, topic: str | None = None) -> ImageSource:
+def open_source(text: str, *, topic: str | None = None, fps: float | None = None) -> ImageSource:
     """Open an image, a folder of images, a video, a camera, a stream or a recording.
 
     Args:
         text: a path, the number of a camera such as ``0``, or an address such as ``rtsp://…``.
         topic: image topic of a recording; None if it has only one.
+        fps: images per second of a folder without times; None if it is not known.
 
     Raises:
         AwarenavError: if there is no such source, or it cannot be read.
     """
+    if fps is not None and not Path(text).is_dir():
+        raise AwarenavError(f"--fps is for a folder of images without times; {text} is none")
     if _STREAM.match(text):
         return open_video(text, live=True)
     path = Path(text)
@@ -46,13 +49,17 @@ def open_source(text: str, *, topic: str | None = None) -> ImageSource:
     if is_recording(path):
         from ._bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
 
+        if fps is not None:
+            raise AwarenavError(
+                f"--fps is for a folder of images; {text} is a recording with times"
+            )
         return BagSource(path, topic)
     if topic is not None:
         raise AwarenavError(f"--topic is for ROS recordings; {text} is not one")
     if path.suffix.lower() in _HEIF:
         raise AwarenavError(f"{text} is an HEIF picture, which cannot be read: save it as JPEG")
     if path.is_dir() or path.suffix.lower() in IMAGE_SUFFIXES:
-        return ImageFiles(path)
+        return ImageFiles(path, fps)
     return open_video(text, live=False)
 
 

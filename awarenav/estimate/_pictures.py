@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from perception import PerceptionError
 from perception.arrays import ImageRgb
+from perception.no_view import eight_bits
 
 from ..errors import AwarenavError
 
@@ -21,6 +24,13 @@ IMAGE_SUFFIXES: Final = (
 )
 _FULL_RANGE: Final = {np.dtype(np.uint8): 255, np.dtype(np.uint16): 65535}
 _ORIENTATION: Final = 0x0112
+# The focal length that has this diagonal field on film of 35 mm, and the image's size then.
+_FOCAL_35MM, _WIDTH, _HEIGHT = 0xA405, 0xA002, 0xA003
+_FILM_MM: Final = math.hypot(36.0, 24.0)
+# Where the directory with those numbers begins.
+_MORE: Final = 0x8769
+# An image with sides of another ratio was cut after it was taken.
+_SAME_RATIO: Final = 0.01
 # Types of a number: the standard wants the first, some writers use the second.
 _SHORT, _LONG = 3, 4
 _JPEG, _PNG = b"\xff\xd8", b"\x89PNG\r\n\x1a\n"
@@ -46,10 +56,11 @@ def read_image(path: Path) -> ImageRgb:
     return read_turned_image(path)[0]
 
 
-def read_turned_image(path: Path) -> tuple[ImageRgb, int]:
-    """Read an image file as :func:`read_image` does; return its EXIF orientation too.
+def read_turned_image(path: Path) -> tuple[ImageRgb, int, float | None]:
+    """Read an image file as :func:`read_image` does; return its EXIF orientation and focal length.
 
-    The orientation is 1 for a file that is stored upright.
+    The orientation is 1 for a file that is stored upright. The focal length is in pixels, None for
+    a file that does not say it, or was cut since.
     """
     try:
         data = path.read_bytes()
@@ -63,7 +74,8 @@ def read_turned_image(path: Path) -> tuple[ImageRgb, int]:
         raise AwarenavError(f"{path} is not an image that can be read ({cause.err})") from cause
     if image is None:
         raise AwarenavError(f"{path} is not an image that can be read: damaged, or another format")
-    return as_rgb(image, str(path)), orientation
+    height, width = image.shape[:2]
+    return as_rgb(image, str(path)), orientation, _exif_focal_px(data, height, width)
 
 
 def as_rgb(image: Any, name: str) -> ImageRgb:
@@ -77,7 +89,7 @@ def as_rgb(image: Any, name: str) -> ImageRgb:
         name: of the image, for the message.
 
     Raises:
-        AwarenavError: for any other array.
+        AwarenavError: for any other array, and 16-bit values that use too little of their range.
     """
     array = np.asarray(image)
     full = _FULL_RANGE.get(array.dtype)
@@ -88,21 +100,39 @@ def as_rgb(image: Any, name: str) -> ImageRgb:
             f"{array.dtype} of shape {array.shape}"
         )
     if full != 255:
-        array = cv2.convertScaleAbs(array, alpha=255.0 / full)
+        try:
+            array = eight_bits(array)
+        except PerceptionError as cause:
+            raise AwarenavError(f"{name}: {cause}") from cause
     code = {1: cv2.COLOR_GRAY2RGB, 3: cv2.COLOR_BGR2RGB, 4: cv2.COLOR_BGRA2RGB}[channels]
     return np.asarray(cv2.cvtColor(array, code), dtype=np.uint8)
 
 
 def exif_orientation(data: bytes) -> int:
     """Return the orientation of a JPEG, PNG, WebP or TIFF file, 1 to 8; 1 (upright) without one."""
+    orientation = _exif(data).get(_ORIENTATION, UPRIGHT)
+    return orientation if UPRIGHT <= orientation <= _LAST else UPRIGHT
+
+
+def _exif_focal_px(data: bytes, height_px: int, width_px: int) -> float | None:
+    numbers = _exif(data)
+    focal_mm = numbers.get(_FOCAL_35MM, 0)
+    sides = sorted((numbers.get(_WIDTH, width_px), numbers.get(_HEIGHT, height_px)))
+    own = sorted((width_px, height_px))
+    cut = min(sides) <= 0 or abs(sides[1] * own[0] / (sides[0] * own[1]) - 1.0) > _SAME_RATIO
+    return None if focal_mm <= 0 or cut else focal_mm / _FILM_MM * math.hypot(*own)
+
+
+def _exif(data: bytes) -> dict[int, int]:
+    """Return the whole numbers in the EXIF data of a file, by tag."""
+    found: dict[int, int] = {}
     try:
         for block in _exif_blocks(data):
-            orientation = _in_tiff(block.removeprefix(_EXIF))
-            if 1 <= orientation <= _LAST:
-                return orientation
+            for tag, value in _in_tiff(block.removeprefix(_EXIF)):
+                found.setdefault(tag, value)
     except struct.error:  # cut off
         pass
-    return UPRIGHT
+    return found
 
 
 def upright(image: NDArray[Any], orientation: int) -> NDArray[Any]:
@@ -160,18 +190,24 @@ def _exif_blocks(data: bytes) -> Iterator[bytes]:
             at += 8 + length + length % 2
 
 
-def _in_tiff(block: bytes) -> int:
-    """Return the orientation in the first directory of a TIFF file; 0 without one."""
+def _in_tiff(block: bytes) -> Iterator[tuple[int, int]]:
+    """Yield tags and whole numbers in the first directory of a TIFF file, and in EXIF's own."""
     order = _TIFF.get(block[:4])
     if order is None:
-        return 0
+        return
     (at,) = struct.unpack_from(order + "I", block, 4)
-    (entries,) = struct.unpack_from(order + "H", block, at)
-    for entry in range(entries):
-        place = at + 2 + 12 * entry
-        tag, kind, _ = struct.unpack_from(order + "HHI", block, place)
-        if tag == _ORIENTATION and kind in (_SHORT, _LONG):
-            number = order + ("H" if kind == _SHORT else "I")
-            (value,) = struct.unpack_from(number, block, place + 8)
-            return int(value)
-    return 0
+    own, directories = True, [at]
+    while directories:
+        at = directories.pop()
+        (entries,) = struct.unpack_from(order + "H", block, at)
+        for entry in range(entries):
+            place = at + 2 + 12 * entry
+            tag, kind, _ = struct.unpack_from(order + "HHI", block, place)
+            if kind not in (_SHORT, _LONG):
+                continue
+            (value,) = struct.unpack_from(
+                order + ("H" if kind == _SHORT else "I"), block, place + 8
+            )
+            yield tag, int(value)
+            if tag == _MORE and own:
+                own, directories = False, [int(value)]

@@ -19,6 +19,7 @@ from typing import Any, Final
 from tqdm import tqdm
 
 from perception import AttentionCone, PersonObservation
+from perception.picture_notes import picture_notes
 from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError, counted
@@ -155,7 +156,7 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
     """
     _check(options)
     with contextlib.ExitStack() as stack:
-        source = open_source(options.source, topic=options.topic)
+        source = open_source(options.source, topic=options.topic, fps=options.fps)
         stack.callback(source.close)
         estimator, settings = _estimator(options, source, networks)
         overlay = None
@@ -185,6 +186,9 @@ def estimate_command(options: Any, networks: Networks | None = None) -> int:
             estimate = _estimate(frame, estimator, summary)
             if estimate is None:
                 continue
+            if not summary.frames and not source.rendered and frame.image_rgb is not None:
+                for note in picture_notes(frame.image_rgb):
+                    _log(note)
             results.add(estimate_record(estimate, settings))
             summary.add(estimate)
             if overlay is not None:  # one is drawn while the next is estimated
@@ -212,6 +216,8 @@ def _estimator(
         _log("the images are rectified: P of the calibration applies, without distortion")
     for note in source.notes:
         _log(note)
+    if source.untimed and options.tracks:
+        _log("nothing tells the times: one image a second is assumed for speeds; give --fps")
     choice = NetworkChoice.of_options(options, rendered=source.rendered, log=_log)
     if networks is None:
         networks = choose_networks(
@@ -226,8 +232,9 @@ def _estimator(
         pose = fixed_camera_pose(options.camera_height_m, options.camera_pitch_deg)
     chosen = {name: getattr(options, name) for name in _SETTINGS}
     chosen |= choice.model_dump(exclude_none=True)
-    if options.depth is not None:
-        chosen["depth"] = options.depth
+    for name in ("depth", "fps"):
+        if getattr(options, name) is not None:
+            chosen[name] = getattr(options, name)
     estimator = PeopleEstimator(
         networks,
         cameras,
@@ -283,6 +290,8 @@ def _check(options: Any) -> None:
         raise AwarenavError("--camera-pitch-deg needs --camera-height-m")
     if options.camera_height_m is not None and options.camera_height_m <= 0.0:
         raise AwarenavError(f"--camera-height-m must be above 0, got {options.camera_height_m:g} m")
+    if options.fps is not None and not 0.01 <= options.fps <= 1000.0:
+        raise AwarenavError(f"--fps must lie in [0.01, 1000] Hz, got {options.fps:g}")
     if options.fov_deg is not None and not 1.0 <= options.fov_deg <= 179.0:
         raise AwarenavError(f"--fov-deg must lie in [1, 179] degrees, got {options.fov_deg:g}")
 

@@ -52,6 +52,7 @@ class SourceFrame:
         problem: why there is no image.
         orientation: EXIF's number of the turn that the file asked for and the image has got; 1 for
             none.
+        focal_px: focal length of the image by its EXIF data; None if they do not say it.
     """
 
     name: str
@@ -60,6 +61,7 @@ class SourceFrame:
     T_odom_camera: FloatArray | None = None
     problem: str = ""
     orientation: int = 1
+    focal_px: float | None = None
 
 
 class ImageSource(ABC):
@@ -73,6 +75,7 @@ class ImageSource(ABC):
         live: whether frames come in real time; a frame that is not taken in time is lost.
         rendered: whether all frames are renders of this package.
         up_camera: (3,) direction up in the camera frame; None if the source does not know it.
+        untimed: whether the stamps are mere numbers, since nothing tells the times.
     """
 
     rectified = False
@@ -82,6 +85,7 @@ class ImageSource(ABC):
     live = False
     rendered = False
     up_camera: FloatArray | None = None
+    untimed = False
 
     @property
     def camera(self) -> Camera | None:
@@ -108,17 +112,18 @@ class ImageFiles(ImageSource):
 
     ``camera.yaml`` beside them is their camera. ``truth.jsonl`` beside them gives the stamp and the
     camera pose of each image; what it says about people is not read. Without it, the stamps are 0,
-    1, 2 … s. If ``render.yaml`` is there as well, as ``awarenav render`` leaves
+    1, 2 … s, or as ``fps`` says. If ``render.yaml`` is there as well, as ``awarenav render`` leaves
     it, the images in ``truth.jsonl`` are renders.
 
     Args:
         path: of the file or folder.
+        fps: images per second of a folder; None if it is not known.
 
     Raises:
         AwarenavError: if there is no image, or the files beside the images cannot be read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, fps: float | None = None) -> None:
         folder = path if path.is_dir() else path.parent
         if path.is_dir():
             files = [
@@ -134,8 +139,15 @@ class ImageFiles(ImageSource):
             files = [path]
         self._files = sorted(files, key=natural_order)
         self._known = _stamps_and_poses(folder / _TRUTH)
+        self._period_s = 1.0 if fps is None else 1.0 / fps
+        self.rate_hz = fps
+        if fps is not None and (self._known or not path.is_dir()):
+            why = f"{_TRUTH} beside it has the times" if self._known else "it is one image"
+            raise AwarenavError(f"--fps is for a folder of images without times; {path}: {why}")
         self._calibration = folder / _CAMERA
         self.count = len(self._files)
+        if self.count > 1 and fps is None and not self._known:
+            self.untimed = True
         self.rendered = (folder / _RENDER).exists() and all(
             each.name in self._known for each in self._files
         )
@@ -159,10 +171,12 @@ class ImageFiles(ImageSource):
     def frames(self) -> Iterator[SourceFrame]:
         """Yield every image; one that cannot be read has a ``problem``."""
         for index, path in enumerate(self._files):
-            stamp_s, pose = self._known.get(path.name, (float(index), None))
+            stamp_s, pose = self._known.get(path.name, (index * self._period_s, None))
             try:
-                image, turned = read_turned_image(path)
-                yield SourceFrame(path.name, stamp_s, image, pose, orientation=turned)
+                image, turned, focal_px = read_turned_image(path)
+                yield SourceFrame(
+                    path.name, stamp_s, image, pose, orientation=turned, focal_px=focal_px
+                )
             except AwarenavError as error:
                 yield SourceFrame(path.name, stamp_s, None, pose, str(error))
 

@@ -45,6 +45,13 @@ _CAMERA: Final = "Camera"
 @option("--frames", type=POSITIVE, metavar="N", help="Stop after N frames.")
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
 @option(
+    "--fps",
+    type=NUMBER,
+    show_default="one image a second",
+    metavar="HZ",
+    help="Images per second of a folder of frames; speeds and predictions depend on it.",
+)
+@option(
     "--depth",
     type=FilePath(),
     metavar="PATH",
@@ -70,8 +77,8 @@ _CAMERA: Final = "Camera"
     type=FilePath(),
     show_default="camera.yaml beside the images, or camera_info of the recording",
     metavar="FILE",
-    help="Calibration (ROS camera_info YAML). Without any, a horizontal field of view of 60 "
-    "degrees is assumed.",
+    help="Calibration (ROS camera_info YAML). Without any, EXIF's focal length counts, or 60 "
+    "degrees across the longer side are assumed.",
 )
 @option(
     "--fov-deg",

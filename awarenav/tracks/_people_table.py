@@ -51,11 +51,11 @@ def read_people_table(
 ) -> PeopleTable:
     """Read a CSV with the columns ``t_s``, ``id``, ``x_m`` and ``y_m``, in any order.
 
-    A mark of the byte order and spaces around values are left out. An id is any text; ``1.0``
-    is 1.
+    A mark of the byte order, the line ``sep=,`` of a spreadsheet, and spaces around values are left
+    out. An id is any text; ``1.0`` is 1. A ``.tsv`` has tabs in place of commas.
 
     Args:
-        path: of the file, UTF-8 with commas.
+        path: of the file, UTF-8.
         optional: further columns of numbers that are read if the table has them.
         error: class of the errors.
 
@@ -67,7 +67,11 @@ def read_people_table(
     rows = []
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file, skipinitialspace=True)
+            comma = "\t" if path.suffix.lower() == ".tsv" else ","
+            start = file.tell()
+            if file.readline().strip().strip('"') != f"sep={comma}":
+                file.seek(start)
+            reader = csv.DictReader(file, skipinitialspace=comma == ",", delimiter=comma)
             names = [name.strip() for name in reader.fieldnames or ()]
             _check_header(path, names, optional, error)
             reader.fieldnames = names
@@ -113,12 +117,13 @@ def _check_header(
     twice = sorted({name for name in (*_REQUIRED, *optional) if names.count(name) > 1})
     if not missing and not twice:
         return
-    other = [mark for mark in (";", "\t") if mark in "".join(names)]
+    own, words = ("\t", "tabs") if path.suffix.lower() == ".tsv" else (",", "commas")
+    other = [mark for mark in (";", "\t", ",") if mark != own and mark in "".join(names)]
     raise error(
         f"{path}: the header {'misses' if missing else 'has twice'} {', '.join(missing or twice)}; "
         f"it must name {', '.join(_REQUIRED)} and may name {' or '.join(optional)}, got "
         f"{', '.join(names) or 'nothing'}"
-        + (f"; columns are separated by commas, these by {other[0]!r}" if other else "")
+        + (f"; columns are separated by {words}, these by {other[0]!r}" if other else "")
     )
 
 

@@ -214,7 +214,7 @@ def _remarks(counts: Counter[str]) -> list[str]:
 
 def is_positions(path: Path) -> bool:
     """Return whether a file holds positions, by its suffix."""
-    return path.suffix.lower() == ".csv"
+    return path.suffix.lower() in (".csv", ".tsv")
 
 
 def read_positions(path: Path) -> Recording:

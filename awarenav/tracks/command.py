@@ -23,7 +23,7 @@ from ..cli import POSITIVE, Command, FilePath, Number, argument, command, option
 @argument(
     "file",
     type=FilePath(),
-    metavar="FILE.jsonl|FILE.csv",
+    metavar="FILE.jsonl|FILE.csv|FILE.tsv",
     help="Estimates, rendered truth, or positions as CSV: t_s, id, x_m, y_m, and std_m if known.",
 )
 @options.plot_file("tracks.png", "The plot; replaces the file.")

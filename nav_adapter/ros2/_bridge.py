@@ -20,6 +20,7 @@ from .._constraints import NavConstraints
 from .._errors import NavError
 from .._policy import AwarenessPolicy
 from .._robot import RobotProfile, RobotState
+from ..rules import Unseen
 from ._alerts import sensor_status
 from ._clock import BridgeClock
 from ._image_input import ImageInput, PerceivedFrame
@@ -108,6 +109,7 @@ class AwarenessBridge:
         self._mask = None if speed_mask is None else SpeedMaskStream(speed_mask, self.frames.odom)
         self._with_camera, self._wanted = with_camera, wanted
         self._warn_user, self._warned = warn, ""
+        self._calibration = "no camera_info yet"
         if not with_camera and not scanners:
             raise NavError("with_camera must be True, or scanners must name one or two, got none")
         self._adapter = NavAdapter(policy, robot, prediction=prediction)
@@ -131,13 +133,17 @@ class AwarenessBridge:
             self._clock, self._poses, self._watch, self._tracker, self._lock, self._warn
         )
         self._images = ImageInput(
-            shared, make_pipeline, camera, rectified=rectified, with_depth=with_depth
+            *(shared, make_pipeline, camera),
+            rectified=rectified,
+            with_depth=with_depth,
+            creeps=policy.applies(Unseen.name) and not scanners,
         )
         self._map = MapInput(shared, self.frames.odom)
         self._scans: tuple[ScanInput, ...] = ()
+        self._legs: ScanPerception | None = None
         self._scans_dropped = 0
         if inputs := tuple(scanners):
-            legs = ScanPerception(robot.footprint_m, inputs, make_detector)
+            legs = self._legs = ScanPerception(robot.footprint_m, inputs, make_detector)
             self._scans = tuple(
                 ScanInput(shared, number, each, legs, self._map)
                 for number, each in enumerate(inputs)
@@ -196,12 +202,25 @@ class AwarenessBridge:
         """The camera, or None while it is unknown."""
         return self._images.camera
 
+    def use_robot(self, robot: RobotProfile) -> None:
+        """Go on with another profile, as :meth:`NavAdapter.use_robot`, in the scans too.
+
+        Raises:
+            NavError: for anything else.
+        """
+        with self._sending, self._lock:
+            self._adapter.use_robot(robot)
+            self._robot = robot
+            if self._legs is not None:
+                self._legs.body_base_m = robot.footprint_m
+
     def on_camera_info(self, message: CameraInfo) -> None:
         """Make the pipeline from the first calibration; later ones are ignored."""
         try:
             if self._with_camera:
                 self._images.calibrate(message)
         except (NavError, PerceptionError) as problem:
+            self._calibration = "the camera_info that comes cannot be used"
             self._warn(str(problem))
 
     def on_transforms(
@@ -369,7 +388,7 @@ class AwarenessBridge:
         if self._poses.state is None:
             return "no odometry yet"
         if self._with_camera and self._images.camera is None:
-            return "no camera_info yet"
+            return self._calibration
         return self._watch.missing_text
 
     def _restart(self) -> None:

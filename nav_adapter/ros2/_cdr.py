@@ -27,6 +27,8 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 _AnyMessage = TypeVar("_AnyMessage", bound=Message)
 
 _STORE: Final = get_typestore(Stores.EMPTY)
+# Headers of plain XCDR2, and those of the first version in the same byte order.
+_XCDR2: Final = {b"\0\6": b"\0\0", b"\0\7": b"\0\1"}
 _REGISTERING: Final = threading.Lock()
 # What rosbags raises for a value that does not fit its field.
 _ERRORS: Final = (
@@ -55,10 +57,20 @@ def encode(message: Message) -> bytes:
 def decode(kind: type[_AnyMessage], data: bytes) -> _AnyMessage:
     """Return a message from CDR bytes, header included, in either byte order.
 
+    The second version of CDR (XCDR2) is read where it has the bytes of the first: it aligns numbers
+    of 8 bytes in another way.
+
     Raises:
-        NavError: for bytes that are cut off or of another type.
+        NavError: for bytes that are cut off or of another type, and for other messages in XCDR2.
     """
     name = _registered(kind)
+    if data[:2] in _XCDR2:
+        if _has_long_numbers(kind):
+            raise NavError(
+                f"{name} comes in the second version of CDR, which is not read: let its publisher "
+                "use the first (data representation XCDR, as ROS 2 does)"
+            )
+        data = _XCDR2[data[:2]] + data[2:]
     try:
         return from_ros(kind, _STORE.deserialize_cdr(data, name))
     except _ERRORS as cause:
@@ -72,6 +84,17 @@ def _registered(kind: type[Message]) -> str:
     with _REGISTERING:
         _STORE.register(get_types_from_msg(definition(kind), name))
     return name
+
+
+@once_per_kind
+def _has_long_numbers(kind: type[Message]) -> bool:
+    """Return whether a message has numbers of 8 bytes."""
+    return any(
+        field.name in ("float64", "int64", "uint64")
+        if field.message is None
+        else _has_long_numbers(field.message)
+        for field in field_types(kind).values()
+    )
 
 
 def _with_arrays(message: Message) -> Any:

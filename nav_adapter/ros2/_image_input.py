@@ -6,7 +6,7 @@ import math
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -17,20 +17,26 @@ from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
 from perception.arrays import FloatArray
 from perception.depth_image import MOST_APART_S
 from perception.errors import DepthImageError
-from perception.no_view import FROZEN, why_no_view
+from perception.no_view import FROZEN, LastFrames, why_no_view
+from perception.picture_notes import picture_notes
 from tracking import PersonTrack
 
 from .._errors import NavError
+from ..rules import CREEPING_MPS
 from ._images import camera_of, depth_of, picture_of
 from ._poses import PoseSpread
 from ._shared import Input, Shared
-from .conversions import to_seconds
+from .conversions import pose_matrix, to_seconds, yaw_quaternion
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 
 # Uncertainty of the height and the tilt of a camera on a driving robot.
 _HEIGHT_STD_M = 0.05
 _TILT_STD_RAD = math.radians(2.0)
 _NEEDS_NOISE: Final = " (frozen? a simulated camera needs noise)"
+_SAME: Final = (
+    f"the picture is {FROZEN}{_NEEDS_NOISE}: nobody counts as aware, and the robot may creep until "
+    "it has moved, and stops if the picture is still the same"
+)
 # Depth images that are kept: a quarter of a second at 30 Hz.
 _KEPT: Final = 8
 
@@ -52,14 +58,26 @@ class DepthInput(Input):
     def __init__(self, shared: Shared) -> None:
         super().__init__(shared, "depth image")
         self._kept: deque[StampedDepth] = deque(maxlen=_KEPT)
+        self._refuses = False
 
     def nearest(self, stamp_s: float) -> StampedDepth | None:
         """Return the depth image of a picture; None if none is near enough in time."""
         with self._shared.lock:
             found = min(self._kept, key=lambda each: abs(each.stamp_s - stamp_s), default=None)
-        if found is None or abs(found.stamp_s - stamp_s) > MOST_APART_S:
-            return None
-        return found
+            if found is None or abs(apart_s := found.stamp_s - stamp_s) <= MOST_APART_S:
+                return found
+            side = "before" if apart_s < 0.0 else "after"
+            apart = (
+                f"none that has come is within {MOST_APART_S:g} s of its picture, the nearest is "
+                f"{abs(apart_s):.3f} s {side} it; the driver must send both at one rate and of one "
+                "time (enable_sync or the like)"
+            )
+            self._shared.watch.depth_unused("they are refused" if self._refuses else apart)
+        return None
+
+    def refuse(self, problem: str, now_s: float) -> None:
+        self._refuses = True
+        super().refuse(problem, now_s)
 
     def note_used(self, depth: StampedDepth) -> None:
         """Note a depth image that perception has used; called with the lock."""
@@ -77,6 +95,7 @@ class DepthInput(Input):
             if self._last.repeats(depth):
                 raise NavError(f"it is the same depth image as before{_NEEDS_NOISE}")
             self._kept.append(StampedDepth(stamp_s, depth))
+            self._refuses = False
         return True
 
 
@@ -92,6 +111,7 @@ class PerceivedFrame:
         T_odom_camera: (4, 4) pose of the camera.
         depth: the depth image that was used; None without one.
         depth_problem: why a depth image was not used; empty if it was, or there was none.
+        repeats: whether the picture is the same as before; nobody then has an awareness.
     """
 
     stamp_s: float
@@ -101,12 +121,15 @@ class PerceivedFrame:
     T_odom_camera: FloatArray
     depth: StampedDepth | None = None
     depth_problem: str = ""
+    repeats: bool = False
 
 
 class ImageInput(Input):
     """The bridge's camera: from its images to tracks, from the first calibration on.
 
-    One thread at a time is in :meth:`read` or :meth:`calibrate`; others wait.
+    One thread at a time is in :meth:`read` or :meth:`calibrate`; others wait. With ``creeps``, the
+    robot creeps where no sensor has seen the way: so it does before pictures that only repeat,
+    while it has not moved.
 
     Attributes:
         camera: None while it is unknown. The pipeline exists as soon as it is known.
@@ -122,8 +145,12 @@ class ImageInput(Input):
         *,
         rectified: bool = False,
         with_depth: bool = False,
+        creeps: bool = True,
     ) -> None:
         super().__init__(shared, "image")
+        # With the robot's pose at the first of equal pictures.
+        self._stood, self._creeps = LastFrames(), creeps
+        self._live_s = math.inf
         self._make_pipeline = make_pipeline
         self.frame: PerceivedFrame | None = None
         self.depth = DepthInput(shared) if with_depth else None
@@ -151,7 +178,7 @@ class ImageInput(Input):
 
     def forget(self) -> None:
         super().forget()
-        self.frame = None
+        self.frame, self._live_s = None, math.inf
         if self.depth is not None:
             self.depth.forget()
 
@@ -165,12 +192,21 @@ class ImageInput(Input):
             is_current = shared.still_current()
             T_odom_camera = shared.poses.T_odom_camera(frame_id, stamp_s)
             spread = shared.poses.spread(stamp_s, frame_id)
-        frame = self._process(message, stamp_s, T_odom_camera, is_current, spread)
+        depth = None if self.depth is None else self.depth.nearest(stamp_s)
+        frame = self._process(message, stamp_s, T_odom_camera, is_current, spread, depth)
         with shared.lock:
             if frame is None or not is_current():
                 return False
             self.frame = frame
+            if frame.repeats:
+                shared.watch.saw_same_image(stamp_s)
+                self.refuse(_SAME, now_s)
+                return False
             self.used += 1
+            self._live_s = stamp_s
+            if self.used == 1:
+                for note in picture_notes(frame.image):
+                    shared.warn(f"image: {note}")
             T_base_camera = shared.poses.camera_in_base(frame_id, stamp_s)
             shared.watch.saw_image(stamp_s, self.camera, T_base_camera)
             if self.depth is not None and frame.depth is not None:
@@ -186,6 +222,7 @@ class ImageInput(Input):
         T_odom_camera: FloatArray,
         is_current: Callable[[], bool],
         spread: PoseSpread,
+        depth: StampedDepth | None,
     ) -> PerceivedFrame | None:
         """Return the frame of an image, or None if ``is_current`` says that it came too late.
 
@@ -195,11 +232,13 @@ class ImageInput(Input):
             NavError, PerceptionError, TrackingError: for an image that cannot be used, or shows
                 nothing (:func:`~perception.no_view.why_no_view`).
         """
-        depth = None if self.depth is None else self.depth.nearest(stamp_s)
         with self._busy:
             image = picture_of(message)
             self._fit(image.shape[1], image.shape[0])
-            if no_view := why_no_view(image, self._last):
+            may_creep = self._may_creep(image, stamp_s)
+            no_view = why_no_view(image, self._last)
+            repeats = no_view == FROZEN and may_creep
+            if no_view and not repeats:
                 hint = _NEEDS_NOISE if no_view == FROZEN else ""
                 raise NavError(f"the picture is no view: it is {no_view}{hint}")
             problem, seen = (
@@ -220,12 +259,33 @@ class ImageInput(Input):
             except DepthImageError as cause:  # before any network has run
                 depth, problem = None, str(cause)
                 observations = seen()
+            if repeats:  # places alone: an old look is no evidence
+                observations = tuple(map(_without_look, observations))
             tracks = self._shared.tracker.update(
                 observations, stamp_s, T_odom_camera, is_current, spread
             )
         if tracks is None:
             return None
-        return PerceivedFrame(stamp_s, tracks, image, observations, T_odom_camera, depth, problem)
+        return PerceivedFrame(
+            *(stamp_s, tracks, image, observations, T_odom_camera, depth, problem, repeats)
+        )
+
+    def _may_creep(self, image: NDArray[np.uint8], stamp_s: float) -> bool:
+        """Return whether a picture, if it repeats, may be of a camera that lives.
+
+        So it may while the robot is where it was at the first of the same, and no faster than it
+        creeps, and no other picture has come for so long that it counts as lost. Each picture is
+        asked.
+        """
+        with self._shared.lock:
+            state, lost_s = self._shared.poses.state, self._shared.watch.lost_after_s
+        if state is None:
+            return False
+        x, y = state.position_odom_m.tolist()
+        T_odom_base = pose_matrix((x, y, 0.0), yaw_quaternion(state.heading_odom_rad))
+        moved = self._stood.repeats(image, T_odom_base)
+        late = stamp_s - self._live_s > lost_s
+        return self._creeps and late and not moved and state.travel_mps <= CREEPING_MPS
 
     def _fit(self, width_px: int, height_px: int) -> None:
         """Make sure that the camera is that of images of this size.
@@ -250,6 +310,12 @@ class ImageInput(Input):
         self._pipeline = self._make_pipeline(camera)
         self._shared.tracker.use_camera(camera)
         self.camera = camera
+
+
+def _without_look(observation: PersonObservation) -> PersonObservation:
+    return replace(
+        observation, gaze_camera=None, awareness=None, awareness_std=None, eyes_seen=False
+    )
 
 
 def _floor(T_odom_camera: FloatArray) -> FloorPlane | None:

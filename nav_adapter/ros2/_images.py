@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from perception import Camera, PerceptionError
+from perception.no_view import eight_bits
 
 from .._errors import NavError
 
@@ -50,12 +51,17 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
         message: ``sensor_msgs`` Image or CompressedImage, of this package or of another library.
 
     Raises:
-        NavError: for an unsupported encoding, too few bytes, or a damaged file.
+        NavError: for an unsupported encoding, too few bytes, a damaged file, or 16-bit values that
+            use too little of their range.
     """
     if not hasattr(message, "encoding"):
         return _decompressed(message)
     if message.encoding not in _ENCODINGS:
-        raise NavError(f"encoding must be one of {', '.join(_ENCODINGS)}, got {message.encoding!r}")
+        counts = message.encoding in _DEPTH_TYPES
+        raise NavError(
+            f"encoding must be one of {', '.join(_ENCODINGS)}, got {message.encoding!r}"
+            + (", that of depth images and of raw counts: scale these to mono8" if counts else "")
+        )
     depth, code = _ENCODINGS[message.encoding]
     height, width = int(message.height), int(message.width)
     wide = message.encoding in _SIXTEEN_BITS
@@ -63,7 +69,10 @@ def picture_of(message: Any) -> NDArray[np.uint8]:
     if wide:
         samples = np.ascontiguousarray(rows).view(">u2" if message.is_bigendian else "<u2")
         native = samples.astype(np.uint16, copy=False)
-        rows = np.asarray(cv2.convertScaleAbs(native, alpha=255.0 / 65535.0), dtype=np.uint8)
+        try:
+            rows = eight_bits(native)
+        except PerceptionError as cause:
+            raise NavError(f"{message.encoding}: {cause}") from cause
     pixels = rows.reshape(height, width, depth) if depth > 1 else rows
     try:
         rgb = pixels if code is None else cv2.cvtColor(np.ascontiguousarray(pixels), code)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from ._clock import CLOCK_TOLERANCE_S, BridgeClock, InputKind
 from ._odometry_check import OdometryCheck
 from ._outgoing import Frames
 from ._transforms import TransformBuffer
-from .conversions import pose_matrix, to_seconds
+from .conversions import header, pose_matrix, to_seconds
 from .messages.geometry_msgs import TransformStamped
 from .messages.nav_msgs import Odometry
 from .messages.tf2_msgs import TFMessage
@@ -91,7 +92,7 @@ class RobotPoses:
         self._frames, self._T_base_camera = frames, T_base_camera
         self._clock, self._warn, self._with_map = clock, warn, with_map
         # Kinds of messages from the future that have been reported.
-        self._ahead: set[InputKind] = set()
+        self._ahead: set[InputKind | Literal["mounts"]] = set()
         self.transforms = TransformBuffer()
         # Apart from tf, which may have a pose of the robot too: two sources in one history would
         # be one robot that jumps.
@@ -107,7 +108,10 @@ class RobotPoses:
         for each in message.transforms:
             to_odom = each.child_frame_id.lstrip("/") == self._frames.odom
             timeless = static or (to_odom and self._with_map)
-            if not timeless and self._is_future_transform(each, now_s):
+            mount = not timeless and self._rides(each)
+            if mount:
+                each = self._not_ahead(each, now_s)  # noqa: PLW2901
+            elif not timeless and self._is_future_transform(each, now_s):
                 continue
             try:
                 self.transforms.add_message(each, static=timeless)
@@ -172,7 +176,8 @@ class RobotPoses:
         Raises:
             NavError: for a pose that is not known at that time.
         """
-        return self.transforms.lookup(self._frames.base, frame, stamp_s)
+        rigid = self._is_on_robot(frame)
+        return self.transforms.lookup(self._frames.base, frame, stamp_s, rigid=rigid)
 
     def camera_in_base(self, frame: str, stamp_s: float) -> FloatArray | None:
         """Return the pose (4, 4) of the camera in the base frame; None if it is not known."""
@@ -235,6 +240,29 @@ class RobotPoses:
             self._ahead.add(kind)
             self._warn(f"{kind}: the {refusal}: refused and counted, without further warnings")
         return refusal is not None
+
+    def _rides(self, message: TransformStamped) -> bool:
+        """Return whether a transform is between two frames of the robot, or may be."""
+        odom, base = self._frames.odom.lstrip("/"), self._frames.base.lstrip("/")
+        parent = message.header.frame_id.lstrip("/")
+        above, over_base = self.transforms.above(parent), self.transforms.above(base)
+        on_robot = {*itertools.takewhile(lambda frame: frame != odom, over_base)}
+        known = on_robot.isdisjoint(above) and odom in above
+        return message.child_frame_id.lstrip("/") != odom and not known
+
+    def _not_ahead(self, message: TransformStamped, now_s: float | None) -> TransformStamped:
+        """Return a mount with the present time if its sender stamps it ahead, as ROS 1 does."""
+        if now_s is None or to_seconds(message.header.stamp) - now_s <= CLOCK_TOLERANCE_S:
+            return message
+        if "mounts" not in self._ahead:
+            self._ahead.add("mounts")
+            ahead_s = to_seconds(message.header.stamp) - now_s
+            self._warn(
+                f"transforms: {message.header.frame_id!r} -> {message.child_frame_id!r} is stamped "
+                f"{ahead_s:.3f} s ahead, as static_transform_publisher of ROS 1 does: between "
+                "frames of the robot, the present time is taken"
+            )
+        return replace(message, header=header(now_s, message.header.frame_id))
 
     def _is_future_transform(self, message: TransformStamped, now_s: float | None) -> bool:
         stamp_s = to_seconds(message.header.stamp)
@@ -300,7 +328,7 @@ class RobotPoses:
                 f"base frame to {child!r} (--base-frame, base_frame)"
             )
             raise NavError(self.problem)
-        return self.transforms.lookup(child, base, stamp_s)
+        return self.transforms.lookup(child, base, stamp_s, rigid=True)
 
     def _is_on_robot(self, frame: str) -> bool:
         """Return whether tf knows the frame beside the base frame, and not by way of odom."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
@@ -27,6 +27,20 @@ def _near_base(position_m: list[float]) -> list[float]:
         )
     return position_m
 
+
+# Keys of Nav2's costmaps and controllers, which people copy, and what this file has instead.
+_OF_NAV2: Final = {
+    "robot_radius": "give the corners of the outline in footprint_m, of a round robot those of a "
+    "polygon about its circle, with 8 corners or more",
+    "footprint": "give its corners in footprint_m, as a list and not as text",
+    "footprint_padding": "give footprint_m with it",
+    "max_vel_x": "it is max_speed_mps here",
+    "vx_max": "it is max_speed_mps here",
+    "acc_lim_x": "it is max_acceleration_mps2 here",
+    "decel_lim_x": "it is max_deceleration_mps2 here, a positive number",
+    "max_vel_theta": "it is max_yaw_rate_radps here",
+    "wz_max": "it is max_yaw_rate_radps here",
+}
 
 _Position = Annotated[list[float], Field(min_length=3, max_length=3), AfterValidator(_near_base)]
 _Corner = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -139,6 +153,20 @@ class RobotFile(NavConfig):
     brakes_on_curve: bool = False
     camera: CameraMount | None = None
     scanners: list[ScannerMount] | None = Field(default=None, min_length=1, max_length=2)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_nav2(cls, data: Any) -> Any:
+        for key in data if isinstance(data, dict) else ():
+            if key in _OF_NAV2:
+                raise ValueError(f"unknown key {key!r} in {cls.__name__}: {_OF_NAV2[key]}")
+        corners = data.get("footprint_m") if isinstance(data, dict) else None
+        if isinstance(corners, str):
+            raise ValueError(
+                f"footprint_m must be a list of corners, got the text {corners!r:.60}: leave out "
+                "its quotation marks"
+            )
+        return data
 
     @model_validator(mode="after")
     def _has_a_profile(self) -> RobotFile:

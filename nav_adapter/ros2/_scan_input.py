@@ -13,6 +13,7 @@ import numpy as np
 from perception import PersonObservation
 from perception.arrays import FloatArray
 from perception.laser import (
+    CarriedThings,
     LaserScan,
     LegDetector,
     MapCells,
@@ -90,6 +91,7 @@ class PerceivedScan:
         sight: where the scan shows what is there.
         view: of the scan in that frame.
         observations: of the people, in that frame.
+        carried_base_m: (K, 2) places of what the robot carries or pulls, in the base frame.
     """
 
     stamp_s: float
@@ -97,12 +99,13 @@ class PerceivedScan:
     sight: ScannerSight
     view: ScannerView
     observations: tuple[PersonObservation, ...]
+    carried_base_m: FloatArray
 
 
 class ScanPerception:
     """Finds people in the scans of all scanners. One thread at a time; others wait.
 
-    Returns on the outline (M, 2) of the robot's body are dropped.
+    Returns on the outline (M, 2) of the robot's body are dropped, and those on what it carries.
     """
 
     def __init__(
@@ -111,10 +114,11 @@ class ScanPerception:
         inputs: tuple[ScannerInput, ...],
         make_detector: Callable[[], LegDetector],
     ) -> None:
-        self._body_base_m, self._inputs = body_base_m, inputs
+        self.body_base_m, self._inputs = body_base_m, inputs
         self._detector = make_detector()
         nothing: tuple[float, tuple[PersonCandidate, ...]] = (-math.inf, ())
         self._found = [nothing] * len(inputs)
+        self._carried = [CarriedThings() for _ in inputs]
         self._placed: tuple[MapCells, FloatArray, FloatArray] | None = None
         self._busy = threading.Lock()
 
@@ -141,7 +145,7 @@ class ScanPerception:
             )
         mount = self._inputs[number].mount
         limits = (-2.0 * math.pi, 2.0 * math.pi) if mount is None else mount.field_of_view_rad
-        scanner = Scanner(T_base_scanner, limits, self._body_base_m)
+        scanner = Scanner(T_base_scanner, limits, self.body_base_m)
         angles = scan.angles_rad[scanner.sees(scan)]
         if not len(angles):
             raise NavError(
@@ -149,6 +153,10 @@ class ScanPerception:
                 f"{limits[0]:.2f} to {limits[1]:.2f} rad"
             )
         points = scan_points(scan, scanner, motion)
+        carried = self._carried[number].note(scan, points, motion)
+        own_base_m = self._carried[number].places_base_m(points, carried)
+        if len(own_base_m):
+            points = points.without(carried)
         low, high = float(angles.min()), float(angles.max())
         to_middle = pose_matrix((0.0, 0.0, 0.0), yaw_quaternion(0.5 * (low + high)))
         T_odom_scanner = motion.pose_at(points.stamp_s) @ T_base_scanner @ to_middle
@@ -168,6 +176,7 @@ class ScanPerception:
             sight_of(scan, scanner, points),
             ScannerView(reach_m, nearest_m, field_rad, points),
             observations_of(own, T_odom_scanner),
+            own_base_m,
         )
         return perceived, contradicted
 
@@ -272,7 +281,8 @@ class ScanInput(Input):
         static_map: MapInput,
     ) -> None:
         super().__init__(shared, f"{scanner.name}: scan")
-        self._number, self._mount = number, scanner.mount
+        self._number, self._mount, self._name = number, scanner.mount, scanner.name
+        self._carries = False
         self._perception, self._map = perception, static_map
         self._messages = ScanMessages(scanner.name, shared.warn)
         self._last_s = -math.inf
@@ -306,6 +316,14 @@ class ScanInput(Input):
         )
         if static_map is not None:
             self._map.judge(contradicted, seen.stamp_s)
+        if len(seen.carried_base_m) and not self._carries:
+            places = ", ".join(f"({x:.2f}, {y:.2f})" for x, y in seen.carried_base_m.tolist())
+            shared.warn(
+                f"{self._name}: what is at {places} m in the base frame keeps its place there "
+                "while the robot moves, as a cart or a load does. It is nobody, but the robot is "
+                "now larger than its footprint: give footprint_m with it"
+            )
+        self._carries |= len(seen.carried_base_m) > 0
         if not seen.sight.nothing:
             tracks = shared.tracker.update(
                 *(seen.observations, seen.stamp_s, seen.T_odom_scanner, is_current, spread),

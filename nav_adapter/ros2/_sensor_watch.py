@@ -38,12 +38,9 @@ class Sensor:
     trouble: str = ""
 
     @property
-    def nothing_yet(self) -> str:
-        """In words, that nothing has come from it yet; empty if something has."""
-        if self.stamp_s > -math.inf:
-            return ""
-        words = {CAMERA: "no camera frame yet", DEPTH: "no depth image yet"}
-        return words.get(self.name, f"no scan yet from {self.name!r}")
+    def heard(self) -> bool:
+        """Whether anything has come from it."""
+        return self.stamp_s > -math.inf
 
 
 class SensorWatch:
@@ -75,21 +72,41 @@ class SensorWatch:
                 f"each scanner must have a name of its own, other than {CAMERA!r} and {DEPTH!r}, "
                 f"got {taken[0]!r} again: rename its topic"
             )
-        self._scanners, self._lost_after_s = tuple(scanners), lost_after_s
+        self._scanners, self.lost_after_s = tuple(scanners), lost_after_s
         self._sensors = {name: Sensor(name) for name in names}
+        self._first_image_s, self._depth_unused = math.inf, ""
         self._field = (0.0, AHEAD_RAD)
         self.seen = SeenDirections()
+        # With the pictures of a camera that may be frozen.
+        self._maybe = SeenDirections()
 
     def saw_image(self, stamp_s: float, camera: Camera, T_base_camera: FloatArray | None) -> None:
         """Note an image, and the camera's pose (4, 4); None leaves its field as it was."""
+        self._first_image_s = min(self._first_image_s, stamp_s)
         self._saw(CAMERA, stamp_s)
         if T_base_camera is not None:
             self._field = camera_field(camera, T_base_camera)
         self.seen.note_field(*self._field, stamp_s)
+        self._maybe.note_field(*self._field, stamp_s)
+
+    def saw_same_image(self, stamp_s: float) -> None:
+        """Note a picture that repeats the one before, of a robot that has not moved since.
+
+        It may be of a simulated camera without noise, before which nothing moves. The robot may
+        creep then, as where no sensor sees: the first step shows whether the camera lives.
+        """
+        if self._sensors[CAMERA].heard:
+            self._saw(CAMERA, stamp_s)
+            self._maybe.note_field(*self._field, stamp_s)
 
     def saw_depth(self, stamp_s: float) -> None:
         """Note a depth image that was used."""
         self._saw(DEPTH, stamp_s)
+        self._depth_unused = ""
+
+    def depth_unused(self, why: str) -> None:
+        """Note why the latest depth images cannot be used."""
+        self._depth_unused = why
 
     def saw_scan(self, number: int, stamp_s: float, sight: ScannerSight) -> None:
         """Note a scan of a scanner, and where it shows what is there."""
@@ -99,6 +116,7 @@ class SensorWatch:
         if not sight.nothing:
             self._saw(name, stamp_s)
             self.seen.note(sight, stamp_s)
+            self._maybe.note(sight, stamp_s)
 
     @property
     def stamp_s(self) -> float | None:
@@ -107,12 +125,19 @@ class SensorWatch:
         Without a camera the field is 60° to either side of straight ahead. None if nothing has seen
         the field.
         """
-        return self.seen.stamp_s(*self._field)
+        return self._maybe.stamp_s(*self._field)
 
     @property
     def missing_text(self) -> str:
-        """The first sensor that nothing has come from yet, in words; empty if there is none."""
-        return next(filter(None, (each.nothing_yet for each in self._sensors.values())), "")
+        """The first sensor that nothing has come from yet, in words; empty if there is none.
+
+        Depth images are not waited for: the camera goes on without them.
+        """
+        for each in self._sensors.values():
+            if not each.heard and each.name != DEPTH:
+                camera = each.name == CAMERA
+                return "no camera frame yet" if camera else f"no scan yet from {each.name!r}"
+        return ""
 
     @property
     def blind_text(self) -> str:
@@ -127,35 +152,40 @@ class SensorWatch:
     def lost(self, now_s: float) -> tuple[str, ...]:
         """Return the sensors that have been silent for too long."""
         ages_s = self.ages_s(now_s).items()
-        return tuple(name for name, age_s in ages_s if age_s > self._lost_after_s)
+        return tuple(name for name, age_s in ages_s if age_s > self.lost_after_s)
 
     def news(self, now_s: float) -> list[str]:
         """Return a line for every sensor that has been lost, or has come back, since last asked.
 
         So is one that has become blind, in a sector or all of it. A sensor that has never been
-        heard is no news.
+        heard is no news, but for depth images, once the camera has been at work for so long.
         """
         lost, lines, back = set(self.lost(now_s)), [], []
         for name, sensor in self._sensors.items():
             trouble, what = "", ""
             blind_s = now_s - sensor.blind_since_s
-            if sensor.blind and (name in lost or blind_s > self._lost_after_s):
+            if sensor.blind and (name in lost or blind_s > self.lost_after_s):
                 trouble = "all blind" if name in lost else "blind"
                 what = f"{name}: {sensor.blind}"
-            elif name in lost and not sensor.nothing_yet:
+            elif name in lost and sensor.heard:
                 trouble = "silent"
-                what = f"{name} has been silent for {now_s - sensor.stamp_s:.1f} s"
+                have = "have" if name == DEPTH else "has"
+                what = f"{name} {have} been silent for {now_s - sensor.stamp_s:.1f} s"
+            late = now_s - self._first_image_s > self.lost_after_s
+            if name == DEPTH and name in lost and late and (self._depth_unused or not what):
+                trouble, what = "silent", f"{name}: {self._depth_unused or 'none has come'}"
             if trouble and trouble != sensor.trouble:
                 lines.append(f"{what}: {self._consequence(lost, now_s)}")
             elif sensor.trouble and not trouble:
-                back.append(f"{name} is back")
+                back.append(f"{name} {'are' if name == DEPTH else 'is'} back")
             self._sensors[name] = replace(sensor, trouble=trouble)
         return lines + back
 
     def forget(self) -> None:
         """Forget all that was seen."""
+        self._first_image_s, self._depth_unused = math.inf, ""
         self._sensors = {name: Sensor(name) for name in self._sensors}
-        self.seen = SeenDirections()
+        self.seen, self._maybe = SeenDirections(), SeenDirections()
 
     def _saw(self, name: str, stamp_s: float) -> None:
         sensor = self._sensors[name]
@@ -164,7 +194,7 @@ class SensorWatch:
     def _consequence(self, lost: set[str], now_s: float) -> str:
         left = [name for name in self._sensors if name not in lost and name != DEPTH]
         seen_s = self.stamp_s
-        if not left or seen_s is None or now_s - seen_s > self._lost_after_s:
+        if not left or seen_s is None or now_s - seen_s > self.lost_after_s:
             return "the robot stops"
         goes_on = f"{' and '.join(left)} {'goes' if len(left) == 1 else 'go'} on"
         if CAMERA in lost:

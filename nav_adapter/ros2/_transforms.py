@@ -19,6 +19,8 @@ from .messages.geometry_msgs import TransformStamped
 _KEPT_S: Final = 5.0
 #: The newest transform is used for at most this long after its stamp.
 HOLD_S: Final = 0.1
+# One between two frames of the robot that has never changed is used for this many of its periods.
+_PERIODS: Final = 3.0
 # Below this turn an arc is a straight line but for rounding.
 _STRAIGHT_RAD: Final = 1e-6
 
@@ -36,7 +38,9 @@ class TransformBuffer:
 
     Between two stamps, a frame moves at constant velocity and turning speed, along an arc. For up
     to 0.1 s after the newest it keeps its motion, as far as it is known; there is no extrapolation
-    before the oldest. Static transforms hold at all times and have no stamp.
+    before the oldest. Static transforms hold at all times and have no stamp. Some senders put them
+    among the others: between ``rigid`` frames one that was sent once, and those that are sent again
+    and again without a change, are taken to be static.
     """
 
     def __init__(self) -> None:
@@ -113,16 +117,24 @@ class TransformBuffer:
                 del self._histories[child], self._parents[child]
         return forgotten
 
-    def lookup(self, target: str, source: str, stamp_s: float) -> FloatArray:
+    def lookup(
+        self, target: str, source: str, stamp_s: float, *, rigid: bool = False
+    ) -> FloatArray:
         """Return T_target_source (4, 4) at ``stamp_s``.
+
+        Args:
+            target: name of the frame to transform to.
+            source: name of the frame to transform from.
+            stamp_s: the time.
+            rigid: whether both are frames of one robot.
 
         Raises:
             NavError: for frames that are not connected, or not known at that time.
         """
         stamp = finite_number("stamp_s", stamp_s, NavError)
         source_way, target_way = self.ways(target, source)
-        T_common_source = self._chain(source_way[:-1], stamp)
-        T_common_target = self._chain(target_way[:-1], stamp)
+        T_common_source = self._chain(source_way[:-1], stamp, rigid)
+        T_common_target = self._chain(target_way[:-1], stamp, rigid)
         return np.asarray(np.linalg.inv(T_common_target) @ T_common_source, dtype=np.float64)
 
     def ways(self, target: str, source: str) -> tuple[list[str], list[str]]:
@@ -161,17 +173,21 @@ class TransformBuffer:
             path.append(self._parents[path[-1]])
         return path
 
-    def _chain(self, children: list[str], stamp: float) -> FloatArray:
+    def above(self, frame: str) -> tuple[str, ...]:
+        """Return a frame and all its ancestors, up to the root."""
+        return tuple(self._path(frame.lstrip("/")))
+
+    def _chain(self, children: list[str], stamp: float, rigid: bool) -> FloatArray:
         """Return the pose of the first child in the parent of the last."""
         T = np.eye(4)
         for child in children:
-            T = self._at(child, stamp) @ T
+            T = self._at(child, stamp, rigid) @ T
         return T
 
-    def _at(self, child: str, stamp: float) -> FloatArray:
+    def _at(self, child: str, stamp: float, rigid: bool) -> FloatArray:
         """Return the pose of a frame in its parent."""
         history = self._histories[child]
-        if child in self._static:
+        if child in self._static or (rigid and _is_constant(history, stamp)):
             return history[-1].T
         after = bisect_right(history, stamp, key=lambda entry: entry.stamp_s)
         if after == 0:
@@ -192,6 +208,15 @@ class TransformBuffer:
             )
         x_m, y_m, heading_rad, *_ = motion.at(since_s)
         return np.asarray(before @ pose_matrix((x_m, y_m, 0.0), yaw_quaternion(heading_rad)))
+
+
+def _is_constant(history: list[_Sample], stamp_s: float) -> bool:
+    """Return whether transforms have never changed and still come, or were sent only once."""
+    last_s = history[-1].stamp_s
+    if any(not np.array_equal(each.T, history[-1].T) for each in history):
+        return False
+    gaps = np.diff([each.stamp_s for each in history])
+    return not len(gaps) or stamp_s - last_s <= max(HOLD_S, _PERIODS * float(gaps.max()))
 
 
 def _part(step: FloatArray, share: float) -> FloatArray:

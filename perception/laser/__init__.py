@@ -16,6 +16,7 @@ that ``tracking.PersonTracker`` takes.
 from __future__ import annotations
 
 from ._candidates import CandidateKind, PersonCandidate, merge_candidates, observations_of
+from ._carried import CarriedThings
 from ._clusters import Clusters, clusters_of
 from ._detector import LegDetector, LegDetectorConfig
 from ._hypotheses import (
@@ -37,6 +38,7 @@ __all__ = [
     "CUTOUT",
     "HYPOTHESIS_FEATURES",
     "CandidateKind",
+    "CarriedThings",
     "Clusters",
     "Hypotheses",
     "LaserScan",

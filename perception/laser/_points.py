@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -152,6 +152,16 @@ class ScanPoints:
     ranges_m: FloatArray
     usable: NDArray[np.bool_]
     angle_increment_rad: float
+
+    def without(self, own: NDArray[np.bool_]) -> ScanPoints:
+        """Return the points without those of some rays (N,): they met the robot's own body."""
+        return replace(
+            self,
+            points_base_m=np.where(own[:, None], np.nan, self.points_base_m),
+            points_odom_m=np.where(own[:, None], np.nan, self.points_odom_m),
+            ranges_m=np.where(own, np.nan, self.ranges_m),
+            usable=self.usable & ~own,
+        )
 
 
 def scan_points(scan: LaserScan, scanner: Scanner, motion: RobotMotion) -> ScanPoints:

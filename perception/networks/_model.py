@@ -83,6 +83,27 @@ class OnnxTensor:
         return f"{self.name} ({extents}) {self.dtype}"
 
 
+# What people have under the name of a network, by how it begins, in lower case.
+_NO_NETWORKS: Final = (
+    (
+        (b"version https://git-lfs",),
+        "it is the pointer of a file in git-lfs: `git lfs pull` fetches the network",
+    ),
+    (
+        (b"<!doctype", b"<html", b"<?xml", b'{"'),
+        "it is a page or an answer of a web server, not the file: fetch it from the address that "
+        "its download button has",
+    ),
+    (
+        (b"pk\x03\x04", b"\x80\x02", b"\x80\x03", b"\x80\x04"),
+        "it is a ZIP or pickle file, such as a PyTorch checkpoint (.pt) or a packed download: "
+        "unpack it, or export the network to ONNX",
+    ),
+    ((b"\x1f\x8b", b"bzh", b"\xfd7zxz"), "it is compressed: unpack it"),
+    ((b"\x89hdf",), "it is a Keras file (HDF5): export the network to ONNX"),
+)
+
+
 class NetworkFile:
     """What messages say of a network, whatever its format.
 
@@ -243,7 +264,7 @@ class OnnxModel(NetworkFile):
             given = "".join(f", {name} with {chosen}" for name, chosen in wanted if chosen)
             raise PerceptionError(
                 f"{self.name} is not an ONNX network that onnxruntime {ort.__version__} can load "
-                f"({len(content)} bytes{given}): {_first_line(cause)}"
+                f"({len(content)} bytes{given}): {looks_like(content) or _first_line(cause)}"
             ) from cause
         used = session.get_providers()
         if idle := [name for name in names if PROVIDERS[name] not in used]:
@@ -309,6 +330,15 @@ def read_model(path_or_bytes: Any, sha256: str | None = None) -> tuple[Path | No
     if sha256 is not None:
         _check_sha256(path or "model given as bytes", content, sha256)
     return path, content
+
+
+def looks_like(content: bytes) -> str:
+    """Return what a file is that is often taken for a network, and the cure; empty if unknown."""
+    start = content[:64].lstrip().lower()
+    for beginnings, words in _NO_NETWORKS:
+        if start.startswith(beginnings):
+            return words
+    return "" if content else "it is empty: fetch it again"
 
 
 def _check_sha256(name: Any, content: bytes, wanted: str) -> None:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .._manifest import TrainingDomain
 from ..errors import PerceptionError
-from ._model import NETWORK_TIME, NetworkFile, OnnxTensor, read_model
+from ._model import NETWORK_TIME, NetworkFile, OnnxTensor, looks_like, read_model
 from ._settings import OnnxSettings
 
 #: Runs a network on one batch, from the input to the outputs by name.
@@ -81,7 +81,7 @@ class TfliteModel(NetworkFile):
         except Exception as cause:  # both engines' errors share no base of their own
             raise PerceptionError(
                 f"{self.name} is not a TFLite network that can be loaded "
-                f"({len(content)} bytes): {_last_line(cause)}"
+                f"({len(content)} bytes): {looks_like(content) or _last_line(cause)}"
             ) from cause
         self._lock = threading.Lock()
 

@@ -10,7 +10,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from .._camera import Camera
+from .._camera import Camera, bent_too_far
 from .._camera_info import FISHEYE, CameraInfo
 from .._observation import PersonObservation
 from ..arrays import (
@@ -80,7 +80,8 @@ class FisheyeLens:
         )
         if angle > math.pi:
             raise PerceptionError(f"max_angle_rad must lie in (0, pi], got {angle:g} rad")
-        radii = _fisheye_radius(np.linspace(0.0, angle, 256), coefficients)
+        angles = np.linspace(0.0, angle, 256)
+        radii = _fisheye_radius(angles, coefficients)
         if not (np.diff(radii) > 0.0).all():
             raise PerceptionError(
                 f"the fisheye polynomial of {coefficients.tolist()} must grow up to max_angle_rad "
@@ -99,6 +100,16 @@ class FisheyeLens:
             coefficients=coefficients,
             max_angle_rad=angle,
         )
+        # Beyond a right angle there is no pinhole to compare with.
+        farthest = math.hypot(self.width_px / self.fx_px, self.height_px / self.fy_px)
+        ahead = (angles > 0.0) & (angles < 0.5 * math.pi) & (radii <= farthest)
+        if wrong := bent_too_far(angles[ahead], radii[ahead]):
+            seen_deg, pinhole_deg = np.degrees(wrong).tolist()
+            raise PerceptionError(
+                f"the fisheye coefficients {coefficients.tolist()} are those of no lens: a ray "
+                f"{seen_deg:.1f} degrees off the axis would fall where a pinhole has "
+                f"{pinhole_deg:.1f}; are they of another model, or in another order?"
+            )
 
     @classmethod
     def from_yaml(

@@ -92,7 +92,7 @@ class Seeing:
         self.ahead_m, self.awareness, self.sigma_m = ahead_m, awareness, sigma_m
         self.gone = False
 
-    def process(self, image_rgb, stamp_s, *, floor=None):
+    def process(self, image_rgb, stamp_s, floor=None, *, up_camera=None):
         ahead_m = self.ahead_m(stamp_s) if callable(self.ahead_m) else self.ahead_m
         seen = PersonObservation(
             stamp_s=stamp_s,
@@ -124,7 +124,7 @@ class Network:
         self.entered.clear()
         self.open.clear()
 
-    def process(self, image_rgb, stamp_s, *, floor=None):
+    def process(self, image_rgb, stamp_s, floor=None, *, up_camera=None):
         self.stamps_s.append(stamp_s)
         self.entered.set()
         assert self.open.wait(PATIENCE_S)

@@ -455,3 +455,30 @@ def test_a_boolean_is_no_number_anywhere(tmp_path: Path) -> None:
     (tmp_path / "tracker.yaml").write_text("awareness: {memory_s: no}\n")
     with pytest.raises(TrackingError, match="awareness: memory_s must be a number, got False"):
         TrackerConfig.from_yaml(tmp_path / "tracker.yaml")
+
+
+@pytest.mark.parametrize(
+    ("shift", "side"),
+    [((0.5, 0), "ahead of"), ((-2, 0), "behind"), ((0, 1), "to the left"), ((0, -1), "right of")],
+)
+def test_a_footprint_wholly_beside_its_origin_is_refused(shift, side) -> None:
+    with pytest.raises(NavError, match=rf"got one wholly .*{side}.*frame of a sensor"):
+        replace(ROBOT, footprint_m=ROBOT.footprint_m + shift)
+    at_its_end = ROBOT.footprint_m - ROBOT.footprint_m.min(axis=0)
+    assert replace(ROBOT, footprint_m=at_its_end) is not None
+
+
+@pytest.mark.parametrize(
+    ("line", "cure"),
+    [
+        ("robot_radius: 0.3", "corners of the outline in footprint_m"),
+        ("footprint: '[[0.3, 0.3], [0.3, -0.3], [-0.3, 0.0]]'", "as a list and not as text"),
+        ("max_vel_theta: 1.0", "it is max_yaw_rate_radps here"),
+    ],
+)
+def test_keys_of_nav2_in_a_robot_file_get_the_right_hint(tmp_path, line, cure) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(f"max_speed_mps: 1.0\n{line}\n")
+    with pytest.raises(NavError, match=cure) as refused:
+        RobotFile.from_yaml(path)
+    assert "did you mean" not in str(refused.value)

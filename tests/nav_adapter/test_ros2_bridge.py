@@ -15,13 +15,16 @@ from bridge_scenes import (
     START_S,
     TIMING,
     Listener,
+    Robot,
     Seeing,
+    attentive,
     image,
     odometry,
     tf,
 )
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from nav_scenes import ROBOT
 from scan_scenes import scan_message
 
 from nav_adapter import AwarenessPolicy, NavError
@@ -247,3 +250,22 @@ def test_lateral_speed_of_the_odometry_counts() -> None:
     too_fast = TwistWithCovariance(Twist(Vector3(0.0, 1e3, 0.0)))
     nav.bridge.on_odometry(replace(odometry(START_S), twist=too_fast))
     assert "speed_mps must be within 100 m/s" in nav.warnings[-1]
+
+
+@pytest.mark.parametrize("longer_m", [0.0, 0.4, 1.2])
+def test_people_are_kept_when_the_robot_takes_a_load(longer_m: float) -> None:
+    """The limit is then that of a bridge that had the larger profile from the start."""
+    outline = ROBOT.footprint_m + np.where(ROBOT.footprint_m > 0.0, [longer_m, 0.0], 0.0)
+    loaded = replace(ROBOT, footprint_m=outline)
+    changed, always = (Robot(make_pipeline=attentive) for _ in range(2))
+    always.bridge.use_robot(loaded)
+    for robot in (changed, always):
+        robot.drive(START_S, 3.0)
+    before = changed.bridge.tracks[0].id
+    changed.bridge.use_robot(loaded)
+    later = [robot.drive(START_S + 3.0, 3.0)[-1] for robot in (changed, always)]
+    assert changed.bridge.tracks[0].id == before
+    assert later[0].speed_limit_mps == pytest.approx(later[1].speed_limit_mps)
+    assert later[0].robot is loaded
+    with pytest.raises(NavError, match="robot"):
+        changed.bridge.use_robot("larger")

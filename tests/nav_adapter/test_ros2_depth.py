@@ -152,28 +152,51 @@ def test_one_from_the_future_is_refused_and_counted() -> None:
     assert "ahead of this computer's clock" in nav.warnings[0]
 
 
-def test_the_robot_stands_until_depth_has_come_and_goes_on_without_it() -> None:
+def test_the_robot_goes_on_without_depth_before_it_comes_and_after() -> None:
     nav = DepthListener()
-    nav.picture(START_S)
-    assert nav.bridge.tick(START_S).limited_by == "no depth image yet"
-    assert nav.standing()
     states = []
-    for tick in range(1, 60):
+    for tick in range(90):
         now = START_S + 0.05 * tick
-        if tick < 20 or tick >= 50:
+        if 20 <= tick < 40 or tick >= 70:
             nav.bridge.on_depth(depth_image(now), now)
         nav.picture(now)
-        nav.bridge.tick(now)
+        constraints = nav.bridge.tick(now)
+        assert not constraints.stale
         status = nav.heard["alerts"][-1].status[1]
         states.append((status.level, status.message))
     assert (b"\0", "all sensors are at work") in [(bytes([level]), text) for level, text in states]
     assert any("lost: depth images" in text for _, text in states)
     assert states[-1][1] == "all sensors are at work"
-    assert [line.split(":")[0].split(" for")[0] for line in nav.warnings] == [
-        "depth images has been silent",
-        "depth images is back",
-    ]
-    assert "no depth" not in nav.bridge.tick(START_S + 2.95).limited_by
+    goes_on = ": camera goes on, and distances are less sure"
+    lost, back, again, there = nav.warnings
+    assert lost == f"depth images: none has come{goes_on}"
+    assert "the nearest is 0." in again
+    assert again.endswith(goes_on)
+    assert back == there == "depth images are back"
+
+
+@pytest.mark.parametrize(
+    ("late_s", "held_s", "said"),
+    [
+        (0.06, 0.0, "the nearest is 0.060 s before it"),
+        (0.7, 0.0, "the nearest is 0.700 s before it"),
+        (0.0, 0.09, "the nearest is 0.100 s before it"),  # right, and later than its picture
+    ],
+)
+def test_depth_of_another_time_is_left_out_and_the_cause_is_said(late_s, held_s, said) -> None:
+    nav, times = DepthListener(), [START_S + 0.1 * index for index in range(20)]
+    for index, now in enumerate(times):
+        sent_s = now if held_s == 0.0 else times[index - 1] if index else None
+        if sent_s is not None:
+            nav.bridge.on_depth(depth_image(sent_s - late_s), now + 0.05)
+        placed_m = nav.picture(now)
+        assert not nav.bridge.tick(now).stale
+    assert placed_m > 0.0
+    assert nav.bridge.counts["depth_images"] == 0
+    (warning,) = nav.warnings
+    assert warning.startswith("depth images: none that has come is within 0.05 s of its picture")
+    assert said in warning
+    assert warning.endswith("camera goes on, and distances are less sure")
 
 
 def test_without_the_option_depth_images_are_an_error() -> None:

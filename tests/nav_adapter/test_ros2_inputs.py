@@ -15,6 +15,8 @@ from hypothesis import strategies as st
 from nav_scenes import finite
 from scipy.spatial.transform import Rotation
 
+from awarenav import AwarenavError
+from awarenav.estimate._pictures import as_rgb
 from nav_adapter import NavError
 from nav_adapter.ros2 import (
     CameraMount,
@@ -370,3 +372,36 @@ def test_no_heading_and_no_tilt_of_a_body_frame_makes_it_optical(yaw, down, roll
     pose[:3, :3] = (turned(yaw, down, roll) * OPTICAL).as_matrix()
     assert optical_problem(pose, "camera_optical_frame", "base_link") == ""
     assert math.isclose(pose[2, 2], -math.sin(math.radians(down)), abs_tol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(51241, 52181), (29500, 31000), (0, 1000), (300, 300), (60000, 62500)]
+)
+def test_16_bit_counts_that_use_little_of_their_range_are_refused_with_the_cure(low, high) -> None:
+    rng = np.random.default_rng(0)
+    counts = np.rint(rng.uniform(low, high, (48, 64))).astype("<u2")
+    for encoding in ("mono16", "rgb16"):
+        samples = counts if encoding == "mono16" else np.repeat(counts[..., None], 3, axis=2)
+        sent = Image(Header(), 48, 64, encoding, 0, samples.strides[0], samples.tobytes())
+        with pytest.raises(NavError, match="scale them to 8 bits first"):
+            picture_of(sent)
+    with pytest.raises(AwarenavError, match=r"a\.png: its 16-bit values lie between"):
+        as_rgb(counts, "a.png")
+    wide = rng.integers(0, 16384, (48, 64)).astype("<u2")  # 14 bits
+    assert picture_of(Image(Header(), 48, 64, "mono16", 0, 128, wide.tobytes())).max() > 60
+
+
+def test_raw_counts_under_the_encoding_of_depth_get_the_hint() -> None:
+    with pytest.raises(NavError, match="scale these to mono8"):
+        picture_of(Image(Header(), 2, 2, "16UC1", 0, 4, bytes(8)))
+
+
+def test_a_robot_whose_calibration_is_that_of_no_lens_stands_and_says_so() -> None:
+    nav = Listener()
+    nav.bridge.on_odometry(odometry(START_S))
+    assert nav.bridge.tick(START_S).limited_by == "no camera_info yet"
+    nav.bridge.on_camera_info(replace(INFO, distortion_model="plumb_bob", d=(-3.0, 0, 0, 0, 0)))
+    assert "is that of no lens" in nav.warnings[-1]
+    assert nav.bridge.tick(START_S).limited_by == "the camera_info that comes cannot be used"
+    nav.bridge.on_camera_info(INFO)
+    assert nav.bridge.camera is not None

@@ -20,8 +20,8 @@ from nav_adapter.ros2._message import FieldType, field_types
 from nav_adapter.ros2.messages import Message, definition, ros_type
 from nav_adapter.ros2.messages.builtin_interfaces import Time
 from nav_adapter.ros2.messages.nav2_msgs import CircleObject, SpeedLimit
-from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid
-from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image
+from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
+from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.unique_identifier_msgs import UUID
 
@@ -105,6 +105,20 @@ def test_bytes_are_those_of_cyclonedds(kind: type[Message], data: st.DataObject)
     assert encode(message) == by_cyclonedds(message)
     for order in (Endianness.Little, Endianness.Big):
         assert decode(kind, by_cyclonedds(message, order)) == message
+
+
+@pytest.mark.parametrize("kind", [Image, LaserScan, Odometry, SpeedLimit, CameraInfo], ids=ros_type)
+@settings(max_examples=10)
+@given(data=st.data())
+def test_the_second_version_of_cdr_is_read_where_it_is_the_same(kind, data: st.DataObject) -> None:
+    message = data.draw(filled(kind))
+    for order, head in ((Endianness.Little, b"\0\7"), (Endianness.Big, b"\0\6")):
+        sent = head + by_cyclonedds(message, order)[2:]
+        if kind in (Image, LaserScan):
+            assert decode(kind, sent) == message
+        else:
+            with pytest.raises(NavError, match="comes in the second version of CDR"):
+                decode(kind, sent)
 
 
 def test_negative_cells_are_read_as_bytes() -> None:

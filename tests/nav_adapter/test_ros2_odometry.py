@@ -277,7 +277,8 @@ def test_a_frame_that_moves_on_the_robot_is_followed_although_its_tf_is_slow() -
 
     def lifted(now: float) -> list[TFMessage]:
         tick = round((now - START_S) / PERIOD_S)
-        return [] if tick % 5 else [tf("base_link", "lift", planar(0.1, z_m=0.1), now)]
+        rises = planar(0.1, z_m=0.1 + 1e-4 * tick)
+        return [] if tick % 5 else [tf("base_link", "lift", rises, now)]
 
     constraints = robot.drive(3.0, on_base(planar(0.1, z_m=0.1), "lift"), lifted)
     assert 0.5 * reference_limit() < constraints[-1].speed_limit_mps <= reference_limit()

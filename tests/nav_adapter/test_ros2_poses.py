@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bridge_scenes import FRONT, INFO, MOUNT, SCANNER_MOUNT, Listener, image
+from bridge_scenes import FRONT, INFO, MOUNT, SCANNER_MOUNT, Listener, image, tf
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from nav_scenes import finite
-from scan_scenes import scan_message
+from scan_scenes import planar, scan_message
 
 from nav_adapter import NavError
 from nav_adapter.rigid import Motion
@@ -161,7 +161,7 @@ class Fixed:
     def __init__(self, motion: Motion, person_odom_m: tuple[float, float]) -> None:
         self.motion, self.person = motion, np.array([*person_odom_m, 1.0, 1.0])
 
-    def process(self, image_rgb, stamp_s, *, floor=None):
+    def process(self, image_rgb, stamp_s, floor=None, *, up_camera=None):
         T_odom_camera = pose_of(self.motion.at(stamp_s - START_S)) @ MOUNT
         place = (np.linalg.inv(T_odom_camera) @ self.person)[:3]
         return (seen(stamp_s=stamp_s, position_camera_m=place),)
@@ -197,3 +197,45 @@ def test_people_stand_where_they_do_however_seldom_odometry_comes(sensor, yaw_ra
     # The less is known about the robot's pose, the less about the people's.
     variances = [float(np.trace(each.covariance_odom[:2, :2])) for each in found]
     assert variances == sorted(variances)
+
+
+def mounted_by(sent: list[tuple[float, float]], T: Any = MOUNT) -> RobotPoses:
+    """Return poses that have heard of a mount in two steps, at times and with stamps."""
+    poses = RobotPoses(Frames(), None, BridgeClock(), lambda text: None, with_map=False)
+    poses.read_transforms(tf("odom", "base_link", np.eye(4), START_S), START_S)
+    for at_s, stamp_s in sent:
+        # The frame below comes first: nobody knows yet where it belongs.
+        poses.read_transforms(tf("mast", "camera", T, START_S + stamp_s), START_S + at_s)
+        poses.read_transforms(tf("base_link", "mast", np.eye(4), START_S + stamp_s), START_S + at_s)
+    return poses
+
+
+@given(st.floats(0.02, 2.0), st.floats(-0.05, 5.0), st.integers(1, 6), st.floats(0.0, 1.0))
+def test_a_mount_among_the_moving_transforms_is_static(period_s, ahead_s, count, share) -> None:
+    """As ROS 1 sends them: stamped ahead, at any period, or once."""
+    sent = [(k * period_s, k * period_s + ahead_s) for k in range(count)]
+    poses = mounted_by(sent)
+    last_s = sent[-1][0]
+    for at_s in (0.0, last_s * share, last_s + 2.0 * period_s * share):
+        assert np.array_equal(poses.in_base("camera", START_S + at_s), MOUNT)
+
+
+def test_a_joint_that_has_moved_or_is_silent_is_no_mount() -> None:
+    poses = mounted_by([(0.1 * k, 0.1 * k) for k in range(5)])
+    assert poses.in_base("camera", START_S + 0.69) is not None
+    with pytest.raises(NavError, match="known until"):
+        poses.in_base("camera", START_S + 0.75)
+    turned = planar(0.0, 0.0, 0.2)
+    poses.read_transforms(tf("base_link", "mast", turned, START_S + 0.5), START_S + 0.5)
+    with pytest.raises(NavError, match="known until"):
+        poses.in_base("camera", START_S + 0.65)
+
+
+def test_the_robot_s_own_pose_is_never_taken_from_ahead_or_held() -> None:
+    poses = mounted_by([(0.0, 0.0)])
+    ahead = tf("odom", "base_link", planar(3.0), START_S + 1.0)
+    poses.read_transforms(ahead, START_S)
+    poses.read_transforms(tf("odom", "wall", MOUNT, START_S), START_S)
+    with pytest.raises(NavError, match="known until"):
+        poses.in_base("wall", START_S + 0.3)
+    assert poses.in_base("wall", START_S)[0, 3] == MOUNT[0, 3]

@@ -218,3 +218,28 @@ def test_a_map_whose_place_is_unknown_is_not_used() -> None:
     nav.bridge.on_transforms(tf("map", "odom", np.eye(4)))
     nav.drive(START_S + 1.2, 0.2)
     assert nav.warnings[2:] == ["the map is used"]
+
+
+def test_legs_of_a_cart_that_ride_along_are_nobody_and_the_footprint_is_named() -> None:
+    """Beside somebody who stands, and counts as before."""
+    cart = [(-0.55, 0.0), (1.2, 0.0)]
+    nav = scanning()
+    for robot in (nav, without := scanning()):
+        for tick in range(60):
+            now = START_S + PERIOD_S * tick
+            speed = min(max(tick - 10, 0) * PERIOD_S, 0.6)
+            x = 0.5 * max(now - START_S - 0.5, 0.0) ** 2 if speed < 0.6 else None
+            if x is None:
+                x = 0.18 + 0.6 * (now - START_S - 1.1)
+            robot.bridge.on_odometry(odometry(now, x=x, speed=speed), now)
+            people = [PERSON, *((x + dx, dy) for dx, dy in cart if robot is nav)]
+            T = planar(x + 0.3)
+            robot.bridge.on_scan(0, scan_message(now, people, T), now)
+            robot.bridge.tick(now)
+    (track,) = [each for each in nav.bridge.tracks if each.time_since_seen_s < 0.2]
+    (alone,) = without.bridge.tracks
+    assert np.linalg.norm(track.position_odom_m - alone.position_odom_m) < 0.05
+    assert without.warnings == []
+    (said,) = nav.warnings
+    assert "keeps its place there while the robot moves" in said
+    assert said.endswith("give footprint_m with it")

@@ -30,7 +30,10 @@ def test_points_behind_the_camera_have_no_image():
     assert np.isnan(pixels[1:]).all()
 
 
-@pytest.mark.parametrize("distortion", [None, [-0.28, 0.07, 0.001, -0.0005, 0.01], [0.1] * 8])
+EIGHT = [0.52, -2.68, 0.0005, -0.0002, 1.56, 0.4, -2.5, 1.48]
+
+
+@pytest.mark.parametrize("distortion", [None, [-0.28, 0.07, 0.001, -0.0005, 0.01], EIGHT])
 def test_yaml_round_trip(tmp_path, distortion):
     camera = Camera(640, 480, 500.0, 510.0, 320.0, 238.0, distortion)
     camera.to_yaml(tmp_path / "camera.yaml")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import Camera
+from perception import Camera, PerceptionError
 from perception.body import place_boxes
+from perception.surround import FisheyeLens
 from tracking import CameraView
 
 # Calibrations as they are published for such cameras, and siblings with other coefficients.
@@ -96,3 +98,48 @@ def test_somebody_beyond_the_end_is_still_placed_and_tracked() -> None:
     seen = CameraView(BARREL).visibility([[3.0, 0.0], [3.0, 2.0], [1.0, 3.0]], level)
     assert (seen[:2] > 0.0).all()
     assert seen[2] == 0.0
+
+
+# Of one lens, in the picture of another model or unit: its first five of eight coefficients, those
+# of a model in pixels, and the numbers of three drivers, at two sizes of the field.
+CUT = [4.655, 1.348, 0.0002, -0.0001, 0.0369]
+NO_LENSES = (
+    CUT, CUT[:4], [15.6, -41.2, 6e-4, -2e-4, 37.9], [-1035.2, 2410.7, 0, 0, -812.4],
+    [-3.0, 0, 0, 0], [900.0, 0, 0, 0], [1e12, 0, 0, 0], [-1e12, 0, 0, 0], [-0.6, 0, 0, 0],
+    [0, 0, 0, 0, 0, 9.0, 0, 0], [0.05, -0.1, 0.4, 0, 0], [0, 0, 0, -0.5],
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("coefficients", NO_LENSES)
+@pytest.mark.parametrize("scale", [1, 3])
+def test_a_distortion_that_no_lens_has_is_refused(coefficients, scale) -> None:
+    size = 640 * scale, 480 * scale
+    with pytest.raises(PerceptionError, match=r"is that of no lens.*rectified images"):
+        Camera(*size, 554.0 * scale, 554.0 * scale, 320.0 * scale, 240.0 * scale, coefficients)
+
+
+def test_a_picture_that_the_bend_does_not_reach_is_a_camera_s() -> None:
+    # A telephoto lens: its coefficients are not known well, and bend nothing.
+    assert Camera(640, 480, 6000.0, 6000.0, 320.0, 240.0, CUT).distortion is not None
+    for camera in LENSES.values():  # a part that is cut out, away from the principal point
+        far = replace(camera, width_px=200, height_px=100, cx_px=camera.cx_px - 150.0)
+        assert np.isfinite(far.normalise([[100.0, 50.0]], nearest=True)).all()
+
+
+@given(st.floats(-0.02, 0.02), st.floats(0.3, 1.0))
+def test_every_projection_of_fisheye_lenses_is_a_lens(more, focal) -> None:
+    """Between f sin θ and f tan θ lie all of them: their series, and somewhat beside them."""
+    series = [
+        [-1 / 6, 1 / 120], [-1 / 24, 1 / 1920], [0, 0], [1 / 12, 1 / 120], [1 / 3, 2 / 15]
+    ]  # fmt: skip
+    for k1, k2 in series:
+        FisheyeLens(
+            640, 480, 640 * focal, 640 * focal, 320.0, 240.0, [k1 + more, k2, 0, 0],
+            max_angle_rad=math.radians(60.0),
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize("coefficients", [[9.0, 0, 0, 0], [80.0, -2.0, 0, 0], [0, 0, 900.0, 0]])
+def test_fisheye_coefficients_that_no_lens_has_are_refused(coefficients) -> None:
+    with pytest.raises(PerceptionError, match="are those of no lens"):
+        FisheyeLens(640, 480, 300.0, 300.0, 320.0, 240.0, coefficients)

@@ -200,6 +200,11 @@ def _rows(trial: TrialRun) -> DetectorLayout:
 def _yolox(trial: TrialRun, classes: int) -> DetectorLayout:
     size = trial.height_px, trial.width_px
     if _is_decoded(trial.outputs[0][0], *size):
+        if (trial.outputs[0][0][:, 4] == 1.0).all():
+            raise trial.refusal(
+                "it looks like YOLOv6, whose rows have 1 in place of YOLOX's objectness, and which "
+                "is not read: export another network of those named below"
+            )
         raise trial.refusal(
             "it looks like YOLOX with boxes decoded in the network; export it with "
             "decode_in_inference=False"

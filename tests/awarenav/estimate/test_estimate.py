@@ -250,7 +250,7 @@ def test_people_in_the_truth_beside_the_images_are_not_read(tmp_path):
 def test_a_missing_calibration_is_assumed_and_reported(tmp_path, capsys):
     source = folder(tmp_path / "set", 2, camera=None)
     assert estimate(NumberReader(), source, "--out", tmp_path / "a.jsonl") == 0
-    assert "field of view of 60 degrees is assumed" in capsys.readouterr().err
+    assert "60 degrees across the longer side are assumed" in capsys.readouterr().err
     # The same field of view, given: the same estimates, without a word.
     arguments = ["--out", tmp_path / "b.jsonl", "--fov-deg", 60]
     assert estimate(NumberReader(), source, *arguments) == 0
@@ -314,3 +314,23 @@ def test_bad_input_is_one_line_and_exit_status_2(tmp_path, capsys, arguments, me
     assert message in error
     assert "Traceback" not in error
     assert not out.exists()
+
+
+@pytest.mark.parametrize(("fps", "stamps_s"), [(None, [0.0, 1.0, 2.0]), (25, [0.0, 0.04, 0.08])])
+def test_a_folder_of_frames_has_the_times_that_fps_says(tmp_path, capsys, fps, stamps_s) -> None:
+    source, out = folder(tmp_path / "set", 3), tmp_path / "out.jsonl"
+    given = () if fps is None else ("--fps", fps)
+    assert estimate(NumberReader(), source, "--out", out, "--tracks", *given) == 0
+    assert [record["stamp_s"] for record in read_records(out)] == pytest.approx(stamps_s)
+    assert ("give --fps" in capsys.readouterr().err) == (fps is None)
+
+
+@pytest.mark.parametrize("fps", [0, -5, 1e9])
+def test_fps_is_refused_where_it_means_nothing(tmp_path, fps) -> None:
+    source = folder(tmp_path / "set", 2)
+    with pytest.raises(AwarenavError, match=r"--fps must lie in \[0.01, 1000\] Hz"):
+        estimate(NumberReader(), source, "--out", tmp_path / "o.jsonl", "--fps", fps)
+    one = next(each for each in source.iterdir() if each.suffix == ".png")
+    with pytest.raises(AwarenavError, match="--fps is for a folder of images"):
+        estimate(NumberReader(), one, "--out", tmp_path / "o.jsonl", "--fps", 10)
+    assert not (tmp_path / "o.jsonl").exists()

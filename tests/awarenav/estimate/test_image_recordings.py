@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -246,3 +247,31 @@ def test_images_in_a_body_frame_are_noted(tmp_path, turn, noted) -> None:
     if noted:
         assert "the frame 'camera' of the images is not an optical frame" in notes[0]
         assert "90 degrees up in 'base_link'" in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "info"),
+    [
+        ("__left__image_rect", "__left__camera_info_rect"),
+        ("__cam0__image_raw", "__cam0__info"),
+        ("__camera__rgb__image_raw", "__camera__rgb__image_raw_info"),
+        ("__front__image_raw__compressed", "__front__calibration"),
+    ],
+)
+def test_a_calibration_under_another_name_beside_the_images_is_theirs(tmp_path, name, info) -> None:
+    picture = compressed(0) if name.endswith("compressed") else image(0)
+    other = replace(camera_info(), header=Header(to_time(1.0), "another_camera"))
+    topics = {name: picture, info: camera_info(), "__rear__camera_info": other}
+    source = opened(bag(tmp_path / "bag", **topics))
+    assert source.camera.fx_px == (250.0 if "rect" in name else 300.0)
+    assert source.notes == ()
+
+
+def test_a_calibration_of_another_camera_is_named_and_not_used(tmp_path) -> None:
+    other = replace(camera_info(), header=Header(to_time(1.0), "another_camera"))
+    two = {"__left__image_raw": image(0), "__left__right_info": other, "__a__camera_info": other}
+    source = opened(bag(tmp_path / "bag", **two))
+    assert source.camera is None
+    (note,) = source.notes
+    assert "calibrations are in /a/camera_info, /left/right_info" in note
+    assert note.endswith("give --camera")

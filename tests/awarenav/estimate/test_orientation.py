@@ -6,6 +6,7 @@ import io
 import math
 import struct
 import zlib
+from contextlib import closing
 from pathlib import Path
 
 import cv2
@@ -16,7 +17,7 @@ from PIL import Image
 from test_estimate import estimate
 
 from awarenav import AwarenavError
-from awarenav.estimate import open_source
+from awarenav.estimate import CameraChoice, open_source
 from awarenav.estimate._pictures import read_image
 from awarenav.records import read_records
 from awarenav.video import VideoWriter
@@ -159,3 +160,45 @@ def test_a_video_that_is_shown_upside_down_has_no_sure_calibration_either(tmp_pa
     fov_deg = math.degrees(2.0 * math.atan(0.5 * WIDTH / CAMERA.fx_px))
     arguments = ["--fov-deg", fov_deg, "--out", tmp_path / "b.jsonl"]
     assert estimate(NumberReader(), path, *arguments) == 0
+
+
+@pytest.mark.parametrize("orientation", [1, 6])
+@pytest.mark.parametrize("portrait", [False, True])
+def test_60_degrees_are_those_of_the_longer_side(tmp_path: Path, orientation, portrait) -> None:
+    said: list[str] = []
+    image = scene() if not portrait else np.ascontiguousarray(np.swapaxes(scene(), 0, 1))
+    path = stored(tmp_path / "a.jpg", orientation, image)
+    with closing(open_source(str(path))) as source:
+        (frame,) = source.frames()
+        height, width = frame.image_rgb.shape[:2]
+        assert (height > width) == portrait
+        camera = CameraChoice.of_options(None, None, source, said.append).of_size(width, height)
+    assert camera.fx_px == camera.fy_px == pytest.approx(32.0 / math.tan(math.radians(30.0)))
+    assert "60 degrees across the longer side are assumed" in said[0]
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "webp"])
+@pytest.mark.parametrize(
+    ("focal_mm", "size", "used"),
+    [(26, (64, 48), True), (52, (6400, 4800), True), (26, (4000, 2000), False), (0, None, False)],
+)
+def test_exif_s_focal_length_is_used_and_said(tmp_path, suffix, focal_mm, size, used) -> None:
+    """By the diagonal, as the standard of camera makers has it; not of a picture that was cut."""
+    exif, said = Image.Exif(), []
+    exif[0x0112] = 6
+    more = exif.get_ifd(0x8769)
+    more[0xA405] = focal_mm
+    if size is not None:
+        more[0xA002], more[0xA003] = size
+    path = tmp_path / f"a.{suffix}"
+    Image.fromarray(scene()).save(path, exif=exif)
+    with closing(open_source(str(path))) as source:
+        (frame,) = source.frames()
+        cameras = CameraChoice.of_options(None, None, source, said.append)
+        camera = cameras.of_size(48, 64, frame.focal_px)
+        given = CameraChoice.of_options(None, 60.0, source, said.append)
+        assert given.of_size(48, 64, frame.focal_px).fx_px == pytest.approx(41.57, abs=0.01)
+    wanted = focal_mm * 80.0 / math.hypot(36.0, 24.0) if used else 32.0 / math.tan(math.pi / 6.0)
+    assert camera.fx_px == pytest.approx(wanted)
+    (text,) = said
+    assert ("by its EXIF data" if used else "are assumed") in text.replace("are by", "by")

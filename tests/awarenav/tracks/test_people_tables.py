@@ -74,6 +74,18 @@ def test_both_commands_read_a_table_as_others_write_it(change, tmp_path: Path, c
     assert people[0] == people[1]
 
 
+@pytest.mark.parametrize(
+    ("suffix", "mark", "first"), [(".tsv", "\t", ""), (".csv", ",", "sep=,\n"), (".TSV", "\t", "")]
+)
+def test_tabs_and_the_first_line_of_a_spreadsheet_are_read(suffix, mark, first, tmp_path) -> None:
+    plain, other = tmp_path / "plain.csv", tmp_path / f"other{suffix}"
+    plain.write_text(table())
+    other.write_text(first + table().replace(",", mark))
+    rows = [read_people_table(path).rows for path in (plain, other)]
+    assert [row._replace(line=0) for row in rows[0]] == [row._replace(line=0) for row in rows[1]]
+    assert both(other) == (0, 0)
+
+
 def test_ids_may_be_any_text_and_tracks_numbers_them(tmp_path: Path, capsys) -> None:
     path = tmp_path / "names.csv"
     path.write_text(table(ids=("7", "bén, 2nd")).replace("bén, 2nd", '"bén, 2nd"'), "utf-8")

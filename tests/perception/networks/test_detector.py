@@ -346,6 +346,10 @@ def test_yolox_with_boxes_decoded_in_the_network_is_refused() -> None:
     rows[0, :, :2], rows[0, :, 2:4] = centres, 3.0 * strides[:, None]
     with pytest.raises(PerceptionError, match="decode_in_inference=False"):
         OnnxPersonDetector(fixed({"out": rows}, SIZE))
+    rows[0, :, 4] = 1.0  # YOLOv6 has no objectness, and no such option
+    with pytest.raises(PerceptionError, match="looks like YOLOv6") as refused:
+        OnnxPersonDetector(fixed({"out": rows}, SIZE))
+    assert "decode_in_inference" not in str(refused.value)
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from perception.networks import (
     OnnxSettings,
     parse_provider_options,
 )
+from perception.networks._tflite import TfliteModel
 
 ROWS = np.arange(12.0).reshape(1, 2, 6)
 
@@ -83,6 +84,31 @@ def test_anything_but_the_file_of_a_network_is_refused(
     path = tmp_path / given if isinstance(given, str) else given
     with pytest.raises(PerceptionError, match=words):
         OnnxModel(path)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("start", "cure"),
+    [
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12\n", "git lfs pull"),
+        (b"\n<!DOCTYPE html><html><body>404</body></html>", "download button"),
+        (b'{"error": "Invalid username or password."}', "download button"),
+        (b"PK\x03\x04" + b"\0" * 200, "export the network to ONNX"),
+        (b"\x80\x02}q\x00.", "export the network to ONNX"),
+        (b"\x1f\x8b\x08" + b"\0" * 50, "unpack it"),
+        (b"\x89HDF\r\n\x1a\n" + b"\0" * 50, "export the network to ONNX"),
+        (b"", "fetch it again"),
+    ],
+)
+def test_a_file_that_is_often_taken_for_a_network_is_named_with_the_cure(
+    tmp_path: Path, start: bytes, cure: str
+) -> None:
+    for suffix, load in ((".onnx", OnnxModel), (".tflite", TfliteModel)):
+        path = tmp_path / f"network{suffix}"
+        path.write_bytes(start)
+        with pytest.raises(PerceptionError) as refused:
+            load(path)
+        assert cure in str(refused.value)
+        assert "protobuf" not in str(refused.value).lower()
 
 
 def test_weights_in_a_separate_file_are_loaded_only_without_a_sha256(tmp_path: Path) -> None:
