@@ -53,7 +53,9 @@ def measure(
     )
     files = RunFiles(folder)
     with contextlib.suppress(AwarenavError, OSError):
-        if len(read_records(files.episodes)) == len(jobs):
+        if {each.conditions for each in read_records(files.episodes)} == {
+            job.conditions for job in jobs
+        }:
             return
     words = ["--face", face, *(["--bare"] if bare else [])]
     with nav2(controller, *words, log=out / f"{folder.name}.log"):
