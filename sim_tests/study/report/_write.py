@@ -334,7 +334,7 @@ def requests_section(results: Results, run: Run) -> Section | None:
 def metrics_section(results: Results) -> Section:
     """Return all means, with their definitions."""
     lead = (
-        "Definitions with their sources: docs/simulation.md. Intervals of means are bias-corrected "
+        "Definitions with their sources: docs/measures.md. Intervals of means are bias-corrected "
         "and accelerated bootstraps within scenarios. Those of shares are exact (Clopper and "
         "Pearson 1934); for none of n the one-sided bound 1 − 0.05^(1/n)."
     )
