@@ -32,8 +32,6 @@ _LEAST_DIFFERENCE: Final = 0.2
 #: The falsified policy, in the folder of the worst cases.
 POLICY_FILE: Final = "policy.yaml"
 _PANELS: Final = 3
-# Up to so many names of scenarios stand level below the course.
-_LEVEL: Final = 8
 _ROBOT: Final = "#1f5fa8"
 _PERSON: Final = "#d9822b"
 _WORST: Final = "#b3261e"
@@ -178,9 +176,8 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
         fontsize=10,
     )
     names = [name.replace("_", " ") for name in middles]
-    axes.set_xticks(
-        list(middles.values()), names, fontsize=7, rotation=90 if len(names) > _LEVEL else 0
-    )
+    level = len(names) == 1  # a scenario with few episodes is narrower than its name
+    axes.set_xticks(list(middles.values()), names, fontsize=7, rotation=0 if level else 90)
     for number, label in enumerate(axes.get_xticklabels()):
         label.set_color(f"C{number % 10}")
     axes.set_xlabel("episodes by scenario, in the order of the search")
@@ -227,7 +224,7 @@ def _draw_plan(axes: Axes, case: WorstCase) -> None:
         f"margin {'none' if margin_m is None else f'{margin_m:.2f} m'}"
         f"{f', {touched} touched' if touched else ''}, at {frame.t_s:.1f} s, robot "
         f"{speed_mps:.2f} m/s",
-        fontsize=9,
+        fontsize=8,
         loc="left",
     )
     axes.set_xlabel("x odom (m)", fontsize=8)

@@ -326,12 +326,12 @@ def _won_back(who: str, against: Comparison) -> str:
 
 
 def _violates(against: Comparison, who: str) -> str:
-    change, base = against.violation_excess, "violation time"
+    change, base, decimals = against.violation_excess, "violation time", 0
     if not change.known:  # the reference violates nothing
-        change, base = against.violation_excess_of_time, "driving time"
+        change, base, decimals = against.violation_excess_of_time, "driving time", 1
     if not change.known:
         return ""
-    text = f"{change.text(0, 100.0)}{THIN}% of {BASELINE}'s {base}"
+    text = f"{change.text(decimals, 100.0)}{THIN}% of {BASELINE}'s {base}"
     if change.n < FEW_PAIRS or change.low <= 0.0 <= change.high:
         return f"Whether its margins with {who} are negative for longer is not shown: {text}."
     return (
