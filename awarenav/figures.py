@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import count, product
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +25,7 @@ try:
     from matplotlib.patches import Circle, Ellipse, Patch, Polygon, Rectangle, Wedge
     from matplotlib.text import Text
     from matplotlib.ticker import MultipleLocator
+    from matplotlib.transforms import Bbox
     from PIL import Image  # a dependency of matplotlib
 except ImportError as cause:  # pragma: no cover - depends on the installation
     raise MissingExtraError(
@@ -44,10 +47,15 @@ __all__ = [
     "QuadMesh",
     "Rectangle",
     "Wedge",
+    "label_points",
     "new_figure",
     "save_figure",
     "scale_by_roots",
 ]
+
+
+#: A label may lie over other points from this ring of places on, and never over another label.
+_RINGS = 8
 
 
 def new_figure(
@@ -87,6 +95,37 @@ def scale_by_roots(axes: Axes, highest: float) -> None:
 
     axes.set_yscale("function", functions=(root, square))
     axes.set_ylim(bottom=-0.004 * max(highest, 1.0))
+
+
+def label_points(axes: Axes, labels: Iterable[tuple[float, float, str, str]]) -> None:
+    """Write labels beside points: none over another one, or over the point of another one.
+
+    Everything else must have been drawn, as the places depend on the scales and the layout.
+
+    Args:
+        axes: the axes.
+        labels: x, y, text and colour of each.
+    """
+    labels = list(labels)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()
+    points = axes.transData.transform([(x, y) for x, y, _, _ in labels] or np.empty((0, 2)))
+    taken: list[Bbox] = []
+    for number, (x, y, text, colour) in enumerate(labels):
+        others = [Bbox.from_bounds(*(p - 4.0), 8.0, 8.0) for p in np.delete(points, number, axis=0)]
+        label = axes.annotate(
+            text, (x, y), xytext=(0, 0), textcoords="offset points", color=colour, fontsize=9
+        )
+        for ring, up, right in (
+            (n, *sides) for n in count() for sides in product((1, -1), (1, -1))
+        ):
+            label.set(ha="left" if right > 0 else "right", va="bottom" if up > 0 else "top")
+            label.set_position((right * (4.0 + 2.0 * ring), up * (3.0 + 4.0 * ring)))
+            box = label.get_window_extent()
+            if not any(map(box.overlaps, taken + [each for each in others if ring < _RINGS])):
+                break
+        taken.append(box)
 
 
 def save_figure(figure: Figure, path: Path) -> None:

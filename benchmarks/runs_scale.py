@@ -2,7 +2,7 @@
 
     python -m benchmarks.runs_scale [--episodes 4] [--pixels] [--dask]
 
-Prints a Markdown table and a plan for a million episodes; docs/simulation.md has the figures of a
+Prints a Markdown table and a plan for a million episodes; docs/simulation_results.md has those of a
 quiet computer. Cost is processor time of one process, so a busy computer changes it little. The
 gain of two workers is wall time and needs a quiet computer. Memory is read with ``resource``: Linux
 only.

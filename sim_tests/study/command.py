@@ -207,7 +207,7 @@ def watch(**values: Any) -> int:
         "awarenav compare monday tuesday --baseline balanced --out both.csv",
     ],
     exit_status={0: "Success.", 2: "Bad input."},
-    epilog="docs/simulation.md defines every metric.",
+    epilog="docs/measures.md defines every metric.",
 )
 @argument(
     "runs",

@@ -151,8 +151,8 @@ def draw_falsification(
 
 def _draw_course(axes: Axes, falsification: Falsification) -> None:
     """Draw the scores by scenario, the lowest so far as a line, and contacts as crosses."""
-    places, names = 0, list(falsification.spaces)
-    for number, name in enumerate(names):
+    places, middles = 0, dict.fromkeys(falsification.spaces, 0.0)
+    for number, name in enumerate(middles):
         scores = np.array([each.score for each in falsification.episodes if each.scenario == name])
         x = places + np.arange(len(scores))
         places += len(scores)
@@ -165,18 +165,7 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
             axes.plot(x[margins], lowest, color=colour, lw=1.4)
         bottom = np.full(int(touched.sum()), axes.get_ylim()[0])
         axes.scatter(x[touched], bottom, marker="x", color=_WORST)
-        axes.annotate(
-            name.replace("_", " "),
-            (x.mean(), 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, -4),
-            textcoords="offset points",
-            rotation=90 if len(names) > 4 else 0,
-            ha="center",
-            va="top",
-            fontsize=7,
-            color=colour,
-        )
+        middles[name] = x.mean()
     axes.axhline(0.0, color=_WORST, lw=0.8, ls="--")
     settings = falsification.settings
     label = " with its floor taken away (UNSAFE)" if settings.unsafe_no_floor else ""
@@ -186,9 +175,14 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
         loc="left",
         fontsize=10,
     )
-    axes.set_xlabel("episode, by scenario in the order of the search")
+    names = [name.replace("_", " ") for name in middles]
+    level = len(names) == 1  # a scenario with few episodes is narrower than its name
+    axes.set_xticks(list(middles.values()), names, fontsize=7, rotation=0 if level else 90)
+    for number, label in enumerate(axes.get_xticklabels()):
+        label.set_color(f"C{number % 10}")
+    axes.set_xlabel("episodes by scenario, in the order of the search")
     axes.set_ylabel("smallest margin, never noticed (m)")
-    axes.set_xlim(-0.5, places - 0.5)  # the names lie at places without a margin, too
+    axes.set_xlim(-0.5, places - 0.5)
     axes.grid(alpha=0.25)
 
 
@@ -230,7 +224,7 @@ def _draw_plan(axes: Axes, case: WorstCase) -> None:
         f"margin {'none' if margin_m is None else f'{margin_m:.2f} m'}"
         f"{f', {touched} touched' if touched else ''}, at {frame.t_s:.1f} s, robot "
         f"{speed_mps:.2f} m/s",
-        fontsize=9,
+        fontsize=8,
         loc="left",
     )
     axes.set_xlabel("x odom (m)", fontsize=8)

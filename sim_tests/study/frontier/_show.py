@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from awarenav.errors import counted
-from awarenav.figures import Axes, new_figure, save_figure, scale_by_roots
+from awarenav.figures import Axes, label_points, new_figure, save_figure, scale_by_roots
 from awarenav.files import json_text, write_text
 from perception.arrays import FloatArray
 
@@ -181,15 +181,10 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
             between = np.linspace(x[0], x[-1], 400)
             x, y = between, np.interp(between, x, y)
         axes.plot(x, y, color=colour, lw=1.4, alpha=0.7, zorder=1)
-        for point in found:
-            if point.member is not None:
-                _name(axes, point, f"{point.member.speed_mps:g}", colour)
     _draw(axes, [frontier.today], _TODAY, "*", "today's AMR", size=13.0)
     others = [p for p in frontier.points[1:] if p.member is None]
     if others:
         _draw(axes, others, _OTHER, "^", "other policies")
-    for point in others:
-        _name(axes, point, point.name, _OTHER)
     scale_by_roots(axes, max(point.impacts.value for point in frontier.points))
     free_s, today_s = frontier.free_s, frontier.free_s + frontier.today.time_lost_s.value
 
@@ -213,6 +208,18 @@ def draw_frontier(frontier: Frontier, path: Path) -> None:
     said = sentences(frontier)
     if said:
         figure.suptitle("\n".join(said).replace("`", ""), fontsize=9, x=0.02, ha="left")
+    label_points(
+        axes,
+        (
+            (p.time_lost_s.value, p.impacts.value, p.name, _OTHER)
+            if p.member is None
+            else (
+                *(p.time_lost_s.value, p.impacts.value, f"{p.member.speed_mps:g}"),
+                _LINES[p.member.kind][0],
+            )
+            for p in frontier.points[1:]
+        ),
+    )
     save_figure(figure, path)
 
 
@@ -250,14 +257,3 @@ def _ends(intervals: Sequence[Interval]) -> FloatArray:
     ]
     below = [max(each.value - each.low, 0.0) for each in known]
     return np.array([below, [max(each.high - each.value, 0.0) for each in known]], dtype=np.float64)
-
-
-def _name(axes: Axes, point: Point, text: str, colour: str) -> None:
-    axes.annotate(
-        text,
-        (point.time_lost_s.value, point.impacts.value),
-        xytext=(4, 4),
-        textcoords="offset points",
-        color=colour,
-        fontsize=9,
-    )

@@ -180,7 +180,7 @@ class MeasuredAttention:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Requests:
-    """The requests for attention of one episode, as docs/simulation.md defines them.
+    """The requests for attention of one episode, as docs/measures.md defines them.
 
     Attributes:
         requests: their number.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ...crossing import CrossingFrame, CrossingResult
 
-#: Width of the parabola that smooths the speed; docs/simulation.md gives its frequency response.
+#: Width of the parabola that smooths the speed; docs/measures.md gives its frequency response.
 SMOOTHED_OVER_S: Final = 0.5
 _DEGREE: Final = 2
 #: A robot counts as moving above this speed; it stops when it falls below the standing speed.

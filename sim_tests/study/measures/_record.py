@@ -141,7 +141,7 @@ def measure(
     length_without_people_m: float | None = None,
     **conditions: Any,
 ) -> EpisodeRecord:
-    """Return the row of a crossing: every measure, as docs/simulation.md defines them.
+    """Return the row of a crossing: every measure, as docs/measures.md defines them.
 
     Numbers are rounded to the six decimals that files keep, so that a record read from a file is
     equal.
@@ -301,7 +301,7 @@ def check_columns(columns: Sequence[str], source: str) -> None:
             hint = did_you_mean(name, RECORD_COLUMNS)
             raise SimError(
                 f"{source} is not a table of episodes: unknown column {name[:80]!r}{hint} "
-                "(docs/simulation.md lists all)"
+                "(docs/measures.md lists all)"
             )
         if list(columns).count(name) > 1:
             raise SimError(f"{source} has the column {name!r} {list(columns).count(name)} times")

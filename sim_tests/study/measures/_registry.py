@@ -133,7 +133,7 @@ class Ratio:
     factor: float = 1.0
 
 
-#: Ratios of sums by the name of their figure, as docs/simulation.md defines them.
+#: Ratios of sums by the name of their figure, as docs/measures.md defines them.
 RATIOS: Final = {
     each.metric.name: each
     for each in (

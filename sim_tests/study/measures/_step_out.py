@@ -1,6 +1,6 @@
 """Step-out impacts: the share and speed of impacts with people who might set off at any time.
 
-An index of what a drive leaves to luck, computed from the log of an episode. docs/simulation.md
+An index of what a drive leaves to luck, computed from the log of an episode. docs/measures.md
 says what it is not.
 """
 

@@ -212,7 +212,7 @@ def _notes(summary: Summary) -> list[str]:
         "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
         "person and the moving robot touched, by any cause. step-out: step-out impacts, never\n"
         "noticed; all. (…): the exact interval. [?]: too few for an interval.\n"
-        "docs/simulation.md defines all figures."
+        "docs/measures.md defines all figures."
     ]
     if any(row.part == UNCONFIRMED for row in summary.attentions):
         notes.append(

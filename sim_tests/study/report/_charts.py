@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from matplotlib import rc_context
@@ -48,23 +48,29 @@ _STYLE: Final[dict[Any, Any]] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "awarenav",
 }
+# What the chart of risk can show upwards, the preferred one first, and the names of its axis.
+_RISKS: Final = {
+    "step_out_all": "step-out impacts, all people, per 1 000",
+    "violation_time_s": "negative margins, s",
+}
 #: Most episodes in a chart; those with the largest margins are left out.
 MOST_MARKS: Final = 3000
 
 
-def risk_chart(arms: Sequence[Arm]) -> tuple[str, str]:
+def risk_chart(arms: Sequence[Arm]) -> list[tuple[str, str]]:
     """Return the chart of the mean time lost against a measure of risk, and its caption.
 
-    The risk is the step-out impacts with all people, or the time of negative margins in tables
-    without them.
+    The risk is the step-out impacts with all people; where they are not known of every robot, or
+    are all 0, the time of negative margins. Without any risk there is no chart.
     """
     rows = [arm.row.means for arm in arms]
-    has_impacts = any(row["step_out_all"].known for row in rows)
-    risk = METRICS["step_out_all" if has_impacts else "violation_time_s"]
+    risk = next((name for name in _RISKS if _tells(rows, name)), None)
+    if risk is None:
+        return []
 
     def draw(axes: Axes) -> None:
         for number, (arm, row) in enumerate(zip(arms, rows, strict=True)):
-            x, y = row["time_lost_s"], row[risk.name]
+            x, y = row["time_lost_s"], row[risk]
             if x.known and y.known:
                 axes.errorbar(
                     x.value,
@@ -79,15 +85,19 @@ def risk_chart(arms: Sequence[Arm]) -> tuple[str, str]:
         highest = axes.get_ylim()[1]
         axes.set_ylim(-0.04 * highest, highest)
         axes.set_xlabel("mean time lost, s")
-        axes.set_ylabel(
-            "step-out impacts, all people, per 1 000" if has_impacts else "negative margins, s"
-        )
+        axes.set_ylabel(_RISKS[risk])
 
     caption = (
-        f"Time lost against risk: the lower left is best. Upwards: {risk.title.lower()}. Bars are "
-        "95 % intervals."
+        "Time lost against risk: the lower left is best. Upwards: "
+        f"{METRICS[risk].title.lower()}. Bars are 95 % intervals."
     )
-    return _svg("risk", draw), caption
+    return [(_svg("risk", draw), caption)]
+
+
+def _tells(rows: Sequence[Mapping[str, Interval]], risk: str) -> bool:
+    """Return whether a risk can be drawn of every robot, and is not 0 of all."""
+    known = all(row["time_lost_s"].known and row[risk].known for row in rows)
+    return known and any(row[risk].value > 0.0 for row in rows)
 
 
 def episode_chart(arms: Sequence[Arm]) -> tuple[str, str]:

@@ -45,8 +45,8 @@ def stills_section(run: Run, results: Results, *, pictures: bool, progress: bool
     with tqdm(worst, desc="stills", unit="episode", file=sys.stderr, disable=silent) as bar:
         stills = [_still(run, arm, each, pictures=pictures) for arm, each in bar]
     lead = (
-        "Contacts with the moving robot first, then the smallest margins; of each scenario and arm "
-        "only the worst."
+        "Contacts with the moving robot first, then the smallest margins; of each scenario and "
+        "robot only the worst."
     )
     if pictures:
         lead += (
@@ -156,7 +156,7 @@ def episodes_section(run: Run, results: Results, folder: Path) -> Section:
                 else Cell(f"{command} --view" if command else "", is_command=bool(command)),
             ]
         )
-    names = ["No.", "Scenario", "Arm", *(["Fault"] if with_faults else []), "Seed", "Lost, s"]
+    names = ["No.", "Scenario", "Robot", *(["Fault"] if with_faults else []), "Seed", "Lost, s"]
     columns = dict.fromkeys((*names, "Margin, m", "Separation, m", "Remark", "Replay"), "")
     table = Table(columns, lines, 3)
     return Section("episodes", "Episodes", lead, tables=(table,), folded=True)

@@ -29,6 +29,7 @@ from ..measures import (
     Variant,
     labels,
     measured_part,
+    number_text,
     paired,
     percent,
     proportion_interval,
@@ -204,18 +205,21 @@ class Results:
         return next((c for c in comparisons if (c.variant, c.part) == (arm.name, part)), None)
 
     def verdict(self, arm: Arm) -> str:
-        """Return the sentences about an arm that are read first; they claim what is shown."""
-        ran = [each for each in (*arm.episodes, *arm.others) if not each.record.error]
+        """Return the sentences about an arm that are read first; they claim what is shown.
+
+        The first line has the worst of all its episodes, with and without faults.
+        """
+        episodes = (*arm.episodes, *arm.others)
+        ran = [each for each in episodes if not each.record.error]
         if not ran:
             return "No episode finished, so nothing can be said."
-        said = [_contacts(ran), _obeys(arm.episodes)]
-        arrived = sum(each.record.time_to_goal_s is not None for each in arm.episodes)
-        said.append(f"It reached the goal in {arrived} of {len(arm.episodes)}.")
+        worst = " ".join(filter(None, [_margins(ran), _obeys(ran), _goals(episodes)]))
+        said = [f"{worst}\n{_contacts(ran)}"]
         whole = self.against(arm)
         if whole is None:
             if arm.variant.policy != BASELINE:
-                said.append("Without the policy blind on the same seeds, no time is won back.")
-            return " ".join(filter(None, said))
+                said.append(f"What awareness saves is not known: {BASELINE} did not run.")
+            return " ".join(said)
         note = self._left_out(arm, whole)
         said.append(_won_back("people", whole))
         attentive = self.against(arm, "attentive")
@@ -266,44 +270,70 @@ def _contacts(ran: Sequence[Episode]) -> str:
     )
 
 
-def _obeys(episodes: Sequence[Episode]) -> str:
-    """Return the sentence on the speed limit; empty where the conduct is not known."""
-    conducts = [each.conduct for each in episodes if each.conduct is not None]
-    excesses = [c.limit_excess_mps for c in conducts if c.limit_excess_mps is not None]
-    if not excesses:
-        return ""
-    over = sum(each > OVERSHOOT_MPS for each in excesses)
-    if not over:
-        return "It obeys the speed limit."
-    return (
-        f"It breaks the speed limit in {over} of {counted(len(excesses), 'episode')}, by up to "
-        f"{max(excesses):.2f} m/s."
+def _margins(ran: Sequence[Episode]) -> str:
+    """Return the sentence on the smallest separation margin of all episodes."""
+    margins_m = [e.record.min_margin_m for e in ran if e.record.min_margin_m is not None]
+    if not margins_m:
+        return "The robot never moved near anybody."
+    below = sum(margin_m < 0.0 for margin_m in margins_m)
+    where = (
+        f"below 0 in {below} of {counted(len(margins_m), 'episode')}" if below else "never below 0"
     )
+    return f"The worst margin is {number_text(min(margins_m))} m, {where}."
+
+
+def _obeys(ran: Sequence[Episode]) -> str:
+    """Return the sentence on the speed limit; empty where the conduct is not known."""
+    conducts = [each.conduct for each in ran if each.conduct is not None]
+    excesses = {
+        "the speed limit": [each.limit_excess_mps for each in conducts],
+        "the limit of its fastest point": [each.fastest_point_excess_mps for each in conducts],
+    }
+    known = {rule: [each for each in of if each is not None] for rule, of in excesses.items()}
+    if not any(known.values()):
+        return ""
+    over = [
+        f"{rule} in {sum(each > OVERSHOOT_MPS for each in of)} of "
+        f"{counted(len(of), 'episode')}, by up to {max(of):.2f} m/s"
+        for rule, of in known.items()
+        if max(of, default=0.0) > OVERSHOOT_MPS
+    ]
+    return f"It exceeds {' and '.join(over)}." if over else "It obeys the speed limit."
+
+
+def _goals(episodes: Sequence[Episode]) -> str:
+    missed = sum(each.record.time_to_goal_s is None for each in episodes)
+    if not missed:
+        return "It misses no goal."
+    return f"It misses the goal in {missed} of {counted(len(episodes), 'episode')}."
 
 
 def _won_back(who: str, against: Comparison) -> str:
     back = against.won_back
     if not back.known:
-        return f"No pair with {BASELINE} tells what it wins back."
-    text = f"{back.text(0, 100.0)}{THIN}% of the time that {BASELINE} loses to {who}"
+        return f"No pair tells whether it is faster than {BASELINE}."
+    pairs = counted(back.n, "pair")
+    if back.value >= 0.0:
+        text = f"wins back {back.text(0, 100.0)}{THIN}% of the time that {BASELINE} loses to {who}"
+    else:  # what it wins back is below 0, and so it loses more
+        more = replace(back, value=-back.value, low=-back.high, high=-back.low)
+        text = f"loses {more.text(0, 100.0)}{THIN}% more time to {who} than {BASELINE}"
     if back.n < FEW_PAIRS:
-        return f"Over only {counted(back.n, 'pair')} it wins back {text}: too few to tell."
-    if back.low > 0.0:
-        return f"It wins back {text} ({counted(back.n, 'pair')})."
-    if back.high < 0.0:
-        return f"It is slower: it wins back {text}."
-    return f"That it wins back time is not shown: {text}."
+        return f"Over only {pairs} it {text}: too few to tell."
+    if back.low <= 0.0 <= back.high:
+        return f"It {text} ({pairs}): no difference is shown."
+    return f"It {text} ({pairs})."
 
 
 def _violates(against: Comparison, who: str) -> str:
-    change, base = against.violation_excess, "violation time"
+    change, base, decimals = against.violation_excess, "violation time", 0
     if not change.known:  # the reference violates nothing
-        change, base = against.violation_excess_of_time, "driving time"
+        change, base, decimals = against.violation_excess_of_time, "driving time", 1
     if not change.known:
         return ""
-    text = f"{change.text(0, 100.0)}{THIN}% of {BASELINE}'s {base}"
+    text = f"{change.text(decimals, 100.0)}{THIN}% of {BASELINE}'s {base}"
     if change.n < FEW_PAIRS or change.low <= 0.0 <= change.high:
-        return f"With {who}, no change of the time of negative margins is shown: {text}."
+        return f"Whether its margins with {who} are negative for longer is not shown: {text}."
     return (
         f"With {who}, margins are negative {'longer' if change.value > 0.0 else 'shorter'}: {text}."
     )

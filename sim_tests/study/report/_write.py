@@ -41,7 +41,7 @@ _AWARENESS: Final = {
     "missed_aware": "aware, not recognised: costs time",
 }
 _REQUESTS: Final = ("requests", *RATIOS, "asked_twice", "step_out_answered")
-# The people of the step-out impacts in the table of arms.
+# The people of the step-out impacts in the table of robots.
 _IMPACTS: Final = ("never", "all")
 _REPORT: Final = "report.html"
 #: Paths or distances that differ by less count as the same.
@@ -113,11 +113,11 @@ def arms_section(results: Results) -> Section:
     """Return the table of arms, and that of differences on the same seeds."""
     arms = Table(
         {
-            "Arm": "policy, and planner and perception where they differ",
+            "Robot": "policy, and planner and perception where they differ",
             "Success": "goal reached, and the robot moved into nobody",
             "Contacts, moving": "episodes in which a person and the moving robot touched, by any "
             "cause",
-            "by the robot": "episodes in which the robot moved into a person",
+            "It moved into them": "episodes in which the robot moved into a person",
             "Time lost, s": METRICS["time_lost_s"].meaning,
             "Negative margin, s": METRICS["violation_time_s"].meaning,
             "Least margin, m": "the worst episode",
@@ -149,12 +149,12 @@ def arms_section(results: Results) -> Section:
         if (against := results.against(arm, part)) is not None and against.pairs
     ]
     columns = {
-        "Arm": "",
+        "Robot": "",
         "People": "what the scenario says that they look at, where it was measured to be so",
         "Pairs": "of episodes with the same scenario and seed",
-        "Time won back, %": "Σ (time lost by blind − by the arm) / Σ time lost by blind",
+        "Time won back, %": "Σ (time lost by blind − by the robot) / Σ time lost by blind",
         "Time lost, s": "mean difference; less is faster",
-        "Negative margins, %": "Σ (time of the arm − of blind) / Σ of blind",
+        "Negative margins, %": "Σ (its time − that of blind) / Σ of blind",
         **{METRICS[f"step_out_{group}"].title: "mean difference" for group in _IMPACTS},
         "Separation, m": "mean difference of the smallest separation",
     }
@@ -190,7 +190,7 @@ def _worst(row: SummaryRow | None, name: str) -> Cell:
 
 def charts_section(results: Results) -> Section:
     """Return the charts."""
-    charts = (risk_chart(results.arms), episode_chart(results.arms))
+    charts = (*risk_chart(results.arms), episode_chart(results.arms))
     return Section("charts", "Time against risk", charts=charts)
 
 
@@ -213,7 +213,7 @@ def awareness_section(results: Results) -> Section | None:
     ]
     if not lines:
         return None
-    names = ("Nearest person", "Arm", "Episodes", "Contacts, moving", "Time lost, s")
+    names = ("Nearest person", "Robot", "Episodes", "Contacts, moving", "Time lost, s")
     columns = dict.fromkeys((*names, "Negative margin, s", "Smallest margin, m"), "")
     lead = "Whether the person who came nearest had seen the robot, and whether it knew."
     return Section("awareness", "Awareness", lead, tables=(Table(columns, lines, 2),))
@@ -225,7 +225,7 @@ def scenarios_section(results: Results, jobs: Iterable[Job]) -> Section:
     rows = {(row.part, row.variant): row for row in results.summary.scenarios}
     compared = [arm for arm in arms if results.against(arm) is not None]
     columns = {"Scenario": "", "People": "its label, and episodes in which they were not so"}
-    columns |= {"Episodes": "of all arms", "Contacts, moving": "by arm"}
+    columns |= {"Episodes": "of all robots", "Contacts, moving": "of each robot"}
     for title, meaning, shown in (
         ("time lost, s", "mean", arms),
         ("won back, %", "of what blind loses", compared),
@@ -314,7 +314,7 @@ def faults_section(results: Results) -> Section | None:
         return None
     columns = {
         "Fault": "",
-        "Arm": "",
+        "Robot": "",
         "Contacts, moving": "",
         "Time lost more, s": "mean difference to the same seeds without the fault",
         "Negative margin more, s": "mean difference to the same seeds without the fault",
@@ -334,7 +334,7 @@ def requests_section(results: Results, run: Run) -> Section | None:
 def metrics_section(results: Results) -> Section:
     """Return all means, with their definitions."""
     lead = (
-        "Definitions with their sources: docs/simulation.md. Intervals of means are bias-corrected "
+        "Definitions with their sources: docs/measures.md. Intervals of means are bias-corrected "
         "and accelerated bootstraps within scenarios. Those of shares are exact (Clopper and "
         "Pearson 1934); for none of n the one-sided bound 1 − 0.05^(1/n)."
     )
@@ -369,7 +369,7 @@ def planners_section(results: Results, run: Run) -> Section | None:
         return None
     conduct = Table(
         {
-            "Arm": "",
+            "Robot": "",
             "Speed limit, m/s": "largest excess of the travel speed over speed_limit_mps",
             "Episodes over": f"with an excess of more than {OVERSHOOT_MPS:g} m/s",
             "Yaw rule, m/s": "the same for |v| + |ω| R and fastest_point_limit_mps",

@@ -200,7 +200,7 @@ def _zone_s(episode: SocialEpisode, zone: str) -> float | None:
     return float(np.diff(episode.t_s) @ inside[:-1].astype(np.float64))
 
 
-_zones("general", "{}_s", "time in {} distance", _zone_s)
+_zones("general", "{}_distance_s", "time in {} distance", _zone_s)
 
 
 # Over the walks without a robot; means of all people as NavWareSet takes them.

@@ -1,6 +1,6 @@
 """Pairs of faults of camera or odometry and of scanners: the robot touches nobody.
 
-Two pairs always run, the others with --full. docs/simulation.md has the command for all pairs.
+Two pairs always run, the others with --full. docs/measures.md has the command for all pairs.
 """
 
 from __future__ import annotations

@@ -108,6 +108,6 @@ def test_the_command_prints_both_tables_and_which_file_to_open(tmp_path, capsys)
 
 def test_the_page_has_the_reported_table_and_names_the_shown_seed() -> None:
     _, rows = read_report()
-    page = (ROOT / "docs" / "simulation.md").read_text("utf-8")
+    page = (ROOT / "docs" / "simulation_results.md").read_text("utf-8")
     assert lanes_table(rows) in page
     assert f"seed {shown_seed(rows)}." in page

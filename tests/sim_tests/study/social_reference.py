@@ -283,7 +283,7 @@ def reference_measures(episode, groups):
         "path_irregularity_radpm": excess / length,
         "mean_goal_angle_rad": goal_angle(rows, goal),
         "time_to_collision_s": collision_time(rows, radius, body),
-        **{f"{zone}_s": times[zone] for zone in ("intimate", "personal", "social")},
+        **{f"{zone}_distance_s": times[zone] for zone in ("intimate", "personal", "social")},
         "human_delay_s": outcome.human_delay_s,
         "people_acceleration_mps2": people[0] / people[1],
         "people_jerk_mps3": people[2] / people[3],

@@ -36,7 +36,7 @@ def test_braking_counts_in_either_direction_and_is_never_overstated(dt_s, sign):
     deceleration, jerk = peak_deceleration_and_jerk(t, speed)
     assert deceleration == pytest.approx(1.0, abs=0.01)
     assert deceleration <= 1.0 + 1e-9
-    assert 2.5 < jerk < 5.0  # a sudden m/s² spreads over the window; see docs/simulation.md
+    assert 2.5 < jerk < 5.0  # a sudden m/s² spreads over the window; see docs/measures.md
 
 
 def test_white_noise_of_the_speed_counts_as_documented():

@@ -89,7 +89,7 @@ def test_obeying_and_using_radii_are_told_from_reading_nothing(tables, page):
     assert radii["straight_on"]["Radii"] == "ignores them"
     assert radii["straight_on"]["Somebody near"] == 1.0
     assert radii["Raises"]["Radii"] == "–"
-    assert "It breaks the speed limit in 1 of 1 episode, by up to" in page.text
+    assert "It exceeds the speed limit in 1 of 1 episode, by up to" in page.text
     assert "It obeys the speed limit." in page.text
 
 

@@ -102,6 +102,38 @@ def test_contact_is_never_played_down(run: MadeUpRun, tmp_path: Path) -> None:
     assert "robot moved into a person" in page.text
 
 
+def test_the_first_line_has_the_worst_of_all_episodes(run: MadeUpRun, tmp_path: Path) -> None:
+    own = [n for n, each in enumerate(run.records) if each.policy == "balanced"]
+    records = [replace(each, min_margin_m=0.3) for each in run.records]
+    with_fault = next(n for n in own if records[n].fault)
+    records[own[0]] = replace(records[own[0]], min_margin_m=-0.2, time_to_goal_s=None)
+    records[with_fault] = replace(records[with_fault], min_margin_m=-0.99)
+    missed = sum(records[n].time_to_goal_s is None for n in own)
+    page = report(replace(run, records=tuple(records)), tmp_path)
+    worst = f"The worst margin is -0.99 m, below 0 in 2 of {len(own)} episodes. "
+    assert f"{worst}It misses the goal in {missed} of {len(own)} episodes." in page.text
+    assert page.text.index(worst) < page.text.index("The moving robot touched nobody")
+
+
+@pytest.mark.parametrize("times", [1.0, 3.0])
+def test_less_won_back_than_none_is_more_time_lost(
+    run: MadeUpRun, tmp_path: Path, times: float
+) -> None:
+    records = tuple(
+        replace(each, time_lost_s=times * each.time_lost_s) if each.policy == "balanced" else each
+        for each in run.records
+        if each.time_lost_s is not None
+    )
+    page = report(replace(run, records=records, jobs=()), tmp_path)
+    assert not re.search(r"It (wins back|loses) -", page.text)
+    assert ("% more time to people than blind" in page.text) == (times > 1.0)
+
+
+def test_without_any_risk_there_is_no_chart_of_it(run: MadeUpRun, tmp_path: Path) -> None:
+    page = report(changed(run, violation_time_s=0.0), tmp_path)
+    assert [name for name, _ in page.tags].count("svg") == 1
+
+
 def test_pairs_of_people_who_do_not_watch_are_named_and_left_out(tmp_path: Path) -> None:
     scenario = "crossing_from_the_left"
     run = changed(made_up_run(scenarios=3, seeds=24), scenario, attentive_share=0.4)

@@ -47,7 +47,12 @@ def test_a_robot_that_strafes_is_measured_as_one_that_faces_its_way():
 def test_without_people_their_measures_do_not_apply():
     measured = social_measures(random_episode(1, people=0))
     ours = random_episode(1, people=0)
-    for name in ("time_to_collision_s", "intimate_s", "hunav_social_work_mps2", "people_jerk_mps3"):
+    for name in (
+        "time_to_collision_s",
+        "intimate_distance_s",
+        "hunav_social_work_mps2",
+        "people_jerk_mps3",
+    ):
         assert measured[name] is None
     assert measured["hunav_path_length_m"] > 0.0
     assert measured["hunav_obstacle_force_mps2"] > 0.0
