@@ -40,8 +40,8 @@ _LOOKING_S: Final = 0.5 / math.log(2.0)
 _FORGETTING_S: Final = 3.0
 # A belief of a half rests on so many looks.
 _HALF_S: Final = 0.5
-# A belief ends at the latest so long after a face has looked away. For robots that stop within that,
-# the limit need not fall faster than they brake.
+# A belief ends at the latest so long after a face has looked away. The limit of robots that stop
+# within that need not fall faster than they brake.
 _AVERTED_LEFT_S: Final = 1.5
 # A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
 _LOOK: Final = 0.5
