@@ -201,9 +201,9 @@ def test_what_is_known_never_grows_without_a_look_and_falls_by_a_second_per_seco
     front, place = SensorConfig(sees_faces=True, measures_range=False), (3.0, 0.5)
     more = {"second": front} if cameras == 2 else {}
     tracker = PersonTracker(REMEMBERS, sensors={LASER: SensorConfig(), **more})
-    events = [(0.04 * count, LASER, count) for count in range(150)]
+    events = [(0.04 * count, LASER, count) for count in range(175)]
     for phase, name in enumerate(["camera", *more]):
-        pictures = range(math.floor(6.0 / period_s))
+        pictures = range(math.floor(7.0 / period_s))
         events += [(0.007 + (0.3 * phase + count) * period_s, name, count) for count in pictures]
     before_s, before = 0.0, 0.0
     for stamp_s, sensor, count in sorted(events):
