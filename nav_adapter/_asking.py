@@ -52,6 +52,9 @@ _LOOK_S: Final = 1.0
 # No way past somebody is expected to take longer than this; it is driven in steps.
 _LONGEST_S: Final = 10.0
 _STEP_S: Final = 0.5
+# So long after a look that would have won too little, it is not computed again: with many people it
+# takes ten times as long as the limit.
+_WEIGHED_S: Final = 0.5
 # A robot that has stood for so long is not on its way, and asks nobody.
 _PARKED_AFTER_S: Final = 10.0
 # Budget, and how long people count as asked.
@@ -70,11 +73,15 @@ class Sound(NamedTuple):
 
 
 class AddressHistory(NamedTuple):
-    """The latest warning that sounded, the requests of the last minute, and the latest motion."""
+    """The latest warning that sounded, the requests of the last minute, and the latest motion.
+
+    And when a look was last found to win too little.
+    """
 
     sound: Sound = Sound()
     requests_s: tuple[float, ...] = ()
     moved_s: float = -math.inf
+    weighed_s: float = -math.inf
 
 
 class Addressed(NamedTuple):
@@ -119,7 +126,8 @@ class Addressing:
         robot_age_s: float,
     ) -> Addressed:
         """Return the warnings of an update, then the request, and the answers."""
-        people, sound, moved_s = dict(people), history.sound, history.moved_s
+        people, sound = dict(people), history.sound
+        moved_s, weighed_s = history.moved_s, history.weighed_s
         alerts: list[Alert] = []
         if self._policy.alerts is not None:
             alerts, sound = self._warnings(self._policy.alerts, people, robot_state, now, sound)
@@ -136,6 +144,7 @@ class Addressing:
             person is not None
             and len(recent_s) < rules.per_minute
             and now - moved_s <= _PARKED_AFTER_S
+            and now - weighed_s >= _WEIGHED_S
             and not any(alert.track_id == person.id for alert in alerts)
             and self._may_be_asked(person, rules, robot_state, now)
         ):
@@ -151,7 +160,9 @@ class Addressing:
                     if not before.answered:
                         asked = Asked(before.times + 1, now)
                         people[each.id] = each._replace(asked=asked)
-        history = AddressHistory(sound, recent_s, moved_s)
+            else:
+                weighed_s = now
+        history = AddressHistory(sound, recent_s, moved_s, weighed_s)
         return Addressed(tuple(alerts), answers, history, people)
 
     def _warnings(

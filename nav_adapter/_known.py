@@ -37,7 +37,7 @@ def known_now(
     if person.awareness_lower > 0.0:
         speed_mps = human_speed_mps(policy, person.awareness_lower)
         # At least what they show, whatever they have noticed.
-        speed_mps = min(max(speed_mps, track.departed_mps), max(speed_mps, unaware_mps))
+        speed_mps = min(max(speed_mps, person.departed_mps), max(speed_mps, unaware_mps))
     later_mps = unaware_mps
     first_mps = speed_mps
     if person.is_at_first_sight:

@@ -66,6 +66,7 @@ class Person(NamedTuple):
         awareness_lower: the lower bound of α that was used.
         aware_for_s: for how long that holds from the stamp of the track on, if they keep to their
             motion.
+        departed_mps: speed by which they depart from it.
         radius_m: radius of the obstacle.
         sigma_m: standard deviation of the position along its most uncertain direction.
         known_s: time for which frames have shown the person.
@@ -85,6 +86,7 @@ class Person(NamedTuple):
     seen_stamp_s: float
     awareness_lower: float
     aware_for_s: float
+    departed_mps: float
     radius_m: float
     sigma_m: float
     known_s: float
@@ -107,6 +109,10 @@ class Person(NamedTuple):
     def lost_for_s(self, stamp_s: float) -> float:
         """Return for how long a person has been lost; 0 for one who has not been dropped."""
         return 0.0 if self.lost_since_s is None else stamp_s - self.lost_since_s
+
+    def is_repeated_by(self, track: PersonTrack) -> bool:
+        """Return whether a track rests on no newer frame: it is no new evidence then."""
+        return _seen_stamp_s(track) - self.seen_stamp_s <= _SAME_STAMP_S
 
     def may_be(self, track: PersonTrack, walking_mps: float) -> bool:
         """Return whether a track is where this person can be.
@@ -280,7 +286,7 @@ class People:
             lower = self._trusted_lower(track, None, now, stale)
             return _remembering(self._at(track, None, lower, now), before)
         lower = self._trusted_lower(track, before, now, stale)
-        advance_s = track.stamp_s - track.time_since_seen_s - before.seen_stamp_s
+        advance_s = _seen_stamp_s(track) - before.seen_stamp_s
         counts = advance_s > _SAME_STAMP_S and not stale
         shown_s = min(advance_s, self._timing.fresh_within_s) if counts else 0.0
         return self._at(track, before, lower, now, shown_s)
@@ -294,13 +300,13 @@ class People:
         is no new evidence, whatever the track says. Whoever answers a request is somebody who
         looks, like anybody else: people look before they set off, and no request makes them stay.
         """
-        seen_stamp_s, status = track.stamp_s - track.time_since_seen_s, track.status
+        seen_stamp_s, status = _seen_stamp_s(track), track.status
         if stale or status == "tentative" or now - seen_stamp_s > self._timing.fresh_within_s:
             return 0.0
         lower, counts_as = track.awareness_lower, self._policy.noticed_counts_as
         if counts_as is not None and track.noticed >= _NOTICED and status == "confirmed":
             lower = max(lower, counts_as)
-        if before is not None and seen_stamp_s - before.seen_stamp_s <= _SAME_STAMP_S:
+        if before is not None and before.is_repeated_by(track):
             return min(lower, before.awareness_lower)
         return lower
 
@@ -322,8 +328,8 @@ class People:
         # Growth ends where the robot stops for lack of data: more would only block its restart.
         grown_s = min(max(ahead_s, 0.0), self._timing.stop_after_s)
         sigma_m = checked_sigma_m(track, place, (vx, vy), grown_s)
-        seen_stamp_s = track.stamp_s - track.time_since_seen_s
-        confirmed = track.status != "tentative"
+        seen_stamp_s, confirmed = _seen_stamp_s(track), track.status != "tentative"
+        aware_for_s, departed_mps = track.aware_for_s, track.departed_mps
         radius_m = self._target_m(0.0 if before is None else lower, sigma_m)
         known_s, kept = 0.0, _NOTHING_KEPT
         if before is not None:
@@ -332,6 +338,10 @@ class People:
             shrinks = track.status == "confirmed" and before.known_s >= 0.0
             shrunk_m = self._timing.shrink_rate_mps * shown_s if shrinks else 0.0
             radius_m = max(radius_m, before.radius_m - shrunk_m)
+            if before.is_repeated_by(track):
+                since_s = track.stamp_s - before.track.stamp_s
+                aware_for_s = min(aware_for_s, max(before.aware_for_s - since_s, 0.0))
+                departed_mps = max(departed_mps, before.departed_mps)
             seen_stamp_s = max(seen_stamp_s, before.seen_stamp_s)
             known_s = before.known_s + shown_s
             confirmed = confirmed or before.was_confirmed
@@ -344,7 +354,8 @@ class People:
             (vx, vy),
             seen_stamp_s,
             lower,
-            track.aware_for_s,
+            aware_for_s,
+            departed_mps,
             radius_m,
             sigma_m,
             known_s,
@@ -376,6 +387,11 @@ class People:
 
     def _policy_speed_mps(self, awareness_lower: float) -> float:
         return human_speed_mps(self._policy, awareness_lower)
+
+
+def _seen_stamp_s(track: PersonTrack) -> float:
+    """Return the stamp of the latest frame that showed a track."""
+    return track.stamp_s - track.time_since_seen_s
 
 
 def human_speed_mps(policy: AwarenessPolicy, awareness_lower: float) -> float:

@@ -18,7 +18,7 @@ theirs at once (:func:`departed_mps`). Two things end the belief, until there ar
 
 Nothing else ends it at once: :func:`aware_for_s` says for how long it lasts at least, which falls
 by a second per second. It is over ``noticed_memory_s`` after the last look, and 1.5 s after a face
-that looks away, in more than one frame: who passes a robot looks ahead.
+that looks away for 0.1 s: who passes a robot looks ahead.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ _LOOKING_S: Final = 0.5 / math.log(2.0)
 _FORGETTING_S: Final = 3.0
 # A belief of a half rests on so many looks.
 _HALF_S: Final = 0.5
-# A belief ends at the latest so long after a face has looked away. Robots stop within that, so the
-# limit need not fall faster than they brake.
+# A belief ends at the latest so long after a face has looked away. The limit of robots that stop
+# within that need not fall faster than they brake.
 _AVERTED_LEFT_S: Final = 1.5
 # A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
 _LOOK: Final = 0.5
@@ -101,7 +101,9 @@ def aware_for_s(track: Track, stamp_s: float, state: State, sensors: Sensors) ->
     if noticed(track, stamp_s, state, sensors) < 0.5:
         return 0.0
     left_s = sensors.config.awareness.noticed_memory_s - (stamp_s - track.look_s)
-    return min(left_s, _FORGETTING_S * math.log(max(track.looked_s / _HALF_S, 1.0)))
+    fades_s = _FORGETTING_S * math.log(max(track.looked_s / _HALF_S, 1.0))
+    # The next picture may show no look, and then stands for the time since the last one.
+    return max(min(left_s, fades_s - _since_pictured_s(track, stamp_s)), 0.0)
 
 
 def departed_mps(track: Track) -> float:
@@ -127,13 +129,13 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     """Take a frame into the looks of one person, who looks at the robot by ``look`` in [0, 1]."""
     stamp, faces, looking = step.frame.stamp_s, step.earlier.faces, look > 0.0
     config, sees_faces = step.config.awareness, step.sensor.settings.sees_faces
-    dt_s = min(step.dt_s, EVIDENCE_GAP_S) if sees_faces else 0.0
+    dt_s = _since_pictured_s(track, stamp) if sees_faces else 0.0
     period_s = face_period_s(track, faces, step.state.clocks, step.sensors)
     since_s = stamp - track.look_s
     if looking:
         track.averted_s = 0.0
     elif sees_faces and _looks_away(sight):
-        track.averted_s += dt_s
+        track.averted_s += min(dt_s, step.dt_s)
     doubtful = sight is not None and sight.jumped
     averted = track.averted_s > _AVERTED_S
     if (
@@ -149,6 +151,7 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     _slow_down(track)
     if not sees_faces or sight is None:
         return
+    track.pictured_s = stamp
     if not looking:
         track.looked_s *= math.exp(-dt_s / _FORGETTING_S)
         return
@@ -164,6 +167,11 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     share = -math.expm1(-dt_s / _KEEPING_S)
     x, y = track.kept_mps
     track.kept_mps = (x + share * (track.vx - x), y + share * (track.vy - y))
+
+
+def _since_pictured_s(track: Track, stamp_s: float) -> float:
+    """Return the time since a picture of any camera last showed a person, up to that of a gap."""
+    return min(stamp_s - track.pictured_s, EVIDENCE_GAP_S)
 
 
 def _cameras_are_silent(stamp_s: float, faces: FrameClock) -> bool:

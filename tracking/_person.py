@@ -55,6 +55,8 @@ class Track:
         look_s: stamp of the latest look; −∞ for none.
         kept_mps: the velocity to which the person keeps, by their looks.
         averted_s: for how long frames since then have shown a face that looks away.
+        pictured_s: stamp of the latest picture of any camera that has shown them since the first
+            look.
         lasting_std: relative standard deviation of the range from the camera that lasts; it is not
             in the covariance (``_size``).
         size_log: ln of the range at which an adult would look as large, over the range.
@@ -82,6 +84,7 @@ class Track:
         self.look_s = -math.inf
         self.kept_mps = (0.0, 0.0)
         self.averted_s = 0.0
+        self.pictured_s = -math.inf
         self.lasting_std = measured.lasting_std
         self.size_log = 0.0
         self.size_variance = math.inf

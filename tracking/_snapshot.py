@@ -51,7 +51,8 @@ class PersonTrack:
         time_since_face_s: ≥ 0, time since the latest picture whose view of the face α rests on;
             infinite if there is none, and None from a tracker that does not say.
         aware_for_s: ≥ 0, for how long what is known of their awareness lasts at least, if they keep
-            to their motion and do not look again; infinite where the tracker does not say.
+            to their motion and do not look again, or 1.5 s once they look away if that is less;
+            infinite where the tracker does not say.
         departed_mps: ≥ 0, speed by which their motion departs from that which they had as they
             looked, or from slowing down; 0 for somebody who has not noticed the robot.
     """

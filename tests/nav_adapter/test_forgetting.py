@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_scenes import ROBOT, person, robot_at, settled_update
 
-from nav_adapter import AwarenessPolicy
+from nav_adapter import AwarenessPolicy, NavAdapter
 from nav_adapter.course import course_of
 from nav_adapter.exporters import speed_limit_at
 from nav_adapter.limit import FINEST, limit_mps, step_of_s
@@ -137,3 +137,31 @@ def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
         field = speed_limit_at(now, here, [[0.0]], first_s=each, dt_s=0.1, speeds_mps=speeds)
         then = limit_with(known(max(left_s - each, 0.0)))
         assert then - 0.02 <= field[0, 0] <= then + 1e-3
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    left_s=st.tuples(LEFT_S, LEFT_S),
+    departed_mps=st.tuples(st.floats(0.0, 1.5), st.floats(0.0, 1.5)),
+    later_s=st.floats(0.0, 0.2),
+    place=st.tuples(st.floats(1.0, 3.0), st.floats(-1.0, 1.0)),
+)
+def test_a_track_without_a_newer_frame_knows_nothing_better(
+    left_s: tuple[float, float],
+    departed_mps: tuple[float, float],
+    later_s: float,
+    place: tuple[float, float],
+) -> None:
+    """Whatever it says of memory and motion: no frame shows either."""
+    adapter = NavAdapter(POLICY, ROBOT)
+
+    def at(stamp_s: float, index: int, unseen_s: float = 0.0) -> PersonTrack:
+        shown = person(stamp_s, position=place, awareness_lower=0.9, unseen_s=unseen_s)
+        return replace(shown, aware_for_s=left_s[index], departed_mps=departed_mps[index])
+
+    for count in range(5):
+        now_s = 0.1 * count
+        before = adapter.update([at(now_s, 0)], robot_at(now_s), now_s)
+    then_s = now_s + later_s
+    after = adapter.update([at(then_s, 1, unseen_s=later_s)], robot_at(then_s), then_s)
+    assert after.speed_limit_mps <= before.speed_limit_mps + 1e-6

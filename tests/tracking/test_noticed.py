@@ -21,7 +21,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracking_scenes import FloatArray, as_bytes, camera_at, nearest, observe
 
-from tracking import AwarenessFilterConfig, PersonTrack, PersonTracker, TrackerConfig
+from tracking import (
+    AwarenessFilterConfig,
+    PersonTrack,
+    PersonTracker,
+    SensorConfig,
+    TrackerConfig,
+)
 
 MEMORY_S = 4.0
 REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=MEMORY_S))
@@ -179,6 +185,39 @@ def test_what_is_known_lasts_for_as_long_as_was_said() -> None:
     falls = -np.diff(said_s)[1:]
     assert falls.max() <= 0.1 + 1e-6
     assert said_s[-1] == 0.0
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    cameras=st.integers(1, 2),
+    period_s=st.floats(0.04, 0.24),
+    looks_s=st.floats(0.7, 1.6),
+    missed=st.sampled_from([0, 3, 4]),
+)
+def test_what_is_known_never_grows_without_a_look_and_falls_by_a_second_per_second(
+    cameras: int, period_s: float, looks_s: float, missed: int
+) -> None:
+    """However many cameras there are, how fast, and whichever of their pictures miss the person."""
+    front, place = SensorConfig(sees_faces=True, measures_range=False), (3.0, 0.5)
+    more = {"second": front} if cameras == 2 else {}
+    tracker = PersonTracker(REMEMBERS, sensors={LASER: SensorConfig(), **more})
+    events = [(0.04 * count, LASER, count) for count in range(175)]
+    for phase, name in enumerate(["camera", *more]):
+        pictures = range(math.floor(7.0 / period_s))
+        events += [(0.007 + (0.3 * phase + count) * period_s, name, count) for count in pictures]
+    before_s, before = 0.0, 0.0
+    for stamp_s, sensor, count in sorted(events):
+        alpha = 0.9 if 1.0 <= stamp_s < 1.0 + looks_s else None
+        if sensor == LASER:
+            seen, at = [seen_by_laser(place, stamp_s)], laser_at()
+        else:
+            seen, at = [seen_by_camera(place, stamp_s, awareness=alpha)], camera_at()
+            seen = [] if missed and count % missed == 0 else seen
+        (track,) = tracker.update(seen, stamp_s, at, sensor=sensor)
+        if alpha is None or sensor == LASER:
+            assert before - (stamp_s - before_s) - 1e-6 <= track.aware_for_s <= before + 1e-9
+        before_s, before = stamp_s, track.aware_for_s
+    assert before == 0.0
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.6], ids=["same_range", "other_range"])

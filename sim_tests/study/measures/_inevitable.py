@@ -47,7 +47,7 @@ def stoppable_mps(
     """
     t_s = trace.t_s
     end = max(int(np.searchsorted(t_s, contact.t_s, "right")) - 1, 0)
-    row = _begun(trace, outline, end, contact.worker)
+    row = _begun(trace, outline, end, contact)
     while row < end and not _in_sight(trace, result, row, contact.worker):
         row += 1
     braking_s = contact.t_s - float(t_s[row]) - STEP_OUT.noticed_after_s
@@ -55,12 +55,15 @@ def stoppable_mps(
     return max(braking_s, 0.0) * result.robot.max_deceleration_mps2
 
 
-def _begun(trace: Trace, outline: Outline, end: int, person: int) -> int:
-    """Return the instant at which a person began the motion that led to a contact at ``end``."""
-    rows = np.arange(end + 1)
+def _begun(trace: Trace, outline: Outline, end: int, contact: ContactEvent) -> int:
+    """Return the instant at which a person began the motion that led to a contact after ``end``."""
+    rows, person = np.arange(end + 1), contact.worker
+    # Between two instants of the log both may come nearer by more than what counts as near.
+    robot = [np.interp(contact.t_s, trace.t_s, each) for each in trace.robot_odom_m.T]
+    at_s = min(contact.t_s, float(trace.t_s[-1]))
     place, velocity = trace.people_odom_m[rows, person], trace.people_odom_mps[rows, person]
-    left_s = trace.t_s[end] - trace.t_s[rows]
-    relative = place + velocity * left_s[:, None] - trace.robot_odom_m[end]
+    left_s = at_s - trace.t_s[rows]
+    relative = place + velocity * left_s[:, None] - np.array(robot)
     cos, sin = np.cos(trace.heading_odom_rad[end]), np.sin(trace.heading_odom_rad[end])
     met = outline.distance(np.nan_to_num(relative @ np.array([[cos, -sin], [sin, cos]]), nan=1e6))
     elsewhere = np.flatnonzero(met[:end] > BODY_RADIUS_M + _NEAR_M)

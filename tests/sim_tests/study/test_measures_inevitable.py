@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from measured_scenes import contact, crossing, straight
+from measured_scenes import ALONG_M, BODY_RADIUS_M, contact, crossing, straight
 
 from sim_tests.study.measures import measure
 
@@ -86,6 +86,21 @@ def test_a_robot_has_from_the_start_on(warning_s, speed_mps, along_mps, angle, r
 @pytest.mark.parametrize("walk", [sets_off(0.0), sets_off(9.0)], ids=["stands", "walks"])
 def test_for_whoever_comes_as_they_always_did_it_had_all_the_time(walk):
     assert stoppable_mps(walk) == pytest.approx(AT_S - UNTIL_BRAKING_S)
+
+
+@given(late_s=st.floats(0.0, 0.049), walks_mps=st.floats(0.0, 2.0))
+@settings(max_examples=15)
+def test_a_contact_between_two_instants_of_the_log_excuses_no_robot(late_s, walks_mps):
+    """Somebody who comes head-on is not near yet at the instant before."""
+    at_s = AT_S + late_s
+
+    def walk(t):
+        return at_s + ALONG_M + BODY_RADIUS_M + walks_mps * (at_s - t), 0.0, -walks_mps, 0.0
+
+    touched = [contact(at_s, 0, "robot", 1.0)]
+    record = measure(crossing(T_S, straight(1.0, (0.0, 0.0)), [walk], contacts=touched))
+    found = record.moving_contact_stoppable_mps
+    assert found == pytest.approx(at_s - UNTIL_BRAKING_S, abs=SAME_MPS)
 
 
 @pytest.mark.parametrize("clear_m", [0.8, 1.6, 3.0])
