@@ -41,6 +41,7 @@ from ..errors import PerceptionError
 from ..eyes import EyeGaze, eyes_from_irises
 from ._images import rgb_image
 from ._model import read_model
+from ._retinaface import RetinaFace
 from ._settings import OnnxSettings
 from ._tflite import TfliteModel
 from .heads import head_crop, looking_at, ray_focal_px
@@ -81,6 +82,11 @@ _MIN_SIDE_PX: Final = 8.0
 # ears, or so many times that of eyes and nose.
 _NOSE_APART: Final = 0.4
 _NOSE_SIZES: Final = 3.3
+# A small face looks here if its nose lies between its eyes, at this share of the way. It is that of
+# the head if its nose and eyes lie where the pose network has them, by this share of the body size:
+# a neighbour's, one on a poster and one on the back of a head lie elsewhere, or look elsewhere.
+_BETWEEN: Final = (0.25, 0.75)
+_APART: Final = 0.15
 # Mesh points whose mean is nose, left eye, right eye, left ear and right ear. The mesh's tragions
 # are higher than the template's ears and would lower level heads by 5° (13 rendered workers); with
 # the points below them it is 1°.
@@ -193,15 +199,23 @@ class FaceMeshPoseEstimator:
     """A pose estimator whose people get the faces of :class:`FaceMesh`.
 
     ``face_evidence`` of a person is True where a face was found; nose, eyes and ears then come from
-    it. It is False where none was found, or one that is turned elsewhere than the head.
+    it. It is False where none was found, or one that is turned elsewhere than the head. Where the
+    mesh finds none, a small face that looks here is evidence alone: the keypoints stay.
 
     Args:
         pose_estimator: finds the bodies.
         mesh: finds the faces.
+        small_faces: looks again where the mesh finds none; None for nothing.
     """
 
-    def __init__(self, pose_estimator: PoseEstimator, mesh: FaceMesh) -> None:
+    def __init__(
+        self,
+        pose_estimator: PoseEstimator,
+        mesh: FaceMesh,
+        small_faces: RetinaFace | None = None,
+    ) -> None:
         self._pose_estimator, self._mesh = pose_estimator, mesh
+        self._small_faces = small_faces
 
     def estimate(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
@@ -223,7 +237,8 @@ class FaceMeshPoseEstimator:
         centre = pixels[kp.HEAD].mean(axis=0)
         marks = self._mesh.find(image, centre, _HEAD_SIDES * size_px, _FARTHEST * size_px)
         if marks is None:
-            return replace(person, face_evidence=False)
+            small = self._is_small_face(image, pixels[kp.HEAD], centre, size_px)
+            return replace(person, face_evidence=small)
         points = np.array([marks[list(rows)].mean(axis=0) for rows in _HEAD_POINTS])
         if not _agree(pixels[kp.HEAD], points[:, :2]):
             return replace(person, face_evidence=False)
@@ -238,6 +253,23 @@ class FaceMeshPoseEstimator:
             eyes_open=eyes_open,
             irises_px=iris_offset(marks[:, :2]),
         )
+
+    def _is_small_face(
+        self, image: ImageRgb, head_px: FloatArray, centre_px: FloatArray, size_px: float
+    ) -> bool:
+        """Return whether the head (5, 2) of the pose network looks here with a face of its own."""
+        if self._small_faces is None:
+            return False
+        face = self._small_faces.find(
+            image, centre_px, _HEAD_SIDES * size_px, _FARTHEST * size_px
+        )
+        if face is None:
+            return False
+        right_eye, left_eye, nose = face[:3]
+        across = left_eye - right_eye
+        share = float((nose - right_eye) @ across) / max(float(across @ across), 1e-9)
+        apart = np.linalg.norm(np.stack([nose, left_eye, right_eye]) - head_px[:3], axis=1)
+        return _BETWEEN[0] <= share <= _BETWEEN[1] and bool(apart.max() <= _APART * size_px)
 
 
 # Landmarks of the left and of the right eye: iris, corners, upper and lower lid.
