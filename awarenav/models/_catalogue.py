@@ -205,8 +205,8 @@ class Catalogue(StrictConfig):
             wrong = [name for role, name in each.networks.items() if roles.get(name) != role]
             if wrong:
                 raise ValueError(
-                    f"set {each.name}: detector, pose, face and small_face must name networks of these roles, "
-                    f"got {', '.join(wrong)}"
+                    f"set {each.name}: {', '.join(each.networks)} must name networks of these "
+                    f"roles, got {', '.join(wrong)}"
                 )
             if each.name in roles:
                 raise ValueError(f"{each.name} is a network and a set")

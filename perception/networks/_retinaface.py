@@ -38,7 +38,7 @@ _SIDE_PX: Final = 160
 _MIN_SIDE_PX: Final = 8.0
 #: Smallest probability of a face.
 _FACE: Final = 0.9
-_MEAN_RGB: Final = (123.0, 117.0, 104.0)
+_MEAN_BGR: Final = (104.0, 117.0, 123.0)
 _STRIDES: Final = (8, 16, 32)
 _ANCHORS_PX: Final = ((16, 32), (64, 128), (256, 512))
 _CENTRE_VARIANCE: Final = 0.1
@@ -94,8 +94,8 @@ class RetinaFace:
         if not (side_px >= _MIN_SIDE_PX and np.isfinite(centre_px).all()):
             return None
         crop = head_crop(image_rgb, centre_px, side_px, _SIDE_PX, np.eye(2))
-        blob = (crop[..., ::-1].astype(np.float32) - np.float32(_MEAN_RGB[::-1])).transpose(2, 0, 1)
-        (found,) = self._model.run({"image": np.ascontiguousarray(blob[None])})
+        planes = (crop[..., ::-1] - np.array(_MEAN_BGR, np.float32)).transpose(2, 0, 1)
+        (found,) = self._model.run({"image": np.ascontiguousarray(planes[None])})
         logits = found[0, :, 4:6].astype(np.float64)
         scores = expit(logits[:, 1] - logits[:, 0])
         middles = _PRIORS[:, :2] - 0.5 * _SIDE_PX
@@ -107,7 +107,8 @@ class RetinaFace:
         x, y, size = _PRIORS[best].tolist()
         in_crop = (x, y) + points * (_CENTRE_VARIANCE * size)
         # The network counts from the corner, image points from the middle of the first pixel.
-        return centre_px + (in_crop - 0.5 * _SIDE_PX) * (side_px / _SIDE_PX)
+        in_image: FloatArray = centre_px + (in_crop - 0.5 * _SIDE_PX) * (side_px / _SIDE_PX)
+        return in_image
 
 
 # (N, 3) middle and side of each anchor, in pixels of the input: places row by row, then sizes.

@@ -37,6 +37,7 @@ from .._camera import Camera
 from .._stages import HeadPose, PersonDetection, PersonKeypoints, PoseEstimator
 from ..anthropometry import EYES_HEAD_M, HEAD_CENTRE_HEAD_M
 from ..arrays import FloatArray, ImageRgb
+from ..body import DEFAULT_MIN_SCORE
 from ..errors import PerceptionError
 from ..eyes import EyeGaze, eyes_from_irises
 from ._images import rgb_image
@@ -84,7 +85,7 @@ _NOSE_APART: Final = 0.4
 _NOSE_SIZES: Final = 3.3
 # A small face looks here if its nose lies between its eyes, at this share of the way. It is that of
 # the head if its nose and eyes lie where the pose network has them, by this share of the body size:
-# a neighbour's, one on a poster and one on the back of a head lie elsewhere, or look elsewhere.
+# a neighbour's and one on a poster lie elsewhere. Without both shoulders nothing tells whose it is.
 _BETWEEN: Final = (0.25, 0.75)
 _APART: Final = 0.15
 # Mesh points whose mean is nose, left eye, right eye, left ear and right ear. The mesh's tragions
@@ -237,7 +238,7 @@ class FaceMeshPoseEstimator:
         centre = pixels[kp.HEAD].mean(axis=0)
         marks = self._mesh.find(image, centre, _HEAD_SIDES * size_px, _FARTHEST * size_px)
         if marks is None:
-            small = self._is_small_face(image, pixels[kp.HEAD], centre, size_px)
+            small = self._is_small_face(image, person, centre, size_px)
             return replace(person, face_evidence=small)
         points = np.array([marks[list(rows)].mean(axis=0) for rows in _HEAD_POINTS])
         if not _agree(pixels[kp.HEAD], points[:, :2]):
@@ -255,21 +256,20 @@ class FaceMeshPoseEstimator:
         )
 
     def _is_small_face(
-        self, image: ImageRgb, head_px: FloatArray, centre_px: FloatArray, size_px: float
+        self, image: ImageRgb, person: PersonKeypoints, centre_px: FloatArray, size_px: float
     ) -> bool:
-        """Return whether the head (5, 2) of the pose network looks here with a face of its own."""
-        if self._small_faces is None:
+        """Return whether the head of the pose network looks here with a face of its own."""
+        if self._small_faces is None or person.scores[kp.SHOULDERS].min() < DEFAULT_MIN_SCORE:
             return False
-        face = self._small_faces.find(
-            image, centre_px, _HEAD_SIDES * size_px, _FARTHEST * size_px
-        )
+        face = self._small_faces.find(image, centre_px, _HEAD_SIDES * size_px, _FARTHEST * size_px)
         if face is None:
             return False
         right_eye, left_eye, nose = face[:3]
         across = left_eye - right_eye
         share = float((nose - right_eye) @ across) / max(float(across @ across), 1e-9)
-        apart = np.linalg.norm(np.stack([nose, left_eye, right_eye]) - head_px[:3], axis=1)
-        return _BETWEEN[0] <= share <= _BETWEEN[1] and bool(apart.max() <= _APART * size_px)
+        apart_px = np.stack([nose, left_eye, right_eye]) - person.keypoints_px[:3]
+        own = float(np.linalg.norm(apart_px, axis=1).max()) <= _APART * size_px
+        return own and _BETWEEN[0] <= share <= _BETWEEN[1]
 
 
 # Landmarks of the left and of the right eye: iris, corners, upper and lower lid.

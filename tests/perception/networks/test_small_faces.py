@@ -1,4 +1,4 @@
-"""A small face is evidence only on the head that the pose network has found, and if it looks here."""
+"""A small face is evidence only on the head that the pose network has found, looking here."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import io
 import math
 import os
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,6 +67,16 @@ def test_profiles_and_backs_get_no_face_that_looks_here(yaw_rad, face_rad, side)
     assert not seen(side * yaw_rad, Small(side * yaw_rad))
     # From behind, the pose network has the left eye at the left.
     assert not seen(math.pi - side * face_rad, Small(face_rad))
+
+
+@given(st.sampled_from([5, 6]), st.floats(0.0, 0.29))
+def test_without_both_shoulders_nothing_tells_whose_face_it_is(shoulder, score):
+    pose, small = Pose(0.0), Small(0.0)
+    assert FaceMeshPoseEstimator(pose, Blind(), small).estimate(IMAGE, ())[0].face_evidence
+    scores = pose.person.scores.copy()
+    scores[shoulder] = score
+    pose.person = replace(pose.person, scores=scores)
+    assert not FaceMeshPoseEstimator(pose, Blind(), small).estimate(IMAGE, ())[0].face_evidence
 
 
 @pytest.mark.parametrize("small", [None, Small(None)])
