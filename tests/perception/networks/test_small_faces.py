@@ -79,6 +79,16 @@ def test_without_both_shoulders_nothing_tells_whose_face_it_is(shoulder, score):
     assert not FaceMeshPoseEstimator(pose, Blind(), small).estimate(IMAGE, ())[0].face_evidence
 
 
+@given(st.floats(math.radians(70.0), math.radians(290.0)))
+def test_a_small_face_over_a_body_that_does_not_face_here_is_none(turned_rad):
+    pose, small = Pose(0.0), Small(0.0)
+    pixels = pose.person.keypoints_px.copy()
+    pixels[5:7, 0] = 320.0 + 45.0 * math.cos(turned_rad) * np.array([1.0, -1.0])
+    pixels[11:13, 1] += 80.0  # the torso keeps the body's size
+    pose.person = replace(pose.person, keypoints_px=pixels)
+    assert not FaceMeshPoseEstimator(pose, Blind(), small).estimate(IMAGE, ())[0].face_evidence
+
+
 @pytest.mark.parametrize("small", [None, Small(None)])
 def test_without_a_small_face_there_is_no_evidence(small):
     assert not seen(0.0, small)
