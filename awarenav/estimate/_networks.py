@@ -35,8 +35,8 @@ from perception.networks.faces import (
     FaceMesh,
     FaceMeshEyeEstimator,
     FaceMeshPoseEstimator,
-    RetinaFace,
 )
+from perception.networks.small_faces import RetinaFace
 from perception.shipped import (
     DETECTOR,
     HEAD,

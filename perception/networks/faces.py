@@ -42,10 +42,10 @@ from ..errors import PerceptionError
 from ..eyes import EyeGaze, eyes_from_irises
 from ._images import rgb_image
 from ._model import read_model
-from ._retinaface import RetinaFace
 from ._settings import OnnxSettings
 from ._tflite import TfliteModel
 from .heads import head_crop, looking_at, ray_focal_px
+from .small_faces import RetinaFace
 
 _DETECTOR: Final = "face_detector.tflite"
 _MESH: Final = "face_landmarks_detector.tflite"

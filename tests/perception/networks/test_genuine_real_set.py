@@ -32,8 +32,8 @@ from perception.networks.faces import (
     FaceMesh,
     FaceMeshEyeEstimator,
     FaceMeshPoseEstimator,
-    RetinaFace,
 )
+from perception.networks.small_faces import RetinaFace
 from perception.ownership import iou
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))

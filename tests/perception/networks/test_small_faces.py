@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from test_face_agreement import IMAGE, Pose, head_px
 
 from perception import PerceptionError
-from perception.networks.faces import FaceMeshPoseEstimator, RetinaFace
+from perception.networks.faces import FaceMeshPoseEstimator
+from perception.networks.small_faces import RetinaFace
 
 ANGLES = st.floats(-0.4, 0.4)
 
