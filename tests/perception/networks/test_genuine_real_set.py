@@ -148,6 +148,30 @@ def test_keypoints_lie_on_the_body_and_its_skeleton_is_upright(files, scene):
     assert root_m[0, 1] < root_m[5:7, 1].min() < root_m[11:13, 1].min() < root_m[15:, 1].min()
 
 
+@pytest.mark.parametrize("refusals", [0, 1, 2, 3])
+def test_somebody_whom_the_network_does_not_find_is_looked_for_again(files, scene, refusals):
+    image, keypoints_px, _ = scene.shown(3.0, 20.0)
+    low, high = keypoints_px.min(axis=0), keypoints_px.max(axis=0)
+    box = PersonDetection(np.concatenate([low - 10.0, high + 10.0]), 1.0)
+    pose = BlazePoseEstimator(files[1])
+    probability = next(each.name for each in pose.model.outputs if each.shape == (1, 1))
+    run, squares = pose.model.run, []
+
+    def unsure(batch):
+        squares.append(batch)
+        refused = len(squares) <= refusals
+        return {**run(batch), **({probability: np.zeros((1, 1))} if refused else {})}
+
+    pose.model.run = unsure
+    (person,) = pose.estimate(image, (box,))
+    assert person.scores.any() == (refusals < 3)
+    assert len(squares) == min(refusals + 1, 3)
+    if refusals < 3:
+        upper = slice(0, 11)  # the last square is about the upper part
+        errors = np.linalg.norm(person.keypoints_px - keypoints_px, axis=1)[upper]
+        assert np.median(errors) < 0.03 * float(high[1] - low[1])
+
+
 @pytest.mark.parametrize("box", [[0, 0, 640, 480], [10, 10, 10, 10], [700, 500, 800, 600]])
 def test_a_box_without_a_person_gives_scores_of_0(files, box):
     image = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
