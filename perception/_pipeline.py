@@ -372,7 +372,7 @@ class AwarenessPipeline:
 
         There is none of somebody whose keypoints or head are not their own.
         """
-        looks = [_Look(missing=one.disowned or "no head pose") for one in found]
+        looks = [_Look(missing=one.disowned or self._without_head(one)) for one in found]
         faces = []
         for row, (one, head) in enumerate(zip(found, heads, strict=True)):
             if one.disowned is not None or head is None:
@@ -395,6 +395,10 @@ class AwarenessPipeline:
             gaze = _gaze(head, eyes[row]) if evidence.direction_known else None
             looks[row] = _Look(estimate, gaze, eyes_seen=eyes[row] is not None)
         return looks
+
+    def _without_head(self, one: FoundPerson) -> AwarenessReason:
+        seen = (one.keypoints.scores >= self._min_score).any()
+        return "no head pose" if seen else "no skeleton"
 
 
 def _gaze(head: HeadPose, eyes: EyeGaze | None) -> FloatArray:

@@ -19,6 +19,7 @@ AwarenessReason = Literal[
     "keypoints outside the box",
     "no body has such limbs",
     "head of another person",
+    "no skeleton",
     "no head pose",
     "face too small",
     "no face found",

@@ -251,6 +251,15 @@ _NETWORK_OPTIONS: Final = (
         "file face_landmarker.task, or 'none'.",
     ),
     option(
+        "--small-face",
+        group=_NETWORKS,
+        excludes="--networks",
+        show_default="from the set 'real' once fetched, else 'none'",
+        metavar="NAME|FILE",
+        help="Network that looks again where --face finds none: 'retinaface-mobilenet' (`awarenav "
+        "models fetch real`), a file mobilenet0.25_Final.pth, or 'none'.",
+    ),
+    option(
         "--eyes",
         group=_NETWORKS,
         excludes="--networks",

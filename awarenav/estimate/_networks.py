@@ -31,7 +31,12 @@ from perception.networks import (
     is_tflite,
     parse_provider_options,
 )
-from perception.networks.faces import FaceMesh, FaceMeshEyeEstimator, FaceMeshPoseEstimator
+from perception.networks.faces import (
+    FaceMesh,
+    FaceMeshEyeEstimator,
+    FaceMeshPoseEstimator,
+)
+from perception.networks.small_faces import RetinaFace
 from perception.shipped import (
     DETECTOR,
     HEAD,
@@ -81,6 +86,7 @@ class NetworkChoice(StrictConfig):
         pose: pose network.
         head: head pose.
         face: network of faces.
+        small_face: network of faces too small for that one.
         eyes: eyes of near people.
         person_class: of the detector.
         input_size: of the detector.
@@ -92,6 +98,7 @@ class NetworkChoice(StrictConfig):
     pose: str = SHIPPED
     head: str = _HEADS[0]
     face: str = _NONE
+    small_face: str = _NONE
     eyes: str = _EYES[0]
     person_class: int | None = None
     input_size: str | None = None
@@ -141,7 +148,10 @@ class NetworkChoice(StrictConfig):
                 named = each.model_dump(include=set(cls.model_fields), exclude_none=True)
                 chosen = cls(**named)
                 wanted = known.intersection(map(str, named.values()))
-                return chosen if all(map(store.is_fetched, wanted)) else None
+                missing = [name for name in wanted if not store.is_fetched(name)]
+                if missing == [each.small_face]:  # fetched before the set had it
+                    return chosen.model_copy(update={"small_face": _NONE})
+                return None if missing else chosen
         return None
 
     def catalogued(self) -> dict[str, RealModel]:
@@ -173,6 +183,7 @@ def choose_networks(
     person_class: int | None = None,
     input_size: str | None = None,
     *,
+    small_face: str = _NONE,
     min_score: float | None = None,
     threads: int | None = None,
     provider: str = "cpu",
@@ -192,6 +203,8 @@ def choose_networks(
             the shipped pose network, else PnP.
         face: ``"none"``, or a file ``face_landmarker.task`` of MediaPipe: faces of near people, and
             evidence that there is one.
+        small_face: ``"none"``, or a file ``mobilenet0.25_Final.pth`` of RetinaFace: looks again
+            where the network of faces finds none.
         eyes: ``"none"``, or ``"auto"``: from the irises that the network of faces finds.
         person_class: number of the class that counts, for a detector of your own; None for the one
             that it calls "person", else the first.
@@ -212,6 +225,8 @@ def choose_networks(
         raise AwarenavError(f"--eyes must be {', '.join(map(repr, _EYES))}, got {eyes!r}")
     if head == "auto":
         head = "network" if pose == SHIPPED else _WITHOUT_NETWORK
+    if face == _NONE != small_face:
+        raise AwarenavError("--small-face looks again where --face finds none: give --face too")
     settings = OnnxSettings(((provider, parse_provider_options(provider_options)),), threads)
     options: dict[str, Any] = {"detect_every_s": detect_every_s}
     if (detector, pose) == (SHIPPED, SHIPPED):
@@ -230,7 +245,11 @@ def choose_networks(
     if face != _NONE:
         path, entry = _file("--face", face, (_NONE,))
         mesh = FaceMesh(path, settings=settings, sha256=entry.sha256 if entry else None)
-        pose_used = FaceMeshPoseEstimator(pose_used, mesh)
+        small = None
+        if small_face != _NONE:
+            path, entry = _file("--small-face", small_face, (_NONE,))
+            small = RetinaFace(path, settings=settings, sha256=entry.sha256 if entry else None)
+        pose_used = FaceMeshPoseEstimator(pose_used, mesh, small)
         domains["face"] = "photographs"
         if eyes == "auto":
             options["eye_estimator"] = FaceMeshEyeEstimator()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path, PurePosixPath
-from typing import Any, ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
@@ -13,14 +13,14 @@ from tracking.config import StrictConfig
 
 from ..errors import AwarenavError, not_one_of
 
-Role = Literal["detector", "pose", "face", "head"]
+Role = Literal["detector", "pose", "face", "small_face", "head"]
 
 #: Set of networks that photographs get once it is fetched, where no option says otherwise.
 DEFAULT_SET: Final = "real"
 _FILE: Final = Path(__file__).parent / "catalogue.yaml"
 # Archives and networks. A bundle of MediaPipe, .task, is both: a ZIP archive of networks.
 _ARCHIVES: Final = (".zip", ".whl", ".task", ".tgz")
-_NETWORKS: Final = (".onnx", ".tflite", ".task")
+_NETWORKS: Final = (".onnx", ".tflite", ".task", ".pth")
 _SHA256: Final = r"^[0-9a-f]{64}$"
 
 
@@ -101,7 +101,7 @@ class RealModel(StrictConfig):
 
     @property
     def file(self) -> str:
-        """Name of the fetched file, which ends in .onnx, .tflite or .task."""
+        """Name of the fetched file, which ends as one of a network does."""
         return self.name + self._suffix(self.sources[0])
 
     def parts(self, source: Source) -> tuple[tuple[tuple[str, ...], str], ...]:
@@ -163,6 +163,8 @@ class NetworkSet(StrictConfig):
     head: str
     #: Network that refines the faces of near people; None for none.
     face: str | None = None
+    #: Network that looks again where that one finds none; None for none.
+    small_face: str | None = None
     purpose: str
     #: A hint that the command gives at the end.
     hint: str | None = None
@@ -170,8 +172,7 @@ class NetworkSet(StrictConfig):
     @property
     def networks(self) -> dict[str, str]:
         """Names of its networks, by their roles."""
-        named = {"detector": self.detector, "pose": self.pose, "face": self.face}
-        return {role: name for role, name in named.items() if name is not None}
+        return self.model_dump(include={*get_args(Role)} - {"head"}, exclude_none=True)
 
     @property
     def file(self) -> str:
@@ -204,8 +205,8 @@ class Catalogue(StrictConfig):
             wrong = [name for role, name in each.networks.items() if roles.get(name) != role]
             if wrong:
                 raise ValueError(
-                    f"set {each.name}: detector, pose and face must name networks of these roles, "
-                    f"got {', '.join(wrong)}"
+                    f"set {each.name}: {', '.join(each.networks)} must name networks of these "
+                    f"roles, got {', '.join(wrong)}"
                 )
             if each.name in roles:
                 raise ValueError(f"{each.name} is a network and a set")

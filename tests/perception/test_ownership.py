@@ -372,9 +372,10 @@ def test_only_one_of_two_boxes_has_the_awareness_of_a_skeleton():
     ("change", "reason"),
     [
         (lambda person: changed(person, scores=np.r_[np.zeros(5), np.ones(12)]), "no head pose"),
+        (lambda person: changed(person, scores=np.zeros(17)), "no skeleton"),
         (lambda person: changed(person, person.keypoints_px + np.array([300.0, 0.0])), OUTSIDE),
     ],
-    ids=["no face", "beside the box"],
+    ids=["no face", "nobody", "beside the box"],
 )
 def test_an_observation_says_why_there_is_no_awareness(change, reason):
     person, detection = seen()

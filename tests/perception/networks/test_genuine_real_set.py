@@ -22,8 +22,18 @@ from perception import (
     PersonKeypoints,
 )
 from perception.eyes import EyeEstimator
-from perception.networks import BlazePoseEstimator, EfficientDetPersonDetector, TfliteModel
-from perception.networks.faces import FaceMesh, FaceMeshEyeEstimator, FaceMeshPoseEstimator
+from perception.networks import (
+    BlazePoseEstimator,
+    EfficientDetPersonDetector,
+    OnnxModel,
+    TfliteModel,
+)
+from perception.networks.faces import (
+    FaceMesh,
+    FaceMeshEyeEstimator,
+    FaceMeshPoseEstimator,
+)
+from perception.networks.small_faces import RetinaFace
 from perception.ownership import iou
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -35,9 +45,9 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    """Return the paths of detector, pose network and network of faces."""
+    """Return the paths of detector, pose network and both networks of faces."""
     store = ModelStore(tmp_path_factory.mktemp("real"))
-    names = "efficientdet-lite0", "blazepose-full", "face-mesh"
+    names = "efficientdet-lite0", "blazepose-full", "face-mesh", "retinaface-mobilenet"
     try:
         store.fetch(*names, progress=False)
     except AwarenavError as cause:
@@ -49,8 +59,8 @@ def files(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def pipeline(files):
-    detector, pose, face = map(str, files)
-    networks = choose_networks(detector, pose, "pnp", face)
+    detector, pose, face, small = map(str, files)
+    networks = choose_networks(detector, pose, "pnp", face, small_face=small)
     return networks.pipeline(CAMERA)
 
 
@@ -138,6 +148,30 @@ def test_keypoints_lie_on_the_body_and_its_skeleton_is_upright(files, scene):
     assert root_m[0, 1] < root_m[5:7, 1].min() < root_m[11:13, 1].min() < root_m[15:, 1].min()
 
 
+@pytest.mark.parametrize("refusals", [0, 1, 2, 3])
+def test_somebody_whom_the_network_does_not_find_is_looked_for_again(files, scene, refusals):
+    image, keypoints_px, _ = scene.shown(3.0, 20.0)
+    low, high = keypoints_px.min(axis=0), keypoints_px.max(axis=0)
+    box = PersonDetection(np.concatenate([low - 10.0, high + 10.0]), 1.0)
+    pose = BlazePoseEstimator(files[1])
+    probability = next(each.name for each in pose.model.outputs if each.shape == (1, 1))
+    run, squares = pose.model.run, []
+
+    def unsure(batch):
+        squares.append(batch)
+        refused = len(squares) <= refusals
+        return {**run(batch), **({probability: np.zeros((1, 1))} if refused else {})}
+
+    pose.model.run = unsure
+    (person,) = pose.estimate(image, (box,))
+    assert person.scores.any() == (refusals < 3)
+    assert len(squares) == min(refusals + 1, 3)
+    if refusals < 3:
+        upper = slice(0, 11)  # the last square is about the upper part
+        errors = np.linalg.norm(person.keypoints_px - keypoints_px, axis=1)[upper]
+        assert np.median(errors) < 0.03 * float(high[1] - low[1])
+
+
 @pytest.mark.parametrize("box", [[0, 0, 640, 480], [10, 10, 10, 10], [700, 500, 800, 600]])
 def test_a_box_without_a_person_gives_scores_of_0(files, box):
     image = np.random.default_rng(0).integers(0, 255, (480, 640, 3), dtype=np.uint8)
@@ -178,7 +212,7 @@ def test_fewer_outputs_cost_less_and_change_no_number(files):
 
 
 def test_a_network_in_the_place_of_another_is_refused_with_what_it_is(files):
-    detector, pose, face = files
+    detector, pose, face, small = files
     with pytest.raises(PerceptionError, match=r"not a BlazePose network: found .*320"):
         BlazePoseEstimator(detector)
     with pytest.raises(PerceptionError, match=r"not an EfficientDet-Lite detector: found .*256"):
@@ -187,6 +221,10 @@ def test_a_network_in_the_place_of_another_is_refused_with_what_it_is(files):
         FaceMesh(pose)
     with pytest.raises(PerceptionError, match="not a TFLite network"):
         TfliteModel(face)
+    with pytest.raises(PerceptionError, match=r"not RetinaFace's mobilenet0\.25_Final\.pth"):
+        RetinaFace(face)
+    with pytest.raises(PerceptionError, match="not an ONNX network"):
+        OnnxModel(small)
     with pytest.raises(PerceptionError, match="sha256"):
         FaceMesh(face, sha256=64 * "0")
     with pytest.raises(PerceptionError, match=r"takes .*320.* got"):
@@ -219,6 +257,26 @@ def test_the_networks_of_faces_run_once_for_a_face_and_its_eyes(files, scene, mo
     assert np.linalg.norm(seen.position_camera_m) == pytest.approx(1.2, rel=0.15)
 
 
+@pytest.mark.parametrize("distance_m", [1.2, 2.5, 4.5, 6.5])
+def test_small_faces_have_their_points_where_they_are_and_backs_have_none(files, scene, distance_m):
+    small = RetinaFace(files[3])
+    image, keypoints_px, _ = scene.shown(distance_m, 0.0)
+    head_px = keypoints_px[:5].mean(axis=0)
+    width_px = float(np.linalg.norm(keypoints_px[3] - keypoints_px[4]))
+    found = small.find(image, head_px, 5.0 * width_px, width_px)
+    assert found is not None
+    errors_px = np.linalg.norm(found[:3] - keypoints_px[[2, 1, 0]], axis=1)
+    assert errors_px.max() < 0.2 * width_px
+    # A shift of the square moves no face, and one that lies elsewhere is another's.
+    aside_px = np.array([0.7 * width_px, 0.0])
+    again = small.find(image, head_px + aside_px, 5.0 * width_px, width_px)
+    np.testing.assert_allclose(again, found, atol=0.12 * width_px)
+    assert small.find(image, head_px + 3.0 * aside_px, 5.0 * width_px, width_px) is None
+    image, keypoints_px, _ = scene.shown(distance_m, 180.0)
+    centre_px = keypoints_px[:5].mean(axis=0)
+    assert small.find(image, centre_px, 5.0 * width_px, width_px) is None
+
+
 def test_eyes_of_far_and_turned_heads_say_nothing():
     turn = np.array([[0.5, 0.0, 0.866], [0.0, 1.0, 0.0], [-0.866, 0.0, 0.5]])
     far = HeadPose([0.0, 0.0, 3.0], FACING, 1e-3 * np.eye(6), 0.5)
@@ -237,9 +295,9 @@ def test_eyes_of_far_and_turned_heads_say_nothing():
 def test_people_of_photographs_are_found_and_nobody_who_looks_away_is_aware(files):
     from benchmarks.perception._photographs import LABELS, measure, read_labels  # noqa: PLC0415
 
-    detector, pose, face = map(str, files)
+    roles = "detector", "pose", "face", "small_face"
     networks = files[0].with_name("networks.yaml")
-    networks.write_text(json.dumps({"detector": detector, "pose": pose, "face": face}))
+    networks.write_text(json.dumps(dict(zip(roles, map(str, files), strict=True))))
     assert (PHOTOGRAPHS / LABELS).is_file()
     figures = measure(PHOTOGRAPHS, read_labels(PHOTOGRAPHS), networks)
     assert figures.found >= 0.85 * figures.people
