@@ -113,7 +113,8 @@ def label_points(axes: Axes, labels: Iterable[tuple[float, float, str, str]]) ->
     points = axes.transData.transform([(x, y) for x, y, _, _ in labels] or np.empty((0, 2)))
     taken: list[Bbox] = []
     for number, (x, y, text, colour) in enumerate(labels):
-        others = [Bbox.from_bounds(*(p - 4.0), 8.0, 8.0) for p in np.delete(points, number, axis=0)]
+        places = np.delete(points, number, axis=0).tolist()
+        others = [Bbox.from_bounds(at - 4.0, above - 4.0, 8.0, 8.0) for at, above in places]
         label = axes.annotate(
             text, (x, y), xytext=(0, 0), textcoords="offset points", color=colour, fontsize=9
         )

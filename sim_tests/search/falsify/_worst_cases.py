@@ -178,8 +178,8 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
     names = [name.replace("_", " ") for name in middles]
     level = len(names) == 1  # a scenario with few episodes is narrower than its name
     axes.set_xticks(list(middles.values()), names, fontsize=7, rotation=0 if level else 90)
-    for number, label in enumerate(axes.get_xticklabels()):
-        label.set_color(f"C{number % 10}")
+    for number, tick in enumerate(axes.get_xticklabels()):
+        tick.set_color(f"C{number % 10}")
     axes.set_xlabel("episodes by scenario, in the order of the search")
     axes.set_ylabel("smallest margin, never noticed (m)")
     axes.set_xlim(-0.5, places - 0.5)
