@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from types import FrameType
 from typing import Any, Final, NoReturn
 
@@ -25,18 +26,17 @@ from nav_adapter.ros2 import (
     renamed,
     scanner_inputs,
 )
-from perception import AttentionCone, Camera
+from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import finite_number
 from perception.laser import MapCells
+from perception.named import Networks
 from perception.shipped import simulator_networks_warning
 from tracking.prediction import PredictionModel
 
 from ..errors import AwarenavError, counted
 from ..estimate import (
-    NetworkChoice,
-    Networks,
-    admit_networks,
-    choose_networks,
+    admit_options,
+    choice_of_options,
     running_options,
 )
 from ..policies import read_policy
@@ -116,7 +116,7 @@ def bridge_command(options: Any) -> int:
             speed_mask=mask,
             warn=_log,
             wanted=publisher.wants,
-            make_pipeline=networks.pipeline,
+            make_pipeline=partial(AwarenessPipeline.of, networks),
         )
         if map_cells is not None:
             bridge.on_map(map_cells)
@@ -151,13 +151,9 @@ def _files(
 def _networks(options: Any) -> tuple[Networks, tuple[str, ...]]:
     """Return the networks, and the roles of those that have seen renders only."""
     # Without a camera they see nothing.
-    choice = NetworkChoice.of_options(options, rendered=options.no_camera, log=_log)
-    networks = choose_networks(**choice.model_dump(), **running_options(options))
-    if options.no_camera:
-        return networks, ()
-    return networks, admit_networks(
-        networks, rendered=False, allowed=options.allow_simulator_networks
-    )
+    choice = choice_of_options(options, rendered=options.no_camera, log=_log)
+    networks = choice.load(**running_options(options))
+    return networks, admit_options(networks, options, rendered=options.no_camera)
 
 
 def _announce(domain: int, inputs: BridgeInputs, published: Mapping[str, Topic]) -> None:

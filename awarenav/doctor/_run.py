@@ -16,6 +16,7 @@ import numpy as np
 
 from perception import AttentionCone, Camera, PerceptionError
 from perception.evidence import AwarenessReason
+from perception.named import NetworkChoice
 from perception.picture_notes import picture_notes
 from perception.shipped import simulator_networks, simulator_networks_warning
 from perception.turn import QuarterTurn
@@ -25,11 +26,10 @@ from ..estimate import (
     CameraChoice,
     FrameEstimate,
     ImageSource,
-    NetworkChoice,
     OverlayWriter,
     PeopleEstimator,
     SourceFrame,
-    choose_networks,
+    choice_of_options,
     is_recording,
     open_source,
     running_options,
@@ -126,8 +126,8 @@ def _source_findings(options: Any) -> list[Finding]:
 
 def _image_findings(options: Any) -> list[Finding]:
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
-        choice = NetworkChoice.of_options(options, rendered=source.rendered)
-        networks = choose_networks(**choice.model_dump(), **running_options(options))
+        choice = choice_of_options(options, rendered=source.rendered)
+        networks = choice.load(**running_options(options))
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
         said: list[str] = []
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, said.append)

@@ -17,8 +17,8 @@ from paths import ROOT
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.estimate import NetworkChoice, admit_networks, choose_networks
-from awarenav.models._catalogue import Catalogue, NetworkSet
+from awarenav.estimate import choice_of_options
+from perception.named import Catalogue, NetworkChoice, NetworkSet, admit_networks, choose_networks
 from perception.networks import OnnxModel
 from perception.shipped import DETECTOR, POSE, shipped_model_path, shipped_models
 
@@ -219,6 +219,6 @@ def test_photographs_get_the_fetched_set_and_one_line_says_so(real_set, photogra
 
 def test_renders_keep_the_shipped_networks(real_set):
     options = SimpleNamespace(networks=None)
-    assert NetworkChoice.of_options(options, rendered=True) == NetworkChoice()
-    chosen = NetworkChoice.of_options(options, rendered=False)
+    assert choice_of_options(options, rendered=True) == NetworkChoice()
+    chosen = choice_of_options(options, rendered=False)
     assert (chosen.detector, chosen.pose, chosen.head) == ("people", "points", "pnp")
