@@ -13,7 +13,7 @@ from functools import partial
 from types import FrameType
 from typing import Any, Final, NoReturn
 
-from nav_adapter import NavError
+from nav_adapter import AwarenessPolicy, NavError
 from nav_adapter.ros2 import (
     MASK_TOPICS,
     PUBLISHED,
@@ -39,7 +39,6 @@ from ..estimate import (
     choice_of_options,
     running_options,
 )
-from ..policies import read_policy
 from ._loop import BridgeInputs, BridgeLoop, TopicPublisher
 from ._replay import BagReplay, ReplayPublisher, recorded_messages, static_transforms
 
@@ -64,7 +63,7 @@ def bridge_command(options: Any) -> int:
         seconds = finite_number("--seconds", seconds, AwarenavError, minimum=0.0)
     domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
-    policy = read_policy(options.policy)
+    policy = AwarenessPolicy.named(options.policy)
     published = _published_topics(
         options.topic, options.only, with_mask=options.speed_mask is not None
     )

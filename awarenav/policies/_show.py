@@ -44,7 +44,7 @@ def show_command(
     """
     check_plot(out, map(Path, names))
     robot = ROBOT if robot_file is None else RobotFile.from_yaml(robot_file).profile()
-    policies = [(name, read_policy(name)) for name in names]
+    policies = [(name, AwarenessPolicy.named(name)) for name in names]
     if out is not None:
         # Only the drawing needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
@@ -59,17 +59,6 @@ def show_command(
     if out is not None:
         print(f"Written to {out}")
     return 0
-
-
-def read_policy(name: str) -> AwarenessPolicy:
-    """Return the policy of a YAML file, or the preset if the name ends in neither .yaml nor .yml.
-
-    Raises:
-        NavError: for a file that cannot be used, or a name that is not a preset.
-    """
-    if Path(name).suffix.lower() in (".yaml", ".yml"):
-        return AwarenessPolicy.from_yaml(name)
-    return AwarenessPolicy.preset(name)
 
 
 def _table(policy: AwarenessPolicy, robot: RobotProfile) -> dict[str, Any]:

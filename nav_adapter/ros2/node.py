@@ -22,7 +22,6 @@ import signal
 import sys
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
 from perception import AwarenessPipeline, Camera
@@ -97,9 +96,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         for key, topic in PUBLISHED.items():
             self._advertise(key, topic)
         self._bridge = AwarenessBridge(
-            AwarenessPolicy.from_yaml(policy)
-            if Path(policy).suffix in (".yaml", ".yml")
-            else AwarenessPolicy.preset(policy),
+            AwarenessPolicy.named(policy),
             robot.profile(),
             self._publish,
             frames=Frames(
