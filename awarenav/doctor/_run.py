@@ -67,6 +67,11 @@ _TURN_WORDS: Final = (
     "by 90 degrees clockwise",
 )
 _REMEDY_NETWORKS: Final = "awarenav models fetch real"
+_FASTER_CAMERA: Final = "a higher rate of the camera's driver; no network changes it"
+_FASTER_NETWORKS: Final = (
+    "--detect-every-s 0.15; for TFLite networks, as `awarenav models fetch real` brings them, the "
+    "extra 'litert'; smaller networks, a GPU (--provider), or another computer"
+)
 
 
 @dataclass(slots=True)
@@ -307,28 +312,32 @@ def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
     found = []
     steps_s = np.diff(seen.stamps_s)
     if (source.live or source.rate_hz is not None) and len(steps_s) and np.median(steps_s) > 0.0:
-        found.append(_rate_finding(1.0 / float(np.median(steps_s)), "the images come at"))
+        found.append(
+            _rate_finding(1.0 / float(np.median(steps_s)), "the images come at", _FASTER_CAMERA)
+        )
         if (steps_s <= 0.0).any():
             text = "stamps do not advance, or go back"
             found.append(Finding.error("frame rate", text, "check the driver's clock"))
     if warm := seen.times_s[_WARM_UP:]:
-        found.append(_rate_finding(1.0 / float(np.median(warm)), "perception manages"))
+        found.append(
+            _rate_finding(1.0 / float(np.median(warm)), "perception manages", _FASTER_NETWORKS)
+        )
     return found
 
 
-def _rate_finding(rate_hz: float, words: str) -> Finding:
+def _rate_finding(rate_hz: float, words: str, remedy: str) -> Finding:
     text = f"{words} {rate_hz:.1f} images per second"
     if rate_hz < _LEAST_HZ:
         return Finding.error(
             "frame rate",
             f"{text}: nobody counts as aware below {_LEAST_HZ:g}",
-            "smaller networks, a smaller picture, or another computer",
+            remedy,
         )
     if rate_hz < _WANTED_HZ:
         return Finding.warning(
             "frame rate",
             f"{text}; the method's paper has {_WANTED_HZ:g}",
-            "--detect-every-s 0.15, smaller networks, or a GPU (--provider)",
+            remedy,
         )
     return Finding.fine("frame rate", text)
 
