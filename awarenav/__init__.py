@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         points,
         polygons,
     )
+    from nav_adapter.ros2 import Navigator
     from perception import (
         AttentionCone,
         AwarenessPipeline,
@@ -69,6 +70,7 @@ __all__ = [
     "NavAdapter",
     "NavConstraints",
     "NavError",
+    "Navigator",
     "OnnxHeadPoseEstimator",
     "OnnxPersonDetector",
     "OnnxPoseEstimator",

@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, Final
 
 from .errors import AwarenavError
@@ -36,6 +37,20 @@ def check_output(
         raise AwarenavError(f"{option} {out} would replace an input")
     if out.is_dir():
         raise AwarenavError(f"{option} must be a file, {out} is a folder")
+
+
+def require_writable(folder: Path, error: type[AwarenavError] = AwarenavError) -> None:
+    """Make a folder of results, and refuse one that cannot be written, before any work.
+
+    Raises:
+        AwarenavError: or ``error``, for a folder that cannot be made or written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+    except OSError as cause:
+        raise error(f"cannot write to {folder}: {cause.strerror or cause}") from cause
 
 
 def check_plot(out: Path | None, inputs: Iterable[Path | None]) -> None:

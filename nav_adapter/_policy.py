@@ -152,6 +152,17 @@ class AwarenessPolicy(NavConfig):
         return policy
 
     @classmethod
+    def named(cls, name: str | Path) -> AwarenessPolicy:
+        """Return the policy of a YAML file, or the preset of a name that does not end as one.
+
+        Raises:
+            NavError: for a file that cannot be used, or a name that is not a preset.
+        """
+        if Path(name).suffix.lower() in (".yaml", ".yml"):
+            return cls.from_yaml(name)
+        return cls.preset(str(name))
+
+    @classmethod
     def from_yaml(cls, path: str | Path) -> AwarenessPolicy:
         """Read and validate a policy file.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,7 +16,6 @@ from ._people_finder import PeopleFinder
 from ._placement import PersonPlace, place_people
 from ._pnp import PnpHeadPoseEstimator
 from ._stages import (
-    DEFAULT_SCORE_THRESHOLD,
     HeadPose,
     HeadPoseEstimator,
     PersonDetector,
@@ -42,9 +40,9 @@ from .depth_image import checked_depth
 from .errors import PerceptionError
 from .evidence import AwarenessReason, FaceEvidence, judge_face
 from .eyes import EyeEstimator, EyeGaze, known_eyes
+from .named import Networks, default_networks
 from .networks import OnnxSettings
 from .ownership import DISOWNED, FoundPerson, own_heads
-from .shipped import shipped_detector, shipped_head_pose_estimator, shipped_pose_estimator
 from .turn import QuarterTurn
 
 _CAMERA_CENTRE: Final = np.zeros((1, 3))
@@ -77,18 +75,19 @@ class AwarenessPipeline:
     Examples:
         >>> import numpy as np
         >>> from perception import AwarenessPipeline, Camera
-        >>> pipeline = AwarenessPipeline(Camera.from_fov(640, 480, np.radians(90.0)))
-        >>> image_rgb = np.full((480, 640, 3), 120, np.uint8)  # here your camera's image
+        >>> camera = Camera.from_fov(640, 480, np.radians(90.0))
+        >>> pipeline = AwarenessPipeline(camera, simulator_networks=True)  # False for your camera
+        >>> image_rgb = np.full((480, 640, 3), 120, np.uint8)  # here its image
         >>> pipeline.process(image_rgb, stamp_s=0.0)  # one observation for each person
         ()
 
     Args:
         camera: the robot's camera.
-        detector: finds people, or makes what finds them for a camera; default the shipped network.
-        pose_estimator: finds their keypoints; default the shipped network.
-        head_pose_estimator: finds their head poses; default the shipped network if the pose
-            estimator is the shipped one too, else :class:`PnpHeadPoseEstimator`. The shipped
-            networks are made for the simulator and are only used on real images on request.
+        detector: finds people, or makes what finds them for a camera. Default, with the pose
+            estimator: the networks that ``awarenav models fetch real`` has downloaded.
+        pose_estimator: finds their keypoints; given with the detector, or neither.
+        head_pose_estimator: finds their head poses; default that of the default networks, else
+            :class:`PnpHeadPoseEstimator`.
         cone: the attention cone; default half-angle 60°.
         robot_points_camera_m: (M, 3) points of the robot in the camera frame. A person who sees
             any of them sees the robot. Default the camera's centre, as in the paper.
@@ -99,7 +98,9 @@ class AwarenessPipeline:
         eye_in_head_std_rad: standard deviations of the eyes relative to the head's direction,
             sideways and up and down, or one number for both. They are part of α's standard
             deviation.
-        onnx_settings: providers and threads of the shipped networks.
+        simulator_networks: the default networks are those that come with the package, which have
+            seen renders only. They are refused without it.
+        onnx_settings: providers and threads of the default networks.
         detect_every_s: longest time between two looks of the detector, in [0, 0.2]; 0 is every
             image. In between, boxes follow the keypoints, which like the heads come from every
             image. The detector also looks where something has changed outside the boxes, where
@@ -107,17 +108,17 @@ class AwarenessPipeline:
             then follow each other; a jump in time needs the detector. Each camera needs a
             pipeline of its own (:meth:`for_another_view`): one for two may find nobody.
         eye_estimator: measures the eyes of near people, for instance
-            :class:`~perception.networks.faces.FaceMeshEyeEstimator`; default none, then the gaze is
-            the head's direction.
+            :class:`~perception.networks.faces.FaceMeshEyeEstimator`; default that of the default
+            networks, else none: then the gaze is the head's direction.
         unusual_size_probability: probability in [0, 0.9] that a person has not the size of an adult
             who stands: a child, somebody bent or seated. 0 where only adults walk and stand: then
             5 % of range are left of unknown stature, which count as noise of each image.
         confirmation: lets the scores of the keypoints confirm or refute detections; the detector
-            must then report its candidates. Default ``KeypointConfirmation()`` if detector and
-            pose estimator are the shipped ones, else none.
+            must then report its candidates. Default that of the default networks, else none.
 
     Raises:
-        PerceptionError: for an invalid value, or a shipped network that cannot be loaded.
+        PerceptionError: for an invalid value, a network that cannot be loaded, and without networks
+            where none but the shipped ones are there and ``simulator_networks`` is False.
     """
 
     def __init__(
@@ -133,6 +134,7 @@ class AwarenessPipeline:
         min_score: float = DEFAULT_MIN_SCORE,
         floor: FloorPlane | None = None,
         eye_in_head_std_rad: Any = DEFAULT_EYE_IN_HEAD_STD_RAD,
+        simulator_networks: bool = False,
         onnx_settings: OnnxSettings | None = None,
         detect_every_s: float = 0.0,
         unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
@@ -156,21 +158,22 @@ class AwarenessPipeline:
         )
         self._floor = _checked_floor(floor)
         self._eye_std_rad = _checked_eye_std(eye_in_head_std_rad)
-        shipped_pose = pose_estimator is None
-        if detector is None:
-            if shipped_pose and confirmation is None:
-                confirmation = KeypointConfirmation()
-            threshold = DEFAULT_SCORE_THRESHOLD
-            if confirmation is not None:
-                threshold = confirmation.detector_threshold
-            detector = partial(shipped_detector, onnx_settings, score_threshold=threshold)
+        if detector is None and pose_estimator is None:
+            networks = default_networks(
+                simulator_networks=simulator_networks, settings=onnx_settings
+            )
+            detector, pose_estimator = networks.make_detector, networks.pose_estimator
+            head_pose_estimator = head_pose_estimator or networks.head_pose_estimator
+            confirmation = confirmation or networks.settings.get("confirmation")
+            eye_estimator = eye_estimator or networks.settings.get("eye_estimator")
+        elif detector is None or pose_estimator is None:
+            missing = "detector" if detector is None else "pose_estimator"
+            raise PerceptionError(
+                f"detector and pose_estimator must be given both, or neither: {missing} is missing"
+            )
         self._make_detector = None if isinstance(detector, PersonDetector) else detector
-        if pose_estimator is None:
-            pose_estimator = shipped_pose_estimator(onnx_settings)
         if head_pose_estimator is None:
             head_pose_estimator = PnpHeadPoseEstimator(self._std_px, self._min_score)
-            if shipped_pose:
-                head_pose_estimator = shipped_head_pose_estimator(onnx_settings)
         self._people = PeopleFinder(
             camera,
             detector if isinstance(detector, PersonDetector) else detector(camera),
@@ -187,6 +190,17 @@ class AwarenessPipeline:
             )
         self._eye_estimator = eye_estimator
         self._turned: dict[QuarterTurn, AwarenessPipeline] = {}
+
+    @classmethod
+    def of(cls, networks: Networks, camera: Camera) -> AwarenessPipeline:
+        """Return a pipeline with networks that :mod:`perception.named` has loaded."""
+        return cls(
+            camera,
+            networks.make_detector,
+            networks.pose_estimator,
+            networks.head_pose_estimator,
+            **networks.settings,
+        )
 
     def for_another_view(self, rotation_camera_view: Any | None = None) -> AwarenessPipeline:
         """Return a pipeline with the same camera, networks and settings that has seen no image.

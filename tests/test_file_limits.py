@@ -11,7 +11,6 @@ from paths import ROOT
 from awarenav.baseline import read_baseline
 from awarenav.errors import AwarenavError
 from awarenav.estimate import open_source
-from awarenav.models._catalogue import Catalogue
 from awarenav.records import continue_records, read_records
 from nav_adapter import AwarenessPolicy, NavError
 from nav_adapter.ros2 import RobotFile
@@ -25,6 +24,7 @@ from perception.documents import (
     parse_json,
     parse_yaml,
 )
+from perception.named import Catalogue
 from perception.surround import FisheyeLens
 from sim_tests import SimError
 from sim_tests.crossing.faults import Fault

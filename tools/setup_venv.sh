@@ -50,8 +50,8 @@ choose_python() {
         command -v "$PYTHON"
     else
         find_python || die "no Python 3.10 or 3.11 with the venv module on PATH (pybullet has wheels" \
-            "for these two only). Install one (Debian, Ubuntu: python3 and python3-venv), or name" \
-            "it: make setup PYTHON=/path/to/python3.11"
+            "for these two only). With uv, which needs no other Python (pipx install uv):" \
+            "uv python install 3.11 && make setup PYTHON=\"\$(uv python find 3.11)\""
     fi
 }
 

@@ -9,10 +9,11 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from types import FrameType
 from typing import Any, Final, NoReturn
 
-from nav_adapter import NavError
+from nav_adapter import AwarenessPolicy, NavError
 from nav_adapter.ros2 import (
     MASK_TOPICS,
     PUBLISHED,
@@ -25,21 +26,19 @@ from nav_adapter.ros2 import (
     renamed,
     scanner_inputs,
 )
-from perception import AttentionCone, Camera
+from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import finite_number
 from perception.laser import MapCells
+from perception.named import Networks
 from perception.shipped import simulator_networks_warning
 from tracking.prediction import PredictionModel
 
 from ..errors import AwarenavError, counted
 from ..estimate import (
-    NetworkChoice,
-    Networks,
-    admit_networks,
-    choose_networks,
+    admit_options,
+    choice_of_options,
     running_options,
 )
-from ..policies import read_policy
 from ._loop import BridgeInputs, BridgeLoop, TopicPublisher
 from ._replay import BagReplay, ReplayPublisher, recorded_messages, static_transforms
 
@@ -64,7 +63,7 @@ def bridge_command(options: Any) -> int:
         seconds = finite_number("--seconds", seconds, AwarenavError, minimum=0.0)
     domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
-    policy = read_policy(options.policy)
+    policy = AwarenessPolicy.named(options.policy)
     published = _published_topics(
         options.topic, options.only, with_mask=options.speed_mask is not None
     )
@@ -116,7 +115,7 @@ def bridge_command(options: Any) -> int:
             speed_mask=mask,
             warn=_log,
             wanted=publisher.wants,
-            make_pipeline=networks.pipeline,
+            make_pipeline=partial(AwarenessPipeline.of, networks),
         )
         if map_cells is not None:
             bridge.on_map(map_cells)
@@ -151,13 +150,9 @@ def _files(
 def _networks(options: Any) -> tuple[Networks, tuple[str, ...]]:
     """Return the networks, and the roles of those that have seen renders only."""
     # Without a camera they see nothing.
-    choice = NetworkChoice.of_options(options, rendered=options.no_camera, log=_log)
-    networks = choose_networks(**choice.model_dump(), **running_options(options))
-    if options.no_camera:
-        return networks, ()
-    return networks, admit_networks(
-        networks, rendered=False, allowed=options.allow_simulator_networks
-    )
+    choice = choice_of_options(options, rendered=options.no_camera, log=_log)
+    networks = choice.load(**running_options(options))
+    return networks, admit_options(networks, options, rendered=options.no_camera)
 
 
 def _announce(domain: int, inputs: BridgeInputs, published: Mapping[str, Topic]) -> None:

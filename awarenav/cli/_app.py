@@ -76,7 +76,7 @@ _COMMANDS: Final[dict[str, dict[str, _Entry]]] = {
     "Simulation": {
         "demo": _Entry(
             "sim_tests.demo.command:demo",
-            "Run the paper's encounter, and a crossing with and without awareness.",
+            "Film four robots in an aisle in which somebody with a phone steps out.",
         ),
         "crossings": _Entry(
             "sim_tests.study.command:crossings",

@@ -11,11 +11,11 @@ import onnxruntime  # type: ignore[import-untyped]
 
 from perception import PerceptionError
 from perception.installation import reinstall_command
+from perception.named import NetworkFolder
 from perception.shipped import shipped_models, verify_shipped_model
 
 from .. import __version__
 from ..errors import AwarenavError
-from ..models import ModelStore
 from ._findings import Finding
 
 # Packages that both provide the module cv2: whichever was installed last overwrote the other.
@@ -85,7 +85,7 @@ def _shipped() -> list[Finding]:
 
 def _fetched() -> list[Finding]:
     try:
-        store = ModelStore()
+        store = NetworkFolder()
         here = [each.name for each in store.catalogue.models if store.is_fetched(each.name)]
     except AwarenavError as error:
         return [Finding.error("fetched networks", str(error))]

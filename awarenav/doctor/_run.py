@@ -16,6 +16,7 @@ import numpy as np
 
 from perception import AttentionCone, Camera, PerceptionError
 from perception.evidence import AwarenessReason
+from perception.named import NetworkChoice
 from perception.picture_notes import picture_notes
 from perception.shipped import simulator_networks, simulator_networks_warning
 from perception.turn import QuarterTurn
@@ -25,11 +26,10 @@ from ..estimate import (
     CameraChoice,
     FrameEstimate,
     ImageSource,
-    NetworkChoice,
     OverlayWriter,
     PeopleEstimator,
     SourceFrame,
-    choose_networks,
+    choice_of_options,
     is_recording,
     open_source,
     running_options,
@@ -67,6 +67,11 @@ _TURN_WORDS: Final = (
     "by 90 degrees clockwise",
 )
 _REMEDY_NETWORKS: Final = "awarenav models fetch real"
+_FASTER_CAMERA: Final = "a higher rate of the camera's driver; no network changes it"
+_FASTER_NETWORKS: Final = (
+    "--detect-every-s 0.15; for TFLite networks, as `awarenav models fetch real` brings them, the "
+    "extra 'litert'; smaller networks, a GPU (--provider), or another computer"
+)
 
 
 @dataclass(slots=True)
@@ -126,8 +131,8 @@ def _source_findings(options: Any) -> list[Finding]:
 
 def _image_findings(options: Any) -> list[Finding]:
     with contextlib.closing(open_source(options.source, topic=options.topic)) as source:
-        choice = NetworkChoice.of_options(options, rendered=source.rendered)
-        networks = choose_networks(**choice.model_dump(), **running_options(options))
+        choice = choice_of_options(options, rendered=source.rendered)
+        networks = choice.load(**running_options(options))
         unfit = () if source.rendered else simulator_networks(networks.training_domains)
         said: list[str] = []
         cameras = CameraChoice.of_options(options.camera, options.fov_deg, source, said.append)
@@ -307,28 +312,32 @@ def _rate_findings(source: ImageSource, seen: _Examined) -> list[Finding]:
     found = []
     steps_s = np.diff(seen.stamps_s)
     if (source.live or source.rate_hz is not None) and len(steps_s) and np.median(steps_s) > 0.0:
-        found.append(_rate_finding(1.0 / float(np.median(steps_s)), "the images come at"))
+        found.append(
+            _rate_finding(1.0 / float(np.median(steps_s)), "the images come at", _FASTER_CAMERA)
+        )
         if (steps_s <= 0.0).any():
             text = "stamps do not advance, or go back"
             found.append(Finding.error("frame rate", text, "check the driver's clock"))
     if warm := seen.times_s[_WARM_UP:]:
-        found.append(_rate_finding(1.0 / float(np.median(warm)), "perception manages"))
+        found.append(
+            _rate_finding(1.0 / float(np.median(warm)), "perception manages", _FASTER_NETWORKS)
+        )
     return found
 
 
-def _rate_finding(rate_hz: float, words: str) -> Finding:
+def _rate_finding(rate_hz: float, words: str, remedy: str) -> Finding:
     text = f"{words} {rate_hz:.1f} images per second"
     if rate_hz < _LEAST_HZ:
         return Finding.error(
             "frame rate",
             f"{text}: nobody counts as aware below {_LEAST_HZ:g}",
-            "smaller networks, a smaller picture, or another computer",
+            remedy,
         )
     if rate_hz < _WANTED_HZ:
         return Finding.warning(
             "frame rate",
             f"{text}; the method's paper has {_WANTED_HZ:g}",
-            "--detect-every-s 0.15, smaller networks, or a GPU (--provider)",
+            remedy,
         )
     return Finding.fine("frame rate", text)
 

@@ -11,11 +11,10 @@ if TYPE_CHECKING:
     from ._camera import CameraChoice, fixed_camera_pose
     from ._estimator import (
         FrameEstimate,
-        Networks,
         PeopleEstimator,
         ids_of_tracks,
     )
-    from ._networks import NetworkChoice, admit_networks, choose_networks, running_options
+    from ._networks import admit_options, choice_of_options, running_options
     from ._open_source import is_recording, open_source
     from ._overlay import OverlayWriter
     from ._sources import ImageSource, SourceFrame
@@ -25,13 +24,11 @@ __all__ = [
     "CameraChoice",
     "FrameEstimate",
     "ImageSource",
-    "NetworkChoice",
-    "Networks",
     "OverlayWriter",
     "PeopleEstimator",
     "SourceFrame",
-    "admit_networks",
-    "choose_networks",
+    "admit_options",
+    "choice_of_options",
     "fixed_camera_pose",
     "ids_of_tracks",
     "is_recording",

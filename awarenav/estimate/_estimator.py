@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -16,16 +16,12 @@ from perception import (
     AwarenessPipeline,
     Camera,
     FloorPlane,
-    HeadPoseEstimator,
-    PersonDetector,
     PersonObservation,
-    PoseEstimator,
 )
 from perception.arrays import FloatArray
 from perception.errors import DepthImageError
-from perception.networks.detectors import for_wide_view
+from perception.named import Networks
 from perception.no_view import LastFrames, NoView, why_no_view
-from perception.shipped import TrainingDomain
 from perception.turn import QuarterTurn
 from tracking import CameraView, PersonTrack, PersonTracker, TrackerConfig
 
@@ -42,33 +38,6 @@ _OF_RECORDINGS: Final = TrackerConfig(max_pause_s=1e12, new_clock_after_s=1e5)
 # Accuracy of the height and pitch of a fixed camera that the user types in.
 _MEASURED_STD_M: Final = 0.05
 _MEASURED_STD_RAD: Final = math.radians(2.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Networks:
-    """The detector and estimators of a pipeline.
-
-    ``detector`` may be a function that makes the detector for a camera. Any other one looks twice
-    at an image of more than 90° across (:func:`~perception.networks.detectors.for_wide_view`).
-    ``head_pose_estimator`` None is the pipeline's default. ``training_domains`` says what each has
-    seen in training, by its role; a role that is missing or None is not known.
-    """
-
-    detector: PersonDetector | Callable[[Camera], PersonDetector]
-    pose_estimator: PoseEstimator
-    head_pose_estimator: HeadPoseEstimator | None = None
-    #: More settings of :class:`~perception.AwarenessPipeline` by name.
-    settings: dict[str, Any] = field(default_factory=dict)
-    training_domains: dict[str, TrainingDomain | None] = field(default_factory=dict)
-
-    def pipeline(self, camera: Camera) -> AwarenessPipeline:
-        """Return a pipeline for a camera."""
-        detector = self.detector
-        if isinstance(detector, PersonDetector):
-            detector = partial(for_wide_view, detector)
-        return AwarenessPipeline(
-            camera, detector, self.pose_estimator, self.head_pose_estimator, **self.settings
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -207,7 +176,7 @@ class PeopleEstimator:
     ) -> tuple[PersonObservation, ...]:
         pipeline = self._pipelines.get(camera)
         if pipeline is None:
-            pipeline = self._networks.pipeline(camera)
+            pipeline = AwarenessPipeline.of(self._networks, camera)
             self._pipelines[camera] = pipeline
         assert frame.image_rgb is not None
         floor = self._floor(frame)

@@ -19,14 +19,15 @@ from typing import Any, Final
 from tqdm import tqdm
 
 from perception import AttentionCone, PersonObservation
+from perception.named import Networks
 from perception.picture_notes import picture_notes
 from perception.shipped import simulator_networks_warning
 
 from ..errors import AwarenavError, counted
 from ._camera import CameraChoice, fixed_camera_pose
 from ._depth_files import DepthFiles
-from ._estimator import FrameEstimate, Networks, PeopleEstimator
-from ._networks import NetworkChoice, admit_networks, choose_networks, running_options
+from ._estimator import FrameEstimate, PeopleEstimator
+from ._networks import admit_options, choice_of_options, running_options
 from ._open_source import CAMERA_NUMBER, open_source
 from ._overlay import OverlayWriter
 from ._results import estimate_record, open_results, settings_hash
@@ -218,13 +219,10 @@ def _estimator(
         _log(note)
     if source.untimed and options.tracks:
         _log("nothing tells the times: one image a second is assumed for speeds; give --fps")
-    choice = NetworkChoice.of_options(options, rendered=source.rendered, log=_log)
+    choice = choice_of_options(options, rendered=source.rendered, log=_log)
     if networks is None:
-        networks = choose_networks(
-            **choice.model_dump(), min_score=options.min_score, **running_options(options)
-        )
-    rendered, allowed = source.rendered, options.allow_simulator_networks
-    unfit = admit_networks(networks, rendered=rendered, allowed=allowed)
+        networks = choice.load(min_score=options.min_score, **running_options(options))
+    unfit = admit_options(networks, options, rendered=source.rendered)
     if unfit:
         _log(f"{simulator_networks_warning(unfit)}: trust none of the results")
     pose = None

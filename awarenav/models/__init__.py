@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._catalogue import DEFAULT_SET, RealModel
     from ._store import ModelStore
 
-__all__ = ["DEFAULT_SET", "ModelStore", "RealModel"]
+__all__ = ["ModelStore"]
 
 __getattr__ = lazy_page(__name__, __file__)

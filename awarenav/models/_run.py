@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import yaml
 
+from perception.named import DEFAULT_SET, NetworkSet, RealModel, Source, default_folder
 from perception.shipped import shipped_models, verify_shipped_model
 
 from ..errors import AwarenavError, counted
 from ..files import json_text, write_text
-from ._catalogue import DEFAULT_SET, NetworkSet, RealModel, Source
-from ._store import ModelStore, default_folder
+from ._store import ModelStore
 
 _WIDTH: Final = 100
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import hashlib
 import re
 import shutil
 import subprocess
@@ -19,14 +18,14 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Final, cast
 from urllib.parse import urlsplit
 
+from perception.named import RealModel, Source, sha256_of
+
 from ..errors import AwarenavError
-from ._catalogue import RealModel, Source
 from ._movenet import movenet_onnx
 
 _TIMEOUT_S: Final = 30.0
 # Attempts after the first, for a connection that breaks.
 _RETRIES: Final = 2
-_CHUNK_BYTES: Final = 1 << 20
 _ERRNO: Final = re.compile(r"\[Errno -?\d+\] [\w ]+")
 _ELSE: Final = (
     "what else works: --from with what another computer downloaded; `awarenav models fetch real` "
@@ -189,22 +188,6 @@ class Sources:
         path = self._scratch / model.file
         path.write_bytes(movenet_onnx(*(part.read_bytes() for part in parts)))
         return self._verified(path, (), model.sha256)
-
-
-def sha256_of(path: Path) -> str:
-    """Return the sha256 of a file's content.
-
-    Raises:
-        AwarenavError: for a file that cannot be read.
-    """
-    digest = hashlib.sha256()
-    try:
-        with path.open("rb") as file:
-            while chunk := file.read(_CHUNK_BYTES):
-                digest.update(chunk)
-    except OSError as cause:
-        raise AwarenavError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    return digest.hexdigest()
 
 
 def _candidates(origin: Path, name: str) -> list[Path]:

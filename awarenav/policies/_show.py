@@ -11,6 +11,7 @@ import numpy as np
 from nav_adapter import AwarenessPolicy, RobotProfile
 from nav_adapter.ros2 import RobotFile
 
+from ..errors import AwarenavError
 from ..files import check_plot, json_text
 from ._effect import BESIDE_M, effect_of
 
@@ -28,7 +29,12 @@ ROBOT: Final = RobotProfile(
 
 
 def show_command(
-    names: Sequence[str], out: Path | None, robot_file: Path | None, *, as_json: bool
+    names: Sequence[str],
+    out: Path | None,
+    robot_file: Path | None,
+    *,
+    overwrite: bool,
+    as_json: bool,
 ) -> int:
     """Run the command; return the exit status.
 
@@ -36,6 +42,7 @@ def show_command(
         names: presets and YAML files of policies.
         out: the drawing; None for none.
         robot_file: the robot; None for that of docs/policies.md.
+        overwrite: replaces an existing drawing.
         as_json: prints the tables as JSON.
 
     Raises:
@@ -43,8 +50,10 @@ def show_command(
         NavError: for a policy or a robot that cannot be used.
     """
     check_plot(out, map(Path, names))
+    if out is not None and out.exists() and not overwrite:
+        raise AwarenavError(f"{out} exists already: --overwrite replaces it")
     robot = ROBOT if robot_file is None else RobotFile.from_yaml(robot_file).profile()
-    policies = [(name, read_policy(name)) for name in names]
+    policies = [(name, AwarenessPolicy.named(name)) for name in names]
     if out is not None:
         # Only the drawing needs matplotlib; without it, the command fails before any work.
         from ..figures import save_figure  # noqa: PLC0415
@@ -59,17 +68,6 @@ def show_command(
     if out is not None:
         print(f"Written to {out}")
     return 0
-
-
-def read_policy(name: str) -> AwarenessPolicy:
-    """Return the policy of a YAML file, or the preset if the name ends in neither .yaml nor .yml.
-
-    Raises:
-        NavError: for a file that cannot be used, or a name that is not a preset.
-    """
-    if Path(name).suffix.lower() in (".yaml", ".yml"):
-        return AwarenessPolicy.from_yaml(name)
-    return AwarenessPolicy.preset(name)
 
 
 def _table(policy: AwarenessPolicy, robot: RobotProfile) -> dict[str, Any]:

@@ -31,7 +31,8 @@ def policy() -> None:
     shell_complete=options.COMPLETE_POLICIES,
     help="Presets, or YAML files.",
 )
-@options.plot_file("policy.png", "The drawing; replaces the file.")
+@options.plot_file("policy.png", "The drawing.")
+@option("--overwrite", is_flag=True, help="Replace the drawing; without it, one is refused.")
 @options.as_json()
 @option(
     "--robot",
@@ -40,7 +41,14 @@ def policy() -> None:
     metavar="FILE",
     help="A robot file, as `awarenav bridge` reads it.",
 )
-def show(policies: tuple[str, ...], out: Path | None, robot: Path | None, *, as_json: bool) -> int:
+def show(
+    policies: tuple[str, ...],
+    out: Path | None,
+    robot: Path | None,
+    *,
+    overwrite: bool,
+    as_json: bool,
+) -> int:
     """Show a policy's effect for one person standing ahead of the robot or beside its path.
 
     Prints and draws the obstacle radius and U, the speed that the person may change to, over
@@ -50,7 +58,7 @@ def show(policies: tuple[str, ...], out: Path | None, robot: Path | None, *, as_
     """
     from ._show import show_command  # noqa: PLC0415 - help needs no policies
 
-    return show_command(policies, out, robot, as_json=as_json)
+    return show_command(policies, out, robot, overwrite=overwrite, as_json=as_json)
 
 
 @command(

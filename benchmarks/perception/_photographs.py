@@ -25,13 +25,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate import NetworkChoice, choose_networks
 from perception import (
     AwarenessPipeline,
     Camera,
     PersonKeypoints,
 )
 from perception import layouts as kp
+from perception.named import NetworkChoice
+from perception.networks import OnnxSettings
 
 from ._pictures import add_networks, pipeline_of
 from ._sureness import matched
@@ -160,14 +161,18 @@ def measure(
     chosen = None
     if networks is None or not networks.is_dir():
         choice = NetworkChoice() if networks is None else NetworkChoice.from_yaml(networks)
-        chosen = choose_networks(**choice.model_dump(), threads=1)
+        chosen = choice.load(settings=OnnxSettings(intra_op_threads=1))
     for name, people in labels.items():
         rgb = read_rgb(folder / name)
         height, width = rgb.shape[:2]
         # The field of view belongs to the longer side, also of an upright photograph.
         focal = 0.5 * max(height, width) / math.tan(0.5 * fov_rad)
         camera = Camera(width, height, focal, focal, 0.5 * width, 0.5 * height)
-        pipeline = pipeline_of(camera, networks) if chosen is None else chosen.pipeline(camera)
+        pipeline = (
+            pipeline_of(camera, networks)
+            if chosen is None
+            else AwarenessPipeline.of(chosen, camera)
+        )
         _count(figures, pipeline, rgb, people)
     return figures
 

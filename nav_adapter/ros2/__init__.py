@@ -16,6 +16,7 @@ from ._alerts import alerts
 from ._bridge import AwarenessBridge
 from ._image_input import PerceivedFrame
 from ._images import camera_of, depth_of, picture_of
+from ._navigator import Navigator
 from ._outgoing import Frames, outgoing
 from ._people import circle_objects, detections, markers, occupancy_grid, people, teb_obstacles
 from ._polygons import STOP_POLYGON_ID, collision_polygons, stop_zone
@@ -45,6 +46,7 @@ __all__ = [
     "DdsNode",
     "Frames",
     "McapRecorder",
+    "Navigator",
     "PerceivedFrame",
     "PerceptionThread",
     "RobotFile",

@@ -6,9 +6,10 @@ thread publishes at a fixed rate; perception has threads of its own. Parameters:
 calibrate``; by default none), ``rate_hz`` (20.0), ``scanners`` (number of laser scanners, 0 to 2),
 ``use_camera`` (true), ``use_map`` (false), ``compressed`` (false),
 ``depth`` (false; whether the camera has depth images),
-``percentage`` (false), ``detector_file`` and ``pose_file`` (ONNX; by default the shipped networks),
-``allow_simulator_networks`` (false; the shipped networks have seen renders only, and are refused
-without it), ``odom_frame``, ``base_frame``, ``camera_frame``; for Nav2's speed filter
+``percentage`` (false), ``detector_file`` and ``pose_file`` (files, or names of networks that are
+fetched; by default the fetched set ``real``), ``allow_simulator_networks`` (false; with true, the
+default is the shipped networks, which have seen renders only and are refused without it),
+``odom_frame``, ``base_frame``, ``camera_frame``; for Nav2's speed filter
 ``speed_mask_hz`` (0.0; masks per second, 0 for none), ``speed_mask_size_m`` (10.0) and
 ``speed_mask_resolution_m`` (0.1). Topics are renamed by ROS's
 remapping. rclpy comes with ROS 2, or from wheels for trying it (docs/nav2.md, With ROS). The module
@@ -21,25 +22,12 @@ import signal
 import sys
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any, Final
 
-from perception import (
-    AwarenessPipeline,
-    Camera,
-    OnnxPersonDetector,
-    OnnxPoseEstimator,
-    PerceptionError,
-)
+from perception import AwarenessPipeline, Camera
 from perception.arrays import finite_number
-from perception.networks import OnnxModel
-from perception.shipped import (
-    DETECTOR,
-    POSE,
-    simulator_networks,
-    simulator_networks_warning,
-)
-from tracking import TrackingError
+from perception.errors import AwarenavError
+from perception.named import NetworkChoice, admit_networks
 from tracking.prediction import PredictionModel
 
 from .._errors import NavError
@@ -108,9 +96,7 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         for key, topic in PUBLISHED.items():
             self._advertise(key, topic)
         self._bridge = AwarenessBridge(
-            AwarenessPolicy.from_yaml(policy)
-            if Path(policy).suffix in (".yaml", ".yml")
-            else AwarenessPolicy.preset(policy),
+            AwarenessPolicy.named(policy),
             robot.profile(),
             self._publish,
             frames=Frames(
@@ -238,7 +224,7 @@ def main() -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         node = AwarenessNode()
-    except (NavError, PerceptionError, TrackingError) as problem:
+    except AwarenavError as problem:
         print(f"awarenav node: {problem}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -266,22 +252,17 @@ def _pipelines(
 
     Networks of renders must be ``allowed``.
     """
-    models = {
-        role: OnnxModel(file) if file else OnnxModel.shipped(shipped)
-        for role, file, shipped in (
-            ("detector", detector_file, DETECTOR),
-            ("pose", pose_file, POSE),
-        )
-    }
-    unfit = simulator_networks({role: model.training_domain for role, model in models.items()})
-    if unfit and not allowed:
-        raise NavError(
-            f"{simulator_networks_warning(unfit)}: set detector_file and pose_file to others, as "
-            "`awarenav models fetch robot` brings them, or allow_simulator_networks to true"
-        )
-    detector = OnnxPersonDetector(models["detector"]) if detector_file else None
-    pose = OnnxPoseEstimator(models["pose"]) if pose_file else None
-    return lambda camera: AwarenessPipeline(camera, detector, pose)
+    given = {"detector": detector_file, "pose": pose_file}
+    default = NetworkChoice.default(simulator=allowed)
+    choice = default.model_copy(update={role: file for role, file in given.items() if file})
+    networks = choice.load()
+    admit_networks(
+        networks,
+        rendered=False,
+        allowed=allowed,
+        or_else="set detector_file and pose_file to others, or allow_simulator_networks to true",
+    )
+    return partial(AwarenessPipeline.of, networks)
 
 
 def _qos(topic: Topic) -> Any:

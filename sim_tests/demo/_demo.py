@@ -108,7 +108,8 @@ def run_paper(out: Path, *, seed: int, video: bool, perception: str, as_json: bo
     """Run the paper's encounter and write its files."""
     require_pybullet()
     if perception == "pixels":
-        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))  # fails now if networks are missing
+        # Fails now if networks are missing.
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0), simulator_networks=True)
     out.mkdir(parents=True, exist_ok=True)
     encounter = run_encounter(out, seed=seed, video=video, perception=perception)
     print(

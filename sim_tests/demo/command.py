@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from awarenav.cli import POSITIVE, OneOf, command, option, options
+from awarenav.files import require_writable
 
 
 @command(
@@ -52,7 +53,12 @@ def demo(
     Writes lanes.jsonl, crossing.webp and crossing.mp4; with --paper encounter.png, encounter.mp4
     and encounter.csv.
     """
-    from . import _demo  # noqa: PLC0415 - help needs no simulator
+    # Help needs no simulator; without it, nothing else is missing first.
+    from ..world.bullet import require_pybullet  # noqa: PLC0415
+
+    require_pybullet()
+    require_writable(out)
+    from . import _demo  # noqa: PLC0415
 
     if paper:
         _demo.run_paper(

@@ -22,7 +22,7 @@ from tracking.config import complaints
 from ..world.errors import SimError
 
 if TYPE_CHECKING:
-    from awarenav.estimate import Networks
+    from perception.named import Networks
 
 _SHIPPED: Final = "shipped"
 _CHECKSUMS: Final = "sha256"
@@ -38,7 +38,7 @@ def networks_data(path: str | Path) -> dict[str, Any]:
     the keys give the same networks in every process, or none.
     """
     # Only crossings with networks of one's own need the modules that run them.
-    from awarenav.estimate import NetworkChoice  # noqa: PLC0415
+    from perception.named import NetworkChoice  # noqa: PLC0415
 
     try:
         data = NetworkChoice.from_yaml(path).model_dump(exclude_defaults=True)
@@ -57,7 +57,8 @@ def networks_data(path: str | Path) -> dict[str, Any]:
 @lru_cache(maxsize=4)
 def load_networks(text: str) -> Networks:
     """Load the networks of a scenario, once in a process."""
-    from awarenav.estimate import NetworkChoice, choose_networks  # noqa: PLC0415
+    from perception.named import NetworkChoice  # noqa: PLC0415
+    from perception.networks import OnnxSettings  # noqa: PLC0415
 
     data = parse_yaml(text, "networks", SimError)
     expected = data.pop(_CHECKSUMS, {})
@@ -69,10 +70,9 @@ def load_networks(text: str) -> Networks:
                     f"{role} {data[role]} has changed: its sha256 is {found}, expected "
                     f"{expected[role]}"
                 )
-        return choose_networks(
-            **choice.model_dump(),
+        return choice.load(
             # An episode runs on one core, often beside others, and is the same everywhere.
-            threads=1,
+            settings=OnnxSettings(intra_op_threads=1),
             detect_every_s=0.0 if choice.detector == _SHIPPED else _DETECT_EVERY_S,
         )
     except ValidationError as error:
@@ -89,9 +89,9 @@ def _absolute(value: Any) -> Any:
 
 def _checksums(data: Mapping[str, Any]) -> dict[str, str]:
     """Return the sha256 of each network that is a file, by its role."""
-    from awarenav.models import ModelStore  # noqa: PLC0415
+    from perception.named import NetworkFolder  # noqa: PLC0415
 
-    store = ModelStore()
+    store = NetworkFolder()
     fetched = {each.name for each in store.catalogue.models}
     found = {}
     for role, value in data.items():

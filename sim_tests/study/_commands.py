@@ -57,7 +57,7 @@ def crossings_command(
     sees = experiment["perception"] == "pixels" and set(experiment["sensors"]) != {"scanner"}
     if sees and not experiment["networks"]:
         # Refuses missing networks before anything runs; the plan loads others.
-        AwarenessPipeline(Camera.from_fov(640, 480, 1.0))
+        AwarenessPipeline(Camera.from_fov(640, 480, 1.0), simulator_networks=True)
     if sample is not None:
         jobs = sample_jobs(jobs, sample, experiment["seed"])
     records = run_jobs(

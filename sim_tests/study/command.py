@@ -31,6 +31,13 @@ _EPISODE = (
 )
 
 
+def _require_simulator() -> None:
+    """Say that PyBullet is missing, before anything else that comes with it is missed."""
+    from ..world.bullet import require_pybullet  # noqa: PLC0415 - help needs no simulator
+
+    require_pybullet()
+
+
 @command(
     "crossings",
     examples=[
@@ -93,6 +100,7 @@ def crossings(**values: Any) -> int:
     interrupted, their table episodes.csv is written, and at the end the report. The row of a failed
     episode has the reason; the other episodes still run.
     """
+    _require_simulator()
     from ._commands import crossings_command  # noqa: PLC0415 - help needs no simulator
 
     return crossings_command(Experiment.taken_from(values), **values)
@@ -130,6 +138,7 @@ def replay(**values: Any) -> int:
 
     Prints whether the episode gives the same row as before.
     """
+    _require_simulator()
     from .runs import replay_command  # noqa: PLC0415 - help needs no simulator
 
     return replay_command(**values)
@@ -195,6 +204,7 @@ def watch(**values: Any) -> int:
     Shows the hall from above and the robot's camera, with attention cones, tracks, scans and radii;
     and over time each person's α with its bound, the speed limit and what sets it.
     """
+    _require_simulator()
     from ._commands import watch_command  # noqa: PLC0415 - help needs no simulator
 
     return watch_command(Experiment.taken_from(values), **values)

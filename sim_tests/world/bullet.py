@@ -64,7 +64,8 @@ class _PyBullet:
         except ImportError as cause:
             raise MissingSimulatorError(
                 "the simulation needs PyBullet, which is not installed; it is the extra 'sim': "
-                f"{install_command('sim')} (wheels exist for Python 3.10 and 3.11)"
+                f"{install_command('sim')} (wheels exist for Python 3.10 and 3.11; where there is "
+                "another one: `uv venv --python 3.11` makes an environment)"
             ) from cause
         vars(self).update(vars(module))
         return getattr(module, name)

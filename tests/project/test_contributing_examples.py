@@ -14,7 +14,7 @@ import pytest
 import yaml
 from paths import ROOT
 
-from awarenav.models._catalogue import Catalogue
+from perception.named import Catalogue
 
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 PACKAGES = ("perception", "tracking", "nav_adapter", "awarenav", "sim_tests", "examples")
@@ -28,7 +28,7 @@ HELPERS = (
 )
 #: Runs over every scenario, and so over the new one.
 CATALOGUE_TEST = "tests/sim_tests/scenario/test_catalogue.py"
-CATALOGUE = "awarenav/models/catalogue.yaml"
+CATALOGUE = "perception/named/catalogue.yaml"
 
 
 @dataclass(frozen=True)

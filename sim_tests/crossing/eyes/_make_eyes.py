@@ -91,10 +91,12 @@ def _shared_pipeline(
         "unusual_size_probability": unusual,
     }
     if not networks:
-        return AwarenessPipeline(camera, onnx_settings=_ONE_CORE, **settings)
+        return AwarenessPipeline(
+            camera, onnx_settings=_ONE_CORE, simulator_networks=True, **settings
+        )
     own = load_networks(networks)
     own = replace(own, settings={**own.settings, **settings})
-    return own.pipeline(camera)
+    return AwarenessPipeline.of(own, camera)
 
 
 def _pixel_eyes(

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from awarenav.estimate import Networks
 from perception import Camera, PersonDetection, PersonKeypoints, PnpHeadPoseEstimator
+from perception.named import Networks
 
 WIDTH, HEIGHT = 320, 240
 CAMERA = Camera.from_fov(WIDTH, HEIGHT, math.radians(60.0))

@@ -14,8 +14,8 @@ from onnx import TensorProto, helper, numpy_helper
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.estimate import NetworkChoice, choose_networks
 from perception import PerceptionError
+from perception.named import NetworkChoice, choose_networks
 
 COMMANDS = ("estimate", "bridge", "doctor")
 SQUARE = (1, 3, 640, 640)

@@ -12,16 +12,28 @@ import cv2
 import numpy as np
 import onnx
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numbered_images import CAMERA, numbered
-from paths import ROOT
+from paths import ROOT, SHARED
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.estimate import NetworkChoice, admit_networks, choose_networks
-from awarenav.models._catalogue import Catalogue, NetworkSet
+from awarenav.estimate import choice_of_options
+from perception import AwarenessPipeline, Camera, PerceptionError
+from perception.named import (
+    Catalogue,
+    NetworkChoice,
+    Networks,
+    NetworkSet,
+    admit_networks,
+    choose_networks,
+    default_networks,
+)
 from perception.networks import OnnxModel
-from perception.shipped import DETECTOR, POSE, shipped_model_path, shipped_models
+from perception.shipped import DETECTOR, POSE, shipped_detector, shipped_model_path, shipped_models
 
+PHOTOGRAPHS = sorted((SHARED / "images").glob("coco_*.jpg"))
 ALL = ("detector", "pose", "head")
 
 
@@ -219,8 +231,8 @@ def test_photographs_get_the_fetched_set_and_one_line_says_so(real_set, photogra
 
 def test_renders_keep_the_shipped_networks(real_set):
     options = SimpleNamespace(networks=None)
-    assert NetworkChoice.of_options(options, rendered=True) == NetworkChoice()
-    chosen = NetworkChoice.of_options(options, rendered=False)
+    assert choice_of_options(options, rendered=True) == NetworkChoice()
+    chosen = choice_of_options(options, rendered=False)
     assert (chosen.detector, chosen.pose, chosen.head) == ("people", "points", "pnp")
 
 
@@ -233,7 +245,7 @@ def test_a_set_that_was_fetched_without_small_faces_is_used_without_them(
     for role, name in catalogue.sets[0].networks.items():
         if role != "small_face" or small:
             (tmp_path / catalogue[name].file).touch()
-    chosen = NetworkChoice.of_options(SimpleNamespace(networks=None), rendered=False)
+    chosen = NetworkChoice.default(simulator=False)
     wanted = ("face-mesh", "retinaface-mobilenet" if small else "none")
     assert (chosen.face, chosen.small_face) == wanted
 
@@ -241,3 +253,65 @@ def test_a_set_that_was_fetched_without_small_faces_is_used_without_them(
 def test_small_faces_need_the_network_that_looks_first():
     with pytest.raises(AwarenavError, match="give --face too"):
         choose_networks(small_face="retinaface-mobilenet")
+
+
+def camera_of(photograph: Path) -> tuple[np.ndarray, Camera]:
+    image_rgb = cv2.cvtColor(cv2.imread(str(photograph)), cv2.COLOR_BGR2RGB)
+    height, width = image_rgb.shape[:2]
+    return image_rgb, Camera.from_fov(width, height, np.radians(60.0))
+
+
+@pytest.mark.skipif(not PHOTOGRAPHS, reason="no photographs beside the checkout")
+def test_the_library_refuses_photographs_as_the_commands_do(tmp_path, capsys):
+    for path in PHOTOGRAPHS:
+        assert main(["estimate", str(path), "--out", str(tmp_path / "out.jsonl")]) == 2
+        _, camera = camera_of(path)
+        with pytest.raises(PerceptionError, match="renders only") as refusal:
+            AwarenessPipeline(camera)
+        # One sentence, but for the word that allows them.
+        said = capsys.readouterr().err.removeprefix("awarenav estimate: ")
+        assert str(refusal.value).partition(" (or ")[0] in " ".join(said.split())
+        assert "`awarenav models fetch real`" in str(refusal.value)
+        assert "simulator_networks=True" in str(refusal.value)
+
+
+def test_the_library_gives_the_simulator_the_shipped_networks(real_set):
+    image_rgb = np.full((CAMERA.height_px, CAMERA.width_px, 3), 120, np.uint8)
+    assert AwarenessPipeline(CAMERA, simulator_networks=True).process(image_rgb, 0.0) == ()
+    networks = default_networks(simulator_networks=True)
+    assert tuple(networks.training_domains) == ALL
+    assert set(networks.training_domains.values()) == {"renders"}
+
+
+def test_the_library_uses_the_fetched_set(real_set):
+    image_rgb = np.full((CAMERA.height_px, CAMERA.width_px, 3), 120, np.uint8)
+    assert AwarenessPipeline(CAMERA).process(image_rgb, 0.0) == ()
+    domains = default_networks(simulator_networks=False).training_domains
+    assert domains == {"detector": "photographs", "pose": "photographs"}
+    (real_set / "points.onnx").unlink()  # half a set is none
+    with pytest.raises(PerceptionError, match="awarenav models fetch real"):
+        AwarenessPipeline(CAMERA)
+
+
+def test_detector_and_pose_estimator_are_given_both_or_neither():
+    with pytest.raises(PerceptionError, match="pose_estimator is missing"):
+        AwarenessPipeline(CAMERA, shipped_detector, simulator_networks=True)
+
+
+@given(
+    domains=st.dictionaries(
+        st.sampled_from(["detector", "pose", "head", "face"]),
+        st.sampled_from(["renders", "photographs", None]),
+    ),
+    rendered=st.booleans(),
+    allowed=st.booleans(),
+)
+def test_networks_of_renders_see_no_other_pictures_unasked(domains, rendered, allowed):
+    networks = Networks(None, None, training_domains=domains)
+    unfit = tuple(role for role, domain in domains.items() if domain == "renders")
+    if unfit and not rendered and not allowed:
+        with pytest.raises(PerceptionError, match="renders only"):
+            admit_networks(networks, rendered=rendered, allowed=allowed)
+    else:
+        admitted = admit_networks(networks, rendered=rendered, allowed=allowed)
+        assert admitted == (() if rendered else unfit)

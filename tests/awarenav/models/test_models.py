@@ -14,10 +14,8 @@ import pytest
 
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
-from awarenav.estimate import NetworkChoice
 from awarenav.models import ModelStore, _sources
-from awarenav.models._catalogue import Catalogue, NetworkSet, RealModel
-from awarenav.models._store import default_folder
+from perception.named import Catalogue, NetworkChoice, NetworkSet, RealModel, default_folder
 
 # Not a network, but enough to tell a complete file from half of it, and an old one from a new one.
 CONTENT = bytes(range(256)) * 4000

@@ -20,7 +20,7 @@ import pytest
 from awarenav.cli import main
 from awarenav.errors import AwarenavError
 from awarenav.models import ModelStore, _sources
-from awarenav.models._catalogue import Catalogue, RealModel
+from perception.named import Catalogue, RealModel
 
 # Not networks, but their sha256 tells them apart as it does networks.
 BOXES, POINTS, OTHER = b"boxes" * 1000, b"points" * 1000, b"others" * 1000

@@ -11,7 +11,6 @@ import pytest
 from paths import SHARED
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate import choose_networks
 from awarenav.models import ModelStore
 from perception import (
     AwarenessPipeline,
@@ -22,17 +21,14 @@ from perception import (
     PersonKeypoints,
 )
 from perception.eyes import EyeEstimator
+from perception.named import choose_networks
 from perception.networks import (
     BlazePoseEstimator,
     EfficientDetPersonDetector,
     OnnxModel,
     TfliteModel,
 )
-from perception.networks.faces import (
-    FaceMesh,
-    FaceMeshEyeEstimator,
-    FaceMeshPoseEstimator,
-)
+from perception.networks.faces import FaceMesh, FaceMeshEyeEstimator, FaceMeshPoseEstimator
 from perception.networks.small_faces import RetinaFace
 from perception.ownership import iou
 
@@ -61,7 +57,7 @@ def files(tmp_path_factory):
 def pipeline(files):
     detector, pose, face, small = map(str, files)
     networks = choose_networks(detector, pose, "pnp", face, small_face=small)
-    return networks.pipeline(CAMERA)
+    return AwarenessPipeline.of(networks, CAMERA)
 
 
 class Given:

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from awarenav.policies import read_policy
 from nav_adapter import AwarenessPolicy, NavError
 from sim_tests import SimError
 from sim_tests.crossing import named_policy
@@ -24,7 +23,7 @@ def test_scanner_is_a_preset_of_the_simulator_alone():
         assert scanner.inflation.radius_m(alpha) == scanner.inflation.radius_m(0.0) == 0.45
     assert scanner.alerts is None
     message = r"'blind', 'conservative', got 'scanner'$"
-    for library in (AwarenessPolicy.preset, read_policy):
+    for library in (AwarenessPolicy.preset, AwarenessPolicy.named):
         with pytest.raises(NavError, match=message):
             library("scanner")
 

@@ -61,7 +61,7 @@ def test_the_shipped_networks_reach_the_figures_of_their_model_cards_on_a_sample
 
 def test_nobody_is_detected_in_images_without_people():
     camera = Camera.from_fov(640, 480, np.radians(60.0))
-    pipeline = AwarenessPipeline(camera)
+    pipeline = AwarenessPipeline(camera, simulator_networks=True)
     rng = np.random.default_rng(0)
     for image in (
         np.zeros((480, 640, 3), np.uint8),

@@ -8,9 +8,8 @@ from typing import Any, ClassVar, Final, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from perception.shipped import TrainingDomain
-from tracking.config import StrictConfig
-
+from .._manifest import TrainingDomain
+from ..config import StrictConfig
 from ..errors import AwarenavError, not_one_of
 
 Role = Literal["detector", "pose", "face", "small_face", "head"]
