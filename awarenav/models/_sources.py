@@ -19,6 +19,8 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Final, cast
 from urllib.parse import urlsplit
 
+from perception.installation import install_command
+
 from ..errors import AwarenavError
 from ._catalogue import RealModel, Source
 from ._movenet import movenet_onnx
@@ -220,9 +222,14 @@ def _from_address(url: str, folder: Path, progress: bool) -> Path:
 
     Proxies and certificates are those of requests (``HTTPS_PROXY``, ``REQUESTS_CA_BUNDLE``).
     """
-    # Slow to import, and of no use to a package or a file of the user.
-    import pooch  # noqa: PLC0415
-    import requests  # noqa: PLC0415
+    try:
+        import pooch  # noqa: PLC0415 - an extra
+        import requests  # noqa: PLC0415 - what pooch needs
+    except ImportError as cause:
+        raise _UnreachableError(
+            "a download needs the package pooch, which is not installed; it is the extra 'fetch': "
+            f"{install_command('fetch')}"
+        ) from cause
 
     pooch.get_logger().setLevel("WARNING")
     name = PurePosixPath(url).name

@@ -46,8 +46,7 @@ def show_command(
     robot = ROBOT if robot_file is None else RobotFile.from_yaml(robot_file).profile()
     policies = [(name, read_policy(name)) for name in names]
     if out is not None:
-        # Only the drawing needs matplotlib; without it, the command fails before any work.
-        from ..figures import save_figure  # noqa: PLC0415
+        from ..figures import save_figure  # noqa: PLC0415 - slow
         from ._drawing import policy_figure  # noqa: PLC0415
 
         save_figure(policy_figure(policies, robot), out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter
+from filterpy.kalman import KalmanFilter, predict
 from hypothesis import given
 from hypothesis import strategies as st
 from tracking_scenes import CAMERA, camera_at, observe, white_acceleration
@@ -40,7 +40,10 @@ def test_the_noise_floor_raises_eigenvalues_and_keeps_directions(
 
 @pytest.mark.parametrize("first", range(0, 1000, 250))
 def test_the_tracker_is_filterpys_kalman_filter(first: int) -> None:
-    """Of a thousand walkers, by two cameras whose frames come one after the other or at once."""
+    """Of a thousand walkers, by two cameras whose frames come one after the other or at once.
+
+    Corrections and predictions are equal to 1e-9.
+    """
     sensors = {"rear": SensorConfig(measures_range=False, alignment_std_rad=0.0)}
     for seed in range(first, first + 250):
         rng = np.random.default_rng(seed)
@@ -66,9 +69,16 @@ def test_the_tracker_is_filterpys_kalman_filter(first: int) -> None:
                 theirs.update(z, R=R)
             seen = [observe(z, now, covariance_odom_m2=R)]
             (track,) = tracker.update(seen, now, CAMERA, sensor=str(rng.choice(["camera", "rear"])))
-            state = [*track.position_odom_m, *track.velocity_odom_mps]
-            np.testing.assert_allclose(state, theirs.x, rtol=0.0, atol=1e-9)
-            np.testing.assert_allclose(track.covariance_odom, theirs.P, rtol=0.0, atol=1e-9)
+            ahead_s = rng.uniform(0.0, 0.5)
+            F, Q = white_acceleration(ahead_s, CONFIG.acceleration_density_m2ps3)
+            (later,) = tracker.predict(now + ahead_s)
+            for ours, x, P in (
+                (track, theirs.x, theirs.P),
+                (later, *predict(theirs.x, theirs.P, F=F, Q=Q)),
+            ):
+                state = [*ours.position_odom_m, *ours.velocity_odom_mps]
+                np.testing.assert_allclose(state, x, rtol=0.0, atol=1e-9)
+                np.testing.assert_allclose(ours.covariance_odom, P, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("dt_s", [0.1, 0.5, 1.0])
