@@ -8,30 +8,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import QuadMesh
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Ellipse, Patch, Polygon, Rectangle, Wedge
+from matplotlib.text import Text
+from matplotlib.ticker import MultipleLocator
+from matplotlib.transforms import Bbox
+from PIL import Image  # a dependency of matplotlib
 
-from perception.installation import install_command
-
-from .errors import MissingExtraError
 from .files import atomic_path, printable
-
-try:
-    from matplotlib import rc_context
-    from matplotlib.axes import Axes
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import QuadMesh
-    from matplotlib.figure import Figure
-    from matplotlib.gridspec import GridSpec
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Circle, Ellipse, Patch, Polygon, Rectangle, Wedge
-    from matplotlib.text import Text
-    from matplotlib.ticker import MultipleLocator
-    from matplotlib.transforms import Bbox
-    from PIL import Image  # a dependency of matplotlib
-except ImportError as cause:  # pragma: no cover - depends on the installation
-    raise MissingExtraError(
-        "a plot needs matplotlib, which is not installed; it is the extra 'plot': "
-        f"{install_command('plot')}. Without it, only tables can be made (--out none)"
-    ) from cause
 
 __all__ = [
     "Axes",

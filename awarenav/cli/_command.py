@@ -19,7 +19,7 @@ _SETTINGS: Final = {
     "show_default": True,
 }
 # The modules that the extra "sim" installs.
-_SIMULATOR_MODULES: Final = ("av", "joblib", "matplotlib", "moderngl", "pybullet")
+_SIMULATOR_MODULES: Final = ("av", "filelock", "joblib", "moderngl", "pybullet")
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import click
-from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from ._command import Decorator, option
@@ -109,26 +108,10 @@ def out_file(
 
 
 def plot_file(default: str, help: str) -> Decorator:
-    """Add ``--out``: the file of a plot; None for ``none``.
-
-    Without matplotlib the default is none, with a remark; a file that is asked for is an error.
-    """
+    """Add ``--out``: the file of a plot; None for ``none``."""
 
     def file_or_none(context: click.Context, parameter: click.Parameter, out: Path) -> Path | None:
-        if str(out) == "none":
-            return None
-        chosen = context.get_parameter_source(str(parameter.name)) is not ParameterSource.DEFAULT
-        if chosen or context.resilient_parsing or _is_installed("matplotlib"):
-            return out
-        # This import loads the networks, which help does not need.
-        from perception.installation import install_command  # noqa: PLC0415
-
-        print(
-            f"{context.command_path}: no plot, since matplotlib is not installed: "
-            f"{install_command('plot')}",
-            file=sys.stderr,
-        )
-        return None
+        return None if str(out) == "none" else out
 
     return option(
         "--out",
@@ -136,15 +119,8 @@ def plot_file(default: str, help: str) -> Decorator:
         default=default,
         metavar="FILE.png|svg|pdf|none",
         callback=file_or_none,
-        help=f"{help} Needs matplotlib.",
+        help=help,
     )
-
-
-def _is_installed(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except ValueError:  # the module is blocked
-        return False
 
 
 def resume() -> Decorator:

@@ -30,9 +30,8 @@ _EXTRAS: Final = (
     ("sim", "pybullet", "crossings"),
     ("ros2", "cyclonedds", "the bridge"),
     ("rosbag", "rosbags", "recordings"),
-    ("plot", "matplotlib", "plots"),
-    ("smooth", "filterpy", "smoothed tracks"),
     ("litert", "ai_edge_litert", "TFLite networks at full speed"),
+    ("fetch", "pooch", "networks that no package index has"),
     ("movenet", "onnx", "fetching MoveNet"),
 )
 

@@ -12,8 +12,8 @@ from scipy.optimize import linear_sum_assignment
 
 from perception.arrays import FloatArray
 
+from ..intervals import MIN_RESAMPLED, Ends, bootstrap_ends, share_interval
 from ..records import PersonRecord
-from ._intervals import MIN_RESAMPLED, Ends, bootstrap_ends, share_interval
 
 # An estimate and a person with this affinity or more can match: the IoU of their boxes.
 _MIN_AFFINITY: Final = 0.5

@@ -14,9 +14,9 @@ from scipy.special import gammaincinv
 from perception.arrays import FloatArray
 
 from ..errors import AwarenavError
+from ..intervals import LEVEL, Metrics
 from ..records import PersonRecord, people_by_frame, read_records
 from ._detection import DetectionFrame, match_frame, precision_with_interval
-from ._intervals import LEVEL, Metrics
 
 #: The people of every frame, by the frame's name.
 Frames = dict[str, list[PersonRecord]]

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from ..cli import table_text
 from ..errors import counted
 from ..files import check_output, json_text, write_text
-from ._intervals import UNBOUNDED, Ends
+from ..intervals import UNBOUNDED, Ends
 from ._judge import judge_files
 
 Verdict = Literal["yes", "no", "too few to tell"]

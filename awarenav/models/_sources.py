@@ -18,6 +18,7 @@ from pathlib import Path, PurePosixPath
 from typing import IO, Final, cast
 from urllib.parse import urlsplit
 
+from perception.installation import install_command
 from perception.named import RealModel, Source, sha256_of
 
 from ..errors import AwarenavError
@@ -203,9 +204,14 @@ def _from_address(url: str, folder: Path, progress: bool) -> Path:
 
     Proxies and certificates are those of requests (``HTTPS_PROXY``, ``REQUESTS_CA_BUNDLE``).
     """
-    # Slow to import, and of no use to a package or a file of the user.
-    import pooch  # noqa: PLC0415
-    import requests  # noqa: PLC0415
+    try:
+        import pooch  # noqa: PLC0415 - an extra
+        import requests  # noqa: PLC0415 - what pooch needs
+    except ImportError as cause:
+        raise _UnreachableError(
+            "a download needs the package pooch, which is not installed; it is the extra 'fetch': "
+            f"{install_command('fetch')}"
+        ) from cause
 
     pooch.get_logger().setLevel("WARNING")
     name = PurePosixPath(url).name

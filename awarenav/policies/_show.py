@@ -55,8 +55,7 @@ def show_command(
     robot = ROBOT if robot_file is None else RobotFile.from_yaml(robot_file).profile()
     policies = [(name, AwarenessPolicy.named(name)) for name in names]
     if out is not None:
-        # Only the drawing needs matplotlib; without it, the command fails before any work.
-        from ..figures import save_figure  # noqa: PLC0415
+        from ..figures import save_figure  # noqa: PLC0415 - slow
         from ._drawing import policy_figure  # noqa: PLC0415
 
         save_figure(policy_figure(policies, robot), out)

@@ -64,8 +64,7 @@ def tracks_command(
         if out is not None and out.resolve() == csv.resolve():
             raise AwarenavError(f"--out and --csv are the same file, {out}")
     if out is not None:
-        # Only the plot needs matplotlib; without it, the command fails before any work.
-        from ..figures import save_figure  # noqa: PLC0415
+        from ..figures import save_figure  # noqa: PLC0415 - slow
         from ._plot import tracks_figure  # noqa: PLC0415
     settings = None if config is None else TrackerConfig.from_yaml(config)
     recording = read_file(file)

@@ -9,8 +9,9 @@ rclpy's messages are converted in :mod:`nav_adapter.ros2.conversions`.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from perception.lazy import lazy_page
 
 from ._alerts import alerts
 from ._bridge import AwarenessBridge
@@ -84,12 +85,4 @@ __all__ = [
     "teb_obstacles",
 ]
 
-
-_NEED_EXTRA = {"decode": "_cdr", "encode": "_cdr", "DdsNode": "_dds", "McapRecorder": "_mcap"}
-
-
-def __getattr__(name: str) -> Any:
-    """Load the names that need the extra ``ros2`` at first use."""
-    if name in _NEED_EXTRA:
-        return getattr(import_module(f"{__name__}.{_NEED_EXTRA[name]}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = lazy_page(__name__, __file__)

@@ -15,18 +15,20 @@ import threading
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from time import perf_counter, thread_time
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import cv2
 import numpy as np
-from flatbuffers.number_types import Int8Flags, Int32Flags
-from flatbuffers.table import Table
 from numpy.typing import NDArray
 
 from .._manifest import TrainingDomain
 from ..errors import PerceptionError
+from ..installation import install_command
 from ._model import NETWORK_TIME, NetworkFile, OnnxTensor, looks_like, read_model
 from ._settings import OnnxSettings
+
+if TYPE_CHECKING:
+    from flatbuffers.table import Table
 
 #: Runs a network on one batch, from the input to the outputs by name.
 _Run: TypeAlias = Callable[[NDArray[Any]], Mapping[str, NDArray[Any]]]
@@ -206,6 +208,11 @@ def _ends(content: bytes) -> tuple[tuple[OnnxTensor, ...], tuple[OnnxTensor, ...
 def _graph(content: bytes | bytearray) -> Table:
     if not is_tflite(content):
         raise ValueError("it does not begin as a TFLite file")
+    try:
+        from flatbuffers.table import Table  # noqa: PLC0415 - an extra
+    except ImportError as cause:
+        command = install_command("litert")
+        raise ImportError(f"flatbuffers is missing, of the extra 'litert': {command}") from cause
     root = Table(content, int.from_bytes(content[:4], "little"))
     graphs = _tables(root, 2)
     if len(graphs) != 1:
@@ -238,7 +245,7 @@ def _reduced(content: bytes, names: Collection[str]) -> bytes:
 
 def _tensor(table: Table) -> OnnxTensor:
     place = table.Offset(_slot(1))
-    number = table.Get(Int8Flags, place + table.Pos) if place else 0
+    number = table.Bytes[place + table.Pos] if place else 0
     name = table.String(table.Offset(_slot(3)) + table.Pos).decode()
     return OnnxTensor(name, tuple(_integers(table, 0)), _DTYPES.get(number, f"type {number}"))
 
@@ -248,7 +255,7 @@ def _tables(table: Table, field: int) -> list[Table]:
     place = table.Offset(_slot(field))
     start = table.Vector(place) if place else 0
     return [
-        Table(table.Bytes, table.Indirect(start + 4 * row))
+        type(table)(table.Bytes, table.Indirect(start + 4 * row))
         for row in range(table.VectorLen(place) if place else 0)
     ]
 
@@ -258,7 +265,7 @@ def _integers(table: Table, field: int) -> list[int]:
     if not place:
         return []
     start = table.Vector(place)
-    return [table.Get(Int32Flags, start + 4 * row) for row in range(table.VectorLen(place))]
+    return list(struct.unpack_from(f"<{table.VectorLen(place)}i", table.Bytes, start))
 
 
 def _slot(field: int) -> int:

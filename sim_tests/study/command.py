@@ -263,7 +263,7 @@ def compare(**values: Any) -> int:
         130: "Interrupted; the episodes so far are kept.",
     },
     epilog="A killed or interrupted run continues with the same command and --resume. "
-    "docs/what_it_wins.md explains the picture. Needs the extra 'plot'.",
+    "docs/what_it_wins.md explains the picture.",
 )
 @argument(
     "folder",

@@ -73,10 +73,11 @@ def test_wheel_carries_the_licence_and_the_command(wheel: Path, root: Path) -> N
     metadata = Parser().parsestr(metadata_file(wheel, "METADATA"))
     assert metadata["License-Expression"] == "Apache-2.0"
     needed = [line for line in metadata.get_all("Requires-Dist", []) if "extra ==" not in line]
-    optional = ("pybullet", "matplotlib", "av", "ai_edge_litert")
+    optional = ("pybullet", "av", "ai_edge_litert", "filelock", "flatbuffers", "pooch")
     assert not any(line.startswith(optional) for line in needed)
+    assert any(line.startswith("filterpy") for line in needed)
     extras = set(metadata.get_all("Provides-Extra", []))
-    assert {"sim", "plot", "litert"} <= extras
+    assert {"sim", "litert", "fetch"} <= extras
 
 
 def test_wheel_carries_the_networks_unaltered(wheel: Path) -> None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-from filterpy.kalman import KalmanFilter
+from filterpy.common import Q_continuous_white_noise
+from filterpy.kalman import KalmanFilter, predict
 from hypothesis import given
 from hypothesis import strategies as st
 from tracking_scenes import CAMERA, camera_at, observe, white_acceleration
 
-from tracking import PersonTracker, SensorConfig, TrackerConfig
+from tracking import PersonTrack, PersonTracker, SensorConfig, TrackerConfig
 
 # Without gates.
 CONFIG = TrackerConfig(
@@ -40,7 +43,16 @@ def test_the_noise_floor_raises_eigenvalues_and_keeps_directions(
 
 @pytest.mark.parametrize("first", range(0, 1000, 250))
 def test_the_tracker_is_filterpys_kalman_filter(first: int) -> None:
-    """Of a thousand walkers, by two cameras whose frames come one after the other or at once."""
+    """Of a thousand walkers, by two cameras whose frames come one after the other or at once.
+
+    Corrections and predictions are equal to 1e-9.
+    """
+
+    def walk(dt_s: float) -> dict[str, Any]:
+        density = CONFIG.acceleration_density_m2ps3
+        Q = Q_continuous_white_noise(2, dt_s, density, block_size=2, order_by_dim=False)
+        return {"F": np.eye(4) + dt_s * np.eye(4, k=2), "Q": Q}
+
     sensors = {"rear": SensorConfig(measures_range=False, alignment_std_rad=0.0)}
     for seed in range(first, first + 250):
         rng = np.random.default_rng(seed)
@@ -48,6 +60,7 @@ def test_the_tracker_is_filterpys_kalman_filter(first: int) -> None:
         theirs.H = np.eye(2, 4)
         place, velocity = rng.uniform(-50.0, 50.0, 2), rng.choice([-1, 1], 2) * rng.uniform(1, 2, 2)
         now = float(rng.uniform(-1e3, 1e3))
+        ours, expected = list[PersonTrack](), list[tuple[Any, Any]]()
         for frame in range(8):
             # Two frames at once, and gaps once the person is confirmed, are among them.
             gap_s = rng.uniform(0.2, 1.0 if frame > 3 else 0.3)
@@ -61,14 +74,18 @@ def test_the_tracker_is_filterpys_kalman_filter(first: int) -> None:
                 theirs.x, theirs.P = np.array([*z, 0.0, 0.0]), np.eye(4)
                 theirs.P[:2, :2] = R
             else:
-                F, Q = white_acceleration(dt_s, CONFIG.acceleration_density_m2ps3)
-                theirs.predict(F=F, Q=Q)
+                theirs.predict(**walk(dt_s))
                 theirs.update(z, R=R)
             seen = [observe(z, now, covariance_odom_m2=R)]
             (track,) = tracker.update(seen, now, CAMERA, sensor=str(rng.choice(["camera", "rear"])))
-            state = [*track.position_odom_m, *track.velocity_odom_mps]
-            np.testing.assert_allclose(state, theirs.x, rtol=0.0, atol=1e-9)
-            np.testing.assert_allclose(track.covariance_odom, theirs.P, rtol=0.0, atol=1e-9)
+            ahead_s = rng.uniform(0.0, 0.5)
+            (later,) = tracker.predict(now + ahead_s)
+            ours += [track, later]
+            expected += [(theirs.x, theirs.P), predict(theirs.x, theirs.P, **walk(ahead_s))]
+        states = [[*each.position_odom_m, *each.velocity_odom_mps] for each in ours]
+        covariances = [each.covariance_odom for each in ours]
+        np.testing.assert_allclose(states, [x for x, _ in expected], rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(covariances, [P for _, P in expected], rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("dt_s", [0.1, 0.5, 1.0])

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaincinv, ndtr, ndtri
 
+from awarenav.intervals import UNBOUNDED, bootstrap_ends, share_interval
 from perception.arrays import FloatArray, finite_array, finite_number
 
 from ...world.errors import SimError
@@ -142,10 +142,7 @@ def proportion_interval(count: int, n: int, level: float = 0.95) -> Interval:
         return Interval(0.0, 0.0, zero_of_n_upper(n, level), n)
     if count == n:
         return Interval(1.0, 1.0 - zero_of_n_upper(n, level), 1.0, n)
-    tail = 0.5 * (1.0 - level)
-    low = float(betaincinv(count, n - count + 1, tail))
-    high = float(betaincinv(count + 1, n - count, 1.0 - tail))
-    return Interval(count / n, low, high, n)
+    return Interval(count / n, *share_interval(count, n, 0.5 * (1.0 - level)), n)
 
 
 def _checked_level(level: float, count: int = 0, n: int = 0) -> float:
@@ -258,21 +255,10 @@ def resampled_interval(
     The interval is unbounded for a single episode, or where more resamples have no figure (NaN)
     than the interval may leave out.
     """
-    usable = np.isfinite(resampled)
-    if not np.isfinite(value) or n < 2 or np.mean(~usable) > 0.5 * (1.0 - level):
-        return Interval(value, -np.inf, np.inf, n)
-    found = resampled[usable]
-    # Ties count half: with few distinct values, many resamples may equal the estimate.
-    tolerance = 1e-12 * max(abs(value), float(np.abs(found).max()))
-    below = float(np.mean(found < value - tolerance))
-    below += 0.5 * float(np.mean(np.abs(found - value) <= tolerance))
-    # With all resamples on one side, the bias would be infinite.
-    least = 0.5 / len(found)
-    bias = float(ndtri(min(max(below, least), 1.0 - least)))
-    moved = bias + ndtri(np.array([0.5 * (1.0 - level), 0.5 * (1.0 + level)]))
-    shares = ndtr(bias + moved / (1.0 - acceleration * moved))
-    low, high = np.quantile(found, shares).tolist()
-    return Interval(value, float(low), float(high), n)
+    usable, tail = np.isfinite(resampled), 0.5 * (1.0 - level)
+    if not np.isfinite(value) or n < 2 or np.mean(~usable) > tail:
+        return Interval(value, *UNBOUNDED, n)
+    return Interval(value, *bootstrap_ends(value, resampled[usable], acceleration, tail), n)
 
 
 def _groups(strata: Sequence[Hashable] | None, n: int) -> list[NDArray[np.intp]]:

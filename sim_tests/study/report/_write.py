@@ -59,7 +59,6 @@ def write_report(
     Raises:
         SimError: there is no ``episodes.csv``, it is not a table of episodes, or the page cannot
             be written.
-        MissingExtraError: matplotlib is not installed.
     """
     run = Run.read(out_dir)
     results = Results.of(run)

@@ -41,7 +41,6 @@ def list_scenarios(*, as_json: bool) -> int:
         "awarenav scenario show crossing_from_left --yaml > mine.yaml",
     ],
     exit_status={0: "Success.", 2: "Bad input."},
-    epilog="The drawing needs matplotlib.",
 )
 @argument(
     "scenario",
@@ -63,7 +62,7 @@ def show(scenario: str, *, yaml: bool, seed: int | None, out: Path | None) -> in
 
     status = show_command(scenario, yaml=yaml, seed=seed)
     if out is not None and not yaml:
-        from ...scenario.drawing import draw_scenario  # noqa: PLC0415 - needs matplotlib
+        from ...scenario.drawing import draw_scenario  # noqa: PLC0415 - slow
 
         draw_scenario(scenario, out)
     return status

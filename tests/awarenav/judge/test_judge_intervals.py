@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_judge import frames, judged, person
 
-from awarenav.judge import requirements
-from awarenav.judge._intervals import (
+from awarenav.intervals import (
     mean_interval,
     percentile_interval,
     rate_interval,
     share_interval,
 )
+from awarenav.judge import requirements
 from awarenav.judge._report import Requirement
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import http.server
 import io
+import sys
 import threading
 import zipfile
 from functools import partial
@@ -140,6 +141,13 @@ def test_missing_file_and_server_are_named_with_what_works_without(server, tmp_p
         store(tmp_path, gone).fetch("tiny", progress=False)
     assert "\n" not in str(raised.value)
     assert names(tmp_path) == set()
+
+
+def test_without_pooch_the_message_names_the_extra(server, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pooch", None)
+    with pytest.raises(AwarenavError, match=r"the extra 'fetch': pip install .*--from"):
+        store(tmp_path, model(server, "a.onnx")).fetch("tiny", progress=False)
+    assert server.requests == []
 
 
 def test_cache_folder_follows_the_environment(monkeypatch, tmp_path):

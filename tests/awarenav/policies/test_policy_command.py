@@ -14,7 +14,6 @@ from awarenav.cli import main
 from nav_adapter import AwarenessPolicy, NavAdapter, RobotProfile, RobotState
 from nav_adapter.ros2 import RobotFile
 from perception.anthropometry import BODY_RADIUS_M
-from perception.installation import install_command
 from tracking import PersonTrack
 
 OWN = """
@@ -125,13 +124,10 @@ sys.exit(main(["policy", "show", "balanced", "--out", {out!r}]))
 
 
 @pytest.mark.parametrize(
-    ("blocked", "out", "status", "said"),
-    [
-        (["pybullet", "av", "matplotlib"], "none", 0, ""),
-        (["pybullet", "av", "matplotlib"], "a.png", 2, install_command("plot")),
-    ],
+    ("blocked", "out"),
+    [(["pybullet", "av", "matplotlib"], "none"), (["pybullet", "av"], "a.png")],
 )
-def test_no_simulator_is_needed(blocked, out, status, said, tmp_path):
+def test_no_simulator_is_needed(blocked, out, tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", BLOCKED.format(blocked=blocked, out=out)],
         cwd=tmp_path,
@@ -140,6 +136,5 @@ def test_no_simulator_is_needed(blocked, out, status, said, tmp_path):
         text=True,
         check=False,
     )
-    assert done.returncode == status, done.stderr
-    assert said in done.stderr
-    assert (tmp_path / "a.png").exists() is (status == 0 and out != "none")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "a.png").exists() is (out != "none")

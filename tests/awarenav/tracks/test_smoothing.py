@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
-import pytest
 
 from awarenav.tracks._smoothing import smooth
 from perception import PersonObservation
 from perception.arrays import FloatArray
-from tracking import PersonTracker, TrackerConfig, TrackingError
+from tracking import PersonTracker, TrackerConfig
 
 CONFIG = TrackerConfig()
 STD_M = 0.1
@@ -105,9 +102,3 @@ def test_places_between_and_outside_the_stamps() -> None:
     assert np.isnan(path.places_m(np.array([stamps_s[0] - 0.01, stamps_s[-1] + 0.01]))).all()
     alone = smooth(stamps_s[:1], states[:1], covariances[:1])
     np.testing.assert_array_equal(alone.states, states[:1])
-
-
-def test_without_filterpy_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "filterpy.kalman", None)
-    with pytest.raises(TrackingError, match="it is the extra 'smooth': pip install"):
-        smooth([0.0], np.zeros((1, 4)), np.eye(4)[None])

@@ -8,25 +8,21 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from track_lines import lines, pose, recorded, standing, walking
-
-from awarenav.tracks._plot import tracks_figure
-from awarenav.tracks._recording import read_positions
-from awarenav.tracks._tracking import track_recording, tracks_in_file
-from perception import Camera
-
-pytest.importorskip("matplotlib")
-
 from matplotlib.lines import Line2D
 from matplotlib.patches import Wedge
+from track_lines import lines, pose, recorded, standing, walking
 
 from awarenav.tracks._plot import (
     covariance_ellipse,
     path_arrows,
     shown_tracks,
     track_colour,
+    tracks_figure,
     view_edges_rad,
 )
+from awarenav.tracks._recording import read_positions
+from awarenav.tracks._tracking import track_recording, tracks_in_file
+from perception import Camera
 
 CAMERA = Camera.from_fov(640, 480, math.radians(70.0))
 

@@ -111,6 +111,12 @@ def test_a_file_that_is_often_taken_for_a_network_is_named_with_the_cure(
         assert "protobuf" not in str(refused.value).lower()
 
 
+def test_without_flatbuffers_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "flatbuffers.table", None)
+    with pytest.raises(PerceptionError, match="of the extra 'litert': pip install"):
+        TfliteModel(b"\x1c\0\0\0TFL3" + bytes(99))
+
+
 def test_weights_in_a_separate_file_are_loaded_only_without_a_sha256(tmp_path: Path) -> None:
     path = tmp_path / "model.onnx"
     values = np.full((1, 2000, 6), 0.5, np.float32)

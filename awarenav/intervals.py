@@ -1,4 +1,4 @@
-"""Confidence intervals of the metrics of estimates: shares, percentiles and means."""
+"""Confidence intervals of metrics: shares, rates, percentiles and means, and any bootstrap."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.special import bdtr, betaincinv, gammaincinv, ndtr, ndtri
 
 from perception.arrays import FloatArray
 
-#: Confidence of all intervals, two-sided.
+#: Confidence of intervals, two-sided.
 LEVEL: Final = 0.95
 #: Fewer values than this bound no mean: their bootstrap is too narrow.
 MIN_RESAMPLED: Final = 10
@@ -73,14 +73,15 @@ class Metrics:
             self.intervals[name] = ends
 
 
-def share_interval(part: int, whole: int) -> Ends:
+def share_interval(part: int, whole: int, tail: float = _TAIL) -> Ends:
     """Return the exact interval of a share (Clopper and Pearson 1934); 0 to 1 for none of none.
 
     The score interval (Wilson 1927) is narrower, but its lower end is too high for a few of many:
-    it excludes a share of 0.5 % after 1 of 26, which happens in 12 % of such samples.
+    it excludes a share of 0.5 % after 1 of 26, which happens in 12 % of such samples. Each end
+    leaves out ``tail``.
     """
-    low = float(betaincinv(part, whole - part + 1, _TAIL)) if part else 0.0
-    high = float(betaincinv(part + 1, whole - part, 1.0 - _TAIL)) if part < whole else 1.0
+    low = float(betaincinv(part, whole - part + 1, tail)) if part else 0.0
+    high = float(betaincinv(part + 1, whole - part, 1.0 - tail)) if part < whole else 1.0
     return low, high
 
 
@@ -131,20 +132,24 @@ def mean_interval(values: Sequence[float]) -> Ends:
     return bootstrap_ends(mean, sample[rows].mean(axis=1), skewness)
 
 
-def bootstrap_ends(value: float, resampled: FloatArray, acceleration: float = 0.0) -> Ends:
+def bootstrap_ends(
+    value: float, resampled: FloatArray, acceleration: float = 0.0, tail: float = _TAIL
+) -> Ends:
     """Return the bias-corrected (and accelerated) ends of an estimate's bootstrap.
 
     Args:
         value: the estimate.
         resampled: (B,) estimates of resamples.
         acceleration: a sixth of the skewness of the influence of single values.
+        tail: left out by each end.
     """
     close = 1.0e-12 * max(abs(value), float(np.abs(resampled).max()))
-    # Ties count half.
+    # Ties count half: with few distinct values, many resamples may equal the estimate.
     below = float(np.mean(resampled < value - close))
     below += 0.5 * float(np.mean(np.abs(resampled - value) <= close))
+    # With all resamples on one side, the bias would be infinite.
     least = 0.5 / len(resampled)
     bias = float(ndtri(min(max(below, least), 1.0 - least)))
-    moved = bias + ndtri(np.array([_TAIL, 1.0 - _TAIL]))
+    moved = bias + ndtri(np.array([tail, 1.0 - tail]))
     low, high = np.quantile(resampled, ndtr(bias + moved / (1.0 - acceleration * moved))).tolist()
     return float(low), float(high)
