@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 
-from sim_tests.conditions import Conditions
 from sim_tests.study.measures import (
     Conduct,
     EpisodeRecord,
@@ -28,11 +27,6 @@ _EXCESS_COLUMNS: Final = (
     *("planner", "policy", "robot", "scenario", "seed"),
     "fastest_point_excess_mps",
 )
-# Two columns of impacts in words. Rows from before looks were what people do have the second.
-_IMPACTS: Final = {
-    "never noticed; all": ("step_out_never", "step_out_all"),
-    "in no attention cone; in one": ("step_out_unaware", "step_out_aware"),
-}
 _TODAY: Final = "today"
 _FACES: Final = {
     _TODAY: "today: scans alone",
@@ -80,16 +74,11 @@ def table(path: Path = ROWS) -> str:
     """
     above_mps = _read_excess(path)
     groups: dict[tuple[str, str, str], list[EpisodeRecord]] = {}
-    impacts_of: dict[Conditions, list[float]] = {}
-    with path.open(encoding="utf-8", newline="") as file:
-        cells = list(csv.DictReader(file))
-    people, names = next(each for each in _IMPACTS.items() if each[1][0] in cells[0])
-    for row, cell in zip(read_records(path), cells, strict=True):
-        impacts_of[row.conditions] = [float(cell[name] or 0.0) for name in names]
+    for row in read_records(path):
         groups.setdefault(_keys(row), []).append(row)
     lines = [
         "| stack | goals | time over today's | with attentive people | touched while moving | "
-        f"step-out impacts, {people} | above the limit, m/s: median, worst |",
+        "step-out impacts, never noticed; all | above the limit, m/s: median, worst |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for (stack, policy, robot), rows in groups.items():
@@ -98,7 +87,7 @@ def table(path: Path = ROWS) -> str:
         attentive = [each for each in rows if each.attention == "attentive"]
         touched = [each for each in rows if each.moving_contacts]
         fastest = max((each.moving_contact_mps or 0.0 for each in touched), default=0.0)
-        impacts = np.mean([impacts_of[each.conditions] for each in rows], axis=0)
+        impacts = (_mean(rows, name) for name in ("step_out_never", "step_out_all"))
         cells = (
             f"{controller}, {_FACES[face]}{policy and f', `{policy}`'}{_ROBOTS[robot]}",
             f"{sum(each.time_to_goal_s is not None for each in rows)} of {len(rows)}",
@@ -124,3 +113,7 @@ def _times(today: Sequence[EpisodeRecord], rows: Sequence[EpisodeRecord]) -> str
 
 def _excess(values_mps: Sequence[float]) -> str:
     return f"{max(float(np.median(values_mps)), 0.0):.2f}, {max(values_mps):.2f}"
+
+
+def _mean(rows: Sequence[EpisodeRecord], name: str) -> float:
+    return float(np.mean([getattr(each, name) or 0.0 for each in rows]))
