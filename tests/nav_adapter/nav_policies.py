@@ -100,7 +100,7 @@ def robots(draw: st.DrawFn) -> RobotProfile:
     angles = np.arange(count) * (2.0 * math.pi / count)
     long, wide = draw(finite(0.2, 0.8)), draw(finite(0.2, 0.8))
     corners = np.stack([long * np.cos(angles), wide * np.sin(angles)], axis=1)
-    corners += draw(finite(-0.15, 0.15))
+    corners += draw(finite(-0.45, 0.45)) * min(long, wide)  # about the origin
     if draw(st.booleans()):
         ahead_m = draw(finite(-0.15, 0.15))
         corners = np.array([[long, wide], [-long, wide], [-long, -wide], [long, -wide]])

@@ -318,7 +318,7 @@ robots = st.builds(
     ),
     st.sampled_from(["differential", "holonomic", "ackermann", None]),
     st.none() | finite(0.1, 4.0),
-    finite(-0.6, 0.6),
+    finite(-0.36, 0.36),
     finite(0.3, 2.5),
 )
 shares = st.sampled_from([-1.0, 0.0, 1.0]) | finite(-1.0, 1.0)

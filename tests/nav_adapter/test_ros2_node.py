@@ -24,6 +24,7 @@ from nav_adapter.ros2.conversions import from_ros, ros_class, to_ros
 from nav_adapter.ros2.messages.nav2_msgs import CircleObject
 from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.node import AwarenessNode
+from perception import PerceptionError
 from tracking import TrackingError
 from tracking.prediction import PredictionModel
 
@@ -193,14 +194,14 @@ def test_the_node_reads_scanners_and_a_map_and_publishes_the_speed_mask(
     [
         ({"scanners": 3}, "scanners must be 0, 1 or 2, got 3"),
         ({"use_camera": False}, "scanners must name one or two"),
-        ({}, "the detector and pose networks have seen renders only"),
+        ({}, "networks have seen renders only"),
     ],
 )
 def test_the_node_refuses_sensors_that_make_no_sense(
     node_module: Any, monkeypatch: pytest.MonkeyPatch, parameters: dict, text: str
 ) -> None:
     monkeypatch.setattr(StandInNode, "parameters", parameters)
-    with pytest.raises(NavError, match=text):
+    with pytest.raises((NavError, PerceptionError), match=text):
         node_module.AwarenessNode()
 
 

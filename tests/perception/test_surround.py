@@ -126,7 +126,7 @@ def directions_of(lens, height: int, width: int) -> np.ndarray:
 )
 def test_each_view_shows_its_directions(lens) -> None:
     views = (*RING, *ring_of_views(Camera.from_fov(120, 90, 1.0), [0.6]))
-    pipeline = SurroundPipeline(lens, views, AwarenessPipeline)
+    pipeline = SurroundPipeline(lens, views, partial(AwarenessPipeline, simulator_networks=True))
     image = directions_of(lens, lens.height_px, lens.width_px)
     for view, flat in zip(views, pipeline.flat_pictures(image), strict=True):
         camera = view.camera

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from paths import ROOT
@@ -12,6 +14,7 @@ from rendered_image import odometry, rendered
 
 from nav_adapter import AwarenessPolicy
 from nav_adapter.ros2 import AwarenessBridge, CameraMount, RobotFile
+from perception import AwarenessPipeline
 from perception.turn import QuarterTurn
 
 ROBOT = ROOT / "docs" / "nav2" / "robot.yaml"
@@ -29,6 +32,7 @@ def tracked(scene, T_base_camera):
         lambda key, message: None,
         T_base_camera=T_base_camera,
         camera=scene.camera,
+        make_pipeline=partial(AwarenessPipeline, simulator_networks=True),
     )
     for tick in range(4):
         now = 1000.0 + 0.1 * tick

@@ -172,4 +172,4 @@ def test_the_page_about_tracking_names_settings_that_exist():
     settings = {*TrackerConfig.model_fields, *AwarenessFilterConfig.model_fields}
     named = set(re.findall(r"`([a-z_0-9]+_(?:m|s|mps|m2ps3|hits|cost|probability|std))`", page))
     assert len(named) > 12
-    assert named <= settings | {"stamp_s"}  # of tracks
+    assert named <= settings | {"stamp_s", "aware_for_s"}  # of tracks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from perception import AttentionCone, Camera, FloorPlane
+from perception import AttentionCone, AwarenessPipeline, Camera, FloorPlane
 from perception.surround import PanoramaLens, SurroundPipeline, ring_of_views
 from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
 from sim_tests.crossing import Stage
@@ -83,7 +84,9 @@ def panorama(stage: Stage, T_odom_camera: np.ndarray, width_px: int) -> np.ndarr
 def test_the_shipped_networks_detect_all_people_in_a_panorama(scenario: Scenario) -> None:
     lens = PanoramaLens(2400, 1200)
     flat = Camera.from_fov(1092, 828, math.radians(110.0))
-    pipeline = SurroundPipeline(lens, ring_of_views(flat, np.radians([0, 90, 180, -90])))
+    views = ring_of_views(flat, np.radians([0, 90, 180, -90]))
+    shipped = partial(AwarenessPipeline, simulator_networks=True)
+    pipeline = SurroundPipeline(lens, views, shipped)
     with Stage(scenario) as stage:
         T_odom_camera = stage.amr.T_odom_camera
         truth = stage.truth(CONE, T_odom_camera)
