@@ -28,7 +28,7 @@ class SlowNetwork:
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
 
-    def process(self, image_rgb, stamp_s, *, floor=None, up_camera=None):
+    def process(self, image_rgb, stamp_s, floor=None, *, up_camera=None):
         time.sleep(self._seconds)
         return (
             PersonObservation(
