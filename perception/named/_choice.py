@@ -1,4 +1,4 @@
-"""Which networks pictures get, and which they are refused."""
+"""The choice of networks for pictures, and the refusal of those that have seen none such."""
 
 from __future__ import annotations
 

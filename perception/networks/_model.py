@@ -105,7 +105,7 @@ _NO_NETWORKS: Final = (
 
 
 class NetworkFile:
-    """What messages say of a network, whatever its format.
+    """The words of messages about a network, whatever its format.
 
     Attributes:
         path: of the file; None if the content was given.

@@ -122,8 +122,7 @@ class AheadPlanner(SamplingPlanner):
         if not self._plan_stamp_s <= now < self._plan_stamp_s + _EVERY_S - 1e-9:
             self._plan_stamp_s = now
             self._choose_way(robot_state, constraints, s_m, d_m)
-        gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
-        top_mps = min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal.distance_m))
+        top_mps = self._top_mps(limits, goal)
         if now - self._plan_stamp_s < self._holds_s:
             top_mps = min(top_mps, self._cap_mps)
         ahead_m = s_m + min(_HEAD_M + _HEAD_S * robot_state.travel_mps, line.length_m - s_m)
@@ -211,7 +210,7 @@ class AheadPlanner(SamplingPlanner):
 
 
 class _Field(NamedTuple):
-    """What holds along ways.
+    """The limits and the room along ways.
 
     Attributes:
         limits_mps: (ways, places, times).

@@ -131,8 +131,7 @@ class SamplingPlanner:
             margin_m=config.detour_margin_m,
             standing_mps=config.standing_speed_mps,
         )
-        gentle_mps2 = config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
-        top_mps = min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal.distance_m))
+        top_mps = self._top_mps(limits, goal)
         if scene.people and config.give_way_s > 0.0:
             top_mps = giving_way_mps(
                 self._way(aim),
@@ -143,6 +142,11 @@ class SamplingPlanner:
             )
         command = self._command(Tick(robot_state, limits, top_mps, aim, dt_s, scene), goal)
         return within_next_limits(command, robot_state, constraints, dt_s)
+
+    def _top_mps(self, limits: TwistLimits, goal: Aim) -> float:
+        """Return the highest speed from which the robot arrives gently."""
+        gentle_mps2 = self.config.goal_deceleration_fraction * self.robot.max_deceleration_mps2
+        return min(limits.speed_mps, math.sqrt(2.0 * gentle_mps2 * goal.distance_m))
 
     def _command(self, tick: Tick, goal: Aim) -> tuple[float, ...]:
         """Return the command of a tick: of the best candidate, or of a way out of a standstill."""

@@ -1,4 +1,4 @@
-"""What the robot carries is its own; whoever stands, walks or drives beside it is not."""
+"""Carried things are the robot's own; whoever stands, walks or drives beside it is not."""
 
 from __future__ import annotations
 
