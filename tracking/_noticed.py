@@ -32,10 +32,8 @@ from ._sensors import Sensors
 from ._state import State, Step, absence_s, face_period_s
 from .awareness_filter import EVIDENCE_GAP_S, grace_s, logit
 from .clock import GAP_PERIODS, FrameClock
-from .people import AVERTED_AWARENESS
+from .people import AVERTED_AWARENESS, NOTICING_S
 
-# Half a second of certain looks gives a belief of a half.
-_LOOKING_S: Final = 0.5 / math.log(2.0)
 # Time constant with which looks decay while the person is seen without a look.
 _FORGETTING_S: Final = 3.0
 # A belief of a half rests on so many looks.
@@ -88,7 +86,7 @@ def noticed(track: Track, stamp_s: float, state: State, sensors: Sensors) -> flo
     period_s = face_period_s(track, state.faces, state.clocks, sensors)
     if age_s > grace_s(period_s, config) and not held(track, stamp_s, state.clocks, sensors):
         return 0.0
-    return -math.expm1(-track.looked_s / _LOOKING_S)
+    return -math.expm1(-track.looked_s / NOTICING_S)
 
 
 def aware_for_s(track: Track, stamp_s: float, state: State, sensors: Sensors) -> float:
@@ -250,7 +248,7 @@ def _nearest_kept(track: Track) -> tuple[float, float]:
 
 def _sets_off(track: Track, since_s: float) -> bool:
     """Return whether a person departs from their motion by more than a belief in looks allows."""
-    looks = track.looked_s / _LOOKING_S if since_s <= EVIDENCE_GAP_S else 0.0
+    looks = track.looked_s / NOTICING_S if since_s <= EVIDENCE_GAP_S else 0.0
     sway_mps = _SWAY_STD_MPS * (1.0 + looks)
     return track.velocity_chi2(_nearest_kept(track), sway_mps) > _DEPARTED_CHI2
 
