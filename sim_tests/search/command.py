@@ -6,7 +6,12 @@ from typing import Any
 
 from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, options
 
-from ..conditions import COMPLETE_SIMULATED_POLICIES, Experiment, conditions_options
+from ..conditions import (
+    COMPLETE_SIMULATED_POLICIES,
+    SETS_TEXT,
+    Experiment,
+    conditions_options,
+)
 
 
 @command(
@@ -119,7 +124,7 @@ def tune(**values: Any) -> int:
     without=("fault",),
     scenario={
         "help": "Scenarios: shipped ones, YAML files, or a set of shipped ones that have a planner "
-        "and people: 'all', 'guidelines' or 'step_out'.",
+        f"and people: {SETS_TEXT}.",
         "default": ["all", "step_out"],
     },
 )
