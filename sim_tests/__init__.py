@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .actors.robot import NOVA_CARTER
     from .crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
     from .crossing.eyes import KeypointNoise
-    from .crossing.planner import LocalPlanner, SamplingPlanner
+    from .crossing.planner import LocalPlanner, ReferencePlanner
     from .scenario import Scenario, ScenarioTemplate, shipped_scenarios
     from .world import Warehouse
     from .world.camera import CameraRenderer
@@ -35,7 +35,7 @@ __all__ = [
     "CrossingResult",
     "KeypointNoise",
     "LocalPlanner",
-    "SamplingPlanner",
+    "ReferencePlanner",
     "Scenario",
     "ScenarioTemplate",
     "SimError",

@@ -34,7 +34,7 @@ ORACLE: Final = "oracle"
 #: The command line's name of the reference planner, which is empty elsewhere.
 REFERENCE_PLANNER: Final = "reference"
 #: The same planner's name in tables of episodes.
-REFERENCE_IN_TABLES: Final = "SamplingPlanner"
+REFERENCE_IN_TABLES: Final = "ReferencePlanner"
 #: The name that stands for "without a fault".
 NO_FAULT: Final = "none"
 #: The name of the habits that people have.
@@ -228,10 +228,10 @@ class Conditions:
     )
     planner: str = _axis(
         "Name of the planner.",
-        help="Local planner: 'reference', 'ahead' (it plans with the limit there and then), "
-        "'costmap' (that of today's AMR), 'straight_on', 'ros2' "
-        "(a stack outside, such as your Nav2), or a class of your own, which gets the robot's "
-        "profile, and static_boxes_odom_m if it accepts it.",
+        help="Local planner: 'reference' (it plans with the limit there and then), "
+        "'costmap' (that of today's AMR), 'straight_on', 'ros2' (a stack outside, such as your "
+        "Nav2), or a class of your own, which gets the robot's profile, and static_boxes_odom_m if "
+        "it accepts it.",
         default=REFERENCE_PLANNER,
         metavar="MODULE:CLASS",
         callback=_without_reference,

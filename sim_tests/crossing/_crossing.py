@@ -175,7 +175,7 @@ def run_crossing(
         scenario: a scenario; or a template, a shipped name or a YAML file, drawn by the seed.
         policy: a policy, the name of a preset, or a YAML file; see :func:`named_policy`.
         planner: the local planner, or its name as for :func:`make_planner`; None for the reference
-            :class:`SamplingPlanner`, or for :class:`StraightOn` where the scenario drives straight
+            :class:`ReferencePlanner`, or for :class:`StraightOn` where the scenario drives straight
             ahead.
         perception: ``"truth"``; ``"keypoints"``: true keypoints with noise through the pipeline;
             ``"pixels"``: rendered images through the shipped networks, at 10 images a second where

@@ -163,7 +163,7 @@ def tune(**values: Any) -> int:
     "--unsafe-no-floor",
     is_flag=True,
     excludes="--planner",
-    help="UNSAFE, for the simulation only: the reference planner ignores the adapter's radii and "
+    help="UNSAFE, for the simulation only: a planner that ignores the adapter's radii and "
     "speed limits. Checks that the search finds the contacts.",
 )
 @options.workers(1)

@@ -62,7 +62,7 @@ def _standing(name, *, contacts=0, violation_s=0.0, lost_s=5.0, missing=0) -> St
     row = Row(name=name, policy="balanced", sensors="camera")
     records = tuple(
         EpisodeRecord(
-            *("a", seed, "balanced", "SamplingPlanner", "keypoints"),
+            *("a", seed, "balanced", "ReferencePlanner", "keypoints"),
             robot_contacts=int(seed < contacts),
             violation_time_s=violation_s + 0.001 * seed,
             time_lost_s=lost_s + 0.1 * seed,
@@ -75,7 +75,7 @@ def _standing(name, *, contacts=0, violation_s=0.0, lost_s=5.0, missing=0) -> St
 def _times(factor=1.0, lost_s=2.0) -> Standing:
     records = tuple(
         EpisodeRecord(
-            *(scenario, seed, "balanced", "SamplingPlanner", "keypoints"),
+            *(scenario, seed, "balanced", "ReferencePlanner", "keypoints"),
             time_to_goal_s=factor * (10.0 + number + 0.1 * seed),
             time_lost_s=lost_s + number,
         )

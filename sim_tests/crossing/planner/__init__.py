@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ._ahead import AheadPlanner
 from ._choice import (
     KNOWN_PLANNERS,
     import_planner,
@@ -14,4 +13,5 @@ from ._choice import (
 )
 from ._config import PlannerConfig
 from ._local_planner import CostmapPlanner, LocalPlanner, SeatedPlanner, StraightOn
+from ._reference import ReferencePlanner
 from ._sampling_planner import SamplingPlanner

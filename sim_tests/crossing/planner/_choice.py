@@ -23,9 +23,8 @@ from perception.arrays import FloatArray
 from ...conditions import REFERENCE_PLANNER
 from ...scenario import Scenario
 from ...world.errors import SimError
-from ._ahead import AheadPlanner
 from ._local_planner import CostmapPlanner, LocalPlanner, StraightOn
-from ._sampling_planner import SamplingPlanner
+from ._reference import ReferencePlanner
 
 # Arguments by these names receive the robot's profile, the racks and walls, the way from start to
 # goal, and the episode's seed.
@@ -69,7 +68,6 @@ def ros2_stack(
 #: Planners that have a name without a module, beside the reference planner.
 KNOWN_PLANNERS: Final[Mapping[str, Callable[..., LocalPlanner]]] = MappingProxyType(
     {
-        "ahead": AheadPlanner,
         "costmap": CostmapPlanner,
         "straight_on": straight_to_goal,
         "ros2": ros2_stack,
@@ -100,13 +98,13 @@ def planner_label(planner: str, scenario: Scenario) -> str:
     if planner:
         return planner.rpartition(":")[2]
     straight = scenario.robot.straight_on_speed_mps is not None
-    return (StraightOn if straight else SamplingPlanner).__name__
+    return (StraightOn if straight else ReferencePlanner).__name__
 
 
 def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanner:
     """Return a new planner for one episode.
 
-    An empty name is the reference :class:`SamplingPlanner`, or :class:`StraightOn` where the
+    An empty name is the :class:`ReferencePlanner`, or :class:`StraightOn` where the
     scenario drives straight ahead. ``"costmap"`` and ``"straight_on"`` have a name, too.
 
     ``module:Class`` names a class, a function that returns a planner, or a planner. The module is
@@ -131,7 +129,7 @@ def make_planner(planner: str, scenario: Scenario, seed: int = 0) -> LocalPlanne
         straight_mps = scenario.robot.straight_on_speed_mps
         if straight_mps is not None:
             return StraightOn(straight_mps)
-        return SamplingPlanner(scenario.robot_profile, scenario.planner_boxes_odom_m)
+        return ReferencePlanner(scenario.robot_profile, scenario.planner_boxes_odom_m)
     factory = import_planner(planner)
     available: dict[str, Any] = {
         _BOXES: scenario.planner_boxes_odom_m,

@@ -1,4 +1,4 @@
-"""Settings of the reference planner."""
+"""Settings of the dynamic window."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The interface of a local planner, and planners that know less than the reference planner."""
+"""The interface of a local planner, and planners that know less than the dynamic window."""
 
 from __future__ import annotations
 
@@ -107,11 +107,12 @@ class StraightOn:
 class CostmapPlanner(SamplingPlanner):
     """A planner with a costmap, as most sites have: it knows places, not velocities.
 
-    It is the reference planner for whom every person stands, without giving way, without more room
-    beside people than beside a rack, and with costs near obstacles as by the defaults of Nav2's
-    inflation layer (``inflation_radius`` 0.55 m, ``cost_scaling_factor`` 10). Their exponential is
-    replaced by the planner's parabola of the same width, which for a robot 0.5 m wide differs from
-    it by less than 0.1 of the cost at contact. It keeps the speed limit of its policy.
+    It is the :class:`SamplingPlanner` for whom every person stands, without giving way, without
+    more room beside people than beside a rack, and with costs near obstacles as by the defaults of
+    Nav2's inflation layer (``inflation_radius`` 0.55 m, ``cost_scaling_factor`` 10). Their
+    exponential is replaced by the planner's parabola of the same width, which for a robot 0.5 m
+    wide differs from it by less than 0.1 of the cost at contact. It keeps the speed limit of its
+    policy.
 
     Args:
         robot: footprint and limits, as for :class:`SamplingPlanner`.

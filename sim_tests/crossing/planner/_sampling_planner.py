@@ -1,4 +1,4 @@
-"""The reference local planner: a dynamic-window planner among moving people and fixed boxes."""
+"""A dynamic-window planner among moving people and fixed boxes, which follows an aim."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reference planner without the adapter's floor: UNSAFE, and in the simulation only."""
+"""The dynamic window without the adapter's floor: UNSAFE, and in the simulation only."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _RADIUS_M: Final = 0.01
 
 
 class NoFloorPlanner:
-    """The reference planner without the adapter's floor: UNSAFE, to check that a search finds it.
+    """The dynamic window without the adapter's floor: UNSAFE, to check that a search finds it.
 
     The adapter has no switch for this, and must not have one. This planner ignores the adapter's
     radii and speed limits: every person is a point, no speed-and-separation rule holds, and nobody

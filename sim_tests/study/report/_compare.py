@@ -16,7 +16,7 @@ from awarenav.files import json_text
 from nav_adapter import AwarenessPolicy
 
 from ...conditions import ORACLE, REFERENCE_PLANNER
-from ...crossing.planner import KNOWN_PLANNERS, SamplingPlanner
+from ...crossing.planner import KNOWN_PLANNERS, ReferencePlanner
 from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
 from ..measures import (
@@ -195,7 +195,7 @@ def print_comparison(folder: Path, *, as_json: bool) -> None:
 
 def known_planners() -> dict[str, str]:
     """Return the planners that have a name, with the first sentence about each."""
-    makers = {REFERENCE_PLANNER: SamplingPlanner, **KNOWN_PLANNERS}
+    makers = {REFERENCE_PLANNER: ReferencePlanner, **KNOWN_PLANNERS}
     sentences = {
         name: (inspect.getdoc(make) or "").partition("\n")[0].removeprefix("Return ")
         for name, make in makers.items()

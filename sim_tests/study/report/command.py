@@ -100,8 +100,8 @@ def list_planners(*, as_json: bool) -> int:
     nargs=-1,
     required=True,
     metavar="MODULE:NAME...",
-    help="Classes, functions that return a planner, planners, or 'reference', 'ahead', "
-    "'costmap', 'straight_on' and 'ros2'.",
+    help="Classes, functions that return a planner, planners, or 'reference', 'costmap', "
+    "'straight_on' and 'ros2'.",
 )
 @conditions_options(
     many=("scenario", "policy"),

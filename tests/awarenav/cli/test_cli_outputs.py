@@ -55,7 +55,7 @@ def test_crossings_print_json_and_name_episodes_that_fail(capfd, tmp_path):
     assert [(row["seed"], row["planner"], bool(row["error"])) for row in rows] == [
         (seed, planner, planner == "Raises")
         for seed in ("7", "8")
-        for planner in ("Raises", "SamplingPlanner")
+        for planner in ("Raises", "ReferencePlanner")
     ]
 
 

@@ -15,7 +15,7 @@ gymnasium = pytest.importorskip("gymnasium", reason="needs the extra awarenav[gy
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode, SyncVectorEnv  # noqa: E402
 
-from sim_tests import SamplingPlanner, SimError, run_crossing  # noqa: E402
+from sim_tests import ReferencePlanner, SimError, run_crossing  # noqa: E402
 from sim_tests.actors.robot import NOVA_CARTER  # noqa: E402
 from sim_tests.crossing import CrossingFrame  # noqa: E402
 from sim_tests.learning import CrossingEnv, PolicyPlanner  # noqa: E402
@@ -53,7 +53,7 @@ def test_the_reference_planner_drives_the_crossing_of_run_crossing() -> None:
     result = run_crossing("crossing_from_left", policy="balanced", seed=3)
     env = make(scenarios="crossing_from_left", normalised_actions=False)
     _, info = env.reset(seed=3)
-    planner = SamplingPlanner(NOVA_CARTER, env.crossing.scenario.planner_boxes_odom_m)
+    planner = ReferencePlanner(NOVA_CARTER, env.crossing.scenario.planner_boxes_odom_m)
     frames, ended = [], False
     while not ended:
         now = env.situation

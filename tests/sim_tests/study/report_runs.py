@@ -72,7 +72,7 @@ def made_up_run(
                         continue
                     own = (fault_rng if fault else rng).standard_normal(6)
                     record = _episode(
-                        EpisodeRecord(name, episode_seed, policy, "SamplingPlanner", perception),
+                        EpisodeRecord(name, episode_seed, policy, "ReferencePlanner", perception),
                         attention,
                         fault,
                         lost_s * kept[_PLACES[attention]],
@@ -81,7 +81,7 @@ def made_up_run(
                     records.append(record)
                     jobs.append(
                         Job(
-                            *(name, episode_seed, policy, "SamplingPlanner", perception),
+                            *(name, episode_seed, policy, "ReferencePlanner", perception),
                             fault=fault,
                             scenario_text=f"name: {name}\nversion: 1\nattention: {attention}\n",
                             policy_text="inflation: {shape: linear}\n",

@@ -33,7 +33,7 @@ def rows(policies, *, seeds=6, spread=0.0, free_s=10.0, attentive_s=0.0):
                 own_s = lost_s + chance - shift_s * lost_s
                 found.append(
                     EpisodeRecord(
-                        *(scenario, seed, policy, "SamplingPlanner", "truth"),
+                        *(scenario, seed, policy, "ReferencePlanner", "truth"),
                         attention=attention,
                         time_without_people_s=free_s,
                         time_to_goal_s=free_s + own_s,

@@ -38,7 +38,7 @@ KINDS = {
 cells = {name: KINDS[each.kind] for name, each in COLUMNS.items()}
 cells["awareness"] = st.sampled_from(["", "aware", "unaware", "falsely_aware", "missed_aware"])
 records = st.builds(EpisodeRecord, **cells)
-PLAIN = EpisodeRecord("late_glance", 3, "balanced", "SamplingPlanner", "truth", success=True)
+PLAIN = EpisodeRecord("late_glance", 3, "balanced", "ReferencePlanner", "truth", success=True)
 in_one_folder = settings(
     max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

@@ -121,7 +121,7 @@ def episodes(policy, lost, violation=None, scenario="a"):
             scenario,
             seed,
             policy,
-            "SamplingPlanner",
+            "ReferencePlanner",
             "truth",
             time_lost_s=time,
             violation_time_s=violated,

@@ -46,7 +46,7 @@ def episode(scenario, seed, policy, **values):
         **values,
     }
     perception = "truth" if policy == "oracle" else "keypoints"
-    return EpisodeRecord(scenario, seed, policy, "SamplingPlanner", perception, **known)
+    return EpisodeRecord(scenario, seed, policy, "ReferencePlanner", perception, **known)
 
 
 RECORDS = [

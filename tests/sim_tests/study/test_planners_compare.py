@@ -38,7 +38,8 @@ people:
     route: [{x_m: 1.4, y_m: {uniform: {low: 1.75, high: 1.85}}}]
     glances: {notices_within_m: 0.0}
 """
-NAMES = ["straight_on", "run_planners:Raises", "run_planners:ReturnsNothing"]
+WINDOW = "sim_tests.crossing.planner:SamplingPlanner"
+NAMES = ["straight_on", WINDOW, "run_planners:Raises", "run_planners:ReturnsNothing"]
 
 
 def scene():
@@ -47,11 +48,11 @@ def scene():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A real comparison of the reference planner with three others, on one seed."""
+    """A real comparison of the reference planner with four others, on one seed."""
     out = tmp_path_factory.mktemp("planners")
     records = compare_planners(NAMES, [scene()], out, seeds=[1])
-    # Two policies and one probe of radii for four planners.
-    assert len(records) == 3 * 4
+    # Two policies and one probe of radii for five planners.
+    assert len(records) == 3 * 5
     return out
 
 
@@ -72,7 +73,8 @@ def test_every_planner_runs_with_blind_and_the_reference_planner_runs_too(folder
     ran = [(key.policy, key.planner) for key in read_jobs(folder)]
     for policy in ("blind", "balanced", "balanced, radii × 2"):
         planners = [planner for of, planner in ran if of == policy]
-        assert planners == ["SamplingPlanner", "straight_on", "Raises", "ReturnsNothing"]
+        others = ["straight_on", "SamplingPlanner", "Raises", "ReturnsNothing"]
+        assert planners == ["ReferencePlanner", *others]
 
 
 def test_obeying_and_using_radii_are_told_from_reading_nothing(tables, page):
@@ -84,8 +86,8 @@ def test_obeying_and_using_radii_are_told_from_reading_nothing(tables, page):
     assert straight_on["Speed limit, m/s"] > 0.3
     assert straight_on["Episodes over"] == 1.0
     assert straight_on["× reference"] < 0.5
-    assert radii["reference"]["Radii"] == "uses them"
-    assert radii["reference"]["More distance, m"] > 0.1
+    assert radii["SamplingPlanner"]["Radii"] == "uses them"
+    assert radii["SamplingPlanner"]["More distance, m"] > 0.1
     assert radii["straight_on"]["Radii"] == "ignores them"
     assert radii["straight_on"]["Somebody near"] == 1.0
     assert radii["Raises"]["Radii"] == "–"

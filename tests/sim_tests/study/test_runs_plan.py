@@ -32,7 +32,7 @@ def test_every_combination_is_planned_once_and_seeds_are_paired():
             for seed in (3, 4)
             for fault in ("", "misses_30")
         )
-    assert {key.planner for key in keys} == {"SamplingPlanner", "Slow"}
+    assert {key.planner for key in keys} == {"ReferencePlanner", "Slow"}
 
 
 def test_the_oracle_is_balanced_and_knows_the_truth():

@@ -21,7 +21,7 @@ people:
     speed_mps: 0.4
     glances: {notices_within_m: 0.0}
 """
-CONDITIONS = Conditions("short", 0, "balanced", "SamplingPlanner", "truth")
+CONDITIONS = Conditions("short", 0, "balanced", "ReferencePlanner", "truth")
 
 
 def record(

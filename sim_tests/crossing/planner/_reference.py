@@ -1,4 +1,4 @@
-"""A planner that looks ahead: it takes the way that the limit, there and then, lets end soonest."""
+"""The reference planner: it takes the way that the limit, there and then, lets end soonest."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ _TOO_FAST_S: Final = 0.5
 # The robot heads for the way so far ahead, and by this time at its speed farther.
 _HEAD_M: Final = 1.0
 _HEAD_S: Final = 0.6
-# Nearer to the goal, the reference planner arrives.
+# Nearer to the goal, the dynamic window arrives alone.
 _ARRIVING_M: Final = 1.0
 # The limit keeps the robot clear of people; for the window they are bodies and some room.
 _ROOM_M: Final = BODY_RADIUS_M + 0.12
@@ -71,15 +71,16 @@ class _Line(NamedTuple):
     length_m: float
 
 
-class AheadPlanner(SamplingPlanner):
+class ReferencePlanner(SamplingPlanner):
     """A planner that compares ways past people for twelve seconds ahead, under the limit there.
 
     Ways lead beside the straight line to the goal, at up to 1.4 m on either side, and begin at once
     or after waiting. The robot drives each of them as fast as
     :func:`~nav_adapter.exporters.speed_limit_at` says for these places and times, while people keep
-    to their motion. It follows the one that ends soonest, with the dynamic window of the reference
-    planner. So it uses the room of an aisle before it needs it, passes people who walk ahead, and
-    goes first only where the limit lets it.
+    to their motion. It follows the one that ends soonest, with the dynamic window of
+    :class:`SamplingPlanner`. So it uses the room of an aisle before it needs it, passes people who
+    walk ahead, and goes first only where the limit lets it. Where there is no limit to plan with,
+    as without people, the window drives alone.
 
     Args:
         robot: footprint and limits, as for :class:`SamplingPlanner`.

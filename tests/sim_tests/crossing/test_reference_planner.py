@@ -1,4 +1,4 @@
-"""The planner ``ahead``: it takes the way that the limit, there and then, lets end soonest."""
+"""The reference planner: it takes the way that the limit, there and then, lets end soonest."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from planner_scenes import DT_S, constraints, drive
 from nav_adapter import AwarenessPolicy, NavAdapter, RobotState
 from sim_tests import run_crossing
 from sim_tests.actors.robot import NOVA_CARTER
-from sim_tests.crossing.planner import AheadPlanner, SamplingPlanner
+from sim_tests.crossing.planner import ReferencePlanner, SamplingPlanner
 from tracking import PersonTrack
 
 GOAL = np.array([10.0, 0.0])
@@ -59,10 +59,9 @@ def drive_past(planner, place, velocity=(0.0, 0.0), alpha=0.0, turn_rad=0.0, sec
 @given(st.floats(-math.pi, math.pi), st.floats(-1.0, 1.0), st.floats(0.0, 1.0))
 def test_a_turned_world_is_driven_through_likewise(turn_rad, y_m, alpha):
     straight, turned = (
-        drive_past(AheadPlanner(NOVA_CARTER), (4.0, y_m), alpha=alpha, turn_rad=each, seconds=2.0)[
-            -1
-        ]
+        drive_past(planner, (4.0, y_m), alpha=alpha, turn_rad=each, seconds=2.0)[-1]
         for each in (0.0, turn_rad)
+        for planner in [ReferencePlanner(NOVA_CARTER)]
     )
     c, s = math.cos(turn_rad), math.sin(turn_rad)
     x_m, y_m = straight.position_odom_m
@@ -73,26 +72,26 @@ def test_a_turned_world_is_driven_through_likewise(turn_rad, y_m, alpha):
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_it_uses_the_room_that_it_has_beside_somebody_who_has_not_noticed(side):
-    """It is aside before it is near, faster there, and at the goal sooner than the reference."""
+    """It is aside before it is near, faster there, and at the goal sooner than the window."""
     place = 5.0, 0.6 * side
-    ahead, reference = (
+    planned, window = (
         drive_past(kind(NOVA_CARTER, HALL), place, seconds=9.0)
-        for kind in (AheadPlanner, SamplingPlanner)
+        for kind in (ReferencePlanner, SamplingPlanner)
     )
-    before = next(each for each in ahead if each.position_odom_m[0] > 3.5)
+    before = next(each for each in planned if each.position_odom_m[0] > 3.5)
     assert side * before.position_odom_m[1] < -0.5
-    assert ahead[-1].position_odom_m[0] > reference[-1].position_odom_m[0] + 0.2
+    assert planned[-1].position_odom_m[0] > window[-1].position_odom_m[0] + 0.2
 
 
 def test_where_there_is_no_room_it_keeps_clear_of_the_racks():
-    states = drive_past(AheadPlanner(NOVA_CARTER, NARROW), (5.0, 0.7), alpha=1.0, seconds=9.0)
+    states = drive_past(ReferencePlanner(NOVA_CARTER, NARROW), (5.0, 0.7), alpha=1.0, seconds=9.0)
     assert max(abs(each.position_odom_m[1]) for each in states) < 1.2 - 0.25
     assert states[-1].position_odom_m[0] > 7.0
 
 
 def test_it_lets_somebody_cross_who_would_be_there_first():
     """It never stops: it is slower early, and there when they have passed."""
-    states = drive_past(AheadPlanner(NOVA_CARTER, HALL), (5.0, -4.0), (0.0, 1.2), seconds=7.0)
+    states = drive_past(ReferencePlanner(NOVA_CARTER, HALL), (5.0, -4.0), (0.0, 1.2), seconds=7.0)
     moving = [each.speed_mps for each in states if each.stamp_s > 1.0]
     assert min(moving) > 0.2
     assert states[-1].position_odom_m[0] > 6.0
@@ -102,24 +101,24 @@ def test_it_lets_somebody_cross_who_would_be_there_first():
 def test_it_keeps_the_limit(limit_mps, y_m):
     state = RobotState(0.0, np.zeros(2), 0.0, min(limit_mps, 0.5), 0.0)
     given = constraints([((4.0, y_m), (0.0, 1.0), 0.45)], limit_mps)
-    speed_mps, _ = AheadPlanner(NOVA_CARTER).plan(state, GOAL, given, DT_S)
+    speed_mps, _ = ReferencePlanner(NOVA_CARTER).plan(state, GOAL, given, DT_S)
     assert speed_mps <= max(limit_mps, 0.45) + 1e-9
 
 
-def test_without_anybody_it_is_the_reference_planner():
+def test_without_anybody_the_window_drives_alone():
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), NOVA_CARTER)
     state = RobotState(0.0, np.zeros(2), 0.1, 0.7, 0.0)
     nobody = adapter.update((), state, 0.0)
-    ahead, reference = (
+    planned, window = (
         kind(NOVA_CARTER, HALL).plan(state, GOAL, nobody, DT_S)
-        for kind in (AheadPlanner, SamplingPlanner)
+        for kind in (ReferencePlanner, SamplingPlanner)
     )
-    assert ahead == reference
+    assert planned == window
 
 
 def test_a_new_goal_is_a_new_line():
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), NOVA_CARTER)
-    planner = AheadPlanner(NOVA_CARTER)
+    planner = ReferencePlanner(NOVA_CARTER)
     state = RobotState(0.0, np.zeros(2), 0.0, 0.7, 0.0)
     limit = adapter.update((person((6.0, 6.0)),), state, 0.0)
     ahead = planner.plan(state, (8.0, 0.0), limit, DT_S)
@@ -130,11 +129,12 @@ def test_a_new_goal_is_a_new_line():
 @pytest.mark.slow
 def test_waits_of_both_are_shorter_and_nobody_is_touched():
     """Seeds that no constant was chosen on."""
-    lasts_s = {"ahead": 0.0, None: 0.0}
+    window = "sim_tests.crossing.planner:SamplingPlanner"
+    lasts_s = {"reference": 0.0, window: 0.0}
     for name in ("turns_back", "stops_midway", "walking_backwards"):
         for seed in (71, 72):
             for planner in lasts_s:
                 result = run_crossing(name, policy="balanced", planner=planner, seed=seed)
                 assert not result.contacts
                 lasts_s[planner] += result.time_to_goal_s
-    assert lasts_s["ahead"] < lasts_s[None]
+    assert lasts_s["reference"] < lasts_s[window]
