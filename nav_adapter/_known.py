@@ -65,7 +65,7 @@ def known_now(
         margins.floor_m,
         within_m,
         Spread.of(track.covariance_odom.tolist()).terms(sigmas),
-        person.aware_for_s,
+        person.counts_for_s(),
         later_mps,
     )
     return Known(key, reach, first_mps, BODY_RADIUS_M + sigmas * person.sigma_m)
@@ -163,7 +163,7 @@ class SpeedBasis:
                         reach=reach._replace(
                             x_m=reach.x_m + vx * t,
                             y_m=reach.y_m + vy * t,
-                            until_s=max(reach.until_s - t, 0.0),
+                            until_s=person.counts_for_s(t),
                         )
                     )
                     for t in times
@@ -231,7 +231,7 @@ class SpeedBasis:
                 x_m=reach.x_m + vx * moved_s,
                 y_m=reach.y_m + vy * moved_s,
                 delay_s=delay_s,
-                until_s=max(reach.until_s - moved_s, 0.0),
+                until_s=person.counts_for_s(moved_s),
                 elapsed_s=min(elapsed_s, _OLDEST_S),
                 variances=variances,
             ),

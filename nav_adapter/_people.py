@@ -10,6 +10,7 @@ import numpy as np
 
 from perception.arrays import finite_number
 from tracking import PersonTrack
+from tracking.people import AVERTED_LEFT_S
 
 from ._errors import NavError
 from ._places import checked_sigma_m, position_sigma_m
@@ -65,7 +66,7 @@ class Person(NamedTuple):
         seen_stamp_s: stamp of the latest frame that showed the person.
         awareness_lower: the lower bound of α that was used.
         aware_for_s: for how long that holds from the stamp of the track on, if they keep to their
-            motion.
+            motion and do not look away.
         departed_mps: speed by which they depart from it.
         radius_m: radius of the obstacle.
         sigma_m: standard deviation of the position along its most uncertain direction.
@@ -95,6 +96,14 @@ class Person(NamedTuple):
     lost_limit_mps: float | None = None
     asked: Asked | None = None
     warned_s: tuple[tuple[AlertKind, float], ...] = ()
+
+    def counts_for_s(self, ahead_s: float = 0.0) -> float:
+        """Return for how long awareness counts in a limit at ``ahead_s`` from the track's stamp on.
+
+        They may look away at any moment. Infinite where nothing is remembered.
+        """
+        left_s = max(self.aware_for_s - ahead_s, 0.0)
+        return left_s if left_s == math.inf else min(left_s, AVERTED_LEFT_S)
 
     @property
     def is_at_first_sight(self) -> bool:

@@ -18,6 +18,13 @@ from awarenav.errors import not_one_of
 
 from .world.errors import SimError
 
+#: Names of the sets of shipped scenarios. ``"all"`` is the set that published figures are over.
+#: ``"guidelines"`` adds the situations of Francis et al. that it lacks, ``"step_out"`` people who
+#: stand beside the robot's way and set off across it as it comes, ``"at_work"`` people who work in
+#: the robot's aisle.
+SCENARIO_SETS: Final = ("all", "guidelines", "step_out", "at_work")
+#: The same in help texts.
+SETS_TEXT: Final = ", ".join(map(repr, SCENARIO_SETS))
 #: How the people in an image are perceived.
 PerceptionKind = Literal["truth", "keypoints", "pixels"]
 #: The sensors of the robot.
@@ -45,8 +52,8 @@ USUAL_SENSORS: Final = {
 COMPLETE_SCENARIOS: Final = completion_of(
     "sim_tests",
     "scenario/shipped",
-    *("all", "guidelines", "step_out"),
-    sets=("guidelines", "step_out"),
+    *SCENARIO_SETS,
+    sets=SCENARIO_SETS[1:],
 )
 #: Completion of the policies of crossings, which have today's AMR besides.
 COMPLETE_SIMULATED_POLICIES: Final = completion_of("nav_adapter", "policies", "scanner")
@@ -195,7 +202,7 @@ class Conditions:
         shell_complete=COMPLETE_SCENARIOS,
         several={
             "help": "Scenarios: shipped ones, YAML files, or a set of shipped ones that have a "
-            "planner: 'all', 'guidelines' or 'step_out'.",
+            f"planner: {SETS_TEXT}.",
             "default": ["all"],
         },
     )

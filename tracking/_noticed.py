@@ -32,17 +32,12 @@ from ._sensors import Sensors
 from ._state import State, Step, absence_s, face_period_s
 from .awareness_filter import EVIDENCE_GAP_S, grace_s, logit
 from .clock import GAP_PERIODS, FrameClock
-from .people import AVERTED_AWARENESS
+from .people import AVERTED_AWARENESS, AVERTED_LEFT_S, NOTICING_S
 
-# Half a second of certain looks gives a belief of a half.
-_LOOKING_S: Final = 0.5 / math.log(2.0)
 # Time constant with which looks decay while the person is seen without a look.
 _FORGETTING_S: Final = 3.0
 # A belief of a half rests on so many looks.
 _HALF_S: Final = 0.5
-# A belief ends at the latest so long after a face has looked away. The limit of robots that stop
-# within that need not fall faster than they brake.
-_AVERTED_LEFT_S: Final = 1.5
 # A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
 _LOOK: Final = 0.5
 # α of a face that looks away is low, and below a half by one standard deviation.
@@ -88,7 +83,7 @@ def noticed(track: Track, stamp_s: float, state: State, sensors: Sensors) -> flo
     period_s = face_period_s(track, state.faces, state.clocks, sensors)
     if age_s > grace_s(period_s, config) and not held(track, stamp_s, state.clocks, sensors):
         return 0.0
-    return -math.expm1(-track.looked_s / _LOOKING_S)
+    return -math.expm1(-track.looked_s / NOTICING_S)
 
 
 def aware_for_s(track: Track, stamp_s: float, state: State, sensors: Sensors) -> float:
@@ -147,7 +142,7 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
     ):
         track.looked_s = 0.0
     if averted and track.looked_s > 0.0:
-        track.look_s = min(track.look_s, stamp - config.noticed_memory_s + _AVERTED_LEFT_S)
+        track.look_s = min(track.look_s, stamp - config.noticed_memory_s + AVERTED_LEFT_S)
     _slow_down(track)
     if not sees_faces or sight is None:
         return
@@ -250,7 +245,7 @@ def _nearest_kept(track: Track) -> tuple[float, float]:
 
 def _sets_off(track: Track, since_s: float) -> bool:
     """Return whether a person departs from their motion by more than a belief in looks allows."""
-    looks = track.looked_s / _LOOKING_S if since_s <= EVIDENCE_GAP_S else 0.0
+    looks = track.looked_s / NOTICING_S if since_s <= EVIDENCE_GAP_S else 0.0
     sway_mps = _SWAY_STD_MPS * (1.0 + looks)
     return track.velocity_chi2(_nearest_kept(track), sway_mps) > _DEPARTED_CHI2
 

@@ -158,7 +158,7 @@ def watch(walker: Person, robot_x_m: float, robot_mps: float, for_s: float) -> W
         gaze = motion.heading_odom_rad + motion.head_yaw_rad + motion.eye_yaw_rad
         off = math.remainder(math.atan2(-py, x - px) - gaze, math.tau)
         places.append((px, py))
-        looks.append(walker.noticed_s is not None and abs(off) < _ON_TARGET_RAD)
+        looks.append(math.isfinite(walker.since_look_s) and abs(off) < _ON_TARGET_RAD)
         eyes.append(motion.eye_yaw_rad)
     return Watched(np.array(places), np.array(looks), np.array(eyes))
 

@@ -64,6 +64,7 @@ class TrueView:
         away: the person is not there: out of every sensor's range, and in no figure.
         since_look_s: time since the person last looked at the robot: 0 during a look, infinite
             before the first. A head that faces the robot without a look does not count.
+        noticed: whether a look of theirs has taken the robot in.
     """
 
     position_camera_m: FloatArray
@@ -74,6 +75,7 @@ class TrueView:
     could_look: bool = True
     away: bool = False
     since_look_s: float = math.inf
+    noticed: bool = False
 
     @property
     def d_fwd_m(self) -> float:
@@ -230,6 +232,7 @@ class Stage(AbstractContextManager["Stage"]):
                     in_front and sighted,
                     motion.away,
                     person.since_look_s,
+                    person.noticed_s is not None,
                 )
             )
         return tuple(views)

@@ -12,19 +12,12 @@ from awarenav.errors import not_one_of
 from perception import documents
 from tracking.config import other_kind
 
+from ..conditions import SCENARIO_SETS
 from ..world.errors import SimError
 
 _FOLDER: Final = resources.files("sim_tests.scenario") / "shipped"
 # The folder of each set of shipped scenarios.
-_SETS: Final = {
-    "all": _FOLDER,
-    "guidelines": _FOLDER / "guidelines",
-    "step_out": _FOLDER / "step_out",
-}
-#: Names of the sets of shipped scenarios. ``"all"`` is the set that published figures are over.
-#: ``"guidelines"`` adds the situations of Francis et al. that it lacks, ``"step_out"`` people who
-#: stand beside the robot's way and set off across it as it comes.
-SCENARIO_SETS: Final = tuple(_SETS)
+_SETS: Final = {name: _FOLDER / ("" if name == "all" else name) for name in SCENARIO_SETS}
 _DEFAULTS: Final = _FOLDER / "defaults"
 _CAMERAS: Final = _FOLDER / "cameras"
 

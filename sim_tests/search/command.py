@@ -6,7 +6,12 @@ from typing import Any
 
 from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, options
 
-from ..conditions import COMPLETE_SIMULATED_POLICIES, Experiment, conditions_options
+from ..conditions import (
+    COMPLETE_SIMULATED_POLICIES,
+    SETS_TEXT,
+    Experiment,
+    conditions_options,
+)
 
 
 @command(
@@ -119,7 +124,7 @@ def tune(**values: Any) -> int:
     without=("fault",),
     scenario={
         "help": "Scenarios: shipped ones, YAML files, or a set of shipped ones that have a planner "
-        "and people: 'all', 'guidelines' or 'step_out'.",
+        f"and people: {SETS_TEXT}.",
         "default": ["all", "step_out"],
     },
 )
@@ -170,7 +175,7 @@ def falsify(**values: Any) -> int:
     """Search for the situations in which a policy does worst.
 
     Varies start, path, speed, pauses, gaze and reactions of a scenario's people, within human
-    limits. Looks for contacts of the moving robot with people who have never looked at it, or only
+    limits. Looks for contacts of the moving robot with people who have never noticed it, or only
     when it asked them to, and for the smallest margin to those who never looked. Contacts with
     people who looked of their own accord are counted apart. A contact is inevitable if not even
     a robot at 0.25 m/s could have stopped, from when its cause could first be seen.

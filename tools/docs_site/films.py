@@ -44,7 +44,7 @@ _NAV2_LANES: Final = {
 }
 #: Largest film, and largest sum of all films.
 MAX_FILM_BYTES: Final = 150_000
-MAX_SUM_BYTES: Final = 5_200_000
+MAX_SUM_BYTES: Final = 5_350_000
 
 #: Films of the home page, which have a still for readers who do not want motion.
 _WITH_STILL: Final = ("crossing_attentive", "crossing_distracted")

@@ -39,6 +39,9 @@ A set of their own, `--scenario guidelines`.""",
     "step_out": """## People who step out
 
 A set of their own too, `--scenario step_out`.""",
+    "at_work": """## People at work
+
+The commonest meeting in a warehouse, `--scenario at_work`.""",
 }
 _OPEN, _CLOSE = '<div class="gallery" markdown>', "</div>"
 _FILM: Final = """<picture>

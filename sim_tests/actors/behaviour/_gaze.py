@@ -154,7 +154,8 @@ class Gaze:
     to the head. The head turns from one side to the other through the front.
 
     Attributes:
-        noticed_s: time of the first look at the robot; None before.
+        noticed_s: time of the first look that took the robot in; None before.
+        take_in_s: looks of so long, in all, take it in; those of an answer, and a contact, at once.
         looks: whether a glance at the robot is on, and the gaze has reached it.
         looked_s: time of the last look at the robot; −∞ before the first.
         looking: whether a glance at the robot is on.
@@ -190,6 +191,7 @@ class Gaze:
         self._twists = activity not in STAYING
         self._posture = HeadAndEyes(self.away, (0.0, 0.0), twists=self._twists)
         self.noticed_s: float | None = None
+        self.take_in_s = 0.0
         self.looks, self.looked_s = False, -math.inf
         self.looking = False
         self.answer: AnsweringLook | None = None
@@ -212,7 +214,8 @@ class Gaze:
         self.answer = AnsweringLook.after(self.answer, heard.from_s, heard.looks_for_s)
 
     def startle(self, t_s: float) -> None:
-        """Start glancing because the robot has touched the person."""
+        """Start glancing because the robot has touched the person, and take in what it is."""
+        self.take_in_s = 0.0
         if self._first_glance_s is None:
             self._first_glance_s = t_s
             self._process.begin(t_s)
@@ -256,8 +259,9 @@ class Gaze:
         self.looks = self.looking and self._posture.off_rad(target) < ON_TARGET_RAD
         if self.looks:
             self.looked_s = t_s
-            if self.noticed_s is None:
+            if self.noticed_s is None and (answers or self.take_in_s <= 0.0):
                 self.noticed_s = t_s
+            self.take_in_s -= dt_s
             if answers and self.answer is not None:
                 self.answer.meet(t_s)
         rest = (0.0 if self.eye_rest is None else self.eye_rest.yaw_rad(dt_s, self.looking), 0.0)

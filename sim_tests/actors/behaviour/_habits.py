@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from awarenav.errors import did_you_mean
+from tracking.people import NOTICING_S
 
 from ...conditions import POPULATIONS, PopulationName
 from ...world.errors import SimError
@@ -81,6 +82,8 @@ class Habits:
         variation: of the walk; None walks as desired.
         people_share: strength of the force of other people.
         eye_spread_rad: standard deviation of the yaw in the head at which the eyes come to rest.
+        noticing_s: time constant with which looks at the robot take it in, see
+            :data:`tracking.people.NOTICING_S`; 0 at once.
         idle_share: share of people with nowhere to go who start within a second.
         near_robot_share: share of the speed that people keep near a robot that they know of.
         near_robot_m: distance from the robot that is near.
@@ -92,6 +95,7 @@ class Habits:
     variation: VariationFigures | None = None
     people_share: float = 1.0
     eye_spread_rad: float = 0.0
+    noticing_s: float = 0.0
     idle_share: float = 0.0
     near_robot_share: float = 1.0
     near_robot_m: float = 12.0
@@ -120,6 +124,7 @@ RECORDED: Final = Habits(
     ),
     people_share=1.7,
     eye_spread_rad=math.radians(10.0),
+    noticing_s=NOTICING_S,
     idle_share=0.08,
     near_robot_share=0.91,
 )

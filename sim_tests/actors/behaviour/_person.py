@@ -120,9 +120,10 @@ class Person:
                 self._obstacles.check_free(
                     f"route point {number} of {spec.name!r}", point.x_m, point.y_m
                 )
-        gaze_rng, reaction_rng = rng.spawn(2)
+        gaze_rng, reaction_rng, noticing_rng = rng.spawn(3)
         self._gaze = Gaze(spec.glances, spec.stature_m, gaze_rng, activity=spec.activity)
         self._gaze.eye_rest = None if self._manner is None else self._manner.eye_rest
+        self._gaze.take_in_s = float(noticing_rng.exponential(habits.noticing_s))
         self._eyes_m = eye_height_m(spec.stature_m, spec.activity)
         self._reactions = ReactionModel(spec.reactions, reaction_rng)
         self._detour = SlowRobotDetour()
@@ -153,12 +154,15 @@ class Person:
 
     @property
     def noticed_s(self) -> float | None:
-        """Time of the first look at the robot; None before."""
+        """Time of the first look that took the robot in; None before."""
         return self._gaze.noticed_s
 
     @property
     def since_look_s(self) -> float:
-        """Time since the last look at the robot: 0 during one, infinite before the first."""
+        """Time since the last look at the robot: 0 during one, infinite before the first.
+
+        Before :attr:`noticed_s`, the looks have not taken the robot in.
+        """
         return 0.0 if self._gaze.looks else self._now_s - self._gaze.looked_s
 
     @property

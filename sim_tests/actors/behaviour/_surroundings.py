@@ -185,7 +185,7 @@ class PersonOutcome:
 
     Attributes:
         name: of the person in the scenario.
-        noticed_s: time of the first look at the robot; None without one.
+        noticed_s: time of the first look that took the robot in; None without one.
         reaction: first reaction to the robot: ``"walk_on"``, ``"wait"``, ``"hurry"``,
             ``"pass_behind"`` or ``"claim"``; empty without an encounter.
         time_s: from the start to the end of the route; None if the end was not reached.

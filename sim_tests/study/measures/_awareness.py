@@ -189,7 +189,7 @@ class Requests:
         asked_twice: people who were asked more than once.
         after_answer: requests to a track that had answered before.
         answered_people: (N, P) whether somebody has answered a request by then.
-        noticed_when_asked: (N, P) the same of people who had never looked at the robot before.
+        noticed_when_asked: (N, P) the same of people who had never noticed the robot before.
     """
 
     requests: int
@@ -222,7 +222,7 @@ class Requests:
                     if answer is not None:
                         answered += 1
                         answered_people[answer:, person] = True
-                        if np.isinf(trace.since_look_s[answer - 1, person]):
+                        if not trace.has_noticed[answer - 1, person]:
                             when_asked[answer:, person] = True
         twice = sum(times > 1 for times in asked.values())
         return cls(requests, answered, needless, twice, after_answer, answered_people, when_asked)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 #: People by what they have noticed of the robot, see :attr:`Trace.noticed`: title and meaning.
 NOTICED: Final = {
-    "never": ("never noticed", "who have never looked at the robot"),
+    "never": ("never noticed", "who have never noticed the robot"),
     "past": ("noticed before", "whose last look at the robot was more than 1 s ago"),
     "looking": ("looking", "who look at the robot, or have within 1 s"),
 }

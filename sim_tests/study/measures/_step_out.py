@@ -129,7 +129,7 @@ def step_out_impacts(
 ) -> Mapping[str, StepOutImpacts]:
     """Return the step-out impacts of a crossing with some of its people each.
 
-    ``"never"`` are people who have never looked at the robot, ``"past"`` those whose last look is
+    ``"never"`` are people who have never noticed the robot, ``"past"`` those whose last look is
     more than 1 s ago, ``"looking"`` all others; ``"all"`` is their sum. ``"answered"`` are people
     who have answered a request of the robot, whom the others hold, too.
 

@@ -40,6 +40,7 @@ class Trace:
             more than 4 m apart.
         could_look: (N, P) whether the robot was in front of the person and in sight.
         since_look_s: (N, P) times since people last looked at the robot, infinite before.
+        has_noticed: (N, P) whether a look of theirs has taken the robot in.
     """
 
     t_s: FloatArray
@@ -53,6 +54,7 @@ class Trace:
     separation_m: FloatArray
     could_look: NDArray[np.bool_]
     since_look_s: FloatArray
+    has_noticed: NDArray[np.bool_]
 
     @classmethod
     def of(cls, result: CrossingResult) -> Trace:
@@ -91,6 +93,7 @@ class Trace:
             separation_m=np.array([frame.separations_m for frame in frames]).reshape(count, people),
             could_look=of_people("could_look", ()).astype(np.bool_),
             since_look_s=of_people("since_look_s", ()),
+            has_noticed=of_people("noticed", ()).astype(np.bool_),
         )
 
     @property
@@ -125,10 +128,10 @@ class Trace:
     def noticed(self) -> dict[str, NDArray[np.bool_]]:
         """People by what they have noticed of the robot, (N, P) each; everybody is in one.
 
-        That is what they did by the simulator, not the way in which a head faces.
+        That is what they took in by the simulator, not the way in which a head faces.
         """
-        never = np.isinf(self.since_look_s)
-        return {"never": never, "past": ~never & ~self.looking, "looking": self.looking}
+        has, looking = self.has_noticed, self.looking
+        return {"never": ~has, "past": has & ~looking, "looking": has & looking}
 
     def to_base(self, vectors_odom: FloatArray) -> FloatArray:
         """Return (N, P, 2) vectors in the axes of the base frame at their instant."""

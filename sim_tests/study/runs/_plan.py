@@ -62,8 +62,8 @@ def plan_jobs(
     They are nested in that order.
 
     Args:
-        scenarios: templates, shipped names, YAML files, or sets (``"all"``, ``"guidelines"``,
-            ``"step_out"``) without the scenarios that need no planner.
+        scenarios: templates, shipped names, YAML files, or sets (:data:`SCENARIO_SETS`)
+            without the scenarios that need no planner.
         policies: names of presets, YAML files, pairs of a name for the tables and a policy, or
             ``"oracle"``. The oracle is ``balanced`` with perception that knows the truth: the
             upper bound of what better perception could gain.
@@ -176,7 +176,7 @@ def named_templates(names: Sequence[str], **axes: str) -> tuple[ScenarioTemplate
     """Return the scenarios of names and YAML files, each once.
 
     Args:
-        names: shipped names, YAML files, or sets (``"all"``, ``"guidelines"``, ``"step_out"``)
+        names: shipped names, YAML files, or sets (:data:`SCENARIO_SETS`)
             without the scenarios that need no planner.
         axes: as for :func:`plan_jobs`.
 

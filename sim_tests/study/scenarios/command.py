@@ -7,7 +7,7 @@ from pathlib import Path
 
 from awarenav.cli import NUMBER, FilePath, Whole, argument, command, group, option, options
 
-from ...conditions import COMPLETE_SCENARIOS
+from ...conditions import COMPLETE_SCENARIOS, SETS_TEXT
 
 
 @group("scenario")
@@ -84,7 +84,7 @@ def show(scenario: str, *, yaml: bool, seed: int | None, out: Path | None) -> in
     required=True,
     metavar="NAME|FILE...",
     shell_complete=COMPLETE_SCENARIOS,
-    help="YAML files, shipped scenarios, or a set of these: 'all', 'guidelines' or 'step_out'.",
+    help=f"YAML files, shipped scenarios, or a set of these: {SETS_TEXT}.",
 )
 @option(
     "--episodes",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sim_tests import run_crossing
 from sim_tests.actors.behaviour import (
+    Heard,
     Person,
     PersonSpec,
     RobotBody,
@@ -19,6 +21,7 @@ from sim_tests.actors.behaviour import (
 from sim_tests.actors.behaviour._habits import GaitVariation, VariationFigures
 from sim_tests.crossing.planner import StraightOn
 from sim_tests.scenario import Scenario, ScenarioTemplate
+from tracking.people import NOTICING_S
 
 NO_BOXES = np.zeros((0, 4))
 
@@ -104,6 +107,42 @@ def test_people_on_the_way_change_their_mind_and_seated_people_stay() -> None:
     seated = recorded(clerk, np.random.default_rng(0), NO_BOXES)
     seated.advance(30.0, beside())
     assert seated.place_odom_m == (1.0, 1.0)
+
+
+def watched(habits: str, seed: int, **changes: object) -> tuple[float, bool]:
+    """Return the looks until somebody noticed the robot, in seconds, and whether any came before.
+
+    They stand and watch, or what ``changes`` say, and a robot drives past.
+    """
+    spec = person(glances={"watches": True, "first_glance_delay_s": 0.0}, start_s=30.0)
+    one = Person(spec, np.random.default_rng(seed), NO_BOXES, habits=habits_of(habits))
+    looks = 0
+    for tick in range(200):
+        around = replace(beside(-1.5 + 0.01 * tick, 0.2), **changes)
+        one.step(0.05 * tick, around)
+        if one.noticed_s is not None:
+            break
+        assert not one.reaction
+        looks += one.since_look_s == 0.0
+    return 0.05 * looks, looks > 0
+
+
+def test_half_a_second_of_looks_takes_the_robot_in_by_half() -> None:
+    """The rule by which the tracker believes it, for looks of any length."""
+    looked_s = np.array([watched("recorded", seed)[0] for seed in range(400)])
+    for t_s in (0.25, 0.5, 1.0):
+        share = -math.expm1(-t_s / NOTICING_S)
+        spread = 4.0 * math.sqrt(share * (1.0 - share) / 400.0)
+        assert np.mean(looked_s < t_s - 1e-9) == pytest.approx(share, abs=spread)
+    assert not any(watched("classic", seed)[1] for seed in range(4))
+
+
+def test_whoever_is_called_or_touched_takes_the_robot_in_at_once() -> None:
+    called, touched = {"heard": (Heard(0.0, 2.0),)}, {"touches": ((1.0, 0.0),)}
+    for seed in range(12):
+        assert not watched("recorded", seed, **called)[1]
+        assert watched("recorded", seed, **touched)[0] <= 0.05
+    assert any(watched("recorded", seed)[1] for seed in range(12))
 
 
 def test_an_errand_leads_out_of_no_rack_and_counts_for_no_walk() -> None:

@@ -18,13 +18,13 @@ QUICK = ("narrow_doorway",)
 
 
 def test_the_sets_share_no_scenario_and_all_stays_as_it_was_measured() -> None:
-    assert SCENARIO_SETS == ("all", "guidelines", "step_out")
+    assert SCENARIO_SETS == ("all", "guidelines", "step_out", "at_work")
     assert shipped_scenarios() == shipped_scenarios("all")
     assert not set(NAMES) & set(shipped_scenarios())
     assert len(named_templates(["all"])) == 23
     assert [each.name for each in named_templates(["guidelines"])] == list(NAMES)
     assert len(named_templates(["all", "guidelines", NAMES[0]])) == 23 + len(NAMES)
-    sets = "'all', 'guidelines', 'step_out'"
+    sets = "'all', 'guidelines', 'step_out', 'at_work'"
     with pytest.raises(SimError, match=f"did you mean 'guidelines'. It must be one of {sets}"):
         shipped_scenarios("guideline")
     for name in NAMES:
@@ -38,7 +38,9 @@ def test_the_list_shows_all_sets(capsys: pytest.CaptureFixture[str]) -> None:
     assert first.startswith("--scenario all\n")
     assert all(f"{name}@" in second and f"{name}@" not in first for name in NAMES)
     assert all(f"{name}@" in first for name in shipped_scenarios())
+    third, fourth = third.split("--scenario at_work\n")
     assert all(f"{name}@" in third for name in shipped_scenarios("step_out"))
+    assert all(f"{name}@" in fourth for name in shipped_scenarios("at_work"))
 
 
 def test_the_child_is_drawn_in_its_size_and_the_robot_is_told_of_unusual_sizes() -> None:

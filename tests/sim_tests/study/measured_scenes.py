@@ -96,6 +96,7 @@ def crossing(
                     not away,
                     away,
                     t - looked_s.get(index, -math.inf),
+                    index in looked_s,
                 )
             )
             said = None if tracked is None or away else tracked(t, index)
@@ -190,4 +191,5 @@ def trace(times, robot, people):
         separation_m=nothing,
         could_look=nothing > 0.0,
         since_look_s=nothing + np.inf,
+        has_noticed=nothing > 0.0,
     )
