@@ -20,7 +20,7 @@ from sim_tests.world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M, Warehou
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import WarehouseLayout
 from sim_tests.world.sightlines import PlacedSurface, SightLines, TriangleSet
-from training.hall import ellipsoid
+from training.round_meshes import ellipsoid
 
 CAMERA = Camera.from_fov(1920, 1200, math.radians(120.0))
 EXACT = KeypointNoise(pixel_std_px=0.0, lift_std_m=0.0, miss_rate=0.0)
