@@ -30,11 +30,11 @@ from ..scenario import SCENARIO_SETS, Scenario, ScenarioTemplate, shipped_scenar
 from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner
-from ._sensing import STREAMS, Sensing
+from ._sensing import Sensing
 from ._stage import Stage
-from .eyes import KeypointNoise
-from .faults import Fault
+from .faults import EpisodeFaults, Fault
 from .planner import LocalPlanner, make_planner, planner_label
+from .sensors import STREAMS, KeypointNoise, SensorSetup
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -128,15 +128,14 @@ class Setup:
         _, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
         stage = Stage(scenario, people_rng, renderer=self.renderer)
         try:
-            sensing = Sensing(
-                stage,
-                Perception.named(self.conditions.perception),
-                self.policy,
-                seed,
-                noise=self.noise,
+            sensors = SensorSetup(
+                stage=stage,
+                seed=seed,
+                faults=EpisodeFaults(self.fault, seed, scenario.camera.camera()),
+                noise=self.noise or KeypointNoise(),
                 pipeline=self.pipeline,
-                fault=self.fault,
             )
+            sensing = Sensing(sensors, Perception.named(self.conditions.perception), self.policy)
         except BaseException:
             stage.close()
             raise

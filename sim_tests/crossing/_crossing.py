@@ -26,9 +26,9 @@ from ._result import CrossingFrame, CrossingResult
 from ._sensing import Sensed
 from ._separations import Separations
 from ._stage import Stage
-from .eyes import KeypointNoise
 from .faults import Fault
 from .planner import LocalPlanner, SeatedPlanner, import_planner, seeded_generators
+from .sensors import KeypointNoise
 
 Observer = Callable[[CrossingFrame, Stage], None]
 

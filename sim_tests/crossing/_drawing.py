@@ -19,7 +19,7 @@ from perception.arrays import FloatArray, ImageRgb
 
 from ._result import CrossingFrame
 from ._stage import Stage
-from .eyes import NOBODY
+from .sensors import NOBODY
 
 _FONT: Final = Font(16, weight=450)
 _TEXT_COLOUR: Final = (40, 40, 46)

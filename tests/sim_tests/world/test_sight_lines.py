@@ -14,8 +14,7 @@ from triangle_hits import shares_met
 from perception import Camera
 from sim_tests.actors.body import Worker
 from sim_tests.actors.body._pose import skin_points
-from sim_tests.crossing.eyes import KeypointNoise
-from sim_tests.crossing.eyes._keypoint_camera import KeypointCamera
+from sim_tests.crossing.sensors import KeypointCamera, KeypointNoise
 from sim_tests.world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M, Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import WarehouseLayout

@@ -27,7 +27,7 @@ from ....world.camera import CameraTiming, CoarseSceneryRenderer, FrameClock
 from ....world.errors import SimError
 from ....world.scanner import ScanScene, SimulatedScanner, scan_all
 from ..._stage import Stage
-from ...eyes import hall_grid, motion_of
+from ...sensors import hall_grid, motion_of
 from ._actions import Actions, actions_of, python_with_ros
 from ._link import Link, link_to
 from ._messages import (

@@ -14,23 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from perception import (
-    AttentionCone,
-    AwarenessPipeline,
-    Camera,
-    PersonDetection,
-    PersonKeypoints,
-)
-from perception.anthropometry import MEAN_STATURE_M, UNUSUAL_SIZE_PROBABILITY
+from perception import AwarenessPipeline, Camera, PersonDetection, PersonKeypoints
+from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray
 
 from ...world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M
 from ...world.config import SimConfig
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
-from .._stage import Stage
-from ._camera_eyes import Exposure
-from ._messages import WorkerObservations
+from ._camera import CameraSensor, pipeline_settings
+from ._sensor import SensorSetup, WorkerObservations, World
 
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
@@ -253,45 +246,46 @@ class KeypointCamera:
         return np.split(unhidden, np.cumsum(counts)[:-1])
 
 
-class KeypointEyes:
-    """Eyes with a keypoint camera and the awareness pipeline."""
+class Keypoints(CameraSensor, name="keypoints"):
+    """A keypoint camera and the awareness pipeline."""
 
-    def __init__(
-        self,
-        stage: Stage,
-        camera: Camera,
-        cone: AttentionCone,
-        noise: KeypointNoise,
-        rng: np.random.Generator,
-        sight: SightLines,
-        unusual_size_probability: float = UNUSUAL_SIZE_PROBABILITY,
-    ) -> None:
-        self._stage = stage
-        self._keypoints = KeypointCamera(camera, sight, noise, rng)
-        self._pipeline = AwarenessPipeline(
-            camera,
-            self._keypoints,
-            self._keypoints,
-            cone=cone,
-            keypoint_std_px=max(noise.pixel_std_px, 0.1),
-            # Workers in a crossing turn their heads; their eyes follow.
-            eye_in_head_std_rad=0.0,
-            unusual_size_probability=unusual_size_probability,
-        )
-        self._blank = np.zeros((camera.height_px, camera.width_px, 3), np.uint8)
+    def __init__(self, setup: SensorSetup) -> None:
+        super().__init__(setup)
+        noise, warehouse = setup.noise, setup.stage.warehouse
+        sight = SightLines(warehouse.layout, warehouse.variant, warehouse.actors)
+        self._keypoints = [KeypointCamera(self.camera, sight, noise, self._rng) for _ in self.views]
+        self._pipelines = [
+            AwarenessPipeline(
+                self.camera,
+                each,
+                each,
+                keypoint_std_px=max(noise.pixel_std_px, 0.1),
+                **pipeline_settings(setup),
+            )
+            for each in self._keypoints
+        ]
+        self._blank = np.zeros((self.camera.height_px, self.camera.width_px, 3), np.uint8)
 
-    def observe(self, exposure: Exposure) -> WorkerObservations:
+    def observe(self, view: int, world: World) -> WorkerObservations:
         """Return the observations of the pipeline from the visible keypoints."""
-        workers = self._keypoints.look(exposure.T_odom_camera, self._stage.workers)
+        keypoints = self._keypoints[view]
+        workers = keypoints.look(world.T_odom_camera, self.stage.workers)
         worker_of = {
             detection.box_xyxy_px.tobytes(): worker
-            for detection, worker in zip(self._keypoints.detect(None), workers, strict=True)
+            for detection, worker in zip(keypoints.detect(None), workers, strict=True)
         }
+        depth_m = self.depth_m(world)
         return tuple(
             (observation, worker_of[observation.box_xyxy_px.tobytes()])
-            for observation in self._pipeline.process(self._blank, exposure.stamp_s)
+            for observation in self._pipelines[view].process(
+                self._blank, world.t_s, depth_m=depth_m
+            )
             if observation.box_xyxy_px is not None
         )
+
+    def depth_m(self, world: World) -> FloatArray | None:
+        """Return a depth picture (H, W) with the image; None for a camera that measures none."""
+        return None
 
 
 def _frustum_normals(camera: Camera) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -25,9 +24,9 @@ from tracking import ScannerView, SensorConfig
 
 from ...world import Warehouse
 from ...world.camera import FrameClock, FrameQueue
+from ...world.errors import SimError
 from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner, scan_all
-from ._camera_eyes import MapView
-from ._messages import NOBODY, Change, Delivery, MountedScan, Sighting
+from ._sensor import NOBODY, Delivery, MapView, MountedScan, Sensor, SensorSetup, Sighting, World
 
 # Random streams of scanners are separate from all others of an episode.
 _STREAM: Final = 0x5CA7
@@ -45,27 +44,26 @@ class _Taken:
     known: RobotMotion
 
 
-class ScannerEyes:
-    """The scanners of a robot, and its leg detector. Each scanner is a sensor of its own.
+class Scanners(Sensor, name="scanner"):
+    """The laser scanners of a robot, and its leg detector; the robot knows the boxes of its hall.
 
-    Args:
-        warehouse: what the scanners see; the robot knows the boxes of its hall.
-        specs: the scanners.
-        body_base_m: (M, 2) outline of the robot in the base frame.
-        seed: of the episode.
-        changes: faults of the scans of each scanner, None for none.
+    Each scanner is a sensor of its own for the tracker.
+
+    Raises:
+        SimError: for a scenario without scanners.
     """
 
-    def __init__(
-        self,
-        warehouse: Warehouse,
-        specs: Sequence[ScannerSpec],
-        body_base_m: FloatArray,
-        seed: int,
-        changes: Sequence[Change[MountedScan] | None],
-    ) -> None:
+    def __init__(self, setup: SensorSetup) -> None:
+        self._stage = setup.stage
+        warehouse, specs = setup.stage.warehouse, setup.stage.scenario.scanners
+        if not specs:
+            raise SimError(
+                f"perception with 'scanner' needs laser scanners, but the scenario "
+                f"{setup.stage.scenario.name!r} has none (scanners: [])"
+            )
+        body_base_m = setup.stage.amr.profile.footprint_m
         scene = ScanScene(warehouse.layout, warehouse.variant, warehouse.actors)
-        generators = np.random.default_rng([_STREAM, seed]).spawn(2 * len(specs))
+        generators = np.random.default_rng([_STREAM, setup.seed]).spawn(2 * len(specs))
         self._scanners = [
             SimulatedScanner(scene, spec, rng)
             for spec, rng in zip(specs, generators[::2], strict=True)
@@ -76,24 +74,27 @@ class ScannerEyes:
         self._mountings = [spec.scanner(body_base_m) for spec in specs]
         self._views = [scanner_view(spec) for spec in specs]
         self._map_view = MapView.of(warehouse)
-        self._changes = tuple(changes)
+        self.tracked = {
+            sensor_name(number): SensorConfig(view=replace(self._map_view, camera=view))
+            for number, view in enumerate(self._views)
+        }
+        self._changes = [setup.faults.scans(n, spec, body_base_m) for n, spec in enumerate(specs)]
         self._queue: FrameQueue[_Taken] = FrameQueue()
         self._detector = LegDetector(static_map=map_of(warehouse))
         self._latest_s = [-math.inf] * len(specs)
 
-    def look(
-        self, now_s: float, T_odom_base: FloatArray, state: RobotState, known: RobotState
-    ) -> tuple[Sighting, ...]:
+    def look(self, world: World) -> tuple[Sighting, ...]:
         """Take the scans that are due; return those that have arrived by now, in that order."""
+        now_s, amr = world.t_s, self._stage.amr
         ticks = [(number, *clock.tick(now_s)) for number, clock in enumerate(self._clocks)]
         due = [(number, arrives_s) for number, is_due, arrives_s in ticks if is_due]
         if due:
-            motion, known_motion = _motion(T_odom_base, state), motion_of(known)
+            motion, known = _motion(amr.T_odom_base, amr.state(now_s)), motion_of(world.known)
             # The noise of a lost scan is drawn, so that a loss changes no other scan.
             scans = scan_all([self._scanners[number] for number, _ in due], motion)
             for (number, arrives_s), scan in zip(due, scans, strict=True):
                 if arrives_s is not None:
-                    self._send(scan, arrives_s, number, motion, known_motion)
+                    self._send(scan, arrives_s, number, motion, known)
         sightings = [
             self._sighting(taken) for taken in self._queue.take(now_s) if self._is_new(taken)
         ]
@@ -156,14 +157,6 @@ def scanner_view(spec: ScannerSpec) -> ScannerView:
     # The view is symmetrical about the scanner's x axis.
     field_rad = math.tau if high - low >= math.tau else max(2.0 * min(-low, high), 1e-3)
     return ScannerView(max_range_m=min(_RANGE_M, spec.range_max_m), field_rad=field_rad)
-
-
-def scanner_sensors(warehouse: Warehouse, specs: Iterable[ScannerSpec]) -> dict[str, SensorConfig]:
-    """Return the scanners as sensors of a tracker whose robot knows the racks of its hall."""
-    return {
-        sensor_name(number): SensorConfig(view=MapView.of(warehouse, scanner_view(spec)))
-        for number, spec in enumerate(specs)
-    }
 
 
 def _pose_of(state: RobotState) -> FloatArray:

@@ -1,32 +1,37 @@
-"""Eyes that pass rendered images through the awareness pipeline."""
+"""A camera of which rendered images pass through the awareness pipeline."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from perception import AwarenessPipeline, Camera, FloorPlane, PersonObservation
-from perception.arrays import FloatArray, ImageRgb
+from perception import AwarenessPipeline, FloorPlane, PersonObservation
+from perception.arrays import FloatArray
+from perception.documents import yaml_text
+from perception.networks import OnnxSettings
 
-from ...world.camera import CameraTiming, CoarseSceneryRenderer, SensorConfig, expose
+from ...scenario import CameraSpec, load_networks
+from ...world.camera import CoarseSceneryRenderer, expose
 from ...world.errors import SimError
-from .._stage import Stage, TrueView
-from ._camera_eyes import Exposure, delivered_picture
-from ._messages import NOBODY, Change, WorkerObservations
+from .._stage import TrueView
+from ._camera import CameraSensor, delivered, pipeline_settings
+from ._sensor import NOBODY, SensorSetup, WorkerObservations, World
 
-#: Frame rate of rendered cameras whose scenario gives none: images are costly to render.
-PIXEL_RATE_HZ: Final = 10.0
+# An episode runs on one core, often beside others, and is the same on every computer.
+_ONE_CORE: Final = OnnxSettings(intra_op_threads=1)
 # An observation shows a worker if the boxes overlap this much, or the positions are this close.
 _MIN_IOU: Final = 0.3
 _MAX_DISTANCE_M: Final = 0.5
 
 
-class PixelEyes:
-    """Eyes with a rendered camera and an awareness pipeline.
+class Pixels(CameraSensor, name="pixels"):
+    """A rendered camera and an awareness pipeline.
 
     The pipeline gets the image, its stamp and the floor, which a robot knows from its own pose and
     the mounting of its camera. Nothing else of the simulation reaches it. The worker of each
@@ -36,19 +41,20 @@ class PixelEyes:
         SimError: for a pipeline with another camera.
     """
 
-    def __init__(
-        self,
-        stage: Stage,
-        camera: Camera,
-        sensor: SensorConfig,
-        rng: np.random.Generator,
-        pipeline: AwarenessPipeline,
-        renderer: CoarseSceneryRenderer | None = None,
-        change: Change[ImageRgb] | None = None,
-    ) -> None:
-        self._stage = stage
-        self._pipeline = pipeline
-        theirs = self._pipeline.camera
+    costly = has_pictures = True
+
+    @staticmethod
+    def scale(spec: CameraSpec) -> float:
+        """Return the scenario's scale of pictures."""
+        return spec.picture_scale
+
+    def __init__(self, setup: SensorSetup) -> None:
+        super().__init__(setup)
+        spec, count = setup.stage.scenario.camera, len(self.views)
+        # The views share networks and renderer, but no image.
+        self._pipelines = [setup.pipeline or _pipeline(setup) for _ in range(count)]
+        camera = self.camera
+        theirs = self._pipelines[0].camera
         # Rendered images have no distortion.
         if (theirs.width_px, theirs.height_px) != (camera.width_px, camera.height_px) or not (
             theirs.distortion is None and np.allclose(theirs.matrix, camera.matrix)
@@ -58,31 +64,48 @@ class PixelEyes:
                 f"{camera.height_px} px, focal length {camera.fx_px:.1f} px, no distortion), got "
                 f"{theirs.width_px} x {theirs.height_px} px, {theirs.fx_px:.1f} px"
             )
-        self._change = change
-        self._camera, self._sensor = camera, sensor
-        (self._noise_rng,) = rng.spawn(1)
-        self._renderer = CoarseSceneryRenderer(stage.warehouse, 1) if renderer is None else renderer
+        self._noise = spec.sensor
+        generators = [self._rng] if count == 1 else self._rng.spawn(count)
+        self._noise_rngs = [rng for each in generators for rng in each.spawn(1)]
+        self._renderer = CoarseSceneryRenderer(self.stage.warehouse, spec.scenery_divisor)
 
-    def observe(self, exposure: Exposure) -> WorkerObservations | None:
+    def observe(self, view: int, world: World) -> WorkerObservations | None:
         """Render an image; return the observations of the pipeline, each with its worker.
 
         None for an image that is no view, such as a black one.
         """
-        view = self._renderer.render(self._camera, exposure.T_odom_camera)
-        taken = expose(view.rgb, self._sensor, self._noise_rng)
-        rgb = delivered_picture(self._change, taken, exposure)
+        seen = self._renderer.render(self.camera, world.T_odom_camera)
+        taken = expose(seen.rgb, self._noise, self._noise_rngs[view])
+        rgb = delivered(self._pictures, taken, world)
         if rgb is None:
             return None
-        floor = FloorPlane.from_pose(exposure.T_odom_camera_known)
-        observations = self._pipeline.process(rgb, exposure.stamp_s, floor=floor)
-        boxes = [_box_of(view.actors == worker.actor) for worker in self._stage.workers]
-        workers = match_to_workers(observations, exposure.truth, boxes)
+        floor = FloorPlane.from_pose(world.T_odom_camera_known)
+        observations = self._pipelines[view].process(rgb, world.t_s, floor=floor)
+        boxes = [_box_of(seen.actors == worker.actor) for worker in self.stage.workers]
+        workers = match_to_workers(observations, world.truth, boxes)
         return tuple(zip(observations, workers, strict=True))
 
 
-def pixel_timing(timing: CameraTiming) -> CameraTiming:
-    """Return the timing with :data:`PIXEL_RATE_HZ` where the scenario gives no rate."""
-    return timing.model_copy(update={"rate_hz": timing.rate_hz or PIXEL_RATE_HZ})
+def _pipeline(setup: SensorSetup) -> AwarenessPipeline:
+    """Return a pipeline that has seen no image, with the scenario's or the shipped networks."""
+    scenario, settings = setup.stage.scenario, tuple(pipeline_settings(setup).items())
+    networks = yaml_text(scenario.networks) if scenario.networks else ""
+    return _shared_pipeline(scenario.camera, settings, networks).for_another_view()
+
+
+# Scenarios with the same camera and the same people share one, because networks load slowly.
+@lru_cache(maxsize=4)
+def _shared_pipeline(
+    spec: CameraSpec, of_people: tuple[tuple[str, Any], ...], networks: str
+) -> AwarenessPipeline:
+    camera, settings = spec.camera(spec.picture_scale), dict(of_people)
+    if not networks:
+        return AwarenessPipeline(
+            camera, onnx_settings=_ONE_CORE, simulator_networks=True, **settings
+        )
+    own = load_networks(networks)
+    own = replace(own, settings={**own.settings, **settings})
+    return AwarenessPipeline.of(own, camera)
 
 
 def match_to_workers(
