@@ -58,7 +58,9 @@ COMPLETE_SCENARIOS: Final = completion_of(
     sets=SCENARIO_SETS[1:],
 )
 #: Completion of the policies of crossings, which have today's AMR besides.
-COMPLETE_SIMULATED_POLICIES: Final = completion_of("nav_adapter", "policies", "scanner")
+COMPLETE_SIMULATED_POLICIES: Final = completion_of(
+    "nav_adapter", "policies", "scanner", "scanner_warning"
+)
 
 _KINDS: Final[tuple[str, ...]] = get_args(PerceptionKind)
 # In --sensors, the camera of --perception.
@@ -225,10 +227,12 @@ class Conditions:
         metavar="NAME|FILE",
         shell_complete=COMPLETE_SIMULATED_POLICIES,
         several={
-            "help": "Policies: presets, 'scanner' (today's AMR), YAML files, or 'oracle' (balanced "
-            "with true awareness).",
+            "help": "Policies: presets, 'scanner' (today's AMR), 'scanner_warning' (the same with "
+            "a warning field), YAML files, or 'oracle' (balanced with true awareness).",
             "default": ["balanced"],
-            "shell_complete": completion_of("nav_adapter", "policies", "scanner", ORACLE),
+            "shell_complete": completion_of(
+                "nav_adapter", "policies", "scanner", "scanner_warning", ORACLE
+            ),
         },
     )
     planner: str = _axis(

@@ -68,7 +68,7 @@ _LEGEND: Final = (
 )
 
 #: Policies that ignore awareness: α says nothing about what the robot does.
-WITHOUT_AWARENESS: Final = ("blind", "scanner")
+WITHOUT_AWARENESS: Final = ("blind", "scanner", "scanner_warning")
 
 #: Rows of the comparison that the film shows, and the title of each lane.
 LANES: Final[dict[str, str]] = {
