@@ -12,6 +12,7 @@ from nav_adapter import NavError
 from nav_adapter.ros2 import AwarenessBridge, Topic
 from nav_adapter.ros2.conversions import from_ros
 from nav_adapter.ros2.messages import Message, ros_type
+from nav_adapter.ros2.messages.geometry_msgs import PolygonStamped
 from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
@@ -71,6 +72,7 @@ def recorded_messages(path: Path, inputs: BridgeInputs) -> BagMessages:
         inputs.camera_info,
         inputs.odom,
         inputs.map,
+        inputs.footprint,
         *inputs.scans,
     )
     optional = (inputs.tf, inputs.tf_static)
@@ -225,6 +227,10 @@ class BagReplay:
                 lambda m, t: bridge.on_transforms(from_ros(TFMessage, m), static=True),
             ),
             (inputs.map, lambda m, t: bridge.on_map(from_ros(OccupancyGrid, m))),
+            (
+                inputs.footprint,
+                lambda m, t: bridge.on_footprint(from_ros(PolygonStamped, m), t),
+            ),
             *((topic, partial(scan, number)) for number, topic in enumerate(inputs.scans)),
         )
         readers |= {f"/{topic.name}": read for topic, read in optional if topic is not None}

@@ -23,6 +23,7 @@ from .._robot import RobotProfile, RobotState
 from ..rules import Unseen
 from ._alerts import sensor_status
 from ._clock import BridgeClock
+from ._footprint_input import FootprintInput
 from ._image_input import ImageInput, PerceivedFrame
 from ._outgoing import Frames, outgoing
 from ._poses import RobotPoses
@@ -33,6 +34,7 @@ from ._shared_tracker import SharedTracker
 from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
+from .messages.geometry_msgs import PolygonStamped
 from .messages.nav_msgs import OccupancyGrid, Odometry
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from .messages.tf2_msgs import TFMessage
@@ -138,6 +140,7 @@ class AwarenessBridge:
             with_depth=with_depth,
             creeps=policy.applies(Unseen.name) and not scanners,
         )
+        self._footprint = FootprintInput(shared, lambda: self._robot, self._go_on_with)
         self._map = MapInput(shared, self.frames.odom)
         self._scans: tuple[ScanInput, ...] = ()
         self._legs: ScanPerception | None = None
@@ -208,6 +211,10 @@ class AwarenessBridge:
         Raises:
             NavError: for anything else.
         """
+        self._go_on_with(robot)
+        self._footprint.bare = robot
+
+    def _go_on_with(self, robot: RobotProfile) -> None:
         with self._sending, self._lock:
             self._adapter.use_robot(robot)
             self._robot = robot
@@ -245,6 +252,19 @@ class AwarenessBridge:
         """
         with self._lock:
             self._poses.read_odometry(message, now_s)
+
+    def on_footprint(self, message: PolygonStamped, now_s: float) -> bool:
+        """Go on with the footprint of a robot that has taken or left a load; return if it was used.
+
+        The limit counts the hull of it and of the profile's footprint. A message that is refused
+        is reported, and the last one is kept.
+
+        Args:
+            message: the outline in the base frame, in one on the robot, or in odom at its stamp, as
+                Nav2's local costmap publishes it.
+            now_s: the present time.
+        """
+        return self._footprint.read(message, now_s)
 
     def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
         """Process one image; return True if it was used."""
@@ -397,7 +417,7 @@ class AwarenessBridge:
         self._tracker.forget()
         self._poses.forget()
         self._watch.forget()
-        for each in (self._images, *self._scans):
+        for each in (self._images, self._footprint, *self._scans):
             each.forget()
         self._warn("the clock has been set back: all tracks and moving transforms are deleted")
 
