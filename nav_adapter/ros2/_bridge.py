@@ -28,6 +28,7 @@ from ._outgoing import Frames, outgoing
 from ._poses import RobotPoses
 from ._scan_input import MapInput, ScanInput, ScannerInput, ScanPerception
 from ._sensor_watch import CAMERA, SensorWatch
+from ._speed_limit import speed_limit
 from ._shared import Shared
 from ._shared_tracker import SharedTracker
 from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
@@ -325,6 +326,11 @@ class AwarenessBridge:
                 self._warn_user(line)
             self._send(constraints, tracks, state, self._wanted, details, sensors)
         return constraints
+
+    def sent_limit_mps(self, constraints: NavConstraints) -> float:
+        """Return the limit (m/s) that Nav2 gets: that of the base, per axis (``speed_limit``)."""
+        message = speed_limit(constraints, self._robot.max_speed_mps, state=self.robot_state)
+        return message.speed_limit
 
     def refuse(self, problem: str) -> None:
         """Warn of a message that could not be decoded."""
