@@ -1,26 +1,47 @@
-"""The results that README leads with, from the committed rows of the leaderboard."""
+"""The figures of README and of the demonstration's page, from committed rows."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import re
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from benchmarks.nav2 import summary
+from sim_tests.demo import reported_table, reported_text
 from sim_tests.study.measures import EpisodeRecord, Interval, bootstrap_interval, paired
+from sim_tests.study.report import Table
 
-from ._page import Standing, standings
-from ._rows import RESULTS, Board
+from ._page import ROBOTS, Standing, impacts_text, standings
+from ._rows import RESULTS, ROOT, Board
 
-_TODAY: Final = "today"
-_COSTMAP: Final = "today-costmap"
-_AWARE: Final = "balanced-camera+scanner"
-_BLIND: Final = "blind-camera+scanner"
+_COSTMAP, _TODAY, _BLIND, _AWARE = ROBOTS
+#: Pages with parts that are made here, each between two comments.
+PAGES: Final = tuple(ROOT / name for name in ("README.md", "docs/simulation_results.md"))
+_PART: Final = re.compile(r"(<!-- figures: (\w+) .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.S)
 
 
-def headline(board: Board, folder: Path = RESULTS) -> str:
-    """Return the results as lines of text.
+def write_figures(board: Board) -> None:
+    """Write the parts with figures into the pages.
+
+    Raises:
+        SimError: the board has no row of a name that is needed here.
+    """
+    parts = figures(board)
+    for page in PAGES:
+        page.write_text(with_figures(page.read_text("utf-8"), parts), "utf-8")
+
+
+def with_figures(page: str, parts: Mapping[str, str]) -> str:
+    """Return the text of a page with the parts between its comments."""
+    return _PART.sub(lambda found: f"{found[1]}{parts[found[2]]}{found[3]}", page)
+
+
+def figures(board: Board, folder: Path = RESULTS) -> dict[str, str]:
+    """Return the parts of the pages, by the names in their comments.
 
     Intervals are 95 %, by bootstrap over scenarios: they say what other scenarios of this kind
     might give.
@@ -29,34 +50,70 @@ def headline(board: Board, folder: Path = RESULTS) -> str:
         SimError: the board has no row of a name that is needed here.
     """
     rows = {each.row.name: each for each in standings(board, folder)}
-    today, costmap, aware, blind = (
-        rows[board.named(name).name] for name in (_TODAY, _COSTMAP, _AWARE, _BLIND)
+    robots = {name: rows[board.named(name).name] for name in ROBOTS}
+    return {
+        "meetings": f"{_meetings(robots).markdown()}\n\n{_price(robots)}",
+        "nav2": summary(),
+        "film": _filled(reported_text()),
+        "lanes": f"```text\n{reported_table()}\n```",
+    }
+
+
+def _filled(text: str) -> str:
+    return textwrap.fill(text, 100, break_long_words=False, break_on_hyphens=False)
+
+
+def _meetings(robots: Mapping[str, Standing]) -> Table:
+    """Return a table with a column for each robot."""
+    count = {each.planned for each in robots.values()}.pop()
+    lines: dict[str, Callable[[Standing], str]] = {
+        "seconds lost among people who watch it": lambda each: (
+            f"{each.mean('time_lost_s', 'attentive').value:.1f}"
+        ),
+        "seconds lost among all": lambda each: f"{each.mean('time_lost_s').value:.1f}",
+        f"touched somebody while it moved, of {count}": lambda each: str(
+            sum(record.moving_touched for record in each.ran)
+        ),
+        "impacts with people who step out and never noticed it": lambda each: each.impacts("never"),
+        "… with people who had noticed it": _noticed,
+        "… with all": lambda each: each.impacts("all"),
+    }
+    return Table(
+        dict.fromkeys(("a meeting", *ROBOTS.values()), ""),
+        [[title, *map(cell, robots.values())] for title, cell in lines.items()],
     )
+
+
+def _noticed(each: Standing) -> str:
+    """Return the step-out impacts with people who had noticed the robot, and the fastest one."""
+    kept = [record for record in each.ran if record.step_out_all is not None]
+    mean = np.mean([record.step_out_all - record.step_out_never for record in kept])  # type: ignore[operator]
+    fastest = max(
+        max(record.step_out_past_worst_mps or 0.0, record.step_out_looking_worst_mps or 0.0)
+        for record in kept
+    )
+    return impacts_text(mean, fastest)
+
+
+def _price(robots: Mapping[str, Standing]) -> str:
+    """Return what awareness costs and saves, with intervals."""
+    aware, blind = robots[_AWARE], robots[_BLIND]
     attentive = [each for each in aware.ran if each.attention == "attentive"]
-    won, won_attentive = (
-        over_scenarios(group, blind.ran, lambda first, second: second - first)
+    saved, saved_attentive = (
+        over_scenarios(group, blind.ran, lambda first, second: second - first).text(1)
         for group in (aware.ran, attentive)
     )
-    lines = [
-        f"{len(board.templates)} scenarios, {board.seeds} seed(s) each, camera and scanners",
-        f"time over today's AMR:          {times(today, aware).text(2)}",
-        f"  over that with a costmap:     {times(costmap, aware).text(2)}",
-        f"what awareness saves:           {won.text(1)} s a crossing",
-        f"  with attentive people:        {won_attentive.text(1)} s",
-        "step-out impacts per 1 000 crossings (fastest), never noticed; all people:",
-    ]
-    for name, row in (
-        ("today's AMR", today),
-        ("with a costmap planner", costmap),
-        ("slow for everybody", blind),
-        ("awarenav", aware),
-    ):
-        hits = sum(each.moving_touched for each in row.ran)
-        lines.append(
-            f"  {name:30s}{row.impacts('never')}; {row.impacts('all')}; contacts with the moving "
-            f"robot in {hits} of {len(row.ran)}"
-        )
-    return "\n".join(lines)
+    predicts, costmap = (times(robots[name], aware).text(2) for name in (_TODAY, _COSTMAP))
+    scenarios = len({each.scenario for each in aware.ran})
+    return _filled(
+        f"{aware.planned} meetings of each robot in {scenarios} scenarios, with a forward camera "
+        "(120°) and two laser scanners, today's AMR with the scanners alone; impacts are [expected "
+        "ones per 1 000 meetings](docs/what_it_wins.md#step-out-impacts), with the fastest in "
+        f"parentheses. awarenav takes {costmap} × the time of the AMR with a costmap planner and "
+        f"{predicts} × that of the one that predicts people. Awareness saves {saved_attentive} s a "
+        f"meeting with people who watch and {saved} s over all, beside the same robot that is slow "
+        "for everybody. Intervals are 95 %."
+    )
 
 
 def times(base: Standing, other: Standing) -> Interval:
