@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class AwarenavError(ValueError):
@@ -32,6 +33,15 @@ def did_you_mean(given: object, names: Iterable[str], *, cutoff: float = 0.6) ->
     """
     near = difflib.get_close_matches(str(given), list(names), n=1, cutoff=cutoff)
     return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def nearest_file(path: Path) -> str:
+    """Return a hint at the file of the most similar name in the folder of one that is not there."""
+    try:
+        names = [each.name for each in path.parent.iterdir()]
+    except OSError:
+        names = []
+    return "" if path.name in names else did_you_mean(path.name, names)
 
 
 def not_one_of(

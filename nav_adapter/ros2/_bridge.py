@@ -28,9 +28,9 @@ from ._outgoing import Frames, outgoing
 from ._poses import RobotPoses
 from ._scan_input import MapInput, ScanInput, ScannerInput, ScanPerception
 from ._sensor_watch import CAMERA, SensorWatch
-from ._speed_limit import speed_limit
 from ._shared import Shared
 from ._shared_tracker import SharedTracker
+from ._speed_limit import speed_limit
 from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
