@@ -36,12 +36,13 @@ def did_you_mean(given: object, names: Iterable[str], *, cutoff: float = 0.6) ->
 
 
 def nearest_file(path: Path) -> str:
-    """Return a hint at the file of the most similar name in the folder of one that is not there."""
+    """Return a hint at the file in the folder whose name, without its ending, is most similar."""
     try:
-        names = [each.name for each in path.parent.iterdir()]
+        names = {each.stem: each.name for each in path.parent.iterdir()}
     except OSError:
-        names = []
-    return "" if path.name in names else did_you_mean(path.name, names)
+        return ""
+    near = difflib.get_close_matches(path.stem, names, n=1)
+    return f"; did you mean {names[near[0]]!r}?" if near and not path.exists() else ""
 
 
 def not_one_of(

@@ -30,8 +30,8 @@ _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 _RANKED_DECIMALS: Final = 2
 #: The robots that README compares, by their rows.
 ROBOTS: Final = {
-    "today-costmap": "today's AMR, costmap planner",
-    "today": "today's AMR, predicts people",
+    "today-costmap": "today's AMR, costmap",
+    "today": "today's AMR, predicts",
     "blind-camera+scanner": "slow for everybody",
     "balanced-camera+scanner": "**awarenav**",
 }
@@ -85,7 +85,9 @@ class Standing:
         mean = self.mean(f"step_out_{people}")
         speeds = (getattr(each, f"step_out_{people}_worst_mps") for each in self.ran)
         fastest_mps = max((speed for speed in speeds if speed is not None), default=0.0)
-        return impacts_text(mean.value, fastest_mps) if mean.known else NOTHING
+        if mean.known and mean.value == 0.0:
+            return "0"
+        return f"{mean.value:.2f} ({fastest_mps:.2f} m/s)" if mean.known else NOTHING
 
     @property
     def rank_key(self) -> tuple[float, float, float, str]:
@@ -96,11 +98,6 @@ class Standing:
             self.mean("time_lost_s").value,
             self.row.name,
         )
-
-
-def impacts_text(mean: float, fastest_mps: float) -> str:
-    """Return a mean of impacts and the speed of the fastest one; 0 for none at all."""
-    return f"{mean:.2f} ({fastest_mps:.2f} m/s)" if mean > 0.0 else "0"
 
 
 def standings(board: Board, folder: Path = RESULTS) -> list[Standing]:

@@ -15,7 +15,7 @@ from sim_tests.demo import reported_table, reported_text
 from sim_tests.study.measures import EpisodeRecord, Interval, bootstrap_interval, paired
 from sim_tests.study.report import Table
 
-from ._page import ROBOTS, Standing, impacts_text, standings
+from ._page import ROBOTS, Standing, standings
 from ._rows import RESULTS, ROOT, Board
 
 _COSTMAP, _TODAY, _BLIND, _AWARE = ROBOTS
@@ -67,16 +67,14 @@ def _meetings(robots: Mapping[str, Standing]) -> Table:
     """Return a table with a column for each robot."""
     count = {each.planned for each in robots.values()}.pop()
     lines: dict[str, Callable[[Standing], str]] = {
-        "seconds lost among people who watch it": lambda each: (
-            f"{each.mean('time_lost_s', 'attentive').value:.1f}"
-        ),
-        "seconds lost among all": lambda each: f"{each.mean('time_lost_s').value:.1f}",
+        "seconds lost, people who watch": lambda each: _mean(each, "time_lost_s", "attentive"),
+        "seconds lost, all": lambda each: _mean(each, "time_lost_s"),
         f"touched somebody while it moved, of {count}": lambda each: str(
             sum(record.moving_touched for record in each.ran)
         ),
-        "impacts with people who step out and never noticed it": lambda each: each.impacts("never"),
-        "… with people who had noticed it": _noticed,
-        "… with all": lambda each: each.impacts("all"),
+        "impacts, never noticed it": lambda each: _mean(each, "step_out_never"),
+        "impacts, had noticed it": _noticed,
+        "impacts, all": lambda each: _mean(each, "step_out_all"),
     }
     return Table(
         dict.fromkeys(("a meeting", *ROBOTS.values()), ""),
@@ -84,15 +82,14 @@ def _meetings(robots: Mapping[str, Standing]) -> Table:
     )
 
 
+def _mean(each: Standing, field: str, attention: str = "") -> str:
+    return f"{each.mean(field, attention).value:.1f}"
+
+
 def _noticed(each: Standing) -> str:
-    """Return the step-out impacts with people who had noticed the robot, and the fastest one."""
-    kept = [record for record in each.ran if record.step_out_all is not None]
-    mean = np.mean([record.step_out_all - record.step_out_never for record in kept])  # type: ignore[operator]
-    fastest = max(
-        max(record.step_out_past_worst_mps or 0.0, record.step_out_looking_worst_mps or 0.0)
-        for record in kept
-    )
-    return impacts_text(mean, fastest)
+    """Return the mean step-out impacts with people who had noticed the robot."""
+    never, everybody = (each.mean(f"step_out_{people}").value for people in ("never", "all"))
+    return f"{everybody - never:.1f}"
 
 
 def _price(robots: Mapping[str, Standing]) -> str:
@@ -107,12 +104,12 @@ def _price(robots: Mapping[str, Standing]) -> str:
     scenarios = len({each.scenario for each in aware.ran})
     return _filled(
         f"{aware.planned} meetings of each robot in {scenarios} scenarios, with a forward camera "
-        "(120°) and two laser scanners, today's AMR with the scanners alone; impacts are [expected "
-        "ones per 1 000 meetings](docs/what_it_wins.md#step-out-impacts), with the fastest in "
-        f"parentheses. awarenav takes {costmap} × the time of the AMR with a costmap planner and "
-        f"{predicts} × that of the one that predicts people. Awareness saves {saved_attentive} s a "
-        f"meeting with people who watch and {saved} s over all, beside the same robot that is slow "
-        "for everybody. Intervals are 95 %."
+        "(120°) and two laser scanners, today's AMR with the scanners alone; impacts are those "
+        "[expected per 1 000 meetings if people step out]"
+        f"(docs/what_it_wins.md#step-out-impacts). awarenav takes {costmap} × the time of the AMR "
+        f"with a costmap planner and {predicts} × that of the one that predicts people. Awareness "
+        f"saves {saved_attentive} s a meeting with people who watch and {saved} s over all, beside "
+        "the same robot that is slow for everybody. Intervals are 95 %."
     )
 
 
