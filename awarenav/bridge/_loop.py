@@ -60,6 +60,15 @@ class BridgeInputs:
         return self.image is not None and is_rectified(self.image.name)
 
 
+def limit_text(bridge: AwarenessBridge, constraints: NavConstraints) -> str:
+    """Return the number of people, the limit with its reason, and the one that Nav2 gets."""
+    people = counted(len(constraints.obstacles), "person", "people")
+    return (
+        f"{people}  limit {constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by}), "
+        f"sent {bridge.sent_limit_mps(constraints):.2f}"
+    )
+
+
 class TopicPublisher:
     """Publishes messages over DDS, and records what it publishes.
 
@@ -161,8 +170,7 @@ class BridgeLoop:
                 total = self._processed
                 report(
                     f"{(total - before) / (now - reported):4.1f} frames/s  "
-                    f"{counted(len(constraints.obstacles), 'person', 'people')}  limit "
-                    f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
+                    f"{limit_text(self._bridge, constraints)}"
                 )
                 reported, before = now, total
 

@@ -17,8 +17,7 @@ from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 
-from ..errors import counted
-from ._loop import BridgeInputs, BridgeViewer
+from ._loop import BridgeInputs, BridgeViewer, limit_text
 
 if TYPE_CHECKING:
     from nav_adapter.ros2 import McapRecorder
@@ -190,10 +189,7 @@ class BagReplay:
         if self._viewer is not None:
             self._viewer.draw(self._bridge, constraints)
         if report is not None:
-            report(
-                f"{now_s:.1f} s  {counted(len(constraints.obstacles), 'person', 'people')}  limit "
-                f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
-            )
+            report(f"{now_s:.1f} s  {limit_text(self._bridge, constraints)}")
 
     def _readers_of(self, inputs: BridgeInputs) -> dict[str, Callable[[Any, float], None]]:
         """Return by topic what is done with a message and its time."""

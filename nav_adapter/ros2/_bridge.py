@@ -31,6 +31,7 @@ from ._scan_input import MapInput, ScanInput, ScannerInput, ScanPerception
 from ._sensor_watch import CAMERA, SensorWatch
 from ._shared import Shared
 from ._shared_tracker import SharedTracker
+from ._speed_limit import speed_limit
 from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
@@ -345,6 +346,11 @@ class AwarenessBridge:
                 self._warn_user(line)
             self._send(constraints, tracks, state, self._wanted, details, sensors)
         return constraints
+
+    def sent_limit_mps(self, constraints: NavConstraints) -> float:
+        """Return the limit (m/s) that Nav2 gets: that of the base, per axis (``speed_limit``)."""
+        message = speed_limit(constraints, self._robot.max_speed_mps, state=self.robot_state)
+        return message.speed_limit
 
     def refuse(self, problem: str) -> None:
         """Warn of a message that could not be decoded."""

@@ -23,7 +23,6 @@ import io
 import math
 import os
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
@@ -41,7 +40,7 @@ from ..body import DEFAULT_MIN_SCORE
 from ..errors import PerceptionError
 from ..eyes import EyeGaze, eyes_from_irises
 from ._images import rgb_image
-from ._model import read_model
+from ._model import read_as
 from ._settings import OnnxSettings
 from ._tflite import TfliteModel
 from .heads import head_crop, looking_at, ray_focal_px
@@ -123,16 +122,8 @@ class FaceMesh:
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
     ) -> None:
-        place, content = read_model(path, sha256)
-        name = "the model given as bytes" if place is None else str(place)
-        try:
-            with zipfile.ZipFile(io.BytesIO(content)) as opened:
-                files = [opened.read(member) for member in (_DETECTOR, _MESH)]
-        except (zipfile.BadZipFile, zlib.error, KeyError) as cause:
-            raise PerceptionError(
-                f"{name} is not MediaPipe's face_landmarker.task, a ZIP with {_DETECTOR} and "
-                f"{_MESH}: {cause}"
-            ) from cause
+        what = f"MediaPipe's face_landmarker.task, a ZIP with {_DETECTOR} and {_MESH}"
+        name, files = read_as(what, _members, path, sha256)
         self._detector, self._mesh = (TfliteModel(each, settings=settings) for each in files)
         self._detector_ends = _named(self._detector, name, (_ANCHORS * _OFFSETS, _ANCHORS))
         # Of the mesh's two outputs of one number the first is the face's.
@@ -417,6 +408,12 @@ def _square(
     return crop.astype(np.float32), np.column_stack(
         [steps, centre_px - steps @ np.full(2, 0.5 * (size_px - 1))]
     )
+
+
+def _members(content: bytes) -> list[bytes]:
+    """Return the two networks of the file."""
+    with zipfile.ZipFile(io.BytesIO(content)) as opened:
+        return [opened.read(member) for member in (_DETECTOR, _MESH)]
 
 
 def _named(model: TfliteModel, name: str, extents: tuple[int, ...]) -> tuple[str, ...]:

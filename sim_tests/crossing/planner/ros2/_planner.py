@@ -17,7 +17,7 @@ from filelock import FileLock, Timeout
 
 from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
 from nav_adapter.ros2 import Frames, SpeedMaskSettings, SpeedMaskStream, outgoing
-from nav_adapter.ros2.conversions import to_time
+from nav_adapter.ros2.conversions import odometry_of, to_time
 from nav_adapter.ros2.messages.geometry_msgs import Twist
 from nav_adapter.ros2.messages.rosgraph_msgs import Clock
 from perception.arrays import FloatArray, finite_number
@@ -36,7 +36,6 @@ from ._messages import (
     base_transform,
     goal_pose,
     map_message,
-    odometry,
     people_of,
     picture_messages,
     scan_message,
@@ -407,7 +406,7 @@ class Ros2Planner:
                 image, about = picture_messages(now_s, CAMERA, camera, rgb)
                 link.publish("image", image)
                 link.publish("camera_info", about)
-            link.publish("odom", odometry(stamped))
+            link.publish("odom", odometry_of(stamped))
             # Last: what begins with the time finds the rest of it.
             link.publish("clock", Clock(to_time(now_s)))
 
