@@ -26,20 +26,18 @@ _OFFSETS_M: Final[FloatArray] = np.array(
 )
 # A way is taken as fast as the limit lets it, or with at most a speed for a time at first: so the
 # robot lets somebody pass.
-_FREE: Final = (math.inf, 0.0)
-_SLOWER: Final = tuple((speed, hold) for speed in (0.0, 0.4, 0.8) for hold in (1.5, 3.0, 5.0))
-# So many of the ways are tried with all of these.
-_BEST: Final = 3
+_STARTS: Final[FloatArray] = np.array(
+    [(math.inf, 0.0), *((speed, hold) for speed in (0.0, 0.4, 0.8) for hold in (1.5, 3.0, 5.0))]
+)
 # A plan holds for this time.
-_EVERY_S: Final = 0.2
-# The limit is computed so far ahead, at places and times so far apart.
+_EVERY_S: Final = 0.4
+# The limit is computed so far ahead, at places and times so far apart; ways are driven through for
+# so long, in the same steps.
 _AHEAD_M: Final = 9.0
 _PLACES_M: Final = 0.3
 _AHEAD_S: Final = 8.0
-_TIMES_S: Final = 0.4
-# Ways are driven through for so long, in steps.
 _DRIVE_S: Final = 12.0
-_STEP_S: Final = 0.25
+_STEP_S: Final = 0.4
 # Length of a change of offset: so many times the offset, and at least so long; and that of the way
 # back to the line before the goal.
 _CHANGE: Final = 2.2
@@ -95,7 +93,7 @@ class ReferencePlanner(SamplingPlanner):
         self._line: _Line | None = None
         self._goal_odom_m = np.full(2, math.nan)
         self._plan_stamp_s = -math.inf
-        self._offset_m, self._cap_mps, self._holds_s = 0.0, *_FREE
+        self._offset_m, self._cap_mps, self._holds_s = 0.0, math.inf, 0.0
 
     def plan(
         self,
@@ -149,7 +147,7 @@ class ReferencePlanner(SamplingPlanner):
         self._line = _Line(np.array(state.position_odom_m), along, left, length_m)
         self._goal_odom_m = np.array(goal_odom_m)
         self._plan_stamp_s = -math.inf
-        self._offset_m, self._cap_mps, self._holds_s = 0.0, *_FREE
+        self._offset_m, self._cap_mps, self._holds_s = 0.0, math.inf, 0.0
 
     def _offsets(
         self, s_m: FloatArray, from_s_m: float, from_d_m: float, offset_m: FloatArray
@@ -177,13 +175,13 @@ class ReferencePlanner(SamplingPlanner):
             line.start_odom_m + places_m[:, None] * line.along + offsets_m[:, :, None] * line.left
         )
         headings = math.atan2(line.along[1], line.along[0]) + np.arctan(slopes)
-        times_s = np.arange(0.0, _AHEAD_S + 1e-9, _TIMES_S)
+        times_s = np.arange(0.0, _AHEAD_S + 1e-9, _STEP_S)
         poses = positions.reshape(-1, 1, 2).repeat(len(times_s), axis=1)
         limits_mps = speed_limit_at(
             constraints,
             poses,
             headings.reshape(-1, 1).repeat(len(times_s), axis=1),
-            dt_s=_TIMES_S,
+            dt_s=_STEP_S,
         ).reshape(*headings.shape, len(times_s))
         outline = self._footprint.at(
             Poses(positions[..., 0], positions[..., 1], np.cos(headings), np.sin(headings))
@@ -193,21 +191,14 @@ class ReferencePlanner(SamplingPlanner):
         field = _Field(limits_mps, room, stretch, reach_m)
         price_s = _OFFSET_S * np.abs(_OFFSETS_M) + _LEFT_S * (_OFFSETS_M > 0.0)
         price_s = price_s + _OTHER_S * (np.abs(_OFFSETS_M - self._offset_m) > 1e-6)
-        speed_mps, rest_m = max(state.travel_mps, 0.0), line.length_m - s_m
-        every = np.arange(len(_OFFSETS_M))
-        first = field.drive_s(self.robot, every, *_FREE, speed_mps, rest_m) + price_s
-        best = np.argsort(first, kind="stable")[:_BEST]
-        ways = np.repeat(best, len(_SLOWER))
-        caps, holds = (np.tile(each, _BEST) for each in np.array(_SLOWER).T)
-        slower = field.drive_s(self.robot, ways, caps, holds, speed_mps, rest_m)
-        slower = slower + price_s[ways] + _SLOW_S
-        if first[best[0]] <= slower.min():
-            chosen, (self._cap_mps, self._holds_s) = best[0], _FREE
-        else:
-            index = int(np.argmin(slower))
-            chosen = ways[index]
-            self._cap_mps, self._holds_s = float(caps[index]), float(holds[index])
-        self._offset_m = float(_OFFSETS_M[chosen])
+        way, start = np.divmod(np.arange(len(_OFFSETS_M) * len(_STARTS)), len(_STARTS))
+        cost_s = price_s[way] + _SLOW_S * (start > 0)
+        cost_s += field.drive_s(
+            self.robot, way, *_STARTS[start].T, max(state.travel_mps, 0.0), line.length_m - s_m
+        )
+        best = int(np.argmin(cost_s))
+        self._offset_m = float(_OFFSETS_M[way[best]])
+        self._cap_mps, self._holds_s = _STARTS[start[best]].tolist()
 
 
 class _Field(NamedTuple):
@@ -229,8 +220,8 @@ class _Field(NamedTuple):
         self,
         robot: RobotProfile,
         way: NDArray[np.intp],
-        cap_mps: FloatArray | float,
-        hold_s: FloatArray | float,
+        cap_mps: FloatArray,
+        hold_s: FloatArray,
         speed_mps: float,
         rest_m: float,
     ) -> FloatArray:
@@ -245,16 +236,8 @@ class _Field(NamedTuple):
             place = np.minimum(s_m / _PLACES_M, places - 1.001)
             index = place.astype(np.intp)
             share = place - index
-            column = min(t_s / _TIMES_S, times - 1.001)
-            early = int(column)
-            late_share = column - early
-            limit = (1.0 - share) * (
-                (1.0 - late_share) * self.limits_mps[way, index, early]
-                + late_share * self.limits_mps[way, index, early + 1]
-            ) + share * (
-                (1.0 - late_share) * self.limits_mps[way, index + 1, early]
-                + late_share * self.limits_mps[way, index + 1, early + 1]
-            )
+            now = self.limits_mps[:, :, min(step, times - 1)]
+            limit = (1.0 - share) * now[way, index] + share * now[way, index + 1]
             limit = np.where(s_m > self.reach_m, fastest_mps, limit)
             left_m = np.maximum(rest_m - s_m, 0.0)
             moves = (v > 0.05) & np.isinf(arrives_s)
