@@ -3,8 +3,8 @@
 α(t) tells whether somebody looks now; a person who has looked for half a second knows of the robot
 for some seconds more. The belief is a lower bound of the probability of that, 1 − exp(−looks / τ),
 where looks is the time in which the person has looked, each frame with a weight of how certain it
-is that α is at least a half. While frames show the person without a look, looks decays. A further
-look never lowers the belief.
+is that α is at least a half, and more than that of somebody who looks where they walk. While
+frames show the person without a look, looks decays. A further look never lowers the belief.
 
 A look is no promise: people often look before they set off. The belief predicts that they keep to
 the motion that they had as they looked, or slow down. The speed by which they depart from that is
@@ -26,20 +26,26 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from perception.awareness import AttentionCone
+
 from ._match import Match, Sight
 from ._person import Track
 from ._sensors import Sensors
 from ._state import State, Step, absence_s, face_period_s
 from .awareness_filter import EVIDENCE_GAP_S, grace_s, logit
 from .clock import GAP_PERIODS, FrameClock
-from .people import AVERTED_AWARENESS, AVERTED_LEFT_S, NOTICING_S
+from .people import AVERTED_AWARENESS, AVERTED_LEFT_S, NOTICING_S, WALKING_MPS
 
 # Time constant with which looks decay while the person is seen without a look.
 _FORGETTING_S: Final = 3.0
 # A belief of a half rests on so many looks.
 _HALF_S: Final = 0.5
-# A frame is a look if it is so certain, from 0 to 1, that α is at least a half: by 0.7 σ.
+# A frame is a look if it is so certain, from 0 to 1, that α is at least that of no look: by 0.7 σ.
 _LOOK: Final = 0.5
+# Somebody who walks has a robot right ahead within this angle of their way: as far as a gaze that
+# rests on something may be off it.
+_AHEAD_TAN: Final = math.tan(math.radians(10.0))
+_CONE: Final = AttentionCone()
 # α of a face that looks away is low, and below a half by one standard deviation.
 _AVERTED_SIGMAS: Final = -1.0
 _AVERTED_LOGIT: Final = logit(AVERTED_AWARENESS)
@@ -202,10 +208,25 @@ def _look(track: Track, sight: Sight | None, step: Step) -> float:
         return 0.0
     if sight.by_ray or sight.given.weak or not track.confirmed:
         return 0.0
-    # In standard deviations above α = 0.5, whose logit is 0; 2 Φ(σ) − 1.
+    # In standard deviations above the α of no look; 2 Φ(σ) − 1.
     mean, variance = sight.evidence
-    certainty = math.erf(math.sqrt(0.5) * mean / math.sqrt(variance))
+    above = mean - _no_look_logit(track, step)
+    certainty = math.erf(math.sqrt(0.5) * above / math.sqrt(variance))
     return certainty if certainty >= _LOOK else 0.0
+
+
+def _no_look_logit(track: Track, step: Step) -> float:
+    """Return logit(α) up to which a face is no look: 0, or that of a gaze along the person's way.
+
+    Whoever walks looks where they go, which faces a robot beside the way, too. One right ahead is
+    what they see.
+    """
+    vx, vy = track.vx, track.vy
+    x, y = step.place_m[0] - track.x, step.place_m[1] - track.y
+    if track.speed_mps < WALKING_MPS or abs(x * vy - y * vx) <= _AHEAD_TAN * (x * vx + y * vy):
+        return 0.0
+    along_way = _CONE.score_of((0.0, 0.0, 0.0), (vx, vy, 0.0), (x, y, 0.0))
+    return max(logit(along_way), 0.0) if along_way > 0.0 else 0.0
 
 
 def _looks_away(sight: Sight | None) -> bool:

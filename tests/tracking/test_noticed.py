@@ -21,6 +21,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tracking_scenes import FloatArray, as_bytes, camera_at, nearest, observe
 
+from perception import AttentionCone
 from tracking import (
     AwarenessFilterConfig,
     PersonTrack,
@@ -99,6 +100,38 @@ def test_half_a_second_of_looking_gives_a_half() -> None:
     assert values == sorted(values)
     assert 0.45 <= values[4] <= 0.52
     assert values[9] > 0.7
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    aside_deg=st.floats(12.0, 38.0),
+    side=st.sampled_from([-1.0, 1.0]),
+    from_deg=st.floats(-30.0, 30.0),
+    speed_mps=st.floats(0.8, 2.0),
+)
+def test_who_looks_where_they_walk_does_not_look_at_a_robot_beside_their_way(
+    aside_deg: float, side: float, from_deg: float, speed_mps: float
+) -> None:
+    """Whoever turns the head to it does, and so does somebody who stands with the same face."""
+
+    def noticed(turned: bool, walks: bool) -> float:
+        scene, way = Scene(), math.radians(from_deg + 180.0 + side * aside_deg)
+        ahead = np.array([math.cos(way), math.sin(way)])
+        here = math.radians(from_deg)
+        scene.place = 7.0 * np.array([math.cos(here), math.sin(here)])
+        velocity = tuple((speed_mps * walks * ahead).tolist())
+        scene.run(0.8, velocity=velocity)
+        most = 0.0
+        for _ in range(15):
+            gaze = -scene.place if turned else ahead
+            alpha = AttentionCone().score_of((*scene.place, 0.0), (*gaze, 0.0), (0.0, 0.0, 0.0))
+            most = max(most, scene.run(0.1, alpha=alpha, velocity=velocity).noticed)
+        return most
+
+    assert noticed(turned=False, walks=True) < 0.5
+    assert noticed(turned=True, walks=True) > 0.5
+    if aside_deg < 30.0:
+        assert noticed(turned=False, walks=False) > 0.5
 
 
 def test_glances_within_seconds_add_up_and_old_ones_fade() -> None:
