@@ -12,5 +12,3 @@ LOOKING_AWARENESS: Final = 0.5
 AVERTED_AWARENESS: Final = 0.1
 #: Nobody runs faster.
 FASTEST_MPS: Final = 12.0
-#: Somebody walks at this speed or faster: three standard deviations of a velocity from scans.
-WALKING_MPS: Final = 0.4
