@@ -14,7 +14,13 @@ import yaml
 from numbered_images import number_of, numbered
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate import CameraChoice, open_source
+from awarenav.estimate import (
+    CameraChoice,
+    PeopleEstimator,
+    SourceFrame,
+    fixed_camera_pose,
+    open_source,
+)
 from nav_adapter.rigid import Motion
 from nav_adapter.ros2.conversions import to_time, yaw_quaternion
 from nav_adapter.ros2.messages import Message
@@ -36,7 +42,7 @@ from nav_adapter.ros2.messages.sensor_msgs import (
 )
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
-from perception import Camera
+from perception import AwarenessPipeline, Camera
 
 pytest.importorskip("rosbags", reason="the extra 'rosbag' is not installed")
 
@@ -288,6 +294,46 @@ def test_a_camera_on_a_robot_that_drives_has_its_pose_in_odom(tmp_path, kind, la
         np.testing.assert_allclose(frame.T_odom_camera[:3, 3], wanted, atol=1e-6)
         np.testing.assert_allclose(frame.T_odom_camera[:3, 2], ahead, atol=1e-6)
         assert frame.on_robot
+
+
+class FloorKeeper:
+    """Perception that finds nobody, and keeps the floors that it is given."""
+
+    def __init__(self) -> None:
+        self.floors: list[Any] = []
+
+    def process(self, image_rgb: Any, stamp_s: float, *, floor: Any, up_camera: Any) -> tuple[()]:
+        self.floors.append(floor)
+        return ()
+
+
+# A typed height of 1.2 m, or none; whether a robot has measured the pose; its height in odom.
+@pytest.mark.parametrize(
+    ("typed", "on_robot", "height_m", "wanted_m", "std_m"),
+    [
+        (False, False, 1.0, 1.0, 0.02),
+        (False, True, 1.0, 1.0, 0.05),
+        (True, False, 1.0, 1.0, 0.02),
+        (True, True, 1.0, 1.2, 0.05),  # odom may begin at the camera
+        (True, True, 0.0, 1.2, 0.05),
+        (False, True, 0.0, None, None),
+        (True, False, None, 1.2, 0.05),
+        (False, False, None, None, None),
+    ],
+)
+def test_the_floor_is_that_of_an_exact_pose_then_of_a_typed_height_then_of_the_robots(
+    typed, on_robot, height_m, wanted_m, std_m, monkeypatch
+) -> None:
+    seen = FloorKeeper()
+    monkeypatch.setattr(AwarenessPipeline, "of", lambda networks, camera: seen)
+    pose = None if height_m is None else fixed_camera_pose(height_m)
+    fixed = fixed_camera_pose(1.2) if typed else None
+    cameras = CameraChoice(None, 60.0, lambda text: None)
+    estimator = PeopleEstimator(None, cameras, fixed_pose_odom_camera=fixed)  # type: ignore[arg-type]
+    estimator.estimate(SourceFrame("0", 1.0, numbered(0), pose, on_robot=on_robot))
+    (floor,) = seen.floors
+    assert (floor and floor.height_m) == wanted_m
+    assert (floor and floor.height_std_m) == std_m
 
 
 @pytest.mark.parametrize("topics", [("tf_static",), ("odom",), ("odom", "body")])
