@@ -12,18 +12,17 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from perception import AwarenessPipeline, Camera, PersonDetection, PersonKeypoints
 from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray
 
 from ...world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M
-from ...world.config import SimConfig
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
+from .._messages import WorkerObservations
 from ._camera import CameraSensor, pipeline_settings
-from ._sensor import SensorSetup, WorkerObservations, World
+from ._sensor import KeypointNoise, SensorSetup, World
 
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
@@ -34,21 +33,6 @@ _BODY_DETAIL: Final = 2
 # A person with fewer visible keypoints (about a quarter of a body) is not detected.
 _MIN_VISIBLE: Final = 5
 _NEAR_M: Final = 0.1
-
-
-class KeypointNoise(SimConfig):
-    """Noise of the keypoints.
-
-    Attributes:
-        pixel_std_px: standard deviation of each coordinate, independent between frames.
-        lift_std_m: standard deviation of each keypoint's depth relative to the body's root; 45 mm
-            is typical of a current whole-body network.
-        miss_rate: share of the frames in which a visible person is not detected.
-    """
-
-    pixel_std_px: float = Field(default=1.0, ge=0.0)
-    lift_std_m: float = Field(default=0.045, ge=0.0)
-    miss_rate: float = Field(default=0.02, ge=0.0, le=1.0)
 
 
 class TrueBody(Protocol):
