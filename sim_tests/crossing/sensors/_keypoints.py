@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from perception import AwarenessPipeline, Camera, PersonDetection, PersonKeypoin
 from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray
 
+from ...actors.body import Worker
 from ...world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
@@ -33,37 +34,6 @@ _BODY_DETAIL: Final = 2
 # A person with fewer visible keypoints (about a quarter of a body) is not detected.
 _MIN_VISIBLE: Final = 5
 _NEAR_M: Final = 0.1
-
-
-class TrueBody(Protocol):
-    """A person in front of the camera."""
-
-    @property
-    def keypoints_odom_m(self) -> FloatArray:
-        """Keypoints (23, 3): COCO body keypoints, then the feet of COCO-WholeBody."""
-        ...
-
-    @property
-    def stature_m(self) -> float:
-        """Body height."""
-        ...
-
-    def reach_odom_m(self) -> FloatArray:
-        """Return low and high corner (2, 3) of a box around all keypoints; a cheap bound."""
-        ...
-
-
-class OcclusionTest(Protocol):
-    """A test of lines of sight, such as :class:`~sim_tests.world.sightlines.SightLines`."""
-
-    def blocked(
-        self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
-        """Return (K,) whether anything lies between the eye (3,) and each of the points (K, 3).
-
-        ``detail`` (K,) is the level of detail of the bodies: 0 the finest, 2 the coarsest.
-        """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +75,7 @@ class KeypointCamera:
     def __init__(
         self,
         camera: Camera,
-        sight: OcclusionTest,
+        sight: SightLines,
         noise: KeypointNoise,
         rng: np.random.Generator,
     ) -> None:
@@ -116,7 +86,7 @@ class KeypointCamera:
         self._visible: tuple[_VisiblePerson, ...] = ()
         self._frustum_normals = _frustum_normals(camera)
 
-    def look(self, T_odom_camera: FloatArray, workers: Sequence[TrueBody]) -> tuple[int, ...]:
+    def look(self, T_odom_camera: FloatArray, workers: Sequence[Worker]) -> tuple[int, ...]:
         """Take a frame; return the visible workers' indices, in the order of the detections."""
         found = (
             self._in_image(index, worker, T_odom_camera) for index, worker in enumerate(workers)
@@ -147,7 +117,7 @@ class KeypointCamera:
                 "detections must be those that detect() returned for this frame"
             ) from None
 
-    def _in_image(self, index: int, worker: TrueBody, T_odom_camera: FloatArray) -> _InImage | None:
+    def _in_image(self, index: int, worker: Worker, T_odom_camera: FloatArray) -> _InImage | None:
         # Every worker draws the same amount of noise, visible or not, so that the noise of one
         # worker does not depend on another.
         missed = self._rng.random() < self._noise.miss_rate
