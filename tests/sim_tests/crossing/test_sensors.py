@@ -6,14 +6,13 @@ import sys
 
 import numpy as np
 import pytest
-from watching_cameras import Watching, world_at
+from watching_cameras import Watching, setup_on, world_at
 
 from perception import PersonObservation
 from perception.anthropometry import MEAN_STATURE_M
-from sim_tests import KeypointNoise, Scenario, conditions, run_crossing
+from sim_tests import Scenario, conditions, run_crossing
 from sim_tests.conditions import CAMERAS, OTHER_SENSORS, Perception
 from sim_tests.crossing import Stage
-from sim_tests.crossing.faults import EpisodeFaults
 from sim_tests.crossing.sensors import Sensor, SensorSetup, Sighting, World, sensor_class
 from sim_tests.world.camera import CameraTiming
 from tracking import SensorConfig
@@ -73,9 +72,7 @@ def test_a_depth_camera_measures_how_far_a_child_is(tmp_path) -> None:
     errors = {}
     for name in ("keypoints", "depth"):
         with Stage(scenario, renderer="auto") as stage:
-            faults = EpisodeFaults(None, 0, scenario.camera.camera())
-            noise = KeypointNoise(miss_rate=0.0)
-            setup = SensorSetup(stage=stage, seed=0, faults=faults, noise=noise)
+            setup = setup_on(stage)
             T = stage.amr.T_odom_camera
             truth = stage.truth(setup.cone, T)
             (image,) = sensor_class(name)(setup).look(World(0.0, T, T, truth, stage.amr.state(0.0)))
