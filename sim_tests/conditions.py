@@ -259,6 +259,9 @@ class Conditions:
                     "measures depth, and its laser scanners; such as 'camera+scanner'. With "
                     "scanners, --perception is keypoints or pixels.",
                     "metavar": "NAME[+NAME...]",
+                    "shell_complete": completion_of(
+                        "sim_tests", "crossing/sensors", _CAMERA, "depth", *OTHER_SENSORS
+                    ),
                     "default": _CAMERA,
                 },
                 several={"default": [_CAMERA], "note": " Several lists are compared."},

@@ -3,59 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, RobotState
+from nav_adapter import AwarenessPolicy
 from perception.arrays import FloatArray
 from perception.laser import AHEAD_RAD, SeenDirections, camera_field
 from tracking import PersonTrack, PersonTracker, TrackerConfig
 
 from ..conditions import Perception
 from ..world.camera import FrameQueue
+from ._messages import Change, Delivery, OdometryReading, Sighting, WorkerObservations
 from ._stage import TrueView
-from .sensors import (
-    CameraSensor,
-    Change,
-    Delivery,
-    OdometryReading,
-    SensorSetup,
-    Sighting,
-    WorkerObservations,
-    World,
-    motion_of,
-    sensor_class,
-    view_of,
-)
+from .sensors import CameraSensor, SensorSetup, World, motion_of, sensor_class, view_of
 
+# The tracker's name of the camera.
+_CAMERA: Final = "camera"
 # Age of perception before the first image has arrived: older than any policy accepts.
 _NEVER_S: Final = 1.0e6
 # Images and scans with stamps farther ahead are refused, as the bridge on a robot refuses them.
 _AHEAD_S: Final = 0.05
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sensed:
-    """The knowledge of the robot in one control cycle.
-
-    Attributes:
-        state: its own state.
-        tracks: tracks of the people.
-        stamp_s: stamp of the newest image, or of scans that show all that is ahead.
-        observed: observations of the newest image if it arrived in this cycle, else none.
-        scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle.
-        seen_stamp_s: from when on it knows what is in a sector, as :meth:`NavAdapter.update` takes
-            it; None for a robot that knows the truth in all directions.
-    """
-
-    state: RobotState
-    tracks: tuple[PersonTrack, ...]
-    stamp_s: float
-    observed: WorkerObservations
-    scan_points_odom_m: FloatArray
-    seen_stamp_s: Callable[[float, float], float | None] | None
 
 
 class Sensing:
@@ -66,13 +34,19 @@ class Sensing:
         perception: their names.
         policy: has the settings of the tracker.
 
+    Attributes:
+        state: the robot's own state, as it knows it.
+        tracks: tracks of the people.
+        observed: observations of the newest image if it arrived in this cycle, else none.
+        scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle.
+
     Raises:
         SimError: for a perception with scanners and a scenario without any.
     """
 
     def __init__(self, setup: SensorSetup, perception: Perception, policy: AwarenessPolicy) -> None:
         self._stage = stage = setup.stage
-        # What the last sensors say of somebody is corrected by the first, the camera.
+        # The camera comes last: its faces are then those of people whom scans have placed.
         self._sensors = [sensor_class(name)(setup) for name in reversed(perception)]
         self._odometry = Odometry(setup.faults.odometry())
         self._sees_all = any(each.knows_all for each in self._sensors)
@@ -94,13 +68,14 @@ class Sensing:
             for each in spec.flat_views(model)
         ]
 
-    def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
-        """Take the images and scans that are due; return what the robot knows then."""
+    def step(self, t_s: float, truth: tuple[TrueView, ...]) -> None:
+        """Take the images and scans that are due in a control cycle."""
         T_odom_camera = self._stage.amr.T_odom_camera
         known = self._odometry.take(OdometryReading(self._stage.amr.state(t_s), T_odom_camera))
         world = World(t_s, T_odom_camera, _camera_at(t_s, known), truth, known.state)
         sightings = [sighting for each in self._sensors for sighting in each.look(world)]
-        observed: WorkerObservations = ()
+        self.state = known.state
+        self.observed: WorkerObservations = ()
         tracks: tuple[PersonTrack, ...] = ()
         for sighting in sightings:
             if not self._is_new(sighting, t_s):
@@ -114,32 +89,35 @@ class Sensing:
             )
             if sighting.sight is not None:
                 self._seen.note(sighting.sight, sighting.stamp_s)
-            else:
+            elif sighting.sensor == _CAMERA:
                 for field in self._fields:
                     self._seen.note_field(*field, sighting.stamp_s)
             if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
                 self._newest_s[sighting.sensor] = sighting.stamp_s
-                if sighting.points_odom_m is None:
-                    observed = sighting.observations
+                if sighting.sensor == _CAMERA:
+                    self.observed = sighting.observations
         latest_s = self._tracker.last_stamp_s
         if latest_s != t_s or not tracks:
             # A sensor's clock may be a little ahead.
             tracks = self._tracker.predict(t_s if latest_s is None else max(t_s, latest_s))
+        self.tracks = tracks
         points = [each.points_odom_m for each in sightings if each.points_odom_m is not None]
-        return Sensed(
-            known.state,
-            tracks,
-            self._perceived_s(),
-            observed,
-            np.concatenate(points) if points else np.zeros((0, 2)),
-            None if self._sees_all else self._seen.stamp_s,
-        )
+        self.scan_points_odom_m: FloatArray = np.concatenate([np.zeros((0, 2)), *points])
 
-    def _perceived_s(self) -> float:
-        """Return the time from which camera or scanners know what is ahead, as on a robot."""
+    @property
+    def seen_stamp_s(self) -> Callable[[float, float], float | None] | None:
+        """The time from which the robot knows what is in a sector, for :class:`NavAdapter`.
+
+        None for a robot that knows the truth in all directions.
+        """
+        return None if self._sees_all else self._seen.stamp_s
+
+    @property
+    def stamp_s(self) -> float:
+        """The time from which camera or scanners know what is ahead, as on a robot."""
         ahead_s = self._seen.stamp_s(0.0, AHEAD_RAD)
         return max(
-            self._newest_s.get("camera", -_NEVER_S), -_NEVER_S if ahead_s is None else ahead_s
+            self._newest_s.get(_CAMERA, -_NEVER_S), -_NEVER_S if ahead_s is None else ahead_s
         )
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:

@@ -119,11 +119,6 @@ class LaneRun:
     result: CrossingResult
     row: LaneRow
 
-    @property
-    def stepping_out(self) -> int:
-        """Number of the person who steps out."""
-        return _number(self.scenario, steps_out=True)
-
 
 def run_lane(lane: Lane, seed: int, observer: Observer | None = None) -> LaneRun:
     """Run one robot with one seed, watched by an observer."""

@@ -22,7 +22,6 @@ import matplotlib as mpl
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from perception import AttentionCone
 from sim_tests import CrossingFrame, run_crossing, shipped_scenarios
 from sim_tests.crossing import Stage, TopView
 from sim_tests.scenario import SCENARIO_SETS
@@ -56,7 +55,6 @@ class Film:
     def __init__(self) -> None:
         self.pictures: list[Image.Image] = []
         self._view: TopView | None = None
-        self._cone = AttentionCone()
         self._next_s = 0.0
         font = Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
         self._font = ImageFont.truetype(str(font), 12)
@@ -73,7 +71,7 @@ class Film:
         self._next_s += _EVERY_S
         # The points of the scans flicker, and would make up most of the file.
         calm = dataclasses.replace(frame, scan_points_odom_m=np.zeros((0, 2)))
-        picture = Image.fromarray(self._view.draw(calm, stage, self._cone))
+        picture = Image.fromarray(self._view.draw(calm, stage))
         self.pictures.append(self._captioned(picture, frame))
 
     def _captioned(self, picture: Image.Image, frame: CrossingFrame) -> Image.Image:

@@ -17,18 +17,9 @@ from tracking import CameraView, SurroundView, View
 
 from ...scenario import CameraSpec, Scenario
 from ...world.camera import FrameClock, FrameQueue
+from .._messages import Change, Delivery, Sighting, WorkerObservations
 from .._stage import Stage
-from ._sensor import (
-    STREAMS,
-    Change,
-    Delivery,
-    MapView,
-    Sensor,
-    SensorSetup,
-    Sighting,
-    WorkerObservations,
-    World,
-)
+from ._sensor import STREAMS, MapView, Sensor, SensorSetup, World
 
 #: Images a second of a camera that renders, where the scenario gives none.
 PIXEL_RATE_HZ: Final = 10.0

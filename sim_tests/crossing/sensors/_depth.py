@@ -53,4 +53,4 @@ class Depth(Keypoints, name="depth"):
         noise = self._depth_rng.standard_normal(seen_m.shape)
         measured_m = true_m + _STD_PER_M * true_m**2 * noise
         size = self.camera.width_px, self.camera.height_px
-        return cv2.resize(measured_m, size, interpolation=cv2.INTER_NEAREST)
+        return np.asarray(cv2.resize(measured_m, size, interpolation=cv2.INTER_NEAREST), np.float64)

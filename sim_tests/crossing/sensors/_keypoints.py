@@ -8,22 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from perception import AwarenessPipeline, Camera, PersonDetection, PersonKeypoints
 from perception.anthropometry import MEAN_STATURE_M
 from perception.arrays import FloatArray
 
+from ...actors.body import Worker
 from ...world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M
-from ...world.config import SimConfig
 from ...world.errors import SimError
 from ...world.sightlines import SightLines
+from .._messages import WorkerObservations
 from ._camera import CameraSensor, pipeline_settings
-from ._sensor import SensorSetup, WorkerObservations, World
+from ._sensor import KeypointNoise, SensorSetup, World
 
 _LAYOUT: Final = "coco_wholebody"
 _LAYOUT_SIZE: Final = 133
@@ -34,52 +34,6 @@ _BODY_DETAIL: Final = 2
 # A person with fewer visible keypoints (about a quarter of a body) is not detected.
 _MIN_VISIBLE: Final = 5
 _NEAR_M: Final = 0.1
-
-
-class KeypointNoise(SimConfig):
-    """Noise of the keypoints.
-
-    Attributes:
-        pixel_std_px: standard deviation of each coordinate, independent between frames.
-        lift_std_m: standard deviation of each keypoint's depth relative to the body's root; 45 mm
-            is typical of a current whole-body network.
-        miss_rate: share of the frames in which a visible person is not detected.
-    """
-
-    pixel_std_px: float = Field(default=1.0, ge=0.0)
-    lift_std_m: float = Field(default=0.045, ge=0.0)
-    miss_rate: float = Field(default=0.02, ge=0.0, le=1.0)
-
-
-class TrueBody(Protocol):
-    """A person in front of the camera."""
-
-    @property
-    def keypoints_odom_m(self) -> FloatArray:
-        """Keypoints (23, 3): COCO body keypoints, then the feet of COCO-WholeBody."""
-        ...
-
-    @property
-    def stature_m(self) -> float:
-        """Body height."""
-        ...
-
-    def reach_odom_m(self) -> FloatArray:
-        """Return low and high corner (2, 3) of a box around all keypoints; a cheap bound."""
-        ...
-
-
-class OcclusionTest(Protocol):
-    """A test of lines of sight, such as :class:`~sim_tests.world.sightlines.SightLines`."""
-
-    def blocked(
-        self, eye_odom_m: FloatArray, ends_odom_m: FloatArray, detail: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
-        """Return (K,) whether anything lies between the eye (3,) and each of the points (K, 3).
-
-        ``detail`` (K,) is the level of detail of the bodies: 0 the finest, 2 the coarsest.
-        """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +75,7 @@ class KeypointCamera:
     def __init__(
         self,
         camera: Camera,
-        sight: OcclusionTest,
+        sight: SightLines,
         noise: KeypointNoise,
         rng: np.random.Generator,
     ) -> None:
@@ -132,7 +86,7 @@ class KeypointCamera:
         self._visible: tuple[_VisiblePerson, ...] = ()
         self._frustum_normals = _frustum_normals(camera)
 
-    def look(self, T_odom_camera: FloatArray, workers: Sequence[TrueBody]) -> tuple[int, ...]:
+    def look(self, T_odom_camera: FloatArray, workers: Sequence[Worker]) -> tuple[int, ...]:
         """Take a frame; return the visible workers' indices, in the order of the detections."""
         found = (
             self._in_image(index, worker, T_odom_camera) for index, worker in enumerate(workers)
@@ -163,7 +117,7 @@ class KeypointCamera:
                 "detections must be those that detect() returned for this frame"
             ) from None
 
-    def _in_image(self, index: int, worker: TrueBody, T_odom_camera: FloatArray) -> _InImage | None:
+    def _in_image(self, index: int, worker: Worker, T_odom_camera: FloatArray) -> _InImage | None:
         # Every worker draws the same amount of noise, visible or not, so that the noise of one
         # worker does not depend on another.
         missed = self._rng.random() < self._noise.miss_rate

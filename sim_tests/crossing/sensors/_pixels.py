@@ -19,9 +19,10 @@ from perception.networks import OnnxSettings
 from ...scenario import CameraSpec, load_networks
 from ...world.camera import CoarseSceneryRenderer, expose
 from ...world.errors import SimError
+from .._messages import NOBODY, WorkerObservations
 from .._stage import TrueView
 from ._camera import CameraSensor, delivered, pipeline_settings
-from ._sensor import NOBODY, SensorSetup, WorkerObservations, World
+from ._sensor import SensorSetup, World
 
 # An episode runs on one core, often beside others, and is the same on every computer.
 _ONE_CORE: Final = OnnxSettings(intra_op_threads=1)

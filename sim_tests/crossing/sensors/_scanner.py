@@ -26,7 +26,8 @@ from ...world import Warehouse
 from ...world.camera import FrameClock, FrameQueue
 from ...world.errors import SimError
 from ...world.scanner import ScannerSpec, ScanScene, SimulatedScanner, scan_all
-from ._sensor import NOBODY, Delivery, MapView, MountedScan, Sensor, SensorSetup, Sighting, World
+from .._messages import NOBODY, Delivery, MountedScan, Sighting
+from ._sensor import MapView, Sensor, SensorSetup, World
 
 # Random streams of scanners are separate from all others of an episode.
 _STREAM: Final = 0x5CA7

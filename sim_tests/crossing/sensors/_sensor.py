@@ -1,4 +1,4 @@
-"""A sensor of a robot: what it may look at, what it says, and its messages on their way.
+"""A sensor of a robot, what it may look at, and what it is made of.
 
 A new sensor is a module ``_NAME.py`` of this folder with a subclass of :class:`Sensor` of that
 name, and the name in :data:`~sim_tests.conditions.CAMERAS` or ``OTHER_SENSORS``.
@@ -7,102 +7,32 @@ name, and the name in :data:`~sim_tests.conditions.CAMERAS` or ``OTHER_SENSORS``
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import TYPE_CHECKING, ClassVar, Final, Generic, TypeAlias, TypeVar
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from nav_adapter import RobotState
-from perception import AttentionCone, AwarenessPipeline, Camera, PersonObservation
+from perception import AttentionCone, AwarenessPipeline, Camera
 from perception.arrays import FloatArray
-from perception.laser import LaserScan, Scanner, ScannerSight
 from perception.surround import FlatView
 from tracking import RangedView, SensorConfig, View
 
 from ...world import Warehouse, crosses_boxes
+from ...world.config import SimConfig
+from .._messages import Sighting
 from .._stage import Stage, TrueView
-
-if TYPE_CHECKING:
-    from ..faults import EpisodeFaults
-    from ._keypoints import KeypointNoise
+from ..faults import EpisodeFaults
 
 #: Random streams of an episode: one that is spare, of the camera's noise, its losses and delays,
 #: and the people.
 STREAMS: Final = 4
 # Boxes lower than this hide at most the legs of a person.
 _HIDING_HEIGHT_M: Final = 1.2
-
-#: Index of an observation that shows none of the workers.
-NOBODY: Final = -1
-
-#: Observations, each with the index of the worker that it shows, or :data:`NOBODY`.
-WorkerObservations: TypeAlias = tuple[tuple[PersonObservation, int], ...]
-
-MessageT = TypeVar("MessageT")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
-    """The observations of one image or scan, as they arrive at the robot.
-
-    Attributes:
-        stamp_s: time of the image or scan.
-        T_odom_camera: (4, 4) pose of the camera or scanner then, as the robot knows it.
-        observations: observations of people, each with the index of its worker.
-        sensor: the tracker's name of the sensor.
-        points_odom_m: (N, 2) points of a scan; None for an image.
-        view: where a scan could have shown people; None for an image.
-        sight: where a scan shows what is there; None for an image.
-    """
-
-    stamp_s: float
-    T_odom_camera: FloatArray
-    observations: WorkerObservations
-    sensor: str = "camera"
-    points_odom_m: FloatArray | None = None
-    view: View | None = None
-    sight: ScannerSight | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MountedScan:
-    """A laser scan, and the mounting of its scanner as the robot assumes it."""
-
-    scan: LaserScan
-    mounting: Scanner
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class OdometryReading:
-    """An odometry message: the robot's state, and the pose of its camera (4, 4)."""
-
-    state: RobotState
-    T_odom_camera: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Delivery(Generic[MessageT]):
-    """A message of a sensor on its way to the robot.
-
-    Attributes:
-        message: a picture (H, W, 3), a :class:`Sighting` of the camera, a :class:`MountedScan`, or
-            an :class:`OdometryReading`.
-        taken_s: true time at which it was taken; its stamp may be wrong.
-        arrives_s: time of its arrival.
-        T_odom_sensor: (4, 4) true pose of the sensor when it was taken.
-    """
-
-    message: MessageT
-    taken_s: float
-    arrives_s: float
-    T_odom_sensor: FloatArray
-
-
-#: A change of what a sensor delivers; None for a message that never arrives.
-Change: TypeAlias = Callable[[Delivery[MessageT]], "Delivery[MessageT] | None"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,6 +68,21 @@ class World:
             T @ view.T_camera_view for T in (self.T_odom_camera, self.T_odom_camera_known)
         )
         return replace(self, T_odom_camera=camera, T_odom_camera_known=known, truth=truth)
+
+
+class KeypointNoise(SimConfig):
+    """Noise of the keypoints.
+
+    Attributes:
+        pixel_std_px: standard deviation of each coordinate, independent between frames.
+        lift_std_m: standard deviation of each keypoint's depth relative to the body's root; 45 mm
+            is typical of a current whole-body network.
+        miss_rate: share of the frames in which a visible person is not detected.
+    """
+
+    pixel_std_px: float = Field(default=1.0, ge=0.0)
+    lift_std_m: float = Field(default=0.045, ge=0.0)
+    miss_rate: float = Field(default=0.02, ge=0.0, le=1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -11,9 +11,10 @@ import numpy as np
 from perception import PersonObservation
 from tracking import SensorConfig
 
+from .._messages import Sighting, WorkerObservations
 from .._stage import TrueView
 from ._camera import CameraSensor
-from ._sensor import MapView, SensorSetup, Sighting, WorkerObservations, World
+from ._sensor import MapView, SensorSetup, World
 
 # Standard deviations that are reported with the truth: small, but not zero.
 _POSITION_COVARIANCE_M2: Final = 0.01**2 * np.eye(3)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from watching_cameras import setup_on
 
 from perception import AttentionCone
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.conditions import CAMERAS, Perception
 from sim_tests.crossing import Stage
-from sim_tests.crossing.faults import EpisodeFaults
-from sim_tests.crossing.sensors import KeypointNoise, MapView, SensorSetup, World, sensor_class
+from sim_tests.crossing.sensors import MapView, World, sensor_class
 from sim_tests.scenario import ScenarioTemplate
 
 NAMES = (*CAMERAS, "scanner", "keypoints+scanner", "pixels+scanner", "depth+scanner")
@@ -125,9 +125,7 @@ def test_the_oracle_sees_everybody_who_is_not_hidden_by_a_high_box() -> None:
         free = view.visibility(odom, T_odom_camera) > 0.0
         near = np.linalg.norm(positions, axis=1) <= 20.0
         now = World(0.0, T_odom_camera, T_odom_camera, truth, stage.amr.state(0.0))
-        faults = EpisodeFaults(None, 0, scenario.camera.camera())
-        setup = SensorSetup(stage=stage, seed=0, faults=faults, noise=KeypointNoise())
         for name, wanted in (("oracle", free & near), ("truth", near)):
-            image, places = sensor_class(name)(setup).look(now)
+            image, places = sensor_class(name)(setup_on(stage)).look(now)
             assert [worker for _, worker in image.observations] == np.flatnonzero(wanted).tolist()
             assert places.observations == image.observations

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from watching_cameras import setup_on
 
 from perception import (
     AttentionCone,
@@ -18,12 +19,10 @@ from perception import (
 )
 from sim_tests import KeypointNoise, Scenario, run_crossing
 from sim_tests.crossing import Stage, TrueView
-from sim_tests.crossing.faults import EpisodeFaults
 from sim_tests.crossing.sensors import (
     NOBODY,
     PIXEL_RATE_HZ,
     KeypointCamera,
-    SensorSetup,
     World,
     match_to_workers,
     sensor_class,
@@ -93,18 +92,12 @@ def test_observations_are_matched_to_the_workers_they_show():
     assert match_to_workers((), truth, boxes) == ()
 
 
-def pixels(stage: Stage, pipeline: AwarenessPipeline):
-    faults = EpisodeFaults(None, 0, CAMERA)
-    setup = {"stage": stage, "seed": 0, "faults": faults, "noise": KeypointNoise()}
-    return sensor_class("pixels")(SensorSetup(**setup, pipeline=pipeline))
-
-
 def test_rendered_people_are_observed_at_their_true_positions(stage: Stage):
     cone = AttentionCone()
     lines = SightLines(stage.warehouse.layout, actors=stage.warehouse.actors)
     keypoints = KeypointCamera(CAMERA, lines, KeypointNoise(), np.random.default_rng(0))
     pipeline = AwarenessPipeline(CAMERA, keypoints, keypoints, cone=cone)
-    camera = pixels(stage, pipeline)
+    camera = sensor_class("pixels")(setup_on(stage, pipeline=pipeline))
     T_odom_camera = stage.amr.T_odom_camera
     truth = stage.truth(cone, T_odom_camera)
     keypoints.look(T_odom_camera, stage.workers)

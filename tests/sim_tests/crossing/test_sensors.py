@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
-from watching_cameras import Watching, world_at
+from watching_cameras import Watching, setup_on, world_at
 
+from perception import PersonObservation
 from perception.anthropometry import MEAN_STATURE_M
-from sim_tests import KeypointNoise, Scenario, run_crossing
+from sim_tests import Scenario, conditions, run_crossing
 from sim_tests.conditions import CAMERAS, OTHER_SENSORS, Perception
 from sim_tests.crossing import Stage
-from sim_tests.crossing.faults import EpisodeFaults
-from sim_tests.crossing.sensors import Sensor, SensorSetup, World, sensor_class
+from sim_tests.crossing.sensors import Sensor, SensorSetup, Sighting, World, sensor_class
 from sim_tests.world.camera import CameraTiming
+from tracking import SensorConfig
 
 
 @pytest.mark.parametrize("name", [*CAMERAS, *OTHER_SENSORS])
@@ -69,9 +72,7 @@ def test_a_depth_camera_measures_how_far_a_child_is(tmp_path) -> None:
     errors = {}
     for name in ("keypoints", "depth"):
         with Stage(scenario, renderer="auto") as stage:
-            faults = EpisodeFaults(None, 0, scenario.camera.camera())
-            noise = KeypointNoise(miss_rate=0.0)
-            setup = SensorSetup(stage=stage, seed=0, faults=faults, noise=noise)
+            setup = setup_on(stage)
             T = stage.amr.T_odom_camera
             truth = stage.truth(setup.cone, T)
             (image,) = sensor_class(name)(setup).look(World(0.0, T, T, truth, stage.amr.state(0.0)))
@@ -93,3 +94,35 @@ def test_an_episode_with_a_depth_camera_repeats() -> None:
     assert [frame.command for frame in first.frames] == [frame.command for frame in second.frames]
     assert any(frame.observations for frame in first.frames)
     assert any(len(frame.scan_points_odom_m) for frame in first.frames)
+
+
+def test_a_new_sensor_is_one_class_and_its_name(monkeypatch) -> None:
+    """A sonar, which hears people on all sides: it is in the tracker, the table and the options."""
+
+    class Sonar(Sensor, name="sonar"):
+        def __init__(self, setup: SensorSetup) -> None:
+            self.tracked = {"sonar": SensorConfig()}
+
+        def look(self, world: World) -> tuple[Sighting, ...]:
+            heard = (
+                PersonObservation(
+                    world.t_s, each.position_camera_m, 0.01 * np.eye(3), None, None, None, 0.9
+                )
+                for each in world.truth
+            )
+            people = tuple((each, number) for number, each in enumerate(heard))
+            return (Sighting(world.t_s, world.T_odom_camera_known, people, sensor="sonar"),)
+
+    monkeypatch.setitem(sys.modules, f"{Sensor.__module__.rpartition('.')[0]}._sonar", Sonar)
+    monkeypatch.setattr(conditions, "OTHER_SENSORS", (*OTHER_SENSORS, "sonar"))
+    assert Perception.of("keypoints", "camera+sonar").name == "keypoints+sonar"
+    behind = {"start_heading_deg": 180.0, "goal_x_m": -1.0}
+    scenario = Scenario.shipped("standing_in_aisle")
+    scenario = scenario.model_copy(
+        update={"duration_s": 0.5, "robot": scenario.robot.model_copy(update=behind)}
+    )
+    for perception, known in (("keypoints", False), ("keypoints+sonar", True)):
+        result = run_crossing(scenario, policy="balanced", perception=perception)
+        assert bool(result.frames[-1].tracks) is known
+        # Hearing people is no view of what is ahead.
+        assert not any(frame.observations for frame in result.frames)

@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from watching_cameras import setup_on
 
 from perception import AttentionCone, AwarenessPipeline, Camera, FloorPlane
 from perception.surround import PanoramaLens, SurroundPipeline, ring_of_views
 from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
 from sim_tests.crossing import Stage
-from sim_tests.crossing.faults import EpisodeFaults
-from sim_tests.crossing.sensors import KeypointNoise, SensorSetup, World, sensor_class
+from sim_tests.crossing.sensors import World, sensor_class
 from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
 from sim_tests.study.runs import named_templates, plan_jobs
 
@@ -113,12 +113,8 @@ def test_the_shipped_networks_detect_all_people_in_a_panorama(scenario: Scenario
 
 
 def test_a_surround_camera_reports_each_person_once_and_nobody_else(scenario: Scenario) -> None:
-    noise = KeypointNoise(miss_rate=0.0)
     with Stage(scenario) as stage:
-        faults = EpisodeFaults(None, 0, scenario.camera.camera())
-        camera = sensor_class("keypoints")(
-            SensorSetup(stage=stage, seed=0, faults=faults, noise=noise)
-        )
+        camera = sensor_class("keypoints")(setup_on(stage))
         assert len(camera.views) == 4
         T_odom_camera = stage.amr.T_odom_camera
         truth = stage.truth(CONE, T_odom_camera)

@@ -14,6 +14,15 @@ from sim_tests.scenario import CameraSpec
 from sim_tests.world.camera import CameraTiming
 
 
+def setup_on(
+    stage: Any, faults: EpisodeFaults | None = None, seed: int = 0, **more: Any
+) -> SensorSetup:
+    """What sensors on a stage are made of; keypoints of everybody in view."""
+    faults = faults or EpisodeFaults(None, seed, stage.scenario.camera.camera())
+    noise = KeypointNoise(miss_rate=0.0)
+    return SensorSetup(stage=stage, seed=seed, faults=faults, noise=noise, **more)
+
+
 class Watching(CameraSensor):
     """A camera whose people a watcher sees, with an ``observe`` of the world."""
 
@@ -26,8 +35,7 @@ class Watching(CameraSensor):
     ) -> None:
         spec = CameraSpec(timing=timing or CameraTiming())
         stage: Any = SimpleNamespace(scenario=SimpleNamespace(camera=spec))
-        faults = faults or EpisodeFaults(None, seed, spec.camera())
-        super().__init__(SensorSetup(stage=stage, seed=seed, faults=faults, noise=KeypointNoise()))
+        super().__init__(setup_on(stage, faults, seed))
         self.watcher = watcher
 
     def observe(self, view: int, world: World) -> Any:

@@ -9,6 +9,7 @@ import pytest
 
 from awarenav.cli import main
 from sim_tests.demo import _lanes
+from sim_tests.demo._film import unaware_person
 from sim_tests.demo._lanes import (
     LANES,
     REPORTED,
@@ -90,7 +91,7 @@ def test_a_reported_row_can_be_measured_again() -> None:
     (reported,) = (row for row in read_report()[1] if (row.seed, row.lane) == (seed, "awarenav"))
     run = run_lane(LANES[-1], seed)
     assert run.row == reported
-    assert run.scenario.people[run.stepping_out].activity == "phone"
+    assert run.scenario.people[unaware_person(run.result)].activity == "phone"
 
 
 @pytest.mark.slow
