@@ -207,6 +207,9 @@ class BagReplay:
         def depth(message: Any, now_s: float) -> None:
             bridge.on_depth(from_ros(Image, message), now_s)
 
+        def footprint(message: Any, now_s: float) -> None:
+            bridge.on_footprint(from_ros(PolygonStamped, message), now_s)
+
         def scan(number: int, message: Any, now_s: float) -> None:
             bridge.on_scan(number, from_ros(LaserScan, message), now_s)
 
@@ -223,10 +226,7 @@ class BagReplay:
                 lambda m, t: bridge.on_transforms(from_ros(TFMessage, m), static=True),
             ),
             (inputs.map, lambda m, t: bridge.on_map(from_ros(OccupancyGrid, m))),
-            (
-                inputs.footprint,
-                lambda m, t: bridge.on_footprint(from_ros(PolygonStamped, m), t),
-            ),
+            (inputs.footprint, footprint),
             *((topic, partial(scan, number)) for number, topic in enumerate(inputs.scans)),
         )
         readers |= {f"/{topic.name}": read for topic, read in optional if topic is not None}

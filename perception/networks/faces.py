@@ -78,9 +78,12 @@ _FARTHEST: Final = 0.4
 _MIN_SIDE_PX: Final = 8.0
 # The mesh may lay a face that looks here over a profile. Then its nose lies elsewhere, from the
 # middle of the ears, than that of the pose network: by 0.4 to 1.5 sizes of the face on renders that
-# are turned by 70 to 100°, and up to 0.36 of faces that look here. The size is the distance of the
-# ears, or so many times that of eyes and nose.
+# are turned by 70 to 100°, and up to 0.36 of faces that look here. It may also lie beside the nose
+# and eyes of the pose network: on photographs by 0.5 sizes over profiles that seem to look here,
+# and up to 0.2 over faces. The size is the distance of the ears, or so many times that of eyes and
+# nose.
 _NOSE_APART: Final = 0.4
+_FACE_APART: Final = 0.35
 _NOSE_SIZES: Final = 3.3
 # A small face looks here if its nose lies between its eyes, at this share of the way. It is that of
 # the head if its nose and eyes lie where the pose network has them, by this share of the body size:
@@ -385,13 +388,15 @@ def _face_scores(points: FloatArray) -> FloatArray:
 
 
 def _agree(before_px: FloatArray, face_px: FloatArray) -> bool:
-    """Return whether the nose of a face points where that of the pose network did."""
+    """Return whether a face lies where the pose network has it, and its nose points there."""
     size_px = max(
         float(np.linalg.norm(face_px[kp.LEFT_EAR] - face_px[kp.RIGHT_EAR])),
         _NOSE_SIZES * float(np.linalg.norm(face_px[1:3].mean(axis=0) - face_px[kp.NOSE])),
     )
     before, face = (each[kp.NOSE] - each[3:].mean(axis=0) for each in (before_px, face_px))
-    return float(np.linalg.norm(before - face)) <= _NOSE_APART * size_px
+    aside_px = float(np.linalg.norm((before_px - face_px)[:3].mean(axis=0)))
+    points_px = float(np.linalg.norm(before - face))
+    return aside_px <= _FACE_APART * size_px and points_px <= _NOSE_APART * size_px
 
 
 def _square(
