@@ -148,7 +148,8 @@ def _reason(cause: Exception) -> str:
         return str(cause)
     mark = cause.problem_mark
     spaces = "; indent with spaces, not tabs" if "'\\t'" in str(cause.problem) else ""
-    return f"line {mark.line + 1}, column {mark.column + 1}: {cause.problem}{spaces}"
+    problem = ", ".join(filter(None, (cause.context, cause.problem)))
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}{spaces}"
 
 
 def yaml_text(value: Any, **settings: Any) -> str:
