@@ -48,7 +48,9 @@ _FAR, _NEAR = 10.0, 1.5
 _SEED: Final = 0
 _WINDOW: Final = 50
 _REFERENCE: Final = "reference planner"
-_TABLE: Final = re.compile(r"(<!-- figures .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.DOTALL)
+_TABLE: Final = re.compile(
+    r"(<!-- figures: learning .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.DOTALL
+)
 
 Episode = tuple[float, str, int, float]  # return, end, steps, seconds
 Act = Callable[[CrossingEnv, dict[str, Any]], Any]
@@ -217,7 +219,7 @@ def figure() -> Figure:
     )
     axes.set_xlabel("steps of the environment (thousands)", fontsize=13)
     axes.set_ylabel(f"mean return of {_WINDOW} episodes", fontsize=13)
-    axes.legend(fontsize=12, loc="lower right")
+    axes.legend(fontsize=12, loc="center right")
     axes.grid(alpha=0.3)
     return drawn
 

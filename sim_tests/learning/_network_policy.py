@@ -153,7 +153,7 @@ class LearnedPlanner(PolicyPlanner):
         robot: the robot, whose limits are the bounds of the actions.
         static_boxes_odom_m: (N, 4) boxes of the scan.
         file: what :meth:`NetworkPolicy.save` wrote; by default the policy of the package, which
-            was trained in 20 minutes and touches people (docs/learning.md).
+            was trained for six minutes and touches people (docs/learning.md).
 
     Raises:
         SimError: the file cannot be read, or is no policy.

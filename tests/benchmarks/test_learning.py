@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from benchmarks.learning import PAGE, page, read, smooth
+from benchmarks.learning import PAGE, page, read, smooth, table
 
 
 def test_the_page_has_the_table_of_the_committed_drives() -> None:
     """After other drives: python -m benchmarks.learning."""
     text = PAGE.read_text(encoding="utf-8")
+    assert table() in text
     assert page(text) == text
 
 

@@ -117,7 +117,7 @@ def test_a_trained_model_gives_the_same_actions_as_its_copy() -> None:
 
 
 def test_the_policy_of_the_package_drives_to_the_goal() -> None:
-    scenario = ScenarioTemplate.shipped("standing_in_aisle").for_seed(0)
+    scenario = ScenarioTemplate.shipped("crossing_from_left").for_seed(0)
     planner = LearnedPlanner(NOVA_CARTER, scenario.planner_boxes_odom_m)
     assert isinstance(planner, PolicyPlanner)
     result = run_crossing(scenario, policy="balanced", planner=planner, seed=0)
