@@ -147,8 +147,10 @@ def _reason(cause: Exception) -> str:
     if not isinstance(cause, yaml.MarkedYAMLError) or cause.problem_mark is None:
         return str(cause)
     mark = cause.problem_mark
-    spaces = "; indent with spaces, not tabs" if "'\\t'" in str(cause.problem) else ""
-    return f"line {mark.line + 1}, column {mark.column + 1}: {cause.problem}{spaces}"
+    tab = any(word in str(cause.problem) for word in ("tab character", "'\\t'"))
+    spaces = "; indent with spaces" if tab else ""
+    problem = ", ".join(filter(None, (cause.context, cause.problem)))
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}{spaces}"
 
 
 def yaml_text(value: Any, **settings: Any) -> str:
