@@ -19,3 +19,5 @@ NOTICING_S: Final = 0.5 / math.log(2.0)
 AVERTED_LEFT_S: Final = 1.5
 #: Nobody runs faster.
 FASTEST_MPS: Final = 12.0
+#: Somebody walks at this speed or faster: three standard deviations of a velocity from scans.
+WALKING_MPS: Final = 0.4
