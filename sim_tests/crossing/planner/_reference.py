@@ -193,9 +193,9 @@ class ReferencePlanner(SamplingPlanner):
         price_s = price_s + _OTHER_S * (np.abs(_OFFSETS_M - self._offset_m) > 1e-6)
         way, start = np.divmod(np.arange(len(_OFFSETS_M) * len(_STARTS)), len(_STARTS))
         cost_s = price_s[way] + _SLOW_S * (start > 0)
-        cost_s += field.drive_s(
-            self.robot, way, *_STARTS[start].T, max(state.travel_mps, 0.0), line.length_m - s_m
-        )
+        cap_mps, hold_s = _STARTS[start].T
+        speed_mps, rest_m = max(state.travel_mps, 0.0), line.length_m - s_m
+        cost_s += field.drive_s(self.robot, way, cap_mps, hold_s, speed_mps, rest_m)
         best = int(np.argmin(cost_s))
         self._offset_m = float(_OFFSETS_M[way[best]])
         self._cap_mps, self._holds_s = _STARTS[start[best]].tolist()
