@@ -30,10 +30,10 @@ _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 _RANKED_DECIMALS: Final = 2
 #: The robots that README compares, by their rows.
 ROBOTS: Final = {
-    "today-costmap": "today's AMR, costmap",
-    "today": "today's AMR, predicts",
-    "blind-camera+scanner": "slow for everybody",
     "balanced-camera+scanner": "**awarenav**",
+    "blind-camera+scanner": "slow for everybody",
+    "today": "today's AMR, predicts",
+    "today-costmap": "today's AMR, costmap",
 }
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 

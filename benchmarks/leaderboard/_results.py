@@ -18,7 +18,7 @@ from sim_tests.study.report import Table
 from ._page import ROBOTS, Standing, standings
 from ._rows import RESULTS, ROOT, Board
 
-_COSTMAP, _TODAY, _BLIND, _AWARE = ROBOTS
+_AWARE, _BLIND, _TODAY, _COSTMAP = ROBOTS
 #: Pages with parts that are made here, each between two comments.
 PAGES: Final = tuple(ROOT / name for name in ("README.md", "docs/simulation_results.md"))
 _PART: Final = re.compile(r"(<!-- figures: (\w+) .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.S)

@@ -28,8 +28,8 @@ _EXCESS_COLUMNS: Final = (
     "fastest_point_excess_mps",
 )
 _TODAY: Final = "today"
-#: Policies of the summary: slow for everybody, and awarenav's default.
-_SUMMED: Final = ("blind", "balanced")
+#: Policies of the summary: awarenav's default, and slow for everybody.
+_SUMMED: Final = ("balanced", "blind")
 _FACES: Final = {
     _TODAY: "today: scans alone",
     "limit": "limit",
@@ -104,16 +104,16 @@ def summary(path: Path = ROWS) -> str:
     The limit alone reaches Nav2, and the robot does not keep its path.
     """
     groups = _groups(path)
-    lines = ["| | Nav2 alone | slow for everybody | **awarenav** |", "| --- | --- | --- | --- |"]
+    lines = ["| | **awarenav** | slow for everybody | Nav2 alone |", "| --- | --- | --- | --- |"]
     for controller in sorted({stack.partition(", ")[0] for stack, _, _ in groups}):
         today = groups[f"{controller}, {_TODAY}", "", ""]
         attentive = [each for each in today if each.attention == "attentive"]
-        robots = [today, *(groups[f"{controller}, limit", each, ""] for each in _SUMMED)]
+        robots = [groups[f"{controller}, limit", each, ""] for each in _SUMMED]
         rows = {
-            "time among people who watch it": ("1", *(_times(attentive, r) for r in robots[1:])),
-            "time among all": ("1", *(_times(today, each) for each in robots[1:])),
-            f"touched somebody while it moved, of {len(today)}": map(_touched, robots),
-            "impacts, never noticed; all": map(_impacts, robots),
+            "time among people who watch it": (*(_times(attentive, r) for r in robots), "1"),
+            "time among all": (*(_times(today, each) for each in robots), "1"),
+            f"touched somebody while it moved, of {len(today)}": map(_touched, [*robots, today]),
+            "impacts, never noticed; all": map(_impacts, [*robots, today]),
         }
         lines += [f"| {controller}: {name} | {' | '.join(row)} |" for name, row in rows.items()]
     return "\n".join(lines)
