@@ -33,7 +33,7 @@ class FieldsAdapter:
     The *warning field* is the one for full speed and twice the reaction time. So a robot that slows
     for somebody who stands has done so before they are in its protective field. With somebody in
     it, the robot drives at 0.3 of its maximum, as with the slowdown zone in the parameters that
-    Nav2 ships. That manual allows a warning field no more than this: it is no safety function.
+    Nav2 ships. A warning field is no safety function (SICK S3000, operating instructions).
 
     Args:
         policy: ``scanner``, or another.
