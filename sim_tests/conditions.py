@@ -52,10 +52,7 @@ USUAL_SENSORS: Final = {
 }
 #: Completion of scenarios on the command line.
 COMPLETE_SCENARIOS: Final = completion_of(
-    "sim_tests",
-    "scenario/shipped",
-    *SCENARIO_SETS,
-    sets=SCENARIO_SETS[1:],
+    "sim_tests", "scenario/shipped", *SCENARIO_SETS, sets=SCENARIO_SETS[1:]
 )
 #: Completion of the policies of crossings, which have today's AMR besides.
 COMPLETE_SIMULATED_POLICIES: Final = completion_of(
