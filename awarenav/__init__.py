@@ -56,7 +56,7 @@ if TYPE_CHECKING:
     from perception.errors import AwarenavError
     from tracking import PersonTrack, PersonTracker, TrackerConfig, TrackingError
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 __all__ = [
     "AttentionCone",

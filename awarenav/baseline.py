@@ -70,27 +70,3 @@ def worse_than(
         for metric in metrics
         if metric.name in baseline and metric.is_worse_than(baseline[metric.name])
     ]
-
-
-def comparison_text(
-    metrics: Iterable[MeasuredValue],
-    baseline: Mapping[str, MeasuredValue],
-    goals: Mapping[str, float] | None = None,
-) -> tuple[str, bool]:
-    """Return a table of metrics and their baseline, and whether none is worse than the baseline.
-
-    The table also shows goals; a goal that is not reached is no failure.
-    """
-    lines = [f"{'metric':42s}{'now':>10s}{'baseline':>10s}  unit"]
-    good = True
-    for metric in metrics:
-        known = baseline.get(metric.name)
-        verdict = ""
-        if known is not None and metric.is_worse_than(known):
-            verdict, good = "   WORSE", False
-        before = "-" if known is None else f"{known.value:.1f}"
-        goal = (goals or {}).get(metric.name)
-        if goal is not None:
-            verdict = f"   goal {goal:g}{'' if metric.value >= goal else ' NOT REACHED'}{verdict}"
-        lines.append(f"{metric.name:42s}{metric.value:10.1f}{before:>10s}  {metric.unit}{verdict}")
-    return "\n".join(lines), good

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from perception.errors import AwarenavError, did_you_mean, not_one_of
+from perception.errors import AwarenavError, did_you_mean, nearest_file, not_one_of
 
 __all__ = [
     "AwarenavError",
     "MissingExtraError",
     "counted",
     "did_you_mean",
+    "nearest_file",
     "not_one_of",
 ]
 

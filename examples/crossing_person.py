@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from nav_adapter import AwarenessPolicy, NavAdapter, NavConstraints, RobotProfile, RobotState
+from nav_adapter.exporters import time_cost
 from perception import PersonObservation
 from perception.anthropometry import BODY_RADIUS_M
 from tracking import PersonTracker, TrackerConfig
@@ -28,6 +29,9 @@ ROBOT = RobotProfile(
     max_deceleration_mps2=1.0,
     reaction_time_s=0.3,
 )
+# Straight ways that start at these angles off the goal, ties to the right.
+_OFF_RAD = np.radians([0, *(side * angle for angle in range(10, 61, 10) for side in (-1, 1))])
+_WAY_M = np.linspace(0.0, 3.0, 16)
 #: Planner: speed (m/s) and yaw rate (rad/s) from state and constraints.
 Plan = Callable[[RobotState, NavConstraints], tuple[float, float]]
 
@@ -75,6 +79,26 @@ def towards_goal(state: RobotState) -> tuple[float, float]:
     dx, dy = GOAL_ODOM_M - state.position_odom_m
     off = math.atan2(dy, dx) - state.heading_odom_rad
     return math.hypot(dx, dy), math.atan2(math.sin(off), math.cos(off))
+
+
+def desired_velocity(state: RobotState, constraints: NavConstraints) -> np.ndarray:
+    """Return the velocity (2,) of the way to the goal that the limit lets end soonest.
+
+    For planners that choose one velocity and see no farther. Each way leads straight for 3 m, as
+    fast as the limit allows there and then, and on to the goal.
+    """
+    to_goal = GOAL_ODOM_M - state.position_odom_m
+    distance_m = float(np.hypot(*to_goal))
+    bearings = math.atan2(to_goal[1], to_goal[0]) + _OFF_RAD
+    ahead = np.stack([np.cos(bearings), np.sin(bearings)], axis=-1)
+    along_m = np.minimum(_WAY_M, distance_m)
+    ways = state.position_odom_m + along_m[:, None] * ahead[:, None]
+    dt_s = _WAY_M[1] / max(constraints.speed_limit_mps, 0.3)
+    headings = np.tile(bearings[:, None], len(_WAY_M))
+    seconds = time_cost(constraints, ways, headings, dt_s=dt_s)
+    seconds += np.hypot(*(GOAL_ODOM_M - ways[:, -1]).T) / ROBOT.max_speed_mps
+    speed = min(constraints.speed_limit_mps, distance_m)
+    return np.asarray(speed * ahead[int(seconds.argmin())])
 
 
 def follow_velocity(state: RobotState, velocity_odom_mps: np.ndarray) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """ORCA in which the robot does all the avoiding: half-planes and a solver from SciPy.
 
-The integration is the call of ``half_planes``. ORCA has no acceleration limit: the velocity that
-it chooses may be out of reach in one cycle, so the drive ramps.
+The integration is the call of ``half_planes``, and the velocity that ORCA stays near to: that of
+the way that the limit lets end soonest. ORCA has no acceleration limit: the velocity that it
+chooses may be out of reach in one cycle, so the drive ramps.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from crossing_person import GOAL_ODOM_M, ROBOT_RADIUS_M, drive, follow_velocity
+from crossing_person import ROBOT_RADIUS_M, desired_velocity, drive, follow_velocity
 from scipy.optimize import minimize
 
 from nav_adapter import NavConstraints, RobotState
@@ -24,10 +25,7 @@ def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
     normals, bounds = rows[:, :2], rows[:, 2]
 
     limit_mps = constraints.speed_limit_mps
-    to_goal = GOAL_ODOM_M - state.position_odom_m
-    desired = to_goal * min(limit_mps / float(np.hypot(*to_goal)), 1.0)
-    # A person straight ahead has no nearer side; a bias to the right, as people have, decides.
-    desired = desired + 0.05 * limit_mps * np.array([heading[1], -heading[0]])
+    desired = desired_velocity(state, constraints)
     if (normals @ desired >= bounds).all():
         return follow_velocity(state, desired)
     found = minimize(

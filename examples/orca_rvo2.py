@@ -1,9 +1,10 @@
 """The RVO2 library by ORCA's authors (``pip install pyrvo``).
 
-The integration is one agent per person, and the limit as the robot's maximum speed. The library
-assumes that every agent does half of the avoiding. The robot therefore does half of the remainder
-in every cycle, which is late but converges. Where that is not enough, use the half-planes
-(``orca_half_planes.py``), which leave nothing to the person. RVO2 does not limit acceleration.
+The integration is one agent per person, the limit as the robot's maximum speed, and the velocity
+that it prefers. The library assumes that every agent does half of the avoiding. The robot therefore
+does half of the remainder in every cycle, which is late but converges. Where that is not enough,
+use the half-planes (``orca_half_planes.py``), which leave nothing to the person. RVO2 does not
+limit acceleration.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import math
 import sys
 
 import numpy as np
-from crossing_person import DT_S, GOAL_ODOM_M, ROBOT_RADIUS_M, drive, follow_velocity
+from crossing_person import DT_S, ROBOT_RADIUS_M, desired_velocity, drive, follow_velocity
 
 from nav_adapter import NavConstraints, RobotState, circles
 
@@ -32,9 +33,7 @@ def plan(state: RobotState, constraints: NavConstraints) -> tuple[float, float]:
 
     limit_mps = constraints.speed_limit_mps
     heading = np.array([math.cos(state.heading_odom_rad), math.sin(state.heading_odom_rad)])
-    to_goal = GOAL_ODOM_M - state.position_odom_m
-    desired = to_goal * min(limit_mps / float(np.hypot(*to_goal)), 1.0)
-    desired = desired + 0.05 * limit_mps * np.array([heading[1], -heading[0]])
+    desired = desired_velocity(state, constraints)
     velocity = state.speed_mps * heading
     _agent(simulator, state.position_odom_m, velocity, desired, ROBOT_RADIUS_M, limit_mps)
     simulator.do_step()

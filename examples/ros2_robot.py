@@ -16,17 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from nav_adapter import RobotState
 from nav_adapter.ros2 import PUBLISHED, READ, DdsNode, RobotFile, renamed
-from nav_adapter.ros2.conversions import header, yaw_quaternion
-from nav_adapter.ros2.messages.geometry_msgs import (
-    Point,
-    Pose,
-    PoseWithCovariance,
-    Twist,
-    TwistWithCovariance,
-    Vector3,
-)
-from nav_adapter.ros2.messages.nav_msgs import Odometry
+from nav_adapter.ros2.conversions import header, odometry_of
 from nav_adapter.ros2.messages.sensor_msgs import LaserScan
 
 ROBOT = Path(__file__).resolve().parents[1] / "docs" / "nav2" / "robot.yaml"
@@ -79,15 +71,8 @@ def main(seconds: float = 120.0, domain: int = 0) -> None:
         x_m, y_m = RADIUS_M * math.sin(yaw_rad), 3.0 - RADIUS_M * math.cos(yaw_rad)
 
         now_s = time.time()
-        pose = Pose(Point(x_m, y_m, 0.0), yaw_quaternion(yaw_rad))
-        twist = Twist(Vector3(speed_mps), Vector3(z=speed_mps / RADIUS_M))
-        odometry = Odometry(
-            header(now_s, "odom"),
-            "base_link",
-            PoseWithCovariance(pose),
-            TwistWithCovariance(twist),
-        )
-        node.publish(READ["odom"], odometry)
+        state = RobotState(now_s, [x_m, y_m], yaw_rad, speed_mps, speed_mps / RADIUS_M)
+        node.publish(READ["odom"], odometry_of(state))
         cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
         T_odom_base = np.array(
             [[cos, -sin, 0, x_m], [sin, cos, 0, y_m], [0, 0, 1, 0], [0, 0, 0, 1]]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from perception.matrices import larger_eigenvalue
 from tracking import PersonTrack
 
 from ._errors import NavError
@@ -22,12 +21,6 @@ def position_sigma_m(track: PersonTrack, ahead_s: float) -> float:
     It is that of the most uncertain direction.
     """
     return Spread.of(track.covariance_odom.tolist()).after(ahead_s).sigma_m
-
-
-def velocity_variance_m2ps2(track: PersonTrack) -> float:
-    """Return the variance of the velocity along its most uncertain direction."""
-    variance_m2ps2: float = larger_eigenvalue(*Spread.of(track.covariance_odom.tolist()).velocity)
-    return variance_m2ps2
 
 
 def checked_sigma_m(

@@ -34,13 +34,6 @@ _SHIPPED: dict[str, type[NavConfig]] = {
     "inflation": InterpolatedInflation,
     "speed": InterpolatedHumanSpeed,
 }
-# Keys of policy files of 0.2 that are gone; ``unaware_below`` is that of the alerts.
-_OF_0_2 = (
-    *("rules", "outline", "noticed", "table_m", "table_mps", "shape", "steepness"),
-    *("watching_above", "watching_human_speed_mps", "minimum_clearance_m"),
-    *("separation_clearance_m", "maximum_radius_m", "shrink_after_s", "new_clock_after_s"),
-    *("unaware_below", "repeat_after_s", "quiet_s"),
-)
 
 
 class _ShippedOrCustom:
@@ -161,21 +154,6 @@ class AwarenessPolicy(NavConfig):
         if Path(name).suffix.lower() in (".yaml", ".yml"):
             return cls.from_yaml(name)
         return cls.preset(str(name))
-
-    @classmethod
-    def from_yaml(cls, path: str | Path) -> AwarenessPolicy:
-        """Read and validate a policy file.
-
-        Raises:
-            NavError: naming the file and the key; for a key of 0.2 also the command that helps.
-        """
-        try:
-            return super().from_yaml(path)
-        except NavError as cause:
-            if any(f"unknown key {key!r} " in str(cause) for key in _OF_0_2):
-                hint = f"a file of 0.2? awarenav policy upgrade {path}"
-                raise NavError(f"{cause}; {hint}") from cause
-            raise
 
     def to_yaml(self, path: str | Path) -> None:
         """Write the policy for :meth:`from_yaml`; custom policy objects cannot be written."""

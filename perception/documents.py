@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import yaml
 
-from .errors import PerceptionError
+from .errors import PerceptionError, nearest_file
 
 try:  # the safe loader in C, ten times as fast, where PyYAML was built with it
     from yaml import CSafeLoader as _SafeLoader
@@ -139,7 +139,18 @@ def parse_yaml(
     except _RepeatedKeyError as cause:
         raise error(f"{source} has {cause}") from None
     except (yaml.YAMLError, RecursionError, *_WRONG_SCALARS) as cause:
-        raise error(f"{source} is not valid YAML: {cause}") from cause
+        raise error(f"{source} is not valid YAML: {_reason(cause)}") from cause
+
+
+def _reason(cause: Exception) -> str:
+    """Return why a text is no YAML, in one line."""
+    if not isinstance(cause, yaml.MarkedYAMLError) or cause.problem_mark is None:
+        return str(cause)
+    mark = cause.problem_mark
+    tab = any(word in str(cause.problem) for word in ("tab character", "'\\t'"))
+    spaces = "; indent with spaces" if tab else ""
+    problem = ", ".join(filter(None, (cause.context, cause.problem)))
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}{spaces}"
 
 
 def yaml_text(value: Any, **settings: Any) -> str:
@@ -221,13 +232,16 @@ def _read_text(path: Path, most_bytes: int, kind: str, error: type[ValueError]) 
         with path.open("rb") as file:
             data = file.read(most_bytes + 1)
     except OSError as cause:
-        raise error(f"cannot read {path}: {cause.strerror or cause}") from cause
+        reason = f"{cause.strerror or cause}{nearest_file(path)}"
+        raise error(f"cannot read {path}: {reason}") from cause
     if len(data) > most_bytes:
         raise error(_too_large(str(path), most_bytes))
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as cause:
-        raise error(f"{path} is not valid {kind}: {cause}") from cause
+        raise error(
+            f"{path} is not valid {kind}: its byte {cause.start} is not UTF-8; save it as UTF-8"
+        ) from cause
 
 
 def _excess(text: str) -> str:

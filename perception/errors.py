@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class AwarenavError(ValueError):
@@ -32,6 +33,16 @@ def did_you_mean(given: object, names: Iterable[str], *, cutoff: float = 0.6) ->
     """
     near = difflib.get_close_matches(str(given), list(names), n=1, cutoff=cutoff)
     return f"; did you mean {near[0]!r}?" if near else ""
+
+
+def nearest_file(path: Path) -> str:
+    """Return a hint at the file in the folder whose name, without its ending, is most similar."""
+    try:
+        names = {each.stem: each.name for each in path.parent.iterdir()}
+    except OSError:
+        return ""
+    near = difflib.get_close_matches(path.stem, names, n=1)
+    return f"; did you mean {names[near[0]]!r}?" if near and not path.exists() else ""
 
 
 def not_one_of(

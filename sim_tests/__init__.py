@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from .actors.body import Worker
     from .actors.robot import NOVA_CARTER
     from .crossing import CrossingFrame, CrossingResult, StraightOn, run_crossing
-    from .crossing.eyes import KeypointNoise
     from .crossing.planner import LocalPlanner, ReferencePlanner
+    from .crossing.sensors import KeypointNoise
     from .scenario import Scenario, ScenarioTemplate, shipped_scenarios
     from .world import Warehouse
     from .world.camera import CameraRenderer

@@ -25,12 +25,14 @@ from .world.errors import SimError
 SCENARIO_SETS: Final = ("all", "guidelines", "step_out", "at_work")
 #: The same in help texts.
 SETS_TEXT: Final = ", ".join(map(repr, SCENARIO_SETS))
-#: How the people in an image are perceived.
+#: What perceives the people in the images of the camera.
 PerceptionKind = Literal["truth", "keypoints", "pixels"]
-#: The sensors of the robot.
-SensorSet = Literal["camera", "camera+scanner", "scanner"]
 #: One more kind, for comparison: the truth about everybody who is not hidden by a rack.
 ORACLE: Final = "oracle"
+#: Cameras by name, of which a robot has one at most, and its other sensors. Each is the class of
+#: this name in ``crossing/sensors/_NAME.py``.
+CAMERAS: Final = ("truth", ORACLE, "keypoints", "pixels", "depth")
+OTHER_SENSORS: Final = ("scanner",)
 #: The command line's name of the reference planner, which is empty elsewhere.
 REFERENCE_PLANNER: Final = "reference"
 #: The same planner's name in tables of episodes.
@@ -50,93 +52,95 @@ USUAL_SENSORS: Final = {
 }
 #: Completion of scenarios on the command line.
 COMPLETE_SCENARIOS: Final = completion_of(
-    "sim_tests",
-    "scenario/shipped",
-    *SCENARIO_SETS,
-    sets=SCENARIO_SETS[1:],
+    "sim_tests", "scenario/shipped", *SCENARIO_SETS, sets=SCENARIO_SETS[1:]
 )
 #: Completion of the policies of crossings, which have today's AMR besides.
-COMPLETE_SIMULATED_POLICIES: Final = completion_of("nav_adapter", "policies", "scanner")
+COMPLETE_SIMULATED_POLICIES: Final = completion_of(
+    "nav_adapter", "policies", "scanner", "scanner_warning"
+)
 
 _KINDS: Final[tuple[str, ...]] = get_args(PerceptionKind)
-_SENSOR_SETS: Final[tuple[str, ...]] = get_args(SensorSet)
-_AND_SCANNER: Final = "+scanner"
+# In --sensors, the camera of --perception.
+_CAMERA: Final = "camera"
 _SCANNER: Final = "scanner"
-# A scanner adds nothing to the truth.
+# Another sensor adds nothing to the truth.
 _TRUTHS: Final = ("truth", ORACLE)
 
 _ScenarioT = TypeVar("_ScenarioT")
 
 
-class Perception(NamedTuple):
-    """The perception of a robot.
+class Perception(tuple[str, ...]):
+    """The sensors of a robot: names of :data:`CAMERAS` and :data:`OTHER_SENSORS`, in this order."""
 
-    Attributes:
-        kind: one of :data:`PerceptionKind`, :data:`ORACLE`, or empty without a camera.
-        has_scanners: whether the scenario's scanners are used.
-    """
-
-    kind: str
-    has_scanners: bool = False
+    __slots__ = ()
 
     @property
     def name(self) -> str:
         """The name in tables, such as ``"keypoints+scanner"``."""
-        if not self.has_scanners:
-            return self.kind
-        return self.kind + _AND_SCANNER if self.kind else _SCANNER
+        return "+".join(self)
 
     @property
-    def sensors(self) -> SensorSet:
-        """The set of sensors: with the kind, what :meth:`of` takes."""
-        if not self.has_scanners:
-            return "camera"
-        return "camera+scanner" if self.kind else "scanner"
+    def kind(self) -> str:
+        """The name of the camera; empty without one."""
+        return self[0] if self[0] in CAMERAS else ""
+
+    @property
+    def is_a_set(self) -> bool:
+        """Whether they go together: one camera that is not the truth, and others."""
+        return self[0] not in _TRUTHS and not set(self[1:]) & set(CAMERAS)
+
+    @property
+    def sensors(self) -> str:
+        """The list of sensors: with the kind, what :meth:`of` takes."""
+        return "+".join(_CAMERA if each in (*_KINDS, ORACLE) else each for each in self)
 
     @property
     def options(self) -> str:
         """The options of ``awarenav crossings``, such as ``"--perception keypoints …"``."""
         if self.kind == ORACLE:
             return f"--policy {ORACLE}"
-        kind = f"--perception {self.kind} " if self.kind else ""
+        kind = f"--perception {self.kind} " if self.kind in _KINDS else ""
         return f"{kind}--sensors {self.sensors}"
 
     @classmethod
     def named(cls, name: str) -> Perception:
-        """Return the perception of a name in tables."""
-        if name == _SCANNER:
-            return cls("", has_scanners=True)
-        kind = name.removesuffix(_AND_SCANNER)
-        has_scanners = kind != name
-        if kind in (*_KINDS, ORACLE) and not (has_scanners and kind in _TRUTHS):
-            return cls(kind, has_scanners)
-        seen = (kind for kind in _KINDS if kind not in _TRUTHS)
-        names = (*_KINDS, *(kind + _AND_SCANNER for kind in seen), _SCANNER)
+        """Return the perception of a name in tables; raise SimError for another name."""
+        parts = set(name.split("+"))
+        found = cls(each for each in (*CAMERAS, *OTHER_SENSORS) if each in parts)
+        if name and found.name == name and (found[1:] == () or found.is_a_set):
+            return found
+        seen = [each for each in CAMERAS if each not in _TRUTHS]
+        both = [f"{camera}+{other}" for camera in seen for other in OTHER_SENSORS]
+        names = (*_KINDS, *(each for each in seen if each not in _KINDS), *both, *OTHER_SENSORS)
         raise SimError(not_one_of("perception", name, names))
 
     @classmethod
     def of(cls, kind: str, sensors: str) -> Perception:
-        """Return the perception of a kind with a set of sensors.
+        """Return the perception of a kind with a list of sensors.
 
         Args:
             kind: one of :data:`PerceptionKind`.
-            sensors: one of :data:`SensorSet`; with the scanner alone, nobody is seen in images.
+            sensors: names joined by ``+``, of which ``"camera"`` is the camera of this kind.
 
         Raises:
-            SimError: for other names, and for the truth with a scanner.
+            SimError: for other names, for two cameras, and for the truth with another sensor.
         """
         if kind not in _KINDS:
             raise SimError(not_one_of("perception", kind, _KINDS))
-        if sensors not in _SENSOR_SETS:
-            raise SimError(not_one_of("sensors", sensors, _SENSOR_SETS))
-        if sensors == "camera":
-            return cls(kind)
-        if kind in _TRUTHS:
+        own = [each for each in CAMERAS if each not in (*_KINDS, ORACLE)]
+        for each in sensors.split("+"):
+            if each not in (known := (_CAMERA, *own, *OTHER_SENSORS)):
+                raise SimError(not_one_of("sensors", each, known))
+        if kind in _TRUTHS and sensors != _CAMERA:
             raise SimError(
-                f"perception {kind!r} has no use for a scanner: sensors must be 'camera', got "
+                f"perception {kind!r} has no use for other sensors: sensors must be 'camera', got "
                 f"{sensors!r}; or perception must be 'keypoints' or 'pixels'"
             )
-        return cls("" if sensors == "scanner" else kind, has_scanners=True)
+        parts = [kind if each == _CAMERA else each for each in sensors.split("+")]
+        found = cls(each for each in (*CAMERAS, *OTHER_SENSORS) if each in parts)
+        if len(found) < len(parts) or not (found[1:] == () or found.is_a_set):
+            raise SimError(f"sensors must be one camera and others, each once, got {sensors!r}")
+        return found
 
 
 class AxisOption(NamedTuple):
@@ -220,10 +224,12 @@ class Conditions:
         metavar="NAME|FILE",
         shell_complete=COMPLETE_SIMULATED_POLICIES,
         several={
-            "help": "Policies: presets, 'scanner' (today's AMR), YAML files, or 'oracle' (balanced "
-            "with true awareness).",
+            "help": "Policies: presets, 'scanner' (today's AMR), 'scanner_warning' (the same with "
+            "a warning field), YAML files, or 'oracle' (balanced with true awareness).",
             "default": ["balanced"],
-            "shell_complete": completion_of("nav_adapter", "policies", "scanner", ORACLE),
+            "shell_complete": completion_of(
+                "nav_adapter", "policies", "scanner", "scanner_warning", ORACLE
+            ),
         },
     )
     planner: str = _axis(
@@ -238,20 +244,24 @@ class Conditions:
         several={"default": [REFERENCE_PLANNER]},
     )
     perception: str = _axis(
-        '``"truth"``, ``"keypoints"`` or ``"pixels"``, with ``"+scanner"`` if there are '
-        'scanners too, or ``"scanner"``.',
+        'Names of the sensors, joined by ``+``: ``"truth"``, ``"keypoints"``, ``"pixels"`` or '
+        '``"depth"``, and ``"scanner"``.',
         help="How the robot perceives people.",
         type=OneOf(_KINDS),
         default="keypoints",
         also={
             "sensors": AxisOption(
                 {
-                    "help": "Sensors of the robot: its camera, its laser scanners, or both. With "
+                    "help": "Sensors of the robot, joined by '+': its camera, or a camera that "
+                    "measures depth, and its laser scanners; such as 'camera+scanner'. With "
                     "scanners, --perception is keypoints or pixels.",
-                    "type": OneOf(_SENSOR_SETS),
-                    "default": "camera",
+                    "metavar": "NAME[+NAME...]",
+                    "shell_complete": completion_of(
+                        "sim_tests", "crossing/sensors", _CAMERA, "depth", *OTHER_SENSORS
+                    ),
+                    "default": _CAMERA,
                 },
-                several={"default": ["camera"], "note": " Several sets are compared."},
+                several={"default": [_CAMERA], "note": " Several lists are compared."},
             )
         },
     )

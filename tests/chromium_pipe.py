@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import os
 import select
@@ -125,11 +124,6 @@ class Chromium:
         self.call("Input.dispatchKeyEvent", type="keyDown", **keys)
         self.call("Input.dispatchKeyEvent", type="keyUp", **keys)
         self.drawn()
-
-    def screenshot(self, file: Path, *, whole: bool = False) -> None:
-        """Write a PNG of the window, or of the whole page."""
-        shot = self.call("Page.captureScreenshot", captureBeyondViewport=whole)
-        file.write_bytes(base64.b64decode(shot["data"]))
 
     def complaints(self) -> list[str]:
         """Return what the page wrote to the console, and errors that nothing caught."""

@@ -20,7 +20,7 @@ ARGUMENTS = {"ros2_robot": ("1",)}
 # Examples that drive end with a line of results.
 DRIVING = (
     "crossing_person",
-    "point_obstacle_dwa",
+    "dwa_arcs",
     "orca_half_planes",
     "orca_rvo2",
     "mppi_cost",
@@ -56,6 +56,21 @@ def test_example_runs(path):
         assert "goal reached" in last
         assert gap_m >= 0.2
         assert excess_mps <= 0.01
+
+
+@pytest.mark.parametrize("name", ["dwa_arcs", "mppi_cost", "orca_half_planes", "orca_rvo2"])
+def test_a_planner_that_knows_the_limit_elsewhere_is_sooner_there_than_one_that_does_not(name):
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name], reason="the example needs the extra dev")
+    planned, straight_on = (
+        [
+            float(x)
+            for x in re.findall(r"([0-9.]+) (?:s|m),", printed(f"{each}.py").splitlines()[-1])
+        ]
+        for each in (name, "crossing_person")
+    )
+    assert planned[0] < straight_on[0] - 0.5  # time
+    assert planned[1] > straight_on[1]  # gap
 
 
 def test_the_costmap_example_leaves_the_map_as_it_was(tmp_path):

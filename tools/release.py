@@ -76,7 +76,7 @@ def notes(changelog: str, version: str) -> str:
 def main() -> int:
     """Check and print; return 0, or 1 if something does not agree."""
     parser = argparse.ArgumentParser(prog="python -m tools.release", description=__doc__)
-    parser.add_argument("tag", help="tag to release, as v0.3.0")
+    parser.add_argument("tag", help="tag to release, as v0.4.0")
     tag = parser.parse_args().tag
     found = problems(ROOT, tag)
     for problem in found:

@@ -41,11 +41,6 @@ class AwarenessFilterConfig(StrictConfig):
     no_face_time_constant_s: float = Field(default=0.2, ge=_LEAST_S, le=_MOST_S)
     """Time constant of the drift to the prior while the person is seen without a usable face."""
 
-    memory_s: float = Field(default=0.0, ge=0.0, le=10.0)
-    """Memory of a look at the robot: the time constants of unseen and of no face are at least this.
-    A face that looks away is evidence and ends the memory, and so does an ambiguous match. The
-    default 0 is no memory; with a memory the robot relies on a look that is that old."""
-
     noticed_memory_s: float = Field(default=0.0, ge=0.0, le=10.0)
     """``PersonTrack.noticed`` lasts at most this long after the last look at the robot, while a
     sensor other than the camera keeps seeing the person. 0 switches it off."""

@@ -179,8 +179,7 @@ def _drift(
     elif seen and missed and stamp - track.face_s <= _MISSED_FACE_S:
         pass  # the belief stays as it is
     elif seen and not face:
-        no_face_s = max(config.no_face_time_constant_s, config.memory_s)
-        track.belief = drift(track.belief, dt_s, no_face_s, config)
+        track.belief = drift(track.belief, dt_s, config.no_face_time_constant_s, config)
         # A person without a face has not just been missed: that ends the grace.
         track.face_s = -math.inf
     else:

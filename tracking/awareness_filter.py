@@ -180,8 +180,8 @@ def drift_unseen(
     """Return the belief at ``to_s`` ≥ ``from_s`` if no frame in between shows the person.
 
     A single missed frame costs little: until the last face is :func:`grace_s` ago the belief drifts
-    as between two faces, then with ``unseen_time_constant_s`` (or ``memory_s``, if longer). The
-    bound falls throughout, and the result does not depend on frames in between.
+    as between two faces, then with ``unseen_time_constant_s``. The bound falls throughout, and the
+    result does not depend on frames in between.
 
     Args:
         belief: at ``from_s``.
@@ -191,11 +191,9 @@ def drift_unseen(
         period_s: usual time between frames.
         config: settings.
     """
-    unseen_s = max(config.unseen_time_constant_s, config.memory_s)
-    slow_s = max(config.evidence_time_constant_s, unseen_s)
     slow_until_s = min(max(face_s + grace_s(period_s, config) - from_s, 0.0), to_s - from_s)
-    belief = drift(belief, slow_until_s, slow_s, config)
-    return drift(belief, to_s - from_s - slow_until_s, unseen_s, config)
+    belief = drift(belief, slow_until_s, config.evidence_time_constant_s, config)
+    return drift(belief, to_s - from_s - slow_until_s, config.unseen_time_constant_s, config)
 
 
 def measure(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, Protocol, TypeAlias, TypeVar
+from typing import Final, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -17,15 +17,6 @@ Upper: TypeAlias = tuple[
 
 # Where each element of the covariance is in its upper triangle.
 _PLACES: Final = np.array([[0, 1, 2, 3], [1, 4, 5, 6], [2, 5, 7, 8], [3, 6, 8, 9]])
-
-
-class Tracked(Protocol):
-    """Something with the covariance of a :class:`~tracking.PersonTrack`."""
-
-    @property
-    def covariance_odom(self) -> FloatArray:
-        """(4, 4), order x, y, vx, vy."""
-        ...
 
 
 def drifted(upper: Upper[_Value], dt_s: _Value) -> Upper[_Value]:
@@ -51,16 +42,3 @@ def drifted(upper: Upper[_Value], dt_s: _Value) -> Upper[_Value]:
 def matrices(uppers: Sequence[Upper[float]]) -> FloatArray:
     """Return the covariances (N, 4, 4) of N upper triangles, N ≥ 1."""
     return np.array(uppers)[:, _PLACES]
-
-
-def covariance_ahead(track: Tracked, ahead_s: float) -> Upper[float]:
-    """Return the upper triangle of a track's covariance, ``ahead_s`` ≥ 0 after its stamp.
-
-    It is that of constant velocity, without noise: xx, xy, xu, xv, yy, yu, yv, uu, uv, vv of the
-    place x, y and the velocity u, v. Plain numbers, fast for one track; :func:`matrices` makes
-    arrays (N, 4, 4) of them.
-    """
-    (xx, xy, xu, xv), (_, yy, yu, yv), (_, _, uu, uv), (_, _, _, vv) = (
-        track.covariance_odom.tolist()
-    )
-    return drifted((xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), ahead_s)

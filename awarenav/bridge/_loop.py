@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol, TypeVar, cast
 from nav_adapter import NavConstraints, NavError
 from nav_adapter.ros2 import AwarenessBridge, PerceptionThread, ScanThread, Topic, is_rectified
 from nav_adapter.ros2.messages import Message
+from nav_adapter.ros2.messages.geometry_msgs import PolygonStamped
 from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
@@ -51,11 +52,21 @@ class BridgeInputs:
     scans: tuple[Topic, ...] = ()
     map: Topic | None = None
     depth: Topic | None = None
+    footprint: Topic | None = None
 
     @property
     def rectified(self) -> bool:
         """True if the images are rectified, by the name of their topic."""
         return self.image is not None and is_rectified(self.image.name)
+
+
+def limit_text(bridge: AwarenessBridge, constraints: NavConstraints) -> str:
+    """Return the number of people, the limit with its reason, and the one that Nav2 gets."""
+    people = counted(len(constraints.obstacles), "person", "people")
+    return (
+        f"{people}  limit {constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by}), "
+        f"sent {bridge.sent_limit_mps(constraints):.2f}"
+    )
 
 
 class TopicPublisher:
@@ -129,12 +140,13 @@ class BridgeLoop:
                 node.subscribe(topic)
         # Poses are read before each image and each publication. On busy cores, waking for each of
         # them would cost the networks more time than reading them.
-        for topic in (inputs.odom, inputs.tf, inputs.tf_static, inputs.map):
+        for topic in (inputs.odom, inputs.tf, inputs.tf_static, inputs.map, inputs.footprint):
             if topic is not None:
                 node.subscribe(topic, wakes=False)
         self._perception = PerceptionThread(bridge, time.time, on_frame=self._on_frame)
         self._scans = ScanThread(bridge, time.time) if inputs.scans else None
-        self._unheard = [topic for topic in (inputs.map, inputs.tf_static) if topic is not None]
+        once = inputs.map, inputs.tf_static, inputs.footprint
+        self._unheard = [topic for topic in once if topic is not None]
 
     def run(
         self, seconds: float | None = None, *, report: Callable[[str], None] = lambda text: None
@@ -158,15 +170,16 @@ class BridgeLoop:
                 total = self._processed
                 report(
                     f"{(total - before) / (now - reported):4.1f} frames/s  "
-                    f"{counted(len(constraints.obstacles), 'person', 'people')}  limit "
-                    f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
+                    f"{limit_text(self._bridge, constraints)}"
                 )
                 reported, before = now, total
 
     def _report_unheard(self, report: Callable[[str], None]) -> None:
-        """Say once which topics that are sent only once have sent nothing, and why."""
+        """Say once which topics that need not be sent again have sent nothing, and why."""
         for topic in self._unheard:
-            if self._node.has_unfit_publisher(topic):
+            if topic is self._inputs.footprint:
+                report(f"no footprint yet on /{topic.name}: that of the robot file holds")
+            elif self._node.has_unfit_publisher(topic):
                 report(
                     f"nothing comes from the publisher of /{topic.name}: its durability is "
                     "volatile or its reliability best_effort; they must be transient_local and "
@@ -198,6 +211,8 @@ class BridgeLoop:
             bridge.on_transforms(transforms, time.time())
         for odometry in self._messages(inputs.odom, Odometry):
             bridge.on_odometry(odometry, time.time())
+        for footprint in self._messages(inputs.footprint, PolygonStamped):
+            bridge.on_footprint(footprint, time.time())
         if inputs.camera_info is not None:
             # Taken even if it is not needed: waiting ends at once while a message is left.
             for cdr in self._node.take_cdr(inputs.camera_info)[-1:]:

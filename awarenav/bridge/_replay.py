@@ -12,12 +12,12 @@ from nav_adapter import NavError
 from nav_adapter.ros2 import AwarenessBridge, Topic
 from nav_adapter.ros2.conversions import from_ros
 from nav_adapter.ros2.messages import Message, ros_type
+from nav_adapter.ros2.messages.geometry_msgs import PolygonStamped
 from nav_adapter.ros2.messages.nav_msgs import OccupancyGrid, Odometry
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 
-from ..errors import counted
-from ._loop import BridgeInputs, BridgeViewer
+from ._loop import BridgeInputs, BridgeViewer, limit_text
 
 if TYPE_CHECKING:
     from nav_adapter.ros2 import McapRecorder
@@ -71,6 +71,7 @@ def recorded_messages(path: Path, inputs: BridgeInputs) -> BagMessages:
         inputs.camera_info,
         inputs.odom,
         inputs.map,
+        inputs.footprint,
         *inputs.scans,
     )
     optional = (inputs.tf, inputs.tf_static)
@@ -188,10 +189,7 @@ class BagReplay:
         if self._viewer is not None:
             self._viewer.draw(self._bridge, constraints)
         if report is not None:
-            report(
-                f"{now_s:.1f} s  {counted(len(constraints.obstacles), 'person', 'people')}  limit "
-                f"{constraints.speed_limit_mps:.2f} m/s ({constraints.limited_by})"
-            )
+            report(f"{now_s:.1f} s  {limit_text(self._bridge, constraints)}")
 
     def _readers_of(self, inputs: BridgeInputs) -> dict[str, Callable[[Any, float], None]]:
         """Return by topic what is done with a message and its time."""
@@ -209,6 +207,9 @@ class BagReplay:
         def depth(message: Any, now_s: float) -> None:
             bridge.on_depth(from_ros(Image, message), now_s)
 
+        def footprint(message: Any, now_s: float) -> None:
+            bridge.on_footprint(from_ros(PolygonStamped, message), now_s)
+
         def scan(number: int, message: Any, now_s: float) -> None:
             bridge.on_scan(number, from_ros(LaserScan, message), now_s)
 
@@ -225,6 +226,7 @@ class BagReplay:
                 lambda m, t: bridge.on_transforms(from_ros(TFMessage, m), static=True),
             ),
             (inputs.map, lambda m, t: bridge.on_map(from_ros(OccupancyGrid, m))),
+            (inputs.footprint, footprint),
             *((topic, partial(scan, number)) for number, topic in enumerate(inputs.scans)),
         )
         readers |= {f"/{topic.name}": read for topic, read in optional if topic is not None}

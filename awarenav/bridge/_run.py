@@ -286,6 +286,9 @@ def _inputs(options: Any) -> BridgeInputs:
         if options.map is None or _is_file(options.map)
         else renamed(READ["map"], options.map),
         depth=None if options.depth is None else renamed(READ["depth"], options.depth),
+        footprint=None
+        if options.footprint is None
+        else renamed(READ["footprint"], options.footprint),
     )
 
 

@@ -116,6 +116,13 @@ _LOG: Final = "Recordings"
     help="Frame in tf of the map in a file; the fixed frame itself needs no tf.",
 )
 @option(
+    "--footprint",
+    group=_READ,
+    metavar="TOPIC",
+    help="geometry_msgs/PolygonStamped of the footprint with a load, as Nav2 publishes it on "
+    "local_costmap/published_footprint. It counts beside that of the robot file.",
+)
+@option(
     "--bag",
     group=_READ,
     type=FilePath(),

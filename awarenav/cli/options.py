@@ -230,10 +230,10 @@ _NETWORK_OPTIONS: Final = (
         "--small-face",
         group=_NETWORKS,
         excludes="--networks",
-        show_default="from the set 'real' once fetched, else 'none'",
+        show_default="none",
         metavar="NAME|FILE",
         help="Network that looks again where --face finds none: 'retinaface-mobilenet' (`awarenav "
-        "models fetch real`), a file mobilenet0.25_Final.pth, or 'none'.",
+        "models fetch retinaface-mobilenet`), a file mobilenet0.25_Final.pth, or 'none'.",
     ),
     option(
         "--eyes",

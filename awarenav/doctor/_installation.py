@@ -30,7 +30,7 @@ _EXTRAS: Final = (
     ("sim", "pybullet", "crossings"),
     ("ros2", "cyclonedds", "the bridge"),
     ("rosbag", "rosbags", "recordings"),
-    ("litert", "ai_edge_litert", "TFLite networks at full speed"),
+    ("litert", "ai_edge_litert", "TFLite networks, as those of the set real"),
     ("fetch", "pooch", "networks that no package index has"),
     ("movenet", "onnx", "fetching MoveNet"),
 )

@@ -69,8 +69,7 @@ _TURN_WORDS: Final = (
 _REMEDY_NETWORKS: Final = "awarenav models fetch real"
 _FASTER_CAMERA: Final = "a higher rate of the camera's driver; no network changes it"
 _FASTER_NETWORKS: Final = (
-    "--detect-every-s 0.15; for TFLite networks, as `awarenav models fetch real` brings them, the "
-    "extra 'litert'; smaller networks, a GPU (--provider), or another computer"
+    "--detect-every-s 0.15; smaller networks, a GPU (--provider), or another computer"
 )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -19,9 +20,11 @@ from nav_adapter.ros2 import (
     optical_problem,
     picture_of,
 )
-from nav_adapter.ros2.conversions import from_ros
+from nav_adapter.ros2.conversions import from_ros, pose_matrix, to_seconds
+from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
 from perception import Camera
+from perception.arrays import FloatArray
 from perception.documents import read_yaml
 from perception.installation import install_command
 
@@ -41,6 +44,11 @@ except ImportError as cause:  # pragma: no cover - depends on the installation
 _IMAGES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO: Final = "sensor_msgs/msg/CameraInfo"
 _TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
+_ODOMETRY: Final = "nav_msgs/msg/Odometry"
+# So long an image waits for the transforms of its time, in recorded time.
+_PATIENCE_S: Final = 0.3
+# Damaged messages, and those of ROS 1 with other fields, tell nothing.
+_UNREADABLE: Final = (ValueError, TypeError, AttributeError)
 # By then every mount has been sent.
 _MOST_TRANSFORMS: Final = 1000
 # What the library says of a file, and its usual cause.
@@ -223,7 +231,8 @@ class BagSource(ImageSource):
     """One image topic of a recording: rosbag2 folder, ``.db3``, ``.mcap``, or a ROS 1 ``.bag``.
 
     The stamp of a frame is that of its message's header. The ``camera_info`` topic beside the
-    images is their camera; the topic's name tells whether they are rectified.
+    images is their camera; the topic's name tells whether they are rectified. A frame has the
+    camera's pose in odom where transforms, or the odometry, tell it.
 
     Args:
         path: of the recording.
@@ -268,17 +277,16 @@ class BagSource(ImageSource):
         """Yield the images of the topic, numbered from 000000."""
         last_s, number = 0.0, 0
         try:
-            for _, recorded_s, message in self._bag.of(_IMAGES, self._topic):
-                stamp = message.header.stamp
+            for recorded_s, message, pose in self._posed():
                 # A driver without a clock sends zero.
-                stamp_s = float(stamp.sec) + 1.0e-9 * float(stamp.nanosec)
+                stamp_s = to_seconds(message.header.stamp)
                 last_s = stamp_s if stamp_s > 0.0 else recorded_s
                 name, image, problem = f"{number:06d}", None, ""
                 try:
                     image = picture_of(message)
                 except NavError as cause:
                     problem = f"{self._topic}, message {number}: {cause}"
-                yield SourceFrame(name, last_s, image, problem=problem)
+                yield SourceFrame(name, last_s, image, pose, on_robot=True, problem=problem)
                 number += 1
         except AwarenavError as cause:
             yield SourceFrame(f"{number:06d}", max(last_s, 0.0), None, problem=str(cause))
@@ -286,6 +294,36 @@ class BagSource(ImageSource):
     def close(self) -> None:
         """Close the recording."""
         self._bag.close()
+
+    def _posed(self) -> Iterator[tuple[float, Any, FloatArray | None]]:
+        """Yield time of recording and message of each image, with the camera's pose in odom."""
+        kinds = {name: kind for name, kind in self._bag.topics if kind in (_TRANSFORMS, _ODOMETRY)}
+        static = [name for name in kinds if name.endswith("_static")]
+        moving = [name for name in kinds if name not in static]
+        poses = _Poses()
+        for _, _, message in self._bag.of([_TRANSFORMS], *static) if static else ():
+            poses.add(message, static=True)
+        waiting: deque[tuple[float, Any]] = deque()
+        wanted, damage = (*_IMAGES, _TRANSFORMS, _ODOMETRY), None
+        try:
+            for topic, recorded_s, message in self._bag.of(wanted, self._topic, *moving):
+                if topic == self._topic:
+                    waiting.append((recorded_s, message))
+                elif kinds[topic] == _TRANSFORMS:
+                    poses.add(message)
+                else:
+                    poses.add_odometry(message)
+                while waiting and (
+                    recorded_s - waiting[0][0] > _PATIENCE_S or poses.reach(waiting[0][1].header)
+                ):
+                    at_s, image = waiting.popleft()
+                    yield at_s, image, poses.of(image.header)
+        except AwarenavError as cause:
+            damage = cause
+        for at_s, image in waiting:
+            yield at_s, image, poses.of(image.header)
+        if damage is not None:
+            raise damage
 
     def _chosen_topic(self, topic: str | None) -> str:
         """Return the image topic that was asked for, or the only one."""
@@ -354,8 +392,7 @@ class BagSource(ImageSource):
         transforms = TransformBuffer()
         topics = sorted(name for name, kind in self._bag.topics if kind == _TRANSFORMS)
         static = [name for name in topics if name.endswith("_static")]
-        # Damaged transforms, and those of ROS 1 with other fields, tell nothing.
-        with contextlib.suppress(ValueError, TypeError, AttributeError):
+        with contextlib.suppress(*_UNREADABLE):
             frame = str(shown.header.frame_id).lstrip("/")
             for names in filter(None, (static, [name for name in topics if name not in static])):
                 found = self._bag.of([_TRANSFORMS], *names)
@@ -369,6 +406,51 @@ class BagSource(ImageSource):
                     else:
                         self.up_camera = T_root_camera[2, :3]
                     return
+
+
+class _Poses:
+    """The poses of cameras in odom, from transforms and odometry as they come.
+
+    Odometry counts for a frame that transforms have not told yet.
+    """
+
+    def __init__(self) -> None:
+        self._transforms = TransformBuffer()
+        self._odom, self._told = "odom", set[str]()
+
+    def add(self, message: Any, *, static: bool = False) -> None:
+        """Take the transforms of a message."""
+        with contextlib.suppress(*_UNREADABLE):
+            for each in from_ros(TFMessage, message).transforms:
+                self._told.add(each.child_frame_id.lstrip("/"))
+                self._transforms.add_message(each, static=static)
+
+    def add_odometry(self, message: Any) -> None:
+        """Take the pose of the robot, whose frame is odom from then on."""
+        with contextlib.suppress(*_UNREADABLE):
+            odometry = from_ros(Odometry, message)
+            child = odometry.child_frame_id.lstrip("/") or "base_link"
+            self._odom = odometry.header.frame_id.lstrip("/") or self._odom
+            if child not in self._told:
+                place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
+                T_odom_child = pose_matrix((place.x, place.y, place.z), turn)
+                stamp_s = to_seconds(odometry.header.stamp)
+                self._transforms.add(self._odom, child, stamp_s, T_odom_child)
+
+    def reach(self, header: Any) -> bool:
+        """Return whether no later message can tell more about the pose at a time."""
+        with contextlib.suppress(NavError):
+            latest_s = self._transforms.latest_s(self._odom, str(header.frame_id))
+            return latest_s >= to_seconds(header.stamp)
+        return False
+
+    def of(self, header: Any) -> FloatArray | None:
+        """Return the pose (4, 4) of the optical frame of an image; None if it is not known."""
+        frame = str(header.frame_id)
+        with contextlib.suppress(NavError):
+            T_odom_camera = self._transforms.lookup(self._odom, frame, to_seconds(header.stamp))
+            return None if optical_problem(T_odom_camera, frame, self._odom) else T_odom_camera
+        return None
 
 
 def _is_zero(info: Any, names: str) -> bool:

@@ -192,14 +192,18 @@ class PeopleEstimator:
             raise AwarenavError(f"{path}: {cause}") from cause
 
     def _floor(self, frame: SourceFrame) -> FloorPlane | None:
-        """Return the floor z = 0 of odom; a recorded pose is more accurate than a typed one."""
-        if frame.T_odom_camera is not None:
-            above = frame.T_odom_camera[2, 3] > 0.0
-            return FloorPlane.from_pose(frame.T_odom_camera) if above else None
-        if self._fixed_pose is None:
+        """Return the floor z = 0 of odom: by an exact pose, else a typed one, else the robot's.
+
+        A robot's odom may begin elsewhere, at the camera for example.
+        """
+        exact = frame.T_odom_camera is not None and not frame.on_robot
+        pose = frame.T_odom_camera if exact or self._fixed_pose is None else self._fixed_pose
+        if pose is None or pose[2, 3] <= 0.0:
             return None
+        if exact:
+            return FloorPlane.from_pose(pose)
         return FloorPlane.from_pose(
-            self._fixed_pose, height_std_m=_MEASURED_STD_M, tilt_std_rad=_MEASURED_STD_RAD
+            pose, height_std_m=_MEASURED_STD_M, tilt_std_rad=_MEASURED_STD_RAD
         )
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from pathlib import Path
 from typing import Final
 
-from ..errors import AwarenavError
+from ..errors import AwarenavError, nearest_file
 from ._pictures import IMAGE_SUFFIXES
 from ._sources import ImageFiles, ImageSource, open_video
 
@@ -42,9 +41,10 @@ def open_source(text: str, *, topic: str | None = None, fps: float | None = None
     if not exists and CAMERA_NUMBER.fullmatch(text):
         return open_video(int(text), live=True)
     if not exists:
+        near = nearest_file(path) or ";"
         raise AwarenavError(
-            f"no such file or folder: {text}{_nearest(path)}; SOURCE is an image, a folder of "
-            "images, a video, the number of a camera, the address of a stream or a ROS recording"
+            f"no such file or folder: {text}{near} SOURCE is an image, a folder of images, a "
+            "video, the number of a camera, the address of a stream or a ROS recording"
         )
     if is_recording(path):
         from ._bag import BagSource  # noqa: PLC0415 - needs the extra rosbag
@@ -69,10 +69,3 @@ def is_recording(path: Path) -> bool:
         names = ("metadata.yaml", *(f"*{suffix}" for suffix in _BAG_SUFFIXES[1:]))
         return any(next(path.glob(name), None) for name in names)
     return path.suffix.lower() in _BAG_SUFFIXES
-
-
-def _nearest(path: Path) -> str:
-    if not path.parent.is_dir():
-        return ""
-    near = difflib.get_close_matches(path.name, [each.name for each in path.parent.iterdir()], n=1)
-    return f" (did you mean {path.parent / near[0]}?)" if near else ""

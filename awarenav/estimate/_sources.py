@@ -53,6 +53,7 @@ class SourceFrame:
         orientation: EXIF's number of the turn that the file asked for and the image has got; 1 for
             none.
         focal_px: focal length of the image by its EXIF data; None if they do not say it.
+        on_robot: whether a robot that drives has measured the pose; else it is exact.
     """
 
     name: str
@@ -62,6 +63,7 @@ class SourceFrame:
     problem: str = ""
     orientation: int = 1
     focal_px: float | None = None
+    on_robot: bool = False
 
 
 class ImageSource(ABC):

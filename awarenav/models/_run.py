@@ -5,11 +5,13 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
 import yaml
 
+from perception.installation import install_command
 from perception.named import DEFAULT_SET, NetworkSet, RealModel, Source, default_folder
 from perception.shipped import shipped_models, verify_shipped_model
 
@@ -18,6 +20,8 @@ from ..files import json_text, write_text
 from ._store import ModelStore
 
 _WIDTH: Final = 100
+# Ends of files that LiteRT runs.
+_OF_LITERT: Final = (".tflite", ".task")
 
 
 def list_command(folder: Path | None, *, as_json: bool) -> int:
@@ -132,6 +136,10 @@ def fetch_command(names: Sequence[str], folder: Path | None, origin: Path | None
         print(f"{name}: {path} ({model.licence}, {model.publisher}; from {source})")
         if model.note is not None:
             print(_indented(f"Note: {model.note}."))
+    if any(catalogue[name].file.endswith(_OF_LITERT) for name in singles) and not find_spec(
+        "ai_edge_litert"
+    ):
+        print(f"note: LiteRT, which runs these networks, is missing: {install_command('litert')}")
     for each in sets:
         write_text(Path(each.file), _set_text(store, each))
         print(f"{each.name}: written to {each.file}")

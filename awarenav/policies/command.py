@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from ..cli import FilePath, argument, command, group, option, options
 
 
 @group("policy")
 def policy() -> None:
-    """Show awareness policies, or translate a policy file of version 0.2."""
+    """Show awareness policies."""
 
 
 @command(
@@ -61,32 +60,4 @@ def show(
     return show_command(policies, out, robot, overwrite=overwrite, as_json=as_json)
 
 
-@command(
-    "upgrade",
-    short_help="Translate a policy file of version 0.2.",
-    examples=[
-        "awarenav policy upgrade old.yaml",
-        "awarenav policy upgrade old.yaml --out new.yaml",
-    ],
-    exit_status={
-        0: "Every setting was translated, or could be dropped safely.",
-        1: "Lines that begin with 'check' need a decision; the new file is written anyway.",
-        2: "Bad input; nothing was written.",
-    },
-)
-@argument("old", type=FilePath(), metavar="OLD.yaml", help="A policy file of version 0.2.")
-@options.out_file(None, "The new file; replaces it.", "NEW.yaml", show_default="none")
-def upgrade(**values: Any) -> int:
-    """Say what becomes of each setting of a policy file of 0.2, and write the new file.
-
-    A line begins with kept, renamed, replaced, dropped, added or check. A setting that the old
-    file left out, and whose default has changed, is written with its old value. 'check' means that
-    the new file may be less careful than the old one on this point, and says what to do.
-    """
-    from ._upgrade import upgrade_command  # noqa: PLC0415 - help needs no policies
-
-    return upgrade_command(**values)
-
-
 policy.add_command(show)
-policy.add_command(upgrade)

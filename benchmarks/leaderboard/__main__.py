@@ -9,7 +9,7 @@ from benchmarks._harness import count, make_parser
 
 from ._measure import measure
 from ._page import leaderboard_page
-from ._results import headline
+from ._results import PAGES, write_figures
 from ._rows import PAGE, RESULTS, Board
 
 
@@ -17,8 +17,8 @@ def main() -> int:
     """Run the command; return 2 for bad input."""
     parser = make_parser(
         "benchmarks.leaderboard",
-        "Measure the rows that docs/leaderboard lacks, and write docs/what_it_wins.md. An "
-        "interrupted run continues with the same command.",
+        "Measure the rows that docs/leaderboard lacks, and write docs/what_it_wins.md and the "
+        "figures of README. An interrupted run continues with the same command.",
     )
     parser.add_argument(
         "--row", nargs="+", metavar="NAME", help="rows to measure (default: all of rows.yaml)"
@@ -27,24 +27,19 @@ def main() -> int:
         "--workers", type=count, default=1, metavar="N", help="worker processes (default: 1)"
     )
     parser.add_argument("--again", action="store_true", help="measure the rows from the beginning")
-    parser.add_argument("--page", action="store_true", help="measure nothing, write the page")
-    parser.add_argument(
-        "--results", action="store_true", help="measure nothing, print the results of README"
-    )
+    parser.add_argument("--page", action="store_true", help="measure nothing, write the pages")
     options = parser.parse_args()
     try:
         board = Board.read()
-        if options.results:
-            print(headline(board))
-            return 0
         rows = [board.named(name) for name in options.row] if options.row else list(board.rows)
         if not options.page:
             measure(board, rows, workers=options.workers, again=options.again)
         PAGE.write_text(leaderboard_page(board, RESULTS), encoding="utf-8")
+        write_figures(board)
     except AwarenavError as error:
         print(f"leaderboard: {error}", file=sys.stderr)
         return 2
-    print(f"written: docs/{PAGE.name}")
+    print(f"written: docs/{PAGE.name}, and the figures of {' and '.join(p.name for p in PAGES)}")
     return 0
 
 

@@ -28,6 +28,13 @@ from ._rows import RESULTS, Board, Row
 _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
 _RANKED_DECIMALS: Final = 2
+#: The robots that README compares, by their rows.
+ROBOTS: Final = {
+    "balanced-camera+scanner": "**awarenav**",
+    "blind-camera+scanner": "slow for everybody",
+    "today": "today's AMR, predicts",
+    "today-costmap": "today's AMR, costmap",
+}
 _TEMPLATE: Final = Path(__file__).with_name("page.txt")
 
 
@@ -76,8 +83,11 @@ class Standing:
     def impacts(self, people: str) -> str:
         """Return the mean step-out impacts with a group of people, and the fastest one."""
         mean = self.mean(f"step_out_{people}")
-        worst = _worst(f"step_out_{people}_worst_mps")(self)
-        return f"{mean.value:.2f} ({worst} m/s)" if mean.known else NOTHING
+        speeds = (getattr(each, f"step_out_{people}_worst_mps") for each in self.ran)
+        fastest_mps = max((speed for speed in speeds if speed is not None), default=0.0)
+        if mean.known and mean.value == 0.0:
+            return "0"
+        return f"{mean.value:.2f} ({fastest_mps:.2f} m/s)" if mean.known else NOTHING
 
     @property
     def rank_key(self) -> tuple[float, float, float, str]:
@@ -150,15 +160,11 @@ def leaderboard_tables(
         of = about.get(each.row.name, {})
         return ", ".join(of[name] for name in ("version", "commit", "date") if of.get(name))
 
-    def goals(each: Standing) -> str:
-        arrived = sum(record.time_to_goal_s is not None for record in each.ran)
-        touched = sum(record.person_touched for record in each.ran)
-        return f"{arrived} of {len(each.ran)}; {touched} of {len(each.ran)}"
-
     def mean(field: str, decimals: int = 1) -> Callable[[Standing], str]:
         return lambda each: each.mean(field).text(decimals)
 
     return {
+        **_beside_today(rows),
         "table": table(
             ("rank, row", ranking),
             ("contacts, moving", _contacts),
@@ -168,7 +174,7 @@ def leaderboard_tables(
         "more": table(
             ("row", _label),
             ("against today's AMR (s)", against),
-            ("goals; walked into", goals),
+            ("goals; walked into", _goals),
             ("measured", measured),
         ),
         "step_out": table(
@@ -185,17 +191,53 @@ def leaderboard_tables(
     }
 
 
+def _beside_today(rows: Sequence[Standing]) -> dict[str, Table]:
+    """Return the robots of README: by the people they meet, and the time lost by scenario."""
+    named = {each.row.name: each for each in rows}
+    robots = {title: named[name] for name, title in ROBOTS.items() if name in named}
+    lines = [
+        [f"{attention or 'all'} people: time lost (s)"]
+        + [each.mean("time_lost_s", attention).text(1) for each in robots.values()]
+        for attention in ("", *_ATTENTIONS)
+    ]
+    lines += [
+        [title, *map(cell, robots.values())]
+        for title, cell in {
+            "goals; walked into": _goals,
+            "contacts, moving": _contacts,
+            "violated margin, unaware people": _violated,
+        }.items()
+    ]
+    scenarios = dict.fromkeys(record.scenario for each in rows for record in each.ran)
+    by_scenario = [
+        [f"`{name}`"]
+        + [
+            f"{np.mean([r.time_lost_s for r in each.ran if r.scenario == name]):.1f}"
+            for each in robots.values()
+        ]
+        for name in scenarios
+    ]
+    columns = ("", *robots)
+    return {
+        "beside": Table(dict.fromkeys(columns, ""), lines),
+        "by_scenario": Table(dict.fromkeys(("time lost (s)", *robots), ""), by_scenario),
+    }
+
+
+def _goals(each: Standing) -> str:
+    arrived = sum(record.time_to_goal_s is not None for record in each.ran)
+    touched = sum(record.person_touched for record in each.ran)
+    return f"{arrived} of {len(each.ran)}; {touched} of {len(each.ran)}"
+
+
+def _violated(each: Standing) -> str:
+    unaware = [record for record in each.ran if record.attention == "unaware"]
+    return f"{sum(record.violation_time_s > 0.0 for record in unaware)} of {len(unaware)}"
+
+
 def _contacts(each: Standing) -> str:
     hits = sum(record.moving_touched for record in each.ran)
     return f"{hits} of {len(each.ran)} (≤ {100.0 * each.contacts.high:.1f} %)"
-
-
-def _worst(field: str) -> Callable[[Standing], str]:
-    def cell(each: Standing) -> str:
-        values = [value for r in each.ran if (value := getattr(r, field)) is not None]
-        return f"{max(values):.2f}" if values else NOTHING
-
-    return cell
 
 
 def _part(attention: str) -> Callable[[Standing], str]:

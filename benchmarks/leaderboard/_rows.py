@@ -19,13 +19,14 @@ from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.runs import Job, named_templates, plan_jobs, policy_text
 from sim_tests.world.config import SimConfig
 
-_ROOT: Final = Path(__file__).resolve().parents[2]
+#: The repository.
+ROOT: Final = Path(__file__).resolve().parents[2]
 #: Folder of the rows and of their results.
-RESULTS: Final = _ROOT / "docs" / "leaderboard"
+RESULTS: Final = ROOT / "docs" / "leaderboard"
 #: Folder of the runs that measure them, which git ignores.
-WORK: Final = _ROOT / "build" / "leaderboard"
+WORK: Final = ROOT / "build" / "leaderboard"
 #: The page.
-PAGE: Final = _ROOT / "docs" / "what_it_wins.md"
+PAGE: Final = ROOT / "docs" / "what_it_wins.md"
 _ROWS_FILE: Final = "rows.yaml"
 _TRUTH: Final = "truth"
 _REFERENCE: Final = "reference"
@@ -72,7 +73,7 @@ class Row(SimConfig):
 
     @property
     def _policy(self) -> AwarenessPolicy:
-        path = _ROOT / self.policy
+        path = ROOT / self.policy
         return named_policy(path if path.suffix else self.policy)[1]
 
     @property
@@ -80,7 +81,7 @@ class Row(SimConfig):
         """A digest of policy, perception, planner's name and networks: what results belong to."""
         text = "\n".join((policy_text(self._policy), self.perception, self.planner))
         if self.networks:
-            text += (_ROOT / self.networks).read_text(encoding="utf-8")
+            text += (ROOT / self.networks).read_text(encoding="utf-8")
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def jobs(self, templates: Sequence[ScenarioTemplate], seeds: Sequence[int]) -> tuple[Job, ...]:
@@ -97,7 +98,7 @@ class Row(SimConfig):
             planners=["" if self.planner == _REFERENCE else self.planner],
             perception=_TRUTH if truth else self._kind,
             sensors=["camera" if truth else self.sensors],
-            networks=str(_ROOT / self.networks) if self.networks else "",
+            networks=str(ROOT / self.networks) if self.networks else "",
         )
 
 

@@ -28,6 +28,8 @@ _EXCESS_COLUMNS: Final = (
     "fastest_point_excess_mps",
 )
 _TODAY: Final = "today"
+#: Policies of the summary: awarenav's default, and slow for everybody.
+_SUMMED: Final = ("balanced", "blind")
 _FACES: Final = {
     _TODAY: "today: scans alone",
     "limit": "limit",
@@ -73,9 +75,7 @@ def table(path: Path = ROWS) -> str:
     episodes; an episode that never arrives counts with what it lasted.
     """
     above_mps = _read_excess(path)
-    groups: dict[tuple[str, str, str], list[EpisodeRecord]] = {}
-    for row in read_records(path):
-        groups.setdefault(_keys(row), []).append(row)
+    groups = _groups(path)
     lines = [
         "| stack | goals | time over today's | with attentive people | touched while moving | "
         "step-out impacts, never noticed; all | above the limit, m/s: median, worst |",
@@ -85,20 +85,56 @@ def table(path: Path = ROWS) -> str:
         controller, _, face = stack.partition(", ")
         today = groups[f"{controller}, {_TODAY}", "", ""]
         attentive = [each for each in rows if each.attention == "attentive"]
-        touched = [each for each in rows if each.moving_contacts]
-        fastest = max((each.moving_contact_mps or 0.0 for each in touched), default=0.0)
-        impacts = (_mean(rows, name) for name in ("step_out_never", "step_out_all"))
         cells = (
             f"{controller}, {_FACES[face]}{policy and f', `{policy}`'}{_ROBOTS[robot]}",
             f"{sum(each.time_to_goal_s is not None for each in rows)} of {len(rows)}",
             _times(today, rows) if policy else "1",
             _times(today, attentive) if policy else "1",
-            f"{len(touched)}, {fastest:.2f} m/s" if touched else "0",
-            "; ".join(f"{each:.1f}" for each in impacts),
+            _touched(rows),
+            _impacts(rows),
             _excess(above_mps[stack, policy, robot]) if policy else "",
         )
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def summary(path: Path = ROWS) -> str:
+    """Return a short table with a column for each robot: Nav2 alone, and with two policies.
+
+    The limit alone reaches Nav2, and the robot does not keep its path.
+    """
+    groups = _groups(path)
+    lines = ["| | **awarenav** | slow for everybody | Nav2 alone |", "| --- | --- | --- | --- |"]
+    for controller in sorted({stack.partition(", ")[0] for stack, _, _ in groups}):
+        today = groups[f"{controller}, {_TODAY}", "", ""]
+        attentive = [each for each in today if each.attention == "attentive"]
+        robots = [groups[f"{controller}, limit", each, ""] for each in _SUMMED]
+        rows = {
+            "time among people who watch it": (*(_times(attentive, r) for r in robots), "1"),
+            "time among all": (*(_times(today, each) for each in robots), "1"),
+            f"touched somebody while it moved, of {len(today)}": map(_touched, [*robots, today]),
+            "impacts, never noticed; all": map(_impacts, [*robots, today]),
+        }
+        lines += [f"| {controller}: {name} | {' | '.join(row)} |" for name, row in rows.items()]
+    return "\n".join(lines)
+
+
+def _groups(path: Path) -> dict[tuple[str, str, str], list[EpisodeRecord]]:
+    """Return the rows by stack and robot."""
+    groups: dict[tuple[str, str, str], list[EpisodeRecord]] = {}
+    for row in read_records(path):
+        groups.setdefault(_keys(row), []).append(row)
+    return groups
+
+
+def _touched(rows: Sequence[EpisodeRecord]) -> str:
+    touched = [each for each in rows if each.moving_contacts]
+    fastest = max((each.moving_contact_mps or 0.0 for each in touched), default=0.0)
+    return f"{len(touched)}, {fastest:.2f} m/s" if touched else "0"
+
+
+def _impacts(rows: Sequence[EpisodeRecord]) -> str:
+    return "; ".join(f"{_mean(rows, name):.1f}" for name in ("step_out_never", "step_out_all"))
 
 
 def _times(today: Sequence[EpisodeRecord], rows: Sequence[EpisodeRecord]) -> str:

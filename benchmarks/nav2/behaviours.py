@@ -109,7 +109,7 @@ def _figure(result: CrossingResult) -> str:
     if result.contacts:
         touched_mps = max(each.robot_speed_mps for each in result.contacts)
         return f"touches at {touched_mps:.2f} m/s"
-    seen = [each.separations.approaches[0] for each in result.frames]
+    seen = [each.approaches[0] for each in result.frames]
     fastest_mps = max(each.robot_speed_mps for each in seen)
     if fastest_mps < 0.03:
         return "stands"

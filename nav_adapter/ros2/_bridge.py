@@ -23,6 +23,7 @@ from .._robot import RobotProfile, RobotState
 from ..rules import Unseen
 from ._alerts import sensor_status
 from ._clock import BridgeClock
+from ._footprint_input import FootprintInput
 from ._image_input import ImageInput, PerceivedFrame
 from ._outgoing import Frames, outgoing
 from ._poses import RobotPoses
@@ -30,9 +31,11 @@ from ._scan_input import MapInput, ScanInput, ScannerInput, ScanPerception
 from ._sensor_watch import CAMERA, SensorWatch
 from ._shared import Shared
 from ._shared_tracker import SharedTracker
+from ._speed_limit import speed_limit
 from ._speed_mask import SpeedMaskSettings, SpeedMaskStream
 from .messages import Message
 from .messages.diagnostic_msgs import DiagnosticStatus
+from .messages.geometry_msgs import PolygonStamped
 from .messages.nav_msgs import OccupancyGrid, Odometry
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from .messages.tf2_msgs import TFMessage
@@ -138,6 +141,7 @@ class AwarenessBridge:
             with_depth=with_depth,
             creeps=policy.applies(Unseen.name) and not scanners,
         )
+        self._footprint = FootprintInput(shared, lambda: self._robot, self._go_on_with)
         self._map = MapInput(shared, self.frames.odom)
         self._scans: tuple[ScanInput, ...] = ()
         self._legs: ScanPerception | None = None
@@ -208,6 +212,10 @@ class AwarenessBridge:
         Raises:
             NavError: for anything else.
         """
+        self._go_on_with(robot)
+        self._footprint.bare = robot
+
+    def _go_on_with(self, robot: RobotProfile) -> None:
         with self._sending, self._lock:
             self._adapter.use_robot(robot)
             self._robot = robot
@@ -245,6 +253,19 @@ class AwarenessBridge:
         """
         with self._lock:
             self._poses.read_odometry(message, now_s)
+
+    def on_footprint(self, message: PolygonStamped, now_s: float) -> bool:
+        """Go on with the footprint of a robot that has taken or left a load; return if it was used.
+
+        The limit counts the hull of it and of the profile's footprint. A message that is refused
+        is reported, and the last one is kept.
+
+        Args:
+            message: the outline in the base frame, in one on the robot, or in odom at its stamp, as
+                Nav2's local costmap publishes it.
+            now_s: the present time.
+        """
+        return self._footprint.read(message, now_s)
 
     def on_image(self, message: Image | CompressedImage, now_s: float) -> bool:
         """Process one image; return True if it was used."""
@@ -326,6 +347,11 @@ class AwarenessBridge:
             self._send(constraints, tracks, state, self._wanted, details, sensors)
         return constraints
 
+    def sent_limit_mps(self, constraints: NavConstraints) -> float:
+        """Return the limit (m/s) that Nav2 gets: that of the base, per axis (``speed_limit``)."""
+        message = speed_limit(constraints, self._robot.max_speed_mps, state=self.robot_state)
+        return message.speed_limit
+
     def refuse(self, problem: str) -> None:
         """Warn of a message that could not be decoded."""
         self._warn(problem)
@@ -397,7 +423,7 @@ class AwarenessBridge:
         self._tracker.forget()
         self._poses.forget()
         self._watch.forget()
-        for each in (self._images, *self._scans):
+        for each in (self._images, self._footprint, *self._scans):
             each.forget()
         self._warn("the clock has been set back: all tracks and moving transforms are deleted")
 

@@ -20,17 +20,8 @@ from .._robot import RobotState
 from ._bridge import AwarenessBridge
 from ._robot_file import RobotFile
 from ._scan_input import ScannerInput
-from .conversions import header, yaw_quaternion
+from .conversions import header, odometry_of
 from .messages import sensor_msgs
-from .messages.geometry_msgs import (
-    Point,
-    Pose,
-    PoseWithCovariance,
-    Twist,
-    TwistWithCovariance,
-    Vector3,
-)
-from .messages.nav_msgs import Odometry
 
 _LOG = logging.getLogger("nav_adapter")
 
@@ -99,17 +90,8 @@ class Navigator:
             state: in odom.
             now_s: the present time; None for that of the state.
         """
-        (x_m, y_m), frames = state.position_odom_m.tolist(), self._bridge.frames
-        pose = Pose(Point(x_m, y_m, 0.0), yaw_quaternion(state.heading_odom_rad))
-        twist = Twist(
-            Vector3(state.speed_mps, state.lateral_mps, 0.0), Vector3(z=state.yaw_rate_radps)
-        )
-        message = Odometry(
-            header(state.stamp_s, frames.odom),
-            frames.base,
-            PoseWithCovariance(pose),
-            TwistWithCovariance(twist),
-        )
+        frames = self._bridge.frames
+        message = odometry_of(state, frame_id=frames.odom, child_frame_id=frames.base)
         self._bridge.on_odometry(message, state.stamp_s if now_s is None else now_s)
 
     def on_image(self, image_rgb: ImageRgb, stamp_s: float, now_s: float | None = None) -> bool:

@@ -171,11 +171,13 @@ class RobotPoses:
         return np.asarray(self._T_odom_base(stamp_s) @ T_base_camera, dtype=np.float64)
 
     def in_base(self, frame: str, stamp_s: float) -> FloatArray:
-        """Return the pose (4, 4) of a frame of the robot in the base frame.
+        """Return the pose (4, 4) of a frame of the robot, or of odom, in the base frame.
 
         Raises:
             NavError: for a pose that is not known at that time.
         """
+        if frame.lstrip("/") == self._frames.odom.lstrip("/"):
+            return np.asarray(np.linalg.inv(self._T_odom_base(stamp_s)), dtype=np.float64)
         rigid = self._is_on_robot(frame)
         return self.transforms.lookup(self._frames.base, frame, stamp_s, rigid=rigid)
 

@@ -81,6 +81,9 @@ READ: Final = MappingProxyType(
         "scan": Topic("scan", LaserScan, reliable=False),
         "scan_2": Topic("scan_2", LaserScan, reliable=False),
         "map": Topic("map", OccupancyGrid, transient_local=True, depth=1),
+        "footprint": Topic(
+            "local_costmap/published_footprint", PolygonStamped, reliable=False, depth=1
+        ),
         "odom": Topic("odom", Odometry, reliable=False, depth=50),
         "tf": Topic("tf", TFMessage, reliable=False, depth=100),
         "tf_static": Topic("tf_static", TFMessage, transient_local=True, depth=100),

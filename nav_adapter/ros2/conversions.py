@@ -15,10 +15,19 @@ from scipy.spatial.transform import Rotation
 from perception.arrays import FloatArray, finite_number
 
 from .._errors import NavError
+from .._robot import RobotState
 from ._message import FieldType, Message, field_types, ros_type
 from .messages.builtin_interfaces import Time
-from .messages.geometry_msgs import Point, Pose, Quaternion
-from .messages.nav_msgs import MapMetaData, OccupancyGrid
+from .messages.geometry_msgs import (
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Twist,
+    TwistWithCovariance,
+    Vector3,
+)
+from .messages.nav_msgs import MapMetaData, OccupancyGrid, Odometry
 from .messages.std_msgs import Header
 
 # builtin_interfaces/Time counts whole seconds in 32 bits.
@@ -64,6 +73,20 @@ def grid_of(
 def yaw_quaternion(yaw_rad: float) -> Quaternion:
     """Return the quaternion of a rotation about z."""
     return Quaternion(z=math.sin(0.5 * yaw_rad), w=math.cos(0.5 * yaw_rad))
+
+
+def odometry_of(
+    state: RobotState, *, frame_id: str = "odom", child_frame_id: str = "base_link"
+) -> Odometry:
+    """Return a robot's pose in odom and its velocity in the base frame as a message."""
+    x_m, y_m = state.position_odom_m.tolist()
+    linear = Vector3(state.speed_mps, state.lateral_mps, 0.0)
+    return Odometry(
+        header(state.stamp_s, frame_id),
+        child_frame_id,
+        PoseWithCovariance(Pose(Point(x_m, y_m, 0.0), yaw_quaternion(state.heading_odom_rad))),
+        TwistWithCovariance(Twist(linear, Vector3(z=state.yaw_rate_radps))),
+    )
 
 
 def pose_matrix(position_m: tuple[float, float, float], turn: Quaternion) -> FloatArray:

@@ -4,7 +4,7 @@ Run it with ``python -m nav_adapter.ros2.node --ros-args -p robot_file:=robot.ya
 thread publishes at a fixed rate; perception has threads of its own. Parameters:
 ``robot_file`` (required), ``policy`` (``balanced``), ``prediction_file`` (of ``awarenav tracks
 calibrate``; by default none), ``rate_hz`` (20.0), ``scanners`` (number of laser scanners, 0 to 2),
-``use_camera`` (true), ``use_map`` (false), ``compressed`` (false),
+``use_camera`` (true), ``use_map`` (false), ``use_footprint`` (false), ``compressed`` (false),
 ``depth`` (false; whether the camera has depth images),
 ``percentage`` (false), ``detector_file`` and ``pose_file`` (files, or names of networks that are
 fetched; by default the fetched set ``real``), ``allow_simulator_networks`` (false; with true, the
@@ -41,6 +41,7 @@ from ._threads import PerceptionThread, ScanThread
 from ._topics import MASK_TOPICS, PUBLISHED, READ, Topic, is_rectified
 from .conversions import from_ros, ros_class, to_ros
 from .messages import Message, ros_type
+from .messages.geometry_msgs import PolygonStamped
 from .messages.nav_msgs import OccupancyGrid, Odometry
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image, LaserScan
 from .messages.tf2_msgs import TFMessage
@@ -125,6 +126,11 @@ class AwarenessNode(Node):  # type: ignore[misc, valid-type, unused-ignore]
         self._subscribe(READ["odom"], lambda m: bridge.on_odometry(from_ros(Odometry, m), now_s()))
         self._subscribe(READ["tf"], partial(self._transforms, static=False))
         self._subscribe(READ["tf_static"], partial(self._transforms, static=True))
+        if self._parameter("use_footprint", False):
+            self._subscribe(
+                READ["footprint"],
+                lambda m: bridge.on_footprint(from_ros(PolygonStamped, m), now_s()),
+            )
         use_map = bool(scans) and self._parameter("use_map", False)
         if use_camera:
             self._subscribe(READ["camera_info"], self._calibration)

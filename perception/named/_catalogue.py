@@ -162,8 +162,6 @@ class NetworkSet(StrictConfig):
     head: str
     #: Network that refines the faces of near people; None for none.
     face: str | None = None
-    #: Network that looks again where that one finds none; None for none.
-    small_face: str | None = None
     purpose: str
     #: A hint that the command gives at the end.
     hint: str | None = None

@@ -56,10 +56,7 @@ class NetworkChoice(StrictConfig):
                 named = each.model_dump(include=set(cls.model_fields), exclude_none=True)
                 chosen = cls(**named)
                 wanted = known.intersection(map(str, named.values()))
-                missing = [name for name in wanted if not folder.is_fetched(name)]
-                if missing == [each.small_face]:  # fetched before the set had it
-                    return chosen.model_copy(update={"small_face": NONE})
-                if not missing:
+                if all(map(folder.is_fetched, wanted)):
                     return chosen
         return cls()
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+import pickle
+import struct
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, thread_time
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +49,10 @@ _DTYPES: Final[dict[str, str]] = {
     "bool": "bool",
 }
 _LOG_ERRORS_ONLY: Final = 3
+# Errors of readers of ZIP files and pickles about another file.
+_WRONG_FILE: Final = (zipfile.BadZipFile, zlib.error, pickle.UnpicklingError, struct.error)
+
+_Parsed = TypeVar("_Parsed")
 
 
 class NetworkTime(threading.local):
@@ -330,6 +338,29 @@ def read_model(path_or_bytes: Any, sha256: str | None = None) -> tuple[Path | No
     if sha256 is not None:
         _check_sha256(path or "model given as bytes", content, sha256)
     return path, content
+
+
+def read_as(
+    what: str, parse: Callable[[bytes], _Parsed], path_or_bytes: Any, sha256: str | None
+) -> tuple[str, _Parsed]:
+    """Return the name of a file for messages, and what is made of its content.
+
+    Args:
+        what: the file that it should be, for the message.
+        parse: makes something of the content; of another file it may raise any of the errors of
+            ZIP files and pickles.
+        path_or_bytes: as for :func:`read_model`.
+        sha256: as for :func:`read_model`.
+
+    Raises:
+        PerceptionError: for a file that cannot be read, and for another file.
+    """
+    path, content = read_model(path_or_bytes, sha256)
+    name = "the model given as bytes" if path is None else str(path)
+    try:
+        return name, parse(content)
+    except (*_WRONG_FILE, LookupError, ValueError, EOFError) as cause:
+        raise PerceptionError(f"{name} is not {what}: {cause!r:.200}") from cause
 
 
 def looks_like(content: bytes) -> str:

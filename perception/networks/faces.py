@@ -23,7 +23,6 @@ import io
 import math
 import os
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
@@ -41,7 +40,7 @@ from ..body import DEFAULT_MIN_SCORE
 from ..errors import PerceptionError
 from ..eyes import EyeGaze, eyes_from_irises
 from ._images import rgb_image
-from ._model import read_model
+from ._model import read_as
 from ._settings import OnnxSettings
 from ._tflite import TfliteModel
 from .heads import head_crop, looking_at, ray_focal_px
@@ -79,9 +78,12 @@ _FARTHEST: Final = 0.4
 _MIN_SIDE_PX: Final = 8.0
 # The mesh may lay a face that looks here over a profile. Then its nose lies elsewhere, from the
 # middle of the ears, than that of the pose network: by 0.4 to 1.5 sizes of the face on renders that
-# are turned by 70 to 100°, and up to 0.36 of faces that look here. The size is the distance of the
-# ears, or so many times that of eyes and nose.
+# are turned by 70 to 100°, and up to 0.36 of faces that look here. It may also lie beside the nose
+# and eyes of the pose network: on photographs by 0.5 sizes over profiles that seem to look here,
+# and up to 0.2 over faces. The size is the distance of the ears, or so many times that of eyes and
+# nose.
 _NOSE_APART: Final = 0.4
+_FACE_APART: Final = 0.35
 _NOSE_SIZES: Final = 3.3
 # A small face looks here if its nose lies between its eyes, at this share of the way. It is that of
 # the head if its nose and eyes lie where the pose network has them, by this share of the body size:
@@ -123,16 +125,8 @@ class FaceMesh:
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
     ) -> None:
-        place, content = read_model(path, sha256)
-        name = "the model given as bytes" if place is None else str(place)
-        try:
-            with zipfile.ZipFile(io.BytesIO(content)) as opened:
-                files = [opened.read(member) for member in (_DETECTOR, _MESH)]
-        except (zipfile.BadZipFile, zlib.error, KeyError) as cause:
-            raise PerceptionError(
-                f"{name} is not MediaPipe's face_landmarker.task, a ZIP with {_DETECTOR} and "
-                f"{_MESH}: {cause}"
-            ) from cause
+        what = f"MediaPipe's face_landmarker.task, a ZIP with {_DETECTOR} and {_MESH}"
+        name, files = read_as(what, _members, path, sha256)
         self._detector, self._mesh = (TfliteModel(each, settings=settings) for each in files)
         self._detector_ends = _named(self._detector, name, (_ANCHORS * _OFFSETS, _ANCHORS))
         # Of the mesh's two outputs of one number the first is the face's.
@@ -394,13 +388,15 @@ def _face_scores(points: FloatArray) -> FloatArray:
 
 
 def _agree(before_px: FloatArray, face_px: FloatArray) -> bool:
-    """Return whether the nose of a face points where that of the pose network did."""
+    """Return whether a face lies where the pose network has it, and its nose points there."""
     size_px = max(
         float(np.linalg.norm(face_px[kp.LEFT_EAR] - face_px[kp.RIGHT_EAR])),
         _NOSE_SIZES * float(np.linalg.norm(face_px[1:3].mean(axis=0) - face_px[kp.NOSE])),
     )
     before, face = (each[kp.NOSE] - each[3:].mean(axis=0) for each in (before_px, face_px))
-    return float(np.linalg.norm(before - face)) <= _NOSE_APART * size_px
+    aside_px = float(np.linalg.norm((before_px - face_px)[:3].mean(axis=0)))
+    points_px = float(np.linalg.norm(before - face))
+    return aside_px <= _FACE_APART * size_px and points_px <= _NOSE_APART * size_px
 
 
 def _square(
@@ -417,6 +413,12 @@ def _square(
     return crop.astype(np.float32), np.column_stack(
         [steps, centre_px - steps @ np.full(2, 0.5 * (size_px - 1))]
     )
+
+
+def _members(content: bytes) -> list[bytes]:
+    """Return the two networks of the file."""
+    with zipfile.ZipFile(io.BytesIO(content)) as opened:
+        return [opened.read(member) for member in (_DETECTOR, _MESH)]
 
 
 def _named(model: TfliteModel, name: str, extents: tuple[int, ...]) -> tuple[str, ...]:

@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from ..arrays import FloatArray, ImageRgb
-from ..errors import PerceptionError
-from ._model import OnnxModel, read_model
+from ._model import OnnxModel, read_as
 from ._settings import OnnxSettings
 from .heads import head_crop
 
@@ -67,16 +66,9 @@ class RetinaFace:
         settings: OnnxSettings | None = None,
         sha256: str | None = None,
     ) -> None:
-        place, content = read_model(path, sha256)
-        try:
-            graph = _Graph(_tensors(content))
-            graph.retinaface()
-        except (pickle.UnpicklingError, EOFError, LookupError, ValueError, struct.error) as cause:
-            raise PerceptionError(
-                f"{place or 'the model given as bytes'} is not RetinaFace's "
-                f"mobilenet0.25_Final.pth: {cause!r:.200}"
-            ) from cause
-        self._model = OnnxModel(graph.onnx(), settings=settings)
+        what = "RetinaFace's mobilenet0.25_Final.pth"
+        _, graph = read_as(what, _onnx_of, path, sha256)
+        self._model = OnnxModel(graph, settings=settings)
 
     def find(
         self, image_rgb: ImageRgb, centre_px: FloatArray, side_px: float, farthest_px: float
@@ -121,6 +113,13 @@ _PRIORS: Final = np.array(
         for size in sizes
     ]
 )
+
+
+def _onnx_of(content: bytes) -> bytes:
+    """Return the network of a checkpoint as ONNX."""
+    graph = _Graph(_tensors(content))
+    graph.retinaface()
+    return graph.onnx()
 
 
 class _Pickle(pickle.Unpickler):

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from ._assembly import Setup, axis_names, changed, named_fault, named_policy
 from ._crossing import Crossing, Observer, drive, run_crossing
-from ._drawing import RequestMemory, TopView, draw_camera_view
+from ._drawing import MapScale, RequestMemory, TopView, camera_view, draw_camera_view
 from ._result import CrossingFrame, CrossingResult
 from ._separations import (
     STANDING_SPEED_MPS,
     ContactEvent,
-    SafetyFigures,
     contact_by,
 )
 from ._stage import Stage, TrueView

@@ -30,11 +30,12 @@ from ..scenario import SCENARIO_SETS, Scenario, ScenarioTemplate, shipped_scenar
 from ..world.errors import SimError
 from ..world.render import RendererName
 from ._command import check_planner
-from ._sensing import STREAMS, Sensing
+from ._fields import SCANNER_WARNING, FieldsAdapter
+from ._sensing import Sensing
 from ._stage import Stage
-from .eyes import KeypointNoise
-from .faults import Fault
+from .faults import EpisodeFaults, Fault
 from .planner import LocalPlanner, make_planner, planner_label
+from .sensors import STREAMS, KeypointNoise, SensorSetup
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -117,7 +118,7 @@ class Setup:
             return make_planner(self.planner, self.scenario, self.conditions.seed)
         return self.planner
 
-    def assembled(self) -> tuple[Stage, Sensing, NavAdapter]:
+    def assembled(self) -> tuple[Stage, Sensing, NavAdapter | FieldsAdapter]:
         """Return stage, senses with their tracker, and adapter; the stage must be closed.
 
         Raises:
@@ -128,19 +129,19 @@ class Setup:
         _, _, _, people_rng = np.random.default_rng(seed).spawn(STREAMS)
         stage = Stage(scenario, people_rng, renderer=self.renderer)
         try:
-            sensing = Sensing(
-                stage,
-                Perception.named(self.conditions.perception),
-                self.policy,
-                seed,
-                noise=self.noise,
+            sensors = SensorSetup(
+                stage=stage,
+                seed=seed,
+                faults=EpisodeFaults(self.fault, seed, scenario.camera.camera()),
+                noise=self.noise or KeypointNoise(),
                 pipeline=self.pipeline,
-                fault=self.fault,
             )
+            sensing = Sensing(sensors, Perception.named(self.conditions.perception), self.policy)
         except BaseException:
             stage.close()
             raise
-        return stage, sensing, NavAdapter(self.policy, scenario.robot_profile)
+        adapter = FieldsAdapter if self.conditions.policy == SCANNER_WARNING else NavAdapter
+        return stage, sensing, adapter(self.policy, scenario.robot_profile)
 
 
 def changed(
@@ -168,8 +169,9 @@ def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPo
 
     Args:
         policy: a policy, whose name is then ``"custom"``; the name of a preset of the library;
-            ``"scanner"``, today's AMR with a safety laser scanner, for comparisons only; or a
-            ``.yaml`` or ``.yml`` file.
+            ``"scanner"``, today's AMR with a safety laser scanner, for comparisons only, or
+            ``"scanner_warning"``, the same with :class:`FieldsAdapter`; or a ``.yaml`` or ``.yml``
+            file.
 
     Raises:
         NavError: for a name that is not a preset, or a file that cannot be used.
@@ -198,12 +200,13 @@ def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPo
 def _own_presets() -> dict[str, AwarenessPolicy]:
     """Return the simulator's own presets by name; they are frozen, so one reading serves all."""
     folder = resources.files("sim_tests.crossing") / "policies"
-    return {
+    found = {
         (name := file.name.removesuffix(".yaml")): AwarenessPolicy.model_validate(
             parse_yaml(file.read_text("utf-8"), name, NavError)
         )
         for file in folder.iterdir()
     }
+    return {**found, SCANNER_WARNING: found["scanner"]}
 
 
 def named_fault(fault: Fault | str | None) -> Fault | None:

@@ -23,19 +23,16 @@ from ..world.render import RendererName
 from ._assembly import Setup
 from ._command import checked_command
 from ._result import CrossingFrame, CrossingResult
-from ._sensing import Sensed
-from ._separations import Separations
+from ._separations import margins_m, moves
 from ._stage import Stage
-from .eyes import KeypointNoise
 from .faults import Fault
 from .planner import LocalPlanner, SeatedPlanner, import_planner, seeded_generators
+from .sensors import KeypointNoise
 
 Observer = Callable[[CrossingFrame, Stage], None]
 
 # Within the goal tolerance the goal counts as reached at this speed or less.
 _GOAL_SPEED_MPS: Final = 0.2
-# Rate at which separations are observed; contacts are checked in every physics step.
-_OBSERVED_HZ: Final = 20.0
 
 
 class Crossing(AbstractContextManager["Crossing"]):
@@ -66,8 +63,6 @@ class Crossing(AbstractContextManager["Crossing"]):
         self.stage, self._sensing, self._adapter = setup.assembled()
         self.goal_odom_m = np.array([scenario.robot.goal_x_m, scenario.robot.goal_y_m])
         self.dt_s = 1.0 / scenario.control_hz
-        self._ticks_per_observation = max(round(scenario.control_hz / _OBSERVED_HZ), 1)
-        self._separations: Separations | None = None
         self._ticks = round(scenario.duration_s * scenario.control_hz)
         self._tick = 0
 
@@ -92,49 +87,47 @@ class Crossing(AbstractContextManager["Crossing"]):
         """Observe the separations, take images and scans, update the constraints.
 
         The frame has no command yet, and the constraints that a seated planner is told. Call it
-        once per control cycle. After the last one no separations are observed any more.
+        once per control cycle.
         """
-        t_s = self.t_s
-        separations = self._separations
-        if separations is None or (
-            not self.time_is_up and self._tick % self._ticks_per_observation == 0
-        ):
-            lasts_s = self._ticks_per_observation * self.dt_s
-            separations = self._separations = self.stage.observe(t_s, lasts_s)
+        t_s, sensing = self.t_s, self._sensing
+        approaches = self.stage.observe()
+        robot_moves = moves(self.stage.amr.motion, self.robot)
         T_odom_camera = self.stage.amr.T_odom_camera
         truth = self.stage.truth(self._cone, T_odom_camera)
         state = self.stage.amr.state(t_s)
-        sensed = self._sensing.step(t_s, truth)
+        sensing.step(t_s, truth)
+        tracks = sensing.tracks
         constraints = self._adapter.update(
-            sensed.tracks,
-            sensed.state,
+            tracks,
+            sensing.state,
             t_s,
-            perception_stamp_s=sensed.stamp_s,
-            seen_stamp_s=sensed.seen_stamp_s,
+            perception_stamp_s=sensing.stamp_s,
+            seen_stamp_s=sensing.seen_stamp_s,
         )
-        tracks = sensed.tracks
         if seat is not None:
             constraints, tracks = seat.told(constraints, tracks)
-        self._ask(constraints, sensed)
-        observed = sensed.observed
+        self._ask(constraints)
+        observed = sensing.observed
         return CrossingFrame(
             t_s=t_s,
             robot_state=state,
-            known_state=sensed.state,
+            known_state=sensing.state,
             T_odom_camera=T_odom_camera,
             truth=truth,
             observations=tuple(observation for observation, _ in observed),
             observed_workers=tuple(worker for _, worker in observed),
             tracks=tracks,
             constraints=constraints,
-            separations=separations,
+            approaches=approaches,
+            margins_m=tuple(margins_m(approaches, self.robot, moves=robot_moves)),
+            robot_moves=robot_moves,
             at_goal=_at_goal(self.scenario, state, self.goal_odom_m),
-            scan_points_odom_m=sensed.scan_points_odom_m,
+            scan_points_odom_m=sensing.scan_points_odom_m,
         )
 
-    def _ask(self, constraints: NavConstraints, sensed: Sensed) -> None:
+    def _ask(self, constraints: NavConstraints) -> None:
         """Let the people hear the robot's requests for attention; warnings do not reach them."""
-        places = {track.id: track.position_odom_m for track in sensed.tracks}
+        places = {track.id: track.position_odom_m for track in self._sensing.tracks}
         for alert in constraints.alerts:
             if alert.kind == "attention" and alert.track_id in places:
                 means: RequestMeans = "light" if alert.means == "light" else "voice"

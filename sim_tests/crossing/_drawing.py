@@ -9,17 +9,25 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from awarenav.drawing import Font, awareness_colour, draw_disc, draw_line
+from awarenav.drawing import (
+    Colour,
+    Font,
+    awareness_colour,
+    draw_disc,
+    draw_line,
+    drawable,
+    fill_hull,
+)
 from nav_adapter import Alert, PersonObstacle
 from nav_adapter.alerts import Answer
 from perception import AttentionCone, Camera, PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 
+from ..world.camera import CameraRenderer
+from ._messages import NOBODY
 from ._result import CrossingFrame
-from ._stage import Stage
-from .eyes import NOBODY
+from ._stage import Stage, TrueView
 
 _FONT: Final = Font(16, weight=450)
 _TEXT_COLOUR: Final = (40, 40, 46)
@@ -33,13 +41,22 @@ _CONE_LENGTH_M: Final = 0.4
 _PERSON_RADIUS_M: Final = 0.22
 # Radii of the two rings around a person who is asked, like the waves of a sound.
 _WAVES_M: Final = (0.42, 0.62)
-# Points farther than this outside the image are not drawn.
-_FAR_PX: Final = 1.0e4
-_SHIFT: Final = 4  # sub-pixel bits of OpenCV's drawing functions
+_CONE: Final = AttentionCone()
+_SECTOR_M: Final = 1.1
 #: Time for which a request or an answer is shown.
 SHOWN_S: Final = 2.0
+_ANGLES: Final = np.linspace(0.0, 2.0 * math.pi, 49)
+_CIRCLE: Final = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 # A person looks at the robot from this estimate of α on.
 _LOOKS_FROM: Final = 0.5
+
+
+def camera_view(frame: CrossingFrame, stage: Stage, width_px: int, **how: Any) -> ImageRgb:
+    """Return what the robot's camera sees, as :func:`draw_camera_view` draws it."""
+    spec = stage.scenario.camera
+    camera = spec.camera(width_px / spec.width_px)
+    picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
+    return draw_camera_view(picture, camera, frame, stage, **how)
 
 
 def draw_camera_view(
@@ -47,7 +64,6 @@ def draw_camera_view(
     camera: Camera,
     frame: CrossingFrame,
     stage: Stage,
-    cone: AttentionCone,
     *,
     box_scale: float = 1.0,
     captions: bool = True,
@@ -60,7 +76,6 @@ def draw_camera_view(
         camera: camera of the image: any size, with the robot's field of view.
         frame: the frame to draw.
         stage: gives the position of the eyes, where the cone is drawn.
-        cone: the attention cone.
         box_scale: size of the images that boxes were observed in, over that of the scenario's
             camera.
         captions: also write the speed limit and its reason.
@@ -74,26 +89,23 @@ def draw_camera_view(
         return camera.project((points_odom_m - origin) @ rotation)
 
     for obstacle in frame.constraints.obstacles:
-        angles = np.linspace(0.0, 2.0 * math.pi, 49)
-        ring = np.zeros((49, 3))
-        ring[:, :2] = obstacle.center_odom_m + obstacle.radius_m * np.stack(
-            [np.cos(angles), np.sin(angles)], axis=1
-        )
+        ring = np.zeros((len(_CIRCLE), 3))
+        ring[:, :2] = obstacle.center_odom_m + obstacle.radius_m * _CIRCLE
         colour = awareness_colour(obstacle.awareness_lower)
         for ends in itertools.pairwise(pixels(ring)):
-            if _drawable(np.array(ends)):
+            if drawable(np.array(ends)):
                 draw_line(image, np.array(ends), colour, 2)
     for observation, worker in zip(frame.observations, frame.observed_workers, strict=True):
         colour = awareness_colour(observation.awareness)
         if observation.gaze_camera is not None and worker != NOBODY:
             eyes = stage.workers[worker].eyes_odom_m
             gaze = rotation @ observation.gaze_camera
-            rim = pixels(np.vstack([eyes, _cone_rim(eyes, gaze, cone.half_angle_rad)]))
+            rim = pixels(np.vstack([eyes, _cone_rim(eyes, gaze)]))
             rim = rim[np.isfinite(rim).all(axis=1)]
-            if len(rim) > 2 and _drawable(rim):
-                _fill(image, rim, colour, 0.16)
+            if len(rim) > 2 and drawable(rim):
+                fill_hull(image, rim, colour, 0.16)
             axis = pixels(np.stack([eyes, eyes + _CONE_LENGTH_M * gaze]))
-            if _drawable(axis):
+            if drawable(axis):
                 draw_line(image, axis, colour, 2)
         if observation.box_xyxy_px is not None:
             box = observation.box_xyxy_px * scale
@@ -181,8 +193,58 @@ def _event_text(event: Alert | Answer) -> str:
     return f"asks by {event.means}: wins {event.wins_s:.1f} s"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class MapScale:
+    """A part of the hall in a picture from above: odom x to the right, y up.
+
+    Attributes:
+        px_per_m: scale.
+        centre_odom_m: (2,) place in the middle of the picture.
+        size_px: width and height of the picture.
+    """
+
+    px_per_m: float
+    centre_odom_m: FloatArray
+    size_px: tuple[int, int]
+
+    def px(self, points_odom_m: FloatArray) -> FloatArray:
+        """Return the pixels (N, 2) of points (N, 2)."""
+        shifted = (np.asarray(points_odom_m) - self.centre_odom_m) * self.px_per_m
+        return np.asarray(shifted * (1.0, -1.0) + 0.5 * np.array(self.size_px))
+
+    def hall(self, boxes_odom_m: FloatArray, floor: Colour, racks: Colour) -> ImageRgb:
+        """Return a picture of the hall alone."""
+        image: ImageRgb = np.full((self.size_px[1], self.size_px[0], 3), floor, np.uint8)
+        for x0, y0, x1, y1 in boxes_odom_m:
+            fill_hull(
+                image, self.px(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), racks, 1.0
+            )
+        return image
+
+    def ring(self, centre_odom_m: FloatArray, radius_m: float) -> FloatArray:
+        """Return the pixels (N, 2) of a circle."""
+        return self.px(centre_odom_m + radius_m * _CIRCLE)
+
+    def gaze(
+        self, frame: CrossingFrame, view: TrueView, eyes_odom_m: FloatArray, radius_m: float
+    ) -> FloatArray:
+        """Return the pixels (N, 2) of the sector that a person's attention cone covers."""
+        x, y = (frame.T_odom_camera[:2, :3] @ view.gaze_camera).tolist()
+        half_rad = _CONE.half_angle_rad
+        angles = np.linspace(-half_rad, half_rad, 15) + math.atan2(y, x)
+        arc = eyes_odom_m + radius_m * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        return self.px(np.vstack([eyes_odom_m, arc]))
+
+    def robot(self, frame: CrossingFrame, points_m: FloatArray) -> FloatArray:
+        """Return the pixels (N, 2) of points (N, 2) of the robot's base frame."""
+        heading = frame.robot_state.heading_odom_rad
+        cos, sin = math.cos(heading), math.sin(heading)
+        turned = points_m @ np.array([[cos, sin], [-sin, cos]])
+        return self.px(turned + frame.robot_state.position_odom_m)
+
+
 class TopView:
-    """A map of the hall from above: odom x to the right, y up.
+    """A map of the hall from above, of frame after frame.
 
     A request for attention is a line to the person with two rings and its text for 2 s, an answer
     two green rings. Each is in one control cycle, so :meth:`watch` gets the cycles that are not
@@ -200,20 +262,10 @@ class TopView:
         size_px: tuple[int, int],
         window_m: tuple[float, float, float, float],
     ) -> None:
-        x_min, y_min, x_max, y_max = window_m
-        self._scale = min(size_px[0] / (x_max - x_min), size_px[1] / (y_max - y_min))
-        centre = 0.5 * np.array([x_min + x_max, y_min + y_max])
-        self._offset = 0.5 * np.array(size_px) - self._scale * centre * (1.0, -1.0)
-        self._background = np.full((size_px[1], size_px[0], 3), _BACKGROUND_COLOUR, np.uint8)
-        for x0, y0, x1, y1 in stage.warehouse.obstacle_boxes_odom:
-            corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
-            cv2.fillConvexPoly(
-                self._background,
-                _fixed_point(self._pixels(corners)),
-                _RACK_COLOUR,
-                cv2.LINE_AA,
-                _SHIFT,
-            )
+        low, high = np.array(window_m[:2]), np.array(window_m[2:])
+        self._map = MapScale(float((size_px / (high - low)).min()), 0.5 * (low + high), size_px)
+        boxes = stage.warehouse.obstacle_boxes_odom
+        self._background = self._map.hall(boxes, _BACKGROUND_COLOUR, _RACK_COLOUR)
         self._robot_path: list[FloatArray] = []
         self._worker_paths: list[list[FloatArray]] = [[] for _ in stage.workers]
         #: Requests, answers and looks of the frames so far.
@@ -223,45 +275,33 @@ class TopView:
         """Remember requests, answers and looks of a frame, for the next ones that are drawn."""
         self.memory.take(frame)
 
-    def _pixels(self, points_odom_m: FloatArray) -> FloatArray:
-        return np.asarray(points_odom_m * (self._scale, -self._scale) + self._offset)
-
-    def draw(self, frame: CrossingFrame, stage: Stage, cone: AttentionCone) -> ImageRgb:
+    def draw(self, frame: CrossingFrame, stage: Stage) -> ImageRgb:
         """Draw one frame; the paths grow with every call."""
         self.watch(frame)
+        place = self._map
         image: ImageRgb = self._background.copy()
-        state = frame.robot_state
-        self._robot_path.append(state.position_odom_m)
-        draw_line(image, self._pixels(np.array(self._robot_path)), _ROBOT_COLOUR, 1)
+        robot_m = frame.robot_state.position_odom_m
+        self._robot_path.append(robot_m)
+        draw_line(image, place.px(np.array(self._robot_path)), _ROBOT_COLOUR, 1)
         for path, view in zip(self._worker_paths, frame.truth, strict=True):
             path.append(view.position_odom_m)
-            draw_line(image, self._pixels(np.array(path)), _PATH_COLOUR, 1)
+            draw_line(image, place.px(np.array(path)), _PATH_COLOUR, 1)
         for obstacle in frame.constraints.obstacles:
             colour = awareness_colour(obstacle.awareness_lower)
-            outline = self._pixels(np.asarray(obstacle.polygon.exterior.coords)[:, :2])
-            _fill(image, outline, colour, 0.22)
-            cv2.polylines(image, [_fixed_point(outline)], True, colour, 1, cv2.LINE_AA, _SHIFT)
-        _mark(image, self._pixels(frame.scan_points_odom_m), _SCAN_COLOUR)
+            outline = place.px(np.asarray(obstacle.polygon.exterior.coords)[:, :2])
+            fill_hull(image, outline, colour, 0.22)
+            draw_line(image, outline, colour, 1)
+        _mark(image, place.px(frame.scan_points_odom_m), _SCAN_COLOUR)
         for worker, view in zip(stage.workers, frame.truth, strict=True):
-            eyes = worker.eyes_odom_m[:2]
-            gaze = (frame.T_odom_camera[:3, :3] @ view.gaze_camera)[:2]
-            heading = math.atan2(gaze[1], gaze[0])
-            angles = np.linspace(-cone.half_angle_rad, cone.half_angle_rad, 15) + heading
-            arc = eyes + 1.1 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-            sector = self._pixels(np.vstack([eyes, arc]))
-            _fill(image, sector, awareness_colour(view.awareness), 0.3)
-            centre = self._pixels(view.position_odom_m[None])
-            draw_disc(image, centre, _PERSON_RADIUS_M * self._scale, _TEXT_COLOUR)
-        heading = state.heading_odom_rad
-        rotation = np.array(
-            [[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]]
-        )
-        outline = self._pixels(stage.amr.profile.footprint_m @ rotation.T + state.position_odom_m)
-        cv2.fillConvexPoly(image, _fixed_point(outline), _ROBOT_COLOUR, cv2.LINE_AA, _SHIFT)
-        nose = np.stack([state.position_odom_m, state.position_odom_m + 0.7 * rotation[:, 0]])
-        draw_line(image, self._pixels(nose), _ROBOT_COLOUR, 2)
+            sector = place.gaze(frame, view, worker.eyes_odom_m[:2], _SECTOR_M)
+            fill_hull(image, sector, awareness_colour(view.awareness), 0.3)
+            centre = place.px(view.position_odom_m)
+            draw_disc(image, centre, _PERSON_RADIUS_M * place.px_per_m, _TEXT_COLOUR)
+        fill_hull(image, place.robot(frame, stage.amr.profile.footprint_m), _ROBOT_COLOUR, 1.0)
+        nose = place.robot(frame, np.array([[0.0, 0.0], [0.7, 0.0]]))
+        draw_line(image, nose, _ROBOT_COLOUR, 2)
         for each in self.memory.shown(frame):
-            self._draw_request(image, each, state.position_odom_m)
+            self._draw_request(image, each, robot_m)
         self._draw_scale(image)
         return image
 
@@ -270,23 +310,23 @@ class TopView:
     ) -> None:
         if request.place_odom_m is None:
             return
-        place = self._pixels(request.place_odom_m)
+        place, scale = self._map.px(request.place_odom_m), self._map.px_per_m
         colour = awareness_colour(1.0) if request.answered else _ROBOT_COLOUR
         if not request.answered:
-            draw_line(image, np.stack([self._pixels(robot_odom_m), place]), colour, 1)
-        angles = np.linspace(0.0, 2.0 * math.pi, 49)
+            draw_line(image, np.stack([self._map.px(robot_odom_m), place]), colour, 1)
         for radius_m in _WAVES_M:
-            ring = np.stack([np.cos(angles), np.sin(angles)], axis=1) * radius_m * self._scale
-            draw_line(image, place + ring, colour, 2)
+            draw_line(image, self._map.ring(request.place_odom_m, radius_m), colour, 2)
         width, height = _FONT.width_px(request.text), _FONT.height_px
-        above = place - np.array([0.5 * width, _WAVES_M[1] * self._scale + height])
+        above = place - np.array([0.5 * width, _WAVES_M[1] * scale + height])
         most = np.maximum((4.0, 18.0), (image.shape[1] - width - 8.0, image.shape[0] - 8.0))
         left, top = np.clip(above, (4.0, 18.0), most).round().astype(int).tolist()
         _write(image, [request.text], (left, top))
 
     def _draw_scale(self, image: ImageRgb) -> None:
         y_px = image.shape[0] - 14.0
-        draw_line(image, np.array([[14.0, y_px], [14.0 + self._scale, y_px]]), _TEXT_COLOUR, 2)
+        draw_line(
+            image, np.array([[14.0, y_px], [14.0 + self._map.px_per_m, y_px]]), _TEXT_COLOUR, 2
+        )
         _write(image, ["1 m"], (16, image.shape[0] - 18))
 
 
@@ -310,18 +350,13 @@ def _known(obstacle: PersonObstacle, noticed_s: float | None) -> str:
     return f"noticed {noticed_s:.1f} s ago, counts as {obstacle.awareness_lower:.2f}"
 
 
-def _cone_rim(apex: FloatArray, gaze: FloatArray, half_angle_rad: float) -> FloatArray:
-    """Return 24 points (24, 3) on the rim of an attention cone, cut off at the drawn length."""
+def _cone_rim(apex: FloatArray, gaze: FloatArray) -> FloatArray:
+    """Return points (N, 3) on the rim of an attention cone, cut off at the drawn length."""
     side = np.cross(gaze, [0.0, 0.0, 1.0] if abs(gaze[2]) < 0.9 else [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
-    angles = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)[:, None]
-    ring = np.cos(angles) * side + np.sin(angles) * np.cross(gaze, side)
-    radius = _CONE_LENGTH_M * math.tan(half_angle_rad)
+    ring = _CIRCLE[:-1, :1] * side + _CIRCLE[:-1, 1:] * np.cross(gaze, side)
+    radius = _CONE_LENGTH_M * math.tan(_CONE.half_angle_rad)
     return np.asarray(apex + _CONE_LENGTH_M * gaze + radius * ring)
-
-
-def _drawable(points_px: FloatArray) -> bool:
-    return bool(np.isfinite(points_px).all() and np.abs(points_px).max() < _FAR_PX)
 
 
 def _mark(image: ImageRgb, points_px: FloatArray, colour: tuple[int, int, int]) -> None:
@@ -333,14 +368,6 @@ def _mark(image: ImageRgb, points_px: FloatArray, colour: tuple[int, int, int]) 
         image[y[inside], x[inside]] = colour
 
 
-def _fill(image: ImageRgb, points_px: FloatArray, colour: Any, opacity: float) -> None:
-    """Blend the convex hull of points (N, 2) into the image."""
-    hull = cv2.convexHull(points_px.astype(np.float32))
-    layer = image.copy()
-    cv2.fillConvexPoly(layer, _fixed_point(hull.reshape(-1, 2)), colour, cv2.LINE_AA, _SHIFT)
-    cv2.addWeighted(layer, opacity, image, 1.0 - opacity, 0.0, dst=image)
-
-
 def _write(image: ImageRgb, lines: list[str], corner: tuple[int, int]) -> None:
     """Write lines of text on a plate; ``corner`` is the lower left one of the first line."""
     height = _FONT.height_px
@@ -350,8 +377,3 @@ def _write(image: ImageRgb, lines: list[str], corner: tuple[int, int]) -> None:
     np.copyto(plate, (0.25 * plate + 0.75 * np.array(_BACKGROUND_COLOUR)).astype(np.uint8))
     for row, text in enumerate(lines):
         _FONT.write(image, text, (left, top + height * row + 1), _TEXT_COLOUR)
-
-
-def _fixed_point(points_px: Any) -> NDArray[np.int32]:
-    fixed: NDArray[np.int32] = np.round(points_px * (1 << _SHIFT)).astype(np.int32)
-    return fixed.reshape(-1, 1, 2)

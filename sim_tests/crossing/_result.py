@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -16,7 +16,7 @@ from tracking import PersonTrack
 
 from ..actors.behaviour import PersonOutcome
 from ..actors.robot import NOVA_CARTER
-from ._separations import ContactEvent, SafetyFigures, Separations, contact_by
+from ._separations import NEAR_M, Approach, ContactEvent, contact_by
 from ._stage import TrueView
 
 
@@ -35,8 +35,9 @@ class CrossingFrame:
             for none.
         tracks: tracks of the people.
         constraints: constraints from the adapter; for a stack outside, those that it is told.
-        separations: separations of the people, as last observed, which is in every frame up to 20 a
-            second.
+        approaches: robot and person where they are nearest, for each person.
+        margins_m: separation margin S − S_p of each person, see :func:`margins_m`.
+        robot_moves: whether a point of the robot moves: it drives, or turns on the spot.
         at_goal: the robot stands at its goal.
         command: commanded speed (m/s) and yaw rate (rad/s); 0 before there is one.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle, as the robot
@@ -58,7 +59,9 @@ class CrossingFrame:
     observed_workers: tuple[int, ...]
     tracks: tuple[PersonTrack, ...]
     constraints: NavConstraints
-    separations: Separations
+    approaches: tuple[Approach, ...]
+    margins_m: tuple[float, ...]
+    robot_moves: bool
     at_goal: bool = False
     command: tuple[float, float] = (0.0, 0.0)
     scan_points_odom_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
@@ -70,13 +73,16 @@ class CrossingFrame:
 
     @property
     def separations_m(self) -> tuple[float, ...]:
-        """Distance between the surfaces of each person and the robot, as last observed."""
-        return self.separations.separations_m
+        """Distance between the surfaces of each person and the robot.
+
+        It is a lower bound with centres more than 4 m apart, and infinite for people who are away.
+        """
+        return tuple(each.separation_m for each in self.approaches)
 
     @property
-    def margins_m(self) -> tuple[float, ...]:
-        """Separation margin of each person, as last observed."""
-        return self.separations.margins_m
+    def margin_m(self) -> float:
+        """Smallest margin to anybody at a moving robot; infinite at one that stands."""
+        return min(self.margins_m, default=math.inf) if self.robot_moves else math.inf
 
     def observation_of(self, worker: int) -> PersonObservation | None:
         """Return the observation of a worker in this frame, or None."""
@@ -147,25 +153,30 @@ class CrossingResult:
         """Simulated time."""
         return self.frames[-1].t_s
 
-    @cached_property
-    def safety(self) -> SafetyFigures:
-        """The safety figures of the observed separations."""
-        figures = SafetyFigures()
-        for frame in self.frames:
-            figures = figures.after(frame.t_s, frame.separations)
-        return figures
-
     @property
     def min_separation_m(self) -> float:
-        """Smallest distance between the surfaces of robot and person."""
-        return self.safety.min_separation_m
+        """Smallest distance between the surfaces of robot and person; infinite without people."""
+        each_m = (away_m for frame in self.frames for away_m in frame.separations_m)
+        return min(each_m, default=math.inf)
 
     @property
     def min_margin_m(self) -> float:
         """Smallest separation margin S − S_p while the robot moved."""
-        return self.safety.min_margin_m
+        return min((frame.margin_m for frame in self.frames), default=math.inf)
 
     @property
     def violation_time_s(self) -> float:
         """Time with a negative margin to anybody while the robot moved."""
-        return self.safety.violation_time_s
+        lasts_s = self.frames[1].t_s - self.frames[0].t_s if len(self.frames) > 1 else 0.0
+        return lasts_s * sum(frame.margin_m < 0.0 for frame in self.frames)
+
+    @property
+    def max_speed_within_2m_mps(self) -> float:
+        """Highest speed of the robot's nearest point to a person whose surface is within 2 m."""
+        speeds_mps = (
+            each.robot_speed_mps
+            for frame in self.frames
+            for each in frame.approaches
+            if each.separation_m < NEAR_M
+        )
+        return max(speeds_mps, default=0.0)

@@ -3,148 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
-from nav_adapter import AwarenessPolicy, RobotState
-from perception import AttentionCone, AwarenessPipeline, Camera
+from nav_adapter import AwarenessPolicy
 from perception.arrays import FloatArray
 from perception.laser import AHEAD_RAD, SeenDirections, camera_field
-from tracking import (
-    CameraView,
-    PersonTrack,
-    PersonTracker,
-    SensorConfig,
-    SurroundView,
-    TrackerConfig,
-)
+from tracking import PersonTrack, PersonTracker, TrackerConfig
 
-from ..conditions import ORACLE, Perception
-from ..world.camera import CameraTiming, FrameQueue
-from ..world.errors import SimError
-from ._stage import Stage, TrueView
-from .eyes import (
-    Change,
-    Delivery,
-    KeypointNoise,
-    MapView,
-    OdometryReading,
-    ScannerEyes,
-    Sighting,
-    TimedEyes,
-    WorkerObservations,
-    make_eyes,
-    motion_of,
-    pixel_timing,
-    scanner_sensors,
-)
-from .faults import EpisodeFaults, Fault
+from ..conditions import Perception
+from ..world.camera import FrameQueue
+from ._messages import Change, Delivery, OdometryReading, Sighting, WorkerObservations
+from ._stage import TrueView
+from .sensors import CameraSensor, SensorSetup, World, motion_of, sensor_class, view_of
 
-#: Random streams of an episode: one that is spare, of the camera's noise, its losses and delays,
-#: and the people.
-STREAMS: Final = 4
-# The true places, without faces.
-_PLACES: Final = "places"
+# The tracker's name of the camera.
+_CAMERA: Final = "camera"
 # Age of perception before the first image has arrived: older than any policy accepts.
 _NEVER_S: Final = 1.0e6
-# An image without a person is no evidence about people farther away than this.
-_DETECTION_RANGE_M: Final = 10.0
 # Images and scans with stamps farther ahead are refused, as the bridge on a robot refuses them.
 _AHEAD_S: Final = 0.05
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sensed:
-    """The knowledge of the robot in one control cycle.
+class Sensing:
+    """The sensors of a robot on a stage, its odometry and its tracker.
+
+    Args:
+        setup: what sensors are made of.
+        perception: their names.
+        policy: has the settings of the tracker.
 
     Attributes:
-        state: its own state.
+        state: the robot's own state, as it knows it.
         tracks: tracks of the people.
-        stamp_s: stamp of the newest image, or of scans that show all that is ahead.
         observed: observations of the newest image if it arrived in this cycle, else none.
         scan_points_odom_m: (N, 2) points of the scans that arrived in this cycle.
-        seen_stamp_s: from when on it knows what is in a sector, as :meth:`NavAdapter.update` takes
-            it; None for a robot that knows the truth in all directions.
-    """
-
-    state: RobotState
-    tracks: tuple[PersonTrack, ...]
-    stamp_s: float
-    observed: WorkerObservations
-    scan_points_odom_m: FloatArray
-    seen_stamp_s: Callable[[float, float], float | None] | None
-
-
-class Sensing:
-    """Camera, scanners, odometry and tracker of a robot on a stage.
 
     Raises:
         SimError: for a perception with scanners and a scenario without any.
     """
 
-    def __init__(
-        self,
-        stage: Stage,
-        perception: Perception,
-        policy: AwarenessPolicy,
-        seed: int,
-        *,
-        cone: AttentionCone | None = None,
-        noise: KeypointNoise | None = None,
-        pipeline: AwarenessPipeline | None = None,
-        fault: Fault | None = None,
-    ) -> None:
-        self._stage = stage
-        _, camera_rng, timing_rng, _ = np.random.default_rng(seed).spawn(STREAMS)
-        model, timing = _camera_and_timing(stage, perception.kind)
-        faults = EpisodeFaults(fault, seed, model)
-        self._camera: TimedEyes | None = None
-        if perception.kind:
-            eyes = make_eyes(
-                perception.kind,
-                stage,
-                model,
-                camera_rng,
-                cone=AttentionCone() if cone is None else cone,
-                noise=KeypointNoise() if noise is None else noise,
-                pipeline=pipeline,
-                pictures=faults.pictures(),
-            )
-            self._camera = TimedEyes(eyes, timing, timing_rng, faults.images())
-        self._odometry = Odometry(faults.odometry())
-        self._scanners: ScannerEyes | None = None
-        if perception.has_scanners:
-            specs, body = stage.scenario.scanners, stage.amr.profile.footprint_m
-            if not specs:
-                raise SimError(
-                    f"perception {perception.name!r} needs laser scanners, but the scenario "
-                    f"{stage.scenario.name!r} has none (scanners: [])"
-                )
-            changes = [faults.scans(number, spec, body) for number, spec in enumerate(specs)]
-            self._scanners = ScannerEyes(stage.warehouse, specs, body, seed, changes)
-        self._tracker = _make_tracker(perception, policy, stage, model)
+    def __init__(self, setup: SensorSetup, perception: Perception, policy: AwarenessPolicy) -> None:
+        self._stage = stage = setup.stage
+        # The camera comes last: its faces are then those of people whom scans have placed.
+        self._sensors = [sensor_class(name)(setup) for name in reversed(perception)]
+        self._odometry = Odometry(setup.faults.odometry())
+        self._sees_all = any(each.knows_all for each in self._sensors)
+        spec = stage.scenario.camera
+        cameras = [each for each in self._sensors if isinstance(each, CameraSensor)]
+        model = cameras[0].camera if cameras else spec.camera()
+        self._tracker = PersonTracker(
+            TrackerConfig.for_policy(policy),
+            view=cameras[0].view if cameras else view_of(stage, model),
+            sensors={
+                name: config for each in self._sensors for name, config in each.tracked.items()
+            },
+        )
         self._newest_s: dict[str, float] = {}
         self._seen = SeenDirections()
-        self._sees_all = perception.kind in ("truth", ORACLE)
         T_base_camera = np.linalg.inv(stage.amr.T_odom_base) @ stage.amr.T_odom_camera
         self._fields = [
-            camera_field(model, T_base_camera @ view.T_camera_view)
-            for view in stage.scenario.camera.flat_views(model)
+            camera_field(model, T_base_camera @ each.T_camera_view)
+            for each in spec.flat_views(model)
         ]
 
-    def step(self, t_s: float, truth: tuple[TrueView, ...]) -> Sensed:
-        """Take the images and scans that are due; return what the robot knows then."""
-        amr = self._stage.amr
-        T_odom_camera, state = amr.T_odom_camera, amr.state(t_s)
-        known = self._odometry.take(OdometryReading(state, T_odom_camera))
-        sightings: tuple[Sighting, ...] = ()
-        if self._scanners is not None:
-            sightings = self._scanners.look(t_s, amr.T_odom_base, state, known.state)
-        if self._camera is not None:
-            sightings += self._camera.look(t_s, T_odom_camera, _camera_at(t_s, known), truth)
-        observed: WorkerObservations = ()
+    def step(self, t_s: float, truth: tuple[TrueView, ...]) -> None:
+        """Take the images and scans that are due in a control cycle."""
+        T_odom_camera = self._stage.amr.T_odom_camera
+        known = self._odometry.take(OdometryReading(self._stage.amr.state(t_s), T_odom_camera))
+        world = World(t_s, T_odom_camera, _camera_at(t_s, known), truth, known.state)
+        sightings = [sighting for each in self._sensors for sighting in each.look(world)]
+        self.state = known.state
+        self.observed: WorkerObservations = ()
         tracks: tuple[PersonTrack, ...] = ()
         for sighting in sightings:
             if not self._is_new(sighting, t_s):
@@ -156,41 +87,37 @@ class Sensing:
                 sensor=sighting.sensor,
                 view=sighting.view,
             )
-            if self._sees_all:
-                tracks = self._tracker.update(
-                    [observation for observation, _ in sighting.observations],
-                    sighting.stamp_s,
-                    sighting.T_odom_camera,
-                    sensor=_PLACES,
-                )
             if sighting.sight is not None:
                 self._seen.note(sighting.sight, sighting.stamp_s)
-            else:
+            elif sighting.sensor == _CAMERA:
                 for field in self._fields:
                     self._seen.note_field(*field, sighting.stamp_s)
             if sighting.stamp_s > self._newest_s.get(sighting.sensor, -_NEVER_S):
                 self._newest_s[sighting.sensor] = sighting.stamp_s
-                if sighting.points_odom_m is None:
-                    observed = sighting.observations
+                if sighting.sensor == _CAMERA:
+                    self.observed = sighting.observations
         latest_s = self._tracker.last_stamp_s
         if latest_s != t_s or not tracks:
             # A sensor's clock may be a little ahead.
             tracks = self._tracker.predict(t_s if latest_s is None else max(t_s, latest_s))
+        self.tracks = tracks
         points = [each.points_odom_m for each in sightings if each.points_odom_m is not None]
-        return Sensed(
-            known.state,
-            tracks,
-            self._perceived_s(),
-            observed,
-            np.concatenate(points) if points else np.zeros((0, 2)),
-            None if self._sees_all else self._seen.stamp_s,
-        )
+        self.scan_points_odom_m: FloatArray = np.concatenate([np.zeros((0, 2)), *points])
 
-    def _perceived_s(self) -> float:
-        """Return the time from which camera or scanners know what is ahead, as on a robot."""
+    @property
+    def seen_stamp_s(self) -> Callable[[float, float], float | None] | None:
+        """The time from which the robot knows what is in a sector, for :class:`NavAdapter`.
+
+        None for a robot that knows the truth in all directions.
+        """
+        return None if self._sees_all else self._seen.stamp_s
+
+    @property
+    def stamp_s(self) -> float:
+        """The time from which camera or scanners know what is ahead, as on a robot."""
         ahead_s = self._seen.stamp_s(0.0, AHEAD_RAD)
         return max(
-            self._newest_s.get("camera", -_NEVER_S), -_NEVER_S if ahead_s is None else ahead_s
+            self._newest_s.get(_CAMERA, -_NEVER_S), -_NEVER_S if ahead_s is None else ahead_s
         )
 
     def _is_new(self, sighting: Sighting, t_s: float) -> bool:
@@ -237,33 +164,3 @@ def _camera_at(t_s: float, known: OdometryReading) -> FloatArray:
     motion = motion_of(known.state)
     moved = motion.pose_at(t_s) @ np.linalg.inv(motion.T_odom_base)
     return np.asarray(moved @ known.T_odom_camera)
-
-
-def _camera_and_timing(stage: Stage, kind: str) -> tuple[Camera, CameraTiming]:
-    spec = stage.scenario.camera
-    if kind == "pixels":
-        return spec.camera(spec.picture_scale), pixel_timing(spec.timing)
-    return spec.camera(), spec.timing
-
-
-def _make_tracker(
-    perception: Perception, policy: AwarenessPolicy, stage: Stage, camera: Camera
-) -> PersonTracker:
-    config = TrackerConfig.for_policy(policy)
-    if perception.kind in ("truth", ORACLE):
-        # The truth has no limits of range or field of view. It remembers who has noticed the robot,
-        # as robots with scanners do.
-        sight = None if perception.kind == "truth" else MapView.of(stage.warehouse)
-        places = SensorConfig(view=sight, measures_range=False, alignment_std_rad=0.0)
-        return PersonTracker(config, view=sight, sensors={_PLACES: places})
-    views = stage.scenario.camera.flat_views(camera)
-    flat = CameraView(camera, max_range_m=_DETECTION_RANGE_M)
-    view = SurroundView((flat,) * len(views), tuple(each.rotation_camera_view for each in views))
-    sensors = None
-    if perception.has_scanners:
-        sensors = scanner_sensors(stage.warehouse, stage.scenario.scanners)
-    return PersonTracker(
-        config,
-        view=MapView.of(stage.warehouse, flat if len(views) == 1 else view),
-        sensors=sensors,
-    )

@@ -1,11 +1,10 @@
-"""Separations and contacts of robot and people as observed, and the safety figures of them."""
+"""Where robot and people are nearest to each other, their margins, and contacts."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
@@ -129,78 +128,26 @@ def moves(motion: Motion, robot: RobotProfile) -> bool:
     return motion.fastest_mps(robot.circumscribed_radius_m) > STANDING_SPEED_MPS
 
 
-@dataclass(frozen=True, eq=False)
-class Separations:
-    """The separations of all people from the robot, as observed at one instant.
+def margins_m(approaches: Sequence[Approach], robot: RobotProfile, *, moves: bool) -> list[float]:
+    """Return the separation margin of each person.
 
     The margin S − S_p is the distance between the surfaces of robot and person, minus the
     protective separation of ISO 13855 and ISO/TS 15066 for their true closing speeds. A standing
     robot has done what the standards ask: its margin is S − C − Z.
 
-    Attributes:
-        t_s: time of the observation.
-        lasts_s: time to the next observation.
-        robot: limits of the robot.
-        robot_moves: whether a point of the robot moves.
+    Args:
         approaches: robot and person, for each person.
+        robot: limits of the robot.
+        moves: whether a point of the robot moves.
     """
-
-    t_s: float
-    lasts_s: float
-    robot: RobotProfile
-    robot_moves: bool
-    approaches: tuple[Approach, ...]
-
-    @cached_property
-    def separations_m(self) -> tuple[float, ...]:
-        """Distance between the surfaces of each person and the robot.
-
-        It is a lower bound with centres more than 4 m apart, and infinite for people who are away.
-        """
-        return tuple(each.separation_m for each in self.approaches)
-
-    @cached_property
-    def margins_m(self) -> tuple[float, ...]:
-        """Separation margin of each person."""
-        if not self.robot_moves:
-            return tuple(each - CLEARANCE_M for each in self.separations_m)
-        protective_m = protective_separation_m(
-            [max(each.closing_mps, 0.0) for each in self.approaches],
-            [max(each.person_closing_mps, 0.0) for each in self.approaches],
-            deceleration_mps2=self.robot.max_deceleration_mps2,
-            reaction_time_s=self.robot.reaction_time_s,
+    needed_m = np.full(len(approaches), CLEARANCE_M)
+    if moves:
+        needed_m = protective_separation_m(
+            [max(each.closing_mps, 0.0) for each in approaches],
+            [max(each.person_closing_mps, 0.0) for each in approaches],
+            deceleration_mps2=robot.max_deceleration_mps2,
+            reaction_time_s=robot.reaction_time_s,
             clearance_m=CLEARANCE_M,
         )
-        pairs = zip(self.separations_m, protective_m.tolist(), strict=True)
-        return tuple(separation_m - needed_m for separation_m, needed_m in pairs)
-
-
-@dataclass(frozen=True, slots=True)
-class SafetyFigures:
-    """The safety figures of an episode, or of its beginning.
-
-    Attributes:
-        min_separation_m: smallest separation; infinite without people.
-        min_margin_m: smallest margin while the robot moved.
-        violation_time_s: time with a negative margin, to anybody, while the robot moved.
-        max_speed_within_2m_mps: highest speed of the robot's nearest point to a person whose
-            surface is within 2 m.
-    """
-
-    min_separation_m: float = math.inf
-    min_margin_m: float = math.inf
-    violation_time_s: float = 0.0
-    max_speed_within_2m_mps: float = 0.0
-
-    def after(self, t_s: float, now: Separations) -> SafetyFigures:
-        """Return the figures after one more control cycle."""
-        if now.t_s < t_s:
-            return self
-        margin_m = min(now.margins_m, default=math.inf) if now.robot_moves else math.inf
-        near = [each.robot_speed_mps for each in now.approaches if each.separation_m < NEAR_M]
-        return SafetyFigures(
-            min((self.min_separation_m, *now.separations_m)),
-            min(self.min_margin_m, margin_m),
-            self.violation_time_s + (now.lasts_s if margin_m < 0.0 else 0.0),
-            max((self.max_speed_within_2m_mps, *near)),
-        )
+    pairs = zip(approaches, needed_m.tolist(), strict=True)
+    return [each.separation_m - least_m for each, least_m in pairs]

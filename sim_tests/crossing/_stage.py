@@ -31,7 +31,7 @@ from ..world import Warehouse
 from ..world.render import RendererName
 from ._audience import Audience, RobotSight, near_robot
 from ._people import staged_people
-from ._separations import AWAY, STANDING_SPEED_MPS, Approach, ContactEvent, Separations, moves
+from ._separations import AWAY, STANDING_SPEED_MPS, Approach, ContactEvent
 
 # Distances between surfaces are exact with centres closer than this, else a lower bound.
 _EXACT_WITHIN_M: Final = 4.0
@@ -202,12 +202,11 @@ class Stage(AbstractContextManager["Stage"]):
             if what is not None:
                 news.append(what)
 
-    def observe(self, t_s: float, lasts_s: float) -> Separations:
-        """Return the separations of all people from the robot now."""
+    def observe(self) -> tuple[Approach, ...]:
+        """Return robot and person where they are nearest now, for each person."""
         approaches = tuple(self._approach(index) for index in range(len(self._motions)))
         self._near_robot = [each.separation_m < _TOUCH_WITHIN_M for each in approaches]
-        robot = self.amr.profile
-        return Separations(t_s, lasts_s, robot, moves(self.amr.motion, robot), approaches)
+        return approaches
 
     def truth(self, cone: AttentionCone, T_odom_camera: FloatArray) -> tuple[TrueView, ...]:
         """Return the truth about every person, seen from the robot's camera."""

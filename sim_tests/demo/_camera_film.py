@@ -13,7 +13,7 @@ from perception import AttentionCone, Camera, PersonDetection, PersonKeypoints
 from perception.arrays import ImageRgb
 
 from ..crossing import CrossingFrame, Stage
-from ..crossing.eyes import PIXEL_RATE_HZ, KeypointCamera, KeypointNoise
+from ..crossing.sensors import PIXEL_RATE_HZ, KeypointCamera, KeypointNoise
 from ..world.camera import CameraRenderer
 from ..world.sightlines import SightLines
 

@@ -22,10 +22,15 @@ from awarenav.drawing import (
     fill_hull,
 )
 from awarenav.video import VideoWriter
-from perception import AttentionCone
-from perception.arrays import FloatArray, ImageRgb
+from perception.arrays import ImageRgb
 
-from ..crossing import STANDING_SPEED_MPS, CrossingFrame, CrossingResult, RequestMemory
+from ..crossing import (
+    STANDING_SPEED_MPS,
+    CrossingFrame,
+    CrossingResult,
+    MapScale,
+    RequestMemory,
+)
 from ..scenario import Scenario
 from ._camera_film import CAMERA_PX, PICTURE_S, CameraPicture
 
@@ -68,7 +73,7 @@ _LEGEND: Final = (
 )
 
 #: Policies that ignore awareness: α says nothing about what the robot does.
-WITHOUT_AWARENESS: Final = ("blind", "scanner")
+WITHOUT_AWARENESS: Final = ("blind", "scanner", "scanner_warning")
 
 #: Rows of the comparison that the film shows, and the title of each lane.
 LANES: Final[dict[str, str]] = {
@@ -193,7 +198,8 @@ def _write_legend(image: ImageRgb, top: int) -> None:
         if sign == "dot":
             draw_disc(image, middle, 11.0, colour)
         else:
-            draw_line(image, middle + 11.0 * _circle(), colour, 3)
+            draw_disc(image, middle, 12.5, colour)
+            draw_disc(image, middle, 9.5, DARK)
         corner = _EDGE_PX + 38, top + number * (_LINE_PX + 2)
         _TEXT.write(image, text, corner, WHITE)
 
@@ -260,10 +266,8 @@ def draw_map(row: ComparisonRow, t_s: float | None) -> ImageRgb:
     Returns:
         An (H, W, 3) RGB image.
     """
-    result, place = row.result, MapScale.of(row)
-    image: ImageRgb = np.full((_MAP_PX[1], _MAP_PX[0], 3), _FLOOR, np.uint8)
-    for x0, y0, x1, y1 in row.scenario.layout.obstacle_boxes_odom:
-        fill_hull(image, place.px(np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])), _RACK, 1.0)
+    result, place = row.result, scale_of(row)
+    image = place.hall(row.scenario.layout.obstacle_boxes_odom, _FLOOR, _RACK)
     people = range(len(result.frames[0].truth))
     times_s = [passage(result, each).t_s if t_s is None else t_s for each in people]
     if t_s is not None:
@@ -276,7 +280,7 @@ def draw_map(row: ComparisonRow, t_s: float | None) -> ImageRgb:
     for number, index in zip(people, indices, strict=False):
         _draw_person(image, result.frames[index], number, place)
     for index in set(indices):
-        outline = place.px(_placed(result.frames[index], result.robot.footprint_m))
+        outline = place.robot(result.frames[index], result.robot.footprint_m)
         fill_hull(image, outline, _ROBOT, 1.0)
     if t_s is not None:
         _draw_requests(image, result, indices[-1], place)
@@ -293,30 +297,17 @@ def _draw_circle(
             continue
         ignored = result.policy in WITHOUT_AWARENESS
         colour = awareness_colour(None if ignored else obstacle.awareness_lower)
-        ring = place.px(obstacle.center_odom_m + obstacle.radius_m * _circle())
+        ring = place.ring(obstacle.center_odom_m, obstacle.radius_m)
         fill_hull(image, ring, colour, 0.25)
         draw_line(image, ring, colour, 3)
 
 
-@dataclass(frozen=True, slots=True)
-class MapScale:
-    """Map of the hall: from odom to pixels, with x to the right and y up."""
-
-    px_per_m: float
-    centre_odom_m: FloatArray
-
-    @classmethod
-    def of(cls, row: ComparisonRow) -> MapScale:
-        """Return the scale at which the robot's way fills the width of the map."""
-        task = row.scenario.robot
-        length_m = abs(task.goal_x_m - task.start_x_m) + 2.0 * _MARGIN_M
-        middle = 0.5 * np.array([task.start_x_m + task.goal_x_m, task.start_y_m + task.goal_y_m])
-        return cls(_MAP_PX[0] / length_m, middle)
-
-    def px(self, points_odom_m: FloatArray) -> FloatArray:
-        """Return the pixels (N, 2) of points (N, 2)."""
-        shifted = (np.asarray(points_odom_m) - self.centre_odom_m) * self.px_per_m
-        return np.asarray(shifted * (1.0, -1.0) + 0.5 * np.array(_MAP_PX))
+def scale_of(row: ComparisonRow) -> MapScale:
+    """Return the scale at which the robot's way fills the width of the map."""
+    task = row.scenario.robot
+    length_m = abs(task.goal_x_m - task.start_x_m) + 2.0 * _MARGIN_M
+    middle = 0.5 * np.array([task.start_x_m + task.goal_x_m, task.start_y_m + task.goal_y_m])
+    return MapScale(_MAP_PX[0] / length_m, middle, _MAP_PX)
 
 
 def _draw_requests(image: ImageRgb, result: CrossingResult, index: int, place: MapScale) -> None:
@@ -327,30 +318,14 @@ def _draw_requests(image: ImageRgb, result: CrossingResult, index: int, place: M
         colour = awareness_colour(1.0) if request.answered else WHITE
         if request.place_odom_m is not None:
             for radius_m in _WAVES_M:
-                draw_line(image, place.px(request.place_odom_m + radius_m * _circle()), colour, 2)
+                draw_line(image, place.ring(request.place_odom_m, radius_m), colour, 2)
 
 
 def _draw_person(image: ImageRgb, frame: CrossingFrame, number: int, place: MapScale) -> None:
     view = frame.truth[number]
-    gaze = (frame.T_odom_camera[:3, :3] @ view.gaze_camera)[:2]
-    heading = math.atan2(gaze[1], gaze[0])
-    half = AttentionCone().half_angle_rad
-    angles = np.linspace(-half, half, 15) + heading
-    arc = view.position_odom_m + _CONE_LENGTH_M * np.stack([np.cos(angles), np.sin(angles)], 1)
+    sector = place.gaze(frame, view, view.position_odom_m, _CONE_LENGTH_M)
     colour = awareness_colour(view.awareness)
-    fill_hull(image, place.px(np.vstack([view.position_odom_m, arc])), colour, 0.45)
+    fill_hull(image, sector, colour, 0.45)
     centre = place.px(view.position_odom_m[None])
     draw_disc(image, centre, _BODY_RADIUS_M * place.px_per_m + 1.5, DARK)
     draw_disc(image, centre, _BODY_RADIUS_M * place.px_per_m, colour)
-
-
-def _circle() -> FloatArray:
-    angles = np.linspace(0.0, 2.0 * math.pi, 65)
-    return np.stack([np.cos(angles), np.sin(angles)], axis=1)
-
-
-def _placed(frame: CrossingFrame, points_m: FloatArray) -> FloatArray:
-    """Return points (N, 2) of the robot's base frame in odom."""
-    cos, sin = (f(frame.robot_state.heading_odom_rad) for f in (math.cos, math.sin))
-    turned = points_m @ np.array([[cos, -sin], [sin, cos]]).T
-    return np.asarray(turned + frame.robot_state.position_odom_m)

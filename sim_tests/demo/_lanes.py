@@ -50,6 +50,14 @@ class Lane:
     planner: str
     sensors: str
 
+    @property
+    def words(self) -> str:
+        """The robot within a sentence."""
+        return {
+            "today": "today's AMR that predicts people",
+            "today-costmap": "today's AMR with a costmap planner",
+        }.get(self.name, self.label)
+
 
 #: The robots. Both of today read laser scanners alone, as in ``docs/leaderboard/rows.yaml``; the
 #: first one's planner knows how people walk, the second one's knows places only.
@@ -110,11 +118,6 @@ class LaneRun:
     scenario: Scenario
     result: CrossingResult
     row: LaneRow
-
-    @property
-    def stepping_out(self) -> int:
-        """Number of the person who steps out."""
-        return _number(self.scenario, steps_out=True)
 
 
 def run_lane(lane: Lane, seed: int, observer: Observer | None = None) -> LaneRun:
@@ -251,3 +254,29 @@ def read_report() -> tuple[dict[str, str], tuple[LaneRow, ...]]:
     """Return what was measured and when, and the rows of the reported seeds."""
     about, *rows = map(json.loads, _REPORT.read_text("utf-8").splitlines())
     return about, tuple(LaneRow(**row) for row in rows)
+
+
+def reported_table() -> str:
+    """Return the table of the reported seeds."""
+    return lanes_table(read_report()[1])
+
+
+def reported_text() -> str:
+    """Return which seed is shown, and how often and how fast each robot touched somebody."""
+    _, rows = read_report()
+    parts = []
+    for lane in LANES:
+        own = [row for row in rows if row.lane == lane.name]
+        touches_mps = [row.touch_mps for row in own if row.touch_mps is not None]
+        hits = sum(row.hit for row in own)
+        about = (
+            f", up to {max(touches_mps):.1f} m/s, {hits} by its own motion" if touches_mps else ""
+        )
+        lost_s = median(row.time_lost_s for row in own)
+        parts.append(f"{lane.words} in {len(touches_mps)}{about} (lost {lost_s:.1f} s)")
+    return (
+        f"The film is the median of {REPORTED} crossings by awarenav's time lost, seed "
+        f"{shown_seed(rows)}; its AMR has the costmap planner. In how many of the {REPORTED} "
+        f"somebody and the moving robot touched: {'; '.join(parts)}. Lost is the median, over the "
+        "time with nobody there."
+    )

@@ -1,8 +1,8 @@
 """Crossings as a Gymnasium environment, and planners made of learned policies.
 
-Importing this page registers ``awarenav/Crossing-v0`` with Gymnasium, the extra ``awarenav[gym]``:
-``gymnasium.make("sim_tests.learning:awarenav/Crossing-v0")``. A :class:`PolicyPlanner` does not
-need Gymnasium.
+Importing this page registers ``awarenav/Crossing-v0`` with Gymnasium, the extra ``awarenav[gym]``.
+``gymnasium.make("sim_tests.learning:awarenav/Crossing-v0")`` imports it, in any process. A
+:class:`PolicyPlanner` and a :class:`LearnedPlanner` do not need Gymnasium.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
     from ._environment import CrossingEnv, RewardWeights
+    from ._network_policy import LearnedPlanner, NetworkPolicy
     from ._policy_planner import ObservationEncoder, PolicyPlanner, command_of
 
 

@@ -15,7 +15,6 @@ from pydantic import Field, ValidationError
 
 from awarenav.errors import MissingExtraError, not_one_of
 from nav_adapter import AwarenessPolicy, NavConstraints, RobotProfile
-from perception import AttentionCone
 from perception.arrays import FloatArray
 from perception.installation import install_command
 from tracking.config import complaints
@@ -25,19 +24,17 @@ from ..conditions import Perception, refuse_unused_networks
 from ..crossing import (
     Crossing,
     CrossingFrame,
-    SafetyFigures,
     Setup,
     TopView,
     axis_names,
+    camera_view,
     changed,
     contact_by,
-    draw_camera_view,
     named_fault,
     named_policy,
 )
 from ..crossing.faults import Fault
 from ..scenario import Scenario, ScenarioTemplate
-from ..world.camera import CameraRenderer
 from ..world.config import SimConfig
 from ..world.errors import SimError
 from ._policy_planner import Observation, ObservationEncoder, action_limits, command_of
@@ -193,10 +190,10 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         )
         self._crossing: Crossing | None = None
         self._situation: CrossingFrame | None = None
-        self._safety = SafetyFigures()
+        self._violation_s = 0.0
+        self._least_m = math.inf, math.inf
         self._last: CrossingFrame | None = None
         self._plan: TopView | None = None
-        self._camera: CameraRenderer | None = None
         self._ended = False
 
     @property
@@ -245,7 +242,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         self._encoder = ObservationEncoder(*self._slots, scenario.planner_boxes_odom_m)
         self._last = None
         self._ended = False
-        self._safety = SafetyFigures()
+        self._violation_s, self._least_m = 0.0, (math.inf, math.inf)
         self._sense()
         return self._observation(), self._info((0.0, 0.0), {}, "", episode_seed)
 
@@ -259,7 +256,8 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         if self._ended:
             raise SimError("the episode has ended: call reset")
         command = command_of(action, crossing.stage.amr.profile, normalised=self._normalised)
-        hits, bumps, safety = _by_robot(crossing), crossing.stage.amr.bumps, self._safety
+        hits, bumps = _by_robot(crossing), crossing.stage.amr.bumps
+        violated_s = self._violation_s
         crossing.command(*command)
         self._last = replace(before, command=command)
         crossing.advance()
@@ -283,8 +281,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             "over_limit": weights.over_limit_per_m
             * _over_limit_mps(before.constraints, command)
             * dt_s,
-            "margin": weights.negative_margin_per_s
-            * (self._safety.violation_time_s - safety.violation_time_s),
+            "margin": weights.negative_margin_per_s * (self._violation_s - violated_s),
             "contact": weights.contact * hits,
             "bump": weights.bump * bumps,
         }
@@ -297,29 +294,27 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
             return None
         crossing = self.crossing
         command = (0.0, 0.0) if self._last is None else self._last.command
-        frame, cone = replace(self.situation, command=command), AttentionCone()
+        frame = replace(self.situation, command=command)
         if self._render_view == "top":
             if self._plan is None:
                 window_odom_m = crossing.scenario.robot.window_odom_m(_PLAN_MARGIN_M)
                 self._plan = TopView(crossing.stage, _PICTURE_PX, window_odom_m)
-            return self._plan.draw(frame, crossing.stage, cone)
-        spec = crossing.scenario.camera
-        camera = spec.camera(_PICTURE_PX[0] / spec.width_px)
-        if self._camera is None:
-            self._camera = CameraRenderer(crossing.stage.warehouse)
-        picture = self._camera.rgb(camera, frame.T_odom_camera)
-        return draw_camera_view(picture, camera, frame, crossing.stage, cone)
+            return self._plan.draw(frame, crossing.stage)
+        return camera_view(frame, crossing.stage, _PICTURE_PX[0])
 
     def close(self) -> None:
         """End the physics world of the episode; a second call does nothing."""
         if self._crossing is not None:
             self._crossing.close()
         self._crossing, self._situation = None, None
-        self._plan, self._camera = None, None
+        self._plan = None
 
     def _sense(self) -> CrossingFrame:
         now = self._situation = self.crossing.sense()
-        self._safety = self._safety.after(now.t_s, now.separations)
+        if not self.crossing.time_is_up:
+            margin_m, separation_m = self._least_m
+            self._least_m = min(margin_m, now.margin_m), min((separation_m, *now.separations_m))
+            self._violation_s += self.crossing.dt_s * (now.margin_m < 0.0)
         return now
 
     def _changed(self, given: Any) -> Scenario | ScenarioTemplate:
@@ -342,18 +337,18 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         reason: str,
         seed: int | None,
     ) -> dict[str, Any]:
-        now, safety = self.situation, self._safety
-        limits = now.constraints
+        now = self.situation
+        limits, (margin_m, separation_m) = now.constraints, self._least_m
         info: dict[str, Any] = {
             "t_s": now.t_s,
             "scenario": self.crossing.scenario.name,
             "command": list(command),
             "distance_to_goal_m": _distance_m(now, self.crossing.goal_odom_m),
-            "margins_m": list(now.separations.margins_m),
-            "separations_m": list(now.separations.separations_m),
-            "min_margin_m": safety.min_margin_m,
-            "min_separation_m": safety.min_separation_m,
-            "violation_time_s": safety.violation_time_s,
+            "margins_m": list(now.margins_m),
+            "separations_m": list(now.separations_m),
+            "min_margin_m": margin_m,
+            "min_separation_m": separation_m,
+            "violation_time_s": self._violation_s,
             "speed_limit_mps": limits.speed_limit_mps,
             "yaw_rate_limit_radps": limits.yaw_rate_limit_radps(now.known_state.speed_mps),
             "limited_by": limits.limited_by,

@@ -54,7 +54,9 @@ def crossings_command(
     All errors are raised before anything runs.
     """
     jobs = experiment_jobs(experiment)
-    sees = experiment["perception"] == "pixels" and set(experiment["sensors"]) != {"scanner"}
+    sees = experiment["perception"] == "pixels" and any(
+        "camera" in each.split("+") for each in experiment["sensors"]
+    )
     if sees and not experiment["networks"]:
         # Refuses missing networks before anything runs; the plan loads others.
         AwarenessPipeline(Camera.from_fov(640, 480, 1.0), simulator_networks=True)

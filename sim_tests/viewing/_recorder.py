@@ -25,9 +25,8 @@ from ..crossing import (
     CrossingResult,
     RequestMemory,
     Stage,
-    draw_camera_view,
+    camera_view,
 )
-from ..world.camera import CameraRenderer
 
 # A scan older than this is not drawn.
 _SCAN_AGE_S: Final = 0.2
@@ -131,7 +130,6 @@ class CameraPictures:
         self._share = share
         self._due_s = 0.0
         self._not_before = 0.0
-        self._renderer: CameraRenderer | None = None
         self.trouble = ""
 
     def take(self, frame: CrossingFrame, stage: Stage) -> str | None:
@@ -139,24 +137,11 @@ class CameraPictures:
         begun = time.monotonic()
         if self.trouble or frame.t_s < self._due_s or begun < self._not_before:
             return None
-        spec = stage.scenario.camera
-        camera = spec.camera(_WIDTH_PX / spec.width_px)
         try:
-            if self._renderer is None:
-                self._renderer = CameraRenderer(stage.warehouse)
-            image = self._renderer.rgb(camera, frame.T_odom_camera)
+            drawn = camera_view(frame, stage, _WIDTH_PX, box_scale=self._box_scale, captions=False)
         except Exception as error:  # drivers of graphics raise errors of every kind
             self.trouble = f"The camera cannot be rendered here: {error}"
             return None
-        drawn = draw_camera_view(
-            image,
-            camera,
-            frame,
-            stage,
-            AttentionCone(),
-            box_scale=self._box_scale,
-            captions=False,
-        )
         _, data = cv2.imencode(
             ".jpg",
             cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from paths import ROOT
 
 from benchmarks.leaderboard import (
     PAGE,
@@ -18,8 +18,8 @@ from benchmarks.leaderboard import (
     ranked,
     read_results,
 )
-from benchmarks.leaderboard._page import Standing
-from benchmarks.leaderboard._results import headline, over_scenarios, times
+from benchmarks.leaderboard._page import ROBOTS, Standing
+from benchmarks.leaderboard._results import PAGES, figures, over_scenarios, times, with_figures
 from sim_tests import SimError
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.study.measures import EpisodeRecord
@@ -100,17 +100,30 @@ def test_the_results_compare_the_same_episodes_of_two_rows():
     assert saved.n == 4
 
 
-def test_the_results_of_the_committed_rows_are_told_and_are_those_of_readme():
-    text = headline(_BOARD)
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    for interval in re.findall(r"[\d.]+ \[.*?\]", text):
-        assert interval in readme
-    *_, today, _, _, aware = (line[32:].split("; ") for line in text.splitlines())
-    assert f"{aware[0]} impacts per 1 000 crossings instead of {today[0]}" in readme
-    assert f"of all people {aware[1]} instead of {today[1]}" in readme
-    assert f"{len(_BOARD.templates)} scenarios" in text
-    assert "contacts with the moving robot in 0 of" in text.splitlines()[-1]
-    assert "nan" not in text
+def test_the_figures_of_the_pages_are_those_of_the_committed_rows():
+    """After other rows: python -m benchmarks.leaderboard --page."""
+    parts = figures(_BOARD)
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        assert "<!-- figures: " in text
+        assert with_figures(text, parts) == text
+
+
+def test_readmes_table_has_a_column_for_each_robot_and_the_price_with_aware_people():
+    table = figures(_BOARD)["meetings"].split("\n\n")[0].splitlines()
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
+    assert cells[0][1:] == list(ROBOTS.values())
+    rows = {line[0]: line[1:] for line in cells[2:]}
+    never, noticed, everybody = (
+        [float(cell) for title, line in rows.items() for cell in line if word in title]
+        for word in ("never noticed", "had noticed", "impacts, all")
+    )
+    assert np.add(never, noticed) == pytest.approx(everybody, abs=0.11)
+    for number, name in enumerate(ROBOTS):
+        records = read_results(_BOARD, _BOARD.named(name))
+        lost_s = np.mean([each.time_lost_s for each in records])
+        assert rows["seconds lost, all"][number] == f"{lost_s:.1f}"
+    assert "nan" not in "".join(table)
 
 
 def test_contacts_come_before_violation_and_violation_before_time():

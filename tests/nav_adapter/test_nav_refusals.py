@@ -452,8 +452,8 @@ def test_a_boolean_is_no_number_anywhere(tmp_path: Path) -> None:
             finite_number("x", value)
         with pytest.raises(NavError, match="reaction_time_s must be a number"):
             replace(ROBOT, reaction_time_s=value)
-    (tmp_path / "tracker.yaml").write_text("awareness: {memory_s: no}\n")
-    with pytest.raises(TrackingError, match="awareness: memory_s must be a number, got False"):
+    (tmp_path / "tracker.yaml").write_text("awareness: {missed_frame_s: no}\n")
+    with pytest.raises(TrackingError, match="missed_frame_s must be a number, got False"):
         TrackerConfig.from_yaml(tmp_path / "tracker.yaml")
 
 

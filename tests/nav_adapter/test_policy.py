@@ -119,7 +119,7 @@ def test_any_object_with_the_needs_of_a_policy_will_do() -> None:
     class Mine:
         filter: AwarenessFilterConfig
 
-    config = TrackerConfig.for_policy(Mine(AwarenessFilterConfig(memory_s=2.0)))
-    assert config.awareness.memory_s == 2.0
+    config = TrackerConfig.for_policy(Mine(AwarenessFilterConfig(missed_frame_s=0.2)))
+    assert config.awareness.missed_frame_s == 0.2
     with pytest.raises(TrackingError, match="policy must be an AwarenessPolicy, got str"):
         TrackerConfig.for_policy("balanced")  # type: ignore[arg-type]

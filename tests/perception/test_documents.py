@@ -73,7 +73,11 @@ def test_the_same_key_of_two_objects_is_no_repetition() -> None:
     [
         (RobotFile.from_yaml, NavError, "max_speed_mps: 1.0\nmax_speed_mps: 9.9\n"),
         (AwarenessPolicy.from_yaml, NavError, "speed: {}\nspeed: {}\n"),
-        (TrackerConfig.from_yaml, TrackingError, "awareness: {memory_s: 1,\n memory_s: 2}\n"),
+        (
+            TrackerConfig.from_yaml,
+            TrackingError,
+            "awareness: {missed_frame_s: 1,\n missed_frame_s: 2}\n",
+        ),
         (ScenarioTemplate.from_yaml, SimError, "name: a\nname: b\n"),
         (Camera.from_yaml, PerceptionError, "image_width: 640\nimage_width: 320\n"),
         (MapCells.from_yaml, PerceptionError, "resolution: 0.05\nresolution: 0.5\n"),
@@ -92,9 +96,9 @@ def test_numbers_with_an_exponent_are_numbers(tmp_path: Path) -> None:
     text = "[5e-2, 1E5, -1e1, +.5e3, 5.e1, 1.0e-3, '5e-2', 5e, e5, 1e2x]"
     read = parse_yaml(text, "text")
     assert read == [0.05, 1e5, -10.0, 500.0, 50.0, 1e-3, "5e-2", "5e", "e5", "1e2x"]
-    (tmp_path / "tracker.yaml").write_text("awareness: {memory_s: 1e-2}\n")
+    (tmp_path / "tracker.yaml").write_text("awareness: {missed_frame_s: 1e-2}\n")
     config = TrackerConfig.from_yaml(tmp_path / "tracker.yaml")
-    assert config.awareness.memory_s == 0.01
+    assert config.awareness.missed_frame_s == 0.01
 
 
 @settings(max_examples=25, deadline=None)

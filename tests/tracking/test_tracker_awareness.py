@@ -253,43 +253,6 @@ def test_an_ambiguous_match_resets_the_awareness_of_both() -> None:
     assert reset >= 20
 
 
-REMEMBERS = TrackerConfig(awareness=AwarenessFilterConfig(memory_s=2.0))
-
-
-@pytest.mark.parametrize("nothing", [None, "unseen"])
-def test_memory_slows_the_fall_without_evidence_and_never_raises_the_bound(nothing: Shown) -> None:
-    shown: list[Shown] = [0.95] * 40 + [nothing] * 40
-    slow, fast = (exact_bounds(shown, config=each) for each in (REMEMBERS, None))
-    np.testing.assert_array_equal(slow[:40], fast[:40])
-    assert (slow[40:] >= fast[40:]).all()
-    assert slow[50] > 0.25
-    assert slow[50] > 5.0 * fast[50]
-    assert (np.diff(slow[39:]) <= 0.0).all()
-    assert slow[-1] < 0.5 * slow[39]
-
-
-def test_a_face_that_looks_away_ends_the_memory() -> None:
-    away: list[Shown] = [0.95] * 40 + [0.0] * 7
-    assert exact_bounds(away, config=REMEMBERS)[-1] < 0.25
-    after_a_gap: list[Shown] = [0.95] * 40 + ["unseen"] * 6 + [0.0] * 7
-    assert exact_bounds(after_a_gap, config=REMEMBERS)[-1] < 0.25
-
-
-def test_without_a_look_there_is_nothing_to_remember() -> None:
-    assert (exact_bounds([None] * 40, config=REMEMBERS) == 0.0).all()
-
-
-def test_an_ambiguous_match_ends_the_memory() -> None:
-    tracker = PersonTracker(REMEMBERS)
-    for step in range(40):
-        now = step * PERIOD_S
-        tracker.update([observe((3.0, 0.0), now, awareness=0.95)], now, CAMERA)
-    # Two people where there was one: either may be the one who looked.
-    now += PERIOD_S
-    pair = [observe((3.0, y_m), now, awareness=0.95) for y_m in (-0.15, 0.15)]
-    assert all(track.awareness_lower < 0.1 for track in tracker.update(pair, now, CAMERA))
-
-
 # How much of the bound is left in the missed frame, which lasts longer with a slow camera.
 @pytest.mark.parametrize(("rate_hz", "left"), [(5.0, 0.4), (10.0, 0.6), (15.0, 0.6), (30.0, 0.8)])
 def test_a_single_missed_frame_costs_little(rate_hz: float, left: float) -> None:

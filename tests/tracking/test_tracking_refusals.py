@@ -241,14 +241,14 @@ def test_what_cannot_be_is_refused_by_name(call: Callable[[], Any], message: str
 
 def test_an_unusable_file_is_refused_in_one_line_that_names_every_wrong_key(tmp_path: Path) -> None:
     path = tmp_path / "tracker.yaml"
-    path.write_text("max_missed_s: 0\ngate_probability: x\nawareness: {memory: 0.1}\n")
+    path.write_text("max_missed_s: 0\ngate_probability: x\nawareness: {noticed_memory: 0.1}\n")
     with pytest.raises(TrackingError) as caught:
         TrackerConfig.from_yaml(path)
     assert str(caught.value).splitlines() == [
         f"{path}: TrackerConfig: gate_probability: Input should be a valid number, unable to parse "
         "string as a number, got 'x'; max_missed_s: Input should be greater than or equal to "
-        "0.0001, got 0; awareness: unknown key 'memory' in AwarenessFilterConfig; did you mean "
-        "'memory_s'?"
+        "0.0001, got 0; awareness: unknown key 'noticed_memory' in AwarenessFilterConfig; did you "
+        "mean 'noticed_memory_s'?"
     ]
     path.write_text("gate_distance_m: 1.0e+300\n", encoding="utf-8")
     with pytest.raises(TrackingError, match=r"tracker\.yaml: (?s:.)*gate_distance_m"):

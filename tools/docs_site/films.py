@@ -2,11 +2,10 @@
 
     python -m tools.docs_site.films                # all scenarios, into docs/images/films
     python -m tools.docs_site.films blind_corner   # one
-    python -m tools.docs_site.films asking         # the two of docs/policies.md
-    python -m tools.docs_site.films nav2           # that of docs/test_your_nav2.md; needs a Nav2
 
 The robot has the recommended set-up, a camera ahead and two laser scanners, and drives with the
-policy ``balanced`` and seed 0. Films run at twice the real speed.
+policy ``balanced`` and seed 0. Films run at twice the real speed. Those of docs/policies.md and
+docs/test_your_nav2.md (``asking_*.webp``, ``nav2.webp``) are by this module of commit 3030439d.
 """
 
 from __future__ import annotations
@@ -23,25 +22,11 @@ import matplotlib as mpl
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from nav_adapter import AwarenessPolicy
-from nav_adapter.policies import AttentionRules
-from perception import AttentionCone
-from sim_tests import CrossingFrame, CrossingResult, Scenario, run_crossing, shipped_scenarios
+from sim_tests import CrossingFrame, run_crossing, shipped_scenarios
 from sim_tests.crossing import Stage, TopView
-from sim_tests.demo._film import ComparisonRow, draw_lane
-from sim_tests.scenario import SCENARIO_SETS, ScenarioTemplate
+from sim_tests.scenario import SCENARIO_SETS
 
 FOLDER: Final = Path(__file__).parents[2] / "docs" / "images" / "films"
-# Films of docs/policies.md, beside the folder: the same crossing with somebody who answers or not.
-_ASKING: Final = {"asking_answered": 1.0, "asking_in_vain": 0.0}
-_ASKING_SEED: Final = 0
-# That of docs/test_your_nav2.md: each lane with its policy, and the limit that Nav2 is told.
-_NAV2_SCENARIO: Final = "standing_in_aisle"
-_NAV2_LANES: Final = {
-    "today's AMR": ("balanced", "nobody"),
-    "awareness-blind": ("blind", "policy"),
-    "aware": ("balanced", "policy"),
-}
 #: Largest film, and largest sum of all films.
 MAX_FILM_BYTES: Final = 150_000
 MAX_SUM_BYTES: Final = 5_350_000
@@ -70,7 +55,6 @@ class Film:
     def __init__(self) -> None:
         self.pictures: list[Image.Image] = []
         self._view: TopView | None = None
-        self._cone = AttentionCone()
         self._next_s = 0.0
         font = Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
         self._font = ImageFont.truetype(str(font), 12)
@@ -87,7 +71,7 @@ class Film:
         self._next_s += _EVERY_S
         # The points of the scans flicker, and would make up most of the file.
         calm = dataclasses.replace(frame, scan_points_odom_m=np.zeros((0, 2)))
-        picture = Image.fromarray(self._view.draw(calm, stage, self._cone))
+        picture = Image.fromarray(self._view.draw(calm, stage))
         self.pictures.append(self._captioned(picture, frame))
 
     def _captioned(self, picture: Image.Image, frame: CrossingFrame) -> Image.Image:
@@ -163,53 +147,6 @@ def _window(stage: Stage) -> tuple[float, float, float, float]:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-def _film_asking() -> None:
-    """Film the robot behind a worker with a phone, who answers its request or does not."""
-    scenario = ScenarioTemplate.shipped("busy_in_aisle").for_seed(_ASKING_SEED)
-    worker = scenario.people[0].model_copy(update={"activity": "phone"})
-    for name, answers in _ASKING.items():
-        hearing = scenario.hearing.with_numbers(
-            {"answers": answers, "phone_factor": 1.0, "startles": 0.0}
-        )
-        film = Film()
-        run_crossing(
-            scenario.model_copy(update={"people": (worker,), "hearing": hearing}),
-            policy=AwarenessPolicy(attention=AttentionRules()),
-            perception="keypoints+scanner",
-            seed=_ASKING_SEED,
-            observer=film,
-        )
-        (FOLDER.parent / f"{name}.webp").write_bytes(film.webp())
-        print(f"{name}: {len(film.pictures)} pictures", flush=True)
-
-
-def _film_nav2() -> None:
-    """Film three robots of a Nav2 that runs in this ROS_DOMAIN_ID: today's, blind, and aware."""
-    scenario = ScenarioTemplate.shipped(_NAV2_SCENARIO).for_seed(0)
-
-    def row(label: str, scenario: Scenario, policy: str, limit: str) -> ComparisonRow:
-        result = run_crossing(scenario, policy=policy, planner=f"ros2(limit='{limit}')")
-        return ComparisonRow(label, result, scenario)
-
-    free = row("", scenario.without_people(), "balanced", "nobody")
-    rows = [row(label, scenario, *drives) for label, drives in _NAV2_LANES.items()]
-    write_nav2_film(rows, free.result)
-
-
-def write_nav2_film(rows: Sequence[ComparisonRow], free: CrossingResult) -> None:
-    """Write the film of robots in the same aisle, one below the other; ``free`` meets nobody.
-
-    It ends when all have arrived that do, and its last picture has the results.
-    """
-    film = Film()
-    end_s = max(row.result.time_to_goal_s or 0.0 for row in rows)
-    for t_s in [*np.arange(0.0, end_s + _EVERY_S, _EVERY_S).tolist(), None]:
-        lanes = [draw_lane(row, free, 0, t_s) for row in rows]
-        film.pictures.append(Image.fromarray(np.vstack(lanes)))
-    (FOLDER.parent / "nav2.webp").write_bytes(film.webp())
-    print(f"nav2: {len(film.pictures)} pictures", flush=True)
-
-
 def filmed_scenarios() -> tuple[str, ...]:
     """Return the names of the shipped scenarios of all sets."""
     return tuple(name for each in SCENARIO_SETS for name in shipped_scenarios(each))
@@ -219,12 +156,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Make the films; return 1 if they are too large."""
     parser = argparse.ArgumentParser(description="Make the films of the gallery.")
     parser.add_argument("scenarios", nargs="*", help="default: all that are shipped")
-    names = parser.parse_args(arguments).scenarios or [*filmed_scenarios(), "asking"]
+    names = parser.parse_args(arguments).scenarios or filmed_scenarios()
     FOLDER.mkdir(parents=True, exist_ok=True)
     for name in names:
-        if name in ("asking", "nav2"):
-            (_film_asking if name == "asking" else _film_nav2)()
-            continue
         film = Film()
         run_crossing(name, policy="balanced", perception="keypoints+scanner", seed=0, observer=film)
         data = film.webp()

@@ -12,7 +12,7 @@ from perception.arrays import FloatArray
 from sim_tests.world import Warehouse
 from sim_tests.world.hall import Mesh, box, merge
 from sim_tests.world.render import RenderView, Visuals
-from training.hall import ellipsoid, tube
+from training.round_meshes import ellipsoid, tube
 
 from ._textures import random_texture
 

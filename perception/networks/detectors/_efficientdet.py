@@ -87,7 +87,7 @@ class EfficientDetPersonDetector:
         self.input_size_hw_px = (side, side)
 
     def __repr__(self) -> str:
-        return f"EfficientDetPersonDetector({self.model.name}: {self.model.engine})"
+        return f"EfficientDetPersonDetector({self.model.name})"
 
     def detect(self, image_rgb: ImageRgb) -> tuple[PersonDetection, ...]:
         """Return the people in an image, highest score first.

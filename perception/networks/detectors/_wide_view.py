@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._camera import Camera
 from ..._stages import PersonDetection, PersonDetector
@@ -16,9 +17,12 @@ from ...ownership import area, common_area
 _WIDE: Final = 0.5
 # Side of the middle, as a share of the image's width.
 _SHARE: Final = 0.5
-# In the whole image a small person may be several boxes, of which this share lies in the fine one.
+# In one look a person may be several boxes, of which this share lies in the other look's one.
 _SAME_SHARE: Final = 0.5
-_EDGE_PX: Final = 2.0
+# Shares of the middle's side. A box that ends this close to an edge is cut by it. That of somebody
+# whom the edge cuts may end short of it by the second.
+_EDGE: Final = 0.01
+_SHORT: Final = 0.125
 
 
 def for_wide_view(detector: PersonDetector, camera: Camera) -> PersonDetector:
@@ -63,22 +67,33 @@ class WideViewDetector:
             PersonDetection(each.box_xyxy_px + shift, each.score)
             for each in self._detector.detect(part)
         ]
-        kept = [each for each in fine if not self._is_cut(each.box_xyxy_px)]
+        coarse = self._detector.detect(image_rgb)
+        kept = [
+            each
+            for each in fine
+            if not self._at_edge(each.box_xyxy_px, _EDGE).any()
+            and not any(self._is_piece(each.box_xyxy_px, other.box_xyxy_px) for other in coarse)
+        ]
         kept += [
             each
-            for each in self._detector.detect(image_rgb)
-            if not any(_same(each.box_xyxy_px, other.box_xyxy_px) for other in kept)
+            for each in coarse
+            if not any(_lies_in(each.box_xyxy_px, other.box_xyxy_px) for other in kept)
         ]
         return tuple(sorted(kept, key=lambda each: -each.score))
 
-    def _is_cut(self, box: FloatArray) -> bool:
-        """Return whether a box reaches an edge of the middle that is none of the image."""
-        middle = self._middle
-        low = (box[:2] < middle[:2] + _EDGE_PX) & (middle[:2] > 0)
-        high = (box[2:] > middle[2:] - _EDGE_PX) & (middle[2:] < self._size)
-        return bool(low.any() or high.any())
+    def _is_piece(self, fine: FloatArray, coarse: FloatArray) -> bool:
+        """Return whether a box of the middle is what an edge has left of one of the whole image."""
+        crossed = self._at_edge(coarse, 0.0) & self._at_edge(fine, _SHORT)
+        return bool(crossed.any()) and _lies_in(fine, coarse)
+
+    def _at_edge(self, box: FloatArray, share: float) -> NDArray[np.bool_]:
+        """Return (4,) whether a box reaches each edge of the middle that is none of the image."""
+        middle, margin_px = self._middle, share * (self._middle[2] - self._middle[0])
+        low = (box[:2] < middle[:2] + margin_px) & (middle[:2] > 0)
+        high = (box[2:] > middle[2:] - margin_px) & (middle[2:] < self._size)
+        return np.concatenate([low, high])
 
 
-def _same(coarse: FloatArray, fine: FloatArray) -> bool:
-    """Return whether a box of the whole image shows the person of one of the middle, or a part."""
-    return common_area(coarse, fine) > _SAME_SHARE * area(coarse)
+def _lies_in(box: FloatArray, other: FloatArray) -> bool:
+    """Return whether a box of one look shows the person of one of the other, or a part."""
+    return common_area(box, other) > _SAME_SHARE * area(box)

@@ -83,10 +83,9 @@ class BlazePoseEstimator:
                 f"{self.model.name} is not a BlazePose network: found {self.model.layout}; known: "
                 f"(1, 256, 256, 3) float32 -> {', '.join(f'(1, {extent})' for extent in _OUTPUTS)}"
             )
-        self.model = self.model.with_outputs([str(name) for name in self._names])
 
     def __repr__(self) -> str:
-        return f"BlazePoseEstimator({self.model.name}: {self.model.engine})"
+        return f"BlazePoseEstimator({self.model.name})"
 
     def estimate(
         self, image_rgb: ImageRgb, detections: tuple[PersonDetection, ...]

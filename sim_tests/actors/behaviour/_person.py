@@ -473,7 +473,7 @@ class Person:
             too_near = math.dist(robot.nearest_point_m(x, y), (x, y)) < _TOO_NEAR_M
             if too_near or not self._reactions.expects_robot_to_yield:
                 fx, fy = robot_force(x, y, vx, vy, robot)
-                ax, ay = ax + fx, ay + fy
+                return ax + fx, ay + fy
         return ax, ay
 
     def _maybe_start(self, manner: Manner, robot: RobotBody | None) -> None:
@@ -496,7 +496,6 @@ class Person:
             self._span.end_halt()
             self._reactions.go_first()
             return
-        errand = manner.errand((x, y), self._obstacles.is_clear)
-        if errand is not None:
+        if errand := manner.errand((x, y), self._obstacles.is_clear):
             goal, speed_mps = errand
             self._follower = RouteFollower(Route([(x, y), goal], []), speed_mps, t_s)

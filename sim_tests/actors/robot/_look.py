@@ -18,7 +18,7 @@ from ...world.sightlines import PlacedSurface, TriangleSet
 from ._model import TRACK_M, WHEEL_RADIUS_M, RobotModel
 from ._robots import Amr, KinematicRobot
 
-# Meshes of the Nova Carter; training/hall makes them.
+# Meshes of the Nova Carter; training/hall of commit 3030439d made them.
 _AMR_FILE: Final = resources.files(__package__) / "nova_carter.npz"
 # Low and high corner of a box that holds the Nova Carter in its base frame.
 _AMR_BOUNDS_M: Final = np.array([[-0.38, -0.26, -0.01], [0.38, 0.26, 1.46]])

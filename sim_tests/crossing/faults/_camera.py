@@ -14,7 +14,7 @@ from perception import PersonObservation
 from perception.arrays import FloatArray, ImageRgb
 
 from ...world.camera import CameraTiming
-from ..eyes import NOBODY, Change, Delivery, OdometryReading, Sighting, WorkerObservations
+from .._messages import NOBODY, Change, Delivery, OdometryReading, Sighting, WorkerObservations
 from ._sensor_fault import (
     Appearances,
     Appearing,

@@ -22,7 +22,7 @@ from tracking.config import complaint
 from ...world.config import SimConfig
 from ...world.errors import SimError
 from ...world.scanner import ScannerSpec
-from ..eyes import Change, Delivery, MountedScan, OdometryReading, Sighting
+from .._messages import Change, Delivery, MountedScan, OdometryReading, Sighting
 from ._camera import CAMERA_FAULTS
 from ._scans import SCAN_FAULTS
 from ._sensor_fault import (

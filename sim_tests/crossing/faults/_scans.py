@@ -11,7 +11,7 @@ from pydantic import Field
 
 from perception.laser import LaserScan
 
-from ..eyes import Change, Delivery, MountedScan
+from .._messages import Change, Delivery, MountedScan
 from ._false_returns import Legs, Mirror, new_legs, new_mirror, with_legs, with_mirror
 from ._sensor_fault import Appearances, Appearing, Onset, Outage, ScanFault, SensorFault, Start
 

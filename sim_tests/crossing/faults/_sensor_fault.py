@@ -22,7 +22,7 @@ from perception.arrays import FloatArray
 
 from ...world.config import SimConfig
 from ...world.scanner import ScannerSpec
-from ..eyes import Change, Delivery
+from .._messages import Change, Delivery
 
 # Random streams of faults are separate from all others of an episode.
 _STREAM: Final = 0xFA017

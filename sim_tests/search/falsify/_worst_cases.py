@@ -189,11 +189,7 @@ def _draw_course(axes: Axes, falsification: Falsification) -> None:
 def _draw_plan(axes: Axes, case: WorstCase) -> None:
     """Draw ways, robot, people and gazes at the first contact, or at the smallest margin."""
     frames, contacts, record = case.result.frames, case.result.contacts, case.record
-    margins = [
-        min(frame.margins_m, default=math.inf) if frame.separations.robot_moves else math.inf
-        for frame in frames
-    ]
-    worst = int(np.argmin(margins))
+    worst = int(np.argmin([frame.margin_m for frame in frames]))
     if contacts:
         worst = int(np.argmin([abs(frame.t_s - contacts[0].t_s) for frame in frames]))
     frame = frames[worst]

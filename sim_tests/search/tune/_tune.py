@@ -111,7 +111,8 @@ class TuneSettings(SearchSettings):
             [(name, policy)],
             seeds,
             planners=[self.planner],
-            perception=perception.kind or "keypoints",  # without a camera it does not matter
+            # Without a camera of that kind it does not matter.
+            perception=perception.kind if "camera" in sensors.split("+") else "keypoints",
             sensors=[sensors_of_today(sensors) if name == TODAY else sensors],
         )
 

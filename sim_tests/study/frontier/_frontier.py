@@ -11,7 +11,6 @@ import numpy as np
 from nav_adapter import AwarenessPolicy
 from perception.arrays import FloatArray
 
-from ...conditions import SensorSet
 from ...world.errors import SimError
 from ..measures import (
     EpisodeRecord,
@@ -36,9 +35,9 @@ _ATTENTIVE: Final = "attentive"
 _Task = tuple[str, int, int]
 
 
-def sensors_of_today(sensors: SensorSet) -> SensorSet:
+def sensors_of_today(sensors: str) -> str:
     """Return the sensors of today's AMR: its laser scanners alone, where the robot has any."""
-    return "camera" if sensors == "camera" else "scanner"
+    return "scanner" if "scanner" in sensors.split("+") else sensors
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,8 +59,7 @@ class Log:
     def nearest_point_mps(self) -> FloatArray:
         """(N, P) speeds of the point of the robot that is nearest to each person."""
         speeds_mps = [
-            [each.robot_speed_mps for each in frame.separations.approaches]
-            for frame in self.result.frames
+            [each.robot_speed_mps for each in frame.approaches] for frame in self.result.frames
         ]
         return np.array(speeds_mps, dtype=np.float64).reshape(self.trace.separation_m.shape)
 

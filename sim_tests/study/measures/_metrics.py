@@ -112,7 +112,7 @@ def time_to_goal_s(log: Log) -> float | None:
 @measure_of_log("Highest speed within 2 m")
 def max_speed_within_2m_mps(log: Log) -> float | None:
     """The robot's highest speed, at its point nearest to a person whose surface is within 2 m."""
-    return log.result.safety.max_speed_within_2m_mps if log.trace.anybody else None
+    return log.result.max_speed_within_2m_mps if log.trace.anybody else None
 
 
 @measure_of_log("Smallest margin", better="higher")

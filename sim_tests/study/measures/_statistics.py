@@ -344,7 +344,6 @@ def paired_difference(
     level: float = 0.95,
     *,
     over: str = "",
-    sign: float = 1.0,
 ) -> Interval:
     """Return the mean of ``other`` − ``base`` over pairs, or its ratio to ``base``, with interval.
 
@@ -360,7 +359,6 @@ def paired_difference(
         rng: draws the resamples; None for a generator with seed 0.
         level: confidence of the interval.
         over: the field of ``base`` whose sum the differences are divided by; empty for their mean.
-        sign: −1 for the differences ``base`` − ``other``.
 
     Returns:
         The figure; NaN if ``over`` is 0 in every episode of ``base``.
@@ -373,7 +371,7 @@ def paired_difference(
     pairs = paired(base, other)
     kept = _with_numbers(pairs, field, over or field)
     interval = bootstrap_interval(
-        [sign * (getattr(second, field) - getattr(first, field)) for first, second in kept],
+        [getattr(second, field) - getattr(first, field) for first, second in kept],
         np.random.default_rng(0) if rng is None else rng,
         level,
         over=[getattr(first, over) for first, _ in kept] if over else None,

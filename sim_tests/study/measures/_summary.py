@@ -132,8 +132,7 @@ class Comparison:
         baseline: label of the policy compared with.
         part: a scenario or a part of :func:`measured_part`; empty for all.
         pairs: number of pairs.
-        won_back: share of the time lost by the baseline that the policy wins back.
-        time_lost_s: mean difference in time lost; negative means that the policy is faster.
+        time_lost_s: mean difference in time lost, seconds a meeting; negative is faster.
         violation_excess: additional violation time, relative to that of the baseline.
         violation_excess_of_time: additional violation time, relative to the baseline's duration.
         violates_more: share of pairs in which the policy violates the margin longer.
@@ -146,7 +145,6 @@ class Comparison:
     baseline: str
     part: str
     pairs: int
-    won_back: Interval
     time_lost_s: Interval
     violation_excess: Interval
     violation_excess_of_time: Interval
@@ -212,7 +210,6 @@ class Summary:
             on the policy's own run, so these rows are not paired across policies.
         comparisons: each policy compared with the baseline, and with itself in the first of several
             tables: over all episodes, then by attention.
-        scenario_comparisons: the same comparisons by scenario.
     """
 
     baseline: str
@@ -222,7 +219,6 @@ class Summary:
     attentions: tuple[SummaryRow, ...]
     awareness: tuple[SummaryRow, ...]
     comparisons: tuple[Comparison, ...]
-    scenario_comparisons: tuple[Comparison, ...]
 
     __repr__ = short_repr
 
@@ -308,7 +304,6 @@ def summarise_sources(
         attentions=rows(measured_part),
         awareness=rows(_awareness_part),
         comparisons=comparisons(lambda record: "") + comparisons(measured_part),
-        scenario_comparisons=comparisons(by_scenario),
     )
 
 
@@ -390,15 +385,14 @@ def _comparison(
 ) -> Comparison:
     variant, baseline, part = names
 
-    def change(field: str, over: str = "", sign: float = 1.0) -> Interval:
-        return paired_difference(base, group, field, rng, level, over=over, sign=sign)
+    def change(field: str, over: str = "") -> Interval:
+        return paired_difference(base, group, field, rng, level, over=over)
 
     return Comparison(
         variant=variant,
         baseline=baseline,
         part=part,
         pairs=len(paired(base, group)),
-        won_back=change("time_lost_s", "time_lost_s", -1.0),
         time_lost_s=change("time_lost_s"),
         violation_excess=change("violation_time_s", "violation_time_s"),
         violation_excess_of_time=change("violation_time_s", "duration_s"),

@@ -60,14 +60,14 @@ def short_text(summary: Summary) -> str:
         "episodes": lambda row: str(row.episodes),
         "success": lambda row: percent(row.success.value),
         "contacts": _moving_contacts,
-        "time lost s": _mean("time_lost_s", bounds=False),
+        "s a meeting": _a_meeting(bounds=False),
         "nearest m": _worst("min_separation_m"),
         "step-out": _step_outs,
         "failed": lambda row: str(row.errors),
     }
     legend = (
         "success: at the goal in time. contacts: episodes in which the moving robot and a person\n"
-        "touched. time lost: to the same task without people. nearest: smallest gap to a person.\n"
+        "touched. s a meeting: time over that of the same robot alone. nearest: to any person, m.\n"
         "step-out: impacts with people who step out and have never noticed the robot; with all\n"
         "people, per 1 000 crossings."
     )
@@ -99,6 +99,11 @@ def _mean(name: str, *, bounds: bool = True) -> Callable[[SummaryRow], str]:
     return cell
 
 
+def _a_meeting(*, bounds: bool = True) -> Callable[[SummaryRow], str]:
+    """Return the column of the seconds that a meeting costs, with its sign."""
+    return lambda row: _signed(row.means["time_lost_s"], bounds=bounds)
+
+
 def _worst(name: str) -> Callable[[SummaryRow], str]:
     """Return the column of a metric's worst value."""
     decimals = METRICS[name].decimals
@@ -122,8 +127,12 @@ def _step_outs(row: SummaryRow) -> str:
     return "; ".join(_mean(f"step_out_{each}", bounds=False)(row) for each in ("never", "all"))
 
 
-def _signed(interval: Interval, decimals: int = 2, scale: float = 1.0) -> str:
+def _signed(
+    interval: Interval, decimals: int = 2, scale: float = 1.0, *, bounds: bool = True
+) -> str:
     text = interval.text(decimals, scale)
+    if not bounds:
+        text = text.partition(" [")[0]
     return f"+{text}" if interval.known and round(interval.value * scale, decimals) > 0.0 else text
 
 
@@ -131,7 +140,7 @@ _POLICIES: Final[dict[str, Callable[[SummaryRow], str]]] = {
     "policy": lambda row: row.variant,
     "success": _successes,
     "time to goal s": _mean("time_to_goal_s"),
-    "time lost s": _mean("time_lost_s"),
+    "s a meeting": _a_meeting(),
     "SPL": _mean("spl", bounds=False),
     "personal zone s": _mean("personal_s"),
 }
@@ -183,8 +192,7 @@ _COMPARISONS: Final[dict[str, Callable[[Comparison], str]]] = {
     "against": lambda each: each.baseline,
     "episodes": lambda each: each.part or "all",
     "pairs": lambda each: str(each.pairs),
-    "won back %": lambda each: each.won_back.text(0, 100.0),
-    "time lost s": lambda each: _signed(each.time_lost_s),
+    "s a meeting": lambda each: _signed(each.time_lost_s),
     "violation %": lambda each: _signed(each.violation_excess, 0, 100.0),
     "% of time": lambda each: _signed(each.violation_excess_of_time, 2, 100.0),
     "longer violation": lambda each: each.violates_more.share_text(),
@@ -196,7 +204,7 @@ _PARTS: Final[dict[str, Callable[[SummaryRow], str]]] = {
     "success": _successes,
     "contacts": _moving_contacts,
     "step-out": _step_outs,
-    "time lost s": _mean("time_lost_s"),
+    "s a meeting": _a_meeting(),
     "nearest m": _worst("min_separation_m"),
     "margin m": _worst("min_margin_m"),
     "violated s": _mean("violation_time_s", bounds=False),
@@ -207,11 +215,12 @@ _PARTS: Final[dict[str, Callable[[SummaryRow], str]]] = {
 def _notes(summary: Summary) -> list[str]:
     """Return the legend, and one line for each policy with episodes that are left out."""
     notes = [
-        "won back: share of the time that the other loses. violation: longer violation of the\n"
-        "margin S − S_p, relative to that of the other, and to the time that it takes. nearest,\n"
-        "margin, violated, TTC, PET under safety: the worst of all episodes. contact, moving: a\n"
-        "person and the moving robot touched, by any cause. step-out: step-out impacts, never\n"
-        "noticed; all. (…): the exact interval. [?]: too few for an interval.\n"
+        "s a meeting: time over that of the same robot alone; against another policy, the\n"
+        "difference. violation: longer violation of the margin S − S_p, relative to that of the\n"
+        "other, and to the time that it takes. nearest, margin, violated, TTC, PET under safety:\n"
+        "the worst of all episodes. contact, moving: a person and the moving robot touched, by\n"
+        "any cause. step-out: step-out impacts, never noticed; all. (…): the exact interval.\n"
+        "[?]: too few for an interval.\n"
         "docs/measures.md defines all figures."
     ]
     if any(row.part == UNCONFIRMED for row in summary.attentions):
@@ -248,10 +257,10 @@ def _notes(summary: Summary) -> list[str]:
                 "task without people"
             )
     for each in summary.comparisons:
-        if each.part == "" and each.won_back.left_out:
+        if each.part == "" and each.time_lost_s.left_out:
             notes.append(
-                f"{each.variant}: {_of(each.won_back.left_out, each.pairs, 'pair')} left out of "
-                "the time won back"
+                f"{each.variant}: {_of(each.time_lost_s.left_out, each.pairs, 'pair')} left out of "
+                "the seconds a meeting"
             )
     return notes
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import inspect
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -16,7 +15,6 @@ from awarenav.files import json_text
 from nav_adapter import AwarenessPolicy
 
 from ...conditions import ORACLE, REFERENCE_PLANNER
-from ...crossing.planner import KNOWN_PLANNERS, ReferencePlanner
 from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
 from ..measures import (
@@ -191,13 +189,3 @@ def print_comparison(folder: Path, *, as_json: bool) -> None:
         print(table_text(list(table.columns), [[cell.text for cell in row] for row in table.cells]))
         print()
     print(f"Report: {folder / 'report.html'}")
-
-
-def known_planners() -> dict[str, str]:
-    """Return the planners that have a name, with the first sentence about each."""
-    makers = {REFERENCE_PLANNER: ReferencePlanner, **KNOWN_PLANNERS}
-    sentences = {
-        name: (inspect.getdoc(make) or "").partition("\n")[0].removeprefix("Return ")
-        for name, make in makers.items()
-    }
-    return {name: text[:1].upper() + text[1:] for name, text in sentences.items()}

@@ -10,11 +10,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from perception import AttentionCone
 from perception.arrays import FloatArray
 
-from ...crossing import CrossingFrame, Stage, TopView, draw_camera_view
-from ...world.camera import CameraRenderer
+from ...crossing import CrossingFrame, Stage, TopView, camera_view
 from ..measures import EpisodeRecord
 from ..runs import Job, box_scale_of, observed_episode
 
@@ -48,36 +46,24 @@ class _WorstInstant:
 
     def __call__(self, frame: CrossingFrame, stage: Stage) -> None:
         self._frames.append(frame)
-        if not frame.margins_m or not frame.separations.robot_moves:
-            return
-        self.least_m = min(self.least_m, *frame.margins_m)
+        self.least_m = min(self.least_m, frame.margin_m)
         if self.least_m <= self._margin_m + _SAME_M:
             self._draw(frame, stage)
             raise _Drawn
 
     def _draw(self, frame: CrossingFrame, stage: Stage) -> None:
-        cone = AttentionCone()
         spec = stage.scenario.camera
-        camera = spec.camera(_WIDTH_PX / spec.width_px)
-        picture = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
+        size_px = _WIDTH_PX, round(_WIDTH_PX / spec.width_px * spec.height_px)
         worker = int(np.argmin(frame.margins_m))
         middle = 0.5 * (frame.robot_state.position_odom_m + frame.truth[worker].position_odom_m)
-        size_px = (camera.width_px, camera.height_px)
         view = TopView(stage, size_px, _window(middle, size_px))
         for earlier in self._frames:
             view.watch(earlier)
         for earlier in self._frames[:-1:_PATH_STEP]:
-            view.draw(earlier, stage, cone)  # extends the paths
-        self.plan = view.draw(frame, stage, cone)
-        self.camera = draw_camera_view(
-            picture,
-            camera,
-            frame,
-            stage,
-            cone,
-            box_scale=self._box_scale,
-            memory=view.memory,
-        )
+            view.draw(earlier, stage)  # extends the paths
+        self.plan = view.draw(frame, stage)
+        how = {"box_scale": self._box_scale, "memory": view.memory}
+        self.camera = camera_view(frame, stage, _WIDTH_PX, **how)
         self.t_s = frame.t_s
 
 

@@ -198,11 +198,10 @@ class Results:
         """The arms that verdicts are about: all but ``blind`` and ``oracle``, unless none is."""
         return tuple(arm for arm in self.arms if arm.variant.policy not in _ORDER) or self.arms
 
-    def against(self, arm: Arm, part: str = "", *, scenario: bool = False) -> Comparison | None:
+    def against(self, arm: Arm, part: str = "") -> Comparison | None:
         """Return the comparison of an arm with ``blind`` and the same planner; None without one."""
-        summary = self.summary
-        comparisons = summary.scenario_comparisons if scenario else summary.comparisons
-        return next((c for c in comparisons if (c.variant, c.part) == (arm.name, part)), None)
+        found = (each for each in self.summary.comparisons if each.variant == arm.name)
+        return next((each for each in found if each.part == part), None)
 
     def verdict(self, arm: Arm) -> str:
         """Return the sentences about an arm that are read first; they claim what is shown.
@@ -221,10 +220,10 @@ class Results:
                 said.append(f"What awareness saves is not known: {BASELINE} did not run.")
             return " ".join(said)
         note = self._left_out(arm, whole)
-        said.append(_won_back("people", whole))
+        said.append(_faster("people", whole))
         attentive = self.against(arm, "attentive")
-        if attentive is not None and attentive.won_back.n < whole.won_back.n:
-            said.append(_won_back("attentive people", attentive))
+        if attentive is not None and attentive.time_lost_s.n < whole.time_lost_s.n:
+            said.append(_faster("attentive people", attentive))
         elif attentive is None and note:
             said.append("Nobody was measured to be attentive.")
         unaware = self.against(arm, "unaware")
@@ -244,7 +243,7 @@ class Results:
             return ""
         listed = ", ".join(f"{name} {number}" for name, number in names.items())
         return (
-            f"Left out of the time won back: {counted(names.total(), 'pair')} labelled attentive "
+            f"Not counted as attentive: {counted(names.total(), 'pair')} labelled attentive "
             "in which somebody was not measured to be aware of the robot for "
             f"{percent(ATTENTIVE_FROM)} of the time ({listed})."
         )
@@ -308,21 +307,21 @@ def _goals(episodes: Sequence[Episode]) -> str:
     return f"It misses the goal in {missed} of {counted(len(episodes), 'episode')}."
 
 
-def _won_back(who: str, against: Comparison) -> str:
-    back = against.won_back
-    if not back.known:
+def _faster(who: str, against: Comparison) -> str:
+    """Return the sentence on the seconds that a meeting costs less than with ``blind``."""
+    change = against.time_lost_s
+    if not change.known:
         return f"No pair tells whether it is faster than {BASELINE}."
-    pairs = counted(back.n, "pair")
-    if back.value >= 0.0:
-        text = f"wins back {back.text(0, 100.0)}{THIN}% of the time that {BASELINE} loses to {who}"
-    else:  # what it wins back is below 0, and so it loses more
-        more = replace(back, value=-back.value, low=-back.high, high=-back.low)
-        text = f"loses {more.text(0, 100.0)}{THIN}% more time to {who} than {BASELINE}"
-    if back.n < FEW_PAIRS:
-        return f"Over only {pairs} it {text}: too few to tell."
-    if back.low <= 0.0 <= back.high:
-        return f"It {text} ({pairs}): no difference is shown."
-    return f"It {text} ({pairs})."
+    pairs, more = counted(change.n, "pair"), "more"
+    if change.value <= 0.0:
+        more = "less"
+        change = replace(change, value=-change.value, low=-change.high, high=-change.low)
+    text = f"a meeting with {who} takes {change.text(1)} s {more} than with {BASELINE}"
+    if change.n < FEW_PAIRS:
+        return f"Over only {pairs}, {text}: too few to tell."
+    if change.low <= 0.0 <= change.high:
+        return f"A{text[1:]} ({pairs}): no difference is shown."
+    return f"A{text[1:]} ({pairs})."
 
 
 def _violates(against: Comparison, who: str) -> str:

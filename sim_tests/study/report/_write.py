@@ -117,7 +117,7 @@ def arms_section(results: Results) -> Section:
             "Contacts, moving": "episodes in which a person and the moving robot touched, by any "
             "cause",
             "It moved into them": "episodes in which the robot moved into a person",
-            "Time lost, s": METRICS["time_lost_s"].meaning,
+            "A meeting, s": METRICS["time_lost_s"].meaning,
             "Negative margin, s": METRICS["violation_time_s"].meaning,
             "Least margin, m": "the worst episode",
             **{
@@ -136,7 +136,6 @@ def arms_section(results: Results) -> Section:
             arm.name,
             part or "all",
             number_cell(against.pairs, 0),
-            interval_cell(against.won_back, 0, 100.0),
             interval_cell(against.time_lost_s, 1),
             interval_cell(against.violation_excess, 0, 100.0),
             interval_cell(against.step_out_never, 1),
@@ -151,8 +150,7 @@ def arms_section(results: Results) -> Section:
         "Robot": "",
         "People": "what the scenario says that they look at, where it was measured to be so",
         "Pairs": "of episodes with the same scenario and seed",
-        "Time won back, %": "Σ (time lost by blind − by the robot) / Σ time lost by blind",
-        "Time lost, s": "mean difference; less is faster",
+        "A meeting, s": "mean difference; less is faster",
         "Negative margins, %": "Σ (its time − that of blind) / Σ of blind",
         **{METRICS[f"step_out_{group}"].title: "mean difference" for group in _IMPACTS},
         "Separation, m": "mean difference of the smallest separation",
@@ -212,7 +210,7 @@ def awareness_section(results: Results) -> Section | None:
     ]
     if not lines:
         return None
-    names = ("Nearest person", "Robot", "Episodes", "Contacts, moving", "Time lost, s")
+    names = ("Nearest person", "Robot", "Episodes", "Contacts, moving", "A meeting, s")
     columns = dict.fromkeys((*names, "Negative margin, s", "Smallest margin, m"), "")
     lead = "Whether the person who came nearest had seen the robot, and whether it knew."
     return Section("awareness", "Awareness", lead, tables=(Table(columns, lines, 2),))
@@ -222,12 +220,10 @@ def scenarios_section(results: Results, jobs: Iterable[Job]) -> Section:
     """Return the table of scenarios, with the arms as columns."""
     arms = results.arms
     rows = {(row.part, row.variant): row for row in results.summary.scenarios}
-    compared = [arm for arm in arms if results.against(arm) is not None]
     columns = {"Scenario": "", "People": "its label, and episodes in which they were not so"}
     columns |= {"Episodes": "of all robots", "Contacts, moving": "of each robot"}
     for title, meaning, shown in (
-        ("time lost, s", "mean", arms),
-        ("won back, %", "of what blind loses", compared),
+        ("a meeting, s", "mean", arms),
         ("negative margin, s", "mean", arms),
         ("least margin, m", "the worst episode", arms),
     ):
@@ -244,7 +240,6 @@ def scenarios_section(results: Results, jobs: Iterable[Job]) -> Section:
             for arm, row in zip(arms, found, strict=True)
             if row is not None and row.moving_contact.count
         }
-        backs = (results.against(arm, scenario, scenario=True) for arm in compared)
         lines.append(
             [
                 scenario,
@@ -256,7 +251,6 @@ def scenarios_section(results: Results, jobs: Iterable[Job]) -> Section:
                     bad=bool(touched),
                 ),
                 *(_mean(row, "time_lost_s", 1) for row in found),
-                *(number_cell(None if b is None else 100.0 * b.won_back.value, 0) for b in backs),
                 *(_mean(row, "violation_time_s", 2) for row in found),
                 *(_worst(row, "min_margin_m") for row in found),
             ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import shlex
 import sys
 import textwrap
@@ -21,7 +22,7 @@ from awarenav.cli import (
     styled,
 )
 
-from ...conditions import Experiment, conditions_options, option_words
+from ...conditions import REFERENCE_PLANNER, Experiment, conditions_options, option_words
 
 
 @command(
@@ -64,9 +65,13 @@ def list_planners(*, as_json: bool) -> int:
     """List the planners that have a name; any other is given as module:NAME."""
     from awarenav.files import json_text  # noqa: PLC0415 - help needs no planners
 
-    from ._compare import known_planners  # noqa: PLC0415
+    from ...crossing.planner import KNOWN_PLANNERS, ReferencePlanner  # noqa: PLC0415
 
-    known = known_planners()
+    sentences = {
+        name: (inspect.getdoc(make) or "").partition("\n")[0].removeprefix("Return ")
+        for name, make in {REFERENCE_PLANNER: ReferencePlanner, **KNOWN_PLANNERS}.items()
+    }
+    known = {name: text[:1].upper() + text[1:] for name, text in sentences.items()}
     if as_json:
         print(json_text([{"name": name, "about": about} for name, about in known.items()]), end="")
         return 0

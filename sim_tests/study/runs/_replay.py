@@ -16,7 +16,6 @@ from tqdm import tqdm
 
 from awarenav.errors import counted
 from awarenav.video import VideoWriter
-from perception import AttentionCone
 
 from ...conditions import Perception, planner_name
 from ...crossing import (
@@ -25,8 +24,9 @@ from ...crossing import (
     Observer,
     Stage,
     TopView,
-    draw_camera_view,
+    camera_view,
 )
+from ...crossing.sensors import CameraSensor, sensor_class
 from ...viewing import (
     CameraPictures,
     CrossingRecorder,
@@ -34,7 +34,6 @@ from ...viewing import (
     show_page,
     write_page,
 )
-from ...world.camera import CameraRenderer
 from ...world.errors import SimError
 from ..measures import (
     RECORD_COLUMNS,
@@ -63,7 +62,6 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         self._box_scale = box_scale
         self._map_path = map_path
         self._video_path = video_path
-        self._cone = AttentionCone()
         self._view: TopView | None = None
         self._video: VideoWriter | None = None
         self._cycles = 0
@@ -104,7 +102,7 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
         self._view.watch(frame)
         if number % every and not closer:
             return
-        above = self._view.draw(frame, stage, self._cone)
+        above = self._view.draw(frame, stage)
         if closer:
             self._closest_m, self._closest = nearest_m, above
         if self._video_path is not None and number % every == 0:
@@ -112,18 +110,14 @@ class ReplayPictures(AbstractContextManager["ReplayPictures"]):
 
     def _add_video_frame(self, frame: CrossingFrame, stage: Stage, above: Image) -> None:
         spec = stage.scenario.camera
-        camera = spec.camera(_HEIGHT_PX / spec.height_px)
-        camera_image = CameraRenderer(stage.warehouse).rgb(camera, frame.T_odom_camera)
-        camera_view = draw_camera_view(
-            camera_image,
-            camera,
+        seen = camera_view(
             frame,
             stage,
-            self._cone,
+            round(_HEIGHT_PX / spec.height_px * spec.width_px),
             box_scale=self._box_scale,
             memory=None if self._view is None else self._view.memory,
         )
-        image = np.hstack([camera_view, above])
+        image = np.hstack([seen, above])
         image = image[:, : image.shape[1] // 2 * 2]  # the codec needs an even width
         if self._video is None:
             size = (image.shape[1], image.shape[0])
@@ -205,9 +199,9 @@ def recorder_of(
 
 def box_scale_of(job: Job) -> float:
     """Return the size of the images of a job's boxes, over that of its scenario's camera."""
-    if Perception.named(job.perception).kind != "pixels":
-        return 1.0
-    return template_of(job.scenario_text).for_seed(job.seed).camera.picture_scale
+    spec = template_of(job.scenario_text).for_seed(job.seed).camera
+    sensors = map(sensor_class, Perception.named(job.perception))
+    return next((each.scale(spec) for each in sensors if issubclass(each, CameraSensor)), 1.0)
 
 
 def find_episode(jobs: Sequence[Job], episode: str) -> int:

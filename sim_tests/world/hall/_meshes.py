@@ -1,7 +1,7 @@
 """Triangle meshes for rendering (boxes, quads, meshes of files, chunks of scenery), and textures.
 
 Collision shapes are separate and simpler. The textures of halls and of the robot, with the named
-rectangles in them, are files beside this module: ``python -m training.hall`` paints them.
+rectangles in them, are files beside this module; training/hall of commit 3030439d painted them.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ def _in_region(uv: FloatArray, region: Region) -> FloatArray:
 
 
 def read_meshes(data: bytes) -> dict[str, Mesh]:
-    """Return the meshes by name in the bytes of an ``.npz`` file of ``training.hall``."""
+    """Return the meshes by name in the bytes of an ``.npz`` file."""
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         names = [key.removesuffix(".indices") for key in arrays.files if key.endswith(".indices")]
         return {

@@ -21,8 +21,11 @@ from rosbags.highlevel import AnyReader
 
 from awarenav.cli import main
 from nav_adapter.ros2 import RobotFile
+from nav_adapter.ros2.conversions import to_time
 from nav_adapter.ros2.messages import Message
+from nav_adapter.ros2.messages.geometry_msgs import Point32, Polygon, PolygonStamped
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo
+from nav_adapter.ros2.messages.std_msgs import Header
 from tracking.prediction import PredictionModel
 
 
@@ -57,6 +60,23 @@ def test_a_recording_gives_the_people_and_limits_of_its_time(
     assert np.hypot(person.position.x - PERSON[0], person.position.y - PERSON[1]) < 0.1
     # The same recording gives the same, byte for byte.
     assert outputs[0].read_bytes() == outputs[1].read_bytes()
+
+
+def test_a_recorded_footprint_lowers_the_limit(tmp_path: Path, robot_file: Path) -> None:
+    """It comes after a second, in odom, as Nav2's local costmap publishes it."""
+    corners = tuple(Point32(x, y, 0.0) for x in (-0.4, 1.2) for y in (-0.3, 0.3))
+    loaded = PolygonStamped(Header(to_time(START_S + 1.0), "odom"), Polygon(corners))
+    topic = "/local_costmap/published_footprint"
+    bag = recorded(tmp_path / "bag", [*messages(), (topic, START_S + 1.05, loaded)])
+    arguments = ["bridge", "--robot", str(robot_file), "--scan", "scan", "--no-camera"]
+    limits = []
+    for more in ([], ["--footprint", topic]):
+        out = tmp_path / f"{len(more)}.mcap"
+        given = ["--bag", str(bag), "--only", "speed_limit", "--record", str(out), *more]
+        assert main([*arguments, *given]) == 0
+        limits.append([each.speed_limit for *_, each in published(out)])
+    assert limits[1][:20] == limits[0][:20]
+    assert limits[1][-1] < limits[0][-1] - 0.1
 
 
 def test_a_replay_has_the_speed_mask_at_its_rate(tmp_path: Path, robot_file: Path) -> None:

@@ -147,7 +147,7 @@ def test_commands_are_completed_with_their_help_and_without_importing_them():
         (["models", "fetch", "--ou"], ["--out"]),
         (["crossings", "--scenario", "crowd"], ["crowd_of_eight"]),
         (["crossings", "--policy", "b"], ["balanced", "blind"]),
-        (["crossings", "--policy", "sc"], ["scanner"]),
+        (["crossings", "--policy", "sc"], ["scanner", "scanner_warning"]),
         (["crossings", "--fault", "gh"], ["ghosts"]),
         (["crossings", "--camera", "su"], ["surround"]),
         (["crossings", "--perception", "k"], ["keypoints"]),

@@ -8,20 +8,32 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 import pytest
 import yaml
 from numbered_images import number_of, numbered
 
 from awarenav.errors import AwarenavError
-from awarenav.estimate import CameraChoice, open_source
-from nav_adapter.ros2.conversions import to_time
+from awarenav.estimate import (
+    CameraChoice,
+    PeopleEstimator,
+    SourceFrame,
+    fixed_camera_pose,
+    open_source,
+)
+from nav_adapter.rigid import Motion
+from nav_adapter.ros2.conversions import to_time, yaw_quaternion
 from nav_adapter.ros2.messages import Message
 from nav_adapter.ros2.messages.geometry_msgs import (
+    Point,
+    Pose,
+    PoseWithCovariance,
     Quaternion,
     Transform,
     TransformStamped,
     Vector3,
 )
+from nav_adapter.ros2.messages.nav_msgs import Odometry
 from nav_adapter.ros2.messages.sensor_msgs import (
     CameraInfo,
     CompressedImage,
@@ -30,7 +42,7 @@ from nav_adapter.ros2.messages.sensor_msgs import (
 )
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
-from perception import Camera
+from perception import AwarenessPipeline, Camera
 
 pytest.importorskip("rosbags", reason="the extra 'rosbag' is not installed")
 
@@ -247,6 +259,96 @@ def test_images_in_a_body_frame_are_noted(tmp_path, turn, noted) -> None:
     if noted:
         assert "the frame 'camera' of the images is not an optical frame" in notes[0]
         assert "90 degrees up in 'base_link'" in notes[0]
+
+
+DRIVES = Motion(1.0, 2.0, 0.5, 0.8, 0.0, 0.6)
+
+
+def odom_messages(kind: str, at_s: float) -> Message:
+    """Return where a robot on a curve is at a time, as one topic or the other has it."""
+    motion = DRIVES.at(at_s)
+    stamp, turn = to_time(at_s), yaw_quaternion(motion.heading_rad)
+    if kind == "odom":
+        pose = PoseWithCovariance(Pose(Point(motion.x_m, motion.y_m, 0.0), turn))
+        return Odometry(Header(stamp, "odom"), "base_link", pose)
+    move = Transform(Vector3(motion.x_m, motion.y_m, 0.0), turn)
+    return TFMessage((TransformStamped(Header(stamp, "odom"), "base_link", move),))
+
+
+@pytest.mark.parametrize("kind", ["odom", "tf"])
+@pytest.mark.parametrize("late_s", [0.0, 0.15, -0.02])
+def test_a_camera_on_a_robot_that_drives_has_its_pose_in_odom(tmp_path, kind, late_s) -> None:
+    """Odometry at 20 Hz, images between its stamps; either may be recorded after the other."""
+    optical = TFMessage((mounted("base_link", "camera", -0.5, 0.5, -0.5, 0.5),))
+    found = [("/tf_static", 1.0, optical)]
+    found += [(f"/{kind}", 1.0 + 0.05 * k, odom_messages(kind, 1.0 + 0.05 * k)) for k in range(30)]
+    stamps_s = [1.02 + 0.1 * k for k in range(12)]
+    found += [("/cam/image_raw", t + late_s, image(k, t)) for k, t in enumerate(stamps_s)]
+    path = recorded(tmp_path / "bag", sorted(found, key=lambda each: each[1]))
+    frames = frames_of(path)
+    assert [frame.stamp_s for frame in frames] == pytest.approx(stamps_s)
+    for frame in frames:
+        motion = DRIVES.at(frame.stamp_s)
+        ahead = np.array([math.cos(motion.heading_rad), math.sin(motion.heading_rad), 0.0])
+        wanted = np.array([motion.x_m, motion.y_m, 1.0]) + 0.2 * ahead
+        np.testing.assert_allclose(frame.T_odom_camera[:3, 3], wanted, atol=1e-6)
+        np.testing.assert_allclose(frame.T_odom_camera[:3, 2], ahead, atol=1e-6)
+        assert frame.on_robot
+
+
+class FloorKeeper:
+    """Perception that finds nobody, and keeps the floors that it is given."""
+
+    def __init__(self) -> None:
+        self.floors: list[Any] = []
+
+    def process(self, image_rgb: Any, stamp_s: float, *, floor: Any, up_camera: Any) -> tuple[()]:
+        self.floors.append(floor)
+        return ()
+
+
+# A typed height of 1.2 m, or none; whether a robot has measured the pose; its height in odom.
+@pytest.mark.parametrize(
+    ("typed", "on_robot", "height_m", "wanted_m", "std_m"),
+    [
+        (False, False, 1.0, 1.0, 0.02),
+        (False, True, 1.0, 1.0, 0.05),
+        (True, False, 1.0, 1.0, 0.02),
+        (True, True, 1.0, 1.2, 0.05),  # odom may begin at the camera
+        (True, True, 0.0, 1.2, 0.05),
+        (False, True, 0.0, None, None),
+        (True, False, None, 1.2, 0.05),
+        (False, False, None, None, None),
+    ],
+)
+def test_the_floor_is_that_of_an_exact_pose_then_of_a_typed_height_then_of_the_robots(
+    typed, on_robot, height_m, wanted_m, std_m, monkeypatch
+) -> None:
+    seen = FloorKeeper()
+    monkeypatch.setattr(AwarenessPipeline, "of", lambda networks, camera: seen)
+    pose = None if height_m is None else fixed_camera_pose(height_m)
+    fixed = fixed_camera_pose(1.2) if typed else None
+    cameras = CameraChoice(None, 60.0, lambda text: None)
+    estimator = PeopleEstimator(None, cameras, fixed_pose_odom_camera=fixed)  # type: ignore[arg-type]
+    estimator.estimate(SourceFrame("0", 1.0, numbered(0), pose, on_robot=on_robot))
+    (floor,) = seen.floors
+    assert (floor and floor.height_m) == wanted_m
+    assert (floor and floor.height_std_m) == std_m
+
+
+@pytest.mark.parametrize("topics", [("tf_static",), ("odom",), ("odom", "body")])
+def test_a_camera_whose_way_to_odom_is_not_recorded_has_no_pose(tmp_path, topics) -> None:
+    """Nor has one whose images are in a frame of the body, not in an optical one."""
+    level = (0.0, 0.0, 0.0, 1.0)
+    turn = level if "body" in topics else (-0.5, 0.5, -0.5, 0.5)
+    found: list[tuple[str, float, Message]] = [("/cam/image_raw", 1.1, image(0, 1.1))]
+    if "odom" in topics:
+        found += [("/odom", 1.0 + 0.1 * k, odom_messages("odom", 1.0 + 0.1 * k)) for k in range(3)]
+    if topics != ("odom",):
+        mount = TFMessage((mounted("base_link", "camera", *turn),))
+        found += [("/tf_static", 1.0, mount)]
+    (frame,) = frames_of(recorded(tmp_path / "bag", sorted(found, key=lambda each: each[1])))
+    assert frame.T_odom_camera is None
 
 
 @pytest.mark.parametrize(

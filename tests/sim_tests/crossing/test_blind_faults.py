@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from watching_cameras import Watching, world_at
 
 from perception import Camera
 from perception.laser import LaserScan
 from sim_tests import Scenario, run_crossing
-from sim_tests.crossing.eyes import Delivery, MountedScan, TimedEyes
-from sim_tests.crossing.eyes._camera_eyes import PicturelessEyes
 from sim_tests.crossing.faults import EpisodeFaults, Fault
+from sim_tests.crossing.sensors import Delivery, MountedScan
 from sim_tests.world.camera import CameraTiming
 from sim_tests.world.scanner import ScannerSpec
 
@@ -84,24 +84,23 @@ def test_a_sector_is_blind_from_its_time_on():
 
 
 class Watcher:
-    """Eyes that see nobody, and count their images."""
+    """Sees nobody, and counts its images."""
 
     def __init__(self) -> None:
         self.images = 0
 
-    def observe(self, exposure):
+    def observe(self, world):
         self.images += 1
         return ()
 
 
 def arrivals(fault: Fault, seed: int = 0, seconds: float = 11.0) -> list[float]:
     """Return the stamps of the images that arrive."""
-    change = EpisodeFaults(fault, seed, CAMERA).pictures()
-    watcher = Watcher() if change is None else PicturelessEyes(Watcher(), change)
-    eyes = TimedEyes(watcher, CameraTiming(latency_s=0.3), np.random.default_rng(0))
+    faults = EpisodeFaults(fault, seed, CAMERA)
+    camera = Watching(Watcher(), faults, CameraTiming(latency_s=0.3))
     stamps = []
     for n in range(round(seconds * 10)):
-        seen = eyes.look(0.1 * n, np.eye(4), np.eye(4), ())
+        seen = camera.look(world_at(0.1 * n))
         stamps += [each.stamp_s for each in seen]
     return stamps
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from watching_cameras import setup_on
 
 from perception import AttentionCone
 from sim_tests import Scenario, SimError, run_crossing
-from sim_tests.conditions import ORACLE, Perception
+from sim_tests.conditions import CAMERAS, Perception
 from sim_tests.crossing import Stage
-from sim_tests.crossing.eyes import Exposure, MapView, TrueEyes
+from sim_tests.crossing.sensors import MapView, World, sensor_class
 from sim_tests.scenario import ScenarioTemplate
 
-NAMES = ("truth", "keypoints", "pixels", "keypoints+scanner", "pixels+scanner", "scanner", ORACLE)
+NAMES = (*CAMERAS, "scanner", "keypoints+scanner", "pixels+scanner", "depth+scanner")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -20,14 +21,17 @@ def test_a_name_leads_to_a_perception_and_back(name: str) -> None:
     assert Perception.named(name).name == name
 
 
-@pytest.mark.parametrize("name", ["", "truth+scanner", "oracle+scanner", "camera", "lidar"])
+@pytest.mark.parametrize(
+    "name",
+    ["", "truth+scanner", "camera", "scanner+depth", "keypoints+depth", "depth+depth", "depth+"],
+)
 def test_other_names_are_refused(name: str) -> None:
     with pytest.raises(SimError, match="perception"):
         Perception.named(name)
 
 
 def test_the_truth_has_no_use_for_a_scanner() -> None:
-    with pytest.raises(SimError, match="no use for a scanner"):
+    with pytest.raises(SimError, match="no use for other sensors"):
         Perception.of("truth", "camera+scanner")
 
 
@@ -120,8 +124,8 @@ def test_the_oracle_sees_everybody_who_is_not_hidden_by_a_high_box() -> None:
         odom = positions @ T_odom_camera[:2, :3].T + T_odom_camera[:2, 3]
         free = view.visibility(odom, T_odom_camera) > 0.0
         near = np.linalg.norm(positions, axis=1) <= 20.0
-        now = Exposure(0.0, T_odom_camera, T_odom_camera, truth)
-        seen = [worker for _, worker in TrueEyes(view).observe(now)]
-        assert seen == np.flatnonzero(free & near).tolist()
-        everybody = [worker for _, worker in TrueEyes().observe(now)]
-        assert everybody == np.flatnonzero(near).tolist()
+        now = World(0.0, T_odom_camera, T_odom_camera, truth, stage.amr.state(0.0))
+        for name, wanted in (("oracle", free & near), ("truth", near)):
+            image, places = sensor_class(name)(setup_on(stage)).look(now)
+            assert [worker for _, worker in image.observations] == np.flatnonzero(wanted).tolist()
+            assert places.observations == image.observations

@@ -9,7 +9,7 @@ import pytest
 
 from perception import AwarenessPipeline, Camera, PerceptionError
 from sim_tests.actors.body import Worker
-from sim_tests.crossing.eyes import KeypointCamera, KeypointNoise
+from sim_tests.crossing.sensors import KeypointCamera, KeypointNoise
 from sim_tests.world import Warehouse
 from sim_tests.world.camera import CameraRenderer
 

@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 import yaml
+from watching_cameras import Watching, world_at
 
 from nav_adapter import RobotState
 from perception import Camera, PersonObservation
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing._sensing import Odometry
-from sim_tests.crossing.eyes import Delivery, OdometryReading, Sighting, TimedEyes
 from sim_tests.crossing.faults import EpisodeFaults, Fault, shipped_faults
-from sim_tests.world.camera import CameraTiming
+from sim_tests.crossing.sensors import Delivery, OdometryReading, Sighting
 
 CAMERA = Camera.from_fov(640, 480, math.radians(90.0))
 # Looks along odom x, 1 m above the floor.
@@ -34,19 +34,19 @@ def observation(stamp_s=0.0, awareness=0.5, std=0.1, x_m=4.0):
     )
 
 
-class WalkerEyes:
-    """Eyes that see one person, who approaches at 1 m/s from 100 m."""
+class Walker:
+    """Sees one person, who approaches at 1 m/s from 100 m."""
 
-    def observe(self, exposure):
-        return ((observation(exposure.stamp_s, x_m=100.0 - exposure.stamp_s), 0),)
+    def observe(self, world):
+        return ((observation(world.t_s, x_m=100.0 - world.t_s), 0),)
 
 
 def looks(fault, seconds=30.0, rate_hz=20.0, seed=0):
     """Return time and sightings of each tick of faulty eyes."""
     faults = EpisodeFaults(fault, seed, CAMERA)
-    eyes = TimedEyes(WalkerEyes(), CameraTiming(), np.random.default_rng(0), faults.images())
+    camera = Watching(Walker(), faults)
     ticks = np.arange(round(seconds * rate_hz)) / rate_hz
-    return [(float(t), eyes.look(float(t), T_ODOM_CAMERA, T_ODOM_CAMERA, ())) for t in ticks]
+    return [(float(t), camera.look(world_at(float(t), T_ODOM_CAMERA))) for t in ticks]
 
 
 def detections(fault, seed=0):

@@ -6,7 +6,7 @@ import pytest
 from perception import Camera
 from perception.anthropometry import MEAN_STATURE_M
 from sim_tests import KeypointNoise, SimError
-from sim_tests.crossing.eyes import KeypointCamera
+from sim_tests.crossing.sensors import KeypointCamera
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
 # Looking along odom x from a height of 1.4 m.

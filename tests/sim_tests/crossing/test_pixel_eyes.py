@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from watching_cameras import setup_on
 
 from perception import (
     AttentionCone,
@@ -18,16 +19,15 @@ from perception import (
 )
 from sim_tests import KeypointNoise, Scenario, run_crossing
 from sim_tests.crossing import Stage, TrueView
-from sim_tests.crossing.eyes import (
+from sim_tests.crossing.sensors import (
     NOBODY,
     PIXEL_RATE_HZ,
-    Exposure,
     KeypointCamera,
-    PixelEyes,
+    World,
     match_to_workers,
-    pixel_timing,
+    sensor_class,
 )
-from sim_tests.world.camera import CameraTiming, SensorConfig
+from sim_tests.world.camera import CameraTiming
 from sim_tests.world.sightlines import SightLines
 
 CAMERA = Camera.from_fov(640, 480, math.radians(60.0))
@@ -97,11 +97,12 @@ def test_rendered_people_are_observed_at_their_true_positions(stage: Stage):
     lines = SightLines(stage.warehouse.layout, actors=stage.warehouse.actors)
     keypoints = KeypointCamera(CAMERA, lines, KeypointNoise(), np.random.default_rng(0))
     pipeline = AwarenessPipeline(CAMERA, keypoints, keypoints, cone=cone)
-    eyes = PixelEyes(stage, CAMERA, SensorConfig(), np.random.default_rng(0), pipeline)
+    camera = sensor_class("pixels")(setup_on(stage, pipeline=pipeline))
     T_odom_camera = stage.amr.T_odom_camera
     truth = stage.truth(cone, T_odom_camera)
     keypoints.look(T_odom_camera, stage.workers)
-    seen = eyes.observe(Exposure(0.25, T_odom_camera, T_odom_camera, truth))
+    now = World(0.25, T_odom_camera, T_odom_camera, truth, stage.amr.state(0.25))
+    ((seen,),) = [[each.observations for each in camera.look(now)]]
     assert sorted(worker for _, worker in seen) == [0, 1]
     for each, worker in seen:
         assert each.stamp_s == 0.25
@@ -110,13 +111,6 @@ def test_rendered_people_are_observed_at_their_true_positions(stage: Stage):
     alpha = {worker: each.awareness or 0.0 for each, worker in seen}
     assert alpha[0] > 0.6
     assert alpha[1] < 0.1
-
-
-def test_a_rendered_camera_without_a_rate_takes_ten_images_a_second():
-    assert pixel_timing(CameraTiming()).rate_hz == PIXEL_RATE_HZ
-    assert pixel_timing(CameraTiming(rate_hz=4.0, drop_rate=0.1)) == CameraTiming(
-        rate_hz=4.0, drop_rate=0.1
-    )
 
 
 class Nobody:
@@ -136,12 +130,19 @@ class Nobody:
         return ()
 
 
-def test_a_crossing_runs_with_a_pipeline_of_ones_own(scenario: Scenario):
+@pytest.mark.parametrize("rate_hz", [None, 4.0])
+def test_a_pipeline_of_ones_own_has_ten_images_a_second_or_the_rate_of_the_scenario(
+    scenario: Scenario, rate_hz: float | None
+):
     nobody = Nobody()
     pipeline = AwarenessPipeline(CAMERA, nobody, nobody)
+    timing = CameraTiming(rate_hz=rate_hz)
+    scenario = scenario.model_copy(
+        update={"camera": scenario.camera.model_copy(update={"timing": timing})}
+    )
     result = run_crossing(scenario, policy="balanced", perception="pixels", pipeline=pipeline)
     assert result.perception == "pixels"
-    assert nobody.images == pytest.approx(PIXEL_RATE_HZ * scenario.duration_s, abs=1)
+    assert nobody.images == pytest.approx((rate_hz or PIXEL_RATE_HZ) * scenario.duration_s, abs=1)
     assert not any(frame.tracks for frame in result.frames)
 
 

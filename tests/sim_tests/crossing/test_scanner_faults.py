@@ -9,7 +9,6 @@ import pytest
 from perception import Camera
 from perception.laser import LaserScan, RobotMotion
 from sim_tests import Scenario, run_crossing
-from sim_tests.crossing.eyes import Delivery, MountedScan
 from sim_tests.crossing.faults import EpisodeFaults, Fault, shipped_faults
 from sim_tests.crossing.faults._false_returns import (
     Legs,
@@ -19,6 +18,7 @@ from sim_tests.crossing.faults._false_returns import (
     with_legs,
     with_mirror,
 )
+from sim_tests.crossing.sensors import Delivery, MountedScan
 from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScannerSpec
 
 # One ray per degree all around, on the middle of the robot.

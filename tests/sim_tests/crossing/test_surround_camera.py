@@ -10,12 +10,13 @@ import cv2
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from watching_cameras import setup_on
 
 from perception import AttentionCone, AwarenessPipeline, Camera, FloorPlane
 from perception.surround import PanoramaLens, SurroundPipeline, ring_of_views
 from sim_tests import CameraRenderer, Scenario, SimError, run_crossing
 from sim_tests.crossing import Stage
-from sim_tests.crossing.eyes import Exposure, KeypointNoise, SurroundEyes, make_eyes
+from sim_tests.crossing.sensors import World, sensor_class
 from sim_tests.scenario import CameraSpec, ScenarioTemplate, shipped_templates
 from sim_tests.study.runs import named_templates, plan_jobs
 
@@ -112,17 +113,15 @@ def test_the_shipped_networks_detect_all_people_in_a_panorama(scenario: Scenario
 
 
 def test_a_surround_camera_reports_each_person_once_and_nobody_else(scenario: Scenario) -> None:
-    noise = KeypointNoise(miss_rate=0.0)
     with Stage(scenario) as stage:
-        camera = scenario.camera.camera()
-        rng = np.random.default_rng(0)
-        eyes = make_eyes("keypoints", stage, camera, rng, cone=CONE, noise=noise)
-        assert isinstance(eyes, SurroundEyes)
+        camera = sensor_class("keypoints")(setup_on(stage))
+        assert len(camera.views) == 4
         T_odom_camera = stage.amr.T_odom_camera
         truth = stage.truth(CONE, T_odom_camera)
-        now = Exposure(0.0, T_odom_camera, T_odom_camera, truth)
-        for _ in range(50):
-            seen = {worker: each for each, worker in eyes.observe(now)}
+        for step in range(50):
+            now = World(0.1 * step, T_odom_camera, T_odom_camera, truth, stage.amr.state(0.0))
+            (image,) = camera.look(now)
+            seen = {worker: each for each, worker in image.observations}
             assert sorted(seen) == [0, 1, 2]
             for worker, observation in seen.items():
                 away = observation.position_camera_m - truth[worker].position_camera_m

@@ -17,11 +17,11 @@ from sim_tests.demo._film import (
     FILM_PX,
     HOLD_S,
     ComparisonRow,
-    MapScale,
     decisive_picture,
     draw_lane,
     draw_map,
     passage,
+    scale_of,
     time_lost_s,
     unaware_person,
     write_crossing_film,
@@ -100,7 +100,7 @@ def test_the_circle_on_the_map_has_the_radius_and_place_of_the_obstacle(aware):
     t_s = frames[index].t_s
     change = draw_map(aware, t_s).astype(int) - draw_map(with_frames(aware, less), t_s)
     _, columns = np.nonzero(np.abs(change).sum(axis=2) > 40)
-    scale = MapScale.of(aware)
+    scale = scale_of(aware)
     u, _ = scale.px(reader.center_odom_m[None])[0]
     # The line is 3 px wide.
     assert 0.5 * np.ptp(columns) / scale.px_per_m == pytest.approx(reader.radius_m, abs=0.1)

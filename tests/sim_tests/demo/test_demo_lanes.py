@@ -6,10 +6,10 @@ import json
 from dataclasses import replace
 
 import pytest
-from paths import ROOT
 
 from awarenav.cli import main
 from sim_tests.demo import _lanes
+from sim_tests.demo._film import unaware_person
 from sim_tests.demo._lanes import (
     LANES,
     REPORTED,
@@ -18,6 +18,7 @@ from sim_tests.demo._lanes import (
     legend,
     read_report,
     report_text,
+    reported_text,
     run_lane,
     shown_seed,
 )
@@ -90,7 +91,7 @@ def test_a_reported_row_can_be_measured_again() -> None:
     (reported,) = (row for row in read_report()[1] if (row.seed, row.lane) == (seed, "awarenav"))
     run = run_lane(LANES[-1], seed)
     assert run.row == reported
-    assert run.scenario.people[run.stepping_out].activity == "phone"
+    assert run.scenario.people[unaware_person(run.result)].activity == "phone"
 
 
 @pytest.mark.slow
@@ -106,8 +107,11 @@ def test_the_command_prints_both_tables_and_which_file_to_open(tmp_path, capsys)
     assert max(map(len, printed.err.splitlines()[:-1])) <= 80
 
 
-def test_the_page_has_the_reported_table_and_names_the_shown_seed() -> None:
+def test_the_text_of_the_reported_seeds_counts_what_their_rows_say() -> None:
     _, rows = read_report()
-    page = (ROOT / "docs" / "simulation_results.md").read_text("utf-8")
-    assert lanes_table(rows) in page
-    assert f"seed {shown_seed(rows)}." in page
+    text = reported_text()
+    assert f"seed {shown_seed(rows)};" in text
+    for lane in LANES:
+        own = [row for row in rows if row.lane == lane.name]
+        touched = sum(row.touch_mps is not None for row in own)
+        assert f"{lane.words} in {touched}" in text

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import copy
 import pickle
+import subprocess
+import sys
 import warnings
 from typing import Any
 
 import numpy as np
 import pytest
+from paths import ROOT
 
 gymnasium = pytest.importorskip("gymnasium", reason="needs the extra awarenav[gym]")
 
@@ -97,6 +100,15 @@ def test_a_policy_drives_the_same_in_the_environment_and_as_a_planner() -> None:
     assert list(map(signature, frames)) == list(map(signature, result.frames))
     assert info["min_margin_m"] == result.min_margin_m
     env.close()
+
+
+def test_a_new_process_makes_it_by_module_and_name() -> None:
+    """As the workers of a vector environment do, which have imported nothing."""
+    code = "import gymnasium; print(gymnasium.make('sim_tests.learning:awarenav/Crossing-v0').spec)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert "awarenav/Crossing-v0" in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize("kwargs", [{}, {"scan_rays": 16, "render_view": "camera"}])

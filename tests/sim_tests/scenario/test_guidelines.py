@@ -7,7 +7,7 @@ import pytest
 from awarenav.cli import main
 from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
 from sim_tests.actors.behaviour import PersonSpec
-from sim_tests.crossing.eyes._make_eyes import unusual_size_probability
+from sim_tests.crossing.sensors._camera import unusual_size_probability
 from sim_tests.scenario import SCENARIO_SETS
 from sim_tests.study.runs import named_templates
 from sim_tests.study.scenarios._validate import AttentionCheck

@@ -11,7 +11,7 @@ from shapely.ops import nearest_points
 from nav_adapter import NavConstraints, RobotState
 from nav_adapter.rigid import Motion
 from sim_tests import NOVA_CARTER, CrossingFrame, CrossingResult
-from sim_tests.crossing._separations import AWAY, Approach, ContactEvent, Separations, moves
+from sim_tests.crossing._separations import AWAY, Approach, ContactEvent, margins_m, moves
 from sim_tests.crossing._stage import TrueView
 from sim_tests.study.measures._trace import Trace
 from tracking import PersonTrack
@@ -103,6 +103,7 @@ def crossing(
             if said is not None:
                 tracks.append(track_at((px + 0.1, py), *said, ident=index + 1, t_s=t))
             approaches.append(AWAY if away else approach_of(state, outline, (px, py), (vx, vy)))
+        robot_moves = moves(Motion.of(state), NOVA_CARTER)
         given = {
             "obstacles": (),
             "limited_by": "nothing",
@@ -122,9 +123,9 @@ def crossing(
                 tracks=tuple(tracks),
                 constraints=limits,
                 command=(speed, 0.0),
-                separations=Separations(
-                    t, 0.05, NOVA_CARTER, moves(Motion.of(state), NOVA_CARTER), tuple(approaches)
-                ),
+                approaches=tuple(approaches),
+                margins_m=tuple(margins_m(approaches, NOVA_CARTER, moves=robot_moves)),
+                robot_moves=robot_moves,
             )
         )
     values = {

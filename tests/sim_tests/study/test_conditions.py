@@ -106,7 +106,9 @@ def test_the_command_of_a_run_gives_the_same_experiment(values, episodes, sample
         assert context.params["out"] == Path("out")
 
 
-@pytest.mark.parametrize("name", ["keypoints", "pixels", "keypoints+scanner", "scanner", "truth"])
+@pytest.mark.parametrize(
+    "name", ["truth", "pixels", "keypoints+scanner", "scanner", "depth+scanner"]
+)
 def test_the_options_of_a_perception_give_it_in_crossings(name):
     words = Perception.named(name).options.split()
     experiment = Experiment.taken_from(
@@ -117,9 +119,9 @@ def test_the_options_of_a_perception_give_it_in_crossings(name):
 
 def test_the_truth_with_scanners_is_refused_and_the_oracle_is_a_policy():
     for sensors in ("scanner", "camera+scanner"):
-        with pytest.raises(SimError, match="no use for a scanner: sensors must be 'camera'"):
+        with pytest.raises(SimError, match="no use for other sensors: sensors must be 'camera'"):
             Perception.of("truth", sensors)
-    assert Perception("oracle").options == "--policy oracle"
+    assert Perception(["oracle"]).options == "--policy oracle"
 
 
 def test_the_api_and_a_job_have_the_same_conditions():

@@ -288,7 +288,7 @@ def test_a_real_crossing_says_in_frames_what_the_meter_said():
     record = measure(result, time_without_people_s=10.0, length_without_people_m=12.8)
     assert record.min_separation_m == pytest.approx(result.min_separation_m, abs=1e-6)
     nearest = min(result.frames, key=lambda frame: frame.separations_m[0])
-    speed = nearest.separations.approaches[0].robot_speed_mps
+    speed = nearest.approaches[0].robot_speed_mps
     assert record.speed_at_min_separation_mps == pytest.approx(speed, abs=1e-6)
     assert 0.9 < record.spl <= 1.0
     assert 0.5 < record.peak_deceleration_mps2 < 1.3

@@ -13,7 +13,8 @@ from perception.installation import install_command
 
 CODE = """
 import json, sys
-sys.modules["pybullet"] = None
+for each in ("pybullet", "filelock", "av", "moderngl"):
+    sys.modules[each] = None
 from awarenav.cli import main
 print(json.dumps([main(command) for command in json.loads(sys.argv[1])]), file=sys.stderr)
 """

@@ -11,7 +11,6 @@ from viewed_crossing import CONDITIONS, SHORT
 
 from nav_adapter import Alert
 from nav_adapter.alerts import Answer
-from perception import AttentionCone
 from sim_tests.crossing import CrossingFrame, RequestMemory, Stage, TopView, run_crossing
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.viewing import CrossingRecorder, write_page
@@ -76,7 +75,7 @@ class Asked:
                 self.views[name] = TopView(stage, (440, 260), (-3.0, -3.0, 6.0, 3.0))
             self.views[name].watch(each)
             if at(frame, ASKED_S + 0.25, 0.05):
-                drawn = self.views[name].draw(each, stage, AttentionCone())
+                drawn = self.views[name].draw(each, stage)
                 self.plans[name] = drawn.astype(int)
 
 

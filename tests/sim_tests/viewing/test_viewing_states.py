@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from viewed_crossing import SHORT, record
 
-from perception import AttentionCone
 from sim_tests.crossing import draw_camera_view, run_crossing
 from sim_tests.scenario import ScenarioTemplate
 from sim_tests.viewing import CameraPictures, outcome_text, page_text, state_of, write_page
@@ -90,7 +89,6 @@ def test_boxes_are_drawn_where_the_person_is():
                 camera,
                 with_boxes(frame, box),
                 stage,
-                AttentionCone(),
                 box_scale=scale,
                 captions=False,
             )

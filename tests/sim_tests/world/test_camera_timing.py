@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim_tests import SimError
-from sim_tests.crossing.eyes import Exposure, TimedEyes
 from sim_tests.world.camera import CameraTiming, FrameClock, FrameQueue
 
 
@@ -93,32 +92,3 @@ def test_a_clock_takes_as_many_frames_as_the_slower_of_rate_and_ticks(
         # No frame is taken before its time or more than one tick after it.
         late = np.array(taken) * rate_hz % 1.0 / rate_hz
         assert np.minimum(late, 1.0 / rate_hz - late).max() < 1.0 / tick_hz + 1e-9
-
-
-class _Counting:
-    """Eyes that see nobody and record the stamps at which they look."""
-
-    def __init__(self) -> None:
-        self.looked_s: list[float] = []
-
-    def observe(self, exposure: Exposure) -> tuple[()]:
-        self.looked_s.append(exposure.stamp_s)
-        return ()
-
-
-def test_timed_eyes_deliver_late_what_they_saw_at_the_stamp() -> None:
-    eyes = _Counting()
-    timing = CameraTiming(rate_hz=10.0, latency_s=0.12, drop_rate=0.25)
-    timed = TimedEyes(eyes, timing, np.random.default_rng(2))
-    delivered = []
-    for tick in range(200):
-        now = tick / 20.0
-        pose = np.eye(4) * (1.0 + tick)
-        for sighting in timed.look(now, pose, pose, ()):
-            assert now - sighting.stamp_s == pytest.approx(0.15)  # the first tick after 0.12 s
-            assert sighting.T_odom_camera[0, 0] == pytest.approx(1.0 + 20.0 * sighting.stamp_s)
-            delivered.append(sighting.stamp_s)
-    # Lost frames are not looked at; at most two are still to be delivered at the end.
-    assert eyes.looked_s[: len(delivered)] == delivered
-    assert len(eyes.looked_s) - len(delivered) <= 2
-    assert len(delivered) == pytest.approx(75, abs=15)

@@ -20,6 +20,7 @@ from sim_tests.world.hall import (
     box,
     merge,
     scenery,
+    scenery_texture,
 )
 
 _VARIANTS = (0, pytest.param(6, marks=pytest.mark.full))
@@ -172,3 +173,10 @@ def test_a_texture_stands_upright_on_each_side_of_a_box(face: str) -> None:
     right = np.cross([0.0, 0.0, 1.0], outward)  # to the right, seen from outside
     np.testing.assert_allclose(side.uv[:, 0], 0.5 + 0.5 * side.vertices_m @ right, atol=1e-12)
     np.testing.assert_allclose(side.uv[:, 1], 0.75 + 0.5 * side.vertices_m[:, 2], atol=1e-12)
+
+
+def test_shipped_textures_are_read_only_and_known_by_name() -> None:
+    for name in TEXTURE_NAMES:
+        assert not scenery_texture(name).flags.writeable
+    with pytest.raises(SimError, match="did you mean 'goods0'"):
+        scenery_texture("good0")

@@ -14,13 +14,12 @@ from triangle_hits import shares_met
 from perception import Camera
 from sim_tests.actors.body import Worker
 from sim_tests.actors.body._pose import skin_points
-from sim_tests.crossing.eyes import KeypointNoise
-from sim_tests.crossing.eyes._keypoint_camera import KeypointCamera
+from sim_tests.crossing.sensors import KeypointCamera, KeypointNoise
 from sim_tests.world import FACE_DEPTH_M, FACE_KEYPOINTS, JOINT_DEPTH_M, Warehouse
 from sim_tests.world.camera import CameraRenderer
 from sim_tests.world.hall import WarehouseLayout
 from sim_tests.world.sightlines import PlacedSurface, SightLines, TriangleSet
-from training.hall import ellipsoid
+from training.round_meshes import ellipsoid
 
 CAMERA = Camera.from_fov(1920, 1200, math.radians(120.0))
 EXACT = KeypointNoise(pixel_std_px=0.0, lift_std_m=0.0, miss_rate=0.0)

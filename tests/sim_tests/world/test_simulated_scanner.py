@@ -20,7 +20,7 @@ from sim_tests.world.scanner import (
     SimulatedScanner,
 )
 from sim_tests.world.sightlines import PlacedSurface, TriangleSet
-from training.hall import tube
+from training.round_meshes import tube
 
 EXACT = {"noise_std_m": 0.0, "dropout_rate": 0.0, "dark_dropout_rate": 0.0}
 CENTRE = ScannerSpec(x_m=0.0, field_of_view_deg=(-180.0, 180.0), resolution_deg=0.25, **EXACT)

@@ -7,7 +7,7 @@ import numpy as np
 from perception.arrays import FloatArray
 from sim_tests.world.hall import Mesh, quad
 from sim_tests.world.render import RenderView, Visuals
-from training.hall import ellipsoid
+from training.round_meshes import ellipsoid
 
 CHECKERBOARD = np.kron(np.indices((4, 4)).sum(axis=0) % 2, np.ones((8, 8)))[..., None] * np.array(
     [200, 40, 30]

@@ -16,15 +16,12 @@ from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
     Pose,
     PoseStamped,
-    PoseWithCovariance,
     Quaternion,
     Transform,
     TransformStamped,
-    Twist,
-    TwistWithCovariance,
     Vector3,
 )
-from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid, Odometry
+from nav_adapter.ros2.messages.nav_msgs import MapMetaData, OccupancyGrid
 from nav_adapter.ros2.messages.people_msgs import People
 from nav_adapter.ros2.messages.sensor_msgs import CameraInfo, Image, LaserScan
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
@@ -38,16 +35,6 @@ MAP: Final = "map"
 ODOM: Final = "odom"
 BASE: Final = "base_link"
 CAMERA: Final = "camera_optical_frame"
-
-
-def odometry(state: RobotState) -> Odometry:
-    """Return the pose in odom and the velocity in the base frame."""
-    top = header(state.stamp_s, ODOM)
-    x, y = state.position_odom_m.tolist()
-    pose = Pose(Point(x, y, 0.0), yaw_quaternion(state.heading_odom_rad))
-    linear = Vector3(state.speed_mps, state.lateral_mps, 0.0)
-    twist = Twist(linear, Vector3(0.0, 0.0, state.yaw_rate_radps))
-    return Odometry(top, BASE, PoseWithCovariance(pose), TwistWithCovariance(twist))
 
 
 def base_transform(state: RobotState) -> TFMessage:

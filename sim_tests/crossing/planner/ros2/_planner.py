@@ -17,7 +17,7 @@ from filelock import FileLock, Timeout
 
 from nav_adapter import NavConstraints, PersonObstacle, RobotProfile, RobotState
 from nav_adapter.ros2 import Frames, SpeedMaskSettings, SpeedMaskStream, outgoing
-from nav_adapter.ros2.conversions import to_time
+from nav_adapter.ros2.conversions import odometry_of, to_time
 from nav_adapter.ros2.messages.geometry_msgs import Twist
 from nav_adapter.ros2.messages.rosgraph_msgs import Clock
 from perception.arrays import FloatArray, finite_number
@@ -27,7 +27,7 @@ from ....world.camera import CameraTiming, CoarseSceneryRenderer, FrameClock
 from ....world.errors import SimError
 from ....world.scanner import ScanScene, SimulatedScanner, scan_all
 from ..._stage import Stage
-from ...eyes import hall_grid, motion_of
+from ...sensors import hall_grid, motion_of
 from ._actions import Actions, actions_of, python_with_ros
 from ._link import Link, link_to
 from ._messages import (
@@ -36,7 +36,6 @@ from ._messages import (
     base_transform,
     goal_pose,
     map_message,
-    odometry,
     people_of,
     picture_messages,
     scan_message,
@@ -407,7 +406,7 @@ class Ros2Planner:
                 image, about = picture_messages(now_s, CAMERA, camera, rgb)
                 link.publish("image", image)
                 link.publish("camera_info", about)
-            link.publish("odom", odometry(stamped))
+            link.publish("odom", odometry_of(stamped))
             # Last: what begins with the time finds the rest of it.
             link.publish("clock", Clock(to_time(now_s)))
 

@@ -1,1 +1,0 @@
-"""Cost of the adapter and its exporters, against the same costmap painted with shapely."""
