@@ -495,7 +495,6 @@ class Person:
             leader.go(t_s)
             self._span.end_halt()
             self._reactions.go_first()
-            return
-        if errand := manner.errand((x, y), self._obstacles.is_clear):
+        elif errand := manner.errand((x, y), self._obstacles.is_clear):
             goal, speed_mps = errand
             self._follower = RouteFollower(Route([(x, y), goal], []), speed_mps, t_s)
