@@ -45,7 +45,7 @@ def files(tmp_path_factory):
     pytest.importorskip("ai_edge_litert", reason="the extra litert is not installed")
     store = ModelStore(tmp_path_factory.mktemp("real"))
     shipped = store.catalogue
-    names = tuple(shipped.sets[0].networks.values())
+    names = (*shipped.sets[0].networks.values(), "retinaface-mobilenet")
     try:
         store.fetch(*names, progress=False)
     except AwarenavError as cause:

@@ -85,8 +85,7 @@ def run_stage(
     with Stage(case, np.random.default_rng(seed)) as stage:
         stage.amr.command(robot_mps, 0.0)
         for tick in range(round(seconds / DT_S)):
-            observed = stage.observe(tick * DT_S, DT_S)
-            nearest_m = min(nearest_m, *observed.separations_m)
+            nearest_m = min(nearest_m, *(each.separation_m for each in stage.observe()))
             motions = stage.motions
             times.append(stage.t_s)
             rows.append([[*m.position_odom_m, *m.velocity_odom_mps] for m in motions])

@@ -100,6 +100,6 @@ def test_the_face_has_a_name_in_crossings():
     assert named_policy("scanner_warning") == ("scanner_warning", SCANNER)
     rules = {
         frame.constraints.limited_by
-        for frame in run_crossing("crossing_from_left", policy="scanner_warning", seed=50).frames
+        for frame in run_crossing("group_crossing", policy="scanner_warning", seed=50).frames
     }
     assert rules == {"robot maximum", "warning field"}
