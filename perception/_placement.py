@@ -31,7 +31,7 @@ from .body import (
     place_bodies,
     place_boxes,
 )
-from .depth_image import BEHIND_M, chest_depths
+from .depth_image import BEHIND_M, Chest, find_chest, trunk_in_image
 
 #: Position (3,) and covariance (3, 3) in the camera frame.
 Placement = tuple[FloatArray, FloatArray]
@@ -44,9 +44,9 @@ _FEET_OUTLIER, _BOTTOM_OUTLIER = 0.10, 0.30
 # probabilities of both to be outliers where the head tells the range.
 _CUT_STD: Final = 0.15
 _CUT_BODY_OUTLIER, _CUT_LEGS_OUTLIER = 0.30, 0.80
-# A surface on the chest's place is that of something else only if it hides the chest, which its
-# keypoints then seldom survive.
-_CHEST_OUTLIER: Final = 0.005
+# A surface on the chest's place is that of something else if it hides the chest: its probability is
+# the share of the seen keypoints that do not lie on the same body, within these limits.
+_CHEST_OUTLIER, _MOST_CHEST_OUTLIER = 0.005, 0.95
 # In a box without a skeleton it may be that of what is behind the person.
 _BOX_CHEST_OUTLIER: Final = 0.2
 # Below a knee the shank is about vertical, for people who stand, walk or sit: from the knee to the
@@ -124,7 +124,6 @@ class _Seen:
         skeleton: the placed body; None without one.
         by_box: the placement by the box; None where the skeleton's is surely more accurate.
         feet: where the ankles would stand on a known floor.
-        chest: depth of the centre line in a depth image, and its standard deviation.
     """
 
     detection: PersonDetection
@@ -133,7 +132,6 @@ class _Seen:
     skeleton: BodyPlacement | None
     by_box: Placement | None
     feet: _Feet | None
-    chest: tuple[float, float] | None
 
 
 class _Ranged(NamedTuple):
@@ -170,14 +168,11 @@ def place_people(
     feet: Sequence[_Feet | None] = [None] * len(people)
     if floor is not None:
         feet = _feet_on_floor(floor, camera, detections, people, keypoint_std_px, min_score)
-    chests: Sequence[tuple[float, float] | None] = [None] * len(people)
-    if depth_m is not None:
-        trunks = [None if body is None else _trunk_px(camera, body) for body in bodies]
-        chests = chest_depths(depth_m, detections, people, trunks, min_score)
     by_boxes = _place_by_boxes(camera, detections, bodies)
-    everybody = map(_Seen, detections, people, heads, bodies, by_boxes, feet, chests)
+    everybody = map(_Seen, detections, people, heads, bodies, by_boxes, feet)
     ranged = [
-        _ranged(camera, each, floor, min_score, unusual_size_probability) for each in everybody
+        _ranged(camera, each, floor, min_score, depth_m, unusual_size_probability)
+        for each in everybody
     ]
     places = iter(_with_range([each for each in ranged if each is not None]))
     return tuple(None if each is None else next(places) for each in ranged)
@@ -201,7 +196,12 @@ def _place_by_boxes(
 
 
 def _ranged(
-    camera: Camera, seen: _Seen, floor: FloorPlane | None, min_score: float, unusual: float
+    camera: Camera,
+    seen: _Seen,
+    floor: FloorPlane | None,
+    min_score: float,
+    depth_m: FloatArray | None,
+    unusual: float,
 ) -> _Ranged | None:
     """Return the placement of a person with the range of all cues; None if nothing places them."""
     body, start = seen.skeleton, seen.by_box
@@ -216,8 +216,10 @@ def _ranged(
         return None
     cues = _range_cues(camera, seen, body, start, floor, min_score)
     by_size = cues[0]
-    if seen.chest is not None:
-        cues.append(_chest_cue(start[0], *seen.chest, seen.skeleton is not None))
+    if depth_m is not None:
+        chest = _chest(camera, seen, start[0], depth_m, min_score)
+        if chest is not None:
+            cues.append(_chest_cue(start[0], chest, seen.skeleton is not None))
     found = combined_range(cues, unusual)
     if body is None:
         return _Ranged(start, found, None, None)
@@ -280,17 +282,33 @@ def _trunk_px(camera: Camera, body: BodyPlacement) -> FloatArray | None:
     return ends if np.isfinite(ends).all() else None
 
 
-def _chest_cue(position: FloatArray, depth_m: float, std_m: float, has_body: bool) -> DepthCue:
-    """Return the cue of the chest's depth in a depth image."""
-    away_m = max(float(position[2]), 1e-3)
+def _chest(
+    camera: Camera, seen: _Seen, position: FloatArray, depth_m: FloatArray, min_score: float
+) -> Chest | None:
+    """Return the surface of a person's chest in a depth image, from a first position."""
+    body, person = seen.skeleton, seen.keypoints
+    direction = position / np.linalg.norm(position)
+    trunk_px = None if body is None else _trunk_px(camera, body)
+    trunk_px = trunk_in_image(seen.detection, person, trunk_px, min_score)
+    rows = np.flatnonzero(person.scores[kp.BODY] >= min_score)
+    ahead_m = np.zeros(len(rows))
+    if body is not None:
+        ahead_m = (body.keypoints_camera_m[rows] - body.position_camera_m) @ direction
+    return find_chest(camera, depth_m, direction, trunk_px, person.keypoints_px[rows], ahead_m)
+
+
+def _chest_cue(position: FloatArray, chest: Chest, has_body: bool) -> DepthCue:
+    """Return the cue of the chest's range in a depth image."""
+    away_m = max(float(np.linalg.norm(position)), 1e-3)
+    range_m = chest.range_m
     if has_body:
         # The chest of a child is less deep: as much as they are smaller.
-        depth_m -= BEHIND_M * (1.0 - min(max((depth_m - BEHIND_M) / away_m, 0.5), 1.0))
-    value = math.log(depth_m / away_m)
-    if has_body:
-        return DepthCue(value, std_m / depth_m, 0.0, _CHEST_OUTLIER)
-    outlier = _BOX_CHEST_OUTLIER, 0.0, 0.0, _FEET_OUTLIER_FARTHER
-    return DepthCue(value, std_m / depth_m, 0.0, *outlier)
+        range_m -= BEHIND_M * (1.0 - min(max((range_m - BEHIND_M) / away_m, 0.5), 1.0))
+    value, std = math.log(range_m / away_m), chest.std_m / range_m
+    if not has_body:
+        return DepthCue(value, std, 0.0, _BOX_CHEST_OUTLIER, 0.0, 0.0, _FEET_OUTLIER_FARTHER)
+    off = 1.0 - (chest.keypoint_share or 0.0)
+    return DepthCue(value, std, 0.0, min(max(off, _CHEST_OUTLIER), _MOST_CHEST_OUTLIER))
 
 
 def _with_range(people: Sequence[_Ranged]) -> list[PersonPlace]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import layouts as kp
+from ._camera import Camera
 from ._stages import PersonDetection, PersonKeypoints
 from .arrays import FloatArray, finite_number
 from .errors import DepthImageError
@@ -37,6 +38,9 @@ _FEWEST: Final = 8
 #: front (Drillis and Contini; with clothes). From the side it is up to half its breadth.
 BEHIND_M: Final = 0.12
 _BEHIND_STD_M: Final = 0.05
+# Half the width of a limb, and how far apart the pixels of the two images may be at least.
+_LIMB_M, _LEAST_REACH_PX = 0.04, 2.0
+_AROUND: Final = np.stack(np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)), axis=-1).reshape(-1, 2)
 # Error of a depth camera as a share of the depth; that of stereo grows to this at about 4 m.
 _RELATIVE_STD: Final = 0.015
 
@@ -93,67 +97,52 @@ def checked_depth(
     return depth
 
 
-def chest_depths(
-    depth_m: FloatArray,
-    detections: Sequence[PersonDetection],
-    people: Sequence[PersonKeypoints],
-    trunks_px: Sequence[FloatArray | None],
-    min_score: float,
-) -> list[tuple[float, float] | None]:
-    """Return the depth of each person's centre line and its standard deviation, in metres.
+class Chest(NamedTuple):
+    """A surface on the upper trunk of a person in a depth image.
 
-    It is that of the largest surface on the upper trunk; None where the depth image has too many
-    holes there, or several surfaces and none of them large.
+    Attributes:
+        range_m: distance of the centre line behind it, along the person's ray.
+        std_m: its standard deviation.
+        keypoint_share: share of the seen keypoints with a depth that lie on the same body; None
+            without any. Those of a person behind something lie farther away than it.
+    """
+
+    range_m: float
+    std_m: float
+    keypoint_share: float | None
+
+
+def find_chest(
+    camera: Camera,
+    depth_m: FloatArray,
+    direction: FloatArray,
+    trunk_px: FloatArray,
+    joints_px: FloatArray,
+    ahead_m: FloatArray,
+) -> Chest | None:
+    """Return the largest surface on a person's upper trunk.
+
+    Depths count as points, measured along the person's ray: at the side of a wide picture the depth
+    along the optical axis differs by the width of a body between its two sides.
 
     Args:
+        camera: camera of both images.
         depth_m: (H, W) of :func:`checked_depth`.
-        detections: one per person.
-        people: their keypoints.
-        trunks_px: (2, 2) neck and middle of the hips where the placed bodies have them, for ends
-            that are not seen; None for people without a placed body.
-        min_score: keypoints with a lower score count as not seen.
+        direction: (3,) unit vector to the person's centre line at chest height.
+        trunk_px: (2, 2) neck and middle of the hips.
+        joints_px: (K, 2) the seen keypoints.
+        ahead_m: (K,) how far each lies beyond the chest, along the ray.
+
+    Returns:
+        None where the depth image has too many holes, or several surfaces and none of them large.
     """
-    return [
-        _chest_depth(depth_m, *_trunk(detection, person, trunk_px, min_score))
-        for detection, person, trunk_px in zip(detections, people, trunks_px, strict=True)
-    ]
-
-
-def _trunk(
-    detection: PersonDetection,
-    person: PersonKeypoints,
-    trunk_px: FloatArray | None,
-    min_score: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the neck (2,) and the middle of the hips (2,) in pixels."""
-    ends = []
-    for end, rows in enumerate((kp.SHOULDERS, kp.HIPS)):
-        seen = person.scores[rows] >= min_score
-        if seen.any():
-            ends.append(person.keypoints_px[rows][seen].mean(axis=0))
-        elif trunk_px is not None:
-            ends.append(trunk_px[end])
-    if len(ends) == 2:
-        return ends[0], ends[1]
-    left, top, right, bottom = detection.box_xyxy_px.tolist()
-    middle, height = 0.5 * (left + right), bottom - top
-    return (
-        np.array([middle, top + _BOX_NECK * height]),
-        np.array([middle, top + _BOX_HIPS * height]),
-    )
-
-
-def _chest_depth(
-    depth_m: FloatArray, neck_px: FloatArray, hips_px: FloatArray
-) -> tuple[float, float] | None:
-    down = hips_px - neck_px
+    down = trunk_px[1] - trunk_px[0]
     aside = np.array([-down[1], down[0]])
-    at = neck_px + _ALONG[:, None, None] * down + _ACROSS[:, None] * aside
-    columns, rows = np.rint(at.reshape(-1, 2)).astype(np.int64).T
-    height, width = depth_m.shape
-    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-    found = depth_m[rows[inside], columns[inside]]
-    found = np.sort(found[np.isfinite(found)])
+    strip_px = (trunk_px[0] + _ALONG[:, None, None] * down + _ACROSS[:, None] * aside).reshape(
+        -1, 2
+    )
+    along_m, inside = _ranges(camera, depth_m, direction, strip_px)
+    found = np.sort(along_m[np.isfinite(along_m)])
     if len(found) < _FEWEST:
         return None
     # The window of this length that holds the most samples.
@@ -163,4 +152,50 @@ def _chest_depth(
     if count < max(_FEWEST, _SURFACE_SHARE * len(found)):
         return None
     surface_m = float(np.median(found[first : first + count]))
-    return surface_m + BEHIND_M, math.hypot(_BEHIND_STD_M, _RELATIVE_STD * surface_m)
+    # The side of a body that the border cuts is as far away as its centre line.
+    side_m = BEHIND_M * (1.0 - float(inside.mean()))
+    std_m = math.hypot(_BEHIND_STD_M, _RELATIVE_STD * surface_m, side_m)
+    # A keypoint lies on the body if any pixel about it does: limbs are thin.
+    reach_px = max(_LEAST_REACH_PX, _LIMB_M * camera.fx_px / surface_m)
+    around_px = joints_px[:, None] + reach_px * _AROUND
+    ranges_m, _ = _ranges(camera, depth_m, direction, around_px.reshape(-1, 2))
+    off_m = np.abs(ranges_m.reshape(-1, len(_AROUND)) - ahead_m[:, None] - surface_m)
+    measured = np.isfinite(off_m).any(axis=1)
+    on = (off_m < _SURFACE_M).any(axis=1)[measured]
+    return Chest(surface_m + BEHIND_M, std_m, float(on.mean()) if len(on) else None)
+
+
+def _ranges(
+    camera: Camera, depth_m: FloatArray, direction: FloatArray, pixels_px: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return (N,) how far pixels lie along a direction, NaN in holes, and (N,) which are inside."""
+    height, width = depth_m.shape
+    columns, rows = np.rint(pixels_px).astype(np.int64).T
+    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    depth = np.where(inside, depth_m[rows * inside, columns * inside], np.nan)
+    rays = camera.normalise(np.stack([columns, rows], axis=1) * inside[:, None], nearest=True)
+    return depth * (rays @ direction[:2] + direction[2]), inside
+
+
+def trunk_in_image(
+    detection: PersonDetection,
+    person: PersonKeypoints,
+    trunk_px: FloatArray | None,
+    min_score: float,
+) -> FloatArray:
+    """Return the neck and the middle of the hips (2, 2) in pixels.
+
+    ``trunk_px`` has them as the placed body does, for ends that are not seen; None without one.
+    """
+    ends = []
+    for end, rows in enumerate((kp.SHOULDERS, kp.HIPS)):
+        seen = person.scores[rows] >= min_score
+        if seen.any():
+            ends.append(person.keypoints_px[rows][seen].mean(axis=0))
+        elif trunk_px is not None:
+            ends.append(trunk_px[end])
+    if len(ends) == 2:
+        return np.array(ends)
+    left, top, right, bottom = detection.box_xyxy_px.tolist()
+    middle, height = 0.5 * (left + right), bottom - top
+    return np.array([[middle, top + _BOX_NECK * height], [middle, top + _BOX_HIPS * height]])

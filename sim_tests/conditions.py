@@ -130,7 +130,7 @@ class Perception(tuple[str, ...]):
         own = [each for each in CAMERAS if each not in (*_KINDS, ORACLE)]
         for each in sensors.split("+"):
             if each not in (known := (_CAMERA, *own, *OTHER_SENSORS)):
-                raise SimError(not_one_of("sensors", each, known))
+                raise SimError(not_one_of("sensors", each, known, or_else="several joined by '+'"))
         if kind in _TRUTHS and sensors != _CAMERA:
             raise SimError(
                 f"perception {kind!r} has no use for other sensors: sensors must be 'camera', got "

@@ -75,8 +75,8 @@ class PeopleEstimator:
             without a pose; it gives the floor.
         up_camera: (3,) direction up in the camera frame, for images without a pose; None where it
             is not known.
-        track: tracks people from frame to frame. Images without a pose then count as those of a
-            fixed camera.
+        track: tracks people from frame to frame. Images of a source without poses then count as
+            those of a fixed camera. Where some images have a pose, the others find nobody's place.
         depth: the depth images of the frames; None without any.
         unfit: roles of the networks that are not made for such images; every estimate has them.
     """
@@ -99,6 +99,7 @@ class PeopleEstimator:
         self._track, self._unfit, self._depth = track, unfit, depth
         self._tracker: PersonTracker | None = None
         self._last = LastFrames()
+        self._moves = False
 
     def estimate(self, frame: SourceFrame) -> FrameEstimate:
         """Estimate the people in a frame that has an image.
@@ -114,26 +115,31 @@ class PeopleEstimator:
         self._require_known_turn(frame)
         camera = self._cameras.of_size(width, height, frame.focal_px)
         pose = self._fixed_pose if frame.T_odom_camera is None else frame.T_odom_camera
+        if frame.T_odom_camera is not None and not self._moves:
+            self._moves, self._tracker = True, None  # earlier people were placed without poses
         no_view = why_no_view(frame.image_rgb, self._last)
         up_camera = self._up_camera if pose is None else pose[2, :3]
         observations = self._process(camera, frame, up_camera)
         tracks: tuple[PersonTrack, ...] | None = None
         track_ids: tuple[int | None, ...] = (None,) * len(observations)
+        if self._moves and frame.T_odom_camera is None:
+            pose = None  # a camera on a robot is nowhere else meanwhile
         if self._track:
-            if pose is None:
+            if pose is None and not self._moves:
                 pose = fixed_camera_pose()
                 pose[:3, :3] @= QuarterTurn.upright(up_camera).rotation_camera_view.T
             if self._tracker is None:
                 # An assumed field of view would drop or keep people wrongly.
                 view = CameraView(camera) if self._cameras.known else None
                 self._tracker = PersonTracker(_OF_RECORDINGS, view=view)
-            if no_view is None:
+            if no_view is None and pose is not None:
                 tracks = self._tracker.update(observations, frame.stamp_s, pose)
             else:
                 last_s = self._tracker.last_stamp_s
                 now_s = frame.stamp_s if last_s is None else max(frame.stamp_s, last_s)
                 tracks = self._tracker.predict(now_s)
-            track_ids = ids_of_tracks(observations, tracks, pose)
+            if pose is not None:
+                track_ids = ids_of_tracks(observations, tracks, pose)
         return FrameEstimate(
             frame,
             camera,

@@ -9,6 +9,8 @@ from typing import Final
 import numpy as np
 from shapely.geometry import MultiPoint
 
+from perception.arrays import finite_array
+
 from .._errors import NavError
 from .._robot import RobotProfile
 from ._shared import Input, Shared
@@ -47,15 +49,19 @@ class FootprintInput(Input):
         self._robot, self._go_on_with = robot, go_on_with
 
     def _use(self, message: PolygonStamped, now_s: float) -> bool:
-        corners = np.array([(each.x, each.y, each.z, 1.0) for each in message.polygon.points])
+        points = [(each.x, each.y, each.z, 1.0) for each in message.polygon.points]
         with self._shared.lock:
             poses = self._shared.poses
             if poses.state is None:
                 return False  # the robot stands for want of odometry, which is told
             try:
+                # Before they are turned: 0 times infinity is no corner, and NumPy warns of it.
+                corners = finite_array(
+                    "footprint_m", np.reshape(points, (-1, 4)), ("M", 4), NavError
+                )
                 stamp_s = to_seconds(message.header.stamp)
                 in_base = poses.in_base(message.header.frame_id, stamp_s)
-                outline = (corners.reshape(-1, 4) @ in_base.T)[:, :2]
+                outline = (corners @ in_base.T)[:, :2]
                 alone = replace(self.bare, footprint_m=outline)
                 both = np.vstack([self.bare.footprint_m, alone.footprint_m])
                 loaded = replace(self.bare, footprint_m=both)

@@ -40,7 +40,8 @@ def shipped_text(name: str) -> tuple[str, str]:
     if plain not in folders:
         if (resources.files("nav_adapter.policies") / f"{plain}.yaml").is_file():
             raise SimError(f"{plain!r} is a policy, not a scenario; give it with --policy")
-        raise SimError(not_one_of("scenario", plain, folders, listed_by="awarenav scenario list"))
+        names = (*folders, *SCENARIO_SETS)
+        raise SimError(not_one_of("scenario", plain, names, listed_by="awarenav scenario list"))
     return plain, (folders[plain] / f"{plain}.yaml").read_text("utf-8")
 
 

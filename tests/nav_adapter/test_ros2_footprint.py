@@ -129,7 +129,9 @@ def test_a_smaller_outline_does_not_shrink_the_robot() -> None:
     [
         (outline()[:2], "base_link", 0.0, "at least 3 corners"),
         (1000.0 * outline(), "base_link", 0.0, "within 10 m"),
+        (np.zeros((0, 2)), "odom", 0.0, "at least 3 corners"),
         (np.full((4, 2), np.nan), "base_link", 0.0, "finite"),
+        (np.full((4, 2), np.inf), "base_link", 0.0, "finite"),
         (outline() + np.array([5.0, 0.0]), "base_link", 0.0, "wholly ahead of"),
         (outline(), "nowhere", 0.0, "no transform between 'nowhere'"),
         (outline(), "odom", 4.0, "holds 0.1 s longer"),

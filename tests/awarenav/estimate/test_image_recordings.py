@@ -42,7 +42,7 @@ from nav_adapter.ros2.messages.sensor_msgs import (
 )
 from nav_adapter.ros2.messages.std_msgs import Header
 from nav_adapter.ros2.messages.tf2_msgs import TFMessage
-from perception import AwarenessPipeline, Camera
+from perception import AwarenessPipeline, Camera, PersonObservation
 
 pytest.importorskip("rosbags", reason="the extra 'rosbag' is not installed")
 
@@ -334,6 +334,37 @@ def test_the_floor_is_that_of_an_exact_pose_then_of_a_typed_height_then_of_the_r
     (floor,) = seen.floors
     assert (floor and floor.height_m) == wanted_m
     assert (floor and floor.height_std_m) == std_m
+
+
+class SomebodyStands:
+    """Perception of somebody who stands 9 m along x of odom, of a camera that drives at 1 m/s."""
+
+    def process(self, image_rgb: Any, stamp_s: float, **_: Any) -> tuple[PersonObservation]:
+        place, spread_m2 = [0.0, 0.2, 9.0 - stamp_s], np.diag([0.05, 0.05, 0.1]) ** 2
+        return (PersonObservation(stamp_s, place, spread_m2, None, None, None, score=0.9),)
+
+
+@pytest.mark.parametrize("typed", [True, False])
+@pytest.mark.parametrize("without", [range(5), range(30, 34), range(30, 60)])
+def test_people_keep_their_place_while_a_robots_pose_is_not_known(
+    typed, without, monkeypatch
+) -> None:
+    """Images before its first pose, and in a gap of its odometry, are not those of a fixed one."""
+    monkeypatch.setattr(AwarenessPipeline, "of", lambda networks, camera: SomebodyStands())
+    fixed = fixed_camera_pose(1.2) if typed else None
+    cameras = CameraChoice(None, 60.0, lambda text: None)
+    estimator = PeopleEstimator(None, cameras, fixed_pose_odom_camera=fixed, track=True)  # type: ignore[arg-type]
+    for k in range(60):
+        pose = fixed_camera_pose(1.0)
+        pose[0, 3] = 0.1 * k
+        known = None if k in without else pose
+        frame = SourceFrame(str(k), 0.1 * k, numbered(k % 20), known, on_robot=True)
+        estimate = estimator.estimate(frame)
+        if k < 5 and known is None:
+            continue
+        assert (estimate.T_odom_camera is None) == (known is None)
+        for track in estimate.tracks or ():
+            assert track.position_odom_m == pytest.approx([9.0, 0.0], abs=0.1)
 
 
 @pytest.mark.parametrize("topics", [("tf_static",), ("odom",), ("odom", "body")])

@@ -60,6 +60,8 @@ def run(tmp_path_factory):
             "drives straight on without a planner",
         ),
         ("watch nowhere", "`awarenav scenario list` lists all"),
+        ("crossings --scenario at_wrk", "did you mean 'at_work'?"),
+        ("crossings --sensors camera,scanner", "or several joined by '+'"),
         ("watch all", "watch shows one crossing"),
         ("watch late_glance --fault scanner_*", "watch shows one crossing"),
         ("watch late_glance --policy brave", "policy must be one of"),
