@@ -16,6 +16,7 @@ from tracking import PersonTrack, TrackerConfig
 from tracking.prediction import PredictionModel
 
 from .._adapter import NavAdapter
+from .._checks import require_type
 from .._constraints import NavConstraints
 from .._errors import NavError
 from .._policy import AwarenessPolicy
@@ -209,11 +210,13 @@ class AwarenessBridge:
     def use_robot(self, robot: RobotProfile) -> None:
         """Go on with another profile, as :meth:`NavAdapter.use_robot`, in the scans too.
 
+        An outline of :meth:`on_footprint` counts on until the next one.
+
         Raises:
             NavError: for anything else.
         """
-        self._go_on_with(robot)
-        self._footprint.bare = robot
+        require_type("robot", robot, RobotProfile)
+        self._go_on_with(self._footprint.loaded(robot))
 
     def _go_on_with(self, robot: RobotProfile) -> None:
         with self._sending, self._lock:

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from shapely.geometry import MultiPoint
 
-from perception.arrays import finite_array
+from perception.arrays import FloatArray, finite_array
 
 from .._errors import NavError
 from .._robot import RobotProfile
@@ -46,7 +46,16 @@ class FootprintInput(Input):
     ) -> None:
         super().__init__(shared, "footprint")
         self.bare = robot()
+        self._load_m: FloatArray | None = None
         self._robot, self._go_on_with = robot, go_on_with
+
+    def loaded(self, bare: RobotProfile) -> RobotProfile:
+        """Return another profile with the last load, which the robot keeps until a message."""
+        self.bare = bare
+        return bare if self._load_m is None else self._hull(bare, self._load_m)
+
+    def _hull(self, bare: RobotProfile, load_m: FloatArray) -> RobotProfile:
+        return replace(bare, footprint_m=np.vstack([bare.footprint_m, load_m]))
 
     def _use(self, message: PolygonStamped, now_s: float) -> bool:
         points = [(each.x, each.y, each.z, 1.0) for each in message.polygon.points]
@@ -63,10 +72,10 @@ class FootprintInput(Input):
                 in_base = poses.in_base(message.header.frame_id, stamp_s)
                 outline = (corners @ in_base.T)[:, :2]
                 alone = replace(self.bare, footprint_m=outline)
-                both = np.vstack([self.bare.footprint_m, alone.footprint_m])
-                loaded = replace(self.bare, footprint_m=both)
+                loaded = self._hull(self.bare, alone.footprint_m)
             except NavError as problem:
                 raise NavError(f"{problem}; the last one is kept") from problem
+        self._load_m = alone.footprint_m
         before, after = (
             MultiPoint(each.footprint_m).convex_hull for each in (self._robot(), loaded)
         )

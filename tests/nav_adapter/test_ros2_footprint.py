@@ -115,6 +115,21 @@ def test_people_are_kept_and_a_load_that_is_left_no_longer_counts() -> None:
     assert nav.bridge.tracks[0].id == identity
 
 
+def test_another_profile_keeps_the_load() -> None:
+    nav = Loaded()
+    before = nav.with_load(outline(front=1.0))
+    nav.bridge.use_robot(replace(ROBOT, max_speed_mps=1.0))
+    after = nav.drive(START_S + 0.9, 0.04)[-1]
+    assert before.robot is not None
+    assert after.robot is not None
+    assert after.robot.max_speed_mps == 1.0
+    np.testing.assert_array_equal(after.robot.footprint_m, before.robot.footprint_m)
+    assert nav.send(outline(), START_S + 0.9)
+    left = nav.drive(START_S + 0.94, 0.04)[-1]
+    assert left.robot is not None
+    assert left.robot.footprint_m.max() == ROBOT.footprint_m.max()
+
+
 def test_a_smaller_outline_does_not_shrink_the_robot() -> None:
     nav = Loaded()
     small = nav.with_load(0.5 * ROBOT.footprint_m)
