@@ -160,9 +160,9 @@ def find_chest(
     around_px = joints_px[:, None] + reach_px * _AROUND
     ranges_m, _ = _ranges(camera, depth_m, direction, around_px.reshape(-1, 2))
     off_m = np.abs(ranges_m.reshape(-1, len(_AROUND)) - ahead_m[:, None] - surface_m)
-    measured = np.isfinite(off_m).any(axis=1)
-    on = (off_m < _SURFACE_M).any(axis=1)[measured]
-    return Chest(surface_m + BEHIND_M, std_m, float(on.mean()) if len(on) else None)
+    off_m = off_m[np.isfinite(off_m).any(axis=1)]
+    share = float((np.nanmin(off_m, axis=1) < _SURFACE_M).mean()) if len(off_m) else None
+    return Chest(surface_m + BEHIND_M, std_m, share)
 
 
 def _ranges(
