@@ -51,10 +51,6 @@ _LEFT_S: Final = 0.02
 _SLOW_S: Final = 0.1
 _NO_ROOM_S: Final = 3.0
 _TOO_FAST_S: Final = 0.5
-# Seconds that a second costs at full speed above the limit that would hold if nobody had noticed
-# the robot. People who have noticed it may set off, too: a way that is as fast without their
-# attention, or nearly, is worth so much. It is computed at every second place and time.
-_TRUST_S: Final = 1.5
 # The robot heads for the way so far ahead, and by this time at its speed farther.
 _HEAD_M: Final = 1.0
 _HEAD_S: Final = 0.6
@@ -180,25 +176,19 @@ class ReferencePlanner(SamplingPlanner):
         )
         headings = math.atan2(line.along[1], line.along[0]) + np.arctan(slopes)
         times_s = np.arange(0.0, _AHEAD_S + 1e-9, _STEP_S)
-        limits_mps = _limits_mps(constraints, positions, headings, len(times_s), _STEP_S)
-        unnoticed_mps = limits_mps
-        if any(person.awareness_lower > 0.0 for person in constraints.obstacles):
-            few = len(times_s[::2])
-            unnoticed_mps = _limits_mps(
-                constraints,
-                positions[:, ::2],
-                headings[:, ::2],
-                few,
-                2.0 * _STEP_S,
-                aware_for_s=0.0,
-            )
-            unnoticed_mps = unnoticed_mps.repeat(2, axis=1).repeat(2, axis=2)
+        poses = positions.reshape(-1, 1, 2).repeat(len(times_s), axis=1)
+        limits_mps = speed_limit_at(
+            constraints,
+            poses,
+            headings.reshape(-1, 1).repeat(len(times_s), axis=1),
+            dt_s=_STEP_S,
+        ).reshape(*headings.shape, len(times_s))
         outline = self._footprint.at(
             Poses(positions[..., 0], positions[..., 1], np.cos(headings), np.sin(headings))
         )
         room = box_gap_m(outline, self._boxes_odom_m) >= self.config.clearance_m
         stretch = np.hypot(1.0, slopes)
-        field = _Field(limits_mps, unnoticed_mps, room, stretch, reach_m)
+        field = _Field(limits_mps, room, stretch, reach_m)
         price_s = _OFFSET_S * np.abs(_OFFSETS_M) + _LEFT_S * (_OFFSETS_M > 0.0)
         price_s = price_s + _OTHER_S * (np.abs(_OFFSETS_M - self._offset_m) > 1e-6)
         way, start = np.divmod(np.arange(len(_OFFSETS_M) * len(_STARTS)), len(_STARTS))
@@ -216,14 +206,12 @@ class _Field(NamedTuple):
 
     Attributes:
         limits_mps: (ways, places, times).
-        unnoticed_mps: the same if nobody had noticed the robot; it may have one more of both.
         room: (ways, places), whether the robot has room between boxes.
         stretch: (ways, places), length of a way over that of the line.
         reach_m: of the places along the line.
     """
 
     limits_mps: FloatArray
-    unnoticed_mps: FloatArray
     room: NDArray[np.bool_]
     stretch: FloatArray
     reach_m: float
@@ -248,15 +236,12 @@ class _Field(NamedTuple):
             place = np.minimum(s_m / _PLACES_M, places - 1.001)
             index = place.astype(np.intp)
             share = place - index
-            column = min(step, times - 1)
-            now = self.limits_mps[:, :, column]
+            now = self.limits_mps[:, :, min(step, times - 1)]
             limit = (1.0 - share) * now[way, index] + share * now[way, index + 1]
             limit = np.where(s_m > self.reach_m, fastest_mps, limit)
             left_m = np.maximum(rest_m - s_m, 0.0)
             moves = (v > 0.05) & np.isinf(arrives_s)
             penalty_s += np.where(moves & ~self.room[way, index], _NO_ROOM_S * _STEP_S, 0.0)
-            trust_mps = np.maximum(v - self.unnoticed_mps[way, index, column], 0.0)
-            penalty_s += np.where(moves, trust_mps * (_TRUST_S * _STEP_S / fastest_mps), 0.0)
             too_fast = v - limit - 1.2 * brakes * _STEP_S
             penalty_s += np.where(moves & (too_fast > 0.0), _TOO_FAST_S * (v - limit), 0.0)
             wanted = np.minimum(limit, np.where(t_s < hold_s, cap_mps, fastest_mps))
@@ -270,25 +255,6 @@ class _Field(NamedTuple):
         left_m = np.maximum(rest_m - s_m, 0.0)
         later_s = _DRIVE_S + left_m / fastest_mps + 0.5 * (fastest_mps - v) / gains
         return np.asarray(np.where(np.isinf(arrives_s), later_s, arrives_s) + penalty_s)
-
-
-def _limits_mps(
-    constraints: NavConstraints,
-    positions_odom_m: FloatArray,
-    headings_odom_rad: FloatArray,
-    times: int,
-    dt_s: float,
-    aware_for_s: float = math.inf,
-) -> FloatArray:
-    """Return the limits (ways, places, times) at poses (ways, places), from now on."""
-    limits_mps: FloatArray = speed_limit_at(
-        constraints,
-        positions_odom_m.reshape(-1, 1, 2).repeat(times, axis=1),
-        headings_odom_rad.reshape(-1, 1).repeat(times, axis=1),
-        dt_s=dt_s,
-        aware_for_s=aware_for_s,
-    )
-    return limits_mps.reshape(*headings_odom_rad.shape, times)
 
 
 def _smooth(share: FloatArray) -> FloatArray:
