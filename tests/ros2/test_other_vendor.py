@@ -13,12 +13,14 @@ from scan_scenes import planar, scan_message
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, DdsNode, decode, encode
 from nav_adapter.ros2.conversions import from_ros, header, ros_class, to_ros
 from nav_adapter.ros2.messages import Message
+from nav_adapter.ros2.messages import geometry_msgs as geometry
 from nav_adapter.ros2.messages.nav2_msgs import CostmapFilterInfo
 from nav_adapter.ros2.messages.sensor_msgs import CompressedImage, Image
 
 STAMP_S = 1000.25
 # On one computer the news takes milliseconds.
 GONE_S = 0.5
+OUTLINE = geometry.Polygon(tuple(geometry.Point32(x, y) for x, y in ((0.5, 0.0), (-0.5, 0.3))))
 SENT = {
     "image": image(STAMP_S),
     "compressed": CompressedImage(header(STAMP_S, "camera"), "png", bytes(range(256))),
@@ -27,6 +29,7 @@ SENT = {
     "scan": scan_message(STAMP_S),
     "scan_2": scan_message(STAMP_S + 0.1),
     "map": dict(everything())["grid"],
+    "footprint": geometry.PolygonStamped(header(STAMP_S, "odom"), OUTLINE),
     "odom": odometry(STAMP_S, 1.0, 0.3),
     "tf": tf("odom", "base_link", planar(1.0, 2.0, 0.3)),
     "tf_static": tf("base_link", "scanner", planar(0.3)),
