@@ -86,7 +86,7 @@ class Perception(tuple[str, ...]):
 
     @property
     def is_a_set(self) -> bool:
-        """Whether they go together: one camera that is not the truth, and others."""
+        """True if they go together: one camera that is not the truth, and others."""
         return self[0] not in _TRUTHS and not set(self[1:]) & set(CAMERAS)
 
     @property

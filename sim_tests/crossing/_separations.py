@@ -1,4 +1,4 @@
-"""Where robot and people are nearest to each other, their margins, and contacts."""
+"""Robot and people where they are nearest to each other, their margins, and contacts."""
 
 from __future__ import annotations
 

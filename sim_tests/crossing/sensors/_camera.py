@@ -62,7 +62,7 @@ class CameraSensor(Sensor):
 
     @property
     def view(self) -> View | None:
-        """Where it can see people, for the tracker; None for everywhere."""
+        """Places where it can see people, for the tracker; None for everywhere."""
         return view_of(self.stage, self.camera)
 
     @staticmethod

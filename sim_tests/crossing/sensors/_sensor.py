@@ -87,7 +87,7 @@ class KeypointNoise(SimConfig):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SensorSetup:
-    """What sensors are made of.
+    """The parts that sensors are made of.
 
     Attributes:
         stage: hall, robot and people; its scenario has the settings of the sensors.

@@ -17,7 +17,7 @@ from sim_tests.world.camera import CameraTiming
 def setup_on(
     stage: Any, faults: EpisodeFaults | None = None, seed: int = 0, **more: Any
 ) -> SensorSetup:
-    """What sensors on a stage are made of; keypoints of everybody in view."""
+    """The parts of sensors on a stage; keypoints of everybody in view."""
     faults = faults or EpisodeFaults(None, seed, stage.scenario.camera.camera())
     noise = KeypointNoise(miss_rate=0.0)
     return SensorSetup(stage=stage, seed=seed, faults=faults, noise=noise, **more)
