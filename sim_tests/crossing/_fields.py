@@ -28,7 +28,7 @@ class FieldsAdapter:
     slower. Manuals of safety scanners size it so: the way in which the vehicle reacts and brakes,
     from its own speed alone, with other fields for other speeds (SICK S300, operating instructions
     8010948, section "Mobile applications"). Somebody in it stops the robot until it has been clear
-    for 2 s, the usual delay before a vehicle starts again by itself.
+    for 2 s; that delay is chosen, no source gives it.
 
     The *warning field* is the one for full speed and twice the reaction time. So a robot that slows
     for somebody who stands has done so before they are in its protective field. With somebody in

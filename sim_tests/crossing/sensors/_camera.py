@@ -81,8 +81,7 @@ class CameraSensor(Sensor):
         """Take an image if one is due; return what has arrived by now, in order of arrival."""
         t_s = world.t_s
         _, arrives_s = self._clock.tick(t_s)
-        observations = None if arrives_s is None else self._observed(world)
-        if arrives_s is not None and observations is not None:
+        if arrives_s is not None and (observations := self._observed(world)) is not None:
             sighting = Sighting(t_s, world.T_odom_camera_known, observations)
             sent: Delivery[Sighting] | None = Delivery(
                 sighting, t_s, arrives_s, world.T_odom_camera
