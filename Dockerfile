@@ -4,8 +4,8 @@
 #   docker build --tag awarenav-dev --target dev .      for development: .devcontainer
 #
 # The bridge speaks DDS with ROS on the host:
-#   docker run --rm --network host --volume "$PWD:/work" awarenav \
-#       bridge --robot robot.yaml --networks real_networks.yaml
+#   docker run --rm --network host --volume "$PWD:/work" awarenav bridge --robot robot.yaml
+# Fetched networks are in the folder networks of that volume.
 
 # Development: make, git and Python. `make setup` installs the lock into the checkout's .venv.
 FROM python:3.11-slim-bookworm AS dev
@@ -27,6 +27,7 @@ RUN apt-get update \
         python3-venv ros-jazzy-nav2-msgs ros-jazzy-rmw-cyclonedds-cpp \
     && rm -rf /var/lib/apt/lists/*
 ENV RMW_IMPLEMENTATION=rmw_cyclonedds_cpp \
+    AWARENAV_MODELS=/work/networks \
     PIP_NO_CACHE_DIR=1 \
     PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /opt/awarenav
@@ -46,7 +47,8 @@ CMD ["ros2", "launch", "/opt/awarenav/docs/nav2/awarenav.launch.yaml", \
 
 # What runs on a robot, without ROS and without the simulator. The last stage is the default.
 FROM python:3.11-slim-bookworm AS robot
-ENV PIP_NO_CACHE_DIR=1 \
+ENV AWARENAV_MODELS=/work/networks \
+    PIP_NO_CACHE_DIR=1 \
     PIP_DISABLE_PIP_VERSION_CHECK=1
 WORKDIR /opt/awarenav
 COPY requirements.lock pyproject.toml README.md LICENSE ./

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Final, Literal, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from .documents import read_yaml, yaml_text
+from .documents import keys_of, read_yaml, yaml_text
 from .errors import PerceptionError, did_you_mean
 
 _ConfigT = TypeVar("_ConfigT", bound="StrictConfig")
@@ -115,9 +115,7 @@ class StrictConfig(BaseModel):
             ValueError: the package's own error, naming the file and the key.
         """
         path = Path(path)
-        data = read_yaml(path, cls.error)
-        if not isinstance(data, dict):
-            raise cls.error(f"{path} must hold a mapping of keys, got {type(data).__name__}")
+        data = keys_of(read_yaml(path, cls.error), str(path), cls.error)
         try:
             return cls.model_validate(data)
         except ValidationError as cause:

@@ -139,18 +139,26 @@ def parse_yaml(
     except _RepeatedKeyError as cause:
         raise error(f"{source} has {cause}") from None
     except (yaml.YAMLError, RecursionError, *_WRONG_SCALARS) as cause:
-        raise error(f"{source} is not valid YAML: {_reason(cause)}") from cause
+        raise error(f"{source} is not valid YAML: {_reason(cause, text)}") from cause
 
 
-def _reason(cause: Exception) -> str:
+def _reason(cause: Exception, text: str) -> str:
     """Return why a text is no YAML, in one line."""
     if not isinstance(cause, yaml.MarkedYAMLError) or cause.problem_mark is None:
         return str(cause)
     mark = cause.problem_mark
-    tab = any(word in str(cause.problem) for word in ("tab character", "'\\t'"))
-    spaces = "; indent with spaces" if tab else ""
+    line = "".join(text.split("\n")[mark.line : mark.line + 1])
+    spaces = "; indent with spaces, not with a tab" if line[mark.column :][:1] == "\t" else ""
     problem = ", ".join(filter(None, (cause.context, cause.problem)))
     return f"line {mark.line + 1}, column {mark.column + 1}: {problem}{spaces}"
+
+
+def keys_of(data: Any, source: str, error: type[ValueError]) -> dict[str, Any]:
+    """Return the mapping that a document holds, or raise ``error``, which names the source."""
+    if not isinstance(data, dict):
+        found = {type(None): "nothing", list: "a list"}.get(type(data), "a single value")
+        raise error(f"{source} must hold lines of `key: value`, got {found}")
+    return data
 
 
 def yaml_text(value: Any, **settings: Any) -> str:

@@ -41,7 +41,7 @@ def nearest_file(path: Path) -> str:
         names = {each.stem: each.name for each in path.parent.iterdir()}
     except OSError:
         return ""
-    near = difflib.get_close_matches(path.stem, names, n=1)
+    near = difflib.get_close_matches(path.stem, names, n=1, cutoff=0.75)
     return f"; did you mean {names[near[0]]!r}?" if near and not path.exists() else ""
 
 

@@ -277,14 +277,13 @@ class Conditions:
         shell_complete=completion_of("sim_tests", "scenario/shipped/cameras"),
     )
     networks: str = _axis(
-        "Name of the file of other networks, empty for the shipped ones.",
+        "Name of the set or file of other networks, empty for the shipped ones.",
         empty=True,
         changes_scenario=True,
-        help="Networks of your own for --perception pixels: a YAML file as for --networks of "
-        "awarenav estimate.",
+        help="Other networks for --perception pixels: as for --networks of awarenav estimate.",
         default="",
         show_default="the shipped ones",
-        metavar="FILE",
+        metavar="SET|FILE",
     )
     robot: str = _axis(
         "Name of another robot, empty for the scenario's own.",

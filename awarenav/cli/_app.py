@@ -289,13 +289,9 @@ def _run(words: list[str]) -> int:
 
 
 def _print_usage_error(error: click.UsageError) -> None:
-    """Print what is wrong with the command line, and which help explains it."""
-    context = error.ctx
-    path = _PROGRAM if context is None else context.command_path
-    if context is not None:
-        print(context.get_usage(), file=sys.stderr)
-        print(f"Try '{path} --help' for help.\n", file=sys.stderr)
-    _print_error(path, error.format_message())
+    """Print what is wrong with the command line, and which help explains it, in one line."""
+    path = _PROGRAM if error.ctx is None else error.ctx.command_path
+    _print_error(path, f"{error.format_message().rstrip('.')} (see `{path} --help`)")
 
 
 def _print_error(path: str, message: str) -> None:

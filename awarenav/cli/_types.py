@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -10,14 +11,30 @@ import click
 
 from ..errors import not_one_of
 
-#: A whole number within limits, ``Whole(1)`` or ``Whole(1, 9)``.
-Whole = click.IntRange
-#: A number within limits, ``Number(0.0, 1.0)``.
-Number = click.FloatRange
+
+class Whole(click.IntRange):
+    """A whole number within limits, ``Whole(1)`` or ``Whole(1, 9)``."""
+
+    name = "whole number"
+
+
+class Number(click.FloatRange):
+    """A finite number within limits, ``Number(0.0, 1.0)``."""
+
+    name = "number"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number, or fail: NaN is within all limits."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"must be finite, got {value}", param, ctx)
+        return number
+
+
 #: A whole number of at least 1.
 POSITIVE: Final = Whole(1)
-#: Any number.
-NUMBER: Final = click.FLOAT
+#: Any finite number.
+NUMBER: Final = Number()
 #: A number from 0 to 1.
 SHARE: Final = Number(0.0, 1.0)
 #: The path of a file; the command itself checks whether the file exists.

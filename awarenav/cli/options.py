@@ -169,9 +169,9 @@ _NETWORK_OPTIONS: Final = (
     option(
         "--networks",
         group=_NETWORKS,
-        type=FilePath(),
-        metavar="FILE",
-        help="Detector, pose and head from a file such as `awarenav models fetch` writes.",
+        metavar="SET|FILE",
+        help="Detector, pose, head and face of a set, such as 'real' (`awarenav models list`), or "
+        "of a YAML file with these keys.",
     ),
     option(
         "--detector",

@@ -12,14 +12,14 @@ from perception.networks import OnnxSettings, parse_provider_options
 def choice_of_options(
     options: Any, *, rendered: bool, log: Callable[[str], None] | None = None
 ) -> NetworkChoice:
-    """Return the choice of a command's options: that of the file, else of the other ones.
+    """Return the choice of a command's options: that of ``networks``, else of the other ones.
 
-    An option that is not given leaves the value of the file, or without a file that of
+    An option that is not given leaves the value of ``networks``, or without it that of
     :meth:`~perception.named.NetworkChoice.default`.
 
     Args:
-        options: with ``networks``, a path or None, and an attribute for each name of the choice;
-            None for an option that is not given.
+        options: with ``networks``, a set, a path or None, and an attribute for each name of the
+            choice; None for an option that is not given.
         rendered: the pictures are renders of this package.
         log: gets one message if the fetched set is used.
 
@@ -29,7 +29,7 @@ def choice_of_options(
     values = {name: getattr(options, name, None) for name in NetworkChoice.model_fields}
     given = {name: value for name, value in values.items() if value is not None}
     if options.networks is not None:
-        return NetworkChoice.from_yaml(options.networks).model_copy(update=given)
+        return NetworkChoice.of(options.networks).model_copy(update=given)
     # Whoever allows networks of renders has asked for them.
     simulator = rendered or getattr(options, "allow_simulator_networks", False)
     default = NetworkChoice.default(simulator=simulator)

@@ -140,9 +140,10 @@ def open_results(
         overwrite: replaces an existing file.
 
     Raises:
-        AwarenavError: for an existing file that may not be replaced or cannot be continued.
+        AwarenavError: for another suffix, and for an existing file that may not be replaced or
+            cannot be continued.
     """
-    check_output(path, ())
+    check_output(path, (".jsonl",))
     exists = path.exists()
     if exists and not resume and not overwrite:
         raise AwarenavError(

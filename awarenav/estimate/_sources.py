@@ -223,13 +223,13 @@ class VideoSource(ImageSource):
 
     def __init__(self, name: str, capture: cv2.VideoCapture, *, live: bool) -> None:
         if not capture.isOpened():
-            what = "camera or stream" if live else "video"
-            hint = (
-                "is it plugged in, not in use, and its number right?"
-                if live
-                else "it may be damaged, cut off, or of a format that OpenCV cannot decode"
-            )
-            raise AwarenavError(f"cannot open {what} {name}: {hint}")
+            if not live:
+                what = f"{name} as a video: it is none, damaged, or of a format that OpenCV lacks"
+            elif "://" in name:
+                what = f"stream {name}: is its address right, and does it send?"
+            else:
+                what = f"camera {name}: is it plugged in, not in use, and its number right?"
+            raise AwarenavError(f"cannot open {what}")
         self._name = name
         self._capture = capture
         self.live = live

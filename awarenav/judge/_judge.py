@@ -46,11 +46,15 @@ def judge_files(truth: Path, estimates: Path, *, common: bool = False) -> dict[s
     """Compare a JSON Lines file of estimates with one of truth; see :func:`judge_frames`.
 
     Raises:
-        AwarenavError: for files that cannot be read or have no frame in common.
+        AwarenavError: for files that cannot be read, are in the wrong order or have no frame in
+            common.
     """
-    true_frames, estimated = (
-        people_by_frame(read_records(path), path) for path in (truth, estimates)
-    )
+    records = [read_records(path) for path in (truth, estimates)]
+    # Every line of `awarenav estimate` has its settings. Two such files may be compared.
+    made = [any("settings" in record for record in each) for each in records]
+    if made == [True, False]:
+        raise AwarenavError(f"{truth} has estimates: give the truth first, then the estimates")
+    true_frames, estimated = map(people_by_frame, records, (truth, estimates))
     if not true_frames:
         raise AwarenavError(f"{truth} has no frame")
     if not true_frames.keys() & estimated.keys():

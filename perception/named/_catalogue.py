@@ -171,11 +171,6 @@ class NetworkSet(StrictConfig):
         """Names of its networks, by their roles."""
         return self.model_dump(include={*get_args(Role)} - {"head"}, exclude_none=True)
 
-    @property
-    def file(self) -> str:
-        """Name of the file for ``--networks``."""
-        return f"{self.name}_networks.yaml"
-
 
 class Catalogue(StrictConfig):
     """All networks for a real robot, with unique names."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import ClassVar
 
 from .._manifest import simulator_networks, simulator_networks_warning
 from ..config import StrictConfig
-from ..errors import AwarenavError, PerceptionError
+from ..errors import AwarenavError, PerceptionError, not_one_of
 from ..networks import OnnxSettings
 from ._catalogue import DEFAULT_SET, RealModel
 from ._folder import NetworkFolder
@@ -14,7 +15,7 @@ from ._load import EYES, HEADS, NONE, SHIPPED, Networks, catalogued, choose_netw
 
 
 class NetworkChoice(StrictConfig):
-    """The networks by name, as ``--networks`` reads them from a file.
+    """The networks by name, as those of ``--networks``.
 
     Attributes:
         detector: as :func:`choose_networks` takes it; so are the others.
@@ -39,6 +40,27 @@ class NetworkChoice(StrictConfig):
     input_size: str | None = None
 
     @classmethod
+    def of(cls, named: str | Path) -> NetworkChoice:
+        """Return the networks of a set, by its name in the catalogue, or of a YAML file.
+
+        Raises:
+            AwarenavError: for a name of neither, for a set that is not fetched, and for a file
+                that cannot be read.
+        """
+        folder = NetworkFolder()
+        sets = {each.name: each for each in folder.catalogue.sets}
+        if str(named) in sets:
+            chosen = sets[str(named)]
+            if not all(map(folder.is_fetched, chosen.networks.values())):
+                where = f"the set {named} is not in {folder.folder}"
+                raise AwarenavError(f"{where}: awarenav models fetch {named}")
+            return cls(**chosen.model_dump(include=set(cls.model_fields), exclude_none=True))
+        if not Path(named).suffix and not Path(named).exists():
+            what = not_one_of("set of networks", str(named), sets, or_else="a YAML file")
+            raise AwarenavError(what)
+        return cls.from_yaml(named)
+
+    @classmethod
     def default(cls, *, simulator: bool) -> NetworkChoice:
         """Return the networks that pictures get where nothing else is named.
 
@@ -50,15 +72,10 @@ class NetworkChoice(StrictConfig):
                 shipped networks.
         """
         folder = NetworkFolder()
-        known = {each.name for each in folder.catalogue.models}
-        for each in () if simulator else folder.catalogue.sets:
-            if each.name == DEFAULT_SET:
-                named = each.model_dump(include=set(cls.model_fields), exclude_none=True)
-                chosen = cls(**named)
-                wanted = known.intersection(map(str, named.values()))
-                if all(map(folder.is_fetched, wanted)):
-                    return chosen
-        return cls()
+        sets = () if simulator else folder.catalogue.sets
+        members = [each.networks.values() for each in sets if each.name == DEFAULT_SET]
+        fetched = any(all(map(folder.is_fetched, names)) for names in members)
+        return cls.of(DEFAULT_SET) if fetched else cls()
 
     def load(
         self,

@@ -192,7 +192,8 @@ def named_policy(policy: AwarenessPolicy | str | Path) -> tuple[str, AwarenessPo
         names = {name.removesuffix(".yaml") for name in shipped if name.endswith(".yaml")}
         if policy in {name for each in SCENARIO_SETS for name in shipped_scenarios(each)}:
             raise NavError(f"{policy!r} is a scenario, not a policy; give it with --scenario")
-        raise NavError(not_one_of("policy", policy, sorted(names | set(own))))
+        known = sorted(names | set(own))
+        raise NavError(not_one_of("policy", policy, known, or_else="a .yaml file"))
     return policy, AwarenessPolicy.preset(policy)
 
 

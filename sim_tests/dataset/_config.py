@@ -8,10 +8,11 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from awarenav.errors import not_one_of
 from perception import Camera
 from tracking.config import complaints
 
-from ..actors.body import worker_names
+from ..actors.body import worker_file
 from ..world.camera import SensorConfig
 from ..world.config import SimConfig
 from ..world.errors import SimError
@@ -73,16 +74,16 @@ class RenderConfig(SimConfig):
     @field_validator("workers")
     @classmethod
     def _known_workers(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        unknown = [n for n in names or () if not n.endswith(".npz") and n not in worker_names()]
-        if unknown:
-            raise ValueError(f"must be .npz files or of {', '.join(worker_names())}")
+        for name in names or ():
+            worker_file(name)
         return names
 
     @field_validator("layouts")
     @classmethod
     def _known_layouts(cls, names: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        if not set(names or ()) <= set(LAYOUTS):
-            raise ValueError(f"must be of {', '.join(LAYOUTS)}")
+        for name in names or ():
+            if name not in LAYOUTS:
+                raise ValueError(not_one_of("layout", name, LAYOUTS))
         return names
 
     @classmethod

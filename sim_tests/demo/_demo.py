@@ -35,12 +35,6 @@ from ._lanes import (
 #: Files of the film: for pages, and for players.
 FILMS: Final = ("crossing.webp", "crossing.mp4")
 _ROWS: Final = "lanes.jsonl"
-# Labels of the film.
-_FILMED: Final = {
-    "today-costmap": "today's AMR",
-    "blind": "awareness-blind",
-    "awarenav": "aware",
-}
 
 
 def run_demo(out: Path, *, seed: int | None, video: bool, as_json: bool) -> None:
@@ -75,10 +69,8 @@ def run_demo(out: Path, *, seed: int | None, video: bool, as_json: bool) -> None
     free = run_nobody(seed)
     films = [ComparisonRow("nobody there", free, runs[0].scenario)]
     for run in runs:
-        if run.lane.name in _FILMED:
-            pictures = camera.pictures if run.lane is LANES[-1] else ()
-            label = _FILMED[run.lane.name]
-            films.append(ComparisonRow(label, run.result, run.scenario, pictures))
+        pictures = camera.pictures if run.lane is LANES[-1] else ()
+        films.append(ComparisonRow(run.lane.name, run.result, run.scenario, pictures))
     write_crossing_film([out / name for name in FILMS], films)
     print(f"\nOpen {out / FILMS[1]}", file=text_stream)
 

@@ -77,9 +77,9 @@ WITHOUT_AWARENESS: Final = ("blind", "scanner", "scanner_warning")
 
 #: Rows of the comparison that the film shows, and the title of each lane.
 LANES: Final[dict[str, str]] = {
-    "today's AMR": "Today’s AMR",
-    "awareness-blind": "Slow for everybody",
-    "aware": "awarenav",
+    "today-costmap": "Today’s AMR, costmap",
+    "blind": "Slow for everybody",
+    "awarenav": "awarenav",
 }
 
 

@@ -103,8 +103,7 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
 
 def _completed(data: Any, source: str) -> dict[str, Any]:
     """Return the keys of a scenario with the defaults that it extends."""
-    if not isinstance(data, dict):
-        raise SimError(f"{source} must hold a mapping of keys, got {type(data).__name__}")
+    data = documents.keys_of(data, source, SimError)
     if "extends" not in data:
         return data
     names = _names_in(_DEFAULTS)

@@ -31,8 +31,8 @@ _CHECKSUMS: Final = "sha256"
 _DETECT_EVERY_S: Final = 0.15
 
 
-def networks_data(path: str | Path) -> dict[str, Any]:
-    """Return the keys of a scenario's ``networks``, from a file as for ``--networks``.
+def networks_data(named: str | Path) -> dict[str, Any]:
+    """Return the keys of a scenario's ``networks``, from a set or file as for ``--networks``.
 
     The paths of files are absolute, and each network that is a file has its checksum, so that
     the keys give the same networks in every process, or none.
@@ -41,7 +41,7 @@ def networks_data(path: str | Path) -> dict[str, Any]:
     from perception.named import NetworkChoice  # noqa: PLC0415
 
     try:
-        data = NetworkChoice.from_yaml(path).model_dump(exclude_defaults=True)
+        data = NetworkChoice.of(named).model_dump(exclude_defaults=True)
     except AwarenavError as error:
         raise SimError(str(error)) from error
     try:
@@ -50,7 +50,7 @@ def networks_data(path: str | Path) -> dict[str, Any]:
             data[_CHECKSUMS] = checksums
         load_networks(yaml_text(data))
     except AwarenavError as error:
-        raise SimError(f"{path}: {error}") from error
+        raise SimError(f"{named}: {error}") from error
     return data
 
 

@@ -174,9 +174,9 @@ class ScenarioTemplate:
         """Return the same scenario with another camera on the robot."""
         return self._with(name, camera=camera_data(name)) if name else self
 
-    def with_networks(self, path: str | Path) -> ScenarioTemplate:
+    def with_networks(self, named: str | Path) -> ScenarioTemplate:
         """Return the same scenario with other networks for the pictures of its camera."""
-        return self._with(path, networks=networks_data(path)) if path else self
+        return self._with(named, networks=networks_data(named)) if named else self
 
     def with_population(self, text: str) -> ScenarioTemplate:
         """Return the same scenario among people with other habits."""

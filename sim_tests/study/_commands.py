@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from awarenav.errors import counted
-from awarenav.files import json_text
+from awarenav.files import check_output, json_text, require_writable
 from perception import AwarenessPipeline, Camera
 
 from ..conditions import Experiment
@@ -116,8 +116,9 @@ def watch_command(
     """Serve the page, run the crossing at the pace of the clock, and end with it."""
     require_pybullet()
     job = _job(experiment)
-    if out is not None and not out.parent.is_dir():
-        raise SimError(f"cannot write {out}: there is no folder {out.parent}")
+    if out is not None:
+        check_output(out, (".html",))
+        require_writable(out.parent, SimError)
     with LivePage(page_text(f"awarenav watch: {job.scenario}"), port) as page:
         print(f"{job.conditions.text}\nWatch it at {page.url} (Ctrl-C ends it)", flush=True)
         if not no_browser:

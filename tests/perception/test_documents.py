@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,29 @@ VALUES = st.recursive(SCALARS, lambda each: st.lists(each) | st.dictionaries(st.
 def test_a_key_that_stands_twice_in_yaml_is_refused_with_both_lines(text: str, what: str) -> None:
     with pytest.raises(PerceptionError, match=f"^text {what}"):
         parse_yaml(text, "text")
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("a:\n\tb: 1\n", "line 2, column 1: .*; indent with spaces, not with a tab"),
+        ("a: {\n\tb: [1\n", "is not valid YAML: line 3, column 1: "),
+        ("", "must hold lines of `key: value`, got nothing"),
+        ("- a\n", "must hold lines of `key: value`, got a list"),
+        ("words\n", "must hold lines of `key: value`, got a single value"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("read", "error"),
+    [(TrackerConfig.from_yaml, TrackingError), (ScenarioTemplate.from_yaml, SimError)],
+)
+def test_a_file_without_keys_is_refused_in_plain_words(
+    read: Callable[[Path], object], error: type[Exception], text: str, what: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(text)
+    with pytest.raises(error, match=what):
+        read(path)
 
 
 def test_merge_keys_keep_their_meaning() -> None:

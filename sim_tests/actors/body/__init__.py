@@ -14,6 +14,7 @@ from ._asset import (
     PARENTS,
     WorkerAsset,
     load_worker,
+    worker_file,
     worker_names,
 )
 from ._footsteps import OnlineFootsteps

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from awarenav.errors import not_one_of
 from perception.arrays import FloatArray
 
 from ...world.errors import SimError
@@ -144,7 +145,7 @@ def load_worker(name: str) -> WorkerAsset:
     Raises:
         SimError: for a name that is not shipped or a file that does not exist.
     """
-    path = _file_of(name)
+    path = worker_file(name)
     with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
         arrays = {key: data[key] for key in data.files}
     joints_m = _read_only_copy(arrays["joints_m"])
@@ -173,19 +174,18 @@ def load_worker(name: str) -> WorkerAsset:
 @lru_cache(maxsize=64)
 def worker_stature_m(name: str) -> float:
     """Return the stature of a worker, without reading the rest."""
-    with _file_of(name).open("rb") as file, np.load(file, allow_pickle=False) as data:
+    with worker_file(name).open("rb") as file, np.load(file, allow_pickle=False) as data:
         return float(data["stature_m"])
 
 
-def _file_of(name: str) -> Path:
+def worker_file(name: str) -> Path:
+    """Return the file of a shipped worker, or the .npz file of that name; SimError for neither."""
     if name.endswith(".npz"):
         if not Path(name).is_file():
-            raise SimError(f"there is no worker {name!r}")
+            raise SimError(f"there is no file {name}")
         return Path(name)
     if name not in worker_names():
-        raise SimError(
-            f"worker must be one of {', '.join(worker_names())} or an .npz file, got {name!r}"
-        )
+        raise SimError(not_one_of("worker", name, worker_names(), or_else="an .npz file"))
     return Path(str(_FOLDER)) / f"{name}.npz"
 
 

@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from awarenav.errors import not_one_of
 from nav_adapter import RobotProfile
 from perception.arrays import FloatArray
 
@@ -229,8 +230,12 @@ def import_planner(planner: str) -> PlannerFactory:
     module_name, colon, name = target.partition(":")
     if not (colon and module_name and name):
         raise SimError(
-            f"planner must be given as module:Class, e.g. my_robot.planning:MyPlanner, or as one "
-            f"of {', '.join((REFERENCE_PLANNER, *KNOWN_PLANNERS))}, got {planner!r}"
+            not_one_of(
+                "planner",
+                planner,
+                (REFERENCE_PLANNER, *KNOWN_PLANNERS),
+                or_else="module:Class, e.g. my_robot.planning:MyPlanner",
+            )
         )
     found = _found(planner, module_name, name)
     if not isinstance(found, type) and callable(getattr(found, "plan", None)):
@@ -260,9 +265,10 @@ def _found(planner: str, module_name: str, name: str) -> Any:
         for part in name.split("."):
             found = getattr(found, part)
     except Exception as cause:  # the user's module may raise anything
-        raise SimError(
-            f"planner {planner!r} cannot be imported: {type(cause).__name__}: {cause}"
-        ) from cause
+        message = f"planner {planner!r} cannot be imported: {type(cause).__name__}: {cause}"
+        if isinstance(cause, ModuleNotFoundError) and cause.name == module_name.partition(".")[0]:
+            message += "; run in the folder of its file, or name that folder in PYTHONPATH"
+        raise SimError(message) from cause
     return found
 
 

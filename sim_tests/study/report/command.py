@@ -42,8 +42,13 @@ def report(folder: Path, out: Path | None, *, no_stills: bool) -> int:
     every scenario and episode; and images of the worst episodes. It is one file that needs no
     network. The page of an unfinished run, or of one with failed episodes, says so.
     """
+    from awarenav.files import check_output, require_writable  # noqa: PLC0415 - as below
+
     from ._write import write_report  # noqa: PLC0415 - help needs no statistics
 
+    if out is not None:
+        check_output(out, (".html",))
+        require_writable(out.parent)
     path = write_report(folder, stills=not no_stills, path=out, progress=True)
     print(f"Written: {path} ({path.stat().st_size / 1e6:.1f} MB); open it in a browser")
     return 0

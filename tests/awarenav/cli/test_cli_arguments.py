@@ -67,7 +67,13 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
         (["crossings", "--scenario", "balanced"], "'balanced' is a policy, not a scenario"),
         (["crossings", "--policy", "late_glance"], "'late_glance' is a scenario, not a policy"),
         (["crossings", "--fault", "ghost"], "did you mean 'ghosts'?"),
+        (["crossings", "--policy", "brave"], "or a .yaml file, got 'brave'"),
+        (["crossings", "--planner", "costmp"], "did you mean 'costmap'?"),
+        (["crossings", "--planner", "nowhere:X"], "or name that folder in PYTHONPATH"),
         (["policy", "show", "balancd"], "did you mean 'balanced'?"),
+        (["render", "--layouts", "aisle"], "did you mean 'aisles'?"),
+        (["render", "--bodies", "gone.npz"], "there is no file gone.npz"),
+        (["estimate", "http://127.0.0.1:9/x"], "is its address right"),
         (["models", "fetch", "yolox-tny"], "did you mean 'yolox-tiny'?"),
         (["doctor", "nowhere"], "no such file or folder: nowhere"),
         (["doctor", "nowhere", "--fov-deg", "60", "--camera", "a.yaml"], "exclude each other"),
@@ -75,7 +81,7 @@ def test_options_that_exclude_each_other_are_refused_together(path, name, other,
     ],
 )
 def test_a_wrong_word_is_refused_with_what_is_right(words, message, tmp_path, capsys):
-    out = ["--out", str(tmp_path / "out")] if words[0] == "crossings" else []
+    out = ["--out", str(tmp_path / "out")] if words[0] in ("crossings", "render") else []
     assert main([*words, *out]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
     assert message in last
@@ -87,22 +93,46 @@ def test_a_wrong_word_is_refused_with_what_is_right(words, message, tmp_path, ca
     ("words", "message"),
     [
         (["crossings", "--episodes", "0"], "'--episodes': 0 is not in the range x>=1"),
-        (["crossings", "--episodes", "2.5"], "'2.5' is not a valid integer"),
+        (["crossings", "--episodes", "2.5"], "'2.5' is not a valid whole number"),
         (["bridge", "--robot", "x", "--domain", "300"], "300 is not in the range 0<=x<=232"),
         (["estimate", "x", "--min-score", "2"], "2.0 is not in the range 0.0<=x<=1.0"),
-        (["bridge", "--robot", "x", "--rate", "half"], "'half' is not a valid float"),
+        (["bridge", "--robot", "x", "--rate", "half"], "'half' is not a valid number"),
         (["crossings", "--policy"], "Option '--policy' requires an argument"),
         (["estimate"], "Missing argument 'SOURCE'"),
         (["bridge"], "Missing option '--robot'"),
     ],
 )
-def test_a_value_that_is_not_valid_is_refused_with_the_help_to_read(words, message, capsys):
+def test_a_value_that_is_not_valid_is_refused_in_one_line_with_the_help_to_read(
+    words, message, capsys
+):
     assert main(words) == 2
-    error = capsys.readouterr().err
-    assert error.startswith(f"Usage: awarenav {words[0]} ")
-    assert f"Try 'awarenav {words[0]} --help' for help." in error
-    assert error.splitlines()[-1].startswith(f"awarenav {words[0]}: ")
-    assert message in error.splitlines()[-1]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"awarenav {words[0]}: ")
+    assert message in line
+    assert line.endswith(f"(see `awarenav {words[0]} --help`)")
+
+
+NUMBERS = {
+    (path, name): each.type
+    for path, command in COMMANDS.items()
+    for name, each in options_of(command).items()
+    if isinstance(each.type, click.FloatRange) or each.type is click.FLOAT
+}
+
+
+@pytest.mark.parametrize("word", ["nan", "inf", "-inf"])
+def test_no_option_takes_a_number_that_is_not_finite(word):
+    assert len(NUMBERS) > 20
+    for number in NUMBERS.values():
+        with pytest.raises(click.BadParameter, match=r"must be finite|not in the range"):
+            number.convert(word, None, None)
+
+
+@pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
+def test_every_command_refuses_an_unknown_option_in_one_line(path, capsys):
+    assert main([*path, "--no-such-option"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"awarenav {' '.join(path)}: ")
 
 
 def test_every_seed_is_zero_unless_it_is_given():

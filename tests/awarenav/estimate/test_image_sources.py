@@ -163,7 +163,7 @@ def test_a_camera_that_is_unplugged_is_a_problem_after_its_last_frame(tmp_path):
     ("name", "message"),
     [
         ("absent.mp4", r"no such file.*did you mean .*absent\.mov"),
-        ("absent.mov", "cannot open video"),
+        ("absent.mov", "as a video: it is none"),
         ("photo.HEIC", "HEIF picture, which cannot be read: save it as JPEG"),
         ("empty", "has no image"),
         ("99", "cannot open camera"),

@@ -339,10 +339,11 @@ OTHERS = [{**record, "frame": "b" + record["frame"]} for record in TRUTH]
             r"'000001.png', person 0: awareness must lie in \[0, 1",
         ),
         (TRUTH, OTHERS, "no frame in common"),
+        ([{**each, "settings": "1a"} for each in TRUTH], TRUTH, "give the truth first"),
         ([], TRUTH, "has no frame"),
         (TRUTH, [TRUTH[0], TRUTH[0]], "two frames have the name"),
     ],
-    ids=["value", "other images", "empty", "twice"],
+    ids=["value", "other images", "swapped", "empty", "twice"],
 )
 def test_files_that_cannot_be_judged_are_refused(tmp_path, truth, estimates, message):
     with pytest.raises(AwarenavError, match=message):

@@ -252,29 +252,25 @@ def test_networks_of_one_archive_take_one_download(server, tmp_path):
     assert server.requests == ["/a.zip"]
 
 
-def test_a_set_is_fetched_and_named_in_a_file_for_the_networks_option(
+def test_a_set_is_fetched_by_name_and_chosen_by_it_with_no_other_file_written(
     catalogue, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
+    before = {path.name for path in tmp_path.iterdir()}
     for words in (["robot"], []):  # the first set is the default
         assert main(["models", "fetch", *words]) == 0
     out = capsys.readouterr().out
-    assert "robot: written to robot_networks.yaml" in out
-    assert "awarenav estimate PHOTO.jpg --networks robot_networks.yaml" in out
+    assert "next: awarenav estimate PHOTO.jpg --networks robot\n" in out
     assert "try real" in out
-    chosen = NetworkChoice.from_yaml("robot_networks.yaml")
-    assert chosen == NetworkChoice(detector="tiny", pose="small", head="pnp")
+    assert NetworkChoice.of("robot") == NetworkChoice(detector="tiny", pose="small", head="pnp")
+    with pytest.raises(AwarenavError, match="'robott' is unknown; did you mean 'robot'"):
+        NetworkChoice.of("robott")
     assert (tmp_path / "models" / "tiny.onnx").read_bytes() == CONTENT
     assert (tmp_path / "models" / "small.onnx").read_bytes() == OTHER
-    # Somebody's own file is not replaced; in another folder the networks are named by their paths.
-    assert main(["models", "fetch", "robot", "--out", "other"]) == 2
-    assert "other contents" in capsys.readouterr().err
-    Path("robot_networks.yaml").unlink()
     assert main(["models", "fetch", "robot", "--out", "other"]) == 0
-    chosen = NetworkChoice.from_yaml("robot_networks.yaml")
-    assert (chosen.detector, chosen.pose) == tuple(
-        str(tmp_path / "other" / name) for name in ("tiny.onnx", "small.onnx")
-    )
+    assert f"next: AWARENAV_MODELS={tmp_path / 'other'} awarenav" in capsys.readouterr().out
+    written = {path.name for path in tmp_path.iterdir()}
+    assert written - {"models", "other"} == before
 
 
 @pytest.mark.parametrize(

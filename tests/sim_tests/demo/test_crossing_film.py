@@ -46,7 +46,7 @@ def free(scenario):
 def aware(scenario):
     recorder = CameraRecorder()
     result = run_crossing(scenario, policy="balanced", perception=SENSES, observer=recorder)
-    return ComparisonRow("aware", result, scenario, recorder.pictures)
+    return ComparisonRow("awarenav", result, scenario, recorder.pictures)
 
 
 def with_frames(row, frames):
@@ -141,7 +141,7 @@ def test_the_film_begins_with_the_results_and_shows_every_picture(aware, free, t
     short = with_frames(aware, aware.result.frames[:41])
     rows = [
         free,
-        *(replace(short, label=each) for each in ("today's AMR", "awareness-blind")),
+        *(replace(short, label=each) for each in ("today-costmap", "blind")),
         short,
     ]
     paths = [tmp_path / "film.webp", tmp_path / "film.mp4"]

@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -109,6 +110,23 @@ def test_a_new_process_makes_it_by_module_and_name() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=ROOT
     )
     assert "awarenav/Crossing-v0" in done.stdout, done.stderr
+
+
+def test_a_worker_of_a_fork_server_knows_the_name_alone(tmp_path: Path) -> None:
+    """As the workers of Stable-Baselines3's SubprocVecEnv, whatever the main module imports."""
+    script = tmp_path / "train.py"
+    script.write_text(
+        "import gymnasium, multiprocessing, sys\n"
+        "if __name__ == '__main__':\n"
+        "    import sim_tests.learning\n"
+        "    context = multiprocessing.get_context('forkserver')\n"
+        "    worker = context.Process(target=gymnasium.make, args=('awarenav/Crossing-v0',))\n"
+        "    worker.start()\n"
+        "    worker.join()\n"
+        "    sys.exit(worker.exitcode)\n"
+    )
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("kwargs", [{}, {"scan_rays": 16, "render_view": "camera"}])

@@ -65,7 +65,8 @@ def run(tmp_path_factory):
         ("watch all", "watch shows one crossing"),
         ("watch late_glance --fault scanner_*", "watch shows one crossing"),
         ("watch late_glance --policy brave", "policy must be one of"),
-        ("watch late_glance --out no_such_folder/page.html", "there is no folder"),
+        ("watch late_glance --out page.pdf", "--out must end in .html"),
+        ("report RUN --out page.pdf", "--out must end in .html"),
     ],
 )
 def test_bad_input_is_refused_before_anything_runs(words, message, run, tmp_path, capsys):
