@@ -10,7 +10,7 @@ from benchmarks._harness import count, make_parser
 from ._measure import measure
 from ._page import leaderboard_page
 from ._results import PAGES, write_figures
-from ._rows import PAGE, RESULTS, Board
+from ._rows import PAGE, RESULTS, STEP_OUT, WORK, Board
 
 
 def main() -> int:
@@ -18,7 +18,7 @@ def main() -> int:
     parser = make_parser(
         "benchmarks.leaderboard",
         "Measure the rows that docs/leaderboard lacks, and write docs/what_it_wins.md and the "
-        "figures of README. An interrupted run continues with the same command.",
+        "figures of other pages. An interrupted run continues with the same command.",
     )
     parser.add_argument(
         "--row", nargs="+", metavar="NAME", help="rows to measure (default: all of rows.yaml)"
@@ -31,9 +31,12 @@ def main() -> int:
     options = parser.parse_args()
     try:
         board = Board.read()
-        rows = [board.named(name) for name in options.row] if options.row else list(board.rows)
-        if not options.page:
-            measure(board, rows, workers=options.workers, again=options.again)
+        wanted = {board.named(name).name for name in options.row or ()}
+        for folder in () if options.page else (RESULTS, STEP_OUT):
+            each = Board.read(folder)
+            rows = [row for row in each.rows if not wanted or row.name in wanted]
+            work = WORK / folder.name
+            measure(each, rows, folder, work=work, workers=options.workers, again=options.again)
         PAGE.write_text(leaderboard_page(board, RESULTS), encoding="utf-8")
         write_figures(board)
     except AwarenavError as error:

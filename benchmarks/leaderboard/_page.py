@@ -23,7 +23,7 @@ from sim_tests.study.measures import (
 from sim_tests.study.report import Table
 
 from ._measure import read_about, read_results
-from ._rows import RESULTS, Board, Row
+from ._rows import RESULTS, STEP_OUT, Board, Row
 
 _ATTENTIONS: Final = ("attentive", "mixed", "unaware")
 # Violation times that agree to so many decimals of a second count as equal in the ranking.
@@ -122,6 +122,7 @@ def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
     scenarios = len(board.templates)
     return _TEMPLATE.read_text(encoding="utf-8").format(
         **{name: table.markdown() for name, table in tables.items()},
+        steps_out=_steps_out().markdown(),
         episodes=scenarios * board.seeds,
         scenarios=scenarios,
         sets=", ".join(f"`{each}`" for each in board.scenarios),
@@ -222,6 +223,26 @@ def _beside_today(rows: Sequence[Standing]) -> dict[str, Table]:
         "beside": Table(dict.fromkeys(columns, ""), lines),
         "by_scenario": Table(dict.fromkeys(("time lost (s)", *robots), ""), by_scenario),
     }
+
+
+def _steps_out() -> Table:
+    """Return how often somebody who steps out and the moving robot touched, and how fast."""
+    board = Board.read(STEP_OUT)
+    robots = {each.row.name: each for each in standings(board, STEP_OUT)}
+    return Table(
+        dict.fromkeys(("touched while it moved", *ROBOTS.values()), ""),
+        [
+            [f"`{of.name}`", *(touched(robots[name], of.name) for name in ROBOTS)]
+            for of in board.templates
+        ],
+    )
+
+
+def touched(each: Standing, scenario: str) -> str:
+    """Return in how many episodes the moving robot and a person touched, and the fastest touch."""
+    ran = [record for record in each.ran if record.scenario == scenario]
+    speeds = [record.moving_contact_mps or 0.0 for record in ran if record.moving_touched]
+    return f"{len(speeds)} of {len(ran)}" + (f", {max(speeds):.2f} m/s" if speeds else "")
 
 
 def _goals(each: Standing) -> str:

@@ -1,4 +1,4 @@
-"""The figures of README and of the demonstration's page, from committed rows."""
+"""The figures of README, the demonstration's page and the safety argument, from committed rows."""
 
 from __future__ import annotations
 
@@ -15,12 +15,13 @@ from sim_tests.demo import reported_table, reported_text
 from sim_tests.study.measures import EpisodeRecord, Interval, bootstrap_interval, paired
 from sim_tests.study.report import Table
 
-from ._page import ROBOTS, Standing, standings
-from ._rows import RESULTS, ROOT, Board
+from ._page import ROBOTS, Standing, standings, touched
+from ._rows import RESULTS, ROOT, STEP_OUT, Board
 
 _AWARE, _BLIND, _TODAY, _COSTMAP = ROBOTS
+_FILES: Final = ("README.md", "docs/simulation_results.md", "docs/safety.md")
 #: Pages with parts that are made here, each between two comments.
-PAGES: Final = tuple(ROOT / name for name in ("README.md", "docs/simulation_results.md"))
+PAGES: Final = tuple(ROOT / name for name in _FILES)
 _PART: Final = re.compile(r"(<!-- figures: (\w+) .*?-->\n\n).*?(\n\n<!-- end of figures -->)", re.S)
 
 
@@ -54,9 +55,40 @@ def figures(board: Board, folder: Path = RESULTS) -> dict[str, str]:
     return {
         "meetings": f"{_meetings(robots).markdown()}\n\n{_price(robots)}",
         "nav2": summary(),
+        "hazards": _hazards(board, folder),
         "film": _filled(reported_text()),
         "lanes": f"```text\n{reported_table()}\n```",
     }
+
+
+def _hazards(board: Board, folder: Path) -> str:
+    """Return the figures of the hazards in the safety argument, of awarenav and of today's AMR."""
+    named = {each.row.name: each for each in standings(board, folder)}
+    steps = {each.row.name: each for each in standings(Board.read(STEP_OUT), STEP_OUT)}
+
+    def both(scenario: str) -> str:
+        """Say how often the two touched somebody in a scenario of people who step out."""
+        own, other = (touched(steps[name], scenario) for name in (_AWARE, _TODAY))
+        return f"{own} (today's AMR {other})"
+
+    def impacts(name: str, people: str) -> str:
+        return named[name].impacts(people).replace(" (", ", at up to ").removesuffix(")")
+
+    lines = (
+        f"H3: of people who had looked and [stepped out](what_it_wins.md#people-who-step-out), the "
+        f"moving `balanced` touched {both('steps_out_near_aware')} who stood near, and "
+        f"{both('steps_out_far_aware')} who stood farther away.",
+        f"H4: of people who step out behind a cart it touched {both('steps_out_behind_cart')}.",
+        f"H14: if those who never noticed it start to 1.6 m/s (time constant 0.35 s), they meet it "
+        f"while it moves {impacts(_AWARE, 'stress_never')} times in 1 000 meetings; today's AMR "
+        f"{impacts(_TODAY, 'stress_never')}.",
+        f"H18: of those whose last look is more than 1 s ago, {impacts(_AWARE, 'past')} in 1 000; "
+        f"with `blind` {impacts(_BLIND, 'past')}.",
+    )
+    return "\n".join(
+        textwrap.fill(f"- {line}", 100, subsequent_indent="  ", break_on_hyphens=False)
+        for line in lines
+    )
 
 
 def _filled(text: str) -> str:

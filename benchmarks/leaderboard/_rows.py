@@ -23,6 +23,8 @@ from sim_tests.world.config import SimConfig
 ROOT: Final = Path(__file__).resolve().parents[2]
 #: Folder of the rows and of their results.
 RESULTS: Final = ROOT / "docs" / "leaderboard"
+#: Folder of the rows of people who step out, and of their results.
+STEP_OUT: Final = RESULTS / "step_out"
 #: Folder of the runs that measure them, which git ignores.
 WORK: Final = ROOT / "build" / "leaderboard"
 #: The page.

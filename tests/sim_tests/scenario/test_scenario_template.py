@@ -211,7 +211,7 @@ def test_files_that_are_not_scenarios_are_refused_by_name(tmp_path):
         ScenarioTemplate.from_yaml(tmp_path / "none.yaml")
     for text, message in (
         ("a: [", r"mine\.yaml is not valid YAML"),
-        ("- a", r"mine\.yaml must hold a mapping"),
+        ("- a", r"mine\.yaml must hold lines of `key: value`, got a list"),
         ("name: a\nextends: crossing_hal", "did you mean 'crossing_hall'"),
         ("name: a\nduration_s: 5\nrobot: {goal_x_m: 3, gaol_y_m: 1}\n", "mean 'goal_y_m'"),
         ("name: a\nduration_s: 5\nlayout: maze\nrobot: {goal_x_m: 3}\n", "'crossing', 'open'"),

@@ -49,7 +49,7 @@ def run(tmp_path_factory):
         ),
         ("frontier EMPTY/nowhere", "nowhere"),
         ("render --resume --out EMPTY/set", "there are no images"),
-        ("planners compare run_planners", "or as one of reference, costmap"),
+        ("planners compare run_planners", "or module:Class, e.g. my_robot.planning:MyPlanner"),
         (
             "planners compare run_planners:Straight(gain=2)",
             "no argument 'gain'; it has 'robot'",
