@@ -380,7 +380,7 @@ def test_a_policy_that_fails_later_leaves_the_adapter_as_it_was() -> None:
         ("attention: {means: [horn]}", "attention.means"),
         ("inflation: {shape: linear}", "unknown key 'shape'"),
         ("rules: {standing: null}", "unknown key 'rules'"),
-        ("[1, 2]", "must hold a mapping"),
+        ("[1, 2]", "got a list"),
         ("inflation: {", "not valid YAML"),
     ],
 )
