@@ -27,7 +27,6 @@ from nav_adapter.ros2 import (
     scanner_inputs,
 )
 from perception import AttentionCone, AwarenessPipeline, Camera
-from perception.arrays import finite_number
 from perception.laser import MapCells
 from perception.named import Networks
 from perception.shipped import simulator_networks_warning
@@ -57,10 +56,6 @@ def bridge_command(options: Any) -> int:
         AwarenavError: for input that cannot be used.
         NavError: for a policy, robot or topic that cannot be used.
     """
-    rate_hz = finite_number("--rate", options.rate, AwarenavError, minimum=1.0, maximum=200.0)
-    seconds = options.seconds
-    if seconds is not None:
-        seconds = finite_number("--seconds", seconds, AwarenavError, minimum=0.0)
     domain = _domain(options.domain)
     robot = RobotFile.from_yaml(options.robot)
     policy = AwarenessPolicy.named(options.policy)
@@ -122,14 +117,14 @@ def bridge_command(options: Any) -> int:
         if isinstance(publisher, ReplayPublisher):
             static = static_transforms(messages, inputs, _log)
             replay = BagReplay(
-                messages, bridge, inputs, rate_hz, publisher, static=static, viewer=viewer
+                messages, bridge, inputs, options.rate, publisher, static=static, viewer=viewer
             )
-            _log(f"replayed {replay.run(seconds, report=_log):.1f} s: {_summary(bridge)}")
+            _log(f"replayed {replay.run(options.seconds, report=_log):.1f} s: {_summary(bridge)}")
             return 0
-        loop = BridgeLoop(node, bridge, inputs, rate_hz, recorder=recorder, viewer=viewer)
+        loop = BridgeLoop(node, bridge, inputs, options.rate, recorder=recorder, viewer=viewer)
         stack.callback(_close, loop)
         _announce(domain, inputs, published)
-        _run_until_interrupted(loop, bridge, seconds)
+        _run_until_interrupted(loop, bridge, options.seconds)
     return 0
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, Final
 
-from ..cli import NUMBER, FilePath, Whole, command, option, options
+from ..cli import NUMBER, FilePath, Number, Whole, command, option, options
 
 _READ: Final = "Topics to read"
 _WRITE: Final = "Topics to publish"
@@ -50,12 +50,12 @@ _LOG: Final = "Recordings"
 )
 @option(
     "--rate",
-    type=NUMBER,
+    type=Number(1.0, 200.0),
     default=20.0,
     metavar="HZ",
     help="Rate of publishing, however long perception takes for an image.",
 )
-@option("--seconds", type=NUMBER, metavar="S", help="End after this time.")
+@option("--seconds", type=Number(0.0), metavar="S", help="End after this time.")
 @options.networks
 @options.allow_simulator_networks()
 @options.running

@@ -15,9 +15,11 @@ from ._command import Decorator, option
 from ._types import POSITIVE, FilePath, FolderPath, Number, OneOf, Whole
 
 __all__ = [
+    "CAMERA",
     "COMPLETE_POLICIES",
     "allow_simulator_networks",
     "as_json",
+    "calibration",
     "completion_of",
     "networks",
     "out_file",
@@ -250,6 +252,36 @@ _NETWORK_OPTIONS: Final = (
 def networks(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--networks``, and the options that choose detector, pose, head and eyes."""
     for add in reversed(_NETWORK_OPTIONS):
+        function = add(function)
+    return function
+
+
+#: Heading of the options of a camera.
+CAMERA: Final = "Camera"
+_CALIBRATION_OPTIONS: Final = (
+    option(
+        "--camera",
+        group=CAMERA,
+        type=FilePath(),
+        show_default="camera.yaml beside the images, or camera_info of the recording",
+        metavar="FILE",
+        help="Calibration (ROS camera_info YAML). Without any, EXIF's focal length counts, or 60 "
+        "degrees across the longer side are assumed.",
+    ),
+    option(
+        "--fov-deg",
+        group=CAMERA,
+        type=Number(1.0, 179.0),
+        excludes="--camera",
+        metavar="DEG",
+        help="Horizontal field of view, instead of a calibration.",
+    ),
+)
+
+
+def calibration(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--camera`` and ``--fov-deg``."""
+    for add in reversed(_CALIBRATION_OPTIONS):
         function = add(function)
     return function
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any, Final
+from typing import Any
 
-from ..cli import NUMBER, POSITIVE, FilePath, argument, command, option, options
-
-_CAMERA: Final = "Camera"
+from ..cli import POSITIVE, FilePath, argument, command, option, options
 
 
 @command(
@@ -42,22 +40,7 @@ _CAMERA: Final = "Camera"
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
 @options.networks
 @options.running
-@option(
-    "--camera",
-    group=_CAMERA,
-    type=FilePath(),
-    show_default="camera.yaml beside the images, or camera_info of the recording",
-    metavar="FILE",
-    help="Calibration (ROS camera_info YAML).",
-)
-@option(
-    "--fov-deg",
-    group=_CAMERA,
-    type=NUMBER,
-    excludes="--camera",
-    metavar="DEG",
-    help="Horizontal field of view, instead of a calibration.",
-)
+@options.calibration
 @options.as_json("the findings")
 def doctor(**values: Any) -> int:
     """Say what is wrong with the installation and the camera, the most important first.

@@ -286,12 +286,6 @@ def _check(options: Any) -> None:
         raise AwarenavError("--resume cannot continue a camera: its frames are gone")
     if options.camera_pitch_deg and options.camera_height_m is None:
         raise AwarenavError("--camera-pitch-deg needs --camera-height-m")
-    if options.camera_height_m is not None and options.camera_height_m <= 0.0:
-        raise AwarenavError(f"--camera-height-m must be above 0, got {options.camera_height_m:g} m")
-    if options.fps is not None and not 0.01 <= options.fps <= 1000.0:
-        raise AwarenavError(f"--fps must lie in [0.01, 1000] Hz, got {options.fps:g}")
-    if options.fov_deg is not None and not 1.0 <= options.fov_deg <= 179.0:
-        raise AwarenavError(f"--fov-deg must lie in [1, 179] degrees, got {options.fov_deg:g}")
 
 
 def _report(options: Any, summary: _Summary, duration_s: float) -> None:

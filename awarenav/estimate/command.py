@@ -5,10 +5,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, Final
 
-from ..cli import NUMBER, POSITIVE, SHARE, FilePath, argument, command, option, options
+from ..cli import NUMBER, POSITIVE, SHARE, FilePath, Number, argument, command, option, options
 
 _NETWORKS: Final = "Networks"
-_CAMERA: Final = "Camera"
 
 
 @command(
@@ -46,7 +45,7 @@ _CAMERA: Final = "Camera"
 @option("--topic", metavar="NAME", help="Image topic of a recording that has several.")
 @option(
     "--fps",
-    type=NUMBER,
+    type=Number(0.01, 1000.0),
     show_default="one image a second",
     metavar="HZ",
     help="Images per second of a folder of frames; speeds and predictions depend on it.",
@@ -71,33 +70,17 @@ _CAMERA: Final = "Camera"
     help="Drop people whose detection score, from 0 to 1, is below this.",
 )
 @options.running
-@option(
-    "--camera",
-    group=_CAMERA,
-    type=FilePath(),
-    show_default="camera.yaml beside the images, or camera_info of the recording",
-    metavar="FILE",
-    help="Calibration (ROS camera_info YAML). Without any, EXIF's focal length counts, or 60 "
-    "degrees across the longer side are assumed.",
-)
-@option(
-    "--fov-deg",
-    group=_CAMERA,
-    type=NUMBER,
-    excludes="--camera",
-    metavar="DEG",
-    help="Horizontal field of view, instead of a calibration.",
-)
+@options.calibration
 @option(
     "--camera-height-m",
-    group=_CAMERA,
-    type=NUMBER,
+    group=options.CAMERA,
+    type=Number(0.0, min_open=True),
     metavar="M",
     help="Height of a fixed camera above a level floor: distances then follow from the feet.",
 )
 @option(
     "--camera-pitch-deg",
-    group=_CAMERA,
+    group=options.CAMERA,
     type=NUMBER,
     default=0.0,
     metavar="DEG",

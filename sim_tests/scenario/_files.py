@@ -103,15 +103,15 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
 
 def _completed(data: Any, source: str) -> dict[str, Any]:
     """Return the keys of a scenario with the defaults that it extends."""
-    data = documents.keys_of(data, source, SimError)
-    if "extends" not in data:
-        return data
+    keys = documents.keys_of(data, source, SimError)
+    if "extends" not in keys:
+        return keys
     names = _names_in(_DEFAULTS)
-    name = data.pop("extends")
+    name = keys.pop("extends")
     if name not in names:
         raise SimError(f"{source}: {not_one_of('extends', name, names)}")
     defaults = parse_yaml((_DEFAULTS / f"{name}.yaml").read_text("utf-8"), str(name))
-    return _merged(defaults, data)
+    return _merged(defaults, keys)
 
 
 def _merged(defaults: dict[str, Any], data: dict[str, Any]) -> dict[str, Any]:

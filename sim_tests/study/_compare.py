@@ -24,8 +24,6 @@ def compare_command(
             of range.
     """
     names = _run_names(runs)
-    if not 0.0 < level < 1.0:
-        raise SimError(f"--level must lie in (0, 1), got {level:g}")
     if out is not None and out.suffix not in (".csv", ".parquet"):
         raise SimError(f"--out must be a .csv or .parquet file, got {out}")
     sources = {name: read_rows(path) for name, path in zip(names, runs, strict=True)}

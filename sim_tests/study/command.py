@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from awarenav.cli import (
-    NUMBER,
     POSITIVE,
     FilePath,
     FolderPath,
@@ -82,7 +81,7 @@ def _require_simulator() -> None:
 )
 @option(
     "--time-limit",
-    type=NUMBER,
+    type=Number(1.0),
     show_default="none",
     metavar="S",
     help="End an episode that takes longer than this in real time, for example because its planner "
@@ -230,7 +229,7 @@ def watch(**values: Any) -> int:
 @option("--baseline", default="blind", metavar="NAME", help="Policy to compare with.")
 @option(
     "--level",
-    type=NUMBER,
+    type=Number(0.0, 1.0, min_open=True, max_open=True),
     default=0.95,
     metavar="X",
     help="Confidence level of the intervals, between 0 and 1.",

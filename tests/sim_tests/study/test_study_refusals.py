@@ -37,7 +37,7 @@ def run(tmp_path_factory):
         ("replay EMPTY 0", "is not the folder of a run"),
         ("compare RUN/absent", "cannot read the episodes"),
         ("compare RUN --baseline balancd", "did you mean 'balanced'"),
-        ("compare RUN --level 95", "--level must lie in (0, 1), got 95"),
+        ("compare RUN --level 95", "95.0 is not in the range 0.0<x<1.0"),
         ("compare RUN RUN", "each run once"),
         ("compare RUN --out table.txt", "--out must be a .csv or .parquet file"),
         ("measures none.csv", "cannot read none.csv"),
