@@ -77,7 +77,7 @@ WITHOUT_AWARENESS: Final = ("blind", "scanner", "scanner_warning")
 
 #: Rows of the comparison that the film shows, and the title of each lane.
 LANES: Final[dict[str, str]] = {
-    "today-costmap": "Today’s AMR, costmap",
+    "today-costmap": "Today: costmap AMR",
     "blind": "Slow for everybody",
     "awarenav": "awarenav",
 }
