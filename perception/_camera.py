@@ -222,7 +222,9 @@ class Camera:
             "horizontal_fov_rad", horizontal_fov_rad, minimum=0.0, exclusive_minimum=True
         )
         if fov >= math.pi:
-            raise PerceptionError(f"horizontal_fov_rad must lie in (0, pi), got {fov:g} rad")
+            raise PerceptionError(
+                f"horizontal_fov_rad must lie in (0, pi), got {fov:g}; is it in degrees?"
+            )
         focal = 0.5 * width_px / math.tan(0.5 * fov)
         return cls(width_px, height_px, focal, focal, 0.5 * width_px, 0.5 * height_px)
 

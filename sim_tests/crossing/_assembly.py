@@ -83,6 +83,8 @@ class Setup:
             SimError: an unknown or unusable argument.
             NavError: an unknown preset or unusable policy file.
         """
+        if seed < 0:
+            raise SimError(f"seed must be 0 or more, got {seed}")
         sight = Perception.named(perception)
         refuse_unused_networks(axes, sight.kind)
         drawn = changed(scenario, axes)

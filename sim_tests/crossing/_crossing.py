@@ -149,7 +149,7 @@ class Crossing(AbstractContextManager["Crossing"]):
 def run_crossing(
     scenario: Scenario | ScenarioTemplate | str,
     *,
-    policy: AwarenessPolicy | str | Path,
+    policy: AwarenessPolicy | str | Path = "balanced",
     planner: LocalPlanner | str | None = None,
     perception: str = "truth",
     seed: int = 0,

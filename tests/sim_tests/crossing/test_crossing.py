@@ -186,10 +186,11 @@ def test_a_robot_that_ignores_people_causes_a_contact_and_is_named_as_its_cause(
             "policy 'scaner' is unknown; did you mean 'scanner'.*'blind'",
         ),
         ({"perception": "radar"}, SimError, "'truth', 'keypoints', 'pixels'"),
+        ({"seed": -1}, SimError, "seed must be 0 or more, got -1"),
     ],
 )
-def test_unknown_names_are_refused_with_the_valid_ones(change, error, message):
-    options = {"scenario": "crossing_attentive", "policy": "balanced"} | change
+def test_unknown_names_and_seeds_are_refused_with_the_valid_ones(change, error, message):
+    options = {"scenario": "crossing_attentive"} | change
     scenario = options.pop("scenario")
     with pytest.raises(error, match=message):
         run_crossing(scenario, **options)
