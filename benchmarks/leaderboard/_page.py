@@ -122,7 +122,7 @@ def leaderboard_page(board: Board, folder: Path = RESULTS) -> str:
     scenarios = len(board.templates)
     return _TEMPLATE.read_text(encoding="utf-8").format(
         **{name: table.markdown() for name, table in tables.items()},
-        steps_out=_steps_out().markdown(),
+        **steps_out(),
         episodes=scenarios * board.seeds,
         scenarios=scenarios,
         sets=", ".join(f"`{each}`" for each in board.scenarios),
@@ -225,17 +225,19 @@ def _beside_today(rows: Sequence[Standing]) -> dict[str, Table]:
     }
 
 
-def _steps_out() -> Table:
+def steps_out() -> dict[str, str]:
     """Return how often somebody who steps out and the moving robot touched, and how fast."""
     board = Board.read(STEP_OUT)
     robots = {each.row.name: each for each in standings(board, STEP_OUT)}
-    return Table(
+    table = Table(
         dict.fromkeys(("touched while it moved", *ROBOTS.values()), ""),
         [
             [f"`{of.name}`", *(touched(robots[name], of.name) for name in ROBOTS)]
             for of in board.templates
         ],
     )
+    most = f"{100.0 * proportion_interval(0, board.seeds).high:.0f} %"
+    return {"steps_out": table.markdown(), "step_outs": str(board.seeds), "step_out_rate": most}
 
 
 def touched(each: Standing, scenario: str) -> str:

@@ -15,7 +15,7 @@ from sim_tests.demo import reported_table, reported_text
 from sim_tests.study.measures import EpisodeRecord, Interval, bootstrap_interval, paired
 from sim_tests.study.report import Table
 
-from ._page import ROBOTS, Standing, standings, touched
+from ._page import ROBOTS, Standing, standings, steps_out, touched
 from ._rows import RESULTS, ROOT, STEP_OUT, Board
 
 _AWARE, _BLIND, _TODAY, _COSTMAP = ROBOTS
@@ -66,6 +66,8 @@ def _hazards(board: Board, folder: Path) -> str:
     named = {each.row.name: each for each in standings(board, folder)}
     steps = {each.row.name: each for each in standings(Board.read(STEP_OUT), STEP_OUT)}
 
+    few = steps_out()
+
     def both(scenario: str) -> str:
         """Say how often the two touched somebody in a scenario of people who step out."""
         own, other = (touched(steps[name], scenario) for name in (_AWARE, _TODAY))
@@ -77,13 +79,14 @@ def _hazards(board: Board, folder: Path) -> str:
     lines = (
         f"H3: of people who had looked and [stepped out](what_it_wins.md#people-who-step-out), the "
         f"moving `balanced` touched {both('steps_out_near_aware')} who stood near, and "
-        f"{both('steps_out_far_aware')} who stood farther away.",
+        f"{both('steps_out_far_aware')} who stood farther away; 0 of {few['step_outs']} leaves a "
+        f"true rate of up to {few['step_out_rate']}.",
         f"H4: of people who step out behind a cart it touched {both('steps_out_behind_cart')}.",
-        f"H14: if those who never noticed it start to 1.6 m/s (time constant 0.35 s), they meet it "
-        f"while it moves {impacts(_AWARE, 'stress_never')} times in 1 000 meetings; today's AMR "
+        f"H14: impacts per 1 000 meetings if those who never noticed it start to 1.6 m/s (time "
+        f"constant 0.35 s): {impacts(_AWARE, 'stress_never')}; today's AMR "
         f"{impacts(_TODAY, 'stress_never')}.",
-        f"H18: of those whose last look is more than 1 s ago, {impacts(_AWARE, 'past')} in 1 000; "
-        f"with `blind` {impacts(_BLIND, 'past')}.",
+        f"H18: impacts per 1 000 meetings with those whose last look is more than 1 s ago: "
+        f"{impacts(_AWARE, 'past')}; with `blind` {impacts(_BLIND, 'past')}.",
     )
     return "\n".join(
         textwrap.fill(f"- {line}", 100, subsequent_indent="  ", break_on_hyphens=False)
