@@ -275,7 +275,7 @@ class Addressing:
                         )
                     own_mps = self._governor.person_mps(then, courses, now, limit_mps)
                     limit_mps = min(limit_mps, own_mps)
-                own, (x, y) = courses.own, _moved(person, _ANSWER_S + at_s).position_odom_m
+                own, (x, y) = courses.turned, _moved(person, _ANSWER_S + at_s).position_odom_m
                 way_m: float = own.cos * (x - own.x_m) + own.sin * (y - own.y_m)
                 way_m += BODY_RADIUS_M - own.rear_m
                 if way_m <= 0.0:

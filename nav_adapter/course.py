@@ -195,13 +195,17 @@ def reach_at(
     The middle is given along and across the middle of the fan, as seen from the base.
     """
     # The formulas of Reach.
-    x_m, y_m, vx, vy, U, tau, delay_s, elapsed_s, margin, within, terms, until_s, later = person
+    x_m, y_m, vx, vy, U, tau, delay_s, elapsed_s, margin, within, terms, *memory = person
+    until_s, later, keeps_s = memory
     a0, a1, a2 = terms
     base_x, base_y, cos, sin = course[:4]
-    m0 = tau * -_expm1(-(t0_s + elapsed_s) / tau)
-    m1 = tau * -_expm1(-(t1_s + elapsed_s) / tau)
-    since_s = t1_s + elapsed_s + delay_s
-    middle_s = 0.5 * (m0 + m1)
+    old0_s, old1_s = t0_s + elapsed_s, t1_s + elapsed_s
+    kept0_s, kept1_s = min(old0_s, keeps_s), min(old1_s, keeps_s)
+    m0 = tau * -_expm1((kept0_s - old0_s) / tau)
+    m1 = tau * -_expm1((kept1_s - old1_s) / tau)
+    since_s = old1_s + delay_s
+    drift0_s, drift1_s = kept0_s + m0, kept1_s + m1
+    middle_s = 0.5 * (drift0_s + drift1_s)
     dx = x_m + vx * middle_s - base_x
     dy = y_m + vy * middle_s - base_y
     x, y = cos * dx + sin * dy, abs(cos * dy - sin * dx)
@@ -213,7 +217,7 @@ def reach_at(
         reach += max(later - U, 0.0) * (late_s + tau * _expm1(-late_s / tau))
     else:
         margin -= within if reach > within else reach
-    reach += 0.5 * (m1 - m0) * _sqrt(vx * vx + vy * vy)
+    reach += 0.5 * (drift1_s - drift0_s) * _sqrt(vx * vx + vy * vy)
     # With a negative a1 it shrinks.
     variance = max(a0 + m1 * (a1 + m1 * a2), a0 + m0 * (a1 + m0 * a2))
     if not variance <= 0.0:

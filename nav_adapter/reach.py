@@ -19,7 +19,9 @@ velocities of unaware people, so r has a knee: beyond s − δ it grows by the r
     r(t) + (U′ − U) (t′ − τ (1 − e^{−t′/τ})),   t′ = t + δ − s ≥ 0,   U′ that of unaware people,
 
 and only what was reached before s lies within the clearance. At s = 0 that is the reach of unaware
-people, and with s → ∞ that of aware ones. ``docs/safety.md`` derives it.
+people, and with s → ∞ that of aware ones. Somebody who walks on keeps u until s, and only then may
+change: u carries the middle for min(t, s) + τ (1 − e^{−(t − s)₊/τ}) seconds, and r is the second
+term alone. ``docs/safety.md`` derives it.
 """
 
 from __future__ import annotations
@@ -30,8 +32,6 @@ from typing import Any, Final, NamedTuple
 from perception.anthropometry import BODY_RADIUS_M
 from perception.matrices import larger_eigenvalue
 
-#: A time constant with which a velocity does not change within seconds.
-WALKING_ON_S: Final = 1e4
 #: Speeds closer than this are equal: U may be the sum of another speed and the rest of theirs.
 SAME_MPS: Final = 1e-9
 
@@ -55,6 +55,7 @@ class Reach(NamedTuple):
             in.
         until_s: s ≥ 0, until when ``speed_mps`` holds, from the time of place and velocity on.
         later_mps: U′ ≥ U, the highest speed that they may change to after that.
+        keeps_s: k ≥ 0, until when they keep u, from the time of place and velocity on.
     """
 
     x_m: float
@@ -70,6 +71,7 @@ class Reach(NamedTuple):
     variances: tuple[float, float, float] = (0.0, 0.0, 0.0)
     until_s: float = math.inf
     later_mps: float = 0.0
+    keeps_s: float = 0.0
 
     @property
     def walks_faster(self) -> bool:
@@ -84,21 +86,23 @@ class Reach(NamedTuple):
         )
 
     def walking_on(self) -> Reach:
-        """Return the reach of this person if they walk straight on."""
+        """Return the reach of this person if they walk straight on while awareness lasts."""
         # The place is as uncertain as now: the same people, unaware, must not come less far.
-        a0, a1, _ = self.variances
+        negative = self.variances[1] < 0.0
         return self._replace(
             speed_mps=0.0,
-            until_s=math.inf,
-            delay_s=0.0,
-            time_constant_s=WALKING_ON_S,
-            variances=(a0 if a1 >= 0.0 else 0.0, 0.0, 0.0),
+            keeps_s=self.until_s,
+            variances=(0.0, 0.0, 0.0) if negative else self.variances,
         )
 
-    def drift_s(self, ahead_s: float) -> float:
-        """Return m, by which u carries the middle of the reach until ``ahead_s`` from now."""
+    def changes_s(self, ahead_s: float) -> float:
+        """Return m, by which a u that may change carries the middle until ``ahead_s`` from now."""
         tau = self.time_constant_s
-        return tau * -math.expm1(-(ahead_s + self.elapsed_s) / tau)
+        return tau * -math.expm1(-max(ahead_s + self.elapsed_s - self.keeps_s, 0.0) / tau)
+
+    def drift_s(self, ahead_s: float) -> float:
+        """Return by how much u carries the middle of the reach until ``ahead_s`` from now."""
+        return min(ahead_s + self.elapsed_s, self.keeps_s) + self.changes_s(ahead_s)
 
     def radius_m(self, ahead_s: float) -> float:
         """Return r, how far from that middle the body's centre line may be ``ahead_s`` from now."""
@@ -114,16 +118,15 @@ class Reach(NamedTuple):
         aware_m = self.speed_mps * changed_s(self.time_constant_s, since_s)
         return float(self.margin_m - min(aware_m, self.within_m))
 
-    def uncertainty_m(self, drift_s: float) -> float:
-        """Return by how much the middle may be wrong after a drift."""
+    def uncertainty_m(self, changes_s: float) -> float:
+        """Return by how much the middle may be wrong after m seconds."""
         a0, a1, a2 = self.variances
-        return math.sqrt(max(a0 + drift_s * (a1 + drift_s * a2), 0.0))
+        return math.sqrt(max(a0 + changes_s * (a1 + changes_s * a2), 0.0))
 
     def farthest_m(self, ahead_s: float) -> float:
         """Return how far the body's centre line may come from p until ``ahead_s`` from now."""
-        drift_s = self.drift_s(ahead_s)
-        walked_m = drift_s * math.hypot(self.velocity_x_mps, self.velocity_y_mps)
-        uncertainty_m = max(self.uncertainty_m(drift_s), self.uncertainty_m(0.0))
+        walked_m = self.drift_s(ahead_s) * math.hypot(self.velocity_x_mps, self.velocity_y_mps)
+        uncertainty_m = max(self.uncertainty_m(self.changes_s(ahead_s)), self.uncertainty_m(0.0))
         return self.radius_m(ahead_s) + walked_m + uncertainty_m
 
 

@@ -58,12 +58,10 @@ class Courses(NamedTuple):
     """The courses of a robot at one time.
 
     Attributes:
-        own: the curve that it drives.
-        field: the same with the clearance of the protective field.
+        field: the curve that it drives, with the clearance of the protective field.
         turned: all courses turned by up to ``turn_deg`` off its own; its own, if it keeps to that.
     """
 
-    own: Course
     field: Course
     turned: Course
 
@@ -84,7 +82,7 @@ class Courses(NamedTuple):
     @classmethod
     def _around(cls, policy: AwarenessPolicy, robot: RobotProfile, own: Course) -> Courses:
         turned = own.turned(robot.turn_rad(policy.reach.turn_deg))
-        return cls(own, own.grown(policy.margins.clearance_m), turned)
+        return cls(own.grown(policy.margins.clearance_m), turned)
 
     def braking(self) -> Courses:
         """Return the courses of a robot that brakes at once."""
@@ -110,21 +108,21 @@ class Rule(ABC):
 
 
 class _Reached(Rule):
-    """A rule by which a robot stands before a reach arrives."""
+    """A rule by which a robot stands before a reach arrives, on any course that it may turn to."""
 
     @abstractmethod
-    def meets(self, person: Known, courses: Courses) -> tuple[Reach, Course] | None:
-        """Return a reach and the courses that may not meet it while the robot moves, if any."""
+    def reach(self, person: Known) -> Reach | None:
+        """Return the reach that the robot may not meet while it moves, if any."""
 
     def cap(self, person: Known, courses: Courses, at_most_mps: float = math.inf) -> float:
         """Return the highest speed that the rule allows."""
-        met = self.meets(person, courses)
-        return math.inf if met is None else limit_mps(*met, at_most_mps)
+        reach = self.reach(person)
+        return math.inf if reach is None else limit_mps(reach, courses.turned, at_most_mps)
 
     def suffices(self, person: Known, courses: Courses, speed_mps: float) -> bool:
         """Return whether a robot keeps the rule that brakes fully from now on."""
-        met = self.meets(person, courses)
-        return met is None or stops_in_time(*met, speed_mps)
+        reach = self.reach(person)
+        return reach is None or stops_in_time(reach, courses.turned, speed_mps)
 
 
 class WithinReach(_Reached):
@@ -135,22 +133,23 @@ class WithinReach(_Reached):
 
     name = "reach"
 
-    def meets(self, person: Known, courses: Courses) -> tuple[Reach, Course] | None:
-        """Return the reach, and the courses turned off the robot's own."""
-        return person.reach, courses.turned
+    def reach(self, person: Known) -> Reach:
+        """Return the reach with the U of their awareness."""
+        return person.reach
 
 
 class WalkingOn(_Reached):
-    """Whoever keeps to their motion is not met by a robot that keeps to its own curve.
+    """The robot stands before somebody who keeps to their motion arrives, on any such course.
 
+    They keep to it until what they know of the robot ends, and are unaware from then on.
     It counts for people who walk faster than their U: walking on is not within their reach then.
     """
 
     name = "walking on"
 
-    def meets(self, person: Known, courses: Courses) -> tuple[Reach, Course] | None:
-        """Return the way of the person, and the robot's own course."""
-        return (person.reach.walking_on(), courses.own) if person.reach.walks_faster else None
+    def reach(self, person: Known) -> Reach | None:
+        """Return the way of the person, and what they may do once they are unaware."""
+        return person.reach.walking_on() if person.reach.walks_faster else None
 
 
 class FirstSight(_Reached):
@@ -158,10 +157,10 @@ class FirstSight(_Reached):
 
     name = "first sight"
 
-    def meets(self, person: Known, courses: Courses) -> tuple[Reach, Course] | None:
-        """Return the reach of somebody unaware, and the courses turned off the robot's own."""
-        met = person.at_first_sight
-        return None if met is person.reach else (met, courses.turned)
+    def reach(self, person: Known) -> Reach | None:
+        """Return the reach of somebody unaware while awareness does not count yet."""
+        reach = person.at_first_sight
+        return None if reach is person.reach else reach
 
 
 class Path(Rule):
@@ -255,7 +254,7 @@ def lowest(
 
     A limit of ``at_most_mps`` or more may be any other such one.
     """
-    lowest_mps, name = courses.own.maximum_mps, ""
+    lowest_mps, name = courses.turned.maximum_mps, ""
     for rule in rules:
         own_mps = rule.cap(person, courses, at_most_mps)
         if own_mps < lowest_mps:
@@ -263,4 +262,4 @@ def lowest(
             at_most_mps = min(at_most_mps, own_mps)
     if person.least_mps > lowest_mps:
         lowest_mps, name = person.least_mps, Lost.name
-    return (math.inf if lowest_mps >= courses.own.maximum_mps else lowest_mps), name
+    return (math.inf if lowest_mps >= courses.turned.maximum_mps else lowest_mps), name

@@ -154,7 +154,9 @@ def _remember(track: Track, sight: Sight | None, look: float, step: Step) -> Non
         return
     track.pictured_s = stamp
     if not looking:
-        track.looked_s *= math.exp(-dt_s / _FORGETTING_S)
+        # What is believed already lasts for as long as was said.
+        against_s = dt_s * look if track.looked_s < _HALF_S else 0.0
+        track.looked_s = max(track.looked_s * math.exp(-dt_s / _FORGETTING_S) + against_s, 0.0)
         return
     if track.looked_s <= 0.0:
         track.kept_mps = (track.vx, track.vy)
@@ -203,16 +205,19 @@ def _shared_with_rivals(tracks: list[Track], match: Match) -> dict[int, tuple[fl
 
 
 def _look(track: Track, sight: Sight | None, step: Step) -> float:
-    """Return, in [0, 1], how certainly the frame shows a person who looks at the robot."""
+    """Return, in [−1, 1], how certainly the frame shows a person who looks at the robot.
+
+    Below 0 it shows, as certainly, less than a gaze along the way: where somebody does look along
+    it, both come by chance, and are of no weight together.
+    """
     if sight is None or sight.evidence is None or not step.sensor.settings.sees_faces:
         return 0.0
     if sight.by_ray or sight.given.weak or not track.confirmed:
         return 0.0
     # In standard deviations above the α of no look; 2 Φ(σ) − 1.
-    mean, variance = sight.evidence
-    above = mean - _no_look_logit(track, step)
-    certainty = math.erf(math.sqrt(0.5) * above / math.sqrt(variance))
-    return certainty if certainty >= _LOOK else 0.0
+    (mean, variance), least = sight.evidence, _no_look_logit(track, step)
+    certainty = math.erf(math.sqrt(0.5) * (mean - least) / math.sqrt(variance))
+    return certainty if certainty >= _LOOK or (certainty <= -_LOOK and least > 0.0) else 0.0
 
 
 def _no_look_logit(track: Track, step: Step) -> float:
@@ -223,7 +228,8 @@ def _no_look_logit(track: Track, step: Step) -> float:
     """
     vx, vy = track.vx, track.vy
     x, y = step.place_m[0] - track.x, step.place_m[1] - track.y
-    if track.speed_mps < WALKING_MPS or abs(x * vy - y * vx) <= _AHEAD_TAN * (x * vx + y * vy):
+    fastest_mps = track.speed_mps + math.sqrt(max(track.p22, track.p33))
+    if fastest_mps < WALKING_MPS or abs(x * vy - y * vx) <= _AHEAD_TAN * (x * vx + y * vy):
         return 0.0
     along_way = _CONE.score_of((0.0, 0.0, 0.0), (vx, vy, 0.0), (x, y, 0.0))
     return max(logit(along_way), 0.0) if along_way > 0.0 else 0.0

@@ -49,7 +49,7 @@ class Reaches:
         elapsed_s: (rows,) age of the place.
         react_s: (rows,) reaction time of the robot and age of the place.
         ahead_s: (J,) times ahead.
-        drift_s: (J, rows) m of :class:`~nav_adapter.reach.Reach`.
+        drift_s: (J, rows) by how much their velocity carries the middle of the reach.
         reach_m: (J, rows) r and the uncertainty; the body is not in it.
         margin_m: (J, rows) body and the clearance that r leaves.
         around_m: (J, rows) farthest place of the body from the place now, until then.
@@ -103,7 +103,7 @@ class Reaches:
             places += place
             values += rest
         x, y, least = np.ascontiguousarray(np.array(places).T)
-        vx, vy, U, tau, delay, elapsed, within, until, later, a0, a1, a2, body = (
+        vx, vy, U, tau, delay, elapsed, within, until, later, keeps, a0, a1, a2, body = (
             np.ascontiguousarray(np.array(values).T)
         )
         each_row = np.array(column_of)
@@ -113,7 +113,9 @@ class Reaches:
         t = (step_s / _PARTS) * np.arange(_PARTS * steps + 1)[:, None]
         late = np.maximum(t - react, 0.0)
         walking = np.hypot(vx, vy)
-        m = tau * -np.expm1(-(t + elapsed) / tau)
+        kept = np.minimum(t + elapsed, keeps)
+        m = tau * -np.expm1((kept - t - elapsed) / tau)
+        drift = kept + m
         since = t + elapsed + delay
         late_s = np.maximum(since - until, 0.0)
         r = U * changed_s(tau, since, np) + np.maximum(later - U, 0.0) * changed_s(tau, late_s, np)
@@ -122,7 +124,7 @@ class Reaches:
         left = left if within.any() else left[:, :1]
         variance = np.maximum(a0 + m * (a1 + m * a2), 0.0)
         r = r + np.sqrt(np.maximum.accumulate(variance, axis=0))
-        around = np.maximum.accumulate(r + (m + 0.5 * step_s) * walking, axis=0)
+        around = np.maximum.accumulate(r + (drift + 0.5 * step_s) * walking, axis=0)
         margin = np.maximum(basis.policy.margins.floor_m, body + basis.policy.margins.clearance_m)
         around = around + margin + elapsed * walking
         # Single precision: its rounding counts as reach, and that of squares grows with them.
@@ -148,7 +150,7 @@ class Reaches:
             *(vy[each_row].astype(np.float32), (body + slack)[each_row].astype(np.float32), least),
             *(elapsed[each_row].astype(np.float32), table(react), t[:, 0].astype(np.float32)),
             *(
-                table(m),
+                table(drift),
                 table(r + slack),
                 table(left),
                 table(around + 2.0 * slack),

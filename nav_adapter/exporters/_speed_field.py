@@ -195,21 +195,20 @@ def limits_at(
         return limits.reshape(shape)
     told = flat(positions_m), flat(headings_rad), velocities, flat(yaw_rates_radps)
     own = courses_at(robot, *told, basis.robot_age_s)
-    turned = None
-    if basis.policy.applies("reach"):
-        turned = own.turned(np.float32(robot.turn_rad(basis.policy.reach.turn_deg)), np)
+    turned = own.turned(np.float32(robot.turn_rad(basis.policy.reach.turn_deg)), np)
+    reached = turned if basis.policy.applies("reach") else None
     field = (
         own.grown(basis.policy.margins.clearance_m) if basis.policy.applies("in the path") else None
     )
     given = np.tile(np.arange(shape[1]), shape[0]), basis, robot, reach_m
-    Field(Reaches.of(known, basis, robot), turned, field, *given).lower(limits)
+    Field(Reaches.of(known, basis, robot), reached, field, *given).lower(limits)
     walkers = [ahead for ahead in known if any(each.reach.walks_faster for each in ahead)]
     if walkers and basis.policy.applies("walking on"):
         on = [
             [each._replace(reach=each.reach.walking_on(), first_sight_mps=0.0) for each in ahead]
             for ahead in walkers
         ]
-        Field(Reaches.of(on, basis, robot), own, None, *given).lower(limits)
+        Field(Reaches.of(on, basis, robot), turned, None, *given).lower(limits)
     return limits.reshape(shape)
 
 

@@ -47,7 +47,7 @@ def limit_of(reach: Reach, turn_rad: float = 0.0) -> float:
     motion = Motion(0.0, 0.0, 0.0, 1.0)
     lowest = min(limit_mps(reach, course_of(ROBOT, motion, turn_rad)), ROBOT.max_speed_mps)
     if reach.walks_faster:
-        lowest = min(lowest, limit_mps(reach.walking_on(), course_of(ROBOT, motion, 0.0)))
+        lowest = min(lowest, limit_mps(reach.walking_on(), course_of(ROBOT, motion, turn_rad)))
     return lowest
 
 
@@ -75,7 +75,7 @@ def test_who_keeps_to_their_motion_never_makes_a_robot_brake_harder_than_it_can(
         y_m=now.y_m + velocity[1] * CYCLE_S,
         until_s=max(left_s - CYCLE_S, 0.0),
     )
-    # Who walks past its side comes into the fan of courses, whatever they know.
+    # Who comes in from beside may stop in the way later than at once.
     if walk[0] > 0.0 and min(now.x_m, later.x_m) < 0.6:
         return
     assert limit_of(later, turn_rad) >= share * before - BRAKING_MPS2 * CYCLE_S - SLACK_MPS
@@ -92,7 +92,7 @@ def test_more_memory_is_never_slower_and_none_is_no_awareness(
 ) -> None:
     some, more = (limit_of(knowing(*place, each, *velocity)) for each in sorted(left_s))
     none = limit_of(knowing(*place, 0.0, *velocity).at_least(UNAWARE_MPS))
-    for_good = limit_of(knowing(*place, math.inf, *velocity)._replace(later_mps=0.0))
+    for_good = limit_of(knowing(*place, math.inf, *velocity))
     course = course_of(ROBOT, Motion(0.0, 0.0, 0.0, 1.0), 0.0)
     forgotten = knowing(*place, 0.0, *velocity)
     assert limit_mps(forgotten, course) == pytest.approx(
@@ -195,3 +195,35 @@ def test_a_track_without_a_newer_frame_knows_nothing_better(
     then_s = now_s + later_s
     after = adapter.update([at(then_s, 1, unseen_s=later_s)], robot_at(then_s), then_s)
     assert after.speed_limit_mps <= before.speed_limit_mps + 1e-6
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    ahead_m=st.floats(8.0, 12.0),
+    beside_m=st.floats(-1.6, 1.6),
+    walking_mps=st.floats(0.4, 1.5),
+    braking_mps2=st.sampled_from([0.6, 1.0, 1.5]),
+    knows_s=st.one_of(st.just(math.inf), st.floats(1.5, 5.0)),
+)
+def test_a_robot_at_its_limit_brakes_in_time_beside_people_who_walk_past(
+    ahead_m: float, beside_m: float, walking_mps: float, braking_mps2: float, knows_s: float
+) -> None:
+    """Whether they go on looking or their look ends on the way."""
+    robot = replace(ROBOT, max_deceleration_mps2=braking_mps2)
+    adapter = NavAdapter(POLICY, robot)
+    driven_m = speed_mps = 0.0
+    for step in range(200):
+        now_s = step * CYCLE_S
+        place_m = ahead_m - walking_mps * now_s
+        if place_m < driven_m + 0.4:
+            break
+        left_s = min(max(knows_s - now_s, 0.0), 3.0)
+        shown = person(now_s, position=(place_m, beside_m), velocity=(-walking_mps, 0.0))
+        looks = 0.9 if left_s > 0.0 else 0.0
+        track = replace(shown, awareness_lower=looks, noticed=looks, aware_for_s=left_s)
+        state = robot_at(now_s, speed_mps=speed_mps, position=(driven_m, 0.0))
+        limit_mps = adapter.update([track], state, now_s).speed_limit_mps
+        slowest_mps = speed_mps - braking_mps2 * CYCLE_S
+        assert now_s < 0.5 or limit_mps >= slowest_mps - 0.03
+        speed_mps = max(min(limit_mps, speed_mps + CYCLE_S), slowest_mps, 0.0)
+        driven_m += speed_mps * CYCLE_S

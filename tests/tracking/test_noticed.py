@@ -134,6 +134,26 @@ def test_who_looks_where_they_walk_does_not_look_at_a_robot_beside_their_way(
         assert noticed(turned=False, walks=False) > 0.5
 
 
+def test_noise_about_a_gaze_along_the_way_seldom_adds_up_to_a_belief() -> None:
+    """Somebody who walks slowly past a robot beside their way, and looks ahead."""
+    believed = 0
+    for seed in range(12):
+        for aside_deg in (18.0, 26.0):
+            scene, way = Scene(seed=seed), math.radians(180.0 + aside_deg)
+            ahead = np.array([math.cos(way), math.sin(way)])
+            scene.place, velocity = np.array([6.0, 0.0]), tuple((0.6 * ahead).tolist())
+            scene.run(0.5, velocity=velocity)
+            most = 0.0
+            for _ in range(45):
+                alpha = AttentionCone().score_of(
+                    (*scene.place, 0.0), (*ahead, 0.0), (0.0, 0.0, 0.0)
+                )
+                noisy = float(np.clip(alpha + 0.05 * scene.rng.normal(), 0.01, 0.99))
+                most = max(most, scene.run(0.1, alpha=noisy, velocity=velocity).noticed)
+            believed += most >= 0.5
+    assert believed <= 5  # of 24
+
+
 def test_glances_within_seconds_add_up_and_old_ones_fade() -> None:
     scene = Scene()
     scene.run(1.0)
