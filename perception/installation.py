@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import sys
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +17,8 @@ from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
 _NAME: Final = "awarenav"
+# pyproject.toml leaves PyBullet out on later ones.
+_NEWEST_OF_PYBULLET: Final = (3, 11)
 _CHECKOUT: Final = Path(__file__).parents[1]
 
 
@@ -45,6 +48,23 @@ def install_command(extras: str = "", options: str = "") -> str:
 def reinstall_command() -> str:
     """Return the pip command that puts files of this installation back."""
     return install_command(options="--force-reinstall --no-deps")
+
+
+def missing_simulator(module: str, python: tuple[int, int] = sys.version_info[:2]) -> str:
+    """Return the message about a missing module of the extra ``sim``, with the way out.
+
+    Args:
+        module: name of the module.
+        python: version of Python; PyBullet has no wheels for those after 3.11.
+    """
+    cure = f"it is part of the extra 'sim': {install_command('sim')}"
+    if python > _NEWEST_OF_PYBULLET:
+        cure = (
+            f"PyBullet has no wheel for this Python {'.'.join(map(str, python))}. One with 3.11 "
+            "beside it (`pipx install uv` brings uv): `uv venv --python 3.11 && . "
+            f".venv/bin/activate && uv {install_command('sim')}`"
+        )
+    return f"the simulator needs {module}, which is not installed; {cure}"
 
 
 def _origin() -> dict[str, Any] | None:

@@ -167,14 +167,9 @@ class Command(click.Command):
         except ModuleNotFoundError as error:
             if error.name not in _SIMULATOR_MODULES:
                 raise
-            from perception.installation import install_command  # noqa: PLC0415 - for help's sake
+            from perception.installation import missing_simulator  # noqa: PLC0415 - for help's sake
 
-            raise CommandFailure(
-                ctx,
-                f"needs {error.name}, which is not installed; it is part of the extra 'sim': "
-                + install_command("sim"),
-                BAD_INPUT,
-            ) from error
+            raise CommandFailure(ctx, missing_simulator(error.name), BAD_INPUT) from error
 
 
 class CommandGroup(click.Group):

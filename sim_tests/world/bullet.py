@@ -10,19 +10,16 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-import sys
 from collections.abc import Iterator
 from typing import Any
 
-from perception.installation import install_command
+from perception.installation import missing_simulator
 
 from .errors import MissingSimulatorError
 
 __all__ = ["pybullet", "require_pybullet"]
 
 _STDERR = 2
-# The newest Python for which PyBullet has wheels; pyproject.toml leaves it out on later ones.
-_NEWEST = (3, 11)
 
 
 @contextlib.contextmanager
@@ -57,19 +54,6 @@ def require_pybullet() -> None:
     pybullet.connect  # noqa: B018 - the first look-up of a name imports it
 
 
-def missing_pybullet(python: tuple[int, int]) -> str:
-    """Return the message about a missing PyBullet, with the way out for a version of Python."""
-    if python <= _NEWEST:
-        cure = f"it is the extra 'sim': {install_command('sim')}"
-    else:
-        cure = (
-            f"it has no wheel for this Python {'.'.join(map(str, python))}. One with 3.11 beside "
-            "it (`pipx install uv` brings uv): `uv venv --python 3.11 && . .venv/bin/activate && "
-            f"uv {install_command('sim')}`"
-        )
-    return f"the simulation needs PyBullet, which is not installed; {cure}"
-
-
 class _PyBullet:
     """The module, with all its names once one of them has been looked up."""
 
@@ -78,7 +62,7 @@ class _PyBullet:
             with _muted_stderr():
                 import pybullet as module  # noqa: PLC0415 - lazy on purpose
         except ImportError as cause:
-            raise MissingSimulatorError(missing_pybullet(sys.version_info[:2])) from cause
+            raise MissingSimulatorError(missing_simulator("pybullet")) from cause
         vars(self).update(vars(module))
         return getattr(module, name)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from perception import installation
-from perception.installation import install_command, reinstall_command
+from perception.installation import install_command, missing_simulator, reinstall_command
 
 
 @pytest.fixture
@@ -72,3 +72,10 @@ def test_a_checkout_that_is_not_installed(monkeypatch):
     monkeypatch.setattr(installation, "distribution", nothing)
     root = Path(installation.__file__).parents[1]
     assert shlex.split(install_command("sim")) == ["pip", "install", "-e", f"{root}[sim]"]
+
+
+def test_a_python_without_a_wheel_of_pybullet_is_told_the_way_to_another() -> None:
+    assert missing_simulator("joblib", (3, 11)).endswith(f"'sim': {install_command('sim')}")
+    later = missing_simulator("pybullet", (3, 12))
+    assert "this Python 3.12" in later
+    assert f"uv venv --python 3.11 && . .venv/bin/activate && uv {install_command('sim')}`" in later

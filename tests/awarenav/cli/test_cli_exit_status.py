@@ -45,8 +45,8 @@ def test_a_simulator_that_is_not_installed_is_one_line_and_2(failing, capsys):
     error = ModuleNotFoundError("No module named 'pybullet'", name="pybullet")
     assert failing(error) == 2
     assert capsys.readouterr().err == (
-        "awarenav policy show: needs pybullet, which is not installed; it is part of the extra "
-        f"'sim': {install_command('sim')}\n"
+        "awarenav policy show: the simulator needs pybullet, which is not installed; it is part of "
+        f"the extra 'sim': {install_command('sim')}\n"
     )
 
 

@@ -113,10 +113,3 @@ def test_a_missing_simulator_is_named_with_its_extra(monkeypatch: pytest.MonkeyP
     for first_use in (again.require_pybullet, lambda: again.pybullet.connect):
         with pytest.raises(MissingSimulatorError, match=re.escape(install_command("sim"))):
             first_use()
-
-
-def test_a_python_without_a_wheel_is_told_the_way_to_another() -> None:
-    assert install_command("sim") in bullet.missing_pybullet((3, 11))
-    later = bullet.missing_pybullet((3, 12))
-    assert "this Python 3.12" in later
-    assert f"uv venv --python 3.11 && . .venv/bin/activate && uv {install_command('sim')}`" in later
