@@ -157,10 +157,6 @@ def leaderboard_tables(
             return ""
         return _signed(paired_difference(baseline.ran, each.ran, "time_lost_s"))
 
-    def measured(each: Standing) -> str:
-        of = about.get(each.row.name, {})
-        return ", ".join(of[name] for name in ("version", "commit", "date") if of.get(name))
-
     def mean(field: str, decimals: int = 1) -> Callable[[Standing], str]:
         return lambda each: each.mean(field).text(decimals)
 
@@ -176,7 +172,7 @@ def leaderboard_tables(
             ("row", _label),
             ("against today's AMR (s)", against),
             ("goals; walked into", _goals),
-            ("measured", measured),
+            ("measured", lambda each: _measured(about.get(each.row.name, {}))),
         ),
         "step_out": table(
             ("row", _label),
@@ -225,6 +221,11 @@ def _beside_today(rows: Sequence[Standing]) -> dict[str, Table]:
     }
 
 
+def _measured(about: Mapping[str, str]) -> str:
+    """Return with what a row was measured, and when."""
+    return ", ".join(about[name] for name in ("version", "commit", "date") if about.get(name))
+
+
 def steps_out() -> dict[str, str]:
     """Return how often somebody who steps out and the moving robot touched, and how fast."""
     board = Board.read(STEP_OUT)
@@ -237,7 +238,15 @@ def steps_out() -> dict[str, str]:
         ],
     )
     most = f"{100.0 * proportion_interval(0, board.seeds).high:.0f} %"
-    return {"steps_out": table.markdown(), "step_outs": str(board.seeds), "step_out_rate": most}
+    measured = "; ".join(dict.fromkeys(map(_measured, read_about(STEP_OUT).values())))
+    return {
+        "steps_out": table.markdown(),
+        "step_outs": str(board.seeds),
+        "step_out_rate": most,
+        "step_out_measured": "; ".join(
+            dict.fromkeys(map(_measured, read_about(STEP_OUT).values()))
+        ),
+    }
 
 
 def touched(each: Standing, scenario: str) -> str:
