@@ -243,9 +243,7 @@ def steps_out() -> dict[str, str]:
         "steps_out": table.markdown(),
         "step_outs": str(board.seeds),
         "step_out_rate": most,
-        "step_out_measured": "; ".join(
-            dict.fromkeys(map(_measured, read_about(STEP_OUT).values()))
-        ),
+        "step_out_measured": textwrap.fill(f"({measured}):", 100),
     }
 
 
