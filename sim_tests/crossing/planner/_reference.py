@@ -179,10 +179,19 @@ class ReferencePlanner(SamplingPlanner):
             line.start_odom_m + places_m[:, None] * line.along + offsets_m[:, :, None] * line.left
         )
         headings = math.atan2(line.along[1], line.along[0]) + np.arctan(slopes)
-        limits_mps = _limits_mps(constraints, positions, headings)
-        unnoticed_mps = limits_mps
+        times = round(_AHEAD_S / _STEP_S) + 1
+        poses = positions.reshape(-1, 1, 2).repeat(times, axis=1)
+        turned_rad = headings.reshape(-1, 1).repeat(times, axis=1)
+
+        def limits(aware_for_s: float = math.inf) -> FloatArray:
+            there_mps: FloatArray = speed_limit_at(
+                constraints, poses, turned_rad, dt_s=_STEP_S, aware_for_s=aware_for_s
+            )
+            return there_mps.reshape(*headings.shape, times)
+
+        limits_mps = unnoticed_mps = limits()
         if any(person.awareness_lower > 0.0 for person in constraints.obstacles):
-            unnoticed_mps = _limits_mps(constraints, positions, headings, aware_for_s=0.0)
+            unnoticed_mps = limits(aware_for_s=0.0)
         outline = self._footprint.at(
             Poses(positions[..., 0], positions[..., 1], np.cos(headings), np.sin(headings))
         )
@@ -232,14 +241,15 @@ class _Field(NamedTuple):
             column = min(step, times - 1)
             now = self.limits_mps[:, :, column]
             limit = (1.0 - share) * now[way, index] + share * now[way, index + 1]
-            limit = np.where(s_m > self.reach_m, fastest_mps, limit)
+            unnoticed = self.unnoticed_mps[way, index, column]
+            beyond = s_m > self.reach_m
+            limit, unnoticed = (np.where(beyond, fastest_mps, each) for each in (limit, unnoticed))
             left_m = np.maximum(rest_m - s_m, 0.0)
             moves = (v > 0.05) & np.isinf(arrives_s)
             penalty_s += np.where(moves & ~self.room[way, index], _NO_ROOM_S * _STEP_S, 0.0)
             too_fast = v - limit - 1.2 * brakes * _STEP_S
             penalty_s += np.where(moves & (too_fast > 0.0), _TOO_FAST_S * (v - limit), 0.0)
-            unnoticed_mps = self.unnoticed_mps[way, index, column]
-            trust_m += np.where(moves, np.maximum(v - unnoticed_mps, 0.0) * _STEP_S, 0.0)
+            trust_m += np.where(moves, np.maximum(v - unnoticed, 0.0) * _STEP_S, 0.0)
             wanted = np.minimum(limit, np.where(t_s < hold_s, cap_mps, fastest_mps))
             wanted = np.minimum(wanted, np.sqrt(1.2 * brakes * left_m))
             after = np.clip(wanted, v - brakes * _STEP_S, v + gains * _STEP_S)
@@ -257,24 +267,6 @@ class _Field(NamedTuple):
         trust_m = np.where(ends, trust_m, np.maximum(trust_m, trust_m[:, :1]))
         price_s = penalty_s + _TRUST_S / fastest_mps * trust_m
         return np.asarray(np.where(ends, arrives_s, later_s) + price_s)
-
-
-def _limits_mps(
-    constraints: NavConstraints,
-    positions_odom_m: FloatArray,
-    headings_odom_rad: FloatArray,
-    aware_for_s: float = math.inf,
-) -> FloatArray:
-    """Return the limits (ways, places, times) at poses (ways, places), from now on."""
-    times = round(_AHEAD_S / _STEP_S) + 1
-    limits_mps: FloatArray = speed_limit_at(
-        constraints,
-        positions_odom_m.reshape(-1, 1, 2).repeat(times, axis=1),
-        headings_odom_rad.reshape(-1, 1).repeat(times, axis=1),
-        dt_s=_STEP_S,
-        aware_for_s=aware_for_s,
-    )
-    return limits_mps.reshape(*headings_odom_rad.shape, times)
 
 
 def _smooth(share: FloatArray) -> FloatArray:
