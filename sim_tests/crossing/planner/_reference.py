@@ -52,8 +52,9 @@ _SLOW_S: Final = 0.1
 _NO_ROOM_S: Final = 3.0
 _TOO_FAST_S: Final = 0.5
 # People who have noticed the robot may set off all the same. Seconds that a second costs at full
-# speed above the limit that would hold if nobody had noticed it. Chosen on seeds 46 to 48: with
-# 3.0 the robot loses as much time as with 0.0.
+# speed above the limit that would hold if nobody had noticed it. On seeds 46 to 48, 0.7 is worth
+# next to nothing, and 3.0 costs time. Where the robot cannot brake to the limit in time, that counts
+# likewise: without it the price is worth half as much.
 _TRUST_S: Final = 1.5
 # The robot heads for the way so far ahead, and by this time at its speed farther.
 _HEAD_M: Final = 1.0
@@ -80,9 +81,10 @@ class ReferencePlanner(SamplingPlanner):
     or after waiting. The robot drives each of them as fast as
     :func:`~nav_adapter.exporters.speed_limit_at` says for these places and times, while people keep
     to their motion. It follows the one that ends soonest, with the dynamic window of
-    :class:`SamplingPlanner`. So it uses the room of an aisle before it needs it, passes people who
-    walk ahead, and goes first only where the limit lets it. Where there is no limit to plan with,
-    as without people, the window drives alone.
+    :class:`SamplingPlanner`. What a way leaves to people's attention counts as time, too. So it
+    uses the room of an aisle before it needs it, passes people who walk ahead, and goes first only
+    where the limit lets it. Where there is no limit to plan with, as without people, the window
+    drives alone.
 
     Args:
         robot: footprint and limits, as for :class:`SamplingPlanner`.
