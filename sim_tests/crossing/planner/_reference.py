@@ -53,8 +53,8 @@ _NO_ROOM_S: Final = 3.0
 _TOO_FAST_S: Final = 0.5
 # People who have noticed the robot may set off all the same. Seconds that a second costs at full
 # speed above the limit that would hold if nobody had noticed it. On seeds 46 to 48, 0.7 is worth
-# next to nothing, and 3.0 costs time. Where the robot cannot brake to the limit in time, that counts
-# likewise: without it the price is worth half as much.
+# next to nothing, and 3.0 costs time. Speed that cannot fall to the limit in time counts likewise;
+# without that the price is worth little more than half.
 _TRUST_S: Final = 1.5
 # The robot heads for the way so far ahead, and by this time at its speed farther.
 _HEAD_M: Final = 1.0
