@@ -14,6 +14,7 @@ Subject = Literal[
     "shipped networks",
     "networks",
     "odometry",
+    "brakes",
     "scanners",
     "images",
     "mount",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,6 +24,7 @@ from perception.no_view import LastFrames
 
 from ..errors import counted
 from ..estimate import BagMessages
+from ._brakes import brakings
 from ._findings import Finding, Severity
 
 _KINDS: Final = {ros_type(each): each for each in (LaserScan, Odometry, TFMessage)}
@@ -33,6 +35,8 @@ _BASE: Final = "base_link"
 # A scanner that is blind in more of its scans is an error; fewer are worth a look.
 _OFTEN: Final = 0.5
 _SELDOM: Final = 0.05
+# A robot that turns no farther off its curve keeps to it: odometry is not surer.
+_ON_CURVE_DEG: Final = 5.0
 _REMEDY_BLIND: Final = (
     "check its window and its driver; directions hidden by the robot's own body belong outside "
     "field_of_view_deg of robot.yaml"
@@ -174,4 +178,21 @@ def _odometry_findings(
             for text in problems
         ]
     text = f"{topic}: {counted(len(odometry), 'message')} that contradict neither tf nor themselves"
-    return [Finding.fine("odometry", text)]
+    return [Finding.fine("odometry", text), *_brake_findings(topic, odometry)]
+
+
+def _brake_findings(topic: str, odometry: Sequence[Odometry]) -> list[Finding]:
+    """Return what the robot file may say of the brakes, if the robot has braked."""
+    found = brakings(odometry)
+    if not found:
+        return []
+    hardest_mps2 = max(each.deceleration_mps2 for each in found)
+    off_deg = math.degrees(max(each.off_rad for each in found))
+    text = (
+        f"{topic}: the robot braked {counted(len(found), 'time')}, at up to {hardest_mps2:.1f} "
+        f"m/s² on average, and turned up to {off_deg:.0f}° off the curve that it was on"
+    )
+    if off_deg <= _ON_CURVE_DEG:
+        return [Finding.fine("brakes", f"{text}: brakes_on_curve: true holds here")]
+    remedy = "a robot file must not say brakes_on_curve: true; turn_deg of the policy covers this"
+    return [Finding("fine", "brakes", text, remedy)]

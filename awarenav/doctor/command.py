@@ -48,7 +48,8 @@ def doctor(**values: Any) -> int:
     Looks at packages and networks; and with SOURCE at what the networks were trained on, the
     calibration, the frame rate reached, exposure, sharpness, and the people found. In the first
     minute of a ROS recording it also looks for blind scanners, for odometry that contradicts tf or
-    itself, and for images in a frame that is not optical.
+    itself, and for images in a frame that is not optical; and says how hard the robot braked, and
+    whether it kept to its curve (brakes_on_curve of a robot file).
     """
     from ._run import doctor_command  # noqa: PLC0415 - help needs no networks
 

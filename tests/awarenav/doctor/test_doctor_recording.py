@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from awarenav.cli import main
-from nav_adapter.ros2.conversions import to_time, yaw_quaternion
+from nav_adapter import RobotState
+from nav_adapter.ros2.conversions import odometry_of, to_time, yaw_quaternion
 from nav_adapter.ros2.messages.geometry_msgs import (
     Point,
     Pose,
@@ -196,3 +197,53 @@ def test_images_that_cannot_be_used_hide_nothing_else(capsys, tmp_path, drive) -
     assert [severity for severity, _ in found["odometry"]] == ["error"]
     ((severity, text),) = found["images"]
     assert (severity, "projection matrix P" in text) == ("error", True)
+
+
+class Braking(Drive):
+    """A recording of a robot that drives on a curve at 1 m/s, slows a little, and brakes."""
+
+    def __init__(self, braking_mps2: float, curvature_radpm: float, off_rad: float) -> None:
+        self.braking_mps2, self.curvature_radpm = braking_mps2, curvature_radpm
+        self.off_rad = off_rad
+
+    def messages(self):
+        rng, speed_mps, heading_rad, place_m = np.random.default_rng(0), 1.0, 3.0, np.zeros(2)
+        for k in range(250):
+            brakes = k >= 100 and speed_mps > 0.0
+            rate_radps = (
+                self.curvature_radpm * speed_mps + brakes * self.off_rad * self.braking_mps2
+            )
+            stamp_s, noise = START_S + 0.02 * k, 0.005 * rng.normal(size=2)
+            state = RobotState(
+                stamp_s, place_m, heading_rad, speed_mps + noise[0], rate_radps + noise[1]
+            )
+            yield "/odom", 0.02 * k, odometry_of(state)
+            place = Vector3(*place_m.tolist())
+            turn = yaw_quaternion(heading_rad)
+            yield "/tf", 0.02 * k, transform("odom", "base_link", place, turn, stamp_s)
+            speed_mps = max(speed_mps - 0.02 * (self.braking_mps2 if brakes else 0.02), 0.0)
+            heading_rad += 0.02 * rate_radps
+            way = 0.02 * speed_mps
+            place_m = place_m + way * np.array([math.cos(heading_rad), math.sin(heading_rad)])
+
+
+@pytest.mark.parametrize("braking_mps2", [0.4, 1.5])
+@pytest.mark.parametrize("curvature_radpm", [0.0, -0.5])
+@pytest.mark.parametrize("off_rad", [0.0, 0.5])
+def test_how_the_robot_brakes(
+    capsys, tmp_path, braking_mps2: float, curvature_radpm: float, off_rad: float
+) -> None:
+    """A slow change of speed is no braking, and a curve before it is no turn."""
+    path = Braking(braking_mps2, curvature_radpm, off_rad).record(tmp_path / "bag")
+    found = findings(capsys, path)
+    ((_, text),) = found["brakes"]
+    hard_mps2, off_deg = map(float, re.findall(r"([\d.]+) m/s².* ([\d.]+)°", text)[0])
+    assert "braked 1 time," in text
+    assert hard_mps2 == pytest.approx(braking_mps2, abs=0.1)
+    assert off_deg == pytest.approx(math.degrees(0.96 * off_rad), abs=3.0)
+    assert ("brakes_on_curve: true holds" in text) == (off_rad == 0.0)
+    assert [severity for severity, _ in found["odometry"]] == ["fine"]
+
+
+def test_a_robot_that_has_not_braked(capsys, tmp_path, drive) -> None:
+    assert "brakes" not in findings(capsys, drive.record(tmp_path / "bag"))

@@ -18,13 +18,14 @@ from tracking import PersonTrack
 
 GOAL = np.array([10.0, 0.0])
 HALL = np.array([[-6.0, 3.0, 20.0, 4.0], [-6.0, -4.0, 20.0, -3.0]])
+AISLE = np.array([[-6.0, 1.95, 20.0, 3.0], [-6.0, -3.0, 20.0, -1.95]])
 NARROW = np.array([[-6.0, 1.2, 20.0, 2.0], [-6.0, -2.0, 20.0, -1.2]])
 
 
-def person(place, velocity=(0.0, 0.0), alpha=0.0, stamp_s=0.0):
+def person(place, velocity=(0.0, 0.0), alpha=0.0, stamp_s=0.0, number=1):
     """Return somebody whose place and velocity are known well."""
     return PersonTrack(
-        id=1,
+        id=number,
         stamp_s=stamp_s,
         status="confirmed",
         position_odom_m=np.asarray(place),
@@ -38,8 +39,13 @@ def person(place, velocity=(0.0, 0.0), alpha=0.0, stamp_s=0.0):
     )
 
 
-def drive_past(planner, place, velocity=(0.0, 0.0), alpha=0.0, turn_rad=0.0, seconds=6.0):
-    """Return the states of a robot that starts at the origin, x to its goal, all of it turned."""
+def drive_past(
+    planner, place, velocity=(0.0, 0.0), alpha=0.0, turn_rad=0.0, seconds=6.0, stands_at=None
+):
+    """Return the states of a robot that starts at the origin, x to its goal, all of it turned.
+
+    Somebody else, who has not noticed it, may stand farther on.
+    """
     c, s = math.cos(turn_rad), math.sin(turn_rad)
     turned = np.array([[c, -s], [s, c]])
     adapter = NavAdapter(AwarenessPolicy.preset("balanced"), NOVA_CARTER)
@@ -47,8 +53,10 @@ def drive_past(planner, place, velocity=(0.0, 0.0), alpha=0.0, turn_rad=0.0, sec
     for _ in range(round(seconds / DT_S)):
         now = state.stamp_s
         there = np.asarray(place) + now * np.asarray(velocity)
-        somebody = person(turned @ there, turned @ np.asarray(velocity), alpha, now)
-        limit = adapter.update((somebody,), state, now)
+        people = [person(turned @ there, turned @ np.asarray(velocity), alpha, now)]
+        if stands_at is not None:
+            people.append(person(turned @ np.asarray(stands_at), stamp_s=now, number=2))
+        limit = adapter.update(tuple(people), state, now)
         command = planner.plan(state, turned @ GOAL, limit, DT_S)
         state = drive(state, command)
         states.append(state)
@@ -81,6 +89,32 @@ def test_it_uses_the_room_that_it_has_beside_somebody_who_has_not_noticed(side):
     before = next(each for each in planned if each.position_odom_m[0] > 3.5)
     assert side * before.position_odom_m[1] < -0.5
     assert planned[-1].position_odom_m[0] > window[-1].position_odom_m[0] + 0.2
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_it_gives_somebody_who_looks_more_room_than_the_limit_asks_for(side):
+    """They may set off all the same. The room costs next to no time."""
+    states = drive_past(ReferencePlanner(NOVA_CARTER, HALL), (5.0, 1.2 * side), alpha=1.0)
+    beside = next(each for each in states if each.position_odom_m[0] > 5.0)
+    assert side * beside.position_odom_m[1] < -1.0
+    assert beside.speed_mps > 0.95 * NOVA_CARTER.max_speed_mps
+    assert states[-1].position_odom_m[0] > 7.5
+
+
+@pytest.mark.parametrize("y_m", [0.0, -1.0])
+def test_it_does_not_dawdle_beside_somebody_who_looks_if_the_way_is_blocked_farther_on(y_m):
+    """The one in the way may leave at any time, so the robot should be there soon."""
+    free_s, blocked_s = (
+        next(
+            each.stamp_s
+            for each in drive_past(
+                ReferencePlanner(NOVA_CARTER, AISLE), (5.0, 1.0), alpha=1.0, stands_at=place
+            )
+            if each.position_odom_m[0] > 5.0
+        )
+        for place in (None, (9.0, y_m))
+    )
+    assert blocked_s < free_s + 0.3
 
 
 def test_where_there_is_no_room_it_keeps_clear_of_the_racks():
