@@ -74,7 +74,7 @@ class _Head:
         rotations: (B, 3, 3) starts.
         translations_m: (B, 3) starts.
         prior: prior from the body, or None.
-        face_scale: of the keypoints; None where they do not tell the range.
+        tells_range: True if a network of faces has placed the keypoints.
     """
 
     row: int
@@ -84,7 +84,7 @@ class _Head:
     rotations: FloatArray
     translations_m: FloatArray
     prior: HeadPrior | None
-    face_scale: float | None
+    tells_range: bool
 
 
 class PnpHeadPoseEstimator:
@@ -181,8 +181,8 @@ class PnpHeadPoseEstimator:
         if not found:
             return None
         rotations, translations = (np.concatenate(each) for each in zip(*found, strict=True))
-        scale = person.face_scale if whole else None
-        return _Head(row, model, rays, seen, rotations, translations, prior, scale)
+        tells_range = whole and person.face_points_m is not None
+        return _Head(row, model, rays, seen, rotations, translations, prior, tells_range)
 
     def _refined(self, camera: Camera, heads: list[_Head]) -> list[HeadPose | None]:
         """Refine the starting poses of several heads at once and return their head poses."""
@@ -211,7 +211,7 @@ class PnpHeadPoseEstimator:
     def _model(self, person: PersonKeypoints, seen: Any) -> FloatArray | None:
         """Return the object points (5, 3) in the head frame; None if they cannot be computed."""
         if self._head_model == "template":
-            return HEAD_TEMPLATE_M
+            return HEAD_TEMPLATE_M if person.face_points_m is None else person.face_points_m
         neck_seen = person.scores[[kp.LEFT_SHOULDER, kp.RIGHT_SHOULDER]] >= self._min_score
         (scale,) = metric_scales((person,), self._min_score)
         if scale is None or not (neck_seen.all() and seen[[0, 3, 4]].all()):
@@ -241,15 +241,12 @@ class PnpHeadPoseEstimator:
         largest = float(np.linalg.eigvalsh(covariance[:3, :3])[-1])
         if not np.isfinite(covariance).all() or largest > _MAX_ROTATION_STD_RAD**2:
             return None
-        position_m, range_std = pose.translation_m, None
-        if head.face_scale is not None:
-            position_m, range_std = head.face_scale * position_m, _FACE_SIZE_STD
         return HeadPose(
-            position_m,
+            pose.translation_m,
             pose.rotation,
             covariance,
             float(np.sqrt(np.sum(pose.reprojection_px**2) / points)),
-            range_relative_std=range_std,
+            range_relative_std=_FACE_SIZE_STD if head.tells_range else None,
         )
 
 

@@ -70,9 +70,10 @@ class PersonKeypoints:
         scale_relative_std: relative standard deviation of the size of the whole skeleton from the
             estimator's noise, beyond the spread of statures and limbs of adults.
         eyes_open: False if lids cover the irises: the eyes blink or look down.
-        face_scale: size of the head whose nose, eyes and ears a network of faces has placed, as a
-            share of the template's (:data:`~perception.anthropometry.HEAD_TEMPLATE_M`); then the
-            head tells the range. None without such a network, or a face.
+        face_points_m: (5, 3) places of nose, eyes and ears in the head frame (:class:`HeadPose`),
+            where a network of faces has placed them: its points of a head are others than COCO's
+            (:data:`~perception.anthropometry.HEAD_TEMPLATE_M`), and tell its range. None without
+            such a network, or a face.
         irises_px: (2,) mean offset of both irises from the midpoints of the corners of their eyes;
             None if no network has placed them, or lids cover one.
     """
@@ -85,7 +86,7 @@ class PersonKeypoints:
     face_evidence: bool = True
     scale_relative_std: float = 0.0
     eyes_open: bool = True
-    face_scale: float | None = None
+    face_points_m: FloatArray | None = None
     irises_px: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -106,9 +107,7 @@ class PersonKeypoints:
                 "scale_relative_std", self.scale_relative_std, minimum=0.0
             ),
             eyes_open=bool(self.eyes_open),
-            face_scale=given(
-                finite_number, "face_scale", self.face_scale, minimum=0.0, exclusive_minimum=True
-            ),
+            face_points_m=given(finite_array, "face_points_m", self.face_points_m, (5, 3)),
             irises_px=given(finite_array, "irises_px", self.irises_px, (2,)),
         )
 

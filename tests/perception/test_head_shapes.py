@@ -10,6 +10,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from synthetic_people import KnownShape, person_at
 
@@ -113,3 +115,36 @@ def test_three_keypoints_without_a_body_are_upright_and_uncertain():
     nees = nees_of(alone, PnpHeadPoseEstimator())
     assert len(nees) == len(alone) > 60
     assert (nees < BOUND_95).mean() >= 0.9
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    st.floats(-0.7, 0.7),
+    st.floats(-0.7, 0.3),
+    st.floats(0.07, 0.12),
+    st.floats(0.012, 0.035),
+    st.floats(0.0, 0.02),
+    st.booleans(),
+)
+def test_a_head_points_where_it_does_wherever_the_points_of_its_face_lie(
+    yaw_rad, pitch_rad, ears_behind_m, eyes_behind_m, ears_above_m, with_body
+):
+    """Networks of faces call other points nose, eyes and ears than networks of bodies."""
+    face_m = HEAD_TEMPLATE_M.copy()
+    face_m[3:, :2] = -ears_above_m, -ears_behind_m
+    face_m[1:3, 1] = -eyes_behind_m
+    person = person_at((0.2, 0.2, 2.0), head_yaw_rad=yaw_rad, head_pitch_rad=pitch_rad)
+    points, rotation = person.points_camera_m.copy(), person.rotation_camera_head
+    points[:5] = points[0] + face_m @ rotation.T
+    scores = np.ones(17)
+    scores[5:] = float(with_body)
+    seen = PersonKeypoints(
+        CAMERA.project(points),
+        points - points[11:13].mean(axis=0),
+        scores,
+        "coco",
+        face_points_m=face_m,
+    )
+    (head,) = PnpHeadPoseEstimator().estimate(None, CAMERA, (seen,))
+    assert head.gaze_camera @ rotation[:, 1] > math.cos(math.radians(5.0))
+    assert np.linalg.norm(head.position_camera_m - points[0]) < 0.1

@@ -73,7 +73,7 @@ def found(head_rad: float, face_rad: float, aside_px: FloatArray | float = 0.0) 
 def test_a_face_that_is_turned_as_the_head_is_its_own(yaw_rad, off_rad):
     person = found(yaw_rad, yaw_rad + off_rad)
     assert person.face_evidence
-    assert person.face_scale < 1.0
+    assert person.face_points_m is not None
     np.testing.assert_allclose(person.keypoints_px[:5], head_px(yaw_rad + off_rad, 0.95))
 
 
@@ -82,7 +82,7 @@ def test_a_face_that_is_turned_as_the_head_is_its_own(yaw_rad, off_rad):
 def test_a_face_that_looks_here_over_a_profile_is_none(yaw_rad, face_rad, side):
     person = found(side * yaw_rad, side * face_rad)
     assert not person.face_evidence
-    assert person.face_scale is None
+    assert person.face_points_m is None
     assert person.irises_px is None
     np.testing.assert_array_equal(person.keypoints_px[:5], head_px(side * yaw_rad))
 

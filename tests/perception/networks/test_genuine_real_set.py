@@ -134,6 +134,16 @@ def test_nobody_who_looks_away_is_aware(pipeline, scene, distance_m, turned_deg)
         assert person.awareness is None or person.awareness < 0.5
 
 
+@pytest.mark.parametrize("turned_deg", [0.0, -35.0])
+@pytest.mark.parametrize("lowered_deg", [0.0, 15.0, 30.0])
+def test_a_head_is_lowered_by_as_much_as_it_seems(pipeline, scene, lowered_deg, turned_deg):
+    image, _, head = scene.shown(2.0, turned_deg, head_pitch_rad=-math.radians(lowered_deg))
+    (person,) = pipeline.process(image, 0.0)
+    assert person.gaze_camera is not None
+    down_deg = math.degrees(math.asin(person.gaze_camera[1]))
+    assert down_deg == pytest.approx(math.degrees(math.asin(head.gaze_camera[1])), abs=9.0)
+
+
 def test_keypoints_lie_on_the_body_and_its_skeleton_is_upright(files, scene):
     image, keypoints_px, _ = scene.shown(3.0, 20.0)
     low, high = keypoints_px.min(axis=0), keypoints_px.max(axis=0)

@@ -45,7 +45,7 @@ def seen(head_rad, small):
     pose = Pose(head_rad)
     (person,) = FaceMeshPoseEstimator(pose, Blind(), small).estimate(IMAGE, ())
     np.testing.assert_array_equal(person.keypoints_px, pose.person.keypoints_px)
-    assert person.face_scale is None
+    assert person.face_points_m is None
     return person.face_evidence
 
 
