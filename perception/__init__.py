@@ -10,7 +10,6 @@ from .lazy import lazy_page
 if TYPE_CHECKING:
     from ._camera import Camera
     from ._floor import FloorPlane
-    from ._fusion import FusedHeadPoseEstimator
     from ._observation import PersonObservation
     from ._pipeline import AwarenessPipeline
     from ._pnp import PnpHeadPoseEstimator
@@ -32,7 +31,6 @@ __all__ = [
     "AwarenessPipeline",
     "Camera",
     "FloorPlane",
-    "FusedHeadPoseEstimator",
     "HeadPose",
     "HeadPoseEstimator",
     "OnnxHeadPoseEstimator",

@@ -232,18 +232,26 @@ def pixel_count(name: str, value: Any) -> int:
     return int(number)
 
 
-def check_image(image_rgb: Any, height_px: int, width_px: int) -> None:
-    """Raise PerceptionError unless this is the uint8 RGB image of a camera of this size."""
+def check_image(image_rgb: Any, height_px: int | str = "H", width_px: int | str = "W") -> None:
+    """Raise PerceptionError unless this is a uint8 RGB image; a letter is any extent."""
     wanted = (height_px, width_px, 3)
     if not isinstance(image_rgb, np.ndarray):
-        raise PerceptionError(
-            f"image_rgb must be a uint8 array of shape {wanted}, got {type(image_rgb).__name__}"
-        )
-    if image_rgb.dtype != np.uint8 or image_rgb.shape != wanted:
-        raise PerceptionError(
-            f"image_rgb must be uint8 RGB of the camera's shape {wanted}, got "
-            f"{image_rgb.dtype} of shape {image_rgb.shape}"
-        )
+        found = type(image_rgb).__name__
+    elif image_rgb.dtype != np.uint8 or not _fits(image_rgb.shape, wanted):
+        found = f"{image_rgb.dtype} of shape {image_rgb.shape}{_conversion_hint(image_rgb)}"
+    else:
+        return
+    raise PerceptionError(
+        f"image_rgb must be uint8 RGB of shape {_shape_text(wanted)}, got {found}"
+    )
+
+
+def _conversion_hint(image: NDArray[Any]) -> str:
+    if image.dtype == np.uint8 and image.ndim == 2:
+        return "; cv2.cvtColor(image, cv2.COLOR_GRAY2RGB) makes it RGB"
+    if image.dtype == np.uint8 and image.ndim == 3 and image.shape[2] == 4:
+        return "; drop the fourth channel"
+    return ""
 
 
 def median_of(values: Iterable[float]) -> float:

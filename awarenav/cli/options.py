@@ -216,8 +216,7 @@ _NETWORK_OPTIONS: Final = (
         show_default="as the set says, else auto",
         metavar="NAME|FILE",
         help="Head pose: 'network' (the shipped one, made for the simulator), 'pnp' (from the "
-        "keypoints), 'fused' (both), an ONNX file, or 'auto': 'network' with the shipped pose "
-        "network, else 'pnp'.",
+        "keypoints), an ONNX file, or 'auto': 'network' with the shipped pose network, else 'pnp'.",
     ),
     option(
         "--face",

@@ -432,8 +432,8 @@ class _Poses:
             child = odometry.child_frame_id.lstrip("/") or "base_link"
             self._odom = odometry.header.frame_id.lstrip("/") or self._odom
             if child not in self._told:
-                place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
-                T_odom_child = pose_matrix((place.x, place.y, place.z), turn)
+                pose = odometry.pose.pose
+                T_odom_child = pose_matrix(pose.position, pose.orientation)
                 stamp_s = to_seconds(odometry.header.stamp)
                 self._transforms.add(self._odom, child, stamp_s, T_odom_child)
 

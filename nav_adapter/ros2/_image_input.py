@@ -27,6 +27,7 @@ from ._images import camera_of, depth_of, picture_of
 from ._poses import PoseSpread
 from ._shared import Input, Shared
 from .conversions import pose_matrix, to_seconds, yaw_quaternion
+from .messages.geometry_msgs import Point
 from .messages.sensor_msgs import CameraInfo, CompressedImage, Image
 
 # Uncertainty of the height and the tilt of a camera on a driving robot.
@@ -282,7 +283,7 @@ class ImageInput(Input):
         if state is None:
             return False
         x, y = state.position_odom_m.tolist()
-        T_odom_base = pose_matrix((x, y, 0.0), yaw_quaternion(state.heading_odom_rad))
+        T_odom_base = pose_matrix(Point(x, y), yaw_quaternion(state.heading_odom_rad))
         moved = self._stood.repeats(image, T_odom_base)
         late = stamp_s - self._live_s > lost_s
         return self._creeps and late and not moved and state.travel_mps <= CREEPING_MPS

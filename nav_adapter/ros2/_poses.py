@@ -285,9 +285,8 @@ class RobotPoses:
         """
         base = self._frames.base.lstrip("/")
         child = message.child_frame_id.lstrip("/") or base
-        position, rotation = message.pose.pose.position, message.pose.pose.orientation
         stamp_s = to_seconds(message.header.stamp)
-        T_odom_child = pose_matrix((position.x, position.y, position.z), rotation)
+        T_odom_child = pose_matrix(message.pose.pose.position, message.pose.pose.orientation)
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
         velocity, turning = np.array([linear.x, linear.y, 0.0]), np.array([0.0, 0.0, angular.z])
         if child != base:

@@ -34,6 +34,7 @@ from ._robot_file import RobotFile, ScannerMount
 from ._scans import ScanMessages, map_cells_of
 from ._shared import Input, Shared
 from .conversions import pose_matrix, yaw_quaternion
+from .messages.geometry_msgs import Point
 from .messages.nav_msgs import OccupancyGrid
 from .messages.sensor_msgs import LaserScan as LaserScanMessage
 
@@ -158,7 +159,7 @@ class ScanPerception:
         if len(own_base_m):
             points = points.without(carried)
         low, high = float(angles.min()), float(angles.max())
-        to_middle = pose_matrix((0.0, 0.0, 0.0), yaw_quaternion(0.5 * (low + high)))
+        to_middle = pose_matrix(Point(), yaw_quaternion(0.5 * (low + high)))
         T_odom_scanner = motion.pose_at(points.stamp_s) @ T_base_scanner @ to_middle
         with self._busy:
             self._use_map(static_map, motion.T_odom_base[:2, 3])

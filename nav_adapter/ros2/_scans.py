@@ -249,8 +249,7 @@ def map_cells_of(message: OccupancyGrid) -> MapCells:
     # Written so that NaN is refused.
     if not 0.005 <= side_m <= 1.0:
         raise NavError(f"a map's resolution must be 0.005 to 1 m, got {side_m:g} m")
-    place, turn = info.origin.position, info.origin.orientation
-    T = pose_matrix((place.x, place.y, place.z), turn)
+    T = pose_matrix(info.origin.position, info.origin.orientation)
     data = np.frombuffer(message.data, np.int8).reshape(info.height, info.width)
     row, column = np.nonzero((data >= _OCCUPIED[0]) & (data <= _OCCUPIED[1]))
     cells = (np.column_stack((column, row)) + 0.5) * side_m

@@ -14,7 +14,7 @@ from perception.arrays import FloatArray, finite_number, rigid_transform
 from .._errors import NavError
 from ..rigid import Motion
 from .conversions import pose_matrix, to_seconds, yaw_quaternion
-from .messages.geometry_msgs import TransformStamped
+from .messages.geometry_msgs import Point, TransformStamped
 
 _KEPT_S: Final = 5.0
 #: The newest transform is used for at most this long after its stamp.
@@ -87,12 +87,11 @@ class TransformBuffer:
         Raises:
             NavError: as :meth:`add`, and for a rotation that is none.
         """
-        move = message.transform.translation
         self.add(
             message.header.frame_id,
             message.child_frame_id,
             to_seconds(message.header.stamp),
-            pose_matrix((move.x, move.y, move.z), message.transform.rotation),
+            pose_matrix(message.transform.translation, message.transform.rotation),
             static=static,
         )
 
@@ -207,7 +206,7 @@ class TransformBuffer:
                 f"{before_s:.3f} s (holds {HOLD_S:g} s longer)"
             )
         x_m, y_m, heading_rad, *_ = motion.at(since_s)
-        return np.asarray(before @ pose_matrix((x_m, y_m, 0.0), yaw_quaternion(heading_rad)))
+        return np.asarray(before @ pose_matrix(Point(x_m, y_m), yaw_quaternion(heading_rad)))
 
 
 def _is_constant(history: list[_Sample], stamp_s: float) -> bool:

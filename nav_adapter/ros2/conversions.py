@@ -89,13 +89,14 @@ def odometry_of(
     )
 
 
-def pose_matrix(position_m: tuple[float, float, float], turn: Quaternion) -> FloatArray:
+def pose_matrix(place_m: Point | Vector3, turn: Quaternion) -> FloatArray:
     """Return the pose (4, 4) of a position and a quaternion, which is normalised.
 
     Raises:
         NavError: for a number that is not finite, a position beyond 10⁶ m, or a quaternion whose
             length is not near 1.
     """
+    position_m = place_m.x, place_m.y, place_m.z
     numbers = np.array([turn.x, turn.y, turn.z, turn.w])
     length = math.hypot(*numbers)  # overflows to infinity without a warning
     # Written so that NaN is refused.

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from .._camera import Camera
-from .._fusion import FusedHeadPoseEstimator
 from .._pnp import PnpHeadPoseEstimator
 from .._stages import HeadPoseEstimator, PersonDetector, PoseEstimator
 from ..confirmation import KeypointConfirmation
@@ -63,7 +62,7 @@ _WORDS: Final = {
 _SIZE: Final = re.compile("([1-9][0-9]{0,4})x([1-9][0-9]{0,4})")
 # Families of detectors that a file may not tell apart.
 _FAMILIES: Final = ("rtmdet", "yolox", "ultralytics")
-HEADS: Final = ("auto", "network", _WITHOUT_NETWORK, "fused")
+HEADS: Final = ("auto", "network", _WITHOUT_NETWORK)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,9 +114,8 @@ def choose_networks(
             ``rtmdet:FILE``, ``yolox:FILE`` and ``ultralytics:FILE`` say what a file is that does
             not tell it.
         pose: ``"shipped"``, or an ONNX or TFLite file.
-        head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), ``"fused"`` (both,
-            weighted by their uncertainties), an ONNX file, or ``"auto"``: the shipped network with
-            the shipped pose network, else PnP.
+        head: ``"network"`` (the shipped one), ``"pnp"`` (the paper's method), an ONNX file, or
+            ``"auto"``: the shipped network with the shipped pose network, else PnP.
         face: ``"none"``, or a file ``face_landmarker.task`` of MediaPipe: faces of near people, and
             evidence that there is one.
         small_face: ``"none"``, or a file ``mobilenet0.25_Final.pth`` of RetinaFace: looks again
@@ -246,12 +244,8 @@ def _head(
 ) -> tuple[HeadPoseEstimator, TrainingDomain | None]:
     if name == _WITHOUT_NETWORK:
         return PnpHeadPoseEstimator(), None
-    if name in ("network", "fused"):
-        shipped = shipped_head_pose_estimator(settings)
-        domain = shipped_model(HEAD).training_domain
-        if name == "network":
-            return shipped, domain
-        return FusedHeadPoseEstimator(shipped, PnpHeadPoseEstimator()), domain
+    if name == "network":
+        return shipped_head_pose_estimator(settings), shipped_model(HEAD).training_domain
     model, entry = _model("--head", name, HEADS, settings)
     own_domain = _domain(model, entry)
     if isinstance(model, TfliteModel):

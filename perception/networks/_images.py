@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import ImageRgb
+from ..arrays import ImageRgb, check_image
 from ..errors import PerceptionError
 from ._model import OnnxModel
 
@@ -27,15 +27,7 @@ def rgb_image(image_rgb: Any) -> ImageRgb:
     Raises:
         PerceptionError: for anything else; the message says what was given.
     """
-    if not isinstance(image_rgb, np.ndarray):
-        raise PerceptionError(
-            f"image_rgb must be a uint8 array of shape (H, W, 3), got {type(image_rgb).__name__}"
-        )
-    if image_rgb.dtype != np.uint8 or image_rgb.ndim != 3 or image_rgb.shape[2] != 3:
-        raise PerceptionError(
-            "image_rgb must be uint8 RGB of shape (H, W, 3), "
-            f"got {image_rgb.dtype} of shape {image_rgb.shape}{_conversion_hint(image_rgb)}"
-        )
+    check_image(image_rgb)
     height, width = image_rgb.shape[:2]
     if not (1 <= height <= _MAX_SIDE_PX and 1 <= width <= _MAX_SIDE_PX):
         raise PerceptionError(
@@ -43,15 +35,7 @@ def rgb_image(image_rgb: Any) -> ImageRgb:
         )
     if image_rgb.strides[1:] != (3, 1) or image_rgb.strides[0] < 3 * width:
         return np.ascontiguousarray(image_rgb)
-    return image_rgb
-
-
-def _conversion_hint(image: NDArray[Any]) -> str:
-    if image.dtype == np.uint8 and image.ndim == 2:
-        return "; cv2.cvtColor(image, cv2.COLOR_GRAY2RGB) makes it RGB"
-    if image.dtype == np.uint8 and image.ndim == 3 and image.shape[2] == 4:
-        return "; drop the fourth channel"
-    return ""
+    return np.asarray(image_rgb)
 
 
 _DTYPES: Final = ("float32", "float16", "uint8")

@@ -193,7 +193,7 @@ def test_networks_of_a_row_see_pixels_and_belong_to_it(tmp_path):
     assert (job.perception, job.networks) == ("pixels+scanner", "real")
     assert row.senses == "camera+scanner with real"
     digests = [plain.digest, row.digest]
-    networks.write_text("head: fused")
+    networks.write_text("head: network")
     assert len({*digests, row.digest}) == 3
 
 

@@ -26,7 +26,7 @@ from nav_adapter.ros2 import (
     picture_of,
 )
 from nav_adapter.ros2.conversions import pose_matrix, to_time, yaw_quaternion
-from nav_adapter.ros2.messages.geometry_msgs import Quaternion
+from nav_adapter.ros2.messages.geometry_msgs import Point, Quaternion
 from nav_adapter.ros2.messages.sensor_msgs import CompressedImage, Image, RegionOfInterest
 from nav_adapter.ros2.messages.std_msgs import Header
 from perception import AwarenessPipeline, Camera
@@ -139,7 +139,7 @@ def test_images_that_cannot_be_read_are_refused(message) -> None:
 
 
 poses = st.builds(
-    lambda x, y, z, turn: pose_matrix((x, y, z), Quaternion(*turn)),
+    lambda x, y, z, turn: pose_matrix(Point(x, y, z), Quaternion(*turn)),
     *[finite(-5.0, 5.0)] * 3,
     st.tuples(*[finite(-1.0, 1.0)] * 4).filter(lambda q: 0.6 < np.linalg.norm(q) < 1.9),
 )
@@ -165,7 +165,7 @@ def test_between_two_stamps_a_frame_moves_at_constant_velocity_in_itself(
     start, seen_from, mount, share: float
 ) -> None:
     """It is the same motion from whichever frame it is seen, and of whichever point of the body."""
-    step = pose_matrix((0.3, -0.2, 0.1), yaw_quaternion(share))
+    step = pose_matrix(Point(0.3, -0.2, 0.1), yaw_quaternion(share))
     lookups = []
     for before, after in ((np.eye(4), np.eye(4)), (seen_from, mount)):
         buffer = TransformBuffer()
@@ -197,7 +197,7 @@ def test_a_lookup_outside_the_known_times_is_refused_with_the_times() -> None:
 def test_late_transforms_are_inserted_in_order() -> None:
     buffer = TransformBuffer()
     for stamp_s in (1.0, 1.2, 1.1):
-        buffer.add("odom", "base", stamp_s, pose_matrix((stamp_s, 0.0, 0.0), Quaternion()))
+        buffer.add("odom", "base", stamp_s, pose_matrix(Point(stamp_s), Quaternion()))
     assert buffer.lookup("odom", "base", 1.15)[0, 3] == pytest.approx(1.15)
 
 

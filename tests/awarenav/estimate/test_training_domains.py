@@ -86,7 +86,7 @@ def test_a_copy_of_a_shipped_network_is_recognised(tmp_path):
     [
         ("shipped", "auto", ("pose", "head")),
         ("shipped", "pnp", ("pose",)),
-        ("shipped", "fused", ("pose", "head")),
+        ("shipped", "network", ("pose", "head")),
     ],
 )
 def test_one_network_of_three_is_enough_to_be_refused(tmp_path, pose, head, roles):

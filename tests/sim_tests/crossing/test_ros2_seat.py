@@ -26,7 +26,7 @@ from nav_adapter import AwarenessPolicy
 from nav_adapter.policies import AttentionRules
 from nav_adapter.ros2 import camera_of, picture_of
 from nav_adapter.ros2.conversions import pose_matrix
-from nav_adapter.ros2.messages.geometry_msgs import Twist, TwistStamped
+from nav_adapter.ros2.messages.geometry_msgs import Point, Twist, TwistStamped
 from sim_tests import Scenario, SimError, run_crossing
 from sim_tests.crossing.planner import is_outside, make_planner, planner_label
 from sim_tests.study.measures import Conduct, measure, nondeterminism_notes
@@ -192,7 +192,7 @@ def test_the_camera_of_the_robot_shows_what_is_ahead(domain) -> None:
     transforms = [each for message in peer.heard["tf_static"] for each in message.transforms]
     (mount,) = (each for each in transforms if each.child_frame_id == "camera_optical_frame")
     # An optical frame: its z axis points ahead.
-    turn = pose_matrix((0.0, 0.0, 0.0), mount.transform.rotation)
+    turn = pose_matrix(Point(), mount.transform.rotation)
     assert turn[0, 2] > 0.9
 
 
