@@ -13,7 +13,7 @@ from .arrays import FloatArray
 CHI2_999: Final = 13.8
 
 
-def _inverse_2x2(matrices: FloatArray) -> FloatArray:
+def inverse_2x2(matrices: FloatArray) -> FloatArray:
     """Return the inverses of symmetric matrices (…, 2, 2)."""
     inverse = np.empty_like(matrices)
     xx, xy, yy = matrices[..., 0, 0], matrices[..., 0, 1], matrices[..., 1, 1]
@@ -29,7 +29,7 @@ def mahalanobis2(offsets: FloatArray, covariances: FloatArray) -> FloatArray:
 
     Of a normal distribution they are χ² with two degrees of freedom.
     """
-    inverse = _inverse_2x2(covariances)
+    inverse = inverse_2x2(covariances)
     x, y = offsets[..., 0], offsets[..., 1]
     return np.asarray(
         x * x * inverse[..., 0, 0] + 2.0 * x * y * inverse[..., 0, 1] + y * y * inverse[..., 1, 1]

@@ -19,6 +19,7 @@ from ..arrays import (
     set_fields,
 )
 from ..errors import PerceptionError
+from ..matrices import inverse_2x2
 
 #: What a candidate stands on.
 CandidateKind = Literal["two_legs", "one_leg", "trolley"]
@@ -101,26 +102,20 @@ def merge_candidates(groups: Iterable[Iterable[PersonCandidate]]) -> tuple[Perso
 
 
 def _fused(one: PersonCandidate, other: PersonCandidate) -> PersonCandidate:
-    weights = [_inverse(each.covariance_m2) for each in (one, other)]
-    (a, b), (c, d) = (weights[0] + weights[1]).tolist()
-    x, y = (weights[0] @ one.position_odom_m + weights[1] @ other.position_odom_m).tolist()
-    scale = 1.0 / (a * d - b * c)
-    mean = scale * (d * x - b * y), scale * (a * y - c * x)
+    first, second = (inverse_2x2(each.covariance_m2) for each in (one, other))
+    mean = inverse_2x2(first + second) @ (
+        first @ one.position_odom_m + second @ other.position_odom_m
+    )
     sizes = [float(each.covariance_m2[0, 0] + each.covariance_m2[1, 1]) for each in (one, other)]
     better = one if sizes[0] <= sizes[1] else other
     kind: CandidateKind = "two_legs" if "two_legs" in (one.kind, other.kind) else one.kind
     return replace(
         one,
         stamp_s=max(one.stamp_s, other.stamp_s),
-        position_odom_m=np.array(mean),
+        position_odom_m=mean,
         covariance_m2=better.covariance_m2,
         kind=kind,
     )
-
-
-def _inverse(matrix: FloatArray) -> FloatArray:
-    (a, b), (c, d) = matrix.tolist()
-    return np.asarray(np.array([(d, -b), (-c, a)]) / (a * d - b * c))
 
 
 # Height above the floor of the point that represents a body, and its spread among adults.

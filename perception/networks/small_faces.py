@@ -75,13 +75,8 @@ class RetinaFace:
     ) -> FloatArray | None:
         """Return the points (5, 2) of the most probable face in a square; None without a face.
 
-        They are u and v of right eye, left eye, nose, and right and left corner of the mouth.
-
-        Args:
-            image_rgb: (H, W, 3) uint8.
-            centre_px: (2,) middle of the square.
-            side_px: its side.
-            farthest_px: a face that lies farther from the middle is another's.
+        They are u and v of right eye, left eye, nose, and right and left corner of the mouth. The
+        arguments are those of :meth:`~perception.networks.faces.FaceMesh.find`.
         """
         if not (side_px >= _MIN_SIDE_PX and np.isfinite(centre_px).all()):
             return None
