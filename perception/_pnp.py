@@ -103,7 +103,8 @@ class PnpHeadPoseEstimator:
             larger residuals enlarge the covariance.
         min_score: keypoints with a lower score count as not seen.
         head_model: ``"template"`` for the anatomical template, whose forward axis is the Frankfurt
-            horizontal; ``"lifted"`` for the person's own lifted keypoints in the frame of the
+            horizontal, or the points that a network of faces has placed (``face_points_m``);
+            ``"lifted"`` for the person's own lifted keypoints in the frame of the
             paper's printed formula (on an upright head a bias of about 36° downwards).
 
     Raises:
