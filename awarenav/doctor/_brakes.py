@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from nav_adapter.ros2.conversions import pose_matrix, to_seconds
+from nav_adapter.ros2.messages.geometry_msgs import Point
 from nav_adapter.ros2.messages.nav_msgs import Odometry
 from perception.arrays import FloatArray
 
@@ -44,7 +45,7 @@ def brakings(odometry: Sequence[Odometry]) -> list[Braking]:
     twists = [each.twist.twist for each in odometry]
     speeds_mps = np.array([math.hypot(each.linear.x, each.linear.y) for each in twists])
     rates_radps = np.array([each.angular.z for each in twists])
-    turns = [pose_matrix((0.0, 0.0, 0.0), each.pose.pose.orientation) for each in odometry]
+    turns = [pose_matrix(Point(), each.pose.pose.orientation) for each in odometry]
     headings_rad = np.unwrap([math.atan2(each[1, 0], each[0, 0]) for each in turns])
     found = []
     for start, end in _falls(speeds_mps):
