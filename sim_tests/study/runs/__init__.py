@@ -34,7 +34,7 @@ if TYPE_CHECKING:
         recorder_of,
         replay_command,
     )
-    from ._run import run_jobs, terminated_as_interrupted
+    from ._run import held, run_jobs, terminated_as_interrupted
     from ._run_files import (
         Job,
         RunFiles,
