@@ -209,9 +209,7 @@ def importances(
     return dict(sorted((nothing | known).items(), key=lambda each: -each[1]))
 
 
-def _distributions(
-    space: Mapping[str, Range],
-) -> dict[str, optuna.distributions.BaseDistribution]:
+def _distributions(space: Mapping[str, Range]) -> dict[str, optuna.distributions.BaseDistribution]:
     return {
         name: optuna.distributions.FloatDistribution(each.low, each.high, log=each.log)
         for name, each in space.items()

@@ -6,12 +6,7 @@ from typing import Any
 
 from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, options
 
-from ..conditions import (
-    COMPLETE_SIMULATED_POLICIES,
-    SETS_TEXT,
-    Experiment,
-    conditions_options,
-)
+from ..conditions import COMPLETE_SIMULATED_POLICIES, SETS_TEXT, Experiment, conditions_options
 
 
 @command(
@@ -20,11 +15,7 @@ from ..conditions import (
         "awarenav tune --trials 200 --workers 8 --out tuning",
         "awarenav tune --policy mine.yaml --ranges ranges.yaml --scenario blind_corner",
     ],
-    exit_status={
-        0: "Success.",
-        2: "Bad input.",
-        130: "Interrupted; the trials so far are kept.",
-    },
+    exit_status={0: "Success.", 2: "Bad input.", 130: "Interrupted; the trials so far are kept."},
     epilog="A killed or interrupted study continues with the same command and --resume, and ends "
     "with the same result; --trials and --held-out may be raised then. Needs the extra 'bench'.",
 )
@@ -53,11 +44,7 @@ from ..conditions import (
     help="Held-out seeds, on which the presets and the chosen policies are compared.",
 )
 @option(
-    "--generation",
-    type=POSITIVE,
-    default=6,
-    metavar="N",
-    help="Trials that are proposed together.",
+    "--generation", type=POSITIVE, default=6, metavar="N", help="Trials that are proposed together."
 )
 @option(
     "--sampler",

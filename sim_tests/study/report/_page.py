@@ -117,12 +117,7 @@ def write_page(
     )
     template = resources.files("sim_tests.study.report") / "page.html"
     page = environment.from_string(template.read_text("utf-8")).render(
-        title=title,
-        sections=sections,
-        lead=lead,
-        verdicts=verdicts,
-        notices=notices,
-        svg=Markup,
+        title=title, sections=sections, lead=lead, verdicts=verdicts, notices=notices, svg=Markup
     )
     write_text(path, page, SimError)
 

@@ -15,12 +15,7 @@ WINDOW = "sim_tests.crossing.planner:SamplingPlanner"
 
 
 def crossing(
-    scenario: str,
-    seed: int,
-    population: str,
-    *,
-    asks: bool = True,
-    perception: str = "truth",
+    scenario: str, seed: int, population: str, *, asks: bool = True, perception: str = "truth"
 ) -> CrossingResult:
     policy = BALANCED.model_copy(update={"attention": AttentionRules() if asks else None})
     return run_crossing(

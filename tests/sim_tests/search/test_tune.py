@@ -29,12 +29,7 @@ from sim_tests.search.tune._evaluation import (
     stages,
 )
 from sim_tests.search.tune._policy_space import PolicySpace, read_ranges, shipped_ranges
-from sim_tests.search.tune._tune import (
-    TuneSettings,
-    Tuning,
-    held_out_scenarios,
-    ranked_trials,
-)
+from sim_tests.search.tune._tune import TuneSettings, Tuning, held_out_scenarios, ranked_trials
 from sim_tests.search.tune._verdict import change_text, is_undecided, verdict_text
 from sim_tests.study.measures import EpisodeRecord, Interval
 

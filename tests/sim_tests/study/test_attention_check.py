@@ -12,10 +12,7 @@ from measured_scenes import crossing
 
 from awarenav.cli import main
 from sim_tests import ScenarioTemplate, run_crossing, shipped_scenarios
-from sim_tests.study.measures import (
-    MeasuredAttention,
-    Trace,
-)
+from sim_tests.study.measures import MeasuredAttention, Trace
 from sim_tests.study.scenarios._validate import AttentionCheck, check_attention
 
 T_S = np.arange(0.0, 10.05, 0.1)
