@@ -119,6 +119,12 @@ def write_csv(
         writer.writerows(rows)
 
 
+def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as Markdown; a bar within a cell is escaped."""
+    body = ([cell.replace("|", r"\|") for cell in row] for row in rows)
+    return "\n".join(f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *body))
+
+
 def printable(name: str) -> str:
     """Return a text with ? for each byte of a file name that is not UTF-8."""
     return name.encode("utf-8", "replace").decode("utf-8")

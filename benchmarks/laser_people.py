@@ -38,8 +38,7 @@ from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScanScene, SimulatedScann
 from tracking import PersonTracker, TrackerConfig
 from training.legs import TRAINING_WORKERS
 
-from .laser_trolley import TROLLEY_AHEAD_M, TROLLEY_KINDS, Trolley, TrolleyKind
-from .laser_wanderer import Wanderer
+from .laser_actors import TROLLEY_AHEAD_M, TROLLEY_KINDS, Trolley, TrolleyKind, Wanderer
 
 _T = TypeVar("_T")
 

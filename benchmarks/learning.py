@@ -178,10 +178,7 @@ def table() -> str:
     for name in dict.fromkeys(row["planner"] for row in rows):
         own = [row for row in rows if row["planner"] == name]
         ends = [row["end"] for row in own]
-        total = bootstrap_interval(
-            [float(row["return"]) for row in own],
-            np.random.default_rng(0),
-        )
+        total = bootstrap_interval([float(row["return"]) for row in own], np.random.default_rng(0))
         counts = (ends.count(end) for end in ("goal", "contact", "bump", "time"))
         lines.append([name, total.text(1), *(f"{count} of {len(own)}" for count in counts)])
     columns = (

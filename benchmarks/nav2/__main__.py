@@ -17,7 +17,7 @@ from sim_tests.study.runs import RunFiles, plan_jobs, read_attempts, run_jobs
 
 from . import behaviours
 from ._results import table, write_excess
-from ._stack import nav2
+from .behaviours import nav2
 from .parameters import CONTROLLERS, FACES
 
 _TIME_LIMIT_S: Final = 300.0

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from awarenav.files import markdown_table
 from sim_tests.study.measures import (
     Conduct,
     EpisodeRecord,
@@ -76,16 +77,16 @@ def table(path: Path = ROWS) -> str:
     """
     above_mps = _read_excess(path)
     groups = _groups(path)
-    lines = [
-        "| stack | goals | time over today's | with attentive people | touched while moving | "
-        "step-out impacts, never noticed; all | above the limit, m/s: median, worst |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
+    header = (
+        *("stack", "goals", "time over today's", "with attentive people", "touched while moving"),
+        *("step-out impacts, never noticed; all", "above the limit, m/s: median, worst"),
+    )
+    lines = []
     for (stack, policy, robot), rows in groups.items():
         controller, _, face = stack.partition(", ")
         today = groups[f"{controller}, {_TODAY}", "", ""]
         attentive = [each for each in rows if each.attention == "attentive"]
-        cells = (
+        cells = [
             f"{controller}, {_FACES[face]}{policy and f', `{policy}`'}{_ROBOTS[robot]}",
             f"{sum(each.time_to_goal_s is not None for each in rows)} of {len(rows)}",
             _times(today, rows) if policy else "1",
@@ -93,9 +94,9 @@ def table(path: Path = ROWS) -> str:
             _touched(rows),
             _impacts(rows),
             _excess(above_mps[stack, policy, robot]) if policy else "",
-        )
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        ]
+        lines.append(cells)
+    return markdown_table(header, lines)
 
 
 def summary(path: Path = ROWS) -> str:

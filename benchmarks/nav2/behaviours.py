@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import subprocess
+import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from sim_tests.crossing import CrossingResult, run_crossing
+from sim_tests.crossing.planner.ros2 import python_with_ros
 from sim_tests.scenario import Scenario
-
-from ._stack import nav2
+from sim_tests.world.errors import SimError
 
 _BLIND: Final = ("--set", "behavior_server.simulate_ahead_time=0.0")
 #: What is there to stop a behaviour, and the arguments of :mod:`benchmarks.nav2.launch` for it.
@@ -114,3 +118,35 @@ def _figure(result: CrossingResult) -> str:
     if fastest_mps < 0.03:
         return "stands"
     return f"{result.min_separation_m:.2f} m left"
+
+
+@contextlib.contextmanager
+def nav2(controller: str, *words: str, log: Path) -> Iterator[subprocess.Popen[str]]:
+    """Have a Nav2 in the domain of this process until the block ends; it goes on by itself.
+
+    Args:
+        controller: the local planner.
+        words: more arguments of :mod:`benchmarks.nav2.launch`.
+        log: file for what the servers print.
+
+    Raises:
+        SimError: it did not start.
+    """
+    command = [python_with_ros(), "-m", "benchmarks.nav2.launch", controller]
+    process = subprocess.Popen(
+        [*command, "--log", str(log), *words],
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        time.sleep(1.0)
+        if process.poll() is not None:
+            raise SimError(f"Nav2 did not start; see above, and {log}")
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(15.0)
+        except subprocess.TimeoutExpired:
+            process.kill()

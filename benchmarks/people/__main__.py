@@ -106,12 +106,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     eyes = {each: eye_yaw_deg(each, seed=options.seed) for each in options.population}
     rows.append(compare_eyes(eyes))
     print("Crowds in the layout of the recordings: 50th, 95th and 99th percentile\n")
-    print("\n".join(table(rows)), flush=True)
+    print(table(rows), flush=True)
     standing = {
         each: displacements(each, options.people, options.seed) for each in options.population
     }
     print("\nDisplacement after standing: 99th percentile, maximum\n")
-    print("\n".join(displacement_table(standing)), flush=True)
+    print(displacement_table(standing), flush=True)
     begun = {
         each: {
             robot: starts(
@@ -122,12 +122,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for each in options.population
     }
     print("\nShare of standing people who start within 1 s\n")
-    print("\n".join(start_table(begun)), flush=True)
+    print(start_table(begun), flush=True)
     looked = {
         each: looked_within(each, options.people, options.seed) for each in options.population
     }
     print("\nShare of people who had looked before crossing\n")
-    print("\n".join(looked_table(looked)), flush=True)
+    print(looked_table(looked), flush=True)
     if options.plots is not None:
         options.plots.mkdir(parents=True, exist_ok=True)
         for name, quantities in _PLOTS.items():

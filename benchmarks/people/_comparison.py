@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from awarenav.files import markdown_table
 from perception.arrays import FloatArray
 from sim_tests.actors.behaviour import LOOK_WITHIN_S, START_SHARES
 
@@ -91,7 +92,7 @@ def compare_eyes(simulated: Mapping[str, FloatArray]) -> Compared:
     )
 
 
-def table(rows: Sequence[Compared]) -> list[str]:
+def table(rows: Sequence[Compared]) -> str:
     """Return the rows as a Markdown table."""
     populations = list(dict.fromkeys(each for row in rows for each in row.simulated))
     head = [cell for each in populations for cell in (f"`{each}`", "KS")]
@@ -102,10 +103,10 @@ def table(rows: Sequence[Compared]) -> list[str]:
             found = row.simulated.get(each)
             cells += ["–", "–"] if found is None else [_text(found), f"{row.distance[each]:.2f}"]
         lines.append(cells)
-    return _markdown(["quantity", "n", "recorded people", *head], lines)
+    return markdown_table(["quantity", "n", "recorded people", *head], lines)
 
 
-def displacement_table(simulated: Mapping[str, Sequence[FloatArray]]) -> list[str]:
+def displacement_table(simulated: Mapping[str, Sequence[FloatArray]]) -> str:
     """Return the displacements after standing as a Markdown table: 99th percentile, maximum."""
     lines = [
         [
@@ -118,10 +119,10 @@ def displacement_table(simulated: Mapping[str, Sequence[FloatArray]]) -> list[st
         ]
         for row, (after_s, high_m, most_m) in enumerate(DISPLACEMENTS)
     ]
-    return _markdown(["after", "recorded people", *_names(simulated)], lines)
+    return markdown_table(["after", "recorded people", *_names(simulated)], lines)
 
 
-def start_table(simulated: Mapping[str, Mapping[str, Sequence[tuple[int, int]]]]) -> list[str]:
+def start_table(simulated: Mapping[str, Mapping[str, Sequence[tuple[int, int]]]]) -> str:
     """Return the shares of people who start within 1 s as a Markdown table."""
     names = ["now", *_ago(), "longer or never"]
     lines = []
@@ -132,10 +133,10 @@ def start_table(simulated: Mapping[str, Mapping[str, Sequence[tuple[int, int]]]]
                 begun, chances = counts[robot][row]
                 cells.append(f"{100.0 * begun / max(chances, 1):.0f} % of {chances}")
             lines.append(cells)
-    return _markdown(["robot", "last look", "recorded people", *_names(simulated)], lines)
+    return markdown_table(["robot", "last look", "recorded people", *_names(simulated)], lines)
 
 
-def looked_table(simulated: Mapping[str, Sequence[float]]) -> list[str]:
+def looked_table(simulated: Mapping[str, Sequence[float]]) -> str:
     """Return the shares of people who had looked as a Markdown table."""
     lines = [
         [
@@ -145,7 +146,7 @@ def looked_table(simulated: Mapping[str, Sequence[float]]) -> list[str]:
         ]
         for row, (within, share) in enumerate(LOOKED)
     ]
-    return _markdown(["looked within", "recorded people", *_names(simulated)], lines)
+    return markdown_table(["looked within", "recorded people", *_names(simulated)], lines)
 
 
 def draw(
@@ -197,15 +198,6 @@ def _ago() -> list[str]:
 
 def _names(populations: Iterable[str]) -> list[str]:
     return [f"`{each}`" for each in populations]
-
-
-def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a Markdown table."""
-    return [
-        f"| {' | '.join(head)} |",
-        "| --- " * len(head) + "|",
-        *(f"| {' | '.join(row)} |" for row in rows),
-    ]
 
 
 def _percentiles(values: FloatArray) -> tuple[float, ...]:

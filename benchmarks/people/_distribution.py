@@ -47,8 +47,7 @@ class Distribution:
         levels = np.linspace(0.0, 1.0, _POINTS)
         return float(
             kstest(
-                values,
-                lambda each: np.interp(each, self.quantiles, levels, left=0.0, right=1.0),
+                values, lambda each: np.interp(each, self.quantiles, levels, left=0.0, right=1.0)
             ).statistic
         )
 

@@ -19,12 +19,7 @@ from sim_tests.actors.behaviour import (
 )
 
 #: Measured on 229 standing people within 4 m of a mobile robot: time, 99th percentile, maximum.
-DISPLACEMENTS: Final = (
-    (0.5, 0.28, 0.61),
-    (1.0, 0.60, 1.20),
-    (1.5, 1.00, 2.02),
-    (2.0, 1.46, 2.83),
-)
+DISPLACEMENTS: Final = ((0.5, 0.28, 0.61), (1.0, 0.60, 1.20), (1.5, 1.00, 2.02), (2.0, 1.46, 2.83))
 #: Shares of crossing pedestrians who had looked within the last s.
 LOOKED: Final = ((0.5, 0.41), (1.0, 0.54), (2.0, 0.75), (3.0, 0.82))
 #: Standard deviation of the yaw of the eyes in the head, shuttle data.

@@ -25,11 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from awarenav.errors import AwarenavError
-from perception import (
-    AwarenessPipeline,
-    Camera,
-    PersonKeypoints,
-)
+from perception import AwarenessPipeline, Camera, PersonKeypoints
 from perception import layouts as kp
 from perception.named import NetworkChoice
 from perception.networks import OnnxSettings
@@ -178,10 +174,7 @@ def measure(
 
 
 def _count(
-    figures: Figures,
-    pipeline: AwarenessPipeline,
-    rgb: NDArray[np.uint8],
-    people: list[Label],
+    figures: Figures, pipeline: AwarenessPipeline, rgb: NDArray[np.uint8], people: list[Label]
 ) -> None:
     """Add one photograph to the figures."""
     began = time.process_time()

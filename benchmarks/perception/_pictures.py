@@ -89,8 +89,7 @@ CONDITIONS: Final = (
     Condition(
         "white balance warm or cold",
         degradation=_either(
-            Degradation(white_balance=(1.35, 1.0, 0.65)),
-            Degradation(white_balance=(0.7, 1.0, 1.4)),
+            Degradation(white_balance=(1.35, 1.0, 0.65)), Degradation(white_balance=(0.7, 1.0, 1.4))
         ),
     ),
     Condition(

@@ -100,10 +100,7 @@ def two_sensor_table(seed: int) -> tuple[list[MeasuredValue], list[str]]:
     noticing = TrackerConfig(awareness=AwarenessFilterConfig(noticed_memory_s=5.0))
     scanner = {"laser": SensorConfig()}
     makers: dict[str, tuple[Callable[[], PersonTracker], list[_FrameOf]]] = {
-        "camera": (
-            PersonTracker,
-            [frame for frame in both if frame[2] == "camera"],
-        ),
+        "camera": (PersonTracker, [frame for frame in both if frame[2] == "camera"]),
         "camera and scanner": (lambda: PersonTracker(sensors=scanner), both),
         "… and noticed": (lambda: PersonTracker(noticing, sensors=scanner), both),
     }

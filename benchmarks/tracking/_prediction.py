@@ -16,13 +16,7 @@ from tqdm import tqdm
 
 from awarenav.baseline import MeasuredValue
 from tracking import PersonTracker, TrackerConfig
-from tracking.prediction import (
-    FITTED,
-    REGION_SHARE,
-    REGION_SIGMAS,
-    PredictionModel,
-    predict_states,
-)
+from tracking.prediction import FITTED, REGION_SHARE, REGION_SIGMAS, PredictionModel, predict_states
 
 from .._recordings import recordings_in, walks_of
 from ._trackers import T_ODOM_CAMERA, observations
@@ -39,11 +33,7 @@ NOISES_M: Final = (0.05, 0.15)
 CROWDS: Final = range(5)
 #: Constant velocity with a white acceleration, whose covariance grows by nothing else.
 CONSTANT_VELOCITY: Final = PredictionModel(
-    lag_per_s2=0.0,
-    acceleration_density_m2ps3=0.05,
-    change_mps=0.0,
-    slow_change_mps=0.0,
-    sway_s=0.0,
+    lag_per_s2=0.0, acceleration_density_m2ps3=0.05, change_mps=0.0, slow_change_mps=0.0, sway_s=0.0
 )
 _MISS_PROBABILITY: Final = 0.1
 # Tracks are judged from this age on, every so often.

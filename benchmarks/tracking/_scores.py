@@ -15,14 +15,7 @@ from awarenav.baseline import MeasuredValue
 
 from .._recordings import recordings_in, walks_of
 from ._judges import TrackingScores, judge
-from ._measurements import (
-    OCCLUDED,
-    OPEN,
-    SensorSettings,
-    SimulatedRecording,
-    record,
-    record_walks,
-)
+from ._measurements import OCCLUDED, OPEN, SensorSettings, SimulatedRecording, record, record_walks
 from ._trackers import Contender, run
 
 SETS: Final = {"open": OPEN, "occluded": OCCLUDED}

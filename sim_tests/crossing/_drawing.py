@@ -257,10 +257,7 @@ class TopView:
     """
 
     def __init__(
-        self,
-        stage: Stage,
-        size_px: tuple[int, int],
-        window_m: tuple[float, float, float, float],
+        self, stage: Stage, size_px: tuple[int, int], window_m: tuple[float, float, float, float]
     ) -> None:
         low, high = np.array(window_m[:2]), np.array(window_m[2:])
         self._map = MapScale(float((size_px / (high - low)).min()), 0.5 * (low + high), size_px)

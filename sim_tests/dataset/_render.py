@@ -79,11 +79,7 @@ def _tile(folder: Path, record: Record, camera: Camera) -> ImageRgb:
 
 
 def _draw_gaze(
-    tile: ImageRgb,
-    person: Record,
-    camera: Camera,
-    scale: float,
-    colour: tuple[int, int, int],
+    tile: ImageRgb, person: Record, camera: Camera, scale: float, colour: tuple[int, int, int]
 ) -> None:
     """Draw a line from the nose along the gaze, in perspective."""
     if not person["keypoints"].get("nose", (0.0, 0.0, 0.0))[2]:

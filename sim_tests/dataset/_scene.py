@@ -69,10 +69,7 @@ def frame_truth(
 
 
 def _silhouette_pixels(
-    renderer: CameraRenderer,
-    camera: Camera,
-    T_odom_camera: FloatArray,
-    worker: Worker,
+    renderer: CameraRenderer, camera: Camera, T_odom_camera: FloatArray, worker: Worker
 ) -> tuple[int, int]:
     """Return the pixels of the worker drawn alone: inside the image, and in total."""
     low, high = worker.skin.bounds_odom_m()
@@ -97,10 +94,7 @@ def _silhouette_pixels(
 
 
 def _geometry(
-    camera: Camera,
-    T_odom_camera: FloatArray,
-    view: RenderedView,
-    worker: Worker,
+    camera: Camera, T_odom_camera: FloatArray, view: RenderedView, worker: Worker
 ) -> dict[str, Any]:
     rotation, origin = T_odom_camera[:3, :3], T_odom_camera[:3, 3]
     body = np.concatenate([worker.keypoints_odom_m, worker.neck_odom_m[None]])

@@ -173,11 +173,7 @@ _EYE_FORWARD_M: Final = 0.08
 
 
 def run_encounter(
-    out: Path,
-    *,
-    seed: int = 0,
-    video: bool = True,
-    perception: str = "keypoints",
+    out: Path, *, seed: int = 0, video: bool = True, perception: str = "keypoints"
 ) -> CrossingResult:
     """Run the encounter and write its table, plot and video."""
     scenario = Scenario.shipped("paper_encounter")

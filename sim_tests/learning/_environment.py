@@ -331,11 +331,7 @@ class CrossingEnv(gymnasium.Env[Observation, NDArray[Any]], EzPickle):
         return self._encoder.encode(now.known_state, self.crossing.goal_odom_m, now.constraints)
 
     def _info(
-        self,
-        command: tuple[float, float],
-        parts: dict[str, float],
-        reason: str,
-        seed: int | None,
+        self, command: tuple[float, float], parts: dict[str, float], reason: str, seed: int | None
     ) -> dict[str, Any]:
         now = self.situation
         limits, (margin_m, separation_m) = now.constraints, self._least_m

@@ -175,10 +175,7 @@ def command_of(action: Any, robot: RobotProfile, *, normalised: bool) -> tuple[f
         raise SimError(f"an action must be two finite numbers of shape (2,), got {action!r:.80}")
     speed, yaw_rate = pair.tolist()
     if normalised:
-        return (
-            min(max(speed, -1.0), 1.0) * speed_limit,
-            min(max(yaw_rate, -1.0), 1.0) * yaw_limit,
-        )
+        return (min(max(speed, -1.0), 1.0) * speed_limit, min(max(yaw_rate, -1.0), 1.0) * yaw_limit)
     return min(max(speed, -speed_limit), speed_limit), min(max(yaw_rate, -yaw_limit), yaw_limit)
 
 

@@ -226,8 +226,6 @@ def find_parameters(data: Mapping[str, Any], source: str) -> dict[str, Distribut
     found: dict[str, Distribution] = {}
     for path, kind, settings in _distributions_in(data, (), source):
         dotted = ".".join(path)
-        if path[0] == "workers":
-            continue  # scripts are refused with the scenario, see Scenario
         if path[0] not in _VARIABLE:
             raise SimError(
                 f"{source}: {dotted}: only numbers under {', '.join(_VARIABLE)} may be "

@@ -233,20 +233,6 @@ class Scenario(SimConfig):
     replay_leaves: bool = False
     start_jitter_s: float = Field(default=0.0, ge=0.0)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _no_scripts(cls, data: Any) -> Any:
-        if not isinstance(data, Mapping) or "workers" not in data:
-            return data
-        if data["workers"]:
-            raise ValueError(
-                "workers: scripted people are now ordinary ones; write each of them under people: "
-                "with a name, the x_m and y_m of its path as route, its speed as speed_mps, its "
-                "first t_s as start_s, its waits as pauses, and its gaze as glances, or as gaze"
-            )
-        # Files that were written with every key hold an empty list.
-        return {key: value for key, value in data.items() if key != "workers"}
-
     @model_validator(mode="after")
     def _unique_names(self) -> Scenario:
         names = [person.name for person in self.people]

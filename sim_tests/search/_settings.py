@@ -1,12 +1,12 @@
-"""The common part of both searches: settings, episodes, printed results, the next command."""
+"""The common part of both searches: folder, settings, episodes, results, the next command."""
 
 from __future__ import annotations
 
 import json
-import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,12 +26,12 @@ from ..conditions import (
 from ..crossing import named_policy
 from ..scenario import ScenarioTemplate
 from ..study.measures import EpisodeRecord, nondeterminism_notes
-from ..study.runs import Job, Workers, attempt, died, named_templates, policy_text
+from ..study.runs import Job, Workers, attempt, died, held, named_templates, policy_text
 from ..world.bullet import require_pybullet
 from ..world.errors import SimError
 
-# The files of every search, beside its results.
-_FILES: Final = ("study.log", "study.log.lock", "studies/*.log*")
+# The episodes of a search that have run, one a line: their keys and the columns of their rows.
+_EPISODES: Final = "episodes.jsonl"
 # Options that the next command has otherwise.
 _OWN_WORDS: Final = ("policy", "seed", "episodes")
 
@@ -81,6 +81,24 @@ def common_settings(experiment: Experiment) -> dict[str, Any]:
     }
 
 
+@contextmanager
+def search_folder(settings: SearchSettings, path: Path, search: str, **how: Any) -> Iterator[None]:
+    """Hold the folder of a search, whose settings are in ``path``, against other processes.
+
+    ``how`` is as for :func:`write_or_check_settings`, which names the errors.
+    """
+    folder = path.parent
+    require_pybullet()
+    if how["resume"] and not path.exists():  # a refusal makes no folder
+        raise SimError(f"--resume: there is no {search} in {folder}, no {path.name}")
+    lock = held(folder)
+    try:
+        write_or_check_settings(settings, path, search, **how)
+        yield
+    finally:
+        lock.release()
+
+
 def write_or_check_settings(
     settings: SearchSettings,
     path: Path,
@@ -95,13 +113,11 @@ def write_or_check_settings(
 
     Raises:
         SimError: the folder holds a search and neither ``resume`` nor ``overwrite`` is True, it
-            holds none and ``resume`` is True, it holds results of something else, the settings
-            differ, or PyBullet is not installed.
+            holds results of something else, or the settings differ.
     """
-    require_pybullet()
     folder = path.parent
     text = json.dumps(asdict(settings), indent=1) + "\n"
-    old = [each for pattern in (*_FILES, *results) for each in sorted(folder.glob(pattern))]
+    old = [each for pattern in (_EPISODES, *results) for each in sorted(folder.glob(pattern))]
     if path.exists() and resume:
         _compare(path, parse_json(text, path.name, SimError), may_grow)
     elif path.exists() and not overwrite:
@@ -109,23 +125,17 @@ def write_or_check_settings(
             f"{folder} already holds a {search}; give --resume to continue it, --overwrite "
             "to replace it, or another --out"
         )
-    elif resume:
-        raise SimError(f"--resume: there is no {search} in {folder}, no {path.name}")
     elif old and not path.exists():
         raise SimError(
             f"{folder} holds {old[0].name} but no {path.name}, so it is not the folder of a "
             f"{search}; choose another --out"
         )
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")  # several processes may write it
-    try:
-        if not resume:  # the old settings go last, so that a kill leaves what can be removed
-            for each in (*old, path):
-                each.unlink(missing_ok=True)
-        folder.mkdir(parents=True, exist_ok=True)
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+    try:  # the old settings go last, so that a kill leaves what can be removed
+        for each in () if resume else (*old, path):
+            each.unlink(missing_ok=True)
     except OSError as cause:
         raise SimError(f"cannot write {path}: {cause.strerror or cause}") from cause
+    write_text(path, text, SimError)
 
 
 def write_json(path: Path, data: Any) -> None:
@@ -180,18 +190,24 @@ def _short(value: Any) -> str:
 
 
 class EpisodeRunner:
-    """Runs batches of episodes; the records come in the order of the jobs.
+    """Runs batches of episodes, each once, also if the search is resumed.
 
     Args:
+        folder: of the search.
         workers: number of processes; 1 runs everything in this process.
         label: label of the progress bar.
         total: number of episodes, if known.
 
     Attributes:
         bar: the progress bar on standard error, which counts episodes.
+
+    Raises:
+        SimError: the file of the episodes so far cannot be read.
     """
 
-    def __init__(self, workers: int, label: str, total: int | None = None) -> None:
+    def __init__(self, folder: Path, workers: int, label: str, total: int | None = None) -> None:
+        self._path = folder / _EPISODES
+        self._known = _read_episodes(self._path)
         self._workers = Workers(workers)
         self._unrepeatable: set[str] = set()
         self.bar = tqdm(desc=label, total=total, unit="episode", smoothing=0.05, file=sys.stderr)
@@ -203,18 +219,65 @@ class EpisodeRunner:
         self._workers.__exit__()
         self.bar.close()
 
-    def run(self, jobs: Sequence[Job]) -> tuple[EpisodeRecord, ...]:
-        """Run the jobs; ``error`` of a record says why an episode failed.
+    def run(self, keys: Sequence[str], job: Callable[[int], Job]) -> tuple[EpisodeRecord, ...]:
+        """Run episodes; ``error`` of a record says why one failed.
 
         A planner that is not deterministic is named once on standard error.
+
+        Args:
+            keys: what tells the episodes of the search apart.
+            job: returns the episode of a place in ``keys``; asked for those that have not run.
+
+        Raises:
+            SimError: an episode cannot be written.
         """
-        records: dict[int, EpisodeRecord] = {}
-        for number, outcome in self._workers.results(attempt, jobs, on_death=died):
-            records[number] = outcome.record
+        records = {n: self._known[key] for n, key in enumerate(keys) if key in self._known}
+        self.bar.update(len(records))
+        new = [number for number in range(len(keys)) if number not in records]
+        for place, outcome in self._workers.results(attempt, map(job, new), on_death=died):
+            records[new[place]] = outcome.record
+            if not outcome.record.error:  # one that failed runs again
+                self._keep(keys[new[place]], outcome.record)
             self.bar.update()
         differing = [each for each in records.values() if each.nondeterministic]
-        new = {record.planner for record in differing} - self._unrepeatable
-        self._unrepeatable |= new
-        for note in nondeterminism_notes(each for each in differing if each.planner in new):
+        unsaid = {record.planner for record in differing} - self._unrepeatable
+        self._unrepeatable |= unsaid
+        for note in nondeterminism_notes(each for each in differing if each.planner in unsaid):
             self.bar.write(note, file=sys.stderr)
-        return tuple(records[number] for number in range(len(jobs)))
+        return tuple(records[number] for number in range(len(keys)))
+
+    def _keep(self, key: str, record: EpisodeRecord) -> None:
+        """Write an episode that has run."""
+        self._known[key] = record
+        cells = {name: value for name, value in asdict(record).items() if value not in (None, "")}
+        try:
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"key": key, "record": cells}) + "\n")
+        except OSError as cause:
+            raise SimError(
+                f"cannot write {self._path}: {cause.strerror or cause}; the episodes so far are "
+                "kept, and --resume continues"
+            ) from cause
+
+
+def _read_episodes(path: Path) -> dict[str, EpisodeRecord]:
+    """Return the episodes of a search that have run, by their keys.
+
+    A last line that a full disk or a killed process left unfinished is cut off.
+    """
+    if not path.exists():
+        return {}
+    with path.open("rb+") as file:
+        text = file.read()
+        file.truncate(text.rfind(b"\n") + 1)
+    found = {}
+    for number, line in enumerate(text.split(b"\n")[:-1], start=1):
+        try:
+            data = parse_json(line, path.name, SimError)
+            found[data["key"]] = EpisodeRecord(**data["record"])
+        except (SimError, KeyError, TypeError) as cause:
+            raise SimError(
+                f"{path}, line {number} is no episode of a search: remove the line, and it runs "
+                "again"
+            ) from cause
+    return found

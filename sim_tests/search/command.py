@@ -6,12 +6,7 @@ from typing import Any
 
 from awarenav.cli import POSITIVE, FilePath, Number, OneOf, command, option, options
 
-from ..conditions import (
-    COMPLETE_SIMULATED_POLICIES,
-    SETS_TEXT,
-    Experiment,
-    conditions_options,
-)
+from ..conditions import COMPLETE_SIMULATED_POLICIES, SETS_TEXT, Experiment, conditions_options
 
 
 @command(
@@ -20,14 +15,9 @@ from ..conditions import (
         "awarenav tune --trials 200 --workers 8 --out tuning",
         "awarenav tune --policy mine.yaml --ranges ranges.yaml --scenario blind_corner",
     ],
-    exit_status={
-        0: "Success.",
-        2: "Bad input.",
-        130: "Interrupted; the trials so far are kept.",
-    },
+    exit_status={0: "Success.", 2: "Bad input.", 130: "Interrupted; the trials so far are kept."},
     epilog="A killed or interrupted study continues with the same command and --resume, and ends "
-    "with the same result; --trials and --held-out may be raised then. Several processes that run "
-    "the command with the same --out share the trials. Needs the extra 'bench'.",
+    "with the same result; --trials and --held-out may be raised then. Needs the extra 'bench'.",
 )
 @conditions_options(many=("scenario",), without=("fault",))
 @option(
@@ -54,11 +44,7 @@ from ..conditions import (
     help="Held-out seeds, on which the presets and the chosen policies are compared.",
 )
 @option(
-    "--generation",
-    type=POSITIVE,
-    default=6,
-    metavar="N",
-    help="Trials that are proposed together; so many processes can work at once.",
+    "--generation", type=POSITIVE, default=6, metavar="N", help="Trials that are proposed together."
 )
 @option(
     "--sampler",
@@ -94,8 +80,9 @@ def tune(**values: Any) -> int:
     look and set off at any time. Trials run few episodes first, and end when an interval shows that
     they are above the risk or lose to --policy. A policy with which a moving robot and a person
     touched is not chosen. Ends with a verdict against --policy on held-out seeds and on every third
-    scenario, which no trial runs, and the next command. Writes study.log, trials.csv, tuning.png,
-    importances.json, chosen.json, and chosen/*.yaml with their results on the held-out seeds.
+    scenario, which no trial runs, and the next command. Writes episodes.jsonl, trials.csv,
+    tuning.png, importances.json, chosen.json, and chosen/*.yaml with their results on the held-out
+    seeds.
     """
     from .tune import run_tune  # noqa: PLC0415 - help needs no simulator
 
@@ -182,7 +169,7 @@ def falsify(**values: Any) -> int:
     People of --population recorded do not draw the speed and glances that are varied; --seed draws
     their pace, sway and starts by chance. Ends with a verdict against another policy in the same
     situations, and the next command. Writes worst_001.yaml and so on (`awarenav crossings
-    --scenario` runs them again), episodes.csv, falsify.png, summary.json and the studies.
+    --scenario` runs them again), episodes.csv, falsify.png, summary.json and episodes.jsonl.
     """
     from .falsify import run_falsify  # noqa: PLC0415 - help needs no simulator
 

@@ -272,10 +272,7 @@ def compare(**values: Any) -> int:
     help="Folder of finished episodes, to draw them again; nothing is run.",
 )
 @conditions_options(
-    many=("scenario",),
-    repeated=True,
-    without=("policy", "fault"),
-    seed=_FIRST_SEED,
+    many=("scenario",), repeated=True, without=("policy", "fault"), seed=_FIRST_SEED
 )
 @option("--episodes", type=POSITIVE, default=1, metavar="N", help="Number of seeds per scenario.")
 @options.workers()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.laser_actors import TROLLEY_SIZE_M, Trolley
 from benchmarks.laser_people import Figures, drive
-from benchmarks.laser_trolley import TROLLEY_SIZE_M, Trolley
 from perception.laser import LegDetectorConfig
 from sim_tests.actors.body import worker_names
 from sim_tests.world.hall import LAYOUTS

@@ -15,11 +15,7 @@ from scipy.spatial.transform import Rotation
 from awarenav.errors import AwarenavError
 from benchmarks.perception.__main__ import main
 from benchmarks.perception._degradations import HEADER, measure, meets, row_of
-from benchmarks.perception._photographs import (
-    LABELS,
-    Label,
-    read_labels,
-)
+from benchmarks.perception._photographs import LABELS, Label, read_labels
 from benchmarks.perception._photographs import measure as measure_photographs
 from benchmarks.perception._pictures import CONDITIONS, degraded_picture, picture_sets, pictures
 from benchmarks.perception._sureness import axis_nees, matched

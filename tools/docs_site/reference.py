@@ -13,6 +13,7 @@ from typing import Any, Final, get_args
 
 from pydantic import BaseModel
 
+from awarenav.files import markdown_table
 from nav_adapter import AwarenessPolicy, InflationPolicy, SpeedPolicy
 from nav_adapter.policies import InterpolatedHumanSpeed, InterpolatedInflation
 from nav_adapter.ros2 import MASK_TOPICS, PUBLISHED, READ, RobotFile, Topic
@@ -291,11 +292,7 @@ def front_door_page() -> str:
 
 def metrics_page() -> str:
     """Return the page of metrics and columns."""
-    columns = ["| column | unit | meaning |", "| --- | --- | --- |"]
-    columns += [
-        f"| `{name}` | {unit_of(name)} | {_cell(plain(each.meaning))} |"
-        for name, each in COLUMNS.items()
-    ]
+    columns = [[f"`{n}`", unit_of(n), _cell(plain(each.meaning))] for n, each in COLUMNS.items()]
     return "\n\n".join(
         [
             _METRICS,
@@ -306,7 +303,7 @@ def metrics_page() -> str:
             "## Ratios of sums over episodes",
             _metric_table({name: ratio.metric for name, ratio in RATIOS.items()}),
             "## Columns of episodes.csv",
-            "\n".join(columns) + "\n",
+            markdown_table(("column", "unit", "meaning"), columns) + "\n",
         ]
     )
 
@@ -333,29 +330,26 @@ def unit_of(name: str) -> str:
 
 
 def _metric_table(metrics: Mapping[str, Metric]) -> str:
-    rows = ["| metric | title | unit | better | meaning |", "| --- | --- | --- | --- | --- |"]
-    rows += [
-        f"| `{name}` | {_cell(each.title)} | {each.unit} | {_BETTER[each.better]} | "
-        f"{_cell(each.meaning)} |"
+    rows = (
+        [f"`{name}`", each.title, each.unit, _BETTER[each.better], _cell(each.meaning)]
         for name, each in metrics.items()
-    ]
-    return "\n".join(rows)
+    )
+    return markdown_table(("metric", "title", "unit", "better", "meaning"), rows)
 
 
 def _topic_table(topics: Iterable[Topic]) -> str:
-    rows = [
-        "| topic | type | reliability | durability | depth |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    rows += [
-        f"| `/{each.name}` | `{ros_type(each.message).replace('/msg/', '/')}` | "
-        f"{'reliable' if each.reliable else 'best effort'} | "
-        f"{'transient local' if each.transient_local else 'volatile'} | {each.depth} |"
+    rows = (
+        [
+            *(f"`/{each.name}`", f"`{ros_type(each.message).replace('/msg/', '/')}`"),
+            "reliable" if each.reliable else "best effort",
+            "transient local" if each.transient_local else "volatile",
+            str(each.depth),
+        ]
         for each in topics
-    ]
-    return "\n".join(rows)
+    )
+    return markdown_table(("topic", "type", "reliability", "durability", "depth"), rows)
 
 
 def _cell(text: str) -> str:
     """Return text for one cell of a table."""
-    return " ".join(text.split()).replace("|", "\\|")
+    return " ".join(text.split())

@@ -17,13 +17,6 @@ from ._person import DECISION_PERIOD_S, Person
 from ._route import Route
 from ._spec import GazeKey, Glances, Lapse, PersonSpec, Reactions, RoutePoint
 from ._starting import LOOK_WITHIN_S, START_SHARES, start_share
-from ._surroundings import (
-    ALONE,
-    MovingBody,
-    PersonMotion,
-    PersonOutcome,
-    RobotBody,
-    Surroundings,
-)
+from ._surroundings import ALONE, MovingBody, PersonMotion, PersonOutcome, RobotBody, Surroundings
 from ._track import RecordedPath, Track, read_recordings
 from ._trajectory import WALKER_RADIUS_M

@@ -77,11 +77,7 @@ class HeadAndEyes:
     """
 
     def __init__(
-        self,
-        head_rad: tuple[float, float],
-        eyes_rad: tuple[float, float],
-        *,
-        twists: bool = True,
+        self, head_rad: tuple[float, float], eyes_rad: tuple[float, float], *, twists: bool = True
     ) -> None:
         self._head, self._eyes, self._twist = head_rad, eyes_rad, 0.0
         self._head_rates, self._eye_rates, self._twist_rate = (0.0, 0.0), (0.0, 0.0), 0.0

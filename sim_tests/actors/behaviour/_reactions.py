@@ -366,10 +366,7 @@ def _on_conflicting_course(
 
 
 def _pass_behind(
-    place: tuple[float, float],
-    desired: DesiredVelocity,
-    course: Motion,
-    back_m: float,
+    place: tuple[float, float], desired: DesiredVelocity, course: Motion, back_m: float
 ) -> DesiredVelocity:
     """Return the velocity to the point behind the robot's tail at the time of arrival there."""
     speed = max(desired.speed_mps, 1e-3)

@@ -14,10 +14,7 @@ from ._surroundings import RobotBody
 #: Share of people at the kerb who start within the next second, by the time since the last look at
 #: the vehicle: now, up to 1 s, up to 4 s, and longer or never. The first row was counted at all
 #: vehicles and stands for a robot that yields, the second at vehicles that move or accelerate.
-START_SHARES: Final = {
-    "yielding": (0.39, 0.45, 0.25, 0.13),
-    "moving": (0.23, 0.26, 0.09, 0.10),
-}
+START_SHARES: Final = {"yielding": (0.39, 0.45, 0.25, 0.13), "moving": (0.23, 0.26, 0.09, 0.10)}
 #: Ends of the first three times since the last look, s.
 LOOK_WITHIN_S: Final = (0.0, 1.0, 4.0)
 # People start only after they have stood for this long.

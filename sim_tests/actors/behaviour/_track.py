@@ -144,13 +144,7 @@ class Track:
         return math.atan2(desired.uy, desired.ux)
 
     def leads(
-        self,
-        t_s: float,
-        state: State,
-        robot: RobotBody | None,
-        *,
-        on_track: bool,
-        startled: bool,
+        self, t_s: float, state: State, robot: RobotBody | None, *, on_track: bool, startled: bool
     ) -> bool:
         """Return whether a person in this state moves as recorded from ``t_s`` on."""
         if robot is None or self.is_away(t_s):

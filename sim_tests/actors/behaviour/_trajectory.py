@@ -196,10 +196,7 @@ def limited(x: float, y: float, most: float) -> tuple[float, float]:
 
 def _distance(point: tuple[float, float], box: Box) -> float:
     x, y = point
-    return math.hypot(
-        x - min(max(x, box[0]), box[2]),
-        y - min(max(y, box[1]), box[3]),
-    )
+    return math.hypot(x - min(max(x, box[0]), box[2]), y - min(max(y, box[1]), box[3]))
 
 
 def _pushed_out(

@@ -14,14 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ._gait import (
-    LONGEST_SWING_S,
-    MAX_CADENCE_HZ,
-    FootPose,
-    Gait,
-    GaitPose,
-    PlanarPose,
-)
+from ._gait import LONGEST_SWING_S, MAX_CADENCE_HZ, FootPose, Gait, GaitPose, PlanarPose
 from ._skeleton import LEFT, RIGHT, SIGNS
 
 _LOADING_SHARE: Final = 0.15
@@ -323,10 +316,7 @@ class OnlineFootsteps:
         return x + ahead * math.cos(yaw), y + ahead * math.sin(yaw), height + lift, yaw, foot.pitch
 
     def _gait_pose(
-        self,
-        dt_s: float,
-        feet: tuple[FootPose, FootPose],
-        place: PlanarPose,
+        self, dt_s: float, feet: tuple[FootPose, FootPose], place: PlanarPose
     ) -> GaitPose:
         """Return the pose of hips and trunk over these feet; advances the hip height."""
         stride_ratio, size = self._stride_ratio, abs(self._stride_ratio)

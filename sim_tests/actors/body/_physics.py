@@ -54,9 +54,7 @@ class WorkerBody:
             self._box()
             if row == _BOX
             else self._capsules(
-                [c for c in skeleton.asset.capsules if c.joint == row],
-                skeleton.scale,
-                centres[row],
+                [c for c in skeleton.asset.capsules if c.joint == row], skeleton.scale, centres[row]
             )
             for row in rows
         ]

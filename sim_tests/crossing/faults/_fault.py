@@ -25,14 +25,7 @@ from ...world.scanner import ScannerSpec
 from .._messages import Change, Delivery, MountedScan, OdometryReading, Sighting
 from ._camera import CAMERA_FAULTS
 from ._scans import SCAN_FAULTS
-from ._sensor_fault import (
-    ImageFault,
-    OdometryFault,
-    PictureFault,
-    ScanFault,
-    SensorFault,
-    Start,
-)
+from ._sensor_fault import ImageFault, OdometryFault, PictureFault, ScanFault, SensorFault, Start
 
 #: Every kind of fault; those of one mapping act in this order.
 FAULT_KINDS: Final = (*CAMERA_FAULTS, *SCAN_FAULTS)

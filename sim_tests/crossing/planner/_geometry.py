@@ -125,10 +125,7 @@ class Rectangles(NamedTuple):
 
 
 def disc_gap_m(
-    rectangles: Rectangles,
-    x_m: FloatArray,
-    y_m: FloatArray,
-    radius_m: FloatArray,
+    rectangles: Rectangles, x_m: FloatArray, y_m: FloatArray, radius_m: FloatArray
 ) -> FloatArray:
     """Return the distance from rectangles to discs; negative where they overlap.
 

@@ -19,15 +19,7 @@ from nav_adapter import NavConstraints, RobotState
 from perception.anthropometry import BODY_RADIUS_M
 from perception.arrays import FloatArray
 
-from ._geometry import (
-    Box,
-    FootprintBox,
-    Poses,
-    Rectangles,
-    box_gap_m,
-    disc_gap_m,
-    strip_distance_m,
-)
+from ._geometry import Box, FootprintBox, Poses, Rectangles, box_gap_m, disc_gap_m, strip_distance_m
 
 #: The robot at its present place.
 STANDING: Final = Poses(*(np.asarray(value) for value in (0.0, 0.0, 1.0, 0.0)))

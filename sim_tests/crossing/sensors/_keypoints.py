@@ -73,11 +73,7 @@ class KeypointCamera:
     """
 
     def __init__(
-        self,
-        camera: Camera,
-        sight: SightLines,
-        noise: KeypointNoise,
-        rng: np.random.Generator,
+        self, camera: Camera, sight: SightLines, noise: KeypointNoise, rng: np.random.Generator
     ) -> None:
         self._camera = camera
         self._sight = sight

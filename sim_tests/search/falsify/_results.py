@@ -241,9 +241,7 @@ def records_against(
 
 
 def verdict_text(
-    falsification: Falsification,
-    cases: Sequence[WorstCase],
-    others: Mapping[str, EpisodeRecord],
+    falsification: Falsification, cases: Sequence[WorstCase], others: Mapping[str, EpisodeRecord]
 ) -> str:
     """Return what the search has found about a policy, and what another one does there."""
     name, episodes = falsification.settings.policy_name, len(falsification.episodes)

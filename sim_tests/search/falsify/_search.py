@@ -6,16 +6,16 @@ the next one starts elsewhere.
 
 from __future__ import annotations
 
+import json
 import math
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
-import filelock
 import numpy as np
 
 from perception.documents import yaml_text
@@ -25,8 +25,8 @@ from ...scenario import Scenario
 from ...study.measures import FAST_IMPACT_MPS, NOTICED, EpisodeRecord
 from ...study.runs import Job, job_of, policy_of, terminated_as_interrupted
 from ...world.errors import SimError
-from .._settings import EpisodeRunner, SearchSettings, write_or_check_settings
-from .._study import Optimizer, Outcome, ParameterValues, Range, SharedStudy, Trial
+from .._settings import EpisodeRunner, SearchSettings, search_folder
+from .._study import Evaluate, Optimizer, Outcome, ParameterValues, Range, Trial
 from ._no_floor_planner import LABEL, PLANNER
 from ._scenario_space import ScenarioSpace
 
@@ -259,36 +259,21 @@ def falsify(
     spaces = {each.name: ScenarioSpace(each, settings.people, asks=asks) for each in templates}
     budget = Budget.of(settings.episodes, len(spaces), settings.generation)
     refuse_unusable_planner(settings.planner, templates[0].median())
-    with _only_process(folder) if folder.is_dir() else nullcontext():  # a refusal makes no folder
-        write_or_check_settings(
-            settings,
-            folder / _SETTINGS_FILE,
-            "falsification",
-            resume=resume,
-            overwrite=overwrite,
-            results=_RESULTS,
-            may_grow=["episodes"],
-        )
-    with (
-        _only_process(folder),
-        EpisodeRunner(workers, "falsify", budget.total(len(spaces))) as runner,
-    ):
-        return _search(settings, folder, spaces, budget, runner)
-
-
-@contextmanager
-def _only_process(folder: Path) -> Iterator[None]:
-    """Refuse to go on while another process falsifies in the folder."""
-    try:
-        with filelock.FileLock(folder / ".lock", blocking=False):
-            yield
-    except filelock.Timeout as cause:
-        raise SimError(f"another process works on the falsification in {folder}") from cause
+    held = search_folder(
+        settings,
+        folder / _SETTINGS_FILE,
+        "falsification",
+        resume=resume,
+        overwrite=overwrite,
+        results=_RESULTS,
+        may_grow=["episodes"],
+    )
+    with held, EpisodeRunner(folder, workers, "falsify", budget.total(len(spaces))) as runner:
+        return _search(settings, spaces, budget, runner)
 
 
 def _search(
     settings: FalsifySettings,
-    folder: Path,
     spaces: dict[str, ScenarioSpace],
     budget: Budget,
     runner: EpisodeRunner,
@@ -296,23 +281,22 @@ def _search(
     """Search in all scenarios, then further in the worst of them."""
     found: dict[str, list[SearchedEpisode]] = {name: [] for name in spaces}
 
+    searches = {
+        name: search(
+            name,
+            space.ranges,
+            space.neutral,
+            partial(_evaluated, settings, space, runner),
+            seed=settings.seed,
+            generation=settings.generation,
+        )
+        for name, space in spaces.items()
+    }
+
     def search_up_to(total: int, names: Sequence[str]) -> None:
         for name in names:
-            found[name] = []
-            search(
-                found[name],
-                name,
-                spaces[name].ranges,
-                spaces[name].neutral,
-                partial(_evaluated, settings, spaces[name], runner),
-                folder,
-                seed=settings.seed,
-                generation=settings.generation,
-                total=total,
-            )
-            done = sum(map(len, found.values()))
-            if runner.bar.n < done:  # episodes of an earlier process
-                runner.bar.update(done - runner.bar.n)
+            while len(found[name]) < total:
+                found[name] += next(searches[name])
 
     interrupted = False
     try:
@@ -334,7 +318,11 @@ def _evaluated(
 ) -> list[Outcome]:
     """Return the outcomes of variations of one scenario, given their parameters by number."""
     runner.bar.set_postfix_str(space.template.name)
-    records = runner.run([settings.job(space.scenario(values)) for values in trials.values()])
+    points = list(trials.values())
+    records = runner.run(
+        [json.dumps([space.template.name, each], sort_keys=True) for each in points],
+        lambda row: settings.job(space.scenario(points[row])),
+    )
     return [
         Outcome(
             score(record, everybody=settings.unsafe_no_floor),
@@ -345,26 +333,20 @@ def _evaluated(
 
 
 def search(
-    found: list[SearchedEpisode],
     name: str,
     ranges: Mapping[str, Range],
     neutral: ParameterValues,
-    evaluate: Callable[[Mapping[int, ParameterValues]], Sequence[Outcome]],
-    folder: Path,
+    evaluate: Evaluate,
     *,
     seed: int,
     generation: int,
-    total: int,
-) -> None:
-    """Search one scenario for the smallest score, or continue, up to a number of episodes.
+) -> Iterator[list[SearchedEpisode]]:
+    """Search one scenario for the smallest score; yield generation after generation, without end.
 
     The first round starts at ``neutral``, the scenario as written; later ones at points drawn from
-    the seed. Each has a study in the folder. ``total`` is a multiple of the generation. All
-    episodes, also those of earlier searches, are added to the empty list ``found`` in the order in
-    which they were proposed; an exception such as an interruption leaves those so far there.
+    the seed.
     """
-    round_ = 0
-    while len(found) < total:
+    for round_ in count():
         rng = np.random.default_rng([seed, zlib.crc32(name.encode()), round_])
         start = dict(neutral)
         if round_ > 0:
@@ -381,20 +363,18 @@ def search(
             first=start,
             spread=_FIRST_SPREAD if round_ == 0 else _LATER_SPREAD,
         )
-        most = total - len(found)
-        study = SharedStudy(folder / "studies" / f"{name}-{round_:02d}.log", optimizer, most)
-        try:
-            while len(trials := study.trials()) < most and not _has_converged(trials, generation):
-                study.evaluate(generation, evaluate)
-        finally:
-            found += [SearchedEpisode(name, round_, trial) for trial in study.trials()]
-        round_ += 1
+        trials: list[Trial] = []
+        for each in optimizer.generations(evaluate):
+            trials += each
+            yield [SearchedEpisode(name, round_, trial) for trial in each]
+            if _has_converged(trials, generation):
+                break
 
 
 def _has_converged(trials: Sequence[Trial], generation: int) -> bool:
     """Return whether the last generations of a round brought almost no progress."""
     whole = len(trials) // generation
-    if len(trials) % generation or whole < _LEAST_GENERATIONS:
+    if whole < _LEAST_GENERATIONS:
         return False
     values = np.array([trial.outcome.value for trial in trials], dtype=np.float64)
     best = values.reshape(whole, generation).min(axis=1)

@@ -28,10 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Words and unit of each figure.
-_LABELS: Final = {
-    OBJECTIVE: ("time lost", " s"),
-    RISK: (RISK_WORDS, ""),
-}
+_LABELS: Final = {OBJECTIVE: ("time lost", " s"), RISK: (RISK_WORDS, "")}
 _TRIAL: Final = "#9aa3ad"
 _WITHIN: Final = "#1f5fa8"
 _CONTACT: Final = "#b3261e"
@@ -133,10 +130,7 @@ def write_tuning(tuning: Tuning, folder: Path) -> None:
             "tuning_seeds": _ends(tuning.settings.tuning_seeds),
             "held_out_seeds": _ends(tuning.settings.held_out_seeds),
             "base": base.name,
-            "risk": {
-                "tuning": round(tuning.risk, 6),
-                "held_out": round(tuning.held_out_risk, 6),
-            },
+            "risk": {"tuning": round(tuning.risk, 6), "held_out": round(tuning.held_out_risk, 6)},
             "beats_base": None if tuning.winner is None else tuning.winner.trial,
             "verdict": verdict_text(tuning),
             "policies": [_figures(tuning, each) for each in rows],

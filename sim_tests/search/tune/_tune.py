@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, cast
-
-import filelock
 
 from awarenav.errors import counted
 from nav_adapter import AwarenessPolicy
@@ -16,11 +16,11 @@ from ...conditions import Perception
 from ...crossing import named_policy
 from ...scenario import ScenarioTemplate
 from ...study.frontier import TODAY, sensors_of_today
-from ...study.measures import EpisodeRecord, Interval, read_records, write_records
+from ...study.measures import Interval
 from ...study.runs import Job, plan_jobs, policy_of
 from ...world.errors import SimError
-from .._settings import EpisodeRunner, SearchSettings, write_or_check_settings
-from .._study import Optimizer, Outcome, ParameterValues, SamplerName, SharedStudy, Trial
+from .._settings import EpisodeRunner, SearchSettings, search_folder
+from .._study import Optimizer, Outcome, ParameterValues, SamplerName, Trial
 from ._evaluation import (
     BEATS_BASE,
     OBJECTIVE,
@@ -38,10 +38,7 @@ from ._evaluation import (
 from ._policy_space import PolicyRange, PolicySpace
 
 _SETTINGS_FILE: Final = "tune.json"
-_RESULTS: Final = (
-    *("evaluations/*.csv", "evaluations/.*.lock", "trials.csv", "importances.json"),
-    *("chosen.json", "chosen/*.yaml", "tuning.png"),
-)
+_RESULTS: Final = ("trials.csv", "importances.json", "chosen.json", "chosen/*.yaml", "tuning.png")
 # Distance from the first tuning seed to the first held-out seed.
 _HELD_OUT_OFFSET: Final = 1_000_000
 # Evaluated beside the trials.
@@ -205,14 +202,14 @@ def tune(
     overwrite: bool = False,
     report: Callable[[Tuning], None] = lambda tuning: None,
 ) -> Tuning:
-    """Search until all trials are finished, by this or other processes.
+    """Search until all trials are finished.
 
     The folder is made when missing. The result does not depend on the number of workers. It is
-    given to ``report`` while no other process reports in the folder.
+    given to ``report`` while the folder is held.
 
     Raises:
-        SimError: settings that do not fit together, a preset with an episode without a result, or
-            no trial with one.
+        SimError: settings that do not fit together, another process that works in the folder, a
+            preset with an episode without a result, or no trial with one.
     """
     base = policy_of(settings.policy)
     ranges = {key: PolicyRange.model_validate(each) for key, each in settings.ranges.items()}
@@ -227,7 +224,7 @@ def tune(
     # Refuses what cannot be run.
     settings.jobs(settings.policy_name, base, settings.tuning_seeds, settings.templates)
     anchors = _anchors(settings.policy_name, base)
-    write_or_check_settings(
+    held = search_folder(
         settings,
         folder / _SETTINGS_FILE,
         "tuning",
@@ -236,18 +233,16 @@ def tune(
         results=_RESULTS,
         may_grow=["trials", "held_out"],
     )
-    study = SharedStudy(folder / "study.log", optimizer, settings.trials)
-    with EpisodeRunner(workers, "tune") as runner:
-        race = _Race(settings, folder, runner, space, anchors)
-        runner.bar.total = race.planned_episodes(len(study.trials()))
-        race.run_anchors()
-        while len(done := study.trials()) < settings.trials:
-            runner.bar.set_postfix_str(f"{len(done)} of {counted(settings.trials, 'trial')}")
-            study.evaluate(1, race.outcomes)
-        runner.bar.set_postfix_str("held-out seeds")
-        tuning = race.result(done)
-        runner.bar.total = runner.bar.n  # some episodes were known before, some trials dropped
-    with filelock.FileLock(folder / "evaluations" / ".report.lock"):  # several may end at once
+    with held:
+        with EpisodeRunner(folder, workers, "tune") as runner:
+            race = _Race(settings, runner, space, anchors)
+            runner.bar.total = race.planned_episodes
+            race.run_anchors()
+            generations = optimizer.generations(race.outcomes, settings.trials)
+            done = [trial for each in generations for trial in each]
+            runner.bar.set_postfix_str("held-out seeds")
+            tuning = race.result(done)
+            runner.bar.total = runner.bar.n  # some trials were dropped
         report(tuning)
     return tuning
 
@@ -268,21 +263,18 @@ class _Race:
     """Runs trials, each only as long as it does not lose to the base policy, and the finalists."""
 
     settings: TuneSettings
-    folder: Path
     runner: EpisodeRunner
     space: PolicySpace
     anchors: dict[str, AwarenessPolicy]
     tuned: dict[str, Evaluation] = field(default_factory=dict)
 
-    def planned_episodes(self, finished_trials: int) -> int:
-        """Return the number of episodes that are left at most."""
-        settings = self.settings
+    @property
+    def planned_episodes(self) -> int:
+        """The number of episodes at most."""
+        settings, anchors = self.settings, len(self.anchors)
         per_trial = settings.episodes * len(settings.tuning_templates)
         per_held_out = settings.held_out * len(settings.scenarios)
-        left = settings.trials - finished_trials
-        return per_trial * (left + len(self.anchors)) + per_held_out * (
-            len(self.anchors) + len(PLACES)
-        )
+        return per_trial * (settings.trials + anchors) + per_held_out * (anchors + len(PLACES))
 
     def run_anchors(self) -> None:
         """Evaluate the base policy and the presets on the tuning seeds."""
@@ -292,7 +284,7 @@ class _Race:
 
     def outcomes(self, trials: Mapping[int, ParameterValues]) -> list[Outcome]:
         """Return the outcomes of trials, given their parameters by number."""
-        return [self._outcome(_label(number), values) for number, values in trials.items()]
+        return [self._outcome(number, values) for number, values in trials.items()]
 
     def result(self, trials: Sequence[Trial]) -> Tuning:
         """Return the result of a finished study; runs the held-out seeds."""
@@ -344,8 +336,9 @@ class _Race:
         tuned, held_out = self._tuned(label, policy), self._held_out(label, policy)
         return Candidate(names, trial.number, policy, tuned, held_out)
 
-    def _outcome(self, label: str, parameters: ParameterValues) -> Outcome:
+    def _outcome(self, number: int, parameters: ParameterValues) -> Outcome:
         settings, base = self.settings, self.tuned[self.settings.policy_name]
+        self.runner.bar.set_postfix_str(f"{number} of {counted(settings.trials, 'trial')}")
         policy = self.space.policy(parameters)
         evaluation = Evaluation(())
         reason: Dropped = ""
@@ -353,7 +346,7 @@ class _Race:
             evaluation = self.tuned[anchor]
         else:
             for seeds in stages(settings.tuning_seeds):
-                part = self._evaluate(label, policy, seeds, settings.tuning_templates)
+                part = self._evaluate(_label(number), policy, seeds, settings.tuning_templates)
                 if part.errors:
                     # Episodes without a result must not make a policy look better.
                     return Outcome(None, notes={"error": part.errors[0]})
@@ -410,31 +403,10 @@ class _Race:
         seeds: range,
         templates: Sequence[ScenarioTemplate],
     ) -> Evaluation:
-        """Return the evaluation of a policy, from a file if this or another process has run it."""
-        path = self.folder / "evaluations" / f"{name}-{seeds[0]}-{seeds[-1]}.csv"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with filelock.FileLock(path.with_name(f".{path.stem}.lock")):  # freed if its process dies
-            if path.exists():
-                return Evaluation.of(kept_records(path, name, seeds, len(templates)))
-            records = self.runner.run(self.settings.jobs(name, policy, seeds, templates))
-            if not any(record.error for record in records):
-                write_records(path, records)
-        return Evaluation.of(records)
-
-
-def kept_records(
-    path: Path, name: str, seeds: Sequence[int], scenarios: int
-) -> tuple[EpisodeRecord, ...]:
-    """Return the records of an evaluation's file; raise SimError for one of other episodes."""
-    records = read_records(path)
-    episodes = {(record.scenario, record.seed) for record in records}
-    if len(records) == len(episodes) == len(seeds) * scenarios and all(
-        record.policy == name and record.seed in seeds for record in records
-    ):
-        return records
-    raise SimError(
-        f"{path} holds other episodes than those of {name}: move it away, and they run again"
-    )
+        jobs = self.settings.jobs(name, policy, seeds, templates)
+        texts = (json.dumps(asdict(job), sort_keys=True) for job in jobs)
+        keys = [hashlib.sha256(text.encode()).hexdigest() for text in texts]
+        return Evaluation.of(self.runner.run(keys, jobs.__getitem__))
 
 
 def _label(number: int) -> str:

@@ -280,8 +280,7 @@ def _worth(points: Sequence[Point], means: _Means, n: int) -> tuple[Worth, ...]:
         won = np.array([_won(means, row, line, column) for row in range(len(means.lost_s))])
         found.append(
             Worth(
-                point.member,
-                *(resampled_interval(float(each[0]), each[1:], n) for each in won.T),
+                point.member, *(resampled_interval(float(each[0]), each[1:], n) for each in won.T)
             )
         )
     return tuple(found)

@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._awareness import (
-        ATTENTION_WITHIN_M,
-        ATTENTIVE_FROM,
-        UNAWARE_UP_TO,
-        MeasuredAttention,
-    )
+    from ._awareness import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNAWARE_UP_TO, MeasuredAttention
     from ._driving import (
         OVERSHOOT_MPS,
         Conduct,

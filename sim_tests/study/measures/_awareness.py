@@ -159,9 +159,7 @@ class MeasuredAttention:
             return np.asarray(steps_s @ condition[:-1].astype(np.float64))
 
         return cls(
-            seconds(matters),
-            seconds(matters & trace.looking),
-            seconds(matters & trace.looks),
+            seconds(matters), seconds(matters & trace.looking), seconds(matters & trace.looks)
         )
 
     @property

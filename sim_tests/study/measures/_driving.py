@@ -108,10 +108,7 @@ def peak_deceleration_and_jerk(
     speed = np.linalg.norm(velocity[whole], axis=1)
     moving = speed > 0.0
     deceleration = -np.sum(slope * velocity[whole], axis=1)[moving] / speed[moving]
-    return (
-        float(deceleration.max(initial=0.0)),
-        float(np.linalg.norm(curvature, axis=1).max()),
-    )
+    return (float(deceleration.max(initial=0.0)), float(np.linalg.norm(curvature, axis=1).max()))
 
 
 def _derivative_weights(window: int, order: int, dt_s: float) -> FloatArray:

@@ -28,12 +28,7 @@ if TYPE_CHECKING:
 DECIMALS: Final = 6
 #: Columns of ``episodes.csv`` in their order.
 RECORD_COLUMNS: Final = tuple(COLUMNS)
-_TYPES: Final[dict[Kind, Any]] = {
-    "text": str,
-    "flag": bool,
-    "count": int,
-    "number": float | None,
-}
+_TYPES: Final[dict[Kind, Any]] = {"text": str, "flag": bool, "count": int, "number": float | None}
 _PARQUET: Final = ".parquet"
 #: Columns of earlier versions, which took a head that faces the robot for a look: not read.
 BY_THE_CONE: Final = frozenset(

@@ -177,11 +177,7 @@ class _Starts:
     """
 
     def __init__(
-        self,
-        trace: Trace,
-        instants: NDArray[np.intp],
-        robot: RobotProfile,
-        model: StepOut,
+        self, trace: Trace, instants: NDArray[np.intp], robot: RobotProfile, model: StepOut
     ) -> None:
         self._robot, self._model = robot, model
         self._outline = Outline(robot.footprint_m)

@@ -39,8 +39,7 @@ def summary_text(summary: Summary, notes: Iterable[str] = ()) -> str:
     if summary.comparisons:
         blocks.append(
             _titled(
-                "Pairs of the same scenario and seed",
-                _table(summary.comparisons, _COMPARISONS, 3),
+                "Pairs of the same scenario and seed", _table(summary.comparisons, _COMPARISONS, 3)
             )
         )
     for title, rows in (

@@ -17,10 +17,7 @@ from nav_adapter import AwarenessPolicy
 from ...conditions import ORACLE, REFERENCE_PLANNER
 from ...scenario import ScenarioTemplate
 from ...world.errors import SimError
-from ..measures import (
-    BASELINE,
-    EpisodeRecord,
-)
+from ..measures import BASELINE, EpisodeRecord
 from ..runs import Job, plan_jobs, policy_of, run_jobs, template_of
 from ._results import WIDE_KEY, Results, Run
 
@@ -104,11 +101,7 @@ def plan_comparison(
         if not given:
             raise SimError(f"{name} must be at least one, got none")
     wanted = dict.fromkeys(["", *("" if each == REFERENCE_PLANNER else each for each in planners)])
-    conditions |= {
-        "planners": list(wanted),
-        "perception": perception,
-        "sensors": (sensors,),
-    }
+    conditions |= {"planners": list(wanted), "perception": perception, "sensors": (sensors,)}
     main = plan_jobs(
         scenarios, [BASELINE, *(p for p in policies if p != BASELINE)], seeds, **conditions
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from awarenav.files import write_text
+from awarenav.files import markdown_table, write_text
 
 from ...world.errors import SimError, needs
 from ..measures import Interval, number_text
@@ -65,9 +65,7 @@ class Table:
 
     def markdown(self) -> str:
         """Return the table as Markdown."""
-        rows = [[cell.text.replace("|", r"\|") for cell in row] for row in self.cells]
-        lines = [list(self.columns), ["---"] * len(self.columns), *rows]
-        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        return markdown_table(list(self.columns), [[c.text for c in row] for row in self.cells])
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +115,7 @@ def write_page(
     )
     template = resources.files("sim_tests.study.report") / "page.html"
     page = environment.from_string(template.read_text("utf-8")).render(
-        title=title,
-        sections=sections,
-        lead=lead,
-        verdicts=verdicts,
-        notices=notices,
-        svg=Markup,
+        title=title, sections=sections, lead=lead, verdicts=verdicts, notices=notices, svg=Markup
     )
     write_text(path, page, SimError)
 

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING
 from perception.lazy import lazy_page
 
 if TYPE_CHECKING:
-    from ._episode import (
-        attempt,
-        died,
-        free_run_of,
-        observed_episode,
-        run_episode,
-        setup_of,
-    )
+    from ._episode import attempt, died, free_run_of, observed_episode, run_episode, setup_of
     from ._parallel import Workers, in_parallel, tidy
     from ._plan import (
         about_run,
@@ -28,13 +21,8 @@ if TYPE_CHECKING:
         sample_jobs,
         template_of,
     )
-    from ._replay import (
-        box_scale_of,
-        find_episode,
-        recorder_of,
-        replay_command,
-    )
-    from ._run import run_jobs, terminated_as_interrupted
+    from ._replay import box_scale_of, find_episode, recorder_of, replay_command
+    from ._run import held, run_jobs, terminated_as_interrupted
     from ._run_files import (
         Job,
         RunFiles,

@@ -123,8 +123,7 @@ def plan_jobs(
 
 
 def experiment_jobs(
-    experiment: Experiment,
-    policies: Sequence[str | tuple[str, AwarenessPolicy]] | None = None,
+    experiment: Experiment, policies: Sequence[str | tuple[str, AwarenessPolicy]] | None = None
 ) -> tuple[Job, ...]:
     """Return the episodes of a command; :func:`plan_jobs` names the errors."""
     first = experiment["seed"]

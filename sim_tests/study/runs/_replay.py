@@ -18,29 +18,11 @@ from awarenav.errors import counted
 from awarenav.video import VideoWriter
 
 from ...conditions import Perception, planner_name
-from ...crossing import (
-    CrossingFrame,
-    CrossingResult,
-    Observer,
-    Stage,
-    TopView,
-    camera_view,
-)
+from ...crossing import CrossingFrame, CrossingResult, Observer, Stage, TopView, camera_view
 from ...crossing.sensors import CameraSensor, sensor_class
-from ...viewing import (
-    CameraPictures,
-    CrossingRecorder,
-    outcome_text,
-    show_page,
-    write_page,
-)
+from ...viewing import CameraPictures, CrossingRecorder, outcome_text, show_page, write_page
 from ...world.errors import SimError
-from ..measures import (
-    RECORD_COLUMNS,
-    EpisodeRecord,
-    nondeterminism_notes,
-    record_row,
-)
+from ..measures import RECORD_COLUMNS, EpisodeRecord, nondeterminism_notes, record_row
 from ._episode import observed_episode
 from ._plan import template_of
 from ._run_files import Job, RunFiles, read_jobs, read_rows

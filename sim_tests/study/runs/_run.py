@@ -181,6 +181,25 @@ def _died(item: _Item, reason: str) -> Attempt:
     return died(item[0], reason)
 
 
+def held(folder: Path) -> filelock.BaseFileLock:
+    """Return the lock of a folder, which this process holds until it releases it or dies.
+
+    The folder is made when missing. Any thread of this process may release the lock.
+
+    Raises:
+        SimError: another process holds it, or the folder cannot be written.
+    """
+    lock = filelock.FileLock(folder / ".lock", thread_local=False)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock.acquire(blocking=False)
+    except filelock.Timeout as cause:
+        raise SimError(f"another process works in {folder}") from cause
+    except OSError as cause:
+        raise SimError(f"cannot write into {folder}: {cause.strerror or cause}") from cause
+    return lock
+
+
 @contextlib.contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
     """Let SIGTERM interrupt the block as Ctrl-C does."""
@@ -222,15 +241,7 @@ class RunFolder(AbstractContextManager["RunFolder"]):
         self._jobs = jobs
         self._about = about
         self.done: dict[int, Attempt] = {}
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            # Any thread of this process may release the lock; a process that dies releases it.
-            self._lock = filelock.FileLock(self._files.lock, thread_local=False)
-            self._lock.acquire(blocking=False)
-        except filelock.Timeout as cause:
-            raise SimError(f"another process is running episodes into {path}") from cause
-        except OSError as cause:
-            raise SimError(f"cannot run into {path}: {cause.strerror or cause}") from cause
+        self._lock = held(path)
         try:
             if resume:
                 self._refuse_another_run()

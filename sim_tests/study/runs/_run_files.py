@@ -10,9 +10,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
-from perception.documents import parse_json, parse_yaml, read_json, read_lines
+from perception.documents import parse_json, read_json, read_lines
 
-from ...conditions import REFERENCE_IN_TABLES, Conditions
+from ...conditions import Conditions
 from ...world.errors import SimError
 from ..measures import Conduct, EpisodeRecord, read_records
 
@@ -81,7 +81,6 @@ class RunFiles:
         replays: the folder of videos, maps and pages of episodes that were replayed.
         social: the table of ``awarenav measures``, one row per episode.
         exports: the folder of episodes in the formats of other projects.
-        lock: the lock file of the process that runs episodes into the folder.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -95,7 +94,6 @@ class RunFiles:
         self.replays = folder / "replays"
         self.social = folder / "social.csv"
         self.exports = folder / "exports"
-        self.lock = folder / ".lock"
 
     def episode(self, number: int) -> Path:
         """Return the path of the file of an episode."""
@@ -120,32 +118,12 @@ def read_jobs(folder: Path) -> tuple[Job, ...]:
 def _parse_job(line: str | bytes, source: str) -> Job:
     try:
         values = parse_json(line, source, SimError)
-        return Job(**(_of_earlier_line(values) if "policy_name" in values else values))
+        return Job(**values)
     except (ValueError, TypeError, KeyError) as cause:
         raise SimError(
             f"{source} is not an episode: it must be an object with the keys "
             f"{', '.join(JOB_FIELDS)} ({cause})"
         ) from cause
-
-
-def _of_earlier_line(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a job from a line whose keys are those of earlier versions."""
-    scenario = parse_yaml(values["scenario"], "its scenario", SimError)
-    planner = values["planner"]
-    straight = scenario["robot"].get("straight_on_speed_mps") is not None
-    return {
-        "scenario": scenario["name"],
-        "seed": values["seed"],
-        "policy": values["policy_name"],
-        "planner": planner.rpartition(":")[2]
-        or ("StraightOn" if straight else REFERENCE_IN_TABLES),
-        "perception": values["perception"],
-        "fault": values["fault_name"],
-        "scenario_text": values["scenario"],
-        "policy_text": values["policy"],
-        "planner_text": planner,
-        "fault_text": values["fault"],
-    }
 
 
 def read_run(folder: Path) -> dict[str, Any]:

@@ -21,13 +21,7 @@ from ...scenario.catalogue import (
     template_problems,
 )
 from ...world.errors import MissingSimulatorError, SimError
-from ..measures import (
-    ATTENTION_WITHIN_M,
-    ATTENTIVE_FROM,
-    UNAWARE_UP_TO,
-    MeasuredAttention,
-    Trace,
-)
+from ..measures import ATTENTION_WITHIN_M, ATTENTIVE_FROM, UNAWARE_UP_TO, MeasuredAttention, Trace
 
 if TYPE_CHECKING:
     from ...crossing import CrossingResult

@@ -159,10 +159,7 @@ def from_recording(
     forces them off. Positions stay as recorded. Without --robot-id, --start and --goal the robot
     drives along the longer side of the floor.
     """
-    from ...scenario.recordings import (  # noqa: PLC0415 - help needs no scenarios
-        RecordingOptions,
-        scenario_from_recording,
-    )
+    from ...scenario.recordings import RecordingOptions, scenario_from_recording  # noqa: PLC0415 - help needs no scenarios
 
     chosen = RecordingOptions(react, robot_id, start, goal, from_s, until_s)
     made = scenario_from_recording(table, out, chosen)

@@ -36,11 +36,7 @@ Source = Literal["general", "HuNavSim", "SocNavGym", "NavWareSet"]
 Measure = Callable[[SocialEpisode], float | None]
 
 #: Hall's zones: from, up to but not including, metres.
-ZONES_M: Final = {
-    "intimate": (-np.inf, 0.45),
-    "personal": (0.45, 1.2),
-    "social": (1.2, 3.6),
-}
+ZONES_M: Final = {"intimate": (-np.inf, 0.45), "personal": (0.45, 1.2), "social": (1.2, 3.6)}
 #: SocNavGym's and SEAN's personal space, from the robot's surface to a person's centre.
 GYM_PERSONAL_SPACE_M: Final = 0.45
 #: NavWareSet's personal space, and what its text takes off the distance between the centres.

@@ -317,10 +317,7 @@ LIGHTINGS: Final[dict[str, Lighting]] = {
         direction_odom=(9.0, -2.5, 3.0), colour_rgb=(1.0, 0.99, 0.95), ambient=0.46, diffuse=0.58
     ),
     "low_sun": Lighting(
-        direction_odom=(-4.0, -5.0, 5.5),
-        colour_rgb=(1.0, 0.93, 0.80),
-        ambient=0.44,
-        diffuse=0.60,
+        direction_odom=(-4.0, -5.0, 5.5), colour_rgb=(1.0, 0.93, 0.80), ambient=0.44, diffuse=0.60
     ),
     "dim_evening": Lighting(
         direction_odom=(-2.0, -3.0, 8.0), colour_rgb=(1.0, 0.95, 0.86), ambient=0.40, diffuse=0.36

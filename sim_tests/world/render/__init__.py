@@ -2,14 +2,6 @@
 
 from __future__ import annotations
 
-from ._backend import (
-    RENDERERS,
-    Drawing,
-    RendererName,
-    RenderView,
-    box_corners,
-    in_view,
-    to_camera,
-)
+from ._backend import RENDERERS, Drawing, RendererName, RenderView, box_corners, in_view, to_camera
 from ._backend_gl import gl_works
 from ._visuals import VisualActor, Visuals

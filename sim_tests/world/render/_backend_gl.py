@@ -122,9 +122,7 @@ class GlBackend(RenderBackend):
                 self._context.buffer(mesh.indices.astype(np.int32).tobytes()),
             )
             array = self._context.vertex_array(
-                self._program,
-                [(buffers[0], "3f 3f 2f", "position", "normal", "uv")],
-                buffers[1],
+                self._program, [(buffers[0], "3f 3f 2f", "position", "normal", "uv")], buffers[1]
             )
         surface = self._textures[texture or 0]
         self._bodies.append(_Body(array, buffers, colour, surface, np.eye(4)))

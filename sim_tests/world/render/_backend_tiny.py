@@ -226,10 +226,7 @@ def cut_texture(
     ):
         sheet[y : y + v1 - v0, x : x + u1 - u0] = texture[v0:v1, u0:u1]
     moved = texels + (corner - first)[rectangle_of.ravel()[island]]
-    return (
-        np.stack([moved[:, 0] / sheet_width, 1.0 - moved[:, 1] / sheet_height], axis=1),
-        sheet,
-    )
+    return (np.stack([moved[:, 0] / sheet_width, 1.0 - moved[:, 1] / sheet_height], axis=1), sheet)
 
 
 def _islands(vertices: int, indices: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -10,12 +10,7 @@ import pytest
 
 from nav_adapter import RobotState
 from sim_tests import SimError
-from sim_tests.actors.robot import (
-    CAMERA_FORWARD_M,
-    CAMERA_HEIGHT_M,
-    NOVA_CARTER,
-    Amr,
-)
+from sim_tests.actors.robot import CAMERA_FORWARD_M, CAMERA_HEIGHT_M, NOVA_CARTER, Amr
 from sim_tests.world import Warehouse
 from sim_tests.world.bullet import pybullet
 from sim_tests.world.hall import WarehouseLayout

@@ -10,14 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from worker_looks import LOOKS, slip_m
 
-from sim_tests.actors.body import (
-    JOINTS,
-    Gait,
-    OnlineFootsteps,
-    load_worker,
-    skeleton,
-    worker_names,
-)
+from sim_tests.actors.body import JOINTS, Gait, OnlineFootsteps, load_worker, skeleton, worker_names
 from sim_tests.actors.body._footsteps import steady_walk
 from sim_tests.actors.body._skeleton import Skeleton
 

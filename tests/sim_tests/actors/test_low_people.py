@@ -12,13 +12,7 @@ from worker_looks import LOOKS
 
 from perception import layouts as kp
 from sim_tests import SimError
-from sim_tests.actors.behaviour import (
-    MovingBody,
-    Person,
-    PersonSpec,
-    RobotBody,
-    Surroundings,
-)
+from sim_tests.actors.behaviour import MovingBody, Person, PersonSpec, RobotBody, Surroundings
 from sim_tests.actors.body import (
     KNEELING_EYE_HEIGHT_SHARE,
     SEATED_EYE_HEIGHT_SHARE,
@@ -35,10 +29,7 @@ from sim_tests.world.sightlines import cut_surfaces
 NO_BOXES = np.empty((0, 4))
 HEADING_RAD = 0.7
 PLACE_M = np.array([1.0, -2.0])
-SHINS = (
-    (kp.LEFT_HIP, kp.LEFT_KNEE, kp.LEFT_ANKLE),
-    (kp.RIGHT_HIP, kp.RIGHT_KNEE, kp.RIGHT_ANKLE),
-)
+SHINS = ((kp.LEFT_HIP, kp.LEFT_KNEE, kp.LEFT_ANKLE), (kp.RIGHT_HIP, kp.RIGHT_KNEE, kp.RIGHT_ANKLE))
 
 
 def seated(hall: Warehouse, look: str, stature_m: float | None = None, **seat: str) -> Worker:

@@ -7,14 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_tests.actors.behaviour import (
-    Heard,
-    Person,
-    PersonSpec,
-    RobotBody,
-    Surroundings,
-    habits_of,
-)
+from sim_tests.actors.behaviour import Heard, Person, PersonSpec, RobotBody, Surroundings, habits_of
 
 DT_S = 0.05
 NO_BOXES = np.empty((0, 4))

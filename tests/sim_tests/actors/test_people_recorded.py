@@ -18,7 +18,7 @@ from sim_tests.actors.behaviour import (
     Surroundings,
     read_recordings,
 )
-from sim_tests.crossing._people import recorded_people
+from sim_tests.crossing._stage import recorded_people
 
 NO_BOXES = np.empty((0, 4))
 TABLE = """t_s, id, x_m, y_m, heading_rad, head_yaw_rad

@@ -243,10 +243,7 @@ def test_somebody_who_is_blocked_is_later_by_every_second():
 
 @pytest.mark.parametrize(
     "fields",
-    [
-        {},
-        {"start_s": 1.0, "turns_back_at_m": 4.0, "pauses": [{"at_m": 6.0, "for_s": 3.0}]},
-    ],
+    [{}, {"start_s": 1.0, "turns_back_at_m": 4.0, "pauses": [{"at_m": 6.0, "for_s": 3.0}]}],
 )
 def test_somebody_who_walks_alone_is_never_late(fields):
     route = [{"x_m": 0.0, "y_m": 0.0}, {"x_m": 6.0, "y_m": 0.0}]

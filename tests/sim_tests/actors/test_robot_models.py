@@ -17,11 +17,7 @@ from pydantic import ValidationError
 from nav_adapter import RobotProfile
 from nav_adapter.ros2 import CameraMount
 from sim_tests import NOVA_CARTER, SimError, Warehouse, Worker
-from sim_tests.actors.robot import (
-    KinematicRobot,
-    RobotModel,
-    shipped_robots,
-)
+from sim_tests.actors.robot import KinematicRobot, RobotModel, shipped_robots
 from sim_tests.world.hall import WarehouseLayout
 
 KINEMATIC = [name for name in shipped_robots() if name != "nova_carter"]

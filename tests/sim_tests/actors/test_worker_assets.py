@@ -10,12 +10,7 @@ from worker_looks import LOOKS
 
 from perception.anthropometry import HEAD_KEYPOINTS, HEAD_TEMPLATE_M, LIMBS, MEAN_STATURE_M
 from perception.arrays import FloatArray
-from sim_tests.actors.body import (
-    JOINTS,
-    WorkerAsset,
-    load_worker,
-    worker_names,
-)
+from sim_tests.actors.body import JOINTS, WorkerAsset, load_worker, worker_names
 
 NAMES = worker_names()
 LEGS = [JOINTS.index(f"{side}_hip") for side in ("left", "right")]

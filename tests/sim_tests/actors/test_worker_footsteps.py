@@ -14,13 +14,7 @@ from scipy.ndimage import uniform_filter1d
 from worker_looks import slip_m
 
 from perception import layouts as kp
-from sim_tests.actors.behaviour import (
-    ALONE,
-    Person,
-    PersonSpec,
-    RecordedPath,
-    Track,
-)
+from sim_tests.actors.behaviour import ALONE, Person, PersonSpec, RecordedPath, Track
 from sim_tests.actors.body import JOINTS, Worker
 
 HZ = 40.0
@@ -120,8 +114,7 @@ def _simulate(worker: Worker, walk: RecordedPath) -> tuple[np.ndarray, np.ndarra
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=() if name in ALWAYS else pytest.mark.full) for name in WALKS],
+    "name", [pytest.param(name, marks=() if name in ALWAYS else pytest.mark.full) for name in WALKS]
 )
 def test_stance_feet_stay_where_they_landed(workers: dict[str, Worker], name: str) -> None:
     """No sole slides, sinks or floats, the legs reach the feet, and no keypoint jumps."""

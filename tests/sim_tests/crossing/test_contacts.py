@@ -220,7 +220,7 @@ def test_people_who_are_away_change_no_row(tmp_path) -> None:
     assert found.min_separation_m is found.step_out_never is None
 
 
-@pytest.mark.parametrize("perception", ["truth", "scanner"])
+@pytest.mark.parametrize("perception", ["truth", pytest.param("scanner", marks=pytest.mark.full)])
 def test_somebody_with_a_phone_is_touched_before_they_notice_whatever_the_cone_says(
     perception: str,
 ) -> None:

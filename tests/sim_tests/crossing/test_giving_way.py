@@ -24,10 +24,7 @@ Person = tuple[float, float, float, float]
 PLACE_M = 0.5
 
 people = st.tuples(
-    st.floats(-3.0, 12.0),
-    st.floats(-6.0, 6.0),
-    st.floats(-2.0, 2.0),
-    st.floats(-2.0, 2.0),
+    st.floats(-3.0, 12.0), st.floats(-6.0, 6.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)
 )
 ways = st.builds(
     Way,

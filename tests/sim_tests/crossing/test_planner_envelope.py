@@ -8,15 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planner_scenes import (
-    AISLE,
-    DT_S,
-    ROUNDING,
-    constraints,
-    coordinate,
-    drive,
-    person_data,
-)
+from planner_scenes import AISLE, DT_S, ROUNDING, constraints, coordinate, drive, person_data
 
 from nav_adapter import NavConstraints, RobotProfile, RobotState
 from sim_tests.actors.robot import NOVA_CARTER

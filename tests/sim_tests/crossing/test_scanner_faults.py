@@ -10,7 +10,7 @@ from perception import Camera
 from perception.laser import LaserScan, RobotMotion
 from sim_tests import Scenario, run_crossing
 from sim_tests.crossing.faults import EpisodeFaults, Fault, shipped_faults
-from sim_tests.crossing.faults._false_returns import (
+from sim_tests.crossing.faults._scans import (
     Legs,
     Mirror,
     new_legs,

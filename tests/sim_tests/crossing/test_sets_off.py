@@ -36,11 +36,7 @@ SETS_OFF = scene(
         "speed_mps": 1.43,
         "heading_deg": -161.0,
         "social": False,
-        "glances": {
-            "watches": True,
-            "first_glance_delay_s": 0.15,
-            "notices_within_m": 15.0,
-        },
+        "glances": {"watches": True, "first_glance_delay_s": 0.15, "notices_within_m": 15.0},
         "lapse": {"after_look_s": 2.24, "looks_away": True, "halts": True},
     },
 )

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from awarenav.cli import main
-from sim_tests.demo import _lanes
+from sim_tests.demo import _demo, _lanes
 from sim_tests.demo._film import unaware_person
 from sim_tests.demo._lanes import (
     LANES,
@@ -86,23 +87,38 @@ def test_the_table_ends_with_impacts_never_noticed_and_of_all_people() -> None:
 
 
 @pytest.mark.slow
-def test_a_reported_row_can_be_measured_again() -> None:
-    seed = shown_seed(read_report()[1])
-    (reported,) = (row for row in read_report()[1] if (row.seed, row.lane) == (seed, "awarenav"))
-    run = run_lane(LANES[-1], seed)
-    assert run.row == reported
-    assert run.scenario.people[unaware_person(run.result)].activity == "phone"
+@pytest.mark.parametrize(
+    "driven",
+    [
+        pytest.param(LANES[-1:], id="awarenav"),
+        pytest.param(LANES, id="all", marks=pytest.mark.full),
+    ],
+)
+def test_the_command_measures_the_reported_row_again_and_says_which_file_to_open(
+    driven, tmp_path, capsys, monkeypatch
+) -> None:
+    """Robots that are not driven have their reported rows."""
+    _, reported = read_report()
+    runs = []
 
+    def run(lane, seed, observer=None):
+        if lane in driven:
+            runs.append(run_lane(lane, seed, observer))
+            return runs[-1]
+        (row,) = (row for row in reported if (row.seed, row.lane) == (seed, lane.name))
+        return SimpleNamespace(lane=lane, row=row)
 
-@pytest.mark.slow
-def test_the_command_prints_both_tables_and_which_file_to_open(tmp_path, capsys) -> None:
+    monkeypatch.setattr(_demo, "run_lane", run)
     out = tmp_path / "demo"
     assert main(["demo", "--no-video", "--json", "--out", str(out)]) == 0
     printed = capsys.readouterr()
     tables = json.loads(printed.out)
     assert [row["lane"] for row in tables["shown"]] == [lane.name for lane in LANES]
-    assert {row["seed"] for row in tables["shown"]} == {tables["seed"]}
+    assert {row["seed"] for row in tables["shown"]} == {tables["seed"]} == {shown_seed(reported)}
     assert len(tables["reported"]) == REPORTED * len(LANES)
+    assert tables["shown"][-1] in tables["reported"]
+    assert runs[-1].scenario.people[unaware_person(runs[-1].result)].activity == "phone"
+    assert len((out / "lanes.jsonl").read_text().splitlines()) == 1 + len(LANES)
     assert printed.err.splitlines()[-1] == f"Open {out / 'lanes.jsonl'}"
     assert max(map(len, printed.err.splitlines()[:-1])) <= 80
 

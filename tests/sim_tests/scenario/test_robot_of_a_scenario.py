@@ -5,11 +5,7 @@ import pytest
 
 from sim_tests import NOVA_CARTER, Scenario, ScenarioTemplate, shipped_scenarios
 from sim_tests.scenario import scenario_for_robot
-from sim_tests.scenario.catalogue import (
-    closest_approaches,
-    robot_plan,
-    scenario_problems,
-)
+from sim_tests.scenario.catalogue import closest_approaches, robot_plan, scenario_problems
 
 RACK = {"x_m": 2.0, "y_m": 0.0, "length_m": 1.0, "width_m": 1.0}
 

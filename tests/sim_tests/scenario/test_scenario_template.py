@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from perception.documents import yaml_text
 from sim_tests import Scenario, ScenarioTemplate, SimError, run_crossing, shipped_scenarios
 from sim_tests.scenario import read_distribution
 
@@ -185,19 +184,6 @@ def test_only_numbers_of_people_and_robot_may_be_distributions():
         ScenarioTemplate({**BASE, "duration_s": {"uniform": {"low": 10, "high": 20}}})
     varied = {**BASE, "robot": {"goal_x_m": {"choice": [10.0, 12.0]}}}
     assert {ScenarioTemplate(varied).for_seed(seed).robot.goal_x_m for seed in range(9)} == {10, 12}
-
-
-@pytest.mark.parametrize("start_s", [0.0, {"uniform": {"low": 0.0, "high": 1.0}}])
-def test_scripts_are_refused_with_the_way_to_convert_them(start_s, tmp_path):
-    old = {**BASE, "workers": [{"path": [{"t_s": start_s, "x_m": 3.0, "y_m": 1.0}]}]}
-    path = tmp_path / "old.yaml"
-    path.write_text(yaml_text(old))
-    for read in (ScenarioTemplate.from_yaml, Scenario.from_yaml):
-        with pytest.raises(SimError, match=r"old\.yaml: workers: .* under people: .* as route"):
-            read(path)
-    # Scenarios that were written with every key hold an empty list.
-    empty = ScenarioTemplate({**BASE, "workers": []})
-    assert empty.for_seed(2) == ScenarioTemplate(BASE).for_seed(2)
 
 
 def test_two_people_with_the_same_name_are_refused():

@@ -1,22 +1,25 @@
-"""A study in Optuna's journal: killed, resumed, shared, damaged, and always the same."""
+"""A search in generations, and its episodes: resumed, killed, damaged, and always the same."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-from pathlib import Path
+import itertools
 
 import numpy as np
 import pytest
 from full_disk import files_up_to
 
+from nav_adapter import AwarenessPolicy
 from sim_tests import SimError
-from sim_tests.search._study import Optimizer, Outcome, Range, SharedStudy, importances
+from sim_tests.search._settings import EpisodeRunner
+from sim_tests.search._study import Optimizer, Outcome, Range, importances
+from sim_tests.study.runs import job_of, policy_text
 
 SPACE = {"x": Range(low=-1.0, high=1.0), "y": Range(low=0.1, high=10.0, log=True)}
 FIRST = {"x": 5.0, "y": 1.0}
-TOTAL = 14
+# A robot that drives for two tenths of a second.
+SHORT = """{name: short, duration_s: 0.2, layout: open,
+  robot: {goal_x_m: 5.0, straight_on_speed_mps: 0.5}}"""
+POLICY = "balanced", policy_text(AwarenessPolicy.preset("balanced"))
 
 
 def optimizer(sampler: str = "tpe", generation: int = 4, seed: int = 3) -> Optimizer:
@@ -29,130 +32,65 @@ def outcome(parameters: dict[str, float], sampler: str = "tpe") -> Outcome:
     return Outcome(x * x + 0.1 * y, constraints, {"note": x})
 
 
-def outcomes(trials: dict[int, dict[str, float]]) -> list[Outcome]:
-    return [outcome(parameters) for parameters in trials.values()]
+def searched(total, made=outcome):
+    evaluate = optimizer().generations(lambda trials: list(map(made, trials.values())), total)
+    return list(itertools.chain(*evaluate))
 
 
-def study(folder: Path, total: int = TOTAL, **changes) -> SharedStudy:
-    return SharedStudy(folder / "s.log", optimizer(**changes), total)
+def test_a_search_with_more_trials_goes_on_from_one_with_fewer():
+    whole = searched(14)
+    assert [trial.number for trial in whole] == list(range(14))
+    assert searched(5) == whole[:5]
 
 
-def work(folder: Path, total: int = TOTAL, most: int = 1, die_at: int = -1) -> list:
-    """Evaluate all trials, ``most`` at once; kill this process in the middle of ``die_at``."""
-
-    def evaluated(trials):
-        if die_at in trials:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return outcomes(trials)
-
-    shared = study(folder, total)
-    while len(found := shared.trials()) < total:
-        shared.evaluate(most, evaluated)
-    return found
-
-
-def start(folder: Path, die_at: int = -1) -> multiprocessing.Process:
-    process = multiprocessing.get_context("fork").Process(
-        target=work, args=(folder,), kwargs={"die_at": die_at}
-    )
-    process.start()
-    return process
-
-
-@pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory):
-    return work(tmp_path_factory.mktemp("whole"))
-
-
-@pytest.mark.parametrize("die_at", [0, 6])
-def test_a_study_killed_and_resumed_is_the_same(tmp_path, uninterrupted, die_at):
-    killed = start(tmp_path, die_at)
-    killed.join()
-    assert killed.exitcode == -signal.SIGKILL
-    assert len(study(tmp_path).trials()) == die_at
-    assert work(tmp_path) == uninterrupted
-
-
-def test_two_processes_of_which_one_is_killed_make_the_same_study(tmp_path, uninterrupted):
-    killed, other = start(tmp_path, 5), start(tmp_path)
-    for process in (killed, other):
-        process.join()
-    # The first process dies only if it gets trial 5; the second one survives in any case.
-    assert killed.exitcode in (0, -signal.SIGKILL)
-    assert other.exitcode == 0
-    assert work(tmp_path) == uninterrupted
-
-
-@pytest.mark.parametrize("most", [3, 100])
-def test_several_trials_at_once_change_nothing(tmp_path, uninterrupted, most):
-    assert work(tmp_path, most=most) == uninterrupted
-
-
-def test_a_study_continues_with_more_trials(tmp_path, uninterrupted):
-    assert work(tmp_path, 5) == uninterrupted[:5]
-    assert work(tmp_path) == uninterrupted
-
-
-def test_processes_take_different_trials_until_only_those_of_others_are_left(
-    tmp_path, uninterrupted
-):
-    mine, theirs = study(tmp_path), study(tmp_path)
-    seen = []
-
-    def second(trials):
-        seen.append(list(trials))
-        return outcomes(trials)
-
-    def first(trials):
-        seen.append(list(trials))
-        theirs.evaluate(2, second)  # the generation has four
-        theirs.evaluate(1, second)  # nobody waits for a process that may have died
-        return outcomes(trials)
-
-    mine.evaluate(2, first)
-    assert seen == [[0, 1], [2, 3], [0]]
-    assert mine.trials() == theirs.trials() == uninterrupted[:4]
-    assert work(tmp_path) == uninterrupted
-
-
-def test_another_search_does_not_continue_a_study(tmp_path):
-    work(tmp_path, 5)
-    with pytest.raises(SimError, match=r"s\.log was made by another search"):
-        study(tmp_path, seed=4)
-
-
-def test_a_failed_trial_keeps_its_number_and_is_not_repeated(tmp_path):
-    shared = study(tmp_path, 8)
-    while len(shared.trials()) < 8:
-        shared.evaluate(
-            4, lambda trials: [Outcome(None if n == 2 else trials[n]["x"]) for n in trials]
-        )
-    values = [trial.outcome.value for trial in study(tmp_path, 8).trials()]
-    assert [row for row, value in enumerate(values) if value is None] == [2]
-    assert len(values) == 8
-
-
-def test_values_that_are_not_finite_are_refused(tmp_path):
+def test_a_failed_trial_keeps_its_number_and_a_value_is_finite():
+    values = iter([0.1, 0.2, None, 0.4, *[0.5] * 4])
+    found = [each.outcome.value for each in searched(8, lambda _: Outcome(next(values)))]
+    assert [row for row, value in enumerate(found) if value is None] == [2]
+    assert len(found) == 8
     with pytest.raises(SimError, match="trial 0: the value must be finite"):
-        study(tmp_path).evaluate(1, lambda trials: [Outcome(float("nan"))])
+        searched(4, lambda _: Outcome(float("nan")))
 
 
-def test_a_study_on_a_full_disk_is_said_and_continues(tmp_path, uninterrupted):
-    shared = study(tmp_path)
-    shared.evaluate(4, outcomes)
-    size = (tmp_path / "s.log").stat().st_size
-    with files_up_to(size + 500), pytest.raises(SimError, match=r"s\.log: .*--resume"):
-        shared.evaluate(4, outcomes)
-    assert not (tmp_path / "s.log").read_bytes().endswith(b"\n")
-    assert work(tmp_path) == uninterrupted
+def run(folder, keys):
+    """Return the seeds of the episodes, and the keys of those that ran now."""
+    ran = []
+
+    def job(place):
+        ran.append(keys[place])
+        seed = "abcdef".index(keys[place])
+        return job_of(SHORT, POLICY, "", seed=seed, perception="truth")
+
+    with EpisodeRunner(folder, 1, "test") as runner:
+        records = runner.run(keys, job)
+    assert not any(record.error for record in records)
+    return [record.seed for record in records], "".join(ran)
 
 
-def test_a_damaged_journal_is_refused_by_its_name(tmp_path):
-    work(tmp_path, 5)
-    lines = (tmp_path / "s.log").read_bytes().splitlines(keepends=True)
-    (tmp_path / "s.log").write_bytes(b"".join([*lines[:3], b"{torn", *lines[3:]]))
-    with pytest.raises(SimError, match=r"cannot use .*s\.log"):
-        study(tmp_path)
+def test_an_episode_runs_once_and_an_unfinished_line_runs_again(tmp_path):
+    assert run(tmp_path, "ba") == ([1, 0], "ba")
+    assert run(tmp_path, "cab") == ([2, 0, 1], "c")
+    file = tmp_path / "episodes.jsonl"
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-20])  # as a kill or a full disk leaves it
+    assert run(tmp_path, "abc") == ([0, 1, 2], "c")
+    assert file.read_bytes() == whole
+    with files_up_to(len(whole) + 50), pytest.raises(SimError, match="--resume continues"):
+        run(tmp_path, "abcd")
+    assert run(tmp_path, "abcd") == ([0, 1, 2, 3], "d")
+    file.write_bytes(whole.replace(b'"seed"', b'"sed"', 1))
+    with pytest.raises(SimError, match=r"episodes\.jsonl, line 1 is no episode"):
+        run(tmp_path, "a")
+
+
+def test_a_failed_episode_is_told_and_runs_again(tmp_path):
+    for _ in range(2):
+        with EpisodeRunner(tmp_path, 1, "test") as runner:
+            job = job_of(SHORT, POLICY, "no.such:Planner", seed=0, perception="truth")
+            (record,) = runner.run("a", lambda _, job=job: job)
+        assert "no.such" in record.error
+    assert not (tmp_path / "episodes.jsonl").exists()
+    assert run(tmp_path, "a") == ([0], "a")
 
 
 @pytest.mark.parametrize("sampler", ["tpe", "nsga2", "cmaes"])

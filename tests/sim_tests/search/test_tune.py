@@ -29,15 +29,9 @@ from sim_tests.search.tune._evaluation import (
     stages,
 )
 from sim_tests.search.tune._policy_space import PolicySpace, read_ranges, shipped_ranges
-from sim_tests.search.tune._tune import (
-    TuneSettings,
-    Tuning,
-    held_out_scenarios,
-    kept_records,
-    ranked_trials,
-)
+from sim_tests.search.tune._tune import TuneSettings, Tuning, held_out_scenarios, ranked_trials
 from sim_tests.search.tune._verdict import change_text, is_undecided, verdict_text
-from sim_tests.study.measures import EpisodeRecord, Interval, write_records
+from sim_tests.study.measures import EpisodeRecord, Interval
 
 PRESETS = ("blind", "conservative", "balanced", "assertive")
 SPACES = {name: PolicySpace(AwarenessPolicy.preset(name)) for name in PRESETS}
@@ -167,7 +161,7 @@ def test_stages_are_the_seeds_in_order_and_double_what_has_run(count, first):
     assert list(itertools.chain(*parts)) == list(seeds)
     done = list(itertools.accumulate(map(len, parts)))
     assert all(after == min(2 * before, count) for before, after in itertools.pairwise(done))
-    # More seeds keep the earlier parts, so that their files serve again.
+    # More seeds keep the earlier parts, so that their episodes serve again.
     assert list(stages(range(first, first + 2 * count)))[: len(parts) - 1] == parts[:-1]
 
 
@@ -203,19 +197,6 @@ def test_the_estimate_from_few_episodes_uses_the_base_policy_on_the_same():
         errors_s.append([part.estimate(base)[0], part.figures[0]])
     paired_s, plain_s = np.std(np.array(errors_s) - whole.figures[0], axis=0)
     assert paired_s < 0.3 * plain_s
-
-
-def test_an_evaluation_of_other_episodes_is_refused_by_its_name(tmp_path):
-    records = [EpisodeRecord("a", seed, "p", "q", "truth", success=True) for seed in range(3)]
-    path = tmp_path / "p-0-2.csv"
-    write_records(path, records)
-    assert kept_records(path, "p", range(3), 1) == tuple(records)
-    for kept, name in ((records[:2], "p"), (records, "other")):
-        write_records(path, kept)
-        with pytest.raises(
-            SimError, match=rf"p-0-2\.csv holds other episodes than those of {name}"
-        ):
-            kept_records(path, name, range(3), 1)
 
 
 def test_a_third_of_the_scenarios_is_held_out_of_every_kind_of_attention():

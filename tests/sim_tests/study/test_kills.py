@@ -24,7 +24,7 @@ COMMANDS = {
     ),
     "tune": (
         ["--trials", "4", "--generation", "2", "--episodes", "1", "--held-out", "1"],
-        ["trials.csv", "chosen.json", "importances.json", "chosen/*.yaml", "evaluations/*.csv"],
+        ["trials.csv", "chosen.json", "importances.json", "chosen/*.yaml", "episodes.jsonl"],
     ),
     "falsify": (
         ["--episodes", "8", "--generation", "4", "--worst", "2"],

@@ -9,11 +9,7 @@ from shapely.geometry import Point
 
 from nav_adapter import Alert, PersonObstacle
 from nav_adapter.alerts import Answer
-from sim_tests.study.measures import (
-    EpisodeRecord,
-    measure,
-    summarise,
-)
+from sim_tests.study.measures import EpisodeRecord, measure, summarise
 
 T_S = np.round(np.arange(0.0, 10.001, 0.05), 2)
 AHEAD, BESIDE = (6.0, 0.0), (6.0, 0.6)

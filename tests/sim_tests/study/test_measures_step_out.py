@@ -12,12 +12,7 @@ from measured_scenes import ACROSS_M, ALONG_M, BODY_RADIUS_M, crossing, straight
 from nav_adapter import RobotProfile
 from sim_tests import NOVA_CARTER
 from sim_tests.study.measures import Trace, measure
-from sim_tests.study.measures._step_out import (
-    FASTER_STEP_OUT,
-    STEP_OUT,
-    StepOut,
-    step_out_impacts,
-)
+from sim_tests.study.measures._step_out import FASTER_STEP_OUT, STEP_OUT, StepOut, step_out_impacts
 
 T_S = np.arange(0.0, 6.001, 0.05)
 BRIEF_S = np.array([0.0, 0.05, 0.1, 0.15])  # two instants of 0.1 s, of which the second lasts 0.05

@@ -18,12 +18,7 @@ from sim_tests.study.report._compare import plan_comparison
 from sim_tests.study.report._results import Results, Run
 from sim_tests.study.report._write import planners_section
 from sim_tests.study.report.command import command_line
-from sim_tests.study.runs import (
-    policy_of,
-    read_attempts,
-    read_jobs,
-    template_of,
-)
+from sim_tests.study.runs import policy_of, read_attempts, read_jobs, template_of
 
 SCENE = """
 name: beside

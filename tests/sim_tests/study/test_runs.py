@@ -207,7 +207,7 @@ def test_a_killed_process_leaves_its_episodes_and_no_workers(tmp_path):
             assert process.poll() is None
             time.sleep(0.01)
         # A second run into the same folder is refused.
-        with pytest.raises(SimError, match="another process is running"):
+        with pytest.raises(SimError, match="another process works in"):
             run_jobs(jobs, out, workers=1, resume=True)
         os.kill(process.pid, signal.SIGKILL)
     assert 0 < len(read_attempts(out)) < len(jobs)

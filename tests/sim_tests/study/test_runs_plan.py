@@ -7,10 +7,7 @@ from run_scenes import short, short_jobs
 from nav_adapter import NavError
 from sim_tests import SimError
 from sim_tests.conditions import ORACLE
-from sim_tests.study.runs import (
-    plan_jobs,
-    run_episode,
-)
+from sim_tests.study.runs import plan_jobs, run_episode
 
 
 def test_every_combination_is_planned_once_and_seeds_are_paired():

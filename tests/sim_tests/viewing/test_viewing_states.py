@@ -85,12 +85,7 @@ def test_boxes_are_drawn_where_the_person_is():
             ("none", lambda box: None, 1.0),
         ):
             drawn[name] = draw_camera_view(
-                picture,
-                camera,
-                with_boxes(frame, box),
-                stage,
-                box_scale=scale,
-                captions=False,
+                picture, camera, with_boxes(frame, box), stage, box_scale=scale, captions=False
             )
 
     scenario = ScenarioTemplate.from_text(SHORT).for_seed(0)

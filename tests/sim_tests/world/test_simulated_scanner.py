@@ -13,12 +13,7 @@ from perception.laser import RobotMotion, scan_points
 from sim_tests.actors.robot import Amr, RobotLook
 from sim_tests.world import Warehouse
 from sim_tests.world.hall import WarehouseLayout, box
-from sim_tests.world.scanner import (
-    DIAGONAL_SCANNERS,
-    ScannerSpec,
-    ScanScene,
-    SimulatedScanner,
-)
+from sim_tests.world.scanner import DIAGONAL_SCANNERS, ScannerSpec, ScanScene, SimulatedScanner
 from sim_tests.world.sightlines import PlacedSurface, TriangleSet
 from training.round_meshes import tube
 

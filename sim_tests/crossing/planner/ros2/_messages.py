@@ -125,9 +125,7 @@ def goal_pose(stamp_s: float, goal_m: Sequence[float], yaw_rad: float) -> PoseSt
     return PoseStamped(header(stamp_s, MAP), Pose(Point(x, y, 0.0), yaw_quaternion(yaw_rad)))
 
 
-def people_of(
-    message: People,
-) -> tuple[tuple[PersonObstacle, ...], tuple[PersonTrack, ...]]:
+def people_of(message: People) -> tuple[tuple[PersonObstacle, ...], tuple[PersonTrack, ...]]:
     """Return the people of an adapter outside as its obstacles, and as tracks where it has one.
 
     Their covariances are not in the message, and 0 in the tracks.
