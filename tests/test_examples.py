@@ -69,7 +69,7 @@ def test_a_planner_that_knows_the_limit_elsewhere_is_sooner_there_than_one_that_
         ]
         for each in (name, "crossing_person")
     )
-    assert planned[0] < straight_on[0] - 0.5  # time
+    assert planned[0] < straight_on[0] - 0.4  # time
     assert planned[1] > straight_on[1]  # gap
 
 
