@@ -168,7 +168,7 @@ class SpeedBasis:
                     )
                     for t in times
                 ]
-            if self.prediction is None and aware_for_s >= times[-1]:
+            if self.prediction is None and aware_for_s > times[-1]:
                 return ahead
         else:
             ahead = [self._unseen(present, person, t, is_shown, seen_s, age_s) for t in times]
@@ -183,7 +183,7 @@ class SpeedBasis:
             if not is_seen and now + time_s - seen_s > fresh_s:
                 sigmas = max(sigmas, margins.unseen_sigmas)
             a0, a1, a2 = reach.variances
-            if time_s > aware_for_s:
+            if time_s >= aware_for_s:
                 reach = reach.at_least(unaware_mps)
             rows.append(
                 known._replace(

@@ -47,8 +47,8 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
 
     For a solver that chooses v (m/s) and ω (rad/s). The region is convex and contains (0, 0):
     |v| at most the speed limit, |v| + |ω| R at most the limit of the fastest point, and |ω| at most
-    ``max_yaw_rate_radps`` of the robot's profile. For a robot that stands, |ω| R − v is at most
-    ``other_way_limit_mps``. Limits that are not there have no rows.
+    ``max_yaw_rate_radps`` of the robot's profile. For a robot that stands, |ω| (R + its width) − v
+    is at most ``other_way_limit_mps``. Limits that are not there have no rows.
 
     The twists of a robot that steers (``min_turning_radius_m``) are two cones, one for each
     direction of travel, and not convex together. The region then holds one of them.
@@ -69,9 +69,12 @@ def twist_envelope(constraints: NavConstraints, *, backward: bool = False) -> Fl
     if math.isfinite(highest_radps):
         rows += [[0.0, 1.0, -highest_radps], [0.0, -1.0, -highest_radps]]
     basis, other_mps = constraints.speed_basis, constraints.other_way_limit_mps
-    if basis is not None and other_mps < fastest_mps:
+    robot = constraints.robot
+    if basis is not None and robot is not None and other_mps < fastest_mps:
         if basis.velocity_base_mps is None:
-            rows += [[1.0, turn * radius_m, -other_mps] for turn in (1.0, -1.0)]
+            # A turn leads another way below v = |ω| · half the width; up to there, all is as slow.
+            turn_m = radius_m + 2.0 * robot.half_width_m
+            rows += [[1.0, sign * turn_m, -other_mps] for sign in (1.0, -1.0)]
         elif (forward_mps := basis.velocity_base_mps[0]) != 0.0:
             rows.append([math.copysign(1.0, forward_mps), 0.0, -other_mps])
     if (curve_m := _tightest_curve_m(constraints)) > 0.0:

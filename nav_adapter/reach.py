@@ -32,8 +32,10 @@ from typing import Any, Final, NamedTuple
 from perception.anthropometry import BODY_RADIUS_M
 from perception.matrices import larger_eigenvalue
 
-#: Speeds closer than this are equal: U may be the sum of another speed and the rest of theirs.
-SAME_MPS: Final = 1e-9
+# Speeds closer than this are equal: U may be the sum of another speed and the rest of theirs.
+_SAME_MPS: Final = 1e-9
+# Somebody slower than this stands, and sways.
+_SWAYS_MPS: Final = 0.1
 
 
 class Reach(NamedTuple):
@@ -74,10 +76,11 @@ class Reach(NamedTuple):
     keeps_s: float = 0.0
 
     @property
-    def walks_faster(self) -> bool:
-        """True if this person walks faster than U: walking on is not within the reach then."""
+    def may_walk_on(self) -> bool:
+        """True if walking on is not within the reach: by more than U, or with all the clearance."""
         walking_mps = math.hypot(self.velocity_x_mps, self.velocity_y_mps)
-        return walking_mps > self.speed_mps + SAME_MPS
+        least_mps = _SWAYS_MPS if self.within_m > 0.0 else self.speed_mps + _SAME_MPS
+        return walking_mps > least_mps
 
     def at_least(self, unaware_mps: float) -> Reach:
         """Return the reach of this person if they are unaware, with a U of at least this."""
@@ -87,13 +90,14 @@ class Reach(NamedTuple):
 
     def walking_on(self) -> Reach:
         """Return the reach of this person if they walk straight on while awareness lasts."""
-        # The place is as uncertain as now: the same people, unaware, must not come less far.
-        negative = self.variances[1] < 0.0
-        return self._replace(
-            speed_mps=0.0,
-            keeps_s=self.until_s,
-            variances=(0.0, 0.0, 0.0) if negative else self.variances,
-        )
+        a0, a1, a2 = variances = self.variances
+        if a1 < 0.0:
+            # The same people, unaware, must not come less far: the least of their variances.
+            least_s = (
+                min(-0.5 * a1 / a2, self.time_constant_s) if a2 > 0.0 else self.time_constant_s
+            )
+            variances = (max(a0 + least_s * (a1 + least_s * a2), 0.0), 0.0, 0.0)
+        return self._replace(speed_mps=0.0, keeps_s=self.until_s, variances=variances)
 
     def changes_s(self, ahead_s: float) -> float:
         """Return m, by which a u that may change carries the middle until ``ahead_s`` from now."""

@@ -142,14 +142,15 @@ class WalkingOn(_Reached):
     """The robot stands before somebody who keeps to their motion arrives, on any such course.
 
     They keep to it until what they know of the robot ends, and are unaware from then on.
-    It counts for people who walk faster than their U: walking on is not within their reach then.
+    It counts where walking on is not within their reach: for people who walk faster than their U,
+    and, with the whole clearance, for everybody else who has noticed the robot and walks.
     """
 
     name = "walking on"
 
     def reach(self, person: Known) -> Reach | None:
         """Return the way of the person, and what they may do once they are unaware."""
-        return person.reach.walking_on() if person.reach.walks_faster else None
+        return person.reach.walking_on() if person.reach.may_walk_on else None
 
 
 class FirstSight(_Reached):

@@ -42,6 +42,8 @@ _FORGETTING_S: Final = 3.0
 _HALF_S: Final = 0.5
 # A frame is a look if it is so certain, from 0 to 1, that α is at least that of no look: by 0.7 σ.
 _LOOK: Final = 0.5
+# Somebody who looks along their way shows so much less than such a gaze by chance, in σ.
+_BY_CHANCE_SIGMAS: Final = 2.5
 # Somebody who walks has a robot right ahead within this angle of their way: as far as a gaze that
 # rests on something may be off it.
 _AHEAD_TAN: Final = math.tan(math.radians(10.0))
@@ -207,8 +209,8 @@ def _shared_with_rivals(tracks: list[Track], match: Match) -> dict[int, tuple[fl
 def _look(track: Track, sight: Sight | None, step: Step) -> float:
     """Return, in [−1, 1], how certainly the frame shows a person who looks at the robot.
 
-    Below 0 it shows, as certainly, less than a gaze along the way: where somebody does look along
-    it, both come by chance, and are of no weight together.
+    Below 0 it shows, as certainly, less than a gaze along the way, but not surely another gaze:
+    where somebody does look along it, both come by chance, and are of no weight together.
     """
     if sight is None or sight.evidence is None or not step.sensor.settings.sees_faces:
         return 0.0
@@ -216,8 +218,10 @@ def _look(track: Track, sight: Sight | None, step: Step) -> float:
         return 0.0
     # In standard deviations above the α of no look; 2 Φ(σ) − 1.
     (mean, variance), least = sight.evidence, _no_look_logit(track, step)
-    certainty = math.erf(math.sqrt(0.5) * (mean - least) / math.sqrt(variance))
-    return certainty if certainty >= _LOOK or (certainty <= -_LOOK and least > 0.0) else 0.0
+    sigmas = (mean - least) / math.sqrt(variance)
+    certainty = math.erf(math.sqrt(0.5) * sigmas)
+    by_chance = least > 0.0 and sigmas >= -_BY_CHANCE_SIGMAS
+    return certainty if certainty >= _LOOK or (certainty <= -_LOOK and by_chance) else 0.0
 
 
 def _no_look_logit(track: Track, step: Step) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -17,10 +17,9 @@ from perception.arrays import FloatArray
 _FROM_MPS: Final = 0.4
 _LOSES: Final = 0.5
 _HARD_MPS2: Final = 0.25
-# A speed that rises by less than this is noise of the odometry.
-_NOISE_MPS: Final = 0.03
-# Share of what it loses, at either end, of which nothing is made.
-_EDGE: Final = 0.1
+# Odometry is looked at in equal steps, as smooth as this makes it.
+_STEP_S: Final = 0.02
+_SMOOTH_S: Final = 0.24
 # Time before, whose curve counts.
 _BEFORE_S: Final = 0.3
 
@@ -31,7 +30,7 @@ class Braking(NamedTuple):
     Attributes:
         speed_mps: before.
         deceleration_mps2: on average.
-        off_rad: ≥ 0, how much farther it turned than on the curve that it was on.
+        off_rad: ≥ 0, how far it turned off the curve that it was on, at most.
     """
 
     speed_mps: float
@@ -40,43 +39,56 @@ class Braking(NamedTuple):
 
 
 def brakings(odometry: Sequence[Odometry]) -> list[Braking]:
-    """Return the times at which a robot braked, from messages in the order of their stamps."""
-    stamps_s = np.array([to_seconds(each.header.stamp) for each in odometry])
+    """Return the times at which a robot braked."""
+    stamps_s, first = np.unique(
+        [to_seconds(each.header.stamp) for each in odometry], return_index=True
+    )
+    odometry = [odometry[index] for index in first]
+    times_s = np.arange(stamps_s[0], stamps_s[-1], _STEP_S)
+    if len(times_s) < 4.0 * _SMOOTH_S / _STEP_S:
+        return []
     twists = [each.twist.twist for each in odometry]
-    speeds_mps = np.array([math.hypot(each.linear.x, each.linear.y) for each in twists])
-    rates_radps = np.array([each.angular.z for each in twists])
     turns = [pose_matrix(Point(), each.pose.pose.orientation) for each in odometry]
-    headings_rad = np.unwrap([math.atan2(each[1, 0], each[0, 0]) for each in turns])
+    headings = np.unwrap([math.atan2(each[1, 0], each[0, 0]) for each in turns])
+    speeds_mps, rates_radps, headings_rad = (
+        _smooth(np.interp(times_s, stamps_s, values))
+        for values in (
+            _without_dropouts(
+                np.array([math.hypot(each.linear.x, each.linear.y) for each in twists])
+            ),
+            np.array([each.angular.z for each in twists]),
+            headings,
+        )
+    )
+    slowing_mps2 = -np.gradient(speeds_mps, _STEP_S)
+    edges = np.flatnonzero(np.diff(slowing_mps2 >= _HARD_MPS2, prepend=False, append=False))
     found = []
-    for start, end in _falls(speeds_mps):
-        speed_mps, fall_mps = speeds_mps[start], speeds_mps[start : end + 1]
-        lost_mps = float(speed_mps - fall_mps[-1])
-        # By the middle part: it may drive on before, and has noise as it stands.
-        first = start + int(np.flatnonzero(fall_mps >= speed_mps - _EDGE * lost_mps)[-1])
-        last = start + int(np.argmax(fall_mps <= fall_mps[-1] + _EDGE * lost_mps))
-        took_s = float(stamps_s[last] - stamps_s[first]) / (1.0 - 2.0 * _EDGE)
-        if speed_mps < _FROM_MPS or lost_mps < max(_LOSES * speed_mps, _HARD_MPS2 * took_s):
+    for begin, end in zip(edges[::2], edges[1::2] - 1, strict=True):
+        speed_mps, lost_mps = speeds_mps[begin], speeds_mps[begin] - speeds_mps[end]
+        if speed_mps < _FROM_MPS or lost_mps < _LOSES * speed_mps:
             continue
-        began_s = stamps_s[first] - _EDGE * took_s
-        before = (stamps_s >= began_s - _BEFORE_S) & (stamps_s <= began_s)
-        if not before.any():
-            continue
+        # It may have begun to turn while the smooth speed was still high.
+        start = max(begin - round(_SMOOTH_S / _STEP_S), 0)
+        before = slice(max(start - round(_BEFORE_S / _STEP_S), 0), start + 1)
         curvature_radpm = rates_radps[before].mean() / speeds_mps[before].mean()
-        way_m = (speed_mps - 0.5 * lost_mps) * took_s
-        began_rad, stood_rad = np.interp([began_s, began_s + took_s], stamps_s, headings_rad)
-        off_rad = abs(float(stood_rad - began_rad - curvature_radpm * way_m))
-        found.append(Braking(float(speed_mps), lost_mps / took_s, off_rad))
+        ways_m = np.cumsum(speeds_mps[start : end + 1]) * _STEP_S
+        turned_rad = headings_rad[start : end + 1] - headings_rad[start]
+        off_rad = float(np.max(np.abs(turned_rad - curvature_radpm * ways_m)))
+        # Both ends of a ramp are smooth.
+        quarter = (end - begin) // 4
+        hard_mps2 = float(slowing_mps2[begin + quarter : end - quarter + 1].mean())
+        found.append(Braking(float(speed_mps), hard_mps2, off_rad))
     return found
 
 
-def _falls(speeds_mps: FloatArray) -> Iterator[tuple[int, int]]:
-    """Yield the first and last index of stretches in which a speed falls, but for noise."""
-    start, last = 0, len(speeds_mps) - 1
-    while start < last:
-        end = lowest = start
-        while end < last and speeds_mps[end + 1] <= speeds_mps[lowest] + _NOISE_MPS:
-            end += 1
-            lowest = end if speeds_mps[end] < speeds_mps[lowest] else lowest
-        if lowest > start:
-            yield start, lowest
-        start = max(end, start + 1)
+def _without_dropouts(values: FloatArray) -> FloatArray:
+    """Return each value or, where that is another, the median of it and its neighbours."""
+    around = np.stack((np.roll(values, 1), values, np.roll(values, -1)))
+    return np.concatenate((values[:1], np.median(around, axis=0)[1:-1], values[-1:]))
+
+
+def _smooth(values: FloatArray) -> FloatArray:
+    """Return running means, as at the ends beyond them."""
+    width = round(_SMOOTH_S / _STEP_S) // 2
+    padded = np.pad(values, width, mode="edge")
+    return np.convolve(padded, np.full(2 * width + 1, 1.0 / (2 * width + 1)), mode="valid")

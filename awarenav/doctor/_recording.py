@@ -177,8 +177,11 @@ def _odometry_findings(
             Finding.error("odometry", f"{topic}: {text.removeprefix('odometry: ')}")
             for text in problems
         ]
-    text = f"{topic}: {counted(len(odometry), 'message')} that contradict neither tf nor themselves"
-    return [Finding.fine("odometry", text), *_brake_findings(topic, odometry)]
+    text = f"{topic}: no contradiction to tf or itself in {counted(len(odometry), 'message')}"
+    found = [Finding.fine("odometry", text)]
+    if odometry[0].child_frame_id.lstrip("/") in ("", recording.base):
+        found += _brake_findings(topic, odometry)
+    return found
 
 
 def _brake_findings(topic: str, odometry: Sequence[Odometry]) -> list[Finding]:
@@ -186,13 +189,16 @@ def _brake_findings(topic: str, odometry: Sequence[Odometry]) -> list[Finding]:
     found = brakings(odometry)
     if not found:
         return []
-    hardest_mps2 = max(each.deceleration_mps2 for each in found)
+    weakest_mps2, *_, hardest_mps2 = sorted(2 * [each.deceleration_mps2 for each in found])
     off_deg = math.degrees(max(each.off_rad for each in found))
     text = (
-        f"{topic}: the robot braked {counted(len(found), 'time')}, at up to {hardest_mps2:.1f} "
-        f"m/s² on average, and turned up to {off_deg:.0f}° off the curve that it was on"
+        f"{topic}: the robot braked {counted(len(found), 'time')}, by {weakest_mps2:.1f} to "
+        f"{hardest_mps2:.1f} m/s², and turned up to {off_deg:.0f}° off the curve that it was on"
     )
     if off_deg <= _ON_CURVE_DEG:
-        return [Finding.fine("brakes", f"{text}: brakes_on_curve: true holds here")]
-    remedy = "a robot file must not say brakes_on_curve: true; turn_deg of the policy covers this"
+        return [Finding.fine("brakes", f"{text}: brakes_on_curve: true held here")]
+    remedy = (
+        "a robot file must not say brakes_on_curve: true, and the policy needs a turn_deg of at "
+        f"least {off_deg:.0f}"
+    )
     return [Finding("fine", "brakes", text, remedy)]

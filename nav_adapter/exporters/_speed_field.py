@@ -202,7 +202,7 @@ def limits_at(
     )
     given = np.tile(np.arange(shape[1]), shape[0]), basis, robot, reach_m
     Field(Reaches.of(known, basis, robot), reached, field, *given).lower(limits)
-    walkers = [ahead for ahead in known if any(each.reach.walks_faster for each in ahead)]
+    walkers = [ahead for ahead in known if any(each.reach.may_walk_on for each in ahead)]
     if walkers and basis.policy.applies("walking on"):
         on = [
             [each._replace(reach=each.reach.walking_on(), first_sight_mps=0.0) for each in ahead]

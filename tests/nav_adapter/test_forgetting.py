@@ -46,7 +46,7 @@ def limit_of(reach: Reach, turn_rad: float = 0.0) -> float:
     """Return the limit of the reach, and of walking on, for a robot at the origin."""
     motion = Motion(0.0, 0.0, 0.0, 1.0)
     lowest = min(limit_mps(reach, course_of(ROBOT, motion, turn_rad)), ROBOT.max_speed_mps)
-    if reach.walks_faster:
+    if reach.may_walk_on:
         lowest = min(lowest, limit_mps(reach.walking_on(), course_of(ROBOT, motion, turn_rad)))
     return lowest
 
@@ -134,6 +134,9 @@ def test_whoever_departs_from_their_motion_is_as_fast_as_that() -> None:
 def test_limits_ahead_know_when_awareness_ends(left_s: float) -> None:
     now = settled_update([known(left_s)], policy=POLICY)
     ahead_s = [0.0, 0.3, 0.8, 2.5]
+    stranger = limit_with(replace(known(), awareness_lower=0.0))
+    unaware = speed_limit_at(now, np.zeros((1, 2, 2)), [[0.0] * 2], dt_s=0.1, aware_for_s=0.0)
+    assert unaware[0] == pytest.approx(stranger, abs=0.02)
     here, speeds = np.zeros((1, 1, 2)), [[robot_at(0.0).speed_mps]]
     for each in ahead_s:
         field = speed_limit_at(now, here, [[0.0]], first_s=each, dt_s=0.1, speeds_mps=speeds)
@@ -227,3 +230,43 @@ def test_a_robot_at_its_limit_brakes_in_time_beside_people_who_walk_past(
         assert now_s < 0.5 or limit_mps >= slowest_mps - 0.03
         speed_mps = max(min(limit_mps, speed_mps + CYCLE_S), slowest_mps, 0.0)
         driven_m += speed_mps * CYCLE_S
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    walk=st.tuples(st.floats(0.12, 1.4), st.floats(-math.pi, math.pi)),
+    place=st.tuples(st.floats(0.8, 4.0), st.floats(-1.6, 1.6)),
+    preset=st.sampled_from(["balanced", "assertive"]),
+)
+def test_who_walks_as_fast_as_their_awareness_lets_them_sets_no_step(
+    walk: tuple[float, float], place: tuple[float, float], preset: str
+) -> None:
+    """The limit does not rise as their awareness falls a little."""
+    policy = AwarenessPolicy.preset(preset)
+    low, high = 0.0, 1.0
+    while high - low > 1e-6:
+        middle = 0.5 * (low + high)
+        fast = policy.speed.human_speed_mps(middle) > walk[0]
+        low, high = (middle, high) if fast else (low, middle)
+    velocity = walk[0] * math.cos(walk[1]), walk[0] * math.sin(walk[1])
+
+    def limit(lower: float) -> float:
+        track = person(position=place, velocity=velocity, awareness_lower=lower)
+        return settled_update([replace(track, noticed=0.0)], policy=policy).speed_limit_mps
+
+    assert limit(low - 1e-6 if low > 0.0 else low) <= limit(high) + 0.003
+
+
+@pytest.mark.parametrize("sigma_m", [0.05, 0.15])
+def test_a_place_that_grows_surer_counts_all_the_same_for_who_walks_on(sigma_m: float) -> None:
+    spreads = [-1.0, -0.1, -1e-9, 0.0, 1e-9]
+    limits = [
+        limit_of(
+            knowing(3.4, 0.2, math.inf, -1.2, 0.0)._replace(
+                variances=(sigma_m**2, each * sigma_m**2, 0.25 * sigma_m**2)
+            )
+        )
+        for each in spreads
+    ]
+    assert limits == sorted(limits, reverse=True)
+    assert limits[2] == pytest.approx(limits[3], abs=1e-3)

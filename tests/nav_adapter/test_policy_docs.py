@@ -148,7 +148,7 @@ def test_an_aware_person_who_walks_may_stop_or_walk_on() -> None:
     walker = reach("balanced", 1.0, walks=1.2)
     assert f"{1.2 * walker.drift_s(100.0):.2f} m from 1.2 m/s" in " ".join(SAFETY.split())
     assert walker.radius_m(1.8) == pytest.approx(0.33, abs=0.005)
-    assert walker.walks_faster
+    assert walker.may_walk_on
     assert 1.2 * walker.walking_on().drift_s(2.0) == pytest.approx(2.4, abs=0.01)
 
 

@@ -154,6 +154,19 @@ def test_noise_about_a_gaze_along_the_way_seldom_adds_up_to_a_belief() -> None:
     assert believed <= 5  # of 24
 
 
+@pytest.mark.parametrize(("speed_mps", "aside_deg"), [(0.5, 20.0), (0.8, 24.0)])
+def test_glances_of_somebody_who_walks_add_up(speed_mps: float, aside_deg: float) -> None:
+    """Between them they look at the floor: not along their way, so nothing speaks against them."""
+    scene, way = Scene(), math.radians(180.0 + aside_deg)
+    scene.place = np.array([6.0, 0.0])
+    velocity = speed_mps * math.cos(way), speed_mps * math.sin(way)
+    scene.run(0.6, velocity=velocity)
+    for _ in range(2):
+        scene.run(0.3, alpha=0.97, velocity=velocity)
+        scene.run(0.3, alpha=0.1, velocity=velocity)
+    assert scene.run(0.3, alpha=0.97, velocity=velocity).noticed >= 0.5
+
+
 def test_glances_within_seconds_add_up_and_old_ones_fade() -> None:
     scene = Scene()
     scene.run(1.0)

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -200,24 +201,31 @@ def test_images_that_cannot_be_used_hide_nothing_else(capsys, tmp_path, drive) -
 
 
 class Braking(Drive):
-    """A recording of a robot that drives on a curve at 1 m/s, slows a little, and brakes."""
+    """A recording of a robot that drives on a curve at 1 m/s, coasts, and brakes."""
 
-    def __init__(self, braking_mps2: float, curvature_radpm: float, off_rad: float) -> None:
+    def __init__(
+        self, braking_mps2: float, curvature_radpm: float = 0.0, off_rad: float = 0.0
+    ) -> None:
         self.braking_mps2, self.curvature_radpm = braking_mps2, curvature_radpm
-        self.off_rad = off_rad
+        # It turns so far off its curve, and back if ``returns``.
+        self.off_rad, self.returns = off_rad, False
+        # Changes of the messages, and noise of the speed.
+        self.change: Callable[[list[Odometry]], list[Odometry]] = list
+        self.noise_mps = 0.005
 
     def messages(self):
         rng, speed_mps, heading_rad, place_m = np.random.default_rng(0), 1.0, 3.0, np.zeros(2)
-        for k in range(250):
+        odometry = []
+        for k in range(300):
             brakes = k >= 100 and speed_mps > 0.0
-            rate_radps = (
-                self.curvature_radpm * speed_mps + brakes * self.off_rad * self.braking_mps2
-            )
-            stamp_s, noise = START_S + 0.02 * k, 0.005 * rng.normal(size=2)
+            off_rad = -self.off_rad if self.returns and speed_mps < 0.48 else self.off_rad
+            rate_radps = self.curvature_radpm * speed_mps + brakes * off_rad * self.braking_mps2
+            stamp_s, noise = START_S + 0.02 * k, rng.normal(size=2)
             state = RobotState(
-                stamp_s, place_m, heading_rad, speed_mps + noise[0], rate_radps + noise[1]
+                *(stamp_s, place_m, heading_rad, speed_mps + self.noise_mps * noise[0]),
+                rate_radps + 0.005 * noise[1],
             )
-            yield "/odom", 0.02 * k, odometry_of(state)
+            odometry.append(odometry_of(state))
             place = Vector3(*place_m.tolist())
             turn = yaw_quaternion(heading_rad)
             yield "/tf", 0.02 * k, transform("odom", "base_link", place, turn, stamp_s)
@@ -225,24 +233,59 @@ class Braking(Drive):
             heading_rad += 0.02 * rate_radps
             way = 0.02 * speed_mps
             place_m = place_m + way * np.array([math.cos(heading_rad), math.sin(heading_rad)])
+        for k, message in enumerate(self.change(odometry)):
+            yield "/odom", 0.02 * k, message
+
+
+def said_of_brakes(capsys, path: Path) -> tuple[float, float, float, str]:
+    """Return weakest and hardest braking, the angle off the curve, and all of the text."""
+    ((_, text),) = findings(capsys, path)["brakes"]
+    values = re.findall(r"by ([\d.]+) to ([\d.]+) m/s².* ([\d.]+)°", text)[0]
+    return *map(float, values), text
 
 
 @pytest.mark.parametrize("braking_mps2", [0.4, 1.5])
 @pytest.mark.parametrize("curvature_radpm", [0.0, -0.5])
-@pytest.mark.parametrize("off_rad", [0.0, 0.5])
+@pytest.mark.parametrize(("off_rad", "returns"), [(0.0, False), (0.5, False), (0.8, True)])
 def test_how_the_robot_brakes(
-    capsys, tmp_path, braking_mps2: float, curvature_radpm: float, off_rad: float
+    capsys, tmp_path, braking_mps2: float, curvature_radpm: float, off_rad: float, returns: bool
 ) -> None:
-    """A slow change of speed is no braking, and a curve before it is no turn."""
-    path = Braking(braking_mps2, curvature_radpm, off_rad).record(tmp_path / "bag")
-    found = findings(capsys, path)
-    ((_, text),) = found["brakes"]
-    hard_mps2, off_deg = map(float, re.findall(r"([\d.]+) m/s².* ([\d.]+)°", text)[0])
+    """Coasting is no braking, a curve before it is no turn, and who turns back has turned."""
+    drive = Braking(braking_mps2, curvature_radpm, off_rad)
+    drive.returns = returns
+    weakest, hardest, off_deg, text = said_of_brakes(capsys, drive.record(tmp_path / "bag"))
     assert "braked 1 time," in text
-    assert hard_mps2 == pytest.approx(braking_mps2, abs=0.1)
-    assert off_deg == pytest.approx(math.degrees(0.96 * off_rad), abs=3.0)
-    assert ("brakes_on_curve: true holds" in text) == (off_rad == 0.0)
-    assert [severity for severity, _ in found["odometry"]] == ["fine"]
+    assert weakest == hardest == pytest.approx(braking_mps2, abs=0.15)
+    assert off_deg == pytest.approx(math.degrees(off_rad * (0.48 if returns else 0.96)), abs=5.0)
+    assert ("brakes_on_curve: true held" in text) == (off_rad == 0.0)
+
+
+def again_and_swapped(odometry: list[Odometry]) -> list[Odometry]:
+    """Return messages of which some come twice, with another twist, and some late."""
+    stopped = replace(odometry[-1], twist=TwistWithCovariance(Twist(Vector3(0.5))))
+    return [odometry[1], odometry[0], *odometry[2:], odometry[-1], stopped, odometry[-3]]
+
+
+def with_dropouts(odometry: list[Odometry]) -> list[Odometry]:
+    """Return messages of which some say that the robot stands."""
+    still = TwistWithCovariance(Twist(Vector3()))
+    return [
+        replace(each, twist=still) if 10 < k < 80 and k % 9 == 0 else each
+        for k, each in enumerate(odometry)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "noise_mps"),
+    [(again_and_swapped, 0.005), (with_dropouts, 0.005), (list, 0.04)],
+)
+def test_brakes_of_poor_odometry(capsys, tmp_path, change, noise_mps: float) -> None:
+    drive = Braking(0.8)
+    drive.change, drive.noise_mps = change, noise_mps
+    weakest, hardest, off_deg, text = said_of_brakes(capsys, drive.record(tmp_path / "bag"))
+    assert "braked 1 time," in text
+    assert weakest == hardest == pytest.approx(0.8, abs=0.15)
+    assert off_deg <= 5.0
 
 
 def test_a_robot_that_has_not_braked(capsys, tmp_path, drive) -> None:
