@@ -30,7 +30,7 @@ _KINDS: Final[dict[str, tuple[Any, str, dict[str, str], dict[str, str]]]] = {
         "libwebp_anim",
         "bgra",
         {"loop": "0"},
-        {"quality": "60", "compression_level": "5"},
+        {"quality": "58", "compression_level": "5"},
     ),
 }
 
