@@ -422,6 +422,41 @@ def test_a_scanner_that_falls_silent_ends_it_also_in_predictions() -> None:
     assert scene.run(0.5, camera=False).noticed == 0.0
 
 
+@settings(max_examples=20, deadline=None)
+@given(
+    direction=st.floats(-math.pi, math.pi),
+    speed_mps=st.floats(0.8, 1.6),
+    behind_m=st.floats(0.3, 0.36),
+)
+def test_the_other_leg_of_somebody_who_walks_is_nobody_and_ends_nothing(
+    direction: float, speed_mps: float, behind_m: float
+) -> None:
+    way = np.array([math.cos(direction), math.sin(direction)])
+    scene, velocity = Scene(), tuple((speed_mps * way).tolist())
+    scene.place = np.array([5.0, 0.0]) - 1.5 * speed_mps * way
+    scene.run(0.7, alpha=0.97, velocity=velocity)
+    assert scene.run(0.7, alpha=0.97, velocity=velocity).noticed >= 0.5
+    for _ in range(4):  # a leg stays where it is while the other one swings
+        leg = tuple((scene.place - behind_m * way).tolist())
+        track = scene.run(0.06, alpha=0.97, velocity=velocity, others=(leg,))
+        assert len(scene.tracks) == 1
+        assert track.noticed >= 0.5
+        scene.run(0.2, alpha=0.97, velocity=velocity)
+
+
+@pytest.mark.parametrize("offset_m", [(0.0, 0.45), (0.7, 0.0), (-0.7, 0.0)])
+def test_somebody_beside_or_a_headway_from_who_walks_is_found(
+    offset_m: tuple[float, float],
+) -> None:
+    scene = Scene()
+    scene.place = np.array([3.0, 0.0])
+    scene.run(1.0, velocity=(1.0, 0.0))
+    for _ in range(10):
+        other = tuple((scene.place + offset_m).tolist())
+        scene.run(0.04, velocity=(1.0, 0.0), others=(other,))
+    assert len(scene.tracks) == 2
+
+
 def test_an_ambiguous_match_ends_it_and_takes_awareness() -> None:
     scene = attentive()
     before = scene.run(0.1, alpha=0.9)
